@@ -1,0 +1,1 @@
+"""Backends: one package each, found through entry points."""

@@ -1,0 +1,68 @@
+"""The seam between missions and machines. Imports nothing else of this project.
+
+`Robot.cycle(command) -> observation` is the whole contract; see `interface`. Values here are frozen and carry units and
+frames in their names; see `observation` for the frames.
+"""
+
+from glotouch_bt.robot.command import HOLD, Command, GripperTarget, JointSetpoint, Request, SetPayload, Tare, Ticket
+from glotouch_bt.robot.conditions import Conditions
+from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription
+from glotouch_bt.robot.errors import (
+    BackendError,
+    BadInput,
+    GlotouchError,
+    MissionFailed,
+    MotionRefused,
+    ParamError,
+    SafetyStop,
+    StaleReading,
+    UnknownName,
+)
+from glotouch_bt.robot.geometry import Array, Pose
+from glotouch_bt.robot.interface import Backend, Robot
+from glotouch_bt.robot.limits import Limits
+from glotouch_bt.robot.observation import GripperState, Observation, TactileFrame
+from glotouch_bt.robot.registry import backend_entry_points, load_backend
+from glotouch_bt.robot.world import Container, Holder, ObjectSet, Probe, World
+
+__all__ = [
+    "HOLD",
+    "Array",
+    "Backend",
+    "BackendError",
+    "BadInput",
+    "Box",
+    "Capsule",
+    "Command",
+    "Conditions",
+    "Container",
+    "GlotouchError",
+    "Gripper",
+    "GripperState",
+    "GripperTarget",
+    "Holder",
+    "Joint",
+    "JointSetpoint",
+    "Limits",
+    "Link",
+    "MissionFailed",
+    "MotionRefused",
+    "ObjectSet",
+    "Observation",
+    "ParamError",
+    "Pose",
+    "Probe",
+    "Request",
+    "Robot",
+    "RobotDescription",
+    "SafetyStop",
+    "SetPayload",
+    "StaleReading",
+    "TactileFrame",
+    "Tare",
+    "Ticket",
+    "UnknownName",
+    "World",
+    "backend_entry_points",
+    "load_backend",
+]

@@ -1,0 +1,100 @@
+"""What a robot is told for one control period, and the slow requests that are started and polled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from glotouch_bt.robot.geometry import Array, Pose, frozen_array
+
+
+@dataclass(frozen=True, slots=True)
+class JointSetpoint:
+    """Where the joints shall be at the END of the coming control period.
+
+    The backend interpolates from the previous setpoint (cubic Hermite, so position and velocity are continuous).
+
+    Attributes:
+        q: (dof,) rad.
+        dq: (dof,) rad/s.
+        ddq: (dof,) rad/s2, feed-forward.
+        pose_B_P: The pose of the pads' mid-point that `q` realises; devices that take Cartesian setpoints are sent this.
+    """
+
+    q: Array
+    dq: Array
+    ddq: Array
+    pose_B_P: Pose
+
+
+@dataclass(frozen=True, slots=True)
+class GripperTarget:
+    """Drive the jaws to an aperture with limited speed and force.
+
+    Attributes:
+        aperture_m: 0 closed .. the gripper's stroke.
+        speed_m_s: Largest jaw closing or opening speed (rate of the aperture).
+        force_N: Largest force of one jaw.
+    """
+
+    aperture_m: float
+    speed_m_s: float
+    force_N: float
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One control period's command.
+
+    Attributes:
+        motion: A joint setpoint, or None to hold the last setpoint at rest.
+        gripper: A new gripper target, or None to keep the last one.
+        tactile: Ask for depth maps (they cost time to make; ask only while squeezing).
+    """
+
+    motion: JointSetpoint | None = None
+    gripper: GripperTarget | None = None
+    tactile: bool = False
+
+
+HOLD = Command()
+
+
+@dataclass(frozen=True, slots=True)
+class Tare:
+    """Zero the wrist force sensor: average `duration_s` of samples at rest and subtract them from now on."""
+
+    duration_s: float = 0.2
+
+
+@dataclass(frozen=True)
+class SetPayload:
+    """Tell the controller what the hand carries, so that it compensates its weight.
+
+    Attributes:
+        mass_kg: Mass beyond the gripper itself.
+        com_P_m: (3,) centre of mass in P.
+    """
+
+    mass_kg: float
+    com_P_m: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "com_P_m", frozen_array("com_P_m", self.com_P_m, (3,)))
+
+
+Request = Tare | SetPayload
+
+
+class Ticket(Protocol):
+    """A slow request under way. Poll it between cycles; time passes only in `Robot.cycle`."""
+
+    @property
+    def done(self) -> bool:
+        """True once the request has finished (well or badly)."""
+        ...
+
+    @property
+    def error(self) -> str | None:
+        """Why it failed, or None."""
+        ...

@@ -1,0 +1,140 @@
+"""The robot as numbers: kinematics, inertia, limits, collision capsules and the gripper. No backend, no solver.
+
+Both a simulator and a planner are built from one description, so that they cannot disagree.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from glotouch_bt.robot.geometry import Pose
+
+Vec3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Capsule:
+    """A collision capsule in its link's frame: segment `start_m`..`end_m` swept by a ball of `radius_m`."""
+
+    start_m: Vec3
+    end_m: Vec3
+    radius_m: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Link:
+    """One rigid link.
+
+    Attributes:
+        name: Link name.
+        mass_kg: Mass.
+        com_m: Centre of mass in the link frame.
+        inertia_kgm2: (ixx, iyy, izz, ixy, ixz, iyz) about the centre of mass, in the link frame's axes.
+        capsules: Collision shape in the link frame.
+    """
+
+    name: str
+    mass_kg: float
+    com_m: Vec3
+    inertia_kgm2: tuple[float, float, float, float, float, float]
+    capsules: tuple[Capsule, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Joint:
+    """A revolute joint and the link it carries.
+
+    Attributes:
+        name: Joint name.
+        origin_m: Joint frame's origin in the parent link's frame.
+        origin_rpy_rad: Fixed-axis roll, pitch, yaw of the joint frame in the parent's.
+        axis: Unit axis in the joint frame.
+        lower_rad, upper_rad: Position range.
+        velocity_rad_s: Velocity limit.
+        torque_Nm: Torque limit.
+        armature_kgm2: Reflected rotor inertia.
+        link: What it carries; the link frame is the joint frame.
+    """
+
+    name: str
+    origin_m: Vec3
+    origin_rpy_rad: Vec3
+    axis: Vec3
+    lower_rad: float
+    upper_rad: float
+    velocity_rad_s: float
+    torque_Nm: float
+    armature_kgm2: float
+    link: Link
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box:
+    """An axis-aligned box in a named frame: centre and half sizes, m."""
+
+    centre_m: Vec3
+    half_m: Vec3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gripper:
+    """A parallel gripper with a gel pad on each finger. Frame P as in `observation`.
+
+    Attributes:
+        pose_E_P: Pads' mid-point in the flange frame.
+        mass_kg, com_E_m: Gripper body without the fingers, centre of mass in E.
+        finger_mass_kg: One finger.
+        stroke_m, force_N, speed_m_s: Largest aperture, jaw force and aperture rate.
+        body: Collision boxes of the body, in E.
+        finger: Collision box of the LEFT finger in P when the jaws are closed (its pad surface at y = 0, extending to
+            +y); the right finger is its mirror image in y. At aperture w each is moved outwards by w/2.
+        pad_window_m: (width along x_P, length along z_P) of the gel.
+        pad_shape: (rows, cols) of the depth map.
+        pad_depth_m: Largest indentation the gel can show.
+    """
+
+    pose_E_P: Pose
+    mass_kg: float
+    com_E_m: Vec3
+    finger_mass_kg: float
+    stroke_m: float
+    force_N: float
+    speed_m_s: float
+    body: tuple[Box, ...]
+    finger: Box
+    pad_window_m: tuple[float, float]
+    pad_shape: tuple[int, int]
+    pad_depth_m: float
+
+    @property
+    def fingertip_below_P_m(self) -> float:
+        """How far the fingers reach beyond P along z_P."""
+        return self.finger.centre_m[2] + self.finger.half_m[2]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotDescription:
+    """One arm with one gripper.
+
+    Attributes:
+        name: Model name, for people.
+        base: The fixed base link, in B.
+        joints: The chain from B to the last link.
+        pose_last_E: Flange frame in the last joint's frame.
+        home_q: A posture well inside the limits with the hand pointing down; also the posture task's target.
+        gripper: The hand.
+        source: Where the numbers come from.
+    """
+
+    name: str
+    base: Link
+    joints: tuple[Joint, ...]
+    pose_last_E: Pose
+    home_q: tuple[float, ...]
+    gripper: Gripper
+    source: str = field(default="")
+
+    @property
+    def dof(self) -> int:
+        """Number of joints."""
+        return len(self.joints)

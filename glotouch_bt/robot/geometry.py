@@ -1,0 +1,120 @@
+"""Rigid poses. `pose_A_C` is frame C written in A; quaternions are w x y z, unit length."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from glotouch_bt.robot.errors import ParamError
+
+Array = npt.NDArray[np.float64]
+
+
+def frozen_array(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Return a read-only float64 copy of `value`, checked for shape and finiteness.
+
+    Raises:
+        ParamError: Wrong shape, or a NaN or infinity inside.
+    """
+    a = np.array(value, dtype=np.float64)
+    if a.shape != shape:
+        raise ParamError(name, a.shape, f"an array of shape {shape}")
+    if not np.isfinite(a).all():
+        raise ParamError(name, a.tolist(), "finite")
+    a.setflags(write=False)
+    return a
+
+
+def quat_to_matrix(q: Array) -> Array:
+    """Rotation matrix (3, 3) of a unit quaternion (4,) w x y z."""
+    w, x, y, z = q
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def matrix_to_quat(m: Array) -> Array:
+    """Unit quaternion (4,) w x y z, w >= 0, of a rotation matrix (3, 3) (Shepperd's method)."""
+    t = np.array([m.trace(), m[0, 0], m[1, 1], m[2, 2]])
+    i = int(np.argmax(t))
+    if i == 0:
+        q = np.array([1 + t[0], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]])
+    else:
+        j, k, l = i - 1, i % 3, (i + 1) % 3
+        q = np.zeros(4)
+        q[0] = m[l, k] - m[k, l]
+        q[1 + j] = 1 + 2 * m[j, j] - t[0]
+        q[1 + k] = m[k, j] + m[j, k]
+        q[1 + l] = m[l, j] + m[j, l]
+    q = q / np.linalg.norm(q)
+    return q if q[0] >= 0 else -q
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A frame written in another one.
+
+    Attributes:
+        position_m: (3,) origin.
+        quat: (4,) unit quaternion w x y z.
+    """
+
+    position_m: Array
+    quat: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0, 0.0]))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position_m", frozen_array("position_m", self.position_m, (3,)))
+        q = frozen_array("quat", self.quat, (4,))
+        norm = float(np.linalg.norm(q))
+        if abs(norm - 1.0) > 1e-6:
+            raise ParamError("quat", q.tolist(), "a unit quaternion (w x y z)")
+        object.__setattr__(self, "quat", frozen_array("quat", q / norm, (4,)))
+
+    @cached_property
+    def rotation(self) -> Array:
+        """Rotation matrix (3, 3)."""
+        return quat_to_matrix(self.quat)
+
+    @classmethod
+    def from_matrix(cls, position_m: npt.ArrayLike, rotation: Array) -> Pose:
+        """Pose from an origin (3,) and a rotation matrix (3, 3)."""
+        return cls(np.asarray(position_m, dtype=np.float64), matrix_to_quat(rotation))
+
+    @classmethod
+    def planar(cls, position_m: npt.ArrayLike, yaw_rad: float) -> Pose:
+        """Upright frame (z up) turned by `yaw_rad` about z."""
+        h = 0.5 * yaw_rad
+        return cls(np.asarray(position_m, dtype=np.float64), np.array([np.cos(h), 0.0, 0.0, np.sin(h)]))
+
+    @classmethod
+    def pointing_down(cls, position_m: npt.ArrayLike, yaw_rad: float) -> Pose:
+        """Tool frame with z down and its x axis at `yaw_rad` from the reference frame's x."""
+        c, s = np.cos(yaw_rad), np.sin(yaw_rad)
+        r = np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, -1.0]])
+        return cls.from_matrix(position_m, r)
+
+    @property
+    def yaw_rad(self) -> float:
+        """Angle of this frame's x axis in the reference frame's xy plane."""
+        r = self.rotation
+        return float(np.arctan2(r[1, 0], r[0, 0]))
+
+    def __matmul__(self, other: Pose) -> Pose:
+        """Chain: pose_A_C = pose_A_B @ pose_B_C."""
+        return Pose.from_matrix(self.position_m + self.rotation @ other.position_m, self.rotation @ other.rotation)
+
+    def inverse(self) -> Pose:
+        """pose_B_A of pose_A_B."""
+        rt = self.rotation.T
+        return Pose.from_matrix(-rt @ self.position_m, rt)
+
+    def apply(self, points: npt.ArrayLike) -> Array:
+        """Points (..., 3) of this frame, written in the reference frame."""
+        return np.asarray(points, dtype=np.float64) @ self.rotation.T + self.position_m

@@ -1,0 +1,151 @@
+"""What touching yields: contacts, contours, candidates, squeezes. Plain frozen values, in the container frame K.
+
+K: origin at the centre of the container's floor, z up. Planar quantities are (x, y) in K; yaw is about +z, from x_K.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from glotouch_bt.robot import Array
+
+ContourKind = Literal["round", "box"]
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One place where the probe's tip met something.
+
+    Attributes:
+        stamp_s: Robot clock at the onset.
+        tip_K_m: (3,) centre of the ball at the onset.
+        approach_K: (3,) unit direction the tip moved in.
+        reaction_K: (3,) unit direction of the force the tip felt.
+        point_K_m: (2,) contact point: the support-plane intercept (paper III-B).
+        force_N: Norm of the filtered contact force when the guard tripped.
+    """
+
+    stamp_s: float
+    tip_K_m: Array
+    approach_K: Array
+    reaction_K: Array
+    point_K_m: Array
+    force_N: float
+
+
+@dataclass(frozen=True)
+class Contour:
+    """A planar outline fitted to contacts.
+
+    Attributes:
+        kind: "round" (circle) or "box" (oriented rectangle).
+        centre_K_m: (2,).
+        size_m: (long, short); a circle has its diameter twice.
+        yaw_rad: Direction of the long side in K, in [-pi/2, pi/2); 0 for a circle.
+        rms_m: Root mean square of the residuals.
+        residuals_m: (k,) signed distance of each contact from the outline, outside positive.
+    """
+
+    kind: ContourKind
+    centre_K_m: Array
+    size_m: tuple[float, float]
+    yaw_rad: float
+    rms_m: float
+    residuals_m: Array
+
+    @property
+    def radius_m(self) -> float:
+        """Radius of the circle round the whole outline."""
+        if self.kind == "round":
+            return 0.5 * self.size_m[0]
+        return 0.5 * float(np.hypot(*self.size_m))
+
+    def outline_K_m(self, n: int = 48) -> Array:
+        """(m, 2) closed polyline of the outline, for maps."""
+        if self.kind == "round":
+            a = np.linspace(0.0, 2 * np.pi, n + 1)
+            local = 0.5 * self.size_m[0] * np.stack([np.cos(a), np.sin(a)], axis=1)
+        else:
+            l, s = 0.5 * self.size_m[0], 0.5 * self.size_m[1]
+            local = np.array([[l, s], [-l, s], [-l, -s], [l, -s], [l, s]])
+        c, s_ = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
+        return local @ np.array([[c, s_], [-s_, c]]) + self.centre_K_m
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An object found by the probe (the paper's C_i).
+
+    Attributes:
+        index: Order of discovery, from 0.
+        contour: Its outline at the sensing height.
+        height_m: Top above the container floor.
+        quality: 0..1, how well the contour is supported (coverage and residual).
+        contacts: What it was fitted to.
+    """
+
+    index: int
+    contour: Contour
+    height_m: float
+    quality: float
+    contacts: tuple[Contact, ...]
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One force-limited closure of the jaws.
+
+    Attributes:
+        height_m: Pads' mid-point above the container floor.
+        aperture_m: Opening on the plateau.
+        position_K_m: (2,) pads' mid-point during the plateau.
+        yaw_rad: Direction of the pads' width axis x_P in K (the jaws close at right angles to it).
+        left_m, right_m: (rows, cols) temporal median of the depth maps; layout as in `robot.TactileFrame`.
+        force_N: Jaw force on the plateau.
+        stable: The aperture reached a plateau and the arm stood still; only stable layers carry evidence.
+    """
+
+    height_m: float
+    aperture_m: float
+    position_K_m: Array
+    yaw_rad: float
+    left_m: Array
+    right_m: Array
+    force_N: float
+    stable: bool
+
+
+@dataclass(frozen=True)
+class TouchSequence:
+    """The layers of one closure sequence, taken at one reference pose, lowest first.
+
+    Attributes:
+        position_K_m: (2,) reference open pose of P.
+        yaw_rad: Reference yaw of x_P in K.
+        layers: Closures at increasing heights.
+    """
+
+    position_K_m: Array
+    yaw_rad: float
+    layers: tuple[Layer, ...]
+
+
+@dataclass(frozen=True)
+class TouchSet:
+    """All squeezes of one candidate.
+
+    Attributes:
+        candidate: What was squeezed.
+        sequences: Three of them (three yaws if round, three parallel tracks if box-like).
+    """
+
+    candidate: Candidate
+    sequences: tuple[TouchSequence, ...]
+
+    @property
+    def layers(self) -> tuple[Layer, ...]:
+        """All layers of all sequences."""
+        return tuple(layer for s in self.sequences for layer in s.layers)

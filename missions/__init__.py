@@ -1,0 +1,1 @@
+"""Missions, worlds, conditions and object meshes that ship with the project (package data)."""

@@ -1,0 +1,246 @@
+"""What a skill is: a py_trees leaf with typed ports whose body is a generator of commands.
+
+    class Approach(Skill):
+        "Advance until touch. SUCCESS: touched. FAILURE no_touch: the travel ran out."
+
+        class Params(SkillParams):
+            travel_m: float = param("Longest free travel", unit="m", default=0.05, ge=0.0, le=0.3)
+
+        start = In(Contact, "where to start")
+        contact = Out(Contact, "first touch, in K")
+
+        def run(self) -> SkillRun:
+            observation = yield HOLD                    # one yield = one control period
+            result = yield from self.context.arm.guarded_line(...)
+            if result.stop is None:
+                raise SkillFailed("no_touch", f"no touch in {self.params.travel_m} m", advice="sweep lower")
+            self.contact = ...
+
+`run` returns: SUCCESS. `SkillFailed` or `MotionRefused`: FAILURE with its reason. Anything else propagates to the runner,
+which holds the arm. A preempted skill's generator is closed (its `finally` blocks run) and the arm is held.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar, cast, overload
+
+import py_trees
+from py_trees.common import Status
+from py_trees.ports import PortInformation, PortsMixin
+from pydantic import BaseModel, ConfigDict, Field
+
+from glotouch_bt.robot import HOLD, Command, GlotouchError, MotionRefused, Observation, Request, Ticket, World
+
+if TYPE_CHECKING:
+    from glotouch_bt.motion import Arm
+
+T = TypeVar("T")
+SkillRun = Generator[Command, Observation, None]
+
+
+class SkillParams(BaseModel):
+    """Base of every skill's parameters; YAML keys are the field names. Unknown keys are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def param(description: str, *, unit: str = "", default: Any = ..., **rules: Any) -> Any:
+    """One parameter: a description, its unit, a default (none: required) and pydantic rules (ge, le, gt, ...)."""
+    return Field(default, description=description, json_schema_extra={"unit": unit}, **rules)
+
+
+class _Port(Generic[T]):
+    def __init__(self, data_type: type[T], description: str, *, key: str | None = None) -> None:
+        self.data_type, self.description, self._key = data_type, description, key
+        self.name = ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    @property
+    def key(self) -> str:
+        """Blackboard key this port is wired to unless the mission says otherwise."""
+        return self._key or self.name
+
+
+class In(_Port[T]):
+    """An input port: read as an attribute. `required=False` gives None when nobody wrote it."""
+
+    def __init__(self, data_type: type[T], description: str, *, key: str | None = None, required: bool = True) -> None:
+        super().__init__(data_type, description, key=key)
+        self.required = required
+
+    @overload
+    def __get__(self, obj: None, owner: type) -> In[T]: ...
+    @overload
+    def __get__(self, obj: Skill, owner: type) -> T: ...
+    def __get__(self, obj: Skill | None, owner: type) -> In[T] | T:
+        if obj is None:
+            return self
+        if not self.required and not obj.blackboard_client.exists(self.name):
+            return cast(T, None)
+        return cast(T, obj.get_input(self.name))
+
+
+class Out(_Port[T]):
+    """An output port: written as an attribute."""
+
+    @overload
+    def __get__(self, obj: None, owner: type) -> Out[T]: ...
+    @overload
+    def __get__(self, obj: Skill, owner: type) -> T: ...
+    def __get__(self, obj: Skill | None, owner: type) -> Out[T] | T:
+        if obj is None:
+            return self
+        return cast(T, obj.get_last_output(self.name))
+
+    def __set__(self, obj: Skill, value: T) -> None:
+        obj.write_port(self.name, value)
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why a node failed.
+
+    Attributes:
+        code: Short stable word, e.g. ``search_exhausted``.
+        message: One sentence for a person, with numbers.
+        evidence: Numbers against their limits.
+        advice: What to try.
+        node: Name of the tree node.
+    """
+
+    code: str
+    message: str
+    evidence: Mapping[str, float | int | str] = field(default_factory=dict)
+    advice: str = ""
+    node: str = ""
+
+
+class SkillFailed(GlotouchError):
+    """Raised inside `run` to end the skill with FAILURE."""
+
+    def __init__(self, code: str, message: str, *, advice: str = "", **evidence: float | int | str) -> None:
+        super().__init__(message)
+        self.reason = Reason(code, message, evidence, advice)
+
+
+class Journal(Protocol):
+    """Where skills write what they found; the runner's record implements it."""
+
+    def event(self, kind: str, stamp_s: float, data: Mapping[str, object]) -> None:
+        """Record one event: `kind` (contact, candidate, touchset, ranking, ...) with JSON-able data (arrays allowed)."""
+        ...
+
+
+class RobotRequests(Protocol):
+    """The part of a Robot a skill may call directly; everything else goes through yielded commands."""
+
+    def start(self, request: Request) -> Ticket:
+        """Begin a slow request; keep yielding and poll the ticket."""
+        ...
+
+
+@dataclass
+class Context:
+    """What the runner lends to every skill.
+
+    Attributes:
+        world: The nominal world.
+        arm: Motion generators and the clearance scene.
+        requests: Tare and payload.
+        journal: The run's record.
+        observation: The newest observation; set by the runner before each tick.
+        command: What the active skill wants next; reset to hold by the runner before each tick.
+    """
+
+    world: World
+    arm: Arm
+    requests: RobotRequests
+    journal: Journal
+    observation: Observation
+    command: Command = HOLD
+
+
+class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):
+    """Base class of every skill; see the module's text. Subclass names are not used: entry points name skills."""
+
+    Params: ClassVar[type[SkillParams]] = SkillParams
+    INPUT_PORTS: ClassVar[dict[str, PortInformation]] = {}  # type: ignore[misc]
+    OUTPUT_PORTS: ClassVar[dict[str, PortInformation]] = {}  # type: ignore[misc]
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        ports = {n: p for c in reversed(cls.__mro__) for n, p in vars(c).items() if isinstance(p, _Port)}
+        cls.INPUT_PORTS = {
+            n: PortInformation(p.data_type, required=p.required, description=p.description)
+            for n, p in ports.items()
+            if isinstance(p, In)
+        }
+        cls.OUTPUT_PORTS = {
+            n: PortInformation(p.data_type, description=p.description) for n, p in ports.items() if isinstance(p, Out)
+        }
+        kwargs.setdefault("register", False)
+        super().__init_subclass__(**kwargs)
+
+    def __init__(self, name: str, params: SkillParams, context: Context) -> None:
+        super().__init__(name)
+        self.params = params
+        self.context = context
+        self.reason: Reason | None = None
+        self._run: SkillRun | None = None
+
+    @classmethod
+    def default_keys(cls) -> dict[str, str]:
+        """Blackboard key of each port where a mission does not rewire it."""
+        return {n: getattr(cls, n).key for n in (*cls.INPUT_PORTS, *cls.OUTPUT_PORTS)}
+
+    def run(self) -> SkillRun:
+        """The skill's body; see the module's text."""
+        raise NotImplementedError
+
+    def write_port(self, name: str, value: object) -> None:
+        """Write an output port (the public door to py_trees' protected setter)."""
+        self._set_output(name, value)
+
+    def event(self, kind: str, **data: object) -> None:
+        """Record an event of this skill at the robot's present time."""
+        self.context.journal.event(kind, self.context.observation.now_s, {"node": self.name, **data})
+
+    def initialise(self) -> None:
+        """Start the body; its first command comes with the first update."""
+        self.reason = None
+        self._run = self.run()
+        self._started = False
+
+    def update(self) -> Status:
+        """Hand the newest observation to the body, take its next command."""
+        assert self._run is not None
+        try:
+            if self._started:
+                self.context.command = self._run.send(self.context.observation)
+            else:
+                self._started = True
+                self.context.command = next(self._run)
+        except StopIteration:
+            return Status.SUCCESS
+        except SkillFailed as e:
+            return self._fail(e.reason)
+        except MotionRefused as e:
+            return self._fail(Reason("motion_refused", str(e), advice="move the target or clear the way"))
+        return Status.RUNNING
+
+    def _fail(self, reason: Reason) -> Status:
+        self.reason = dataclasses.replace(reason, node=self.name)
+        self.feedback_message = reason.message
+        return Status.FAILURE
+
+    def terminate(self, new_status: Status) -> None:
+        """Close the body; a preempted skill leaves the arm holding."""
+        if self._run is not None:
+            self._run.close()
+            self._run = None
+        if new_status is Status.INVALID:
+            self.context.command = HOLD
