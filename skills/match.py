@@ -1,0 +1,74 @@
+"""Decide which squeezed candidate is the target."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from glotouch_bt.recognition import MatchParams, PadSpec, Ranking, TargetModel, match, rank
+from glotouch_bt.robot import BadInput
+from glotouch_bt.robot.meshes import Mesh, load_folder, load_mesh
+from glotouch_bt.touch import TouchSet
+from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from skills.grasp_plan import GraspPlan, plan_grasp
+
+
+class MatchParams_(SkillParams):
+    """Parameters of `match`."""
+
+    target: str = param("The object to find: an STL file, or the name of one in the world's object folder")
+
+
+class Match(Skill):
+    """Rank all TouchSets by their matching loss against the target's STL and plan the grasp of the best.
+
+    SUCCESS: the best candidate passes margin, fit and evidence; `plan` says how to grasp it.
+    FAILURE `not_recognised`: it does not; `ranking` is written all the same.
+    FAILURE `no_touch`: nothing was squeezed.
+    """
+
+    Params = MatchParams_
+    params: MatchParams_
+    touchsets = In(tuple, "one TouchSet per candidate squeezed", required=False)
+    ranking = Out(Ranking, "all candidates, best first")
+    plan = Out(GraspPlan, "how to grasp the best one")
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        touchsets: tuple[TouchSet, ...] = self.touchsets or ()
+        if not touchsets:
+            raise SkillFailed("no_touch", "no candidate was squeezed, so nothing can be recognised")
+        gripper = self.context.arm.description.gripper
+        mesh = self._target()
+        model = TargetModel.from_mesh(mesh, PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m))
+        matches = [match(model, t, MatchParams()) for t in touchsets]
+        ranking = rank(matches)
+        self.ranking = ranking
+        self.event("ranking", target=mesh.name, ranking=ranking)
+        if not ranking.accepted:
+            raise SkillFailed(
+                "not_recognised",
+                f"no candidate is surely {mesh.name}: {'; '.join(ranking.reasons)}",
+                advice="touch more, or lower the gates",
+                margin=ranking.margin,
+            )
+        best = next(t for t in touchsets if t.candidate.index == ranking.best.index)
+        self.plan = plan_grasp(best, ranking.best, mesh)
+        self.event("plan", plan=self.plan)
+        return
+        yield
+
+    def _target(self) -> Mesh:
+        return load_target(self.params.target, self.context.world.objects.folder)
+
+
+def load_target(target: str, folder: Path) -> Mesh:
+    """The target's mesh: `target` is a path to an STL, or a stem in `folder`.
+
+    Raises:
+        BadInput: Neither is a usable STL.
+    """
+    if target.lower().endswith(".stl"):
+        return load_mesh(Path(target))
+    if not target:
+        raise BadInput("the target is an empty name; give an STL file or the name of one in the object folder")
+    return load_folder(folder, (target,))[0]

@@ -1,0 +1,151 @@
+"""Squeeze a candidate between the tactile jaws at several heights, in three sequences."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glotouch_bt.motion import Motion
+from glotouch_bt.robot import Array, Command, GripperTarget, MotionRefused, Observation, Pose
+from glotouch_bt.touch import Candidate, Layer, TouchSequence, TouchSet, make_layer
+from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+
+HAND_CLEARANCE_M = 0.004
+"""Fingertips stay this far above the floor, and the hand's body this far above a candidate's top."""
+
+
+class SqueezeParams(SkillParams):
+    """Parameters of `squeeze`."""
+
+    force_N: float = param("Closing force of one jaw", unit="N", default=10.0, gt=0.0, le=10.0)
+    closing_speed_m_s: float = param("Closing speed", unit="m/s", default=0.04, gt=0.0, le=0.2)
+    layers: int = param("Closures per sequence", default=4, ge=1, le=10)
+    layer_gap_m: float = param("Least distance between two layers", unit="m", default=0.012, ge=0.002, le=0.05)
+    side_gap_m: float = param("Open jaw to the contour, each side", unit="m", default=0.010, ge=0.004, le=0.03)
+    travel_speed_m_s: float = param("Speed of the empty hand", unit="m/s", default=0.25, gt=0.0, le=0.25)
+    descent_speed_m_s: float = param("Speed down over the object", unit="m/s", default=0.10, gt=0.0, le=0.25)
+    settle_s: float = param("How long the plateau is watched", unit="s", default=0.15, ge=0.05, le=1.0)
+    top_overlap_m: float = param("Pad centre of the highest layer below the top", unit="m", default=0.008, ge=0.0,
+                                 le=0.03)
+
+
+class Squeeze(Skill):
+    """Force-limited closures on one candidate.
+
+    A round candidate is squeezed at three yaws, 60 degrees apart; a box-like one on three parallel tracks across its short
+    side. Layers go from low to high: the first closure centres the object between the jaws where it cannot topple.
+
+    SUCCESS: at least one stable layer; `touchset` holds all of them.
+    FAILURE `nothing_felt`: no closure reached a plateau on anything.
+    FAILURE `too_wide`: the object does not fit between the open jaws in any direction tried.
+    """
+
+    Params = SqueezeParams
+    params: SqueezeParams
+    candidate = In(Candidate, "what to squeeze")
+    known = In(tuple, "all candidates, to keep clear of", key="candidates", required=False)
+    touchset = Out(TouchSet, "what was felt")
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        candidate = self.candidate
+        others = [c for c in (self.known or ()) if c.index != candidate.index]
+        arm = self.context.arm
+        pose_B_K = self.context.world.container.pose_B_K
+        for other in others:
+            arm.scene.add_contour(f"candidate {other.index}", pose_B_K, other.contour, other.height_m)
+        sequences: list[TouchSequence] = []
+        refusals: list[str] = []
+        try:
+            for choices in self._plan(candidate):
+                for position, yaw, opening in choices:
+                    try:
+                        sequence = yield from self._sequence(candidate, position, yaw, opening)
+                    except MotionRefused as refusal:
+                        refusals.append(str(refusal))
+                        continue
+                    sequences.append(sequence)
+                    break
+        finally:
+            for other in others:
+                arm.scene.remove_obstacle(f"candidate {other.index}")
+        touchset = TouchSet(candidate, tuple(sequences))
+        stable = sum(layer.stable for layer in touchset.layers)
+        self.event("touchset", touchset=touchset, refusals=refusals)
+        if not sequences:
+            raise SkillFailed("too_wide", f"no squeeze of candidate {candidate.index} is possible: {'; '.join(refusals[:3])}")
+        if stable == 0:
+            raise SkillFailed("nothing_felt", f"no closure on candidate {candidate.index} reached a plateau",
+                              advice="the object may have moved away; trace it again", closures=len(touchset.layers))
+        self.touchset = touchset
+
+    def _plan(self, candidate: Candidate) -> list[list[tuple[Array, float, float]]]:
+        """For each sequence its alternatives in order of preference: (position (2,) in K, yaw in K, opening)."""
+        p, contour = self.params, candidate.contour
+        stroke = self.context.arm.description.gripper.stroke_m
+        opening = min(contour.size_m[1] + 2 * p.side_gap_m, stroke)
+        if contour.kind == "round":
+            turns = np.deg2rad([0.0, 60.0, -60.0])
+            slack = np.deg2rad([0.0, 12.0, -12.0, 24.0, -24.0])
+            return [[(contour.centre_K_m, float(t + s), opening) for s in slack] for t in turns]
+        along = np.array([np.cos(contour.yaw_rad), np.sin(contour.yaw_rad)])
+        reach = 0.5 * contour.size_m[0] - 0.5 * self.context.arm.description.gripper.pad_window_m[0]
+        tracks = np.clip(0.25 * contour.size_m[0], 0.0, max(reach, 0.0)) * np.array([-1.0, 0.0, 1.0])
+        return [
+            [
+                (contour.centre_K_m + t * along, contour.yaw_rad + turn, opening)
+                for turn in np.deg2rad([0.0, 180.0, 6.0, -6.0])
+            ]
+            for t in tracks
+        ]
+
+    def _heights(self, candidate: Candidate) -> Array:
+        """Pad-centre heights above the floor, lowest first."""
+        p, gripper = self.params, self.context.arm.description.gripper
+        lowest = gripper.fingertip_below_P_m + HAND_CLEARANCE_M
+        body_limit = candidate.height_m + HAND_CLEARANCE_M - (gripper.pose_E_P.position_m[2] - body_bottom_m(gripper))
+        lowest = max(lowest, body_limit)
+        highest = max(candidate.height_m - p.top_overlap_m, lowest)
+        count = int(np.clip(np.floor((highest - lowest) / p.layer_gap_m) + 1, 1, p.layers))
+        return np.linspace(lowest, highest, count)
+
+    def _sequence(self, candidate: Candidate, position: Array, yaw_K: float, opening: float) -> Motion[TouchSequence]:
+        """Open over the candidate, close at each height from below, rise."""
+        p, arm = self.params, self.context.arm
+        heights = self._heights(candidate)
+        above_z = candidate.height_m + arm.description.gripper.fingertip_below_P_m + 0.02
+        yaw_K = (yaw_K + 0.5 * np.pi) % np.pi - 0.5 * np.pi
+        yield from arm.jaws(opening, speed_m_s=0.2)
+        above = self._pose(position, above_z, yaw_K)
+        travel_z = max(float(arm.pose_B_P.position_m[2]), float(above.position_m[2]))
+        arm.require_clear(self._pose(position, float(heights[0]), yaw_K), opening)
+        yield from arm.transit(above, height_B_m=travel_z, speed_m_s=p.travel_speed_m_s)
+        layers: list[Layer] = []
+        for height in heights:
+            yield from arm.line(self._pose(position, float(height), yaw_K), p.descent_speed_m_s)
+            layers.append((yield from self._close(float(height), position, yaw_K)))
+            yield from arm.jaws(opening, speed_m_s=0.2)
+        yield from arm.line(above, p.descent_speed_m_s)
+        return TouchSequence(np.asarray(position), yaw_K, tuple(layers))
+
+    def _close(self, height: float, position: Array, yaw_K: float) -> Motion[Layer]:
+        p, arm = self.params, self.context.arm
+        yield from arm.jaws(0.0, speed_m_s=p.closing_speed_m_s, force_N=p.force_N)
+        command = Command(gripper=GripperTarget(0.0, p.closing_speed_m_s, p.force_N), tactile=True)
+        blocks: list[Observation] = []
+        for _ in range(round(p.settle_s / arm.period_s)):
+            blocks.append((yield command))
+        pose_K_B = self.context.world.container.pose_B_K.inverse()
+        measured = pose_K_B.apply(blocks[-1].pose_B_P.position_m)
+        return make_layer(
+            blocks, height_m=height, position_K_m=measured[:2], yaw_rad=yaw_K, force_N=p.force_N,
+            pad_shape=arm.description.gripper.pad_shape,
+        )
+
+    def _pose(self, position_K: Array, height: float, yaw_K: float) -> Pose:
+        pose_B_K = self.context.world.container.pose_B_K
+        return Pose.pointing_down(pose_B_K.apply(np.array([*position_K, height])), pose_B_K.yaw_rad + yaw_K)
+
+
+def body_bottom_m(gripper) -> float:  # type: ignore[no-untyped-def]
+    """How far the gripper's body reaches below the flange."""
+    return max(b.centre_m[2] + b.half_m[2] for b in gripper.body)

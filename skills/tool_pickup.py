@@ -1,0 +1,118 @@
+"""Take the probe out of its holder and feel the floor with it."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from glotouch_bt.robot import SetPayload, Tare
+from glotouch_bt.touch import GuardParams
+from skills.base import Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from skills.held_tool import HeldTool
+from skills.probing import Prober
+from skills.requests import finish
+
+
+class ToolPickupParams(SkillParams):
+    """Parameters of `tool_pickup`."""
+
+    grip_N: float = param("Jaw force on the handle", unit="N", default=60.0, gt=0.0, le=60.0)
+    speed_m_s: float = param("Speed with the probe in the hand", unit="m/s", default=0.10, gt=0.0, le=0.15)
+    free_speed_m_s: float = param("Speed of the empty hand", unit="m/s", default=0.25, gt=0.0, le=0.25)
+    floor_touch: bool = param("Touch the floor in a free corner to learn its height", default=True)
+    corner_gap_m: float = param("Ball centre to each wall at that corner", unit="m", default=0.014, ge=0.008, le=0.05)
+
+
+class ToolPickup(Skill):
+    """Grasp the probe in its holder, draw it out, tell the controller its weight, tare, and touch the container's floor.
+
+    SUCCESS: the probe is held and its floor height is known.
+    FAILURE `no_probe`: the jaws closed on nothing (or on something of another width).
+    FAILURE `probe_not_lifted`: the hand came up without the probe's weight.
+    FAILURE `motion_refused`: the holder cannot be reached.
+    """
+
+    Params = ToolPickupParams
+    params: ToolPickupParams
+    tool = Out(HeldTool, "the probe in the jaws")
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        arm, world, p = self.context.arm, self.context.world, self.params
+        grasp = world.holder.pose_B_grasp
+        probe, gripper = world.probe, arm.description.gripper
+        opening = min(probe.handle_m[1] + 0.03, gripper.stroke_m)
+        above = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, 0.06]))
+
+        yield from arm.jaws(opening, speed_m_s=0.15)
+        yield from arm.transit(above, height_B_m=max(above.position_m[2], arm.pose_B_P.position_m[2]), speed_m_s=p.free_speed_m_s)
+        yield from finish(self.context.requests.start(Tare()), "tare")
+        arm.scene.allow_tool_contact(True)
+        yield from arm.line(grasp, 0.05)
+        state = yield from arm.jaws(0.0, speed_m_s=0.04, force_N=p.grip_N)
+        if abs(state.aperture_m - probe.handle_m[1]) > 0.004:
+            yield from arm.jaws(opening, speed_m_s=0.1)
+            yield from arm.line(above, 0.05)
+            raise SkillFailed(
+                "no_probe",
+                f"the jaws closed to {state.aperture_m * 1e3:.1f} mm; the handle is {probe.handle_m[1] * 1e3:.1f} mm wide",
+                advice="check that the probe stands in its holder and that the holder's pose is right",
+                aperture_m=state.aperture_m,
+            )
+        arm.scene.hold_tool(probe)
+        out_of_hole = probe.length_m + 0.06
+        yield from arm.shift(np.array([0.0, 0.0, out_of_hole]), p.speed_m_s, check=False)
+        arm.scene.allow_tool_contact(False)
+        weight_N = yield from self._weight_N()
+        if weight_N < 0.5 * probe.mass_kg * 9.81:
+            raise SkillFailed(
+                "probe_not_lifted",
+                f"the hand carries {weight_N:.2f} N; the probe weighs {probe.mass_kg * 9.81:.2f} N",
+                advice="raise grip_N, or check the handle",
+                weight_N=weight_N,
+            )
+        payload = SetPayload(probe.mass_kg, np.array([0.0, 0.0, probe.com_below_grasp_m]))
+        yield from finish(self.context.requests.start(payload), "payload")
+        yield from arm.hold(0.2)
+        yield from finish(self.context.requests.start(Tare()), "tare")
+        tool = HeldTool(
+            tip_P_m=np.array([0.0, 0.0, probe.grasp_to_tip_m]),
+            tip_radius_m=probe.tip_radius_m,
+            shaft_radius_m=0.5 * probe.shaft_diameter_m,
+            aperture_m=state.aperture_m,
+        )
+        if p.floor_touch:
+            tool = yield from self._feel_floor(tool)
+        self.event("tool", held=True, grasp_to_tip_m=probe.grasp_to_tip_m, floor_z_K_m=tool.floor_z_K_m, weight_N=weight_N)
+        self.tool = tool
+
+    def _weight_N(self):  # type: ignore[no-untyped-def]
+        blocks = yield from self.context.arm.hold(0.2)
+        wrench = np.concatenate([b.wrench_S for b in blocks])[:, :3].mean(axis=0)
+        down_E = self.context.arm.pose_B_P.rotation.T @ np.array([0.0, 0.0, -1.0])
+        return float(wrench @ down_E)
+
+    def _feel_floor(self, tool: HeldTool):  # type: ignore[no-untyped-def]
+        """Lower the ball in the corner nearest to the holder; a touch far from the nominal floor is not the floor."""
+        world, p = self.context.world, self.params
+        half = 0.5 * np.array(world.container.interior_m[:2]) - p.corner_gap_m
+        holder_K = world.container.pose_B_K.inverse().apply(world.holder.pose_B_grasp.position_m)
+        corner = np.where(holder_K[:2] >= 0, half, -half)
+        prober = Prober(self.context, tool, GuardParams())
+        high = world.container.interior_m[2] + 0.06
+        yield from prober.hop(np.array([*corner, 0.0]), max(high, float(prober.tip_K_m[2])), p.speed_m_s)
+        near = 0.02
+        yield from self.context.arm.line(tool.pose_B_P(world, np.array([*corner, near])), p.speed_m_s)
+        probed = yield from prober.move(np.array([*corner, tool.tip_radius_m - 0.008]), 0.01)
+        if probed.contact is None:
+            raise SkillFailed(
+                "no_floor",
+                "the ball met no floor 8 mm below where the registration puts it",
+                advice="check the container's pose and that the probe is held by its handle",
+            )
+        floor_z = float(probed.contact.tip_K_m[2]) - tool.tip_radius_m
+        yield from prober.retreat(np.array([0.0, 0.0, 1.0]), 0.01, 0.05)
+        return dataclasses.replace(tool, floor_z_K_m=floor_z)
+
+
