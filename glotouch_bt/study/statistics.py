@@ -1,0 +1,54 @@
+"""Intervals: a figure without one is not a figure."""
+
+from __future__ import annotations
+
+from typing import TypedDict
+
+import numpy as np
+import numpy.typing as npt
+
+
+class Rate(TypedDict):
+    """A rate with its Wilson 95 % interval over n trials."""
+
+    rate: float
+    lo: float
+    hi: float
+    n: int
+
+
+class Mean(TypedDict):
+    """A mean with its bootstrap 95 % interval over n values."""
+
+    mean: float
+    lo: float
+    hi: float
+    n: int
+
+
+def wilson(successes: int, n: int) -> Rate:
+    """Wilson score interval at 95 % (E. B. Wilson, JASA 22, 1927). n = 0 gives the whole range.
+
+    Raises:
+        ValueError: Not 0 <= successes <= n.
+    """
+    if not 0 <= successes <= n:
+        raise ValueError(f"{successes} successes of {n}: must be 0 <= successes <= n")
+    if n == 0:
+        return {"rate": float("nan"), "lo": 0.0, "hi": 1.0, "n": 0}
+    z2 = 1.959963984540054**2
+    p = successes / n
+    centre = (p + z2 / (2 * n)) / (1 + z2 / n)
+    half = np.sqrt(z2 * (p * (1 - p) / n + z2 / (4 * n * n))) / (1 + z2 / n)
+    return {"rate": p, "lo": max(0.0, float(centre - half)), "hi": min(1.0, float(centre + half)), "n": n}
+
+
+def bootstrap_mean(values: npt.ArrayLike, resamples: int = 2000, seed: int = 0) -> Mean:
+    """Percentile bootstrap of the mean at 95 % (B. Efron, Ann. Statist. 7, 1979); seeded, so the same values give the same."""
+    x = np.asarray(values, dtype=np.float64)
+    if x.size == 0:
+        return {"mean": float("nan"), "lo": float("nan"), "hi": float("nan"), "n": 0}
+    rng = np.random.default_rng(seed)
+    means = x[rng.integers(0, x.size, (resamples, x.size))].mean(axis=1)
+    lo, hi = np.percentile(means, [2.5, 97.5])
+    return {"mean": float(x.mean()), "lo": float(lo), "hi": float(hi), "n": int(x.size)}
