@@ -7,6 +7,7 @@ import numpy as np
 from glotouch_bt.robot import Pose
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.grasp_plan import GraspPlan
+from skills.hand import hand_pose_B
 
 
 class GraspParams(SkillParams):
@@ -38,7 +39,7 @@ class Grasp(Skill):
         arm, p, plan = self.context.arm, self.params, self.plan
         pose_B_K = self.context.world.container.pose_B_K
         gripper = arm.description.gripper
-        goal = Pose.pointing_down(pose_B_K.apply(plan.position_K_m), pose_B_K.yaw_rad + plan.yaw_rad)
+        goal = hand_pose_B(arm, self.context.world.container, plan.position_K_m, plan.yaw_rad)
         high = np.array([*plan.position_K_m[:2], p.headroom_m + gripper.fingertip_below_P_m])
         above = Pose(pose_B_K.apply(high), goal.quat)
         yield from arm.jaws(min(plan.opening_m, gripper.stroke_m), speed_m_s=0.2)

@@ -21,8 +21,9 @@ class GuardedSweepParams(SkillParams):
     speed_m_s: float = param("Sweeping speed", unit="m/s", default=0.04, gt=0.0, le=0.08)
     travel_speed_m_s: float = param("Speed above the objects", unit="m/s", default=0.10, gt=0.0, le=0.15)
     wall_gap_m: float = param("Ball centre kept from the walls", unit="m", default=0.012, ge=0.008, le=0.05)
-    coverage_radius_m: float = param("A place farther than this from every swept path is unexplored", unit="m",
-                                     default=0.024, ge=0.005, le=0.08)
+    coverage_radius_m: float = param(
+        "A place farther than this from every swept path is unexplored", unit="m", default=0.024, ge=0.005, le=0.08
+    )
     retreat_m: float = param("Way back from a contact", unit="m", default=0.006, ge=0.002, le=0.03)
 
 

@@ -16,6 +16,7 @@ class HeldTool:
         tip_radius_m: Ball radius.
         shaft_radius_m: Shaft radius.
         aperture_m: Reported aperture with the handle between the pads.
+        yaw_B_rad: Yaw of x_P in B at which the probe was grasped; the hand keeps it while it probes.
         floor_z_K_m: Height of the floor in K as the tip felt it; 0 if the registration were exact and the grasp perfect.
             Heights measured with this tool subtract it.
     """
@@ -24,14 +25,14 @@ class HeldTool:
     tip_radius_m: float
     shaft_radius_m: float
     aperture_m: float
+    yaw_B_rad: float
     floor_z_K_m: float = 0.0
 
     def tip_K_m(self, world: World, pose_B_P: Pose) -> Array:
         """(3,) centre of the ball in K for a pose of the pads' mid-point in B."""
         return world.container.pose_B_K.inverse().apply(pose_B_P.apply(self.tip_P_m))
 
-    def pose_B_P(self, world: World, tip_K_m: Array, yaw_K_rad: float = 0.0) -> Pose:
+    def pose_B_P(self, world: World, tip_K_m: Array) -> Pose:
         """Pose of the pads' mid-point that brings the ball's centre to `tip_K_m` (3,), the hand pointing down."""
-        pose_B_K = world.container.pose_B_K
-        turned = Pose.pointing_down(pose_B_K.apply(tip_K_m), pose_B_K.yaw_rad + yaw_K_rad)
+        turned = Pose.pointing_down(world.container.pose_B_K.apply(tip_K_m), self.yaw_B_rad)
         return Pose(turned.position_m - turned.rotation @ self.tip_P_m, turned.quat)

@@ -25,10 +25,12 @@ class OrbitProbeParams(SkillParams):
     travel_speed_m_s: float = param("Speed above the objects", unit="m/s", default=0.10, gt=0.0, le=0.15)
     max_contacts: int = param("Most contacts per object", default=12, ge=3, le=40)
     max_step_deg: float = param("Longest single step on the orbit", unit="deg", default=45.0, gt=5.0, le=90.0)
-    headroom_m: float = param("Ball's height above the floor when crossing an object", unit="m", default=0.13,
-                              ge=0.02, le=0.2)
-    exclusion_m: float = param("Margin round a traced object that the search keeps out of", unit="m", default=0.010,
-                               ge=0.0, le=0.05)
+    headroom_m: float = param(
+        "Ball's height above the floor when crossing an object", unit="m", default=0.13, ge=0.02, le=0.2
+    )
+    exclusion_m: float = param(
+        "Margin round a traced object that the search keeps out of", unit="m", default=0.010, ge=0.0, le=0.05
+    )
 
 
 class OrbitProbe(Skill):

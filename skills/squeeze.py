@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from glotouch_bt.motion import Motion
-from glotouch_bt.robot import Array, Command, GripperTarget, MotionRefused, Observation, Pose
+from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose
 from glotouch_bt.touch import Candidate, Layer, TouchSequence, TouchSet, make_layer
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from skills.hand import hand_pose_B
 
 HAND_CLEARANCE_M = 0.004
 """Fingertips stay this far above the floor, and the hand's body this far above a candidate's top."""
@@ -24,8 +25,9 @@ class SqueezeParams(SkillParams):
     travel_speed_m_s: float = param("Speed of the empty hand", unit="m/s", default=0.25, gt=0.0, le=0.25)
     descent_speed_m_s: float = param("Speed down over the object", unit="m/s", default=0.10, gt=0.0, le=0.25)
     settle_s: float = param("How long the plateau is watched", unit="s", default=0.15, ge=0.05, le=1.0)
-    top_overlap_m: float = param("Pad centre of the highest layer below the top", unit="m", default=0.008, ge=0.0,
-                                 le=0.03)
+    top_overlap_m: float = param(
+        "Pad centre of the highest layer below the top", unit="m", default=0.008, ge=0.0, le=0.03
+    )
 
 
 class Squeeze(Skill):
@@ -72,10 +74,16 @@ class Squeeze(Skill):
         stable = sum(layer.stable for layer in touchset.layers)
         self.event("touchset", touchset=touchset, refusals=refusals)
         if not sequences:
-            raise SkillFailed("too_wide", f"no squeeze of candidate {candidate.index} is possible: {'; '.join(refusals[:3])}")
+            raise SkillFailed(
+                "too_wide", f"no squeeze of candidate {candidate.index} is possible: {'; '.join(refusals[:3])}"
+            )
         if stable == 0:
-            raise SkillFailed("nothing_felt", f"no closure on candidate {candidate.index} reached a plateau",
-                              advice="the object may have moved away; trace it again", closures=len(touchset.layers))
+            raise SkillFailed(
+                "nothing_felt",
+                f"no closure on candidate {candidate.index} reached a plateau",
+                advice="the object may have moved away; trace it again",
+                closures=len(touchset.layers),
+            )
         self.touchset = touchset
 
     def _plan(self, candidate: Candidate) -> list[list[tuple[Array, float, float]]]:
@@ -113,7 +121,10 @@ class Squeeze(Skill):
         p, arm = self.params, self.context.arm
         heights = self._heights(candidate)
         above_z = candidate.height_m + arm.description.gripper.fingertip_below_P_m + 0.02
-        yaw_K = (yaw_K + 0.5 * np.pi) % np.pi - 0.5 * np.pi
+        yaw_K = (
+            hand_pose_B(arm, self.context.world.container, np.zeros(3), yaw_K).yaw_rad
+            - self.context.world.container.pose_B_K.yaw_rad
+        )
         yield from arm.jaws(opening, speed_m_s=0.2)
         above = self._pose(position, above_z, yaw_K)
         travel_z = max(float(arm.pose_B_P.position_m[2]), float(above.position_m[2]))
@@ -137,15 +148,18 @@ class Squeeze(Skill):
         pose_K_B = self.context.world.container.pose_B_K.inverse()
         measured = pose_K_B.apply(blocks[-1].pose_B_P.position_m)
         return make_layer(
-            blocks, height_m=height, position_K_m=measured[:2], yaw_rad=yaw_K, force_N=p.force_N,
+            blocks,
+            height_m=height,
+            position_K_m=measured[:2],
+            yaw_rad=yaw_K,
+            force_N=p.force_N,
             pad_shape=arm.description.gripper.pad_shape,
         )
 
     def _pose(self, position_K: Array, height: float, yaw_K: float) -> Pose:
-        pose_B_K = self.context.world.container.pose_B_K
-        return Pose.pointing_down(pose_B_K.apply(np.array([*position_K, height])), pose_B_K.yaw_rad + yaw_K)
+        return hand_pose_B(self.context.arm, self.context.world.container, np.array([*position_K, height]), yaw_K)
 
 
-def body_bottom_m(gripper) -> float:  # type: ignore[no-untyped-def]
+def body_bottom_m(gripper: Gripper) -> float:
     """How far the gripper's body reaches below the flange."""
     return max(b.centre_m[2] + b.half_m[2] for b in gripper.body)

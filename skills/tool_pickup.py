@@ -6,9 +6,10 @@ import dataclasses
 
 import numpy as np
 
-from glotouch_bt.robot import SetPayload, Tare
+from glotouch_bt.robot import Pose, SetPayload, Tare
 from glotouch_bt.touch import GuardParams
 from skills.base import Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from skills.hand import easy_yaw
 from skills.held_tool import HeldTool
 from skills.probing import Prober
 from skills.requests import finish
@@ -40,13 +41,17 @@ class ToolPickup(Skill):
     def run(self) -> SkillRun:
         """See the class."""
         arm, world, p = self.context.arm, self.context.world, self.params
-        grasp = world.holder.pose_B_grasp
+        stowed = world.holder.pose_B_grasp
+        yaw = easy_yaw(arm, stowed.yaw_rad)
+        grasp = Pose.pointing_down(stowed.position_m, yaw)
         probe, gripper = world.probe, arm.description.gripper
         opening = min(probe.handle_m[1] + 0.03, gripper.stroke_m)
         above = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, 0.06]))
 
         yield from arm.jaws(opening, speed_m_s=0.15)
-        yield from arm.transit(above, height_B_m=max(above.position_m[2], arm.pose_B_P.position_m[2]), speed_m_s=p.free_speed_m_s)
+        yield from arm.transit(
+            above, height_B_m=max(above.position_m[2], arm.pose_B_P.position_m[2]), speed_m_s=p.free_speed_m_s
+        )
         yield from finish(self.context.requests.start(Tare()), "tare")
         arm.scene.allow_tool_contact(True)
         yield from arm.line(grasp, 0.05)
@@ -81,10 +86,13 @@ class ToolPickup(Skill):
             tip_radius_m=probe.tip_radius_m,
             shaft_radius_m=0.5 * probe.shaft_diameter_m,
             aperture_m=state.aperture_m,
+            yaw_B_rad=yaw,
         )
         if p.floor_touch:
             tool = yield from self._feel_floor(tool)
-        self.event("tool", held=True, grasp_to_tip_m=probe.grasp_to_tip_m, floor_z_K_m=tool.floor_z_K_m, weight_N=weight_N)
+        self.event(
+            "tool", held=True, grasp_to_tip_m=probe.grasp_to_tip_m, floor_z_K_m=tool.floor_z_K_m, weight_N=weight_N
+        )
         self.tool = tool
 
     def _weight_N(self):  # type: ignore[no-untyped-def]
@@ -114,5 +122,3 @@ class ToolPickup(Skill):
         floor_z = float(probed.contact.tip_K_m[2]) - tool.tip_radius_m
         yield from prober.retreat(np.array([0.0, 0.0, 1.0]), 0.01, 0.05)
         return dataclasses.replace(tool, floor_z_K_m=floor_z)
-
-

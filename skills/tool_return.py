@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from glotouch_bt.robot import SetPayload, Tare
+from glotouch_bt.robot import Pose, SetPayload, Tare
 from skills.base import In, Skill, SkillParams, SkillRun, param
 from skills.held_tool import HeldTool
 from skills.requests import finish
@@ -33,7 +33,7 @@ class ToolReturn(Skill):
     def run(self) -> SkillRun:
         """See the class."""
         arm, world, p = self.context.arm, self.context.world, self.params
-        grasp = world.holder.pose_B_grasp
+        grasp = Pose.pointing_down(world.holder.pose_B_grasp.position_m, self.tool.yaw_B_rad)
         above = dataclasses.replace(
             grasp, position_m=grasp.position_m + np.array([0.0, 0.0, world.probe.length_m + 0.06])
         )

@@ -1,0 +1,20 @@
+"""The open hand: parallel jaws look the same after half a turn, so of two yaws the arm takes the easier one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glotouch_bt.motion import Arm
+from glotouch_bt.robot import Array, Container, Pose
+
+
+def easy_yaw(arm: Arm, yaw_B_rad: float) -> float:
+    """Of `yaw_B_rad` and its half turns, the one nearest to the arm's home yaw (farthest from the last joint's stops)."""
+    away = (yaw_B_rad - arm.home_yaw_B_rad + 0.5 * np.pi) % np.pi - 0.5 * np.pi
+    return float(arm.home_yaw_B_rad + away)
+
+
+def hand_pose_B(arm: Arm, container: Container, position_K_m: Array, yaw_K_rad: float) -> Pose:
+    """Pose of P in B, pointing down at `position_K_m` (3,) with x_P along `yaw_K_rad` or its half turn."""
+    yaw_B = easy_yaw(arm, container.pose_B_K.yaw_rad + yaw_K_rad)
+    return Pose.pointing_down(container.pose_B_K.apply(position_K_m), yaw_B)
