@@ -1,0 +1,192 @@
+"""Columns of numbers as a compact binary message that says its own layout: the full-rate part of a record.
+
+A column is rounded to a stated step, differenced along time until it is small, and written byte plane by byte plane, so
+that the chunk compression of the file finds mostly zeros. The message is a Protocol Buffers message of one schema
+(`PACKED_DESCRIPTOR`), so any MCAP tool can open it; docs/record.md says how to unpack it by hand.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from glotouch_bt.robot import Array, GlotouchError
+
+PACKED_NAME = "glotouch.Packed"
+_NAN = -(2**31)
+
+
+@dataclass(frozen=True)
+class Column:
+    """How one quantity is packed.
+
+    Attributes:
+        name: Name with its unit and frame.
+        shape: Shape of one row; () is a number.
+        step: What values are rounded to, in the unit of the name.
+        order: How often the column is differenced along time (0 white noise, 1 steps, 2 smooth motion).
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    step: float
+    order: int
+
+    @property
+    def width(self) -> int:
+        """Numbers in one row."""
+        return math.prod(self.shape)
+
+    def __str__(self) -> str:
+        return f"{self.name}:{'x'.join(map(str, self.shape)) or '1'}:{self.step:g}:{self.order}"
+
+    @classmethod
+    def parse(cls, text: str) -> Column:
+        """The column a layout's word describes."""
+        name, shape, step, order = text.split(":")
+        return cls(name, () if shape == "1" else tuple(int(s) for s in shape.split("x")), float(step), int(order))
+
+
+def pack(start_ns: int, columns: Sequence[Column], values: Sequence[npt.ArrayLike]) -> bytes:
+    """One packed message.
+
+    Args:
+        start_ns: Robot clock of the first row, ns.
+        columns: How each quantity is packed; all have the same number of rows.
+        values: One array (rows, *shape) for each column. NaN and infinities come back as NaN.
+    """
+    blocks: list[bytes] = []
+    rows = 0
+    for column, value in zip(columns, values, strict=True):
+        a = np.asarray(value, dtype=np.float64)
+        rows = len(a)
+        a = a.reshape(rows, column.width)
+        scaled = np.rint(a * (1.0 / column.step))
+        finite = np.isfinite(scaled)
+        if finite.all():
+            steps = np.clip(scaled, _NAN + 1, 2**31 - 1).astype(np.int32)
+        else:
+            steps = np.clip(np.where(finite, scaled, 0.0), _NAN + 1, 2**31 - 1).astype(np.int32)
+            steps[~finite] = _NAN
+        for _ in range(column.order):
+            steps[1:] -= steps[:-1].copy()  # wraps modulo 2^32 where it must; the sum wraps back
+        planes = np.ascontiguousarray(steps.astype("<i4")).view(np.uint8).reshape(rows, column.width, 4)
+        blocks.append(planes.transpose(1, 2, 0).tobytes())
+    layout = " ".join(map(str, columns)).encode()
+    data = b"".join(blocks)
+    return b"".join(
+        (
+            _tag(1, 0) + _varint(start_ns & (2**64 - 1)),
+            _tag(2, 0) + _varint(rows),
+            _field(3, layout),
+            _field(4, data),
+        )
+    )
+
+
+def unpack(message: bytes) -> tuple[int, dict[str, Array]]:
+    """The start stamp in ns and the columns (rows, *shape) of a packed message.
+
+    Raises:
+        GlotouchError: The bytes are not a packed message.
+    """
+    start_ns, rows, layout, data = 0, 0, b"", b""
+    at = 0
+    try:
+        while at < len(message):
+            key, at = _read_varint(message, at)
+            if key & 7 == 0:
+                number, at = _read_varint(message, at)
+                start_ns, rows = (number, rows) if key >> 3 == 1 else (start_ns, number)
+            elif key & 7 == 2:
+                size, at = _read_varint(message, at)
+                chunk, at = message[at : at + size], at + size
+                layout, data = (chunk, data) if key >> 3 == 3 else (layout, chunk)
+            else:
+                raise GlotouchError(f"not a {PACKED_NAME} message (wire type {key & 7})")
+        columns = [Column.parse(word) for word in layout.decode().split()]
+        if len(data) != 4 * rows * sum(c.width for c in columns):
+            raise GlotouchError(f"{PACKED_NAME}: {len(data)} bytes do not hold {rows} rows of {layout.decode()!r}")
+    except (IndexError, ValueError) as e:
+        raise GlotouchError(f"not a {PACKED_NAME} message ({e})") from e
+    out: dict[str, Array] = {}
+    at = 0
+    for c in columns:
+        size = 4 * rows * c.width
+        planes = np.frombuffer(data, np.uint8, size, at).reshape(c.width, 4, rows)
+        at += size
+        steps = np.ascontiguousarray(planes.transpose(2, 0, 1)).view("<i4").reshape(rows, c.width)
+        for _ in range(c.order):
+            steps = np.cumsum(steps, axis=0, dtype=np.int32)
+        values = steps * c.step
+        values[steps == _NAN] = np.nan
+        out[c.name] = values.reshape(rows, *c.shape)
+    return start_ns - 2**64 if start_ns >= 2**63 else start_ns, out
+
+
+def join(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
+    """Unpacked messages of one channel, one after the other."""
+    if not parts:
+        return {}
+    return {name: np.concatenate([p[name] for p in parts]) for name in parts[0]}
+
+
+def _varint(n: int) -> bytes:
+    out = bytearray()
+    while n > 0x7F:
+        out.append(n & 0x7F | 0x80)
+        n >>= 7
+    out.append(n)
+    return bytes(out)
+
+
+def _read_varint(data: bytes, at: int) -> tuple[int, int]:
+    n = shift = 0
+    while True:
+        byte = data[at]
+        at += 1
+        n |= (byte & 0x7F) << shift
+        if byte < 0x80:
+            return n, at
+        shift += 7
+
+
+def _tag(number: int, wire: int) -> bytes:
+    return _varint(number << 3 | wire)
+
+
+def _field(number: int, data: bytes) -> bytes:
+    return _tag(number, 2) + _varint(len(data)) + data
+
+
+def _packed_descriptor() -> bytes:
+    """A serialised FileDescriptorSet of the schema (descriptor.proto's field numbers), as MCAP asks of protobuf."""
+    package, name = PACKED_NAME.split(".")
+    int64, uint32, string, raw = 3, 13, 9, 12
+    fields = b""
+    for number, (field, kind) in enumerate(
+        (("start_ns", int64), ("rows", uint32), ("layout", string), ("data", raw)), start=1
+    ):
+        optional = 1
+        fields += _field(
+            2,
+            _field(1, field.encode())
+            + _tag(3, 0)
+            + _varint(number)
+            + _tag(4, 0)
+            + _varint(optional)
+            + _tag(5, 0)
+            + _varint(kind),
+        )
+    message = _field(1, name.encode()) + fields
+    file = (
+        _field(1, b"glotouch/packed.proto") + _field(2, package.encode()) + _field(4, message) + _field(12, b"proto3")
+    )
+    return _field(1, file)
+
+
+PACKED_DESCRIPTOR = _packed_descriptor()

@@ -1,0 +1,86 @@
+"""Plottable JSON messages of many control cycles at once: one format operation a channel, no loop over samples.
+
+Each function returns the messages of one channel, one a row, in the order of the rows. Numbers that are not finite
+become null.
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from glotouch_bt.robot import Array
+
+Stamps = npt.NDArray[np.int64]
+_NOT_FINITE = re.compile(r"-?\b(?:nan|inf)\b")
+_TIME = '{"sec":%d,"nsec":%d}'
+
+
+def _rows(template: str, stamps_ns: Stamps, *columns: npt.ArrayLike) -> list[bytes]:
+    """`template` filled once a row: sec and nsec first, then the columns side by side."""
+    if len(stamps_ns) == 0:
+        return []
+    blocks: list[Any] = [stamps_ns // 10**9, stamps_ns % 10**9, *columns]
+    table = np.column_stack([np.asarray(b, dtype=np.float64).reshape(len(stamps_ns), -1) for b in blocks])
+    text = "\n".join([template] * len(stamps_ns)) % tuple(table.ravel().tolist())
+    if not np.isfinite(table).all():
+        text = _NOT_FINITE.sub("null", text)
+    return text.encode().split(b"\n")
+
+
+def wrench(stamps_ns: Stamps, wrench_S: Array) -> list[bytes]:
+    """`wrench_S` (n, 6): force N, torque Nm."""
+    xyz = '{"x":%.4f,"y":%.4f,"z":%.4f}'
+    tail = '{"x":%.5f,"y":%.5f,"z":%.5f}'
+    return _rows(f'{{"timestamp":{_TIME},"frame_id":"S","force":{xyz},"torque":{tail}}}', stamps_ns, wrench_S)
+
+
+def pose(stamps_ns: Stamps, position_B_P: Array, quat_B_P: Array) -> list[bytes]:
+    """foxglove.PoseInFrame of the pads' mid-point: (n, 3) m and (n, 4) w x y z."""
+    return _rows(
+        f'{{"timestamp":{_TIME},"frame_id":"B","pose":{{"position":{{"x":%.6f,"y":%.6f,"z":%.6f}},'
+        '"orientation":{"x":%.7f,"y":%.7f,"z":%.7f,"w":%.7f}}}',
+        stamps_ns,
+        position_B_P,
+        quat_B_P[:, [1, 2, 3, 0]],
+    )
+
+
+def transforms(stamps_ns: Stamps, position_B_P: Array, quat_B_P: Array) -> list[bytes]:
+    """foxglove.FrameTransforms: P in B."""
+    return _rows(
+        f'{{"transforms":[{{"timestamp":{_TIME},"parent_frame_id":"B","child_frame_id":"P",'
+        '"translation":{"x":%.6f,"y":%.6f,"z":%.6f},"rotation":{"x":%.7f,"y":%.7f,"z":%.7f,"w":%.7f}}]}',
+        stamps_ns,
+        position_B_P,
+        quat_B_P[:, [1, 2, 3, 0]],
+    )
+
+
+def joints(stamps_ns: Stamps, q: Array, dq: Array) -> list[bytes]:
+    """foxglove.JointStates: (n, dof) rad and rad/s; joints are named joint1, joint2, ..."""
+    each = ",".join(f'{{"name":"joint{i + 1}","position":%.6f,"velocity":%.5f}}' for i in range(q.shape[1]))
+    table = np.stack([q, dq], axis=2)
+    return _rows(f'{{"timestamp":{_TIME},"joints":[{each}]}}', stamps_ns, table)
+
+
+def gripper(stamps_ns: Stamps, aperture_m: Array, force_N: Array, moving: Array) -> list[bytes]:
+    """Jaws as last reported: (n,) each; `moving` is 0 or 1."""
+    return _rows(
+        f'{{"timestamp":{_TIME},"aperture_m":%.6f,"force_N":%.3f,"moving":%d}}', stamps_ns, aperture_m, force_N, moving
+    )
+
+
+def depth_image(stamp_ns: int, frame_id: str, depth_m: Array) -> bytes:
+    """foxglove.RawImage, 32FC1, of one depth map in metres (rounded to a micrometre)."""
+    rows, cols = depth_m.shape
+    data = base64.b64encode(np.round(depth_m, 6).astype("<f4").tobytes()).decode()
+    head = f'{{"timestamp":{_TIME},' % divmod(stamp_ns, 10**9)
+    return (
+        f'{head}"frame_id":"{frame_id}","width":{cols},"height":{rows},"encoding":"32FC1","step":{4 * cols},'
+        f'"data":"{data}"}}'
+    ).encode()
