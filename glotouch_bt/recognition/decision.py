@@ -1,0 +1,122 @@
+"""From losses to a decision: which candidate is the target, and is it sure enough to act on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from glotouch_bt.robot import ParamError
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The pose at which the loss is least.
+
+    Attributes:
+        yaw_rad: Yaw of the mesh's frame O in K, in (-pi, pi].
+        shift_m: Window shift delta along x_P.
+        z0_m: Height offset.
+        scale: Model scale.
+        bias_m: Aperture bias.
+        reflected: The first scan was fitted from behind: relative yaw in (90, 270] deg. A scan's reflection is a turn by 180.
+    """
+
+    yaw_rad: float
+    shift_m: float
+    z0_m: float
+    scale: float
+    bias_m: float
+    reflected: bool
+
+
+@dataclass(frozen=True)
+class Match:
+    """How well one candidate's TouchSet fits the target.
+
+    Attributes:
+        index: The candidate's index.
+        loss: Total matching loss; infinite if nothing was felt.
+        terms: What it is the sum of: width, image, depth, mode, height, contour.
+        fit: The fitted pose; None if nothing was felt.
+        pose_K_O: (x, y, yaw) of the mesh's frame O in K, m and rad; the contour's centre and yaw if nothing was felt.
+        evidence: Sum of layer weights (a layer both pads felt counts 1).
+    """
+
+    index: int
+    loss: float
+    terms: Mapping[str, float]
+    fit: Fit | None
+    pose_K_O: tuple[float, float, float]
+    evidence: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gates:
+    """What a decision needs.
+
+    Attributes:
+        margin: Least difference between the best and the second loss.
+        loss: Largest loss of the best.
+        evidence: Least evidence of the best: layers felt by both pads.
+    """
+
+    margin: float = 0.05
+    loss: float = 1.5
+    evidence: float = 3.0
+
+    def __post_init__(self) -> None:
+        for name in ("margin", "loss", "evidence"):
+            v = getattr(self, name)
+            if not math.isfinite(v) or v < 0:
+                raise ParamError(f"gates.{name}", v, "finite and not negative")
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """All candidates, best first, and whether the best may be taken for the target.
+
+    Attributes:
+        matches: By increasing loss; ties by index.
+        margin: Second loss minus best loss; infinite for a single candidate that was felt, 0 if nothing was felt.
+        accepted: All gates passed.
+        reasons: What failed, in words; empty if accepted.
+    """
+
+    matches: tuple[Match, ...]
+    margin: float
+    accepted: bool
+    reasons: tuple[str, ...] = field(default=())
+
+    @property
+    def best(self) -> Match:
+        """The match with the least loss."""
+        return self.matches[0]
+
+
+def rank(matches: Sequence[Match], gates: Gates | None = None) -> Ranking:
+    """Sort by loss and apply the gates (paper IV-C: margin, absolute fit, evidence).
+
+    Raises:
+        ParamError: No match at all.
+    """
+    gates = gates or Gates()
+    if not matches:
+        raise ParamError("matches", len(matches), "at least one")
+    order = tuple(sorted(matches, key=lambda m: (m.loss, m.index)))
+    best = order[0]
+    reasons: list[str] = []
+    if not math.isfinite(best.loss):
+        return Ranking(order, 0.0, False, ("no evidence: no closure on any candidate was felt by a pad",))
+    margin = (order[1].loss - best.loss) if len(order) > 1 else math.inf
+    if margin < gates.margin:
+        reasons.append(
+            f"margin {margin:.3f} between candidates {best.index} and {order[1].index} is below {gates.margin:g}"
+        )
+    if best.loss > gates.loss:
+        reasons.append(f"loss {best.loss:.3f} of candidate {best.index} is above {gates.loss:g}: none fits the target")
+    if best.evidence < gates.evidence:
+        reasons.append(
+            f"evidence {best.evidence:.2f} of candidate {best.index} is below {gates.evidence:g} layers felt by both pads"
+        )
+    return Ranking(order, margin, not reasons, tuple(reasons))

@@ -1,0 +1,176 @@
+"""What the pads would feel of a target, from its STL alone: support widths, pad images, contour, nonplanarity.
+
+Everything is tabulated once per (mesh, pad) over relative yaw phi (hand against mesh), shift l along x_P from the middle of
+the mesh's traced outline, and height z of the pads' mid-point above the floor.
+"""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from glotouch_bt.recognition.outline import Outline, fit_outline, minimum_rectangle, traced_outline
+from glotouch_bt.recognition.pads import FINE, Array32, PadSpec, image_feature
+from glotouch_bt.recognition.raster import mirrored, side_images, window_max
+from glotouch_bt.recognition.touches import pooled_images, simulated_statistics
+from glotouch_bt.robot import Array
+from glotouch_bt.robot.meshes import Mesh
+
+YAWS = 72
+STRIDE = 2
+"""Table cells are two raster cells apart: 2.3 mm along x_P, 2.7 mm in height."""
+_CACHE_SIZE = 64
+_cache: dict[tuple[str, PadSpec], TargetModel] = {}
+
+
+@dataclass(frozen=True, eq=False)
+class TargetModel:
+    """Tables of one mesh for one pad. Build with `from_mesh`.
+
+    Attributes:
+        name: The mesh's name, for people only.
+        digest: The mesh's content hash.
+        pad: The pad.
+        phi_rad: (72,) relative yaws, from 0, evenly over the full turn.
+        l_m: (nl,) table shifts, symmetric about 0.
+        z_m: (nz,) table heights of the pads' mid-point.
+        reach_m: (72, nl, nz) largest coordinate along y_P inside the left pad's window; NaN where it is empty.
+        fine_m: (72, fl, fz) side images the tables come from (see `raster`); -inf where empty.
+        outline: Traced outline about `centre_m`.
+        centre_m: (2,) middle of the traced outline in the mesh's frame O.
+        height_m: Top above the floor.
+        rho: Nonplanarity predicted for a 10 N touch, median over simulated touches (the paper's rho_M).
+        rho_sd: Its spread over touches (half the 16-84 % range).
+        normal_dispersion: 1 - |mean normal| over touched patches, mean over touches (the paper's d_M).
+        anisotropy: 1 - short / long of the smallest rectangle round the footprint (the paper's a_M).
+        top_slope_m: How much lower than the top the probe may find it, within 4 mm of the outline's middle.
+        top_centre_m: Height found by touching the outline's middle from above.
+    """
+
+    name: str
+    digest: str
+    pad: PadSpec
+    phi_rad: Array
+    l_m: Array
+    z_m: Array
+    reach_m: Array32
+    fine_m: Array32
+    outline: Outline
+    centre_m: Array
+    height_m: float
+    rho: float
+    rho_sd: float
+    normal_dispersion: float
+    anisotropy: float
+    top_slope_m: float
+    top_centre_m: float
+    _lazy: dict[str, Array32] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def from_mesh(cls, mesh: Mesh, pad: PadSpec | None = None) -> TargetModel:
+        """Build (about 0.3 s) or fetch from the in-memory cache, keyed by content and pad."""
+        pad = pad or PadSpec()
+        key = (mesh.digest, pad)
+        if key not in _cache:
+            while len(_cache) >= _CACHE_SIZE:
+                del _cache[next(iter(_cache))]
+            _cache[key] = _build(mesh, pad)
+        return _cache[key]
+
+    @cached_property
+    def width_m(self) -> Array32:
+        """(72, nl, nz) support width W(l, z; phi), eq. (finite_window_width); NaN where a window is empty."""
+        return self.reach_m + mirrored(self.reach_m)
+
+    @cached_property
+    def middle_m(self) -> Array32:
+        """(72, nl, nz) y_P of the point halfway between the two supports: where centring jaws bring the hand's middle."""
+        return np.float32(0.5) * (self.reach_m - mirrored(self.reach_m))
+
+    @property
+    def images(self) -> Array32:
+        """(72, nl, nz, 35) predicted image features of the LEFT pad at `pad.force_N`; built at first use (about 1 s)."""
+        if "images" not in self._lazy:
+            self._lazy["images"] = image_feature(pooled_images(self.fine_m, STRIDE, self.pad)).astype(np.float32)
+        return self._lazy["images"]
+
+    def width_at(self, l_m: float, z_m: float, phi_rad: float) -> float:
+        """One support width by linear interpolation of the table; NaN outside it."""
+        n = len(self.phi_rad)
+        at = (phi_rad / (2 * np.pi) * n) % n
+        i, f = int(at), at % 1.0
+        total = 0.0
+        for j, w in ((i % n, 1 - f), ((i + 1) % n, f)):
+            a, wl = _bracket(self.l_m, l_m)
+            b, wz = _bracket(self.z_m, z_m)
+            if a < 0 or b < 0:
+                return float("nan")
+            t = self.width_m[j, a : a + 2, b : b + 2]
+            total += w * float(np.array([1 - wl, wl]) @ t.astype(np.float64) @ np.array([1 - wz, wz]))
+        return total
+
+    def to_bytes(self) -> bytes:
+        """The expensive part (side images) as an npz, for a cache on disk kept by the caller."""
+        buffer = io.BytesIO()
+        np.savez_compressed(buffer, fine_m=self.fine_m.astype(np.float32), digest=np.array(self.digest))
+        return buffer.getvalue()
+
+
+def _bracket(grid: Array, x: float) -> tuple[int, float]:
+    t = (x - grid[0]) / (grid[1] - grid[0])
+    i = int(np.floor(t))
+    if i < 0 or i > len(grid) - 1 or (i == len(grid) - 1 and t > i):
+        return -1, 0.0
+    i = min(i, len(grid) - 2)
+    return i, float(t - i)
+
+
+def _build(mesh: Mesh, pad: PadSpec) -> TargetModel:
+    solid = mesh.as_trimesh()
+    outline = fit_outline(traced_outline(solid))
+    long, short, _, centre = minimum_rectangle(mesh.vertices_m[:, :2])
+    middle = outline.box_centre_m if outline.p_box > 0.5 else outline.circle_centre_m
+    solid.apply_translation([-middle[0], -middle[1], 0.0])
+    outline = fit_outline(traced_outline(solid))
+    top = float(mesh.vertices_m[:, 2].max())
+    step_l, step_z = pad.window_m[0] / FINE[1], pad.window_m[1] / FINE[0]
+    radius = float(np.hypot(*np.abs(solid.vertices[:, :2]).max(axis=0)))
+    n = int(np.ceil((radius + 0.5 * pad.window_m[0]) / (STRIDE * step_l))) * STRIDE + FINE[1] // 2
+    fine_l = np.arange(-n, n + 1) * step_l
+    # Heights: pad centres from 8 mm to 8 mm above the top; the raster reaches half a window farther on both sides.
+    centres = np.arange(0.008, top + 0.008, STRIDE * step_z)
+    half = FINE[0] // 2
+    fine_z = centres[0] + (np.arange(STRIDE * (len(centres) - 1) + 1 + 2 * half) - half) * step_z
+    phi = np.arange(YAWS) * (2 * np.pi / YAWS)
+    fine = side_images(solid, phi, fine_l, fine_z)
+    h = FINE[1] // 2
+    reach = window_max(fine)[:, h:-h:STRIDE, half:-half:STRIDE]
+    reach = np.where(np.isfinite(reach), reach, np.nan).astype(np.float32)
+    rho, rho_sd, dispersion = simulated_statistics(fine, STRIDE, pad)
+    top_centre, top_slope = _top(solid, top)
+    for a in (reach, fine):
+        a.setflags(write=False)
+    return TargetModel(
+        mesh.name, mesh.digest, pad, phi, fine_l[h:-h:STRIDE], centres, reach, fine, outline, middle, top, rho, rho_sd,
+        dispersion, 1.0 - short / long, top_slope, top_centre,
+    )  # fmt: skip
+
+
+def _top(solid: object, top: float) -> tuple[float, float]:
+    """Height of the ball's contact from above at the middle, and its spread when the aim is off by up to 4 mm."""
+    ring = np.array([[0.0, 0.0], *(r * np.array([np.cos(a), np.sin(a)]) for r in (2e-3, 4e-3) for a in np.arange(8) * np.pi / 4)])  # noqa: E501
+    ball = np.array([[0.0, 0.0], *(r * np.array([np.cos(a), np.sin(a)]) for r in (2e-3, 4e-3) for a in np.arange(6) * np.pi / 3)])  # noqa: E501
+    sag = 0.006 - np.sqrt(0.006**2 - (ball**2).sum(axis=1))
+    points = (ring[:, None] + ball[None]).reshape(-1, 2)
+    o = np.column_stack([points, np.full(len(points), top + 0.01)])
+    d = np.tile([0.0, 0.0, -1.0], (len(o), 1))
+    hit = solid.ray.intersects_first(o, d)  # type: ignore[attr-defined]
+    n, p = solid.face_normals[hit], solid.triangles[hit, 0]  # type: ignore[attr-defined]
+    along = np.where(np.abs(n[:, 2]) < 1e-9, np.nan, n[:, 2])
+    z = p[:, 2] + ((p[:, :2] - points) * n[:, :2]).sum(axis=1) / along
+    z = np.where((hit >= 0) & np.isfinite(z), z, 0.0).reshape(len(ring), len(ball)) - sag
+    heights = z.max(axis=1)
+    return float(heights[0]), float(np.ptp(heights))
