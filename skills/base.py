@@ -53,8 +53,11 @@ def param(description: str, *, unit: str = "", default: Any = ..., **rules: Any)
 
 
 class _Port(Generic[T]):
-    def __init__(self, data_type: type[T], description: str, *, key: str | None = None) -> None:
-        self.data_type, self.description, self._key = data_type, description, key
+    def __init__(
+        self, data_type: type[T], description: str, *, key: str | None = None, element: type | None = None
+    ) -> None:
+        """`element`: type of the items, when the data type is a tuple (checked through for_each)."""
+        self.data_type, self.description, self._key, self.element = data_type, description, key, element
         self.name = ""
 
     def __set_name__(self, owner: type, name: str) -> None:
@@ -69,8 +72,16 @@ class _Port(Generic[T]):
 class In(_Port[T]):
     """An input port: read as an attribute. `required=False` gives None when nobody wrote it."""
 
-    def __init__(self, data_type: type[T], description: str, *, key: str | None = None, required: bool = True) -> None:
-        super().__init__(data_type, description, key=key)
+    def __init__(
+        self,
+        data_type: type[T],
+        description: str,
+        *,
+        key: str | None = None,
+        element: type | None = None,
+        required: bool = True,
+    ) -> None:
+        super().__init__(data_type, description, key=key, element=element)
         self.required = required
 
     @overload
@@ -86,7 +97,19 @@ class In(_Port[T]):
 
 
 class Out(_Port[T]):
-    """An output port: written as an attribute."""
+    """An output port: written as an attribute. `always=True` promises that it is written even when the skill fails."""
+
+    def __init__(
+        self,
+        data_type: type[T],
+        description: str,
+        *,
+        key: str | None = None,
+        element: type | None = None,
+        always: bool = False,
+    ) -> None:
+        super().__init__(data_type, description, key=key, element=element)
+        self.always = always
 
     @overload
     def __get__(self, obj: None, owner: type) -> Out[T]: ...

@@ -1,1 +1,1 @@
-"""Room under construction."""
+"""Missions: YAML to a checked tree, one tick a control period, a result with reasons."""

@@ -1,0 +1,195 @@
+"""A positioned mapping against a pydantic model: every fault becomes a finding at its own line and column."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+from glotouch_bt.mission.findings import Findings
+from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq
+from glotouch_bt.mission.units import convert, split_quantity, units_for
+
+M = TypeVar("M", bound=BaseModel)
+
+# pydantic's error types in our words; {} are its context values
+_WORDS = {
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "float_type": "must be a number",
+    "bool_type": "must be true or false",
+    "string_type": "must be text",
+    "literal_error": "must be {expected}",
+    "enum": "must be {expected}",
+    "greater_than": "must be > {gt}",
+    "greater_than_equal": "must be >= {ge}",
+    "less_than": "must be < {lt}",
+    "less_than_equal": "must be <= {le}",
+    "tuple_type": "must be a list",
+    "list_type": "must be a list",
+    "dict_type": "must be a mapping",
+    "model_type": "must be a mapping",
+    "too_short": "must have at least {min_length} items",
+    "too_long": "must have at most {max_length} items",
+}
+
+
+class Poison:
+    """Marks a value that already has a finding, so that no second one is reported for it."""
+
+
+POISON = Poison()
+
+
+def unit_of(field: FieldInfo) -> str:
+    """The unit a parameter declares, or empty."""
+    extra = field.json_schema_extra
+    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+
+
+def validate(model: type[M], given: Map, what: str, findings: Findings, *, where: Place | None = None) -> M | None:
+    """Make a model from a mapping; None if that gave findings.
+
+    Args:
+        model: The pydantic model; its fields may declare a unit.
+        given: What was written.
+        what: What is being filled, for messages (``skill 'squeeze'``).
+        findings: Where faults go.
+        where: Place of missing keys (default: the mapping).
+    """
+    values: dict[str, Any] = {}
+    poisoned: set[str] = set()
+    known = True
+    for key, node in given.entries:
+        name = str(key.value)
+        field = model.model_fields.get(name)
+        if field is None:
+            findings.unknown(key.place, "unknown_parameter", f"parameter of {what}:", name, model.model_fields)
+            known = False
+            continue
+        value = _value(node, unit_of(field), name, findings)
+        if _holds_poison(value):
+            poisoned.add(name)
+        else:
+            values[name] = value
+    try:
+        made = model.model_validate_json(json.dumps(values), strict=True)
+    except ValidationError as e:
+        before = len(findings)
+        for error in e.errors():
+            _report(error, model, given, what, findings, poisoned, where or given.place)
+        if len(findings) == before and not poisoned and known:
+            findings.add(where or given.place, "wrong_value", f"{what}: {e.errors()[0]['msg']}")
+        return None
+    return made if known and not poisoned else None
+
+
+def _value(node: Node, unit: str, name: str, findings: Findings) -> Any:
+    """The plain value, quantities converted to the field's unit."""
+    if isinstance(node, Seq):
+        return [_value(i, unit, name, findings) for i in node.items]
+    if isinstance(node, Map):
+        return {str(k.value): _value(v, unit, name, findings) for k, v in node.entries}
+    number, given_unit = node.value, node.unit
+    if node.poisoned:
+        return POISON
+    if isinstance(number, str) and (found := split_quantity(number)) and unit:
+        number, given_unit = found
+    if given_unit and unit and isinstance(number, (int, float)):
+        try:
+            return convert(number, given_unit, unit)
+        except ValueError:
+            source = f" (from {node.origin})" if node.origin else ""
+            findings.add(
+                node.place,
+                "wrong_unit",
+                f"{name} is in {unit}, not {given_unit!r}{source}",
+                valid=", ".join(units_for(unit)),
+            )
+            return POISON
+    return number
+
+
+def _holds_poison(value: Any) -> bool:
+    if isinstance(value, Mapping):
+        return any(_holds_poison(v) for v in value.values())
+    if isinstance(value, list):
+        return any(_holds_poison(v) for v in value)
+    return isinstance(value, Poison)
+
+
+def locate(node: Node, loc: tuple[int | str, ...]) -> tuple[Node, Place, tuple[int | str, ...]]:
+    """Follow a pydantic location as far as the source goes: (node, place of its key or value, what is left)."""
+    place = node.place
+    for i, step in enumerate(loc):
+        if isinstance(node, Map) and isinstance(step, str) and (child := node.get(step)) is not None:
+            place = node.key_place(step) if isinstance(child, Scalar) and child.value is None else child.place
+            node = child
+        elif isinstance(node, Seq) and isinstance(step, int) and step < len(node.items):
+            node = node.items[step]
+            place = node.place
+        else:
+            return node, place, loc[i:]
+    return node, place, ()
+
+
+def _report(
+    error: Any, model: type[BaseModel], given: Map, what: str, findings: Findings, poisoned: set[str], where: Place
+) -> None:
+    loc: tuple[int | str, ...] = error["loc"]
+    name = str(loc[0]) if loc else ""
+    if name in poisoned:
+        return
+    field = model.model_fields.get(name)
+    unit = f" {unit_of(field)}" if field and unit_of(field) else ""
+    if error["type"] == "missing" and len(loc) == 1:
+        description = f" ({field.description})" if field and field.description else ""
+        findings.add(where, "missing_parameter", f"{what} needs {name!r}{description}")
+        return
+    node, place, rest = locate(given, loc)
+    if error["type"] == "extra_forbidden":
+        parent = locate(given, loc[:-1])[0]
+        at = parent.key_place(str(loc[-1])) if isinstance(parent, Map) else place
+        findings.unknown(at, "unknown_parameter", f"key of {name} in {what}:", str(loc[-1]), ())
+        return
+    dotted = ".".join(str(s) for s in loc if not isinstance(s, str) or s in _written(given) or rest == ())
+    shown = f" = {node.value!r}" if isinstance(node, Scalar) else ""
+    source = f" (from {node.origin})" if isinstance(node, Scalar) and node.origin else ""
+    words = _WORDS.get(error["type"])
+    rule = words.format(**error.get("ctx", {})) if words else error["msg"][:1].lower() + error["msg"][1:]
+    if error["type"] == "missing":
+        rule = f"needs {loc[-1]!r}"
+        dotted, shown = ".".join(str(s) for s in loc[:-1]), ""
+    subject = f"{dotted}{shown}{source}" if dotted else what
+    code = "wrong_range" if error["type"].startswith(("greater", "less")) else "wrong_type"
+    findings.add(place, code, f"{subject}: {rule}{unit if code == 'wrong_range' else ''}", valid=_valid(field, unit))
+
+
+def _written(given: Map) -> set[str]:
+    names: set[str] = set()
+    stack: list[Node] = [given]
+    while stack:
+        node = stack.pop()
+        if isinstance(node, Map):
+            names.update(node.keys())
+            stack.extend(v for _, v in node.entries)
+        elif isinstance(node, Seq):
+            stack.extend(node.items)
+    return names
+
+
+def _valid(field: FieldInfo | None, unit: str) -> str:
+    """The field's type, range and unit in words."""
+    if field is None:
+        return ""
+    kind = getattr(field.annotation, "__name__", str(field.annotation).replace("typing.", ""))
+    rules = [
+        f"{symbol} {getattr(m, attribute)}"
+        for m in field.metadata
+        for attribute, symbol in (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
+        if getattr(m, attribute, None) is not None
+    ]
+    return f"{kind}{unit}" + (f", {', '.join(rules)}" if rules else "")

@@ -1,0 +1,200 @@
+"""A mission file to a checked mission, or to one report of everything that is wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from glotouch_bt.mission.findings import Findings, MissionFaults
+from glotouch_bt.mission.flow import check_flow
+from glotouch_bt.mission.library import SkillShelf, find_shipped, shipped_root, shown
+from glotouch_bt.mission.nodes import NodeSpec, number_names
+from glotouch_bt.mission.parameters import Parameter, Value, read_parameters, resolved, substitute
+from glotouch_bt.mission.parse import Scope, parse_tree
+from glotouch_bt.mission.source import Map, Node, Scalar, plain, read_yaml
+from glotouch_bt.mission.worlds import read_world
+from glotouch_bt.robot import BadInput, World
+from skills.base import Skill
+
+MISSION_KEYS = ("mission", "description", "world", "parameters", "tree", "timeout_s")
+LONGEST_S = 3600.0
+
+
+@dataclass(frozen=True)
+class Mission:
+    """A mission that passed every check.
+
+    Attributes:
+        name: Its name.
+        description: One line for people.
+        world: The nominal world it runs in.
+        parameters: Values in use, in their declared units.
+        stl_parameters: Names of those parameters that name an object.
+        tree: The checked tree.
+        timeout_s: Longest duration on the robot's clock.
+        file: Where it came from.
+        document: The mission as plain data with the values in use, for the run's folder.
+    """
+
+    name: str
+    description: str
+    world: World
+    parameters: Mapping[str, Value]
+    stl_parameters: tuple[str, ...]
+    tree: NodeSpec
+    timeout_s: float
+    file: Path
+    document: Mapping[str, Any]
+
+    def resolved_yaml(self) -> str:
+        """The document as YAML text."""
+        return str(yaml.safe_dump(dict(self.document), sort_keys=False, allow_unicode=True, width=110))
+
+
+def load_mission(
+    given: str | Path,
+    settings: Mapping[str, str | Value] | None = None,
+    *,
+    skills: Mapping[str, type[Skill]] | None = None,
+    objects: Path | None = None,
+) -> Mission:
+    """Load and check a mission.
+
+    Args:
+        given: Path of a mission file, or the name of a shipped mission.
+        settings: `--set` values; names the mission does not declare are left to the caller (`split_settings`).
+        skills: Known skills (default: all that are installed).
+        objects: A folder of STL files to use instead of the world's.
+
+    Raises:
+        MissionFaults: Everything that is wrong with it, each with its place. (A `BadInput`.)
+        BadInput: It cannot be read at all.
+    """
+    path = find_shipped("", str(given), "mission")
+    findings = Findings()
+    mission = _read(path, dict(settings or {}), SkillShelf() if skills is None else skills, objects, findings)
+    if mission is None or len(findings):
+        raise MissionFaults(findings.sorted())
+    return mission
+
+
+def split_settings(mission: Mission, settings: Mapping[str, str]) -> dict[str, str]:
+    """The `--set` values that no mission parameter takes; they are backend options."""
+    return {k: v for k, v in settings.items() if k not in mission.parameters}
+
+
+def _read(
+    path: Path,
+    settings: Mapping[str, str | Value],
+    skills: Mapping[str, type[Skill]],
+    objects: Path | None,
+    findings: Findings,
+) -> Mission | None:
+    source = read_yaml(path, shown(path))
+    if not isinstance(source, Map):
+        findings.add(source.place, "wrong_type", "a mission must be a mapping", valid=", ".join(MISSION_KEYS))
+        return None
+    for key, _ in source.entries:
+        if key.value not in MISSION_KEYS:
+            findings.unknown(key.place, "unknown_key", "key of a mission:", str(key.value), MISSION_KEYS)
+    name = _text(source, "mission", findings, required=True)
+    description = _text(source, "description", findings, required=False)
+    world, world_document = _world(source, path, objects, findings)
+    folder = world.objects.folder if world else None
+    parameters = read_parameters(source.get("parameters"), settings, findings, folder)
+    timeout_s = _timeout(source, findings)
+    tree_node = source.get("tree")
+    if tree_node is None:
+        findings.add(source.place, "missing_key", "a mission needs 'tree'")
+        return None
+    scope = Scope(skills, findings, path, folder)
+    tree = parse_tree(substitute(tree_node, parameters, findings), scope)
+    number_names(tree)
+    check_flow(tree, findings)
+    if world is None or len(findings):
+        return None
+    values = {n: p.value for n, p in parameters.items() if p.value is not None}
+    document = _document(source, name, world_document, parameters)
+    stl = tuple(n for n, p in parameters.items() if p.declared.type == "stl")
+    return Mission(name, description, world, values, stl, tree, timeout_s, path, document)
+
+
+def _text(source: Map, key: str, findings: Findings, *, required: bool) -> str:
+    node = source.get(key)
+    if node is None:
+        if required:
+            findings.add(source.place, "missing_key", f"a mission needs {key!r}")
+        return ""
+    if not isinstance(node, Scalar) or not isinstance(node.value, str) or not node.value.strip():
+        findings.add(node.place, "wrong_type", f"{key}: must be text")
+        return ""
+    if key == "mission" and not all(c.isalnum() or c in "_-" for c in node.value):
+        findings.add(node.place, "wrong_name", f"mission name {node.value!r}", valid="letters, digits, _ and -")
+    return node.value
+
+
+def _timeout(source: Map, findings: Findings) -> float:
+    node = source.get("timeout_s")
+    if node is None:
+        return LONGEST_S
+    value = node.value if isinstance(node, Scalar) else None
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= 86_400:
+        findings.add(node.place, "wrong_value", "timeout_s: must be a number of seconds in (0, 86400]")
+        return LONGEST_S
+    return float(value)
+
+
+def _world(source: Map, path: Path, objects: Path | None, findings: Findings) -> tuple[World | None, object]:
+    node = source.get("world")
+    if node is None:
+        findings.add(source.place, "missing_key", "a mission needs 'world'", valid="worlds/NAME.yaml or a path")
+        return None, None
+    if isinstance(node, Map):
+        return read_world(node, path, findings, objects), plain(node)
+    if not isinstance(node, Scalar) or not isinstance(node.value, str):
+        findings.add(node.place, "wrong_type", "world: must be the path of a world file")
+        return None, None
+    found = _find_world(node.value, path)
+    if found is None:
+        names = [f"worlds/{p.name}" for p in sorted((shipped_root() / "worlds").glob("*.yaml"))]
+        findings.unknown(node.place, "unknown_world", "world", node.value, names)
+        return None, None
+    try:
+        content = read_yaml(found, shown(found))
+    except BadInput as e:
+        findings.add(node.place, "unusable_world", f"the world cannot be read: {e}")
+        return None, None
+    inside = shown(found).removeprefix("missions/")
+    document = inside if inside != shown(found) else str(found.resolve())
+    return read_world(content, found, findings, objects), document
+
+
+def _find_world(given: str, mission: Path) -> Path | None:
+    """Relative to the mission's file, else to the shipped missions; a bare name is a shipped world."""
+    names = [given] if given.endswith((".yaml", ".yml")) else [given, f"worlds/{given}.yaml"]
+    for root in (mission.parent, shipped_root()):
+        for name in names:
+            if (root / name).is_file():
+                return root / name
+    return None
+
+
+def _document(source: Map, name: str, world: object, parameters: Mapping[str, Parameter]) -> dict[str, Any]:
+    document: dict[str, Any] = {"mission": name, "world": world}
+    for key in ("description", "timeout_s"):
+        node: Node | None = source.get(key)
+        if node is not None:
+            document[key] = plain(node)
+    section = resolved(source.get("parameters"), parameters)
+    if section:
+        document["parameters"] = section
+    tree = source.get("tree")
+    document["tree"] = plain(tree) if tree is not None else None
+    return document
+
+
+__all__ = ["LONGEST_S", "Mission", "load_mission", "split_settings"]

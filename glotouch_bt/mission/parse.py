@@ -1,0 +1,333 @@
+"""A tree as written to checked `NodeSpec`s. Faults are gathered, never raised; a faulty node stays in place."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from glotouch_bt.mission.fields import validate
+from glotouch_bt.mission.findings import Findings
+from glotouch_bt.mission.library import shown
+from glotouch_bt.mission.nodes import KINDS, ConditionSettings, Kind, NodeSpec, RepeatSettings, SubtreeSettings, Wire
+from glotouch_bt.mission.parameters import Parameter, Value, read_parameters, substitute
+from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, read_yaml
+from glotouch_bt.robot import BadInput
+from skills.base import Skill
+
+KEY = re.compile(r"[a-z][a-z0-9_]*")
+DEEPEST_SUBTREE = 8
+SUBTREE_KEYS = ("subtree", "description", "parameters", "tree")
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What a tree is read in.
+
+    Attributes:
+        skills: Known skills.
+        findings: Where faults go.
+        file: The file being read; subtrees are found relative to it.
+        stl_folder: The world's objects, for stl parameters of subtrees.
+        prefix: Put before private keys ("" in the mission itself).
+        ports: Subtree key -> absolute key; None in the mission itself, where a key is its own name.
+        trail: Files being read, outermost first.
+    """
+
+    skills: Mapping[str, type[Skill]]
+    findings: Findings
+    file: Path
+    stl_folder: Path | None = None
+    prefix: str = ""
+    ports: Mapping[str, str] = field(default_factory=dict)
+    trail: tuple[Path, ...] = ()
+
+    def key(self, name: str) -> str:
+        """The absolute key of a name used in this tree."""
+        return self.ports.get(name, self.prefix + name)
+
+
+def parse_tree(node: Node, scope: Scope) -> NodeSpec:
+    """Read one node and everything below it."""
+    if isinstance(node, Scalar) and isinstance(node.value, str) and not node.poisoned:
+        return _named(node.value, node.place, Scalar(None, node.place), scope)
+    if isinstance(node, Map) and len(node.entries) == 1:
+        key, body = node.entries[0]
+        return _named(str(key.value), key.place, body, scope)
+    if isinstance(node, Seq):
+        return _composite("sequence", node.place, node, scope)
+    if isinstance(node, Map) and node.entries:
+        names = ", ".join(node.keys())
+        what = f"a node has one name, here are {len(node.entries)}: {names} (is the indentation right?)"
+        scope.findings.add(node.entries[1][0].place, "not_a_node", what)
+        key, body = node.entries[0]
+        return _named(str(key.value), key.place, body, scope) if key.value in {*KINDS, *scope.skills} else _lost(node)
+    if not (isinstance(node, Scalar) and node.poisoned):
+        scope.findings.add(node.place, "not_a_node", "not a node", valid="a skill or node name, then its settings")
+    return _lost(node)
+
+
+def _lost(node: Node) -> NodeSpec:
+    return NodeSpec("unknown", "unknown", node.place)
+
+
+def _named(name: str, place: Place, body: Node, scope: Scope) -> NodeSpec:
+    if name in KINDS:
+        kind = KINDS[name]
+        if kind.children == "many":
+            return _composite(name, place, body, scope)
+        if kind.children == "one":
+            return _decorator(name, kind, place, body, scope)
+        return _subtree(place, body, scope) if name == "subtree" else _condition(place, body, scope)
+    known = name
+    if name not in scope.skills:
+        known = scope.findings.unknown(place, "unknown_skill", "skill or node", name, [*KINDS, *scope.skills])
+        if known not in scope.skills:
+            return NodeSpec("unknown", name, place)
+    try:
+        skill = scope.skills[known]
+    except BadInput as e:
+        scope.findings.add(place, "unusable_skill", str(e))
+        return NodeSpec("unknown", name, place)
+    return _skill(known, skill, place, body, scope)
+
+
+def _settings_map(name: str, place: Place, body: Node, scope: Scope) -> Map:
+    """The mapping after a node's name; an empty one if it is missing or wrong (then reported)."""
+    if isinstance(body, Map):
+        return body
+    if not (isinstance(body, Scalar) and (body.value is None or body.poisoned)):
+        scope.findings.add(body.place, "wrong_type", f"{name}: its settings must be a mapping, {name}: {{key: value}}")
+    return Map((), place)
+
+
+def _take(given: Map, *names: str) -> tuple[dict[str, tuple[Place, Node]], Map]:
+    """Split off some keys: ({name: (key place, value)}, the rest)."""
+    taken = {str(k.value): (k.place, v) for k, v in given.entries if k.value in names}
+    return taken, replace(given, entries=tuple((k, v) for k, v in given.entries if k.value not in names))
+
+
+def _title(taken: Mapping[str, tuple[Place, Node]], default: str, scope: Scope) -> str:
+    if "name" not in taken:
+        return default
+    node = taken["name"][1]
+    if isinstance(node, Scalar) and isinstance(node.value, str) and node.value.strip():
+        return node.value.strip()[:80]
+    scope.findings.add(node.place, "wrong_type", "name: must be text")
+    return default
+
+
+def _composite(kind: str, place: Place, body: Node, scope: Scope) -> NodeSpec:
+    if isinstance(body, Seq):
+        taken: dict[str, tuple[Place, Node]] = {"do": (place, body)}
+        rest = Map((), place)
+    else:
+        taken, rest = _take(_settings_map(kind, place, body, scope), "name", "do")
+    settings = validate(KINDS[kind].settings, rest, f"node {kind!r}", scope.findings, where=place)
+    children: tuple[NodeSpec, ...] = ()
+    below = taken["do"][1] if "do" in taken else None
+    if isinstance(below, Seq):
+        children = tuple(parse_tree(i, scope) for i in below.items)
+    elif isinstance(below, Map):
+        children = (parse_tree(below, scope),)
+    if not children:
+        scope.findings.add(place, "no_children", f"{kind} has no children", valid=f"{kind}: [node, node, ...]")
+    return NodeSpec(kind, _title(taken, kind, scope), place, children, settings)
+
+
+def _decorator(name: str, kind: Kind, place: Place, body: Node, scope: Scope) -> NodeSpec:
+    bare = not kind.settings.model_fields  # `succeed: {orbit_probe: ...}` needs no `do`
+    if bare and not (isinstance(body, Map) and ("do" in body or not body.entries)):
+        taken: dict[str, tuple[Place, Node]] = {"do": (place, body)}
+        rest = Map((), place)
+    else:
+        taken, rest = _take(_settings_map(name, place, body, scope), "name", "do")
+    settings = validate(kind.settings, rest, f"node {name!r}", scope.findings, where=place)
+    below = taken["do"][1] if "do" in taken else None
+    if below is None or (isinstance(below, Scalar) and below.value is None):
+        scope.findings.add(place, "no_children", f"{name} has no child", valid="do: a node")
+        children: tuple[NodeSpec, ...] = ()
+    else:
+        children = (parse_tree(below, scope),)
+    spec = NodeSpec(name, _title(taken, name, scope), place, children, settings)
+    if name == "repeat":
+        _check_repeat(spec, rest, scope)
+    elif name == "for_each":
+        _wire_for_each(spec, rest, scope)
+    return spec
+
+
+def _wire(name: str, given: Map, scope: Scope, *, path: tuple[str, ...] | None = None) -> Wire | None:
+    """The key written under a setting, checked to be a key."""
+    node: Node | None = given
+    for step in path or (name,):
+        node = node.get(step) if isinstance(node, Map) else None
+    if not isinstance(node, Scalar) or not isinstance(node.value, str) or node.poisoned:
+        return None
+    return _keyed(name, node.value, node.place, scope)
+
+
+def _keyed(port: str, key: str, place: Place, scope: Scope) -> Wire | None:
+    if not KEY.fullmatch(key):
+        scope.findings.add(place, "wrong_key", f"{key!r} is not a port key", valid="small letters, digits and _")
+        return None
+    return Wire(port, scope.key(key), place)
+
+
+def _check_repeat(spec: NodeSpec, given: Map, scope: Scope) -> None:
+    settings = spec.settings
+    if not isinstance(settings, RepeatSettings):
+        return
+    if (settings.times is None) == (settings.until is None):
+        scope.findings.add(spec.place, "wrong_value", "repeat needs either times or until, and not both")
+        return
+    if isinstance(settings.until, str):
+        wire = _wire("until", given, scope)
+    else:
+        wire = _wire("until", given, scope, path=("until", "port"))
+        below = given.get("until")
+        if isinstance(settings.until, ConditionSettings) and isinstance(below, Map):
+            _check_comparison(settings.until, below.place, scope)
+    if wire:
+        spec.reads = {"until": wire}
+
+
+def _wire_for_each(spec: NodeSpec, given: Map, scope: Scope) -> None:
+    items, item = _wire("items", given, scope), _wire("item", given, scope)
+    reads = {"items": items} if items else {}
+    writes = {"item": item} if item else {}
+    collect = given.get("collect")
+    if isinstance(collect, Map):
+        for key, value in collect.entries:
+            source = _keyed(f"collect.{key.value}", str(key.value), key.place, scope)
+            if source and isinstance(value, Scalar) and isinstance(value.value, str) and not value.poisoned:
+                target = _keyed(f"collect.{key.value}", value.value, value.place, scope)
+                if target:
+                    reads[source.port], writes[target.port] = source, target
+    spec.reads, spec.writes = reads, writes
+
+
+def _check_comparison(settings: ConditionSettings, place: Place, scope: Scope) -> None:
+    asked = [n for n in ("equals", "at_least", "at_most", "is_set") if getattr(settings, n) is not None]
+    if len(asked) != 1:
+        found = " and ".join(asked) or "none"
+        what = f"a condition needs exactly one comparison, found {found}"
+        scope.findings.add(place, "wrong_value", what, valid="equals, at_least, at_most, is_set")
+
+
+def _condition(place: Place, body: Node, scope: Scope) -> NodeSpec:
+    taken, rest = _take(_settings_map("condition", place, body, scope), "name")
+    settings = validate(ConditionSettings, rest, "node 'condition'", scope.findings, where=place)
+    if settings is not None:
+        _check_comparison(settings, place, scope)
+    default = f"{settings.port}?" if settings is not None else "condition"
+    wire = _wire("port", rest, scope)
+    reads = {"port": wire} if wire else {}
+    return NodeSpec("condition", _title(taken, default, scope), place, (), settings, reads=reads)
+
+
+def _skill(name: str, skill: type[Skill], place: Place, body: Node, scope: Scope) -> NodeSpec:
+    taken, rest = _take(_settings_map(name, place, body, scope), "name", "in", "out")
+    params = validate(skill.Params, rest, f"skill {name!r}", scope.findings, where=place)
+    keys = skill.default_keys()
+    reads = {p: Wire(p, scope.key(keys[p]), place) for p in skill.INPUT_PORTS}
+    writes = {p: Wire(p, scope.key(keys[p]), place) for p in skill.OUTPUT_PORTS}
+    for direction, wires, other in (("in", reads, skill.OUTPUT_PORTS), ("out", writes, skill.INPUT_PORTS)):
+        if direction in taken:
+            _rewire(name, direction, taken[direction][1], wires, other, scope)
+    return NodeSpec(
+        "skill",
+        _title(taken, name, scope),
+        place,
+        skill=name,
+        skill_type=skill,
+        params=params,
+        reads=reads,
+        writes=writes,
+    )
+
+
+def _rewire(
+    skill: str, direction: str, given: Node, wires: dict[str, Wire], other: Mapping[str, object], scope: Scope
+) -> None:
+    if not isinstance(given, Map):
+        scope.findings.add(given.place, "wrong_type", f"{direction}: must be a mapping of port: key")
+        return
+    word = "input" if direction == "in" else "output"
+    for key, value in given.entries:
+        port = str(key.value)
+        if port not in wires:
+            if port in other:
+                where = "out" if direction == "in" else "in"
+                what = f"port {port!r} of skill {skill!r} is not an {word} port: it belongs under {where}:"
+                scope.findings.add(key.place, "unknown_port", what, valid=", ".join(wires) or "none")
+            else:
+                scope.findings.unknown(key.place, "unknown_port", f"{word} port of skill {skill!r}:", port, wires)
+        elif not isinstance(value, Scalar) or not isinstance(value.value, str):
+            scope.findings.add(value.place, "wrong_key", f"{direction}.{port}: must be the name of a key")
+        elif not value.poisoned and (wire := _keyed(port, value.value, value.place, scope)):
+            wires[port] = wire
+
+
+def _subtree(place: Place, body: Node, scope: Scope) -> NodeSpec:
+    given = _settings_map("subtree", place, body, scope)
+    taken, rest = _take(given, "name")
+    settings = validate(SubtreeSettings, rest, "node 'subtree'", scope.findings, where=place)
+    if settings is None:
+        return NodeSpec("unknown", _title(taken, "subtree", scope), place)
+    file_node = rest.get("file")
+    at = file_node.place if file_node else place
+    path = scope.file.parent / settings.file
+    trail = (*scope.trail, scope.file.resolve())
+    if path.resolve() in trail or len(trail) > DEEPEST_SUBTREE:
+        scope.findings.add(at, "subtree_loop", f"subtree {settings.file!r} contains itself or is nested too deep")
+        return NodeSpec("unknown", _title(taken, "subtree", scope), place)
+    try:
+        source = read_yaml(path, shown(path))
+    except BadInput as e:
+        scope.findings.add(at, "unusable_subtree", f"subtree cannot be read: {e}")
+        return NodeSpec("unknown", _title(taken, "subtree", scope), place)
+    title = _title(taken, path.stem, scope)
+    inner, tree = _open_subtree(source, settings.parameters, rest, scope, at)
+    if tree is None:
+        return NodeSpec("unknown", title, place)
+    ports: dict[str, str] = {}
+    for key, value in _entries(rest.get("ports")):
+        if isinstance(value, Scalar) and (wire := _keyed(str(key.value), str(value.value), value.place, scope)):
+            ports[str(key.value)] = wire.key
+    prefix = f"{scope.prefix}{path.stem}@{place.line}.{place.column}/"
+    child_scope = replace(scope, file=path, prefix=prefix, ports=ports, trail=trail)
+    child = parse_tree(substitute(tree, inner, scope.findings), child_scope)
+    used = {w.key for n in child.walk() for w in (*n.reads.values(), *n.writes.values())}
+    for key, _ in _entries(rest.get("ports")):
+        if str(key.value) in ports and ports[str(key.value)] not in used:
+            names = sorted(k.removeprefix(prefix) for k in used if k.startswith(prefix))
+            scope.findings.unknown(key.place, "unknown_port", f"port of subtree {path.stem!r}:", str(key.value), names)
+    return NodeSpec("subtree", title, place, (child,), settings)
+
+
+def _entries(node: Node | None) -> tuple[tuple[Scalar, Node], ...]:
+    return node.entries if isinstance(node, Map) else ()
+
+
+def _open_subtree(
+    source: Node, values: Mapping[str, Value], given: Map, scope: Scope, at: Place
+) -> tuple[dict[str, Parameter], Node | None]:
+    """The parameters and the tree of a subtree's file; no tree if it has none."""
+    if not isinstance(source, Map):
+        scope.findings.add(at, "unusable_subtree", "a subtree file must be a mapping", valid=", ".join(SUBTREE_KEYS))
+        return {}, None
+    for key, _ in source.entries:
+        if key.value not in SUBTREE_KEYS:
+            scope.findings.unknown(key.place, "unknown_key", "key of a subtree file:", str(key.value), SUBTREE_KEYS)
+    parameters = read_parameters(source.get("parameters"), values, scope.findings, scope.stl_folder)
+    for key, _ in _entries(given.get("parameters")):
+        if key.value not in parameters:
+            scope.findings.unknown(
+                key.place, "unknown_parameter", "parameter of the subtree:", str(key.value), parameters
+            )
+    tree = source.get("tree")
+    if tree is None:
+        scope.findings.add(source.place, "missing_key", "a subtree file needs 'tree'")
+    return parameters, tree

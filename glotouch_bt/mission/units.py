@@ -1,0 +1,67 @@
+"""Numbers with units in YAML: `speed: 40 mm/s` for a parameter in m/s. Plain numbers are SI."""
+
+from __future__ import annotations
+
+import math
+import re
+
+# unit -> (SI unit it belongs to, factor). Angles are radians in SI.
+UNITS: dict[str, tuple[str, float]] = {
+    "m": ("m", 1.0),
+    "cm": ("m", 1e-2),
+    "mm": ("m", 1e-3),
+    "um": ("m", 1e-6),
+    "rad": ("rad", 1.0),
+    "deg": ("rad", math.pi / 180),
+    "m/s": ("m/s", 1.0),
+    "cm/s": ("m/s", 1e-2),
+    "mm/s": ("m/s", 1e-3),
+    "rad/s": ("rad/s", 1.0),
+    "deg/s": ("rad/s", math.pi / 180),
+    "m/s2": ("m/s2", 1.0),
+    "mm/s2": ("m/s2", 1e-3),
+    "N": ("N", 1.0),
+    "mN": ("N", 1e-3),
+    "kN": ("N", 1e3),
+    "Nm": ("Nm", 1.0),
+    "mNm": ("Nm", 1e-3),
+    "s": ("s", 1.0),
+    "ms": ("s", 1e-3),
+    "us": ("s", 1e-6),
+    "min": ("s", 60.0),
+    "kg": ("kg", 1.0),
+    "g": ("kg", 1e-3),
+    "Hz": ("Hz", 1.0),
+    "kHz": ("Hz", 1e3),
+    "%": ("", 1e-2),
+}
+
+_QUANTITY = re.compile(r"([-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([A-Za-z%µ][A-Za-z0-9/%^]*)")
+
+
+def split_quantity(text: str) -> tuple[float, str] | None:
+    """("40 mm/s") -> (40.0, "mm/s"); None if the text is not a number followed by a unit-like word."""
+    found = _QUANTITY.fullmatch(text.strip())
+    if not found or not math.isfinite(float(found[1])):
+        return None
+    return float(found[1]), found[2].replace("^", "")
+
+
+def units_for(unit: str) -> list[str]:
+    """The units that may be written where `unit` is expected."""
+    base = UNITS.get(unit, (unit, 1.0))[0]
+    return [u for u, (b, _) in UNITS.items() if b == base] or ([unit] if unit else [])
+
+
+def convert(value: float, unit: str, expected: str) -> float:
+    """A number in `unit`, in the expected unit.
+
+    Raises:
+        ValueError: They measure different things, or one is unknown.
+    """
+    if unit == expected:
+        return value
+    if unit not in UNITS or expected not in UNITS or UNITS[unit][0] != UNITS[expected][0]:
+        raise ValueError(f"{unit!r} is not {expected!r}")
+    # One rounding to 15 digits: 40 mm/s is 0.04 m/s, not 0.040000000000000001 of a product's last bit.
+    return float(f"{value * UNITS[unit][1] / UNITS[expected][1]:.15g}")
