@@ -1,1 +1,6 @@
-"""Room under construction."""
+"""What a person looks at after a run: `write_report` makes report.html, `read_run` gives the record as arrays and events."""
+
+from glotouch_bt.report.run_record import Event, PortWrite, RunRecord, Tick, read_run
+from glotouch_bt.report.write import write_report
+
+__all__ = ["Event", "PortWrite", "RunRecord", "Tick", "read_run", "write_report"]

@@ -1,0 +1,136 @@
+"""The force trace of a run, and every contact stop close up."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from glotouch_bt.report.page import esc, legend, number, section
+from glotouch_bt.report.run_record import Event, RunRecord
+from glotouch_bt.report.svg import Scale, label, picture, polyline, x_axis, y_axis
+from glotouch_bt.robot import Array
+
+BINS = 1000
+CLOSE_UPS = 48
+CLOSE_UP_S = 0.12
+
+
+def contact_of(event: Event) -> dict[str, Any]:
+    """The contact an event carries; empty if it has none."""
+    value = event.data.get("contact")
+    return value if isinstance(value, dict) else {}
+
+
+def contact_stamp_s(event: Event) -> float:
+    """Robot clock at the onset of an event's contact."""
+    stamp = contact_of(event).get("stamp_s")
+    return float(stamp) if isinstance(stamp, int | float) else event.stamp_s
+
+
+def envelope(stamp_s: Array, value: Array, bins: int) -> tuple[Array, Array, Array, Array]:
+    """Time (m,), least, median and largest of `value` in at most `bins` equal stretches of samples."""
+    edges = np.unique(np.linspace(0, len(value), min(bins, len(value)) + 1).astype(int))
+    low = np.minimum.reduceat(value, edges[:-1])
+    high = np.maximum.reduceat(value, edges[:-1])
+    middle = (edges[:-1] + edges[1:]) // 2
+    median = np.array([np.median(value[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True)])
+    return stamp_s[middle], low, median, high
+
+
+def force_section(record: RunRecord) -> str:
+    """The section, or nothing if no force was recorded."""
+    if len(record.samples.get("stamp_s", ())) < 2:
+        return ""
+    stamp = record.samples["stamp_s"]
+    force = np.nan_to_num(np.linalg.norm(record.samples["force_S_N"], axis=1))
+    contacts = record.of_kind("contact")
+    body = _trace(record, stamp, force, contacts)
+    keys = [("k-force", "size of the wrist force |F| (band: least to largest)")]
+    if contacts:
+        keys.append(("k-contact", f"contact stop ({len(contacts)})"))
+    body += legend(keys)
+    if contacts:
+        body += _close_ups(stamp, record.samples["force_S_N"], contacts)
+    lead = (
+        "What the wrist felt from start to end, after the last zeroing of the sensor. Each dot is a place where the arm "
+        "stopped because it touched something; below, the jaws' opening at the same times."
+    )
+    return section("Force", lead, body)
+
+
+def _trace(record: RunRecord, stamp: Array, force: Array, contacts: list[Event]) -> str:
+    width, left, right = 1060.0, 46.0, 1050.0
+    top, bottom = 34.0, 214.0
+    x = Scale(float(stamp[0]), float(stamp[-1]), left, right)
+    y = Scale(0.0, max(float(force.max()) * 1.12, 1.0), bottom, top)
+    t, low, median, high = envelope(stamp, force, BINS)
+    px = x(t)
+    out = [x_axis(x, top, bottom, ""), y_axis(y, left, right, "force, N")]
+    band = "fill:var(--wash);stroke:none"
+    out.append(polyline(np.concatenate([px, px[::-1]]), np.concatenate([y(high), y(low)[::-1]]), band, closed=True))
+    out.append(polyline(px, y(median), "fill:none;stroke:var(--blue);stroke-width:1.3;stroke-linejoin:round"))
+    peak = int(np.argmax(force))
+    peak_x, peak_y = x.at(float(stamp[peak])), y.at(float(force[peak]))
+    anchor = "e" if peak_x > 0.8 * right else ""
+    shift = -7 if anchor else 7
+    for e in contacts:
+        at = contact_stamp_s(e)
+        if stamp[0] <= at <= stamp[-1]:
+            size = contact_of(e).get("force_N")
+            felt = float(size) if isinstance(size, int | float) else float(np.interp(at, stamp, force))
+            cx = x.at(at)
+            out.append(f'<line x1="{cx:.1f}" x2="{cx:.1f}" y1="{bottom}" y2="{bottom + 5}" stroke="var(--contact)"/>')
+            out.append(
+                f'<circle cx="{cx:.1f}" cy="{y.at(min(felt, y.high)):.1f}" r="3.2" fill="var(--contact)" '
+                f'stroke="var(--card)"><title>contact at {at:.2f} s: {felt:.2f} N</title></circle>'
+            )
+    out.append(f'<circle cx="{peak_x:.1f}" cy="{peak_y:.1f}" r="3" fill="none" stroke="var(--ink)"/>')
+    out.append(label(peak_x + shift, peak_y - 5, f"peak {force[peak]:.1f} N", f"ink s halo {anchor}".strip()))
+    height = bottom + 34
+    cycles = record.cycles
+    if len(cycles.get("stamp_s", ())) > 1:
+        top2, bottom2 = bottom + 52, bottom + 122
+        aperture = np.nan_to_num(cycles["gripper_aperture_m"]) * 1e3
+        y2 = Scale(0.0, max(float(aperture.max()) * 1.1, 1.0), bottom2, top2)
+        out.append(x_axis(x, top2, bottom2, "robot clock, s"))
+        out.append(y_axis(y2, left, right, "jaw opening, mm", about=3))
+        t2, low2, median2, high2 = envelope(cycles["stamp_s"], aperture, BINS)
+        edge = np.where(high2 - median2 > median2 - low2, high2, low2)  # the turning points, not the smooth middle
+        out.append(polyline(x(t2), y2(edge), "fill:none;stroke:var(--t1);stroke-width:1.4"))
+        height = bottom2 + 40
+    return picture(width, height, "".join(out), "wrist force over time with contact stops")
+
+
+def _close_ups(stamp: Array, force_S_N: Array, contacts: list[Event]) -> str:
+    """One small chart a contact: the force's change around the onset."""
+    figures: list[str] = []
+    for i, e in enumerate(contacts[:CLOSE_UPS]):
+        at = contact_stamp_s(e)
+        a, b = np.searchsorted(stamp, [at - CLOSE_UP_S, at + CLOSE_UP_S])
+        if b - a < 4:
+            continue
+        force = np.nan_to_num(force_S_N[a:b])
+        before = stamp[a:b] < at - 0.02
+        change = np.linalg.norm(force - (force[before].mean(axis=0) if before.any() else force[0]), axis=1)
+        x = Scale(-CLOSE_UP_S, CLOSE_UP_S, 2, 148)
+        y = Scale(0.0, max(float(change.max()) * 1.1, 1.0), 52, 6)
+        step = max(1, len(change) // 120)
+        body = (
+            '<line x1="2" x2="148" y1="52" y2="52" class="axis"/>'
+            '<line x1="75" x2="75" y1="4" y2="52" stroke="var(--contact)" stroke-dasharray="2 2"/>'
+            + polyline(x(stamp[a:b:step] - at), y(change[::step]), "fill:none;stroke:var(--blue);stroke-width:1.2")
+        )
+        size = contact_of(e).get("force_N")
+        text = f"<b>{i + 1}</b> · {at:.1f} s · stop at {number(size, 1, 'N')} · peak {change.max():.1f} N"
+        figures.append(
+            f"<figure>{picture(150, 56, body, 'contact ' + str(i + 1))}<figcaption>{text}</figcaption></figure>"
+        )
+    if not figures:
+        return ""
+    more = f" The first {CLOSE_UPS} of {len(contacts)} are shown." if len(contacts) > CLOSE_UPS else ""
+    return (
+        f"<details open><summary>Contact stops close up: force change from {esc(int(CLOSE_UP_S * 1e3))} ms before to "
+        f"{int(CLOSE_UP_S * 1e3)} ms after each onset (dashed).{more}</summary>"
+        f'<div class="sparks">{"".join(figures)}</div></details>'
+    )
