@@ -1,7 +1,7 @@
 """The Flexiv Rizon 4 with a Xense-like parallel gripper, as numbers. Shared by the simulator and the hardware backend.
 
 Kinematics and inertia: the vendor's own description (flexivrobotics/flexiv_description, config/Rizon4), which an
-independent model of the arm agrees with (google-deepmind/mujoco_menagerie, flexiv_rizon4); the armature comes from there.
+independent model of the arm agrees with (google-deepmind/mujoco_menagerie, flexiv_rizon4); the armature is from there.
 Position ranges: the vendor's RDK v1.5 URDF, 0.0873 rad (5 degrees) inside those of the description at each end.
 """
 
@@ -88,9 +88,9 @@ _TABLE = (
     ((-0.015, 0.073, 0.11), (0.0, -pi / 2, 0.0), Z, -2.9671, 2.9671, 4.8869, 39.0, 0.13),
 )
 
-# A parallel gripper of the Xense kind. Stroke, force, speed, gel window and gel depth: docs of the conditions every figure
-# is measured under. Masses, boxes and the 0.20 m from the flange to the pads' mid-point are ours: 0.884 kg of hand (0.944
-# with the probe), fingers that reach 0.131 m below the body.
+# A parallel gripper of the Xense kind. Stroke, force, speed, gel window and gel depth are those of the conditions every
+# figure is measured under. Masses, boxes and the 0.20 m from the flange to the pads are ours: 0.884 kg of hand
+# (0.944 with the probe), fingers that reach 0.131 m below the body.
 XENSE_GRIPPER = Gripper(
     pose_E_P=Pose(np.array([0.0, 0.0, 0.20])),
     mass_kg=0.704,
