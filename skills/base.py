@@ -16,7 +16,7 @@
                 raise SkillFailed("no_touch", f"no touch in {self.params.travel_m} m", advice="sweep lower")
             self.contact = ...
 
-`run` returns: SUCCESS. `SkillFailed` or `MotionRefused`: FAILURE with its reason. Anything else propagates to the runner,
+`run` returns: SUCCESS. `SkillFailed` or `MotionRefused`: FAILURE with its reason. Anything else reaches the runner,
 which holds the arm. A preempted skill's generator is closed (its `finally` blocks run) and the arm is held.
 """
 
@@ -155,7 +155,7 @@ class Journal(Protocol):
     """Where skills write what they found; the runner's record implements it."""
 
     def event(self, kind: str, stamp_s: float, data: Mapping[str, object]) -> None:
-        """Record one event: `kind` (contact, candidate, touchset, ranking, ...) with JSON-able data (arrays allowed)."""
+        """Record one event: `kind` (contact, candidate, touchset, ranking, ...) with JSON-able data or arrays."""
         ...
 
 

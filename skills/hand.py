@@ -9,7 +9,7 @@ from glotouch_bt.robot import Array, Container, Pose
 
 
 def easy_yaw(arm: Arm, yaw_B_rad: float) -> float:
-    """Of `yaw_B_rad` and its half turns, the one nearest to the arm's home yaw (farthest from the last joint's stops)."""
+    """Of `yaw_B_rad` and its half turns, the one nearest to the arm's home yaw (far from the last joint's stops)."""
     away = (yaw_B_rad - arm.home_yaw_B_rad + 0.5 * np.pi) % np.pi - 0.5 * np.pi
     return float(arm.home_yaw_B_rad + away)
 

@@ -17,7 +17,7 @@ class HeldTool:
         shaft_radius_m: Shaft radius.
         aperture_m: Reported aperture with the handle between the pads.
         yaw_B_rad: Yaw of x_P in B at which the probe was grasped; the hand keeps it while it probes.
-        floor_z_K_m: Height of the floor in K as the tip felt it; 0 if the registration were exact and the grasp perfect.
+        floor_z_K_m: Height of the floor in K as the tip felt it; 0 if registration and grasp were perfect.
             Heights measured with this tool subtract it.
     """
 

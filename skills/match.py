@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from glotouch_bt.recognition import MatchParams, PadSpec, Ranking, TargetModel, match, rank
+from glotouch_bt.recognition import LossParams, PadSpec, Ranking, TargetModel, match, rank
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.meshes import Mesh, load_folder, load_mesh
 from glotouch_bt.touch import TouchSet
@@ -12,7 +12,7 @@ from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, para
 from skills.grasp_plan import GraspPlan, plan_grasp
 
 
-class MatchParams_(SkillParams):
+class MatchParams(SkillParams):
     """Parameters of `match`."""
 
     target: str = param("The object to find: an STL file, or the name of one in the world's object folder")
@@ -26,8 +26,8 @@ class Match(Skill):
     FAILURE `no_touch`: nothing was squeezed.
     """
 
-    Params = MatchParams_
-    params: MatchParams_
+    Params = MatchParams
+    params: MatchParams
     touchsets = In(tuple, "one TouchSet per candidate squeezed", required=False)
     ranking = Out(Ranking, "all candidates, best first")
     plan = Out(GraspPlan, "how to grasp the best one")
@@ -40,7 +40,7 @@ class Match(Skill):
         gripper = self.context.arm.description.gripper
         mesh = self._target()
         model = TargetModel.from_mesh(mesh, PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m))
-        matches = [match(model, t, MatchParams()) for t in touchsets]
+        matches = [match(model, t, LossParams()) for t in touchsets]
         ranking = rank(matches)
         self.ranking = ranking
         self.event("ranking", target=mesh.name, ranking=ranking)

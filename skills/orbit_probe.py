@@ -7,8 +7,16 @@ import numpy as np
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.search import SearchMap
-from glotouch_bt.touch import Candidate, Contact, Contour, GuardParams, contour_quality, fit_contour, needs_more
-from glotouch_bt.touch import largest_gap_direction
+from glotouch_bt.touch import (
+    Candidate,
+    Contact,
+    Contour,
+    GuardParams,
+    contour_quality,
+    fit_contour,
+    largest_gap_direction,
+    needs_more,
+)
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.held_tool import HeldTool
 from skills.probing import Prober

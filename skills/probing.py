@@ -15,7 +15,7 @@ from skills.held_tool import HeldTool
 BASELINE_S = 0.12
 SETTLE_S = 0.08
 GENTLE_ACCELERATION_M_S2, GENTLE_JERK_M_S3 = 0.3, 5.0
-"""Limits while a guard listens: the hand's own inertia stays below 0.06 N at the tip (measured in a feasibility study)."""
+"""Limits while a guard listens: the hand's own inertia stays below 0.06 N at the tip (feasibility study)."""
 
 
 @dataclass(frozen=True)

@@ -33,8 +33,8 @@ class SqueezeParams(SkillParams):
 class Squeeze(Skill):
     """Force-limited closures on one candidate.
 
-    A round candidate is squeezed at three yaws, 60 degrees apart; a box-like one on three parallel tracks across its short
-    side. Layers go from low to high: the first closure centres the object between the jaws where it cannot topple.
+    A round candidate is squeezed at three yaws, 60 degrees apart; a box-like one on three parallel tracks across its
+    short side. Layers go from low to high: the first closure centres the object between the jaws where it cannot topple.
 
     SUCCESS: at least one stable layer; `touchset` holds all of them.
     FAILURE `nothing_felt`: no closure reached a plateau on anything.
@@ -144,7 +144,7 @@ class Squeeze(Skill):
         command = Command(gripper=GripperTarget(0.0, p.closing_speed_m_s, p.force_N), tactile=True)
         blocks: list[Observation] = []
         for _ in range(round(p.settle_s / arm.period_s)):
-            blocks.append((yield command))
+            blocks.append((yield command))  # noqa: PERF401 (a comprehension cannot yield)
         pose_K_B = self.context.world.container.pose_B_K.inverse()
         measured = pose_K_B.apply(blocks[-1].pose_B_P.position_m)
         return make_layer(

@@ -26,7 +26,7 @@ class ToolPickupParams(SkillParams):
 
 
 class ToolPickup(Skill):
-    """Grasp the probe in its holder, draw it out, tell the controller its weight, tare, and touch the container's floor.
+    """Grasp the probe in its holder, draw it out, tell the controller its weight, tare, and touch the floor.
 
     SUCCESS: the probe is held and its floor height is known.
     FAILURE `no_probe`: the jaws closed on nothing (or on something of another width).
@@ -61,7 +61,7 @@ class ToolPickup(Skill):
             yield from arm.line(above, 0.05)
             raise SkillFailed(
                 "no_probe",
-                f"the jaws closed to {state.aperture_m * 1e3:.1f} mm; the handle is {probe.handle_m[1] * 1e3:.1f} mm wide",
+                f"the jaws closed to {state.aperture_m * 1e3:.1f} mm, the handle is {probe.handle_m[1] * 1e3:.1f}",
                 advice="check that the probe stands in its holder and that the holder's pose is right",
                 aperture_m=state.aperture_m,
             )
