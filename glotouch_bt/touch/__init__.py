@@ -1,1 +1,65 @@
-"""Room under construction."""
+"""What touching means: contacts found in a wrist's signal, outlines fitted to them, squeezes turned into evidence.
+
+Pure: arrays in, values out. Knows no robot, tree or file.
+"""
+
+from glotouch_bt.touch.baseline import Baseline, fit_baseline
+from glotouch_bt.touch.contours import consistent, contour_quality, fit_contour, fit_kind, signed_distance
+from glotouch_bt.touch.detector import (
+    ContactGuard,
+    GuardParams,
+    HardStop,
+    HardTrip,
+    Onset,
+    reaction_direction,
+    settled,
+)
+from glotouch_bt.touch.filtering import LowPass
+from glotouch_bt.touch.fusion import TipFusion
+from glotouch_bt.touch.localisation import contact_direction, contact_point, disc_support, polygon_support
+from glotouch_bt.touch.patches import PatchStats, evidence_weight, patch_statistics, relative_nonplanarity
+from glotouch_bt.touch.plateau import Plateau, PlateauParams, find_plateau, make_layer, temporal_median
+from glotouch_bt.touch.tracing import largest_gap_direction, needs_more, widest_gap
+from glotouch_bt.touch.values import Candidate, Contact, Contour, ContourKind, Layer, TouchSequence, TouchSet
+
+__all__ = [
+    "Baseline",
+    "Candidate",
+    "Contact",
+    "ContactGuard",
+    "Contour",
+    "ContourKind",
+    "GuardParams",
+    "HardStop",
+    "HardTrip",
+    "Layer",
+    "LowPass",
+    "Onset",
+    "PatchStats",
+    "Plateau",
+    "PlateauParams",
+    "TipFusion",
+    "TouchSequence",
+    "TouchSet",
+    "consistent",
+    "contact_direction",
+    "contact_point",
+    "contour_quality",
+    "disc_support",
+    "evidence_weight",
+    "find_plateau",
+    "fit_baseline",
+    "fit_contour",
+    "fit_kind",
+    "largest_gap_direction",
+    "make_layer",
+    "needs_more",
+    "patch_statistics",
+    "polygon_support",
+    "reaction_direction",
+    "relative_nonplanarity",
+    "settled",
+    "signed_distance",
+    "temporal_median",
+    "widest_gap",
+]
