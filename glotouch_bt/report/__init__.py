@@ -1,4 +1,4 @@
-"""What a person looks at after a run: `write_report` makes report.html, `read_run` gives the record as arrays and events."""
+"""What a person looks at after a run: `write_report` makes report.html, `read_run` gives its arrays and events."""
 
 from glotouch_bt.report.run_record import Event, PortWrite, RunRecord, Tick, read_run
 from glotouch_bt.report.write import write_report

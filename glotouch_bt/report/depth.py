@@ -14,19 +14,9 @@ from glotouch_bt.report.page import esc, number, section
 from glotouch_bt.report.run_record import RunRecord
 from glotouch_bt.robot import Array
 
-_ANCHORS = np.array(  # a perceptually even ramp from black over red to pale yellow
-    [
-        (6, 6, 18),
-        (45, 14, 92),
-        (104, 24, 110),
-        (160, 44, 98),
-        (212, 72, 66),
-        (244, 126, 24),
-        (249, 194, 44),
-        (252, 252, 170),
-    ],
-    dtype=np.float64,
-)
+_DARK = [(6, 6, 18), (45, 14, 92), (104, 24, 110), (160, 44, 98)]
+_BRIGHT = [(212, 72, 66), (244, 126, 24), (249, 194, 44), (252, 252, 170)]
+_ANCHORS = np.array(_DARK + _BRIGHT, dtype=np.float64)  # an even ramp from black over red to pale yellow
 MISSING = 255
 
 
@@ -66,11 +56,12 @@ def depth_section(record: RunRecord) -> str:
         f"{number(deepest, 2, 'mm', 1e3)}</p>"
     )
     lead = (
-        "What the two gel pads felt each time the jaws closed: left pad and right pad side by side, the upper edge nearest "
-        "the wrist. Each row is one sequence of closures from low to high; beneath, the height of the pads above the floor, "
-        "the opening between them, and the force. Faded pictures did not come to rest and carry no weight."
+        "What the two gel pads felt each time the jaws closed: left pad and right pad side by side, the upper edge "
+        "nearest the wrist. Each row is one sequence of closures from low to high; beneath, the height of the pads "
+        "above the floor, the opening between them, and the force. Faded pictures did not come to rest and carry no "
+        "weight."
     )
-    return section("Squeezes", lead, bar + "".join(_set(s, deepest) for s in sets))
+    return section("Squeezes", lead, bar + f'<div class="sets">{"".join(_set(s, deepest) for s in sets)}</div>')
 
 
 def _layers(touchset: dict[str, Any]) -> list[dict[str, Any]]:
@@ -98,13 +89,13 @@ def _set(touchset: dict[str, Any], deepest: float) -> str:
     rows = []
     for k, sequence in enumerate(touchset.get("sequences") or []):
         yaw = sequence.get("yaw_rad")
-        turn = f"jaws at {number(float(np.rad2deg(yaw)), 0)}°" if isinstance(yaw, int | float) else ""
+        turn = f"pads along {number(float(np.rad2deg(yaw)), 0)}°" if isinstance(yaw, int | float) else ""
         figures = "".join(_figure(layer, deepest) for layer in sequence.get("layers") or [])
         rows.append(
-            f'<div class="seq"><div class="tag">sequence {k + 1}<br>{turn}</div><div class="layers">{figures}</div></div>'
+            f'<div class="seq"><p class="tag">sequence {k + 1} · {turn}</p><div class="layers">{figures}</div></div>'
         )
     title = f"<h3>Candidate {esc(index)}<small>{len(layers)} closures, {stable} at rest</small></h3>"
-    return title + ("".join(rows) or "<p>No closure was possible.</p>")
+    return f"<div>{title}{''.join(rows) or '<p>No closure was possible.</p>'}</div>"
 
 
 def _figure(layer: dict[str, Any], deepest: float) -> str:
@@ -115,5 +106,6 @@ def _figure(layer: dict[str, Any], deepest: float) -> str:
     height, opening = number(layer.get("height_m"), 0, "mm", 1e3), number(layer.get("aperture_m"), 1, "mm", 1e3)
     return (
         f'<figure{"" if layer.get("stable") else " class=off"}><div class="pads">{pads}</div>'
-        f"<figcaption>at {height}<br>opening <b>{opening}</b><br>{number(layer.get('force_N'), 1, 'N')}</figcaption></figure>"
+        f"<figcaption>at {height}, {number(layer.get('force_N'), 1, 'N')}<br>opening <b>{opening}</b>"
+        "</figcaption></figure>"
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,7 @@ def envelope(stamp_s: Array, value: Array, bins: int) -> tuple[Array, Array, Arr
     low = np.minimum.reduceat(value, edges[:-1])
     high = np.maximum.reduceat(value, edges[:-1])
     middle = (edges[:-1] + edges[1:]) // 2
-    median = np.array([np.median(value[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True)])
+    median = np.array([np.median(value[a:b]) for a, b in pairwise(edges)])
     return stamp_s[middle], low, median, high
 
 
@@ -46,15 +47,15 @@ def force_section(record: RunRecord) -> str:
     force = np.nan_to_num(np.linalg.norm(record.samples["force_S_N"], axis=1))
     contacts = record.of_kind("contact")
     body = _trace(record, stamp, force, contacts)
-    keys = [("k-force", "size of the wrist force |F| (band: least to largest)")]
+    keys = [("k-force", "size of the wrist force |F|, least to largest in each moment")]
     if contacts:
         keys.append(("k-contact", f"contact stop ({len(contacts)})"))
     body += legend(keys)
     if contacts:
         body += _close_ups(stamp, record.samples["force_S_N"], contacts)
     lead = (
-        "What the wrist felt from start to end, after the last zeroing of the sensor. Each dot is a place where the arm "
-        "stopped because it touched something; below, the jaws' opening at the same times."
+        "What the wrist felt from start to end, after the last zeroing of the sensor. Each dot is a place where the "
+        "arm stopped because it touched something; below, the jaws' opening at the same times."
     )
     return section("Force", lead, body)
 
@@ -64,12 +65,12 @@ def _trace(record: RunRecord, stamp: Array, force: Array, contacts: list[Event])
     top, bottom = 34.0, 214.0
     x = Scale(float(stamp[0]), float(stamp[-1]), left, right)
     y = Scale(0.0, max(float(force.max()) * 1.12, 1.0), bottom, top)
-    t, low, median, high = envelope(stamp, force, BINS)
+    t, low, _, high = envelope(stamp, force, BINS)
     px = x(t)
     out = [x_axis(x, top, bottom, ""), y_axis(y, left, right, "force, N")]
-    band = "fill:var(--wash);stroke:none"
+    band = "fill:var(--blue);fill-opacity:.32;stroke:none"
     out.append(polyline(np.concatenate([px, px[::-1]]), np.concatenate([y(high), y(low)[::-1]]), band, closed=True))
-    out.append(polyline(px, y(median), "fill:none;stroke:var(--blue);stroke-width:1.3;stroke-linejoin:round"))
+    out.append(polyline(px, y(high), "fill:none;stroke:var(--blue);stroke-width:1;stroke-linejoin:round"))
     peak = int(np.argmax(force))
     peak_x, peak_y = x.at(float(stamp[peak])), y.at(float(force[peak]))
     anchor = "e" if peak_x > 0.8 * right else ""

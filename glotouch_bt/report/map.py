@@ -1,4 +1,4 @@
-"""The map: the container from above with the probe's path, its contacts, the fitted contours, the jaws, and the truth."""
+"""The map: the container from above with the probe's path, contacts, fitted contours, the jaws, and the truth."""
 
 from __future__ import annotations
 
@@ -71,8 +71,8 @@ def map_section(record: RunRecord) -> str:
     truth = true_outlines(record)
     found = candidates(record)
     lead = (
-        "The container from above (x to the right, y up, millimetres from its middle). The probe's ball moved along the "
-        "grey path; where it touched, the outline of an object was fitted."
+        "The container from above (x to the right, y up, millimetres from its middle). The probe's ball moved along "
+        "the grey path; where it touched, the outline of an object was fitted."
     )
     if truth:
         lead += " Green is where the objects really stood: known in simulation only, and to this report only."
@@ -82,7 +82,7 @@ def map_section(record: RunRecord) -> str:
 def _picture(
     record: RunRecord, interior: tuple[float, float, float], found: list[dict[str, Any]], truth: list[TrueOutline]
 ) -> str:
-    half_x, half_y, margin = interior[0] / 2, interior[1] / 2, 0.022
+    half_x, half_y, margin = interior[0] / 2, interior[1] / 2, 0.012
     width = 1060.0
     scale = (width - 60) / (2 * (half_x + margin))
     height = 2 * (half_y + margin) * scale + 40
@@ -203,30 +203,30 @@ def _pair(value: object) -> Array | None:
 def _table(found: list[dict[str, Any]], truth: list[TrueOutline]) -> str:
     if not found:
         return "<p>No object was found.</p>"
-    head = ["candidate", "class", "centre x, y", "size", "yaw", "height", "fit rms", "contacts", "quality"]
-    if truth:
-        head += ["true object", "centre off by"]
+    head = ["candidate", "class"] + (["true object"] if truth else [])
+    first_number = len(head)
+    head += ["x, y (mm)", "size (mm)", "yaw", "height (mm)", "fit rms (mm)", "contacts", "quality"]
+    head += ["centre off (mm)"] if truth else []
     rows = []
     for c in found:
         contour = contour_of(c)
         assert contour is not None
-        size = contour.size_m
-        row = [
-            f"<b>{c['index']}</b>",
-            esc(contour.kind),
-            f"{number(float(contour.centre_K_m[0]), 1, scale=1e3)}, {number(float(contour.centre_K_m[1]), 1, 'mm', 1e3)}",
-            number(size[0], 1, "mm", 1e3)
-            if contour.kind == "round"
-            else f"{number(size[0], 1, scale=1e3)} × {number(size[1], 1, 'mm', 1e3)}",
+        size, centre = contour.size_m, contour.centre_K_m
+        row = [f"<b>{c['index']}</b>", esc(contour.kind)]
+        near = min(truth, key=lambda o: float(np.linalg.norm(o.centre_K_m - centre)), default=None)
+        if near is not None:
+            row.append(esc(near.name))
+        both = f"{number(size[0], 1, scale=1e3)} × {number(size[1], 1, scale=1e3)}"
+        row += [
+            f"{number(float(centre[0]), 1, scale=1e3)}, {number(float(centre[1]), 1, scale=1e3)}",
+            f"⌀ {number(size[0], 1, scale=1e3)}" if contour.kind == "round" else both,
             "–" if contour.kind == "round" else number(float(np.rad2deg(contour.yaw_rad)), 0) + "°",
-            number(c.get("height_m"), 1, "mm", 1e3),
-            number(contour.rms_m, 2, "mm", 1e3),
+            number(c.get("height_m"), 1, scale=1e3),
+            number(contour.rms_m, 2, scale=1e3),
             str(len(c.get("contacts") or [])),
             number(c.get("quality"), 2),
         ]
-        if truth:
-            near = min(truth, key=lambda o: float(np.linalg.norm(o.centre_K_m - contour.centre_K_m)))
-            off = float(np.linalg.norm(near.centre_K_m - contour.centre_K_m))
-            row += [esc(near.name), number(off, 1, "mm", 1e3)]
+        if near is not None:
+            row.append(number(float(np.linalg.norm(near.centre_K_m - centre)), 1, scale=1e3))
         rows.append(row)
-    return "<h3>Candidates</h3>" + table(head, rows, numeric_from=2)
+    return "<h3>Candidates</h3>" + table(head, rows, numeric_from=first_number)

@@ -23,8 +23,8 @@ def ranking_section(record: RunRecord) -> str:
     matches.sort(key=lambda m: (_loss(m), str(m.get("index"))))
     target = data.get("target") or record.result.get("target") or "the target"
     lead = (
-        f"How badly each candidate fits {esc(target)}: the loss, least first. The best is taken only if it leads clearly "
-        "(margin), fits well (loss) and was felt enough (evidence)."
+        f"How badly each candidate fits {esc(target)}: the loss, least first. The best is taken only if it leads "
+        "clearly (margin), fits well (loss) and was felt enough (evidence)."
     )
     names = sorted({n for m in matches for n in (m.get("terms") or {})})
     body = (

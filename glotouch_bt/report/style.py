@@ -29,7 +29,7 @@ h3 small{font-weight:400;color:var(--soft);margin-left:8px}
 .facts{color:var(--soft);margin:0}
 .facts b{color:var(--ink);font-weight:600}
 .facts span{margin-right:20px;white-space:nowrap}
-.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(128px,1fr));gap:10px;margin-top:18px}
+.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(106px,1fr));gap:10px;margin-top:18px}
 .tile{border:1px solid var(--line);border-radius:9px;padding:10px 13px}
 .tile b{display:block;font-size:21px;font-weight:600;line-height:1.25;font-variant-numeric:tabular-nums}
 .tile span{color:var(--soft);font-size:12.5px}
@@ -69,12 +69,13 @@ ol.chain li:not(:last-child)::after{content:"";position:absolute;left:10.5px;top
 ol.chain code{font-size:13px}
 ol.chain p{margin:2px 0 0;color:var(--soft)}
 code{font-family:ui-monospace,SFMono-Regular,Menlo,Consolas,"DejaVu Sans Mono",monospace;font-size:13px}
-.seq{display:flex;align-items:flex-start;gap:14px;margin:0 0 10px}
-.seq>.tag{flex:0 0 118px;color:var(--soft);font-size:12.5px;padding-top:2px}
+.sets{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,460px),1fr));gap:6px 30px}
+.seq{margin:0 0 12px}
+.seq>.tag{color:var(--soft);font-size:12.5px;margin:0 0 4px}
 .layers{display:flex;flex-wrap:wrap;gap:12px}
 figure{margin:0}
 figure .pads{display:flex;gap:3px}
-figure img{width:56px;height:98px;image-rendering:pixelated;border-radius:3px;background:var(--grid);display:block}
+figure img{width:50px;height:87px;image-rendering:pixelated;border-radius:3px;background:var(--grid);display:block}
 figcaption{font-size:11.5px;line-height:1.35;color:var(--soft);margin-top:4px;font-variant-numeric:tabular-nums}
 figcaption b{color:var(--ink);font-weight:600}
 figure.off{opacity:.55}

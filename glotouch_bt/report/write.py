@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -44,19 +45,17 @@ def write_report(run_dir: Path) -> Path:
 
 def render(record: RunRecord) -> str:
     """The report's HTML."""
-    parts = [
-        _header(record),
-        _reasons(record),
-        map_section(record),
-        force_section(record),
-        depth_section(record),
-        ranking_section(record),
-        timeline_section(record),
-        _log(record),
-        _about(record),
-    ]
+    parts = [_part(name, make, record) for name, make in PARTS]
     mission = record.result.get("mission") or record.run.get("mission") or "run"
     return page(f"{mission} · {verdict(record)[1]}", "".join(parts))
+
+
+def _part(name: str, make: Callable[[RunRecord], str], record: RunRecord) -> str:
+    """One part of the page; what cannot be read (an event of another version's shape) costs only that part."""
+    try:
+        return make(record)
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as e:
+        return section(name, f"This part of the record could not be read ({esc(type(e).__name__)}: {esc(e)}).", "")
 
 
 def verdict(record: RunRecord) -> tuple[str, str]:
@@ -111,7 +110,8 @@ def _header(record: RunRecord) -> str:
     tiles = "".join(f'<div class="tile"><b>{v}</b><span>{esc(k)}</span></div>' for k, v in _numbers(record))
     over = esc(r.get("mission") or run.get("mission") or "run")
     return (
-        f'<header class="{tone}"><p class="over">GLoTouch run report · {over}</p><h1 class="verdict">{esc(sentence)}</h1>'
+        f'<header class="{tone}"><p class="over">GLoTouch run report · {over}</p>'
+        f'<h1 class="verdict">{esc(sentence)}</h1>'
         f'<p class="facts">{"".join(facts)}</p><div class="tiles">{tiles}</div></header>'
     )
 
@@ -138,7 +138,7 @@ def _numbers(record: RunRecord) -> list[tuple[str, str]]:
         len(s.get("layers") or []) for t in touchsets if isinstance(t, dict) for s in t.get("sequences") or []
     )
     if closures:
-        out.append(("closures of the jaws", str(closures)))
+        out.append(("jaw closures", str(closures)))
     peak = r.get("peak_force_N")
     if not _real(peak) and len(record.samples.get("stamp_s", ())):
         peak = float(np.nan_to_num(np.linalg.norm(record.samples["force_S_N"], axis=1)).max())
@@ -222,3 +222,16 @@ def _about(record: RunRecord) -> str:
     rows.append(["<code>record</code>", f"{esc(record.path.name)}, {count} force samples, {len(record.events)} events"])
     body = f"<details><summary>Show</summary>{table(['name', 'value'], rows, numeric_from=9)}</details>"
     return section("About this run", "What the run was told before it began.", body)
+
+
+PARTS: tuple[tuple[str, Callable[[RunRecord], str]], ...] = (
+    ("Verdict", _header),
+    ("Why", _reasons),
+    ("Map", map_section),
+    ("Force", force_section),
+    ("Squeezes", depth_section),
+    ("Recognition", ranking_section),
+    ("Timeline of the tree", timeline_section),
+    ("Log", _log),
+    ("About this run", _about),
+)

@@ -198,6 +198,7 @@ def test_ticks_events_ports_attachments(tmp_path: Path) -> None:
     assert any(n.startswith("contact") for n in names)
     with (tmp_path / "run.mcap").open("rb") as f:
         attachments = {a.name: json.loads(a.data) for a in make_reader(f).iter_attachments()}
+    with (tmp_path / "run.mcap").open("rb") as f:
         metadata = {m.name: m.metadata for m in make_reader(f).iter_metadata()}
     assert attachments["run.json"]["container"]["interior_m"] == [0.4, 0.3, 0.08]
     assert attachments["result.json"] == {"status": "success"}  # no wall time

@@ -62,7 +62,9 @@ class Clock:
         quat = np.tile(Pose.pointing_down([0, 0, 0], 0.0).quat, (N, 1))
         jaws = GripperState(float(stamp[-1]), self.aperture, 5.0, False)
         o = Observation(stamp, q, 0 * q, position, quat, wrench, jaws, tactile)
-        c = Command(JointSetpoint(q[-1], 0 * q[-1], 0 * q[-1], Pose(position[-1])), GripperTarget(self.aperture, 0.1, 10))
+        c = Command(
+            JointSetpoint(q[-1], 0 * q[-1], 0 * q[-1], Pose(position[-1])), GripperTarget(self.aperture, 0.1, 10)
+        )
         self.record.block(o, c if self.cycles % 2 else HOLD)
         self.cycles += 1
 
@@ -135,7 +137,7 @@ def make_run(folder: Path, *, until: str = "end", seed: int = 5) -> Made:
         outline, centre = contour_of(spec), np.array(spec[2])
         contacts: list[Contact] = []
         bearings = np.deg2rad([200, 250, 300, 345, 40, 90, 140])
-        clock.line_K(np.array([*(centre + [0, -0.06]), z + 0.06]))
+        clock.line_K(np.array([*(centre - np.array([0, 0.06])), z + 0.06]))
         for k, b in enumerate(bearings):
             away = np.array([np.cos(b), np.sin(b)])
             far = centre + away * (outline.radius_m + 0.022)
@@ -159,7 +161,11 @@ def make_run(folder: Path, *, until: str = "end", seed: int = 5) -> Made:
                 tick("retrieve/explore/orbit_probe", "RUNNING")
                 if until == "sweep":
                     made.contacts, made.cycles = contacts, clock.cycles
-                    result = {"mission": "retrieve", "status": "aborted", "reason_chain": ["interrupted by <user> & co"]}
+                    result = {
+                        "mission": "retrieve",
+                        "status": "aborted",
+                        "reason_chain": ["interrupted by <user> & co"],
+                    }
                     record.close(result)
                     (folder / "result.json").write_text(json.dumps(result))
                     return made
@@ -258,7 +264,9 @@ def ranking(made: Made) -> dict[str, object]:
         terms = dict(zip(("width", "image", "depth", "height", "contour"), share.tolist(), strict=True))
         centre = made.candidates[index].contour.centre_K_m
         pose = (float(centre[0]), float(centre[1]), 0.7)
-        matches.append({"index": index, "loss": losses[index], "terms": terms, "pose_K_O": pose, "evidence": 8.25 - index})
+        matches.append(
+            {"index": index, "loss": losses[index], "terms": terms, "pose_K_O": pose, "evidence": 8.25 - index}
+        )
     return {
         "matches": matches,
         "margin": 0.911 - 0.4325,

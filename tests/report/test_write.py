@@ -1,0 +1,159 @@
+"""The page against the run it is made of."""
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from glotouch_bt.mission.record import Recorder
+from glotouch_bt.report import read_run, write_report
+from glotouch_bt.report.map import tip_path_K_m
+from glotouch_bt.report.timeline import spans
+from glotouch_bt.report.truth import true_outlines
+from glotouch_bt.robot import BadInput
+
+VOID = {"meta", "img", "br"}
+
+
+class Balanced(HTMLParser):
+    """Fails on a tag that is not closed in order; collects text and tags."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.text: list[str] = []
+        self.tags: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open, tag
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text.append(data)
+
+
+def parsed(page: str) -> Balanced:
+    p = Balanced()
+    p.feed(page)
+    assert p.open == []
+    return p
+
+
+@pytest.fixture(scope="module")
+def page(whole: SimpleNamespace) -> str:
+    return write_report(whole.folder).read_text()
+
+
+def test_the_page_says_what_the_run_says(page: str, whole: SimpleNamespace) -> None:
+    text = " ".join(parsed(page).text)
+    for said in ("Retrieved <b>wukong & co</b>", "12.3 N", "6.28 m", "5 of 5", "0.432", "0.479", "nominal"):
+        assert said in text, said
+    assert f"contact stop ({len(whole.contacts)})" in text
+    for title in ("Map", "Force", "Squeezes", "Recognition", "Timeline of the tree", "Log", "About this run"):
+        assert f"<h2>{title}</h2>" in page
+    for touchset in whole.touchsets:
+        for layer in touchset.layers:
+            assert f"{layer.aperture_m * 1e3:.1f} mm" in text
+    assert page.count("data:image/png;base64,") == 2 * sum(len(t.layers) for t in whole.touchsets)
+
+
+def test_the_page_needs_no_network_and_runs_no_script(page: str) -> None:
+    assert not re.search(r"https?:|[\"'(]//|url\(|@import|<script|<link|<iframe|\son\w+=", page)
+    assert len(page) < 5_000_000
+
+
+def test_names_are_escaped(page: str) -> None:
+    assert "<b>wukong" not in page
+    assert "&lt;b&gt;wukong &amp; co&lt;/b&gt;" in page
+    assert "probe stowed &lt;safely&gt;" in page
+
+
+def test_same_run_same_page(page: str, whole: SimpleNamespace) -> None:
+    assert write_report(whole.folder).read_text() == page
+
+
+@pytest.mark.parametrize("until", ["opened", "sweep"])
+def test_a_run_that_stopped_early_gives_a_shorter_report(tmp_path: Path, writer: SimpleNamespace, until: str) -> None:
+    writer.make_run(tmp_path, until=until)
+    page = write_report(tmp_path).read_text()
+    text = " ".join(parsed(page).text)
+    assert "Recognition" not in text
+    if until == "sweep":
+        assert "Aborted: interrupted by <user> & co" in text
+        assert "Why" in text
+
+
+def test_a_cut_record_without_a_result_still_gives_a_report(whole: SimpleNamespace, tmp_path: Path) -> None:
+    data = (whole.folder / "run.mcap").read_bytes()
+    (tmp_path / "run.mcap").write_bytes(data[: len(data) // 2])
+    text = " ".join(parsed(write_report(tmp_path).read_text()).text)
+    assert "The run did not end" in text
+    assert "the record was cut short" in text
+
+
+def test_events_of_odd_shapes_are_no_error(tmp_path: Path) -> None:
+    odd: list[object] = [
+        None,
+        3,
+        "x",
+        [],
+        [1, "a"],
+        {},
+        {"contour": 3},
+        {"sequences": [{"layers": [{}]}], "matches": [{}]},
+    ]
+    with Recorder(tmp_path / "run.mcap", {"container": {"interior_m": [0.4, 0.3, 0.1]}, "pose_B_K": 4}) as record:
+        for kind, key in (
+            ("contact", "contact"),
+            ("candidate", "candidate"),
+            ("sweep", "path_K_m"),
+            ("touchset", "touchset"),
+            ("ranking", "ranking"),
+            ("tool", "grasp_to_tip_m"),
+            ("note", "text"),
+        ):
+            for i, value in enumerate(odd):
+                record.event(kind, 0.1 * i, {key: value})
+    parsed(write_report(tmp_path).read_text())
+
+
+def test_the_tip_path_is_where_the_tip_was(whole: SimpleNamespace, writer: SimpleNamespace) -> None:
+    """The ball passed every contact's recorded position, at the height of the contacts."""
+    path = tip_path_K_m(read_run(whole.folder))
+    path = path[np.isfinite(path).all(axis=1)]
+    for contact in whole.contacts:
+        assert np.linalg.norm(path - contact.tip_K_m, axis=1).min() < 0.004
+
+
+def test_true_outlines_come_back_in_K(whole: SimpleNamespace, writer: SimpleNamespace) -> None:
+    outlines = true_outlines(read_run(whole.folder))
+    assert [o.name for o in outlines] == [spec[0] for spec in writer.OBJECTS]
+    for o, spec in zip(outlines, writer.OBJECTS, strict=True):
+        np.testing.assert_allclose(o.start_K_m[:-1].mean(axis=0), spec[2], atol=1e-6)
+    assert outlines[1].moved_m == pytest.approx(np.hypot(0.009, 0.004), rel=1e-6)
+    assert outlines[0].moved_m == 0.0
+
+
+def test_spans_of_the_tree(whole: SimpleNamespace) -> None:
+    found = spans(read_run(whole.folder))
+    squeezes = [s for s in found if s.node.endswith("/squeeze")]
+    assert [s.status for s in squeezes] == ["SUCCESS", "FAILURE", "SUCCESS", "SUCCESS", "SUCCESS"]
+    assert all(s.end_s > s.start_s for s in squeezes)
+    (match,) = [s for s in found if s.node.endswith("/match")]
+    assert match.start_s == match.end_s
+
+
+def test_no_run_is_bad_input(tmp_path: Path) -> None:
+    with pytest.raises(BadInput):
+        write_report(tmp_path)
