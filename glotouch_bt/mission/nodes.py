@@ -25,7 +25,7 @@ class Plain(Settings):
 class ParallelSettings(Settings):
     """Tick all children in every period."""
 
-    policy: Literal["all", "one"] = Field("all", description="succeed when all have, or when one has")
+    policy: Literal["all", "one"] = Field(default="all", description="succeed when all have, or when one has")
 
 
 class RetrySettings(Settings):
@@ -44,18 +44,18 @@ class ConditionSettings(Settings):
     """Compare a port's value; a port that nobody has written yet fails every comparison but `is_set: false`."""
 
     port: str = Field(description="key to look at")
-    equals: bool | int | float | str | None = Field(None, description="succeed if equal")
-    at_least: float | None = Field(None, description="succeed if the number is at least this")
-    at_most: float | None = Field(None, description="succeed if the number is at most this")
-    is_set: bool | None = Field(None, description="succeed if somebody wrote it (false: nobody)")
+    equals: bool | int | float | str | None = Field(default=None, description="succeed if equal")
+    at_least: float | None = Field(default=None, description="succeed if the number is at least this")
+    at_most: float | None = Field(default=None, description="succeed if the number is at most this")
+    is_set: bool | None = Field(default=None, description="succeed if somebody wrote it (false: nobody)")
 
 
 class RepeatSettings(Settings):
     """Do the child again while it succeeds, a number of times or until a condition holds (tested after each pass)."""
 
-    times: int | None = Field(None, description="number of passes", ge=1, le=1_000_000)
-    until: str | ConditionSettings | None = Field(None, description="a boolean key, or a condition")
-    limit: int = Field(1000, description="with until: passes after which it fails", ge=1, le=1_000_000)
+    times: int | None = Field(default=None, description="number of passes", ge=1, le=1_000_000)
+    until: str | ConditionSettings | None = Field(default=None, description="a boolean key, or a condition")
+    limit: int = Field(default=1000, description="with until: passes after which it fails", ge=1, le=1_000_000)
 
 
 class ForEachSettings(Settings):
@@ -64,7 +64,7 @@ class ForEachSettings(Settings):
     items: str = Field(description="key holding the tuple")
     item: str = Field(description="key each item is written to")
     collect: dict[str, str] = Field(default_factory=dict, description="child's key: key of the tuple it is gathered in")
-    on_failure: Literal["continue", "stop"] = Field("stop", description="what a failing item does")
+    on_failure: Literal["continue", "stop"] = Field(default="stop", description="what a failing item does")
 
 
 class SubtreeSettings(Settings):

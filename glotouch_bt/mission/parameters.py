@@ -26,10 +26,12 @@ class Declaration(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     type: Literal["int", "float", "str", "bool", "stl"] = Field(description="int, float, str, bool or stl (an object)")
-    default: bool | int | float | str | None = Field(None, description="value unless --set gives one; none: required")
-    range: tuple[float, float] | None = Field(None, description="[lowest, highest] valid number")
-    unit: str = Field("", description="unit of the number (SI when empty)")
-    description: str = Field("", description="for people")
+    default: bool | int | float | str | None = Field(
+        default=None, description="value unless --set gives one; none: required"
+    )
+    range: tuple[float, float] | None = Field(default=None, description="[lowest, highest] valid number")
+    unit: str = Field(default="", description="unit of the number (SI when empty)")
+    description: str = Field(default="", description="for people")
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ class PoseSection(_Section):
     """A planar pose: an origin and a turn about z."""
 
     position_m: Vec3 = Field(description="origin in B")
-    yaw_deg: float = Field(0.0, description="turn about z_B")
+    yaw_deg: float = Field(default=0.0, description="turn about z_B")
 
 
 class ContainerSection(_Section):
@@ -63,9 +63,11 @@ class ObjectsSection(_Section):
 
     folder: str = Field(description="folder of STL files, relative to the world's file")
     names: tuple[str, ...] = ()
-    expected: int | None = Field(None, ge=1, le=20, description="how many objects shall be in the folder or the names")
-    min_gap_m: float = Field(ObjectSet.min_gap_m, ge=0)
-    min_wall_gap_m: float = Field(ObjectSet.min_wall_gap_m, ge=0)
+    expected: int | None = Field(
+        default=None, ge=1, le=20, description="how many objects shall be in the folder or the names"
+    )
+    min_gap_m: float = Field(default=ObjectSet.min_gap_m, ge=0)
+    min_wall_gap_m: float = Field(default=ObjectSet.min_wall_gap_m, ge=0)
 
 
 class WorldFile(_Section):

@@ -1,0 +1,247 @@
+"""One mission on one backend, from the command line's words to a run's folder with its result.
+
+Only here, and in the report, is the truth of a simulated world looked at, after the run, for scoring.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from glotouch_bt import __version__
+from glotouch_bt.mission.library import shown
+from glotouch_bt.mission.load import Mission, load_mission, split_settings
+from glotouch_bt.mission.mcap_json import to_json
+from glotouch_bt.mission.record import Recorder
+from glotouch_bt.mission.runner import Outcome, run_mission
+from glotouch_bt.mission.tally import Tally
+from glotouch_bt.mission.worlds import load_conditions
+from glotouch_bt.robot import BadInput, Conditions, Robot, load_backend
+from glotouch_bt.robot.referee import Referee, TrueObject
+from glotouch_bt.study.run_folder import RunFolder
+
+RECORDED_PACKAGES = ("mujoco", "numpy", "pin", "py_trees", "ruckig", "scipy", "trimesh")
+LARGEST_SEED = 2**32 - 1
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """What shall be run.
+
+    Attributes:
+        mission: Path or shipped name.
+        backend: Name of a registered backend.
+        seed: Source of every random draw, 0 .. 2**32 - 1.
+        settings: `--set` values: mission parameters, and what no parameter takes goes to the backend.
+        objects: Folder of STL files instead of the world's.
+        conditions: Path or shipped name.
+        out: The run's folder (default: runs/<time>-<mission>-s<seed>).
+    """
+
+    mission: str
+    backend: str = "mujoco"
+    seed: int = 0
+    settings: Mapping[str, str] = field(default_factory=dict)
+    objects: Path | None = None
+    conditions: str = "nominal"
+    out: Path | None = None
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What came of it.
+
+    Attributes:
+        folder: The run's folder.
+        result: The content of result.json.
+        outcome: How it ended.
+        report: Path of report.html, or None if none could be made.
+        warning: What went wrong after the run (a report that could not be made), or empty.
+    """
+
+    folder: Path
+    result: Mapping[str, Any]
+    outcome: Outcome
+    report: Path | None
+    warning: str = ""
+
+    @property
+    def exit_code(self) -> int:
+        """0 done, 1 the mission failed, 3 a safety stop or failure, 130 interrupted."""
+        if isinstance(self.outcome.error, KeyboardInterrupt):
+            return 130
+        return {"success": 0, "failure": 1, "aborted": 3}[self.outcome.status]
+
+
+def launch(
+    request: RunRequest,
+    *,
+    on_start: Callable[[Mission, Path], None] | None = None,
+    on_progress: Callable[[float, Tally], None] | None = None,
+) -> RunResult:
+    """Check everything, open the backend, run the mission, score it, write the run's folder.
+
+    Raises:
+        BadInput: Something given is wrong; nothing moved and nothing is left on disk.
+        BackendError: The backend did not open; nothing is left on disk.
+    """
+    began = time.perf_counter()
+    if not 0 <= request.seed <= LARGEST_SEED:
+        raise BadInput(f"--seed {request.seed}: must be in 0 .. {LARGEST_SEED}")
+    mission = load_mission(request.mission, request.settings, objects=request.objects)
+    conditions = load_conditions(request.conditions)
+    backend = load_backend(request.backend)
+    options = split_settings(mission, request.settings)
+    folder = RunFolder(request.out) if request.out else RunFolder.named(mission.name, request.seed)
+    try:
+        try:
+            robot = backend.open(mission.world, conditions, request.seed, options)
+        except BadInput as e:
+            if not options:
+                raise
+            known = ", ".join(mission.parameters) or "none"
+            raise BadInput(f"{e} (parameters of mission {mission.name!r}: {known})") from e
+    except BaseException:
+        folder.abandon()
+        raise
+    with robot:
+        folder.clear()
+        if on_start is not None:
+            on_start(mission, folder.path)
+        referee = backend.referee(robot)
+        return _run(request, mission, conditions, robot, referee, folder, began, on_progress)
+
+
+def _run(
+    request: RunRequest,
+    mission: Mission,
+    conditions: Conditions,
+    robot: Robot,
+    referee: Referee | None,
+    folder: RunFolder,
+    began: float,
+    on_progress: Callable[[float, Tally], None] | None,
+) -> RunResult:
+    folder.write_text("mission.yaml", _mission_yaml(request, mission))
+    objects_at_start = referee.objects() if referee else []
+    ready = time.perf_counter()
+    recorder = Recorder(folder.path / "run.mcap", _description(request, mission, conditions))
+    result: dict[str, Any] | None = None
+    try:
+        outcome = run_mission(mission, robot, recorder, on_progress=on_progress)
+        ended = time.perf_counter()
+        result = _result(request, mission, outcome, referee)
+        result |= {"wall_time_s": round(ended - ready, 3), "wall_open_s": round(ready - began, 3)}
+    finally:
+        recorder.close(result)
+    folder.write_json("result.json", result)
+    if referee is not None:
+        truth = {"start": _truth(objects_at_start), "end": _truth(referee.objects())}
+        folder.write_json("truth.json", truth)
+    report, warning = _report(folder.path)
+    return RunResult(folder.path, result, outcome, report, warning)
+
+
+def _report(folder: Path) -> tuple[Path | None, str]:
+    """A run whose report fails is still a run."""
+    from glotouch_bt.report import write_report
+
+    try:
+        return write_report(folder), ""
+    except Exception as e:
+        return None, f"the report could not be made ({type(e).__name__}: {e}); `glotouch report {folder}` tries again"
+
+
+def _mission_yaml(request: RunRequest, mission: Mission) -> str:
+    head = f"# backend {request.backend}, seed {request.seed}, conditions {request.conditions}\n"
+    return head + mission.resolved_yaml()
+
+
+def _description(request: RunRequest, mission: Mission, conditions: Conditions) -> dict[str, object]:
+    """What is known before the run; goes into the record."""
+    world = mission.world
+    objects = dataclasses.replace(world.objects, folder=Path(shown(world.objects.folder)))
+    return {
+        "mission": mission.name,
+        "backend": request.backend,
+        "seed": request.seed,
+        "conditions": conditions,
+        "parameters": dict(mission.parameters),
+        "pose_B_K": world.container.pose_B_K,
+        "container": world.container,
+        "probe": world.probe,
+        "holder": world.holder,
+        "objects": objects,
+        "versions": _versions(),
+    }
+
+
+def _result(request: RunRequest, mission: Mission, outcome: Outcome, referee: Referee | None) -> dict[str, Any]:
+    found = outcome.found
+    target = _target(mission)
+    retrieved: str | None = None
+    correct: bool | None = None
+    peak = found.peak_force_N
+    if referee is not None:
+        held = [o.name for o in referee.objects() if o.in_gripper]
+        retrieved = held[0] if held else None
+        correct = retrieved == target if target is not None else None
+        peak = referee.peak_force_N()
+    return {
+        "mission": mission.name,
+        "backend": request.backend,
+        "seed": request.seed,
+        "conditions": Path(request.conditions).stem,
+        "status": outcome.status,
+        "reasons": outcome.reasons,
+        "reason_chain": [to_json(f.as_dict()) for f in outcome.chain],
+        "target": target,
+        "retrieved": retrieved,
+        "correct": correct,
+        "ranking": found.ranking,
+        "candidates": found.candidates,
+        "contacts": found.contacts,
+        "sim_time_s": round(outcome.end_s - outcome.start_s, 6),
+        "ticks": outcome.ticks,
+        "probe_path_m": round(found.probe_path_m, 6),
+        "peak_force_N": round(float(peak), 6),
+        "sensed_peak_force_N": round(found.peak_force_N, 6),
+        "parameters": {k: _portable(k, v, mission) for k, v in mission.parameters.items()},
+        "versions": _versions(),
+    }
+
+
+def _target(mission: Mission) -> str | None:
+    """The object the mission is after: its first stl parameter, by stem."""
+    for name in mission.stl_parameters:
+        if name in mission.parameters:
+            return _stem(str(mission.parameters[name]))
+    return None
+
+
+def _stem(given: str) -> str:
+    return Path(given).stem if given.lower().endswith(".stl") else given
+
+
+def _portable(name: str, value: object, mission: Mission) -> object:
+    """A parameter as result.json has it: no path of this machine."""
+    return _stem(str(value)) if name in mission.stl_parameters else value
+
+
+def _truth(objects: list[TrueObject]) -> list[Any]:
+    return [to_json(o) for o in objects]
+
+
+def _versions() -> dict[str, str]:
+    found = {"glotouch-bt": __version__}
+    for package in RECORDED_PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found
