@@ -8,7 +8,7 @@ from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose
 from glotouch_bt.touch import Candidate, Layer, TouchSequence, TouchSet, make_layer
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
-from skills.hand import hand_pose_B
+from skills.hand import hand_pose_B, require_clear
 
 HAND_CLEARANCE_M = 0.004
 """Fingertips stay this far above the floor, and the hand's body this far above a candidate's top."""
@@ -33,8 +33,8 @@ class SqueezeParams(SkillParams):
 class Squeeze(Skill):
     """Force-limited closures on one candidate.
 
-    A round candidate is squeezed at three yaws, 60 degrees apart; a box-like one on three parallel tracks across its
-    short side. Layers go from low to high: the first closure centres the object between the jaws where it cannot topple.
+    A round candidate is squeezed at three yaws, 60 degrees apart; a box-like one on three parallel tracks across
+    its short side. Layers go from low to high: the first closure centres the object between the jaws where it cannot topple.
 
     SUCCESS: at least one stable layer; `touchset` holds all of them.
     FAILURE `nothing_felt`: no closure reached a plateau on anything.
@@ -52,9 +52,16 @@ class Squeeze(Skill):
         candidate = self.candidate
         others = [c for c in (self.known or ()) if c.index != candidate.index]
         arm = self.context.arm
-        pose_B_K = self.context.world.container.pose_B_K
         for other in others:
-            arm.scene.add_contour(f"candidate {other.index}", pose_B_K, other.contour, other.height_m)
+            outline = other.contour
+            arm.scene.add_obstacle(
+                f"candidate {other.index}",
+                outline.kind,
+                centre_K_m=outline.centre_K_m,
+                size_m=outline.size_m,
+                height_m=other.height_m,
+                yaw_rad=outline.yaw_rad,
+            )
         sequences: list[TouchSequence] = []
         refusals: list[str] = []
         try:
@@ -128,7 +135,7 @@ class Squeeze(Skill):
         yield from arm.jaws(opening, speed_m_s=0.2)
         above = self._pose(position, above_z, yaw_K)
         travel_z = max(float(arm.pose_B_P.position_m[2]), float(above.position_m[2]))
-        arm.require_clear(self._pose(position, float(heights[0]), yaw_K), opening)
+        require_clear(arm, self._pose(position, float(heights[0]), yaw_K), opening)
         yield from arm.transit(above, height_B_m=travel_z, speed_m_s=p.travel_speed_m_s)
         layers: list[Layer] = []
         for height in heights:

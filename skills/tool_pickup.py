@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 
+from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Pose, SetPayload, Tare
 from glotouch_bt.touch import GuardParams
 from skills.base import Out, Skill, SkillFailed, SkillParams, SkillRun, param
@@ -53,7 +54,8 @@ class ToolPickup(Skill):
             above, height_B_m=max(above.position_m[2], arm.pose_B_P.position_m[2]), speed_m_s=p.free_speed_m_s
         )
         yield from finish(self.context.requests.start(Tare()), "tare")
-        arm.scene.allow_tool_contact(True)
+        arm.scene.allow("hand", "probe")
+        arm.scene.allow("hand", "holder")
         yield from arm.line(grasp, 0.05)
         state = yield from arm.jaws(0.0, speed_m_s=0.04, force_N=p.grip_N)
         if abs(state.aperture_m - probe.handle_m[1]) > 0.004:
@@ -65,10 +67,11 @@ class ToolPickup(Skill):
                 advice="check that the probe stands in its holder and that the holder's pose is right",
                 aperture_m=state.aperture_m,
             )
-        arm.scene.hold_tool(probe)
+        arm.scene.hold_tool(True)
         out_of_hole = probe.length_m + 0.06
         yield from arm.shift(np.array([0.0, 0.0, out_of_hole]), p.speed_m_s, check=False)
-        arm.scene.allow_tool_contact(False)
+        arm.scene.disallow("hand", "holder")
+        arm.scene.disallow("hand", "probe")
         weight_N = yield from self._weight_N()
         if weight_N < 0.5 * probe.mass_kg * 9.81:
             raise SkillFailed(
@@ -95,13 +98,13 @@ class ToolPickup(Skill):
         )
         self.tool = tool
 
-    def _weight_N(self):  # type: ignore[no-untyped-def]
+    def _weight_N(self) -> Motion[float]:
         blocks = yield from self.context.arm.hold(0.2)
         wrench = np.concatenate([b.wrench_S for b in blocks])[:, :3].mean(axis=0)
         down_E = self.context.arm.pose_B_P.rotation.T @ np.array([0.0, 0.0, -1.0])
         return float(wrench @ down_E)
 
-    def _feel_floor(self, tool: HeldTool):  # type: ignore[no-untyped-def]
+    def _feel_floor(self, tool: HeldTool) -> Motion[HeldTool]:
         """Lower the ball in the corner nearest to the holder; a touch far from the nominal floor is not the floor."""
         world, p = self.context.world, self.params
         half = 0.5 * np.array(world.container.interior_m[:2]) - p.corner_gap_m
@@ -112,6 +115,7 @@ class ToolPickup(Skill):
         yield from prober.hop(np.array([*corner, 0.0]), max(high, float(prober.tip_K_m[2])), p.speed_m_s)
         near = 0.02
         yield from self.context.arm.line(tool.pose_B_P(world, np.array([*corner, near])), p.speed_m_s)
+        self.context.arm.scene.allow("tip", "floor")
         probed = yield from prober.move(np.array([*corner, tool.tip_radius_m - 0.008]), 0.01)
         if probed.contact is None:
             raise SkillFailed(
@@ -121,4 +125,5 @@ class ToolPickup(Skill):
             )
         floor_z = float(probed.contact.tip_K_m[2]) - tool.tip_radius_m
         yield from prober.retreat(np.array([0.0, 0.0, 1.0]), 0.01, 0.05)
+        self.context.arm.scene.disallow("tip", "floor")
         return dataclasses.replace(tool, floor_z_K_m=floor_z)

@@ -40,7 +40,7 @@ class ToolReturn(Skill):
         height = max(float(arm.pose_B_P.position_m[2]), float(above.position_m[2]))
         yield from arm.transit(above, height_B_m=height, speed_m_s=p.speed_m_s)
         yield from arm.line(grasp, p.insert_speed_m_s, check=False)
-        arm.scene.drop_tool()
+        arm.scene.hold_tool(False)
         opening = min(self.tool.aperture_m + 0.03, arm.description.gripper.stroke_m)
         yield from arm.jaws(opening, speed_m_s=0.08)
         yield from arm.shift(np.array([0.0, 0.0, 0.08]), 0.08, check=False)

@@ -150,7 +150,6 @@ class _Loop:
                 self._decide(outcome, root)
                 return
             context.observation = observation = robot.cycle(context.command)
-            context.arm.sync(observation)
             tally.block(observation, context.command)
             if self._on_progress is not None and now_s >= next_progress_s:
                 next_progress_s = now_s + PROGRESS_EVERY_S
