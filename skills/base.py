@@ -188,12 +188,12 @@ class Context:
     command: Command = HOLD
 
 
-class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):
+class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: ignore[call-arg]
     """Base class of every skill; see the module's text. Subclass names are not used: entry points name skills."""
 
     Params: ClassVar[type[SkillParams]] = SkillParams
-    INPUT_PORTS: ClassVar[dict[str, PortInformation]] = {}  # type: ignore[misc]
-    OUTPUT_PORTS: ClassVar[dict[str, PortInformation]] = {}  # type: ignore[misc]
+    INPUT_PORTS: ClassVar[dict[str, PortInformation]] = {}
+    OUTPUT_PORTS: ClassVar[dict[str, PortInformation]] = {}
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         ports = {n: p for c in reversed(cls.__mro__) for n, p in vars(c).items() if isinstance(p, _Port)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,10 +49,10 @@ def plan_grasp(touchset: TouchSet, match: Match, mesh: Mesh, side_gap_m: float =
 
     def worth(layer: Layer) -> float:
         areas = [patch_statistics(d).area_fraction for d in (layer.left_m, layer.right_m)]
-        hold = np.prod([a / (a + AREA_SCALE) for a in areas])
+        hold = math.prod([a / (a + AREA_SCALE) for a in areas])
         across = np.array([np.cos(layer.yaw_rad), np.sin(layer.yaw_rad)])
-        lever = np.hypot(across @ (com_K[:2] - layer.position_K_m), 0.5 * (com_K[2] - layer.height_m))
-        return float(layer.stable) * float(hold) / (1.0 + (lever / LEVER_SCALE_M) ** 2)
+        lever = math.hypot(across @ (com_K[:2] - layer.position_K_m), 0.5 * (com_K[2] - layer.height_m))
+        return float(layer.stable) * hold / (1.0 + (lever / LEVER_SCALE_M) ** 2)
 
     best = max(touchset.layers, key=worth)
     return GraspPlan(

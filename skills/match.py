@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from glotouch_bt.recognition import LossParams, PadSpec, Ranking, TargetModel, match, rank
-from glotouch_bt.robot import BadInput
+from glotouch_bt.robot import HOLD, BadInput
 from glotouch_bt.robot.meshes import Mesh, load_folder, load_mesh
 from glotouch_bt.touch import TouchSet
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
@@ -37,6 +37,7 @@ class Match(Skill):
         touchsets: tuple[TouchSet, ...] = self.touchsets or ()
         if not touchsets:
             raise SkillFailed("no_touch", "no candidate was squeezed, so nothing can be recognised")
+        yield HOLD  # matching takes longer than a control period; on hardware the arm holds meanwhile
         gripper = self.context.arm.description.gripper
         mesh = self._target()
         model = TargetModel.from_mesh(mesh, PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m))
@@ -54,8 +55,6 @@ class Match(Skill):
         best = next(t for t in touchsets if t.candidate.index == ranking.best.index)
         self.plan = plan_grasp(best, ranking.best, mesh)
         self.event("plan", plan=self.plan)
-        return
-        yield
 
     def _target(self) -> Mesh:
         return load_target(self.params.target, self.context.world.objects.folder)

@@ -34,7 +34,7 @@ class Squeeze(Skill):
     """Force-limited closures on one candidate.
 
     A round candidate is squeezed at three yaws, 60 degrees apart; a box-like one on three parallel tracks across
-    its short side. Layers go from low to high: the first closure centres the object between the jaws where it cannot topple.
+    its short side. Layers go from low to high: the first closure centres the object where it cannot topple.
 
     SUCCESS: at least one stable layer; `touchset` holds all of them.
     FAILURE `nothing_felt`: no closure reached a plateau on anything.
