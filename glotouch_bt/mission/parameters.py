@@ -12,8 +12,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from glotouch_bt.mission.fields import validate
 from glotouch_bt.mission.findings import Findings
+from glotouch_bt.mission.library import shown
 from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, plain
 from glotouch_bt.mission.units import UNITS, convert, split_quantity
+from glotouch_bt.robot import BadInput
+from glotouch_bt.robot.meshes import load_mesh
 
 Value = bool | int | float | str
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -161,18 +164,20 @@ def _valid(declared: Declaration) -> str:
 
 
 def _stl_usable(name: str, folder: Path, place: Place, findings: Findings) -> bool:
-    """An stl parameter names a file of the objects' folder, or is a path to an STL file."""
+    """An stl parameter names a file of the objects' folder, or is a path to an STL file; either must be a good solid."""
     path = Path(name)
-    if path.suffix.lower() == ".stl":
-        if path.is_file():
-            return True
-        findings.add(place, "no_such_stl", f"no such STL file: {name}")
+    if path.suffix.lower() != ".stl":
+        files = {p.stem: p for p in sorted(folder.iterdir()) if p.suffix.lower() == ".stl"} if folder.is_dir() else {}
+        if name not in files:
+            findings.unknown(place, "no_such_stl", f"object (in {shown(folder)})", name, files)
+            return False
+        path = files[name]
+    try:
+        load_mesh(path)
+    except BadInput as e:
+        findings.add(place, "unusable_stl", str(e))
         return False
-    stems = sorted(p.stem for p in folder.iterdir() if p.suffix.lower() == ".stl") if folder.is_dir() else []
-    if name in stems:
-        return True
-    findings.unknown(place, "no_such_stl", f"object (in {folder})", name, stems)
-    return False
+    return True
 
 
 def substitute(node: Node, parameters: Mapping[str, Parameter], findings: Findings) -> Node:

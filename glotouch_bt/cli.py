@@ -1,0 +1,278 @@
+"""The command line. Thin: it reads words, calls the house, prints, and turns errors into exit codes.
+
+Exit codes: 0 done; 1 the mission failed; 2 bad input; 3 a safety stop or backend failure; 130 Ctrl-C.
+Heavy imports stand inside the commands, so that `glotouch --help` is quick.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import sys
+import traceback
+from collections.abc import Callable
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any, ParamSpec
+
+import typer
+
+P = ParamSpec("P")
+
+app = typer.Typer(
+    name="glotouch",
+    help="Missions for robots that work by touch.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+_debug = False
+
+
+class TreeFormat(StrEnum):
+    """How `glotouch tree` draws."""
+
+    text = "text"
+    svg = "svg"
+
+
+Mission = Annotated[str, typer.Argument(help="path of a mission file, or the name of a shipped mission")]
+Sets = Annotated[
+    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="a mission parameter or backend option")
+]
+Objects = Annotated[
+    Path | None, typer.Option("--objects", metavar="DIR", help="folder of watertight STL files in metres")
+]
+Json = Annotated[bool, typer.Option("--json", help="print JSON on stdout, nothing else")]
+
+
+@app.callback()
+def _options(debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False) -> None:
+    global _debug
+    _debug = _debug or debug
+
+
+def _guarded(command: Callable[P, int | None]) -> Callable[P, None]:
+    """Run a command; every error becomes one message on stderr and an exit code."""
+
+    @functools.wraps(command)
+    def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        from glotouch_bt.robot import BadInput, GlotouchError, MissionFailed
+
+        try:
+            code = command(*args, **kwargs) or 0
+        except KeyboardInterrupt:
+            code = _fail(130, "interrupted")
+        except BrokenPipeError:
+            sys.stderr.close()
+            code = 0
+        except BadInput as e:
+            code = _fail(2, str(e))
+        except MissionFailed as e:
+            code = _fail(1, str(e))
+        except GlotouchError as e:
+            code = _fail(3, str(e))
+        except Exception as e:
+            code = _fail(3, f"internal error: {type(e).__name__}: {e} (--debug shows where)")
+        if code:
+            raise typer.Exit(code)
+
+    return run
+
+
+def _fail(code: int, message: str) -> int:
+    if _debug:
+        traceback.print_exc()
+    sys.stderr.write(f"glotouch: {message}\n")
+    return code
+
+
+def _settings(given: list[str] | None) -> dict[str, str]:
+    from glotouch_bt.robot import BadInput
+
+    settings: dict[str, str] = {}
+    for item in given or []:
+        name, equals, value = item.partition("=")
+        if not equals or not name.strip():
+            raise BadInput(f"--set {item}: must be NAME=VALUE")
+        if name.strip() in settings:
+            raise BadInput(f"--set {name.strip()}: given twice")
+        settings[name.strip()] = value
+    return settings
+
+
+def _print_json(data: object) -> None:
+    sys.stdout.write(json.dumps(data, indent=2, allow_nan=False, default=str) + "\n")
+
+
+@app.command()
+@_guarded
+def run(
+    mission: Mission,
+    backend: Annotated[str, typer.Option(help="a registered backend (see: glotouch backends)")] = "mujoco",
+    seed: Annotated[int, typer.Option(help="source of every random draw")] = 0,
+    set_: Sets = None,
+    objects: Objects = None,
+    conditions: Annotated[str, typer.Option(help="disturbances: ideal, nominal, harsh, or a file")] = "nominal",
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="the run's folder (default: runs/...)")] = None,
+    json_: Json = False,
+) -> int:
+    """Run a mission and write its record, result and report."""
+    from glotouch_bt import console
+    from glotouch_bt.study.launch import RunRequest, launch
+
+    request = RunRequest(mission, backend, seed, _settings(set_), objects, conditions, out)
+    with console.RunProgress(quiet=json_) as progress:
+        done = launch(request, on_start=progress.start, on_progress=progress.update)
+    if json_:
+        _print_json({**done.result, "folder": str(done.folder)})
+    else:
+        console.print_result(done)
+    if done.warning:
+        console.print_error(done.warning)
+    if done.outcome.error is not None:
+        if _debug:
+            traceback.print_exception(done.outcome.error)
+        console.print_error(done.outcome.reasons[-1])
+    elif done.exit_code and json_:
+        console.print_error(" <- ".join(done.outcome.reasons))
+    return done.exit_code
+
+
+@app.command()
+@_guarded
+def check(
+    missions: Annotated[list[str], typer.Argument(metavar="MISSION...", help="mission files or shipped names")],
+    set_: Sets = None,
+    objects: Objects = None,
+    json_: Json = False,
+) -> int:
+    """Find every fault of missions before anything moves; nothing is run."""
+    from glotouch_bt.mission.findings import MissionFaults
+    from glotouch_bt.mission.load import load_mission, split_settings
+    from glotouch_bt.robot import BadInput
+
+    settings = _settings(set_)
+    reports: list[dict[str, object]] = []
+    for given in missions:
+        findings: list[object] = []
+        try:
+            mission = load_mission(given, settings, objects=objects)
+        except MissionFaults as e:
+            findings = [f.as_dict() for f in e.findings]
+            if not json_:
+                sys.stderr.write(f"{e}\n{given}: {len(findings)} fault{'s' if len(findings) != 1 else ''}\n")
+        except BadInput as e:
+            findings = [{"file": given, "line": 0, "column": 0, "code": "unreadable", "what": str(e)}]
+            if not json_:
+                sys.stderr.write(f"{e}\n")
+        else:
+            left = ", ".join(split_settings(mission, settings))
+            note = f" (not parameters of it, for the backend: {left})" if left else ""
+            if not json_:
+                sys.stdout.write(f"{given}: ok, {sum(1 for _ in mission.tree.walk())} nodes{note}\n")
+        reports.append({"mission": given, "ok": not findings, "findings": findings})
+    ok = all(r["ok"] for r in reports)
+    if json_:
+        _print_json({"ok": ok, "missions": reports})
+    return 0 if ok else 2
+
+
+@app.command()
+@_guarded
+def skills(name: Annotated[str | None, typer.Argument(help="one skill")] = None, json_: Json = False) -> None:
+    """List the installed skills, or describe one: parameters, units, ranges, ports."""
+    from glotouch_bt import console
+    from glotouch_bt.mission.catalogue import describe_skill
+    from glotouch_bt.mission.library import SkillShelf
+
+    shelf = SkillShelf()
+    described = [describe_skill(n, shelf[n]) for n in ([name] if name else shelf)]
+    if json_:
+        _print_json(described[0] if name else described)
+    elif name:
+        console.print_skill(described[0])
+    else:
+        console.print_skills(described)
+
+
+@app.command()
+@_guarded
+def backends(json_: Json = False) -> None:
+    """List the installed backends and whether they can be used here."""
+    from glotouch_bt import console
+    from glotouch_bt.robot import BackendError, backend_entry_points, load_backend
+
+    found: list[dict[str, Any]] = []
+    for name in sorted(backend_entry_points()):
+        try:
+            found.append({"name": name, "usable": True, "summary": load_backend(name).summary})
+        except BackendError as e:
+            found.append({"name": name, "usable": False, "summary": str(e)})
+    if json_:
+        _print_json(found)
+    else:
+        rows = [(b["name"], "yes" if b["usable"] else "no", b["summary"]) for b in found]
+        console.print_table("backends", ("name", "usable", "what it is"), rows)
+
+
+@app.command()
+@_guarded
+def tree(
+    mission: Mission,
+    format_: Annotated[TreeFormat, typer.Option("--format", help="how to draw it")] = TreeFormat.text,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="write there instead of stdout")] = None,
+    set_: Sets = None,
+    objects: Objects = None,
+) -> None:
+    """Draw a mission's tree."""
+    from glotouch_bt.mission.drawing import as_svg, as_text
+    from glotouch_bt.mission.load import load_mission
+    from glotouch_bt.robot import BadInput
+
+    loaded = load_mission(mission, _settings(set_), objects=objects)
+    drawn = as_svg(loaded) if format_ is TreeFormat.svg else as_text(loaded)
+    if out is None:
+        sys.stdout.write(drawn)
+        return
+    try:
+        out.write_text(drawn, encoding="utf-8")
+    except OSError as e:
+        raise BadInput(f"--out {out}: cannot be written ({e.strerror})") from e
+
+
+@app.command()
+@_guarded
+def report(folder: Annotated[Path, typer.Argument(metavar="RUN", help="a run's folder")], json_: Json = False) -> None:
+    """Make report.html of a run again."""
+    from glotouch_bt.report import write_report
+
+    made = write_report(folder)
+    if json_:
+        _print_json({"report": str(made)})
+    else:
+        sys.stdout.write(f"{made}\n")
+
+
+@app.command()
+@_guarded
+def schema() -> None:
+    """Print the JSON Schema of mission files, for editors."""
+    from glotouch_bt.mission.library import SkillShelf
+    from glotouch_bt.mission.schema import mission_schema
+
+    _print_json(mission_schema(SkillShelf()))
+
+
+def main() -> None:
+    """The `glotouch` command; `--debug` may stand anywhere."""
+    global _debug
+    if "--debug" in sys.argv[1:]:
+        _debug = True
+        sys.argv = [a for a in sys.argv if a != "--debug"]
+    app()
+
+
+if __name__ == "__main__":
+    main()
