@@ -1,1 +1,22 @@
-"""Room under construction."""
+"""Kinematics (Pinocchio), timing (ruckig), clearance (python-fcl), and the guarded motions made of them."""
+
+from glotouch_bt.motion.arm import Arm, Guard, Motion, MoveResult
+from glotouch_bt.motion.clearance import Blocked, Scene
+from glotouch_bt.motion.kinematics import Kinematics, build_model
+from glotouch_bt.motion.paths import Arc, Line, Path, Piece, Polyline
+
+__all__ = [
+    "Arc",
+    "Arm",
+    "Blocked",
+    "Guard",
+    "Kinematics",
+    "Line",
+    "Motion",
+    "MoveResult",
+    "Path",
+    "Piece",
+    "Polyline",
+    "Scene",
+    "build_model",
+]

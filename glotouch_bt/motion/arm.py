@@ -1,0 +1,346 @@
+"""Motions as generators: `result = yield from arm.line(pose, 0.04, guard=detector)`.
+
+Each motion is planned, and unless told otherwise checked, completely before its first command; then it yields one
+`Command` a control period and takes the `Observation` sensed in it. A guard that trips makes the very NEXT command
+the first of the deceleration. A generator may be closed at any yield; the arm's setpoint is then what was last
+yielded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from typing import TypedDict, TypeVar, Unpack
+
+import numpy as np
+import numpy.typing as npt
+
+from glotouch_bt.motion.clearance import Scene
+from glotouch_bt.motion.jaws import JawWatch
+from glotouch_bt.motion.joints import plan_joints
+from glotouch_bt.motion.kinematics import Kinematics
+from glotouch_bt.motion.paths import Arc, Line, Path, Polyline
+from glotouch_bt.motion.plan import Plan, plan_piece
+from glotouch_bt.robot import (
+    Array,
+    Command,
+    GripperState,
+    GripperTarget,
+    JointSetpoint,
+    Limits,
+    MotionRefused,
+    Observation,
+    Pose,
+    RobotDescription,
+    World,
+)
+
+T = TypeVar("T")
+Motion = Generator[Command, Observation, T]
+Guard = Callable[[Observation], object | None]
+
+# Null-space pull towards home in free motions, per metre travelled: half the way home in 0.35 m.
+POSTURE_GAIN_1_M = 2.0
+# A path may begin this far from where the arm is (servo error right after `sync`).
+_START_M, _START_RAD = 2e-3, 0.02
+
+
+@dataclass(frozen=True)
+class MoveResult:
+    """How a motion ended; the arm is at rest.
+
+    Attributes:
+        completed: The whole path was travelled.
+        stop: What the guard returned, or None.
+        travelled_m: Path length travelled, as commanded.
+        path_B_m: (m, 3) measured position of P in B, newest sample of each period.
+        pose_B_P: Measured pose of P in B at the end.
+    """
+
+    completed: bool
+    stop: object | None
+    travelled_m: float
+    path_B_m: Array
+    pose_B_P: Pose
+
+
+class MoveOptions(TypedDict, total=False):
+    """Keyword options of `Arm.follow`, taken by every motion along a path; see there."""
+
+    acceleration_m_s2: float | None
+    jerk_m_s3: float | None
+    guard: Guard | None
+    check: bool
+    tactile: bool
+    posture_gain: float | None
+    what: str
+
+
+class Arm:
+    """The arm's motions. Holds the present setpoint, so one Arm drives one robot.
+
+    Args:
+        description: The robot's numbers.
+        limits: Robot-wide limits; the ones of the tool bound every motion here.
+        world: Nominal container, probe and holder.
+        period_s: Control period.
+
+    Attributes:
+        kinematics: Forward and inverse kinematics.
+        scene: What must not be hit; skills add what they find to it.
+    """
+
+    def __init__(self, description: RobotDescription, limits: Limits, world: World, period_s: float) -> None:
+        self.description, self.limits, self.world, self.period_s = description, limits, world, period_s
+        self.kinematics = Kinematics(description)
+        self.scene = Scene(self.kinematics, world)
+        self._q: Array = self.kinematics.home.copy()
+        self._aperture_m = description.gripper.stroke_m
+
+    # -- where it is -------------------------------------------------------------------------------------------------
+
+    @property
+    def q(self) -> Array:
+        """(dof,) present joint setpoint, rad."""
+        return self._q
+
+    @property
+    def pose_B_P(self) -> Pose:
+        """Pose of P in B at the present setpoint."""
+        return self.kinematics.fk(self._q)
+
+    @property
+    def aperture_m(self) -> float:
+        """Opening of the jaws as last seen; clearance is checked with it."""
+        return self._aperture_m
+
+    def sync(self, observation: Observation) -> None:
+        """Take the measured joint positions and aperture as the present setpoint. Call once, at the start."""
+        self._q = np.array(observation.q[-1])
+        self._see(observation)
+
+    def _see(self, observation: Observation) -> None:
+        self._aperture_m = min(max(observation.gripper.aperture_m, 0.0), self.description.gripper.stroke_m)
+
+    # -- motions -----------------------------------------------------------------------------------------------------
+
+    def hold(self, duration_s: float, *, tactile: bool = False) -> Motion[list[Observation]]:
+        """Stay at rest for a whole number of periods (rounded up); returns what was sensed."""
+        out = []
+        for _ in range(int(np.ceil(duration_s / self.period_s - 1e-9))):
+            observation = yield Command(tactile=tactile)
+            self._see(observation)
+            out.append(observation)
+        return out
+
+    def joints(self, q: npt.ArrayLike, speed: float = 0.5, *, check: bool = True) -> Motion[None]:
+        """Move to joint positions `q` (dof,) rad along a straight line in joint space, from rest to rest.
+
+        Args:
+            q: Where to.
+            speed: 0..1, share of the joints' speed limits; lowered so that P keeps within the tool's speed limit.
+            check: Refuse what would leave the limits or hit something.
+
+        Raises:
+            MotionRefused: Before the first command.
+        """
+        plan = plan_joints(self.kinematics, self._q, np.asarray(q, dtype=np.float64), speed, self.limits, self.period_s)
+        if check:
+            self._clear(plan.checks_q, "joint move")
+        for k in range(len(plan.profile.q)):
+            self._q = plan.profile.q[k]
+            pose = self.kinematics.fk(self._q)
+            self._see((yield Command(JointSetpoint(self._q, plan.profile.dq[k], plan.profile.ddq[k], pose))))
+
+    def follow(
+        self,
+        path: Path,
+        speed_m_s: float,
+        *,
+        acceleration_m_s2: float | None = None,
+        jerk_m_s3: float | None = None,
+        guard: Guard | None = None,
+        check: bool = True,
+        tactile: bool = False,
+        posture_gain: float | None = None,
+        what: str = "follow",
+    ) -> Motion[MoveResult]:
+        """Travel a Cartesian path of P from rest to rest; rests between the pieces of a path that has several.
+
+        Args:
+            path: Begins where P is.
+            speed_m_s, acceleration_m_s2, jerk_m_s3: Along the path; the limits' acceleration and jerk when omitted.
+            guard: Called once a period with the fresh observation; anything but None breaks the motion off with the
+                limits' stop deceleration and jerk, and comes back as `stop`.
+            check: Look for collisions along the path (reach and joint limits are always looked at).
+            tactile: Ask for depth maps on the way.
+            posture_gain: Null-space pull towards home per metre; by default 0 under a guard, else `POSTURE_GAIN_1_M`.
+            what: Named in a refusal.
+
+        Raises:
+            MotionRefused: Before the first command: the path does not begin here, asks for more than the limits, leaves
+                the arm's reach or a joint's range or speed, or would hit something (the pair is named).
+        """
+        acceleration = self.limits.tcp_acceleration_m_s2 if acceleration_m_s2 is None else acceleration_m_s2
+        jerk = self.limits.tcp_jerk_m_s3 if jerk_m_s3 is None else jerk_m_s3
+        self._within_limits(speed_m_s, acceleration, jerk, what)
+        if posture_gain is None:
+            posture_gain = POSTURE_GAIN_1_M if guard is None else 0.0
+        self._begins_here(path, what)
+        plans = []
+        q = self._q
+        for piece in path.pieces:
+            plan = plan_piece(
+                self.kinematics,
+                piece,
+                q,
+                speed_m_s=speed_m_s,
+                acceleration_m_s2=acceleration,
+                jerk_m_s3=jerk,
+                period_s=self.period_s,
+                posture_gain=posture_gain,
+                what=what,
+            )
+            q = plan.knots_q[-1]
+            plans.append(plan)
+        if check and plans:
+            self._clear(np.concatenate([p.knots_q for p in plans]), what)
+        return (yield from self._travel(plans, guard, tactile))
+
+    def line(self, pose_B_P: Pose, speed_m_s: float, **options: Unpack[MoveOptions]) -> Motion[MoveResult]:
+        """Straight to a pose of P in B; options as in `follow`."""
+        options.setdefault("what", "line")
+        return (yield from self.follow(Line(self.pose_B_P, pose_B_P), speed_m_s, **options))
+
+    def shift(
+        self, displacement_B_m: npt.ArrayLike, speed_m_s: float, **options: Unpack[MoveOptions]
+    ) -> Motion[MoveResult]:
+        """Straight by a displacement (3,) m in B, orientation kept; options as in `follow`."""
+        here = self.pose_B_P
+        there = Pose(here.position_m + np.asarray(displacement_B_m, dtype=np.float64), here.quat)
+        options.setdefault("what", "shift")
+        return (yield from self.follow(Line(here, there), speed_m_s, **options))
+
+    def arc(
+        self,
+        centre_B_m: npt.ArrayLike,
+        axis: npt.ArrayLike,
+        angle_rad: float,
+        speed_m_s: float,
+        *,
+        turn: bool = False,
+        **options: Unpack[MoveOptions],
+    ) -> Motion[MoveResult]:
+        """Round an axis through `centre_B_m` (3,) by an angle, the hand turning along or not; options of `follow`."""
+        options.setdefault("what", "arc")
+        path = Arc(self.pose_B_P, centre_B_m, axis, angle_rad, turn)
+        return (yield from self.follow(path, speed_m_s, **options))
+
+    def transit(
+        self, pose_B_P: Pose, height_B_m: float, speed_m_s: float, **options: Unpack[MoveOptions]
+    ) -> Motion[MoveResult]:
+        """Straight up to a height of P in B, across (turning on the way), straight down; options as in `follow`.
+
+        A start or a goal above the height is left or reached by the crossing itself, at its own height.
+        """
+        here = self.pose_B_P
+        up = Pose(np.array([*here.position_m[:2], max(here.position_m[2], height_B_m)]), here.quat)
+        over = Pose(np.array([*pose_B_P.position_m[:2], max(pose_B_P.position_m[2], height_B_m)]), pose_B_P.quat)
+        options.setdefault("what", "transit")
+        path = Polyline((here, up, over, pose_B_P))
+        return (yield from self.follow(path, speed_m_s, **options))
+
+    def jaws(
+        self,
+        aperture_m: float,
+        *,
+        speed_m_s: float = 0.05,
+        force_N: float = 10.0,
+        timeout_s: float = 3.0,
+        tactile: bool = False,
+        on_observation: Callable[[Observation], None] | None = None,
+    ) -> Motion[GripperState]:
+        """Drive the jaws while the arm holds, until they are reported still for about 60 ms, or the time is out.
+
+        Args:
+            aperture_m: Target opening; clipped to the stroke.
+            speed_m_s, force_N: Limits of the jaws; clipped to what the gripper can do.
+            timeout_s: Give up waiting (the last state says `moving`).
+            tactile: Ask for depth maps.
+            on_observation: Called with every observation on the way (to collect frames).
+
+        Returns:
+            The last reported state, its aperture the mean over the still window.
+        """
+        hand = self.description.gripper
+        target = GripperTarget(
+            min(max(aperture_m, 0.0), hand.stroke_m), min(speed_m_s, hand.speed_m_s), min(force_N, hand.force_N)
+        )
+        watch = JawWatch(self.period_s)
+        gripper: GripperTarget | None = target
+        for _ in range(max(1, int(np.ceil(timeout_s / self.period_s - 1e-9)))):
+            observation = yield Command(gripper=gripper, tactile=tactile)
+            gripper = None
+            self._see(observation)
+            if on_observation is not None:
+                on_observation(observation)
+            if watch.still(observation.now_s, observation.gripper):
+                break
+        return watch.state()
+
+    # -- inside ------------------------------------------------------------------------------------------------------
+
+    def _travel(self, plans: Sequence[Plan], guard: Guard | None, tactile: bool) -> Motion[MoveResult]:
+        limits = self.limits
+        track: list[Array] = []
+        done_m, stopped = 0.0, None
+        pose = self.pose_B_P
+        for plan in plans:
+            running: Plan | None = plan
+            while running is not None:
+                now, running = running, None
+                for k in range(len(now)):
+                    self._q = now.q[k]
+                    observation = yield Command(now.setpoint(k), None, tactile)
+                    self._see(observation)
+                    track.append(observation.position_B_P[-1])
+                    pose = observation.pose_B_P
+                    if guard is not None and stopped is None:
+                        stopped = guard(observation)
+                        if stopped is not None:
+                            running = now.halt(k, limits.stop_acceleration_m_s2, limits.stop_jerk_m_s3, self.period_s)
+                            travelled = float(now.progress.s[k])
+                            break
+                else:
+                    travelled = float(now.progress.s[-1])
+            done_m += travelled
+            if stopped is not None:
+                break
+        total = float(sum(p.piece.length_m for p in plans))
+        path = np.array(track).reshape(-1, 3)
+        return MoveResult(done_m >= total - 1e-9, stopped, done_m, path, pose)
+
+    def _within_limits(self, speed: float, acceleration: float, jerk: float, what: str) -> None:
+        limits = self.limits
+        for name, value, limit in (
+            ("speed_m_s", speed, limits.tcp_speed_m_s),
+            ("acceleration_m_s2", acceleration, limits.tcp_acceleration_m_s2),
+            ("jerk_m_s3", jerk, limits.tcp_jerk_m_s3),
+        ):
+            if not 0.0 < value <= limit * (1 + 1e-9):
+                raise MotionRefused(what, f"{name} {value:g} is not within 0..{limit:g}")
+
+    def _begins_here(self, path: Path, what: str) -> None:
+        begin, here = path.pose(0.0), self.pose_B_P
+        away = float(np.linalg.norm(begin.position_m - here.position_m))
+        turned = 2.0 * float(np.arccos(min(1.0, abs(float(begin.quat @ here.quat)))))
+        if away > _START_M or turned > _START_RAD:
+            raise MotionRefused(
+                what, f"it begins {away * 1e3:.1f} mm and {np.degrees(turned):.1f} deg from P's setpoint"
+            )
+
+    def _clear(self, q: Array, what: str) -> None:
+        found = self.scene.first_blocked(q, self._aperture_m)
+        if found is not None:
+            share = 100.0 * found.index / max(len(q) - 1, 1)
+            raise MotionRefused(what, f"{found}, {share:.0f} % of the way")

@@ -1,0 +1,365 @@
+"""What would the arm, the hand or the held probe hit? Exact distances from python-fcl, few of them.
+
+All positions come in one batch: axis-aligned boxes of every part at every posture against those of every obstacle
+(numpy) leave the few pairs that are really near, and only those are measured by fcl. Nominal numbers of the world;
+frame B inside, K for obstacles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import fcl
+import numpy as np
+import numpy.typing as npt
+
+from glotouch_bt.motion.kinematics import Kinematics
+from glotouch_bt.robot import Array, ParamError, Pose, RobotDescription, UnknownName, World
+
+# Between the handle's lower face and the holder block's top ("just below the handle").
+HOLDER_GAP_M = 0.001
+WALLS = ("wall +x", "wall -x", "wall +y", "wall -y")
+# A part that starts too near may leave, but not come nearer by more than this.
+_LEAVING_M = 2e-4
+
+
+@dataclass(frozen=True)
+class Blocked:
+    """The first place of a path that is not clear.
+
+    Attributes:
+        index: Which posture of the batch.
+        part: The moving part, e.g. "left finger".
+        obstacle: What it comes too near to.
+        distance_m: Signed distance; negative is penetration.
+        margin_m: What was asked for.
+    """
+
+    index: int
+    part: str
+    obstacle: str
+    distance_m: float
+    margin_m: float
+
+    def __str__(self) -> str:
+        thing = f"{self.obstacle} of the container" if self.obstacle in (*WALLS, "floor") else self.obstacle
+        if self.distance_m <= 0:
+            return f"{self.part} would hit {thing} (penetration {-self.distance_m * 1e3:.1f} mm)"
+        return f"{self.part} would pass {thing} at {self.distance_m * 1e3:.1f} mm (margin {self.margin_m * 1e3:.1f} mm)"
+
+
+@dataclass
+class _Part:
+    """A moving convex shape: its frame in a link's frame, and the half sizes of its box there."""
+
+    name: str
+    link: int
+    rotation: Array
+    origin_m: Array
+    half_m: Array
+    body: fcl.CollisionObject
+
+
+@dataclass
+class _Obstacle:
+    """A fixed convex shape in B and its axis-aligned box."""
+
+    name: str
+    centre_m: Array
+    half_m: Array
+    body: fcl.CollisionObject
+
+
+class Scene:
+    """Everything that must not be touched, and what is allowed to be.
+
+    Parts: "<link name>" of each moving link, "gripper body", "left finger", "right finger", and while the probe is
+    held "tip", "shaft", "handle". Groups: "fingers", "tool" (tip, shaft, handle), "hand" (all but the arm's links),
+    "arm". Obstacles: "floor", "wall +x", "wall -x", "wall +y", "wall -y" (of the container, in K), "holder", "probe"
+    (its handle, while it stands in the holder) and whatever `add_obstacle` added.
+
+    The hand against the arm itself is not looked at: over a container in front of it the arm cannot fold that far.
+
+    Args:
+        kinematics: The arm.
+        world: Nominal container, probe and holder.
+        margin_m: Least clearance of every pair that is not allowed.
+    """
+
+    def __init__(self, kinematics: Kinematics, world: World, *, margin_m: float = 0.002) -> None:
+        self.margin_m = margin_m
+        self._kinematics = kinematics
+        self._world = world
+        self._request = fcl.DistanceRequest(enable_nearest_points=False, enable_signed_distance=True)
+        self._arm_parts = _arm_parts(kinematics.description)
+        self._hand_pose = kinematics.description.pose_last_E @ kinematics.description.gripper.pose_E_P
+        self._tool_parts = self._build_tool()
+        self._holding = False
+        self._allowed: set[tuple[str, str]] = set()
+        self._obstacles: dict[str, _Obstacle] = {}
+        for obstacle in _container_and_holder(world):
+            self._obstacles[obstacle.name] = obstacle
+        self._probe = _stowed_probe(world)
+        self._obstacles[self._probe.name] = self._probe
+
+    # -- what is there -----------------------------------------------------------------------------------------------
+
+    @property
+    def obstacles(self) -> tuple[str, ...]:
+        """Names of all obstacles."""
+        return tuple(self._obstacles)
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Names of all moving parts, the probe's included whether or not it is held."""
+        return tuple(p.name for p in (*self._arm_parts, *self._tool_parts))
+
+    @property
+    def holding_tool(self) -> bool:
+        """True while the probe moves with the hand."""
+        return self._holding
+
+    def hold_tool(self, held: bool) -> None:
+        """Say whether the probe is in the jaws (its parts move with the hand) or in its holder (an obstacle)."""
+        self._holding = held
+        if held:
+            self._obstacles.pop(self._probe.name, None)
+        else:
+            self._obstacles[self._probe.name] = self._probe
+
+    def add_obstacle(
+        self,
+        name: str,
+        kind: Literal["round", "box"],
+        *,
+        centre_K_m: npt.ArrayLike,
+        size_m: tuple[float, float],
+        height_m: float,
+        yaw_rad: float = 0.0,
+        base_K_m: float = 0.0,
+    ) -> None:
+        """Add, or replace, an upright prism or cylinder standing in the container.
+
+        Args:
+            name: Any name that no built-in obstacle has.
+            kind: "round" (a cylinder of diameter size_m[0]) or "box".
+            centre_K_m: (2,) its axis in K.
+            size_m: (along yaw, across), m.
+            height_m: Its top above its base.
+            yaw_rad: Direction of its first side in K.
+            base_K_m: Height of its base above the container floor.
+
+        Raises:
+            ParamError: A taken name, an unknown kind, or sizes that are not positive and finite.
+        """
+        if name in (*WALLS, "floor", "holder", "probe"):
+            raise ParamError("obstacle", name, "not one of the world's own names")
+        if kind not in ("round", "box"):
+            raise ParamError("obstacle.kind", kind, "'round' or 'box'")
+        centre = np.asarray(centre_K_m, dtype=np.float64)
+        sizes = np.array([*size_m, height_m])
+        if centre.shape != (2,) or not (np.isfinite(centre).all() and np.isfinite(sizes).all() and (sizes > 0).all()):
+            raise ParamError(f"obstacle {name}", (centre_K_m, size_m, height_m), "a centre (2,) and positive sizes")
+        pose_K = Pose.planar((*centre, base_K_m + 0.5 * height_m), yaw_rad)
+        pose = self._world.container.pose_B_K @ pose_K
+        if kind == "round":
+            sizes[1] = sizes[0]
+            shape = fcl.Cylinder(0.5 * sizes[0], height_m)
+        else:
+            shape = fcl.Box(*sizes)
+        self._obstacles[name] = _obstacle(name, pose, 0.5 * sizes, shape)
+
+    def remove_obstacle(self, name: str) -> None:
+        """Forget an added obstacle and what was allowed to touch it.
+
+        Raises:
+            UnknownName: No such added obstacle.
+        """
+        added = [n for n in self._obstacles if n not in (*WALLS, "floor", "holder", "probe")]
+        if name not in added:
+            raise UnknownName("obstacle", name, added)
+        del self._obstacles[name]
+        self._allowed = {pair for pair in self._allowed if pair[1] != name}
+
+    def clear_obstacles(self) -> None:
+        """Forget every added obstacle."""
+        for name in [n for n in self._obstacles if n not in (*WALLS, "floor", "holder", "probe")]:
+            self.remove_obstacle(name)
+
+    def allow(self, part: str, obstacle: str) -> None:
+        """Let a part, or a group of parts, touch an obstacle: intended contact.
+
+        Raises:
+            UnknownName: No such part, group or obstacle.
+        """
+        self._allowed |= self._pairs(part, obstacle)
+
+    def disallow(self, part: str, obstacle: str) -> None:
+        """Take back `allow`."""
+        self._allowed -= self._pairs(part, obstacle)
+
+    def _pairs(self, part: str, obstacle: str) -> set[tuple[str, str]]:
+        tool = [p.name for p in self._tool_parts]
+        fingers = ["left finger", "right finger"]
+        hand = ["gripper body", *fingers, *tool]
+        groups = {
+            "fingers": fingers,
+            "tool": tool,
+            "hand": hand,
+            "arm": [n for n in self.parts if n not in hand],
+        }
+        if part not in groups and part not in self.parts:
+            raise UnknownName("part", part, (*self.parts, *groups))
+        known = {*self._obstacles, "probe"}
+        if obstacle not in known:
+            raise UnknownName("obstacle", obstacle, known)
+        return {(name, obstacle) for name in groups.get(part, [part])}
+
+    # -- asking ------------------------------------------------------------------------------------------------------
+
+    def why_blocked(self, q: Array, aperture_m: float, margin_m: float | None = None) -> str | None:
+        """Why the arm must not be at `q` (dof,) rad with the jaws at `aperture_m`; None when all is clear."""
+        found = self.first_blocked(np.asarray(q, dtype=np.float64)[None], aperture_m, margin_m)
+        return None if found is None else str(found)
+
+    def first_blocked(self, q: Array, aperture_m: float, margin_m: float | None = None) -> Blocked | None:
+        """The first of several postures in order, (n, dof) rad, that is not clear, or None.
+
+        A pair that is already too near at the first posture may stay or part, but not come nearer (so that a part can
+        be withdrawn from a contact).
+        """
+        margin = self.margin_m if margin_m is None else margin_m
+        parts = [*self._arm_parts, *(self._tool_parts if self._holding else ())]
+        obstacles = list(self._obstacles.values())
+        rotations, centres = self._placed(parts, q, aperture_m)
+        half = np.abs(rotations) @ np.stack([p.half_m for p in parts])[None, :, :, None]
+        gap = np.abs(centres[:, :, None] - np.stack([o.centre_m for o in obstacles]))
+        gap -= half[:, :, None, :, 0] + np.stack([o.half_m for o in obstacles])
+        near = (gap < margin).all(axis=3)
+        near &= ~np.array([[(p.name, o.name) in self._allowed for o in obstacles] for p in parts], dtype=bool)
+        at_start: dict[tuple[int, int], float] = {}
+        for n, i, k in np.argwhere(near).tolist():
+            body = parts[i].body
+            body.setTransform(fcl.Transform(rotations[n, i], centres[n, i]))
+            distance = fcl.distance(body, obstacles[k].body, self._request, fcl.DistanceResult())
+            if distance >= margin:
+                continue
+            if len(q) > 1:
+                if n == 0:
+                    at_start[i, k] = distance
+                    continue
+                if distance >= at_start.get((i, k), np.inf) - _LEAVING_M:
+                    continue
+            return Blocked(n, parts[i].name, obstacles[k].name, float(distance), margin)
+        return None
+
+    def distance_m(self, part: str, obstacle: str, q: Array, aperture_m: float) -> float:
+        """Signed distance of one part (m, negative is penetration) from one obstacle at `q` (dof,) rad."""
+        parts = {p.name: p for p in (*self._arm_parts, *self._tool_parts)}
+        if part not in parts:
+            raise UnknownName("part", part, parts)
+        if obstacle not in self._obstacles:
+            raise UnknownName("obstacle", obstacle, self._obstacles)
+        rotations, centres = self._placed([parts[part]], np.asarray(q, dtype=np.float64)[None], aperture_m)
+        body = parts[part].body
+        body.setTransform(fcl.Transform(rotations[0, 0], centres[0, 0]))
+        return float(fcl.distance(body, self._obstacles[obstacle].body, self._request, fcl.DistanceResult()))
+
+    def _placed(self, parts: list[_Part], q: Array, aperture_m: float) -> tuple[Array, Array]:
+        links = [self._kinematics.link_placements(row) for row in q]
+        index = [p.link for p in parts]
+        link_R = np.stack([r for r, _ in links])[:, index]
+        link_p = np.stack([p for _, p in links])[:, index]
+        origin = np.stack([p.origin_m for p in parts])
+        opening = self._hand_pose.rotation[:, 1] * (0.5 * aperture_m)
+        for i, part in enumerate(parts):
+            if part.name == "left finger":
+                origin[i] += opening
+            elif part.name == "right finger":
+                origin[i] -= opening
+        return link_R @ np.stack([p.rotation for p in parts]), link_p + (link_R @ origin[None, :, :, None])[..., 0]
+
+    def _build_tool(self) -> list[_Part]:
+        probe = self._world.probe
+        last = self._kinematics.description.dof - 1
+        half_handle = 0.5 * probe.handle_m[2]
+        radius = 0.5 * probe.shaft_diameter_m
+        shaft = probe.grasp_to_tip_m - half_handle
+        tip = self._hand_pose @ Pose(np.array([0.0, 0.0, probe.grasp_to_tip_m]))
+        middle = self._hand_pose @ Pose(np.array([0.0, 0.0, half_handle + 0.5 * shaft]))
+        return [
+            _part("tip", last, tip, np.full(3, probe.tip_radius_m), fcl.Sphere(probe.tip_radius_m)),
+            _part("shaft", last, middle, np.array([radius, radius, 0.5 * shaft]), fcl.Cylinder(radius, shaft)),
+            _part("handle", last, self._hand_pose, 0.5 * np.array(probe.handle_m), fcl.Box(*probe.handle_m)),
+        ]
+
+
+def _part(name: str, link: int, pose: Pose, half_m: Array, shape: fcl.CollisionGeometry) -> _Part:
+    return _Part(
+        name, link, pose.rotation.copy(), pose.position_m.copy(), half_m, fcl.CollisionObject(shape, fcl.Transform())
+    )
+
+
+def _arm_parts(description: RobotDescription) -> list[_Part]:
+    """Capsules of the moving links, then the gripper's body and fingers (closed)."""
+    parts = []
+    for i, joint in enumerate(description.joints):
+        for capsule in joint.link.capsules:
+            start, end = np.array(capsule.start_m), np.array(capsule.end_m)
+            pose = Pose.from_matrix(0.5 * (start + end), _rotation_to(end - start))
+            length, r = float(np.linalg.norm(end - start)), capsule.radius_m
+            half = np.array([r, r, r + 0.5 * length])
+            parts.append(_part(joint.link.name, i, pose, half, fcl.Capsule(r, length)))
+    last, hand = description.dof - 1, description.gripper
+    for box in hand.body:
+        pose = description.pose_last_E @ Pose(np.array(box.centre_m))
+        parts.append(_part("gripper body", last, pose, np.array(box.half_m), fcl.Box(*(2 * h for h in box.half_m))))
+    for name, side in (("left finger", 1.0), ("right finger", -1.0)):
+        centre = np.array(hand.finger.centre_m) * [1.0, side, 1.0]
+        pose = description.pose_last_E @ hand.pose_E_P @ Pose(centre)
+        half = np.array(hand.finger.half_m)
+        parts.append(_part(name, last, pose, half, fcl.Box(*(2 * half))))
+    return parts
+
+
+def _rotation_to(direction: Array) -> Array:
+    """A rotation (3, 3) whose z axis points along `direction`; identity for no direction."""
+    length = float(np.linalg.norm(direction))
+    if length < 1e-9:
+        return np.eye(3)
+    z = direction / length
+    x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def _obstacle(name: str, pose: Pose, half_m: Array, shape: fcl.CollisionGeometry) -> _Obstacle:
+    body = fcl.CollisionObject(shape, fcl.Transform(np.array(pose.rotation), np.array(pose.position_m)))
+    return _Obstacle(name, np.array(pose.position_m), np.abs(pose.rotation) @ half_m, body)
+
+
+def _container_and_holder(world: World) -> list[_Obstacle]:
+    box, t = world.container, world.container.wall_m
+    x, y, z = (0.5 * side for side in box.interior_m)
+    places = {
+        "floor": ((0.0, 0.0, -0.5 * t), (x + t, y + t, 0.5 * t)),
+        "wall +x": ((x + 0.5 * t, 0.0, z), (0.5 * t, y + t, z)),
+        "wall -x": ((-x - 0.5 * t, 0.0, z), (0.5 * t, y + t, z)),
+        "wall +y": ((0.0, y + 0.5 * t, z), (x + t, 0.5 * t, z)),
+        "wall -y": ((0.0, -y - 0.5 * t, z), (x + t, 0.5 * t, z)),
+    }
+    out = [
+        _obstacle(name, box.pose_B_K @ Pose(np.array(centre)), np.array(half), fcl.Box(*(2 * h for h in half)))
+        for name, (centre, half) in places.items()
+    ]
+    half = np.array(world.holder.half_m)
+    below = 0.5 * world.probe.handle_m[2] + HOLDER_GAP_M + half[2]
+    pose = world.holder.pose_B_grasp @ Pose(np.array([0.0, 0.0, below]))
+    out.append(_obstacle("holder", pose, half, fcl.Box(*(2 * half))))
+    return out
+
+
+def _stowed_probe(world: World) -> _Obstacle:
+    half = 0.5 * np.array(world.probe.handle_m)
+    return _obstacle("probe", world.holder.pose_B_grasp, half, fcl.Box(*(2 * half)))

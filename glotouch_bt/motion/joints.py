@@ -1,0 +1,77 @@
+"""Moves in joint space: for long ways through free space, where the track of P does not matter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from glotouch_bt.motion.kinematics import Kinematics
+from glotouch_bt.motion.timing import JointProfile, joint_move
+from glotouch_bt.robot import Array, Limits, MotionRefused
+
+# The description has no acceleration limits; a joint takes this long to its full speed and acceleration. Ours, gentle.
+SPEED_RISE_S = 0.4
+ACCELERATION_RISE_S = 0.1
+_SAMPLES = 40
+
+
+@dataclass(frozen=True)
+class JointPlan:
+    """A joint move and the postures to check it at.
+
+    Attributes:
+        profile: Setpoints per control period.
+        checks_q: (k, dof) rad, evenly spaced from start to end, at most 2 degrees apart.
+    """
+
+    profile: JointProfile
+    checks_q: Array
+
+
+def plan_joints(
+    kinematics: Kinematics, start: Array, end: Array, speed: float, limits: Limits, period_s: float
+) -> JointPlan:
+    """Plan from rest to rest on a straight line in joint space.
+
+    Args:
+        kinematics: The arm.
+        start, end: (dof,) rad.
+        speed: 0..1, share of the joints' speed limits; lowered so that P stays within the tool's speed limit.
+        limits: For the tool's speed.
+        period_s: Control period.
+
+    Raises:
+        MotionRefused: The end is outside a joint's range, or speed outside 0..1.
+    """
+    if not 0.0 < speed <= 1.0:
+        raise MotionRefused("joint move", f"speed {speed:g} is not within 0..1")
+    if start.shape != end.shape or not np.isfinite(end).all():
+        raise MotionRefused("joint move", f"its end must be {len(start)} finite numbers")
+    for joint, value in zip(kinematics.description.joints, end, strict=True):
+        if not joint.lower_rad <= value <= joint.upper_rad:
+            raise MotionRefused(
+                "joint move",
+                f"{joint.name} at {value:.3f} rad is outside its range {joint.lower_rad:.3f}..{joint.upper_rad:.3f}",
+            )
+    largest = float(np.abs(end - start).max())
+    checks = np.linspace(start, end, max(2, int(np.ceil(largest / np.radians(2.0))) + 1))
+    if largest < 1e-9:
+        still = JointProfile(end[None].copy(), np.zeros((1, len(end))), np.zeros((1, len(end))))
+        return JointPlan(still, checks)
+    velocity = speed * kinematics.velocity
+    profile = _profile(start, end, velocity, 1.0, period_s)
+    picks = np.unique(np.linspace(0, len(profile.q) - 1, _SAMPLES).astype(int))
+    fastest = max(float(np.linalg.norm((kinematics.jacobian(profile.q[k]) @ profile.dq[k])[:3])) for k in picks)
+    if fastest > limits.tcp_speed_m_s:
+        # Stretching time by 1/r scales speed by r, acceleration by r^2 and jerk by r^3: the same track, slower.
+        profile = _profile(start, end, velocity, 0.98 * limits.tcp_speed_m_s / fastest, period_s)
+    for array in (profile.q, profile.dq, profile.ddq):
+        array.setflags(write=False)
+    return JointPlan(profile, checks)
+
+
+def _profile(start: Array, end: Array, velocity: Array, slower: float, period_s: float) -> JointProfile:
+    acceleration = velocity / SPEED_RISE_S
+    jerk = acceleration / ACCELERATION_RISE_S
+    return joint_move(start, end, velocity * slower, acceleration * slower**2, jerk * slower**3, period_s)

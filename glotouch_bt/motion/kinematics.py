@@ -1,0 +1,265 @@
+"""Forward and inverse kinematics of a described arm, with Pinocchio as the engine.
+
+The Pinocchio model is built in code from the `RobotDescription` (no URDF or MJCF in between, so nothing is lost on
+the way: armature, velocity limits and every body arrive). Frames: B arm base, P pads' mid-point.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+from scipy.linalg.lapack import dgesv
+
+from glotouch_bt.robot import Array, Joint, Link, MotionRefused, ParamError, Pose, RobotDescription
+
+_POSITION_TOLERANCE_M = 1e-8
+_ROTATION_TOLERANCE_RAD = 1e-7
+_LARGEST_STEP_RAD = 0.3
+_ITERATIONS = 200
+
+
+def se3(pose: Pose) -> pin.SE3:
+    """The same pose as a Pinocchio SE3."""
+    return pin.SE3(np.array(pose.rotation), np.array(pose.position_m))
+
+
+def build_model(description: RobotDescription) -> pin.Model:
+    """Pinocchio model of the arm: joints, limits, armature, link inertias and the frame "P".
+
+    The gripper's body and fingers (jaws closed) are appended to the last link, so that mass matrices are the arm's with
+    its hand.
+    """
+    model = pin.Model()
+    model.name = description.name
+    parent = 0
+    for joint in description.joints:
+        parent = model.addJoint(
+            parent,
+            _joint_model(joint),
+            pin.SE3(pin.rpy.rpyToMatrix(*joint.origin_rpy_rad), np.array(joint.origin_m)),
+            joint.name,
+            np.array([joint.torque_Nm]),
+            np.array([joint.velocity_rad_s]),
+            np.array([joint.lower_rad]),
+            np.array([joint.upper_rad]),
+        )
+        model.appendBodyToJoint(parent, _inertia(joint.link), pin.SE3.Identity())
+    model.armature = np.array([j.armature_kgm2 for j in description.joints])
+    hand = description.gripper
+    last_E, E_P = se3(description.pose_last_E), se3(hand.pose_E_P)
+    model.appendBodyToJoint(parent, pin.Inertia(hand.mass_kg, np.array(hand.com_E_m), np.zeros((3, 3))), last_E)
+    fingers = pin.Inertia(2 * hand.finger_mass_kg, np.array([0.0, 0.0, hand.finger.centre_m[2]]), np.zeros((3, 3)))
+    model.appendBodyToJoint(parent, fingers, last_E * E_P)
+    model.addFrame(pin.Frame("P", parent, 0, last_E * E_P, pin.FrameType.OP_FRAME))
+    return model
+
+
+def _joint_model(joint: Joint) -> pin.JointModel:
+    named = {
+        (1.0, 0.0, 0.0): pin.JointModelRX,
+        (0.0, 1.0, 0.0): pin.JointModelRY,
+        (0.0, 0.0, 1.0): pin.JointModelRZ,
+    }
+    if joint.axis in named:
+        return named[joint.axis]()
+    return pin.JointModelRevoluteUnaligned(np.array(joint.axis))
+
+
+def _inertia(link: Link) -> pin.Inertia:
+    xx, yy, zz, xy, xz, yz = link.inertia_kgm2
+    return pin.Inertia(link.mass_kg, np.array(link.com_m), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+
+
+class Kinematics:
+    """Kinematics of one arm. Not for use from two threads at once (one Pinocchio workspace inside).
+
+    Attributes:
+        description: What it was built from.
+        lower, upper: (dof,) position limits, rad.
+        velocity: (dof,) velocity limits, rad/s.
+        home: (dof,) the description's home posture, rad.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        self.description = description
+        self.model = build_model(description)
+        self._data = self.model.createData()
+        self._frame = self.model.getFrameId("P")
+        self.lower: Array = np.array([j.lower_rad for j in description.joints])
+        self.upper: Array = np.array([j.upper_rad for j in description.joints])
+        self.velocity: Array = np.array([j.velocity_rad_s for j in description.joints])
+        self.home: Array = np.array(description.home_q)
+        self._ridge = np.zeros((6, 6))
+
+    def fk(self, q: Array) -> Pose:
+        """Pose of P in B at joint positions `q` (dof,), rad."""
+        position, rotation = self.place(q)
+        return Pose.from_matrix(position, rotation)
+
+    def place(self, q: Array) -> tuple[Array, Array]:
+        """Position (3,) and rotation (3, 3) of P in B at `q`; the same as `fk` without the quaternion."""
+        pin.forwardKinematics(self.model, self._data, self._checked(q))
+        placement = pin.updateFramePlacement(self.model, self._data, self._frame)
+        return placement.translation.copy(), placement.rotation.copy()
+
+    def jacobian(self, q: Array) -> Array:
+        """(6, dof) Jacobian of P: linear (m/s) over angular (rad/s) velocity, both written in B's axes, per rad/s."""
+        pin.computeJointJacobians(self.model, self._data, self._checked(q))
+        pin.updateFramePlacement(self.model, self._data, self._frame)
+        j = pin.getFrameJacobian(self.model, self._data, self._frame, pin.LOCAL_WORLD_ALIGNED)
+        return np.asarray(j, dtype=np.float64)
+
+    def link_placements(self, q: Array) -> tuple[Array, Array]:
+        """Every joint's link frame in B at `q`: rotations (dof, 3, 3) and origins (dof, 3), m."""
+        pin.forwardKinematics(self.model, self._data, self._checked(q))
+        frames = list(self._data.oMi)[1:]
+        return np.array([m.rotation for m in frames]), np.array([m.translation for m in frames])
+
+    def step(self, pose_B_P: Pose, q: Array) -> Array:
+        """One Newton step of q (dof,) towards a near pose: smallest joint change, no posture task, limits ignored.
+
+        The error falls quadratically: from 1 mm away to about a micrometre.
+        """
+        return q + self._newton(pose_B_P.position_m, pose_B_P.rotation, q, None)[:, 0]
+
+    def flow(
+        self, position_m: Array, rotation: Array, q: Array, twist_B: Array, posture_gain: float = 0.0
+    ) -> tuple[Array, Array, float]:
+        """Correction and tangent for following a path, both from one Jacobian at `q`.
+
+        Args:
+            position_m, rotation: The target of P, (3,) m and (3, 3).
+            q: (dof,) rad, near the target.
+            twist_B: (6,) linear and angular change of the target per metre of path, in B.
+            posture_gain: How strongly the null space pulls towards home, per metre of path.
+
+        Returns:
+            The Newton correction (dof,) rad; dq/ds (dof,) rad/m at the path's twist plus the posture pull; and how far
+            P at `q` is from the target (m, plus rad at 0.1 m lever).
+        """
+        both = self._newton(position_m, rotation, q, twist_B, posture_gain)
+        return both[:, 0], both[:, 1], self._error
+
+    def _newton(
+        self, position_m: Array, rotation: Array, q: Array, twist_B: Array | None, posture_gain: float = 0.0
+    ) -> Array:
+        j = self.jacobian(q)
+        frame = self._data.oMf[self._frame]
+        error = np.zeros((6, 1 if twist_B is None else 2 if posture_gain == 0.0 else 3))
+        error[:3, 0] = position_m - frame.translation
+        now = frame.rotation
+        # Small rotation vector from `now` to the target: half the sum of the crossed columns (Siciliano et al., 3.7.3).
+        m = rotation @ now.T
+        error[3, 0] = 0.5 * (m[2, 1] - m[1, 2])
+        error[4, 0] = 0.5 * (m[0, 2] - m[2, 0])
+        error[5, 0] = 0.5 * (m[1, 0] - m[0, 1])
+        e = error[:, 0]
+        self._error = float(np.sqrt(e[:3] @ e[:3]) + 0.1 * np.sqrt(e[3:] @ e[3:]))
+        if twist_B is not None:
+            error[:, 1] = twist_B
+            if posture_gain != 0.0:
+                pull = posture_gain * (self.home - q)
+                error[:, 2] = j @ pull
+        gram = j @ j.T
+        gram.flat[::7] += 1e-9
+        x = j.T @ dgesv(gram, error, overwrite_a=1, overwrite_b=1)[2]
+        if twist_B is not None and posture_gain != 0.0:
+            x[:, 1] += pull - x[:, 2]
+        return np.asarray(x, dtype=np.float64)
+
+    def ik(
+        self,
+        pose_B_P: Pose,
+        q_seed: npt.ArrayLike,
+        *,
+        posture_weight: float = 0.2,
+        posture_q: npt.ArrayLike | None = None,
+        what: str = "reaching a pose",
+    ) -> Array:
+        """Joint positions that put P at a pose: damped least squares with limits and a null-space posture task.
+
+        Levenberg-Marquardt damping that vanishes with the error (Sugihara 2011); a joint that would leave its range is
+        clamped and taken out of the step. When the seed fails, home and home turned towards the target are tried.
+
+        Args:
+            pose_B_P: Where P shall be.
+            q_seed: (dof,) rad, where to start; the nearest branch is found.
+            posture_weight: 0..1, share of the way to `posture_q` taken in the null space per iteration; 0 leaves the
+                null space as it falls out of the seed.
+            posture_q: (dof,) rad, the posture wished for; home when omitted.
+            what: Named in the error.
+
+        Returns:
+            (dof,) rad, inside the limits, exact to 1e-8 m and 1e-7 rad.
+
+        Raises:
+            MotionRefused: No solution within the joint limits was found; says how near it came and which joint blocks.
+        """
+        posture = self.home if posture_q is None else self._checked(np.asarray(posture_q, dtype=np.float64))
+        seed = self._checked(np.asarray(q_seed, dtype=np.float64))
+        turned = self.home.copy()
+        home_P = self.place(self.home)[0]
+        turn = np.arctan2(pose_B_P.position_m[1], pose_B_P.position_m[0]) - np.arctan2(home_P[1], home_P[0])
+        turned[0] = np.clip(turned[0] + turn, self.lower[0], self.upper[0])
+        best = ""
+        least = np.inf
+        for start in (seed, self.home, turned):
+            q, error, blocked = self._solve(pose_B_P, np.clip(start, self.lower, self.upper), posture_weight, posture)
+            if error == 0.0:
+                return q
+            if error < least:
+                least = error
+                missing = np.linalg.norm(self.place(q)[0] - pose_B_P.position_m)
+                where = np.array2string(pose_B_P.position_m, precision=3)
+                best = f"P at {where} m in B cannot be reached, the nearest is {missing * 1e3:.1f} mm away"
+                best += f" with {blocked}" if blocked else " (out of reach or too near a singularity)"
+        raise MotionRefused(what, best)
+
+    def _solve(self, pose: Pose, q: Array, weight: float, posture: Array) -> tuple[Array, float, str]:
+        target = pose.rotation
+        dof = len(q)
+        blocked = ""
+        norm = np.inf
+        for _ in range(_ITERATIONS):
+            before = q.copy()
+            j = self.jacobian(q)
+            frame = self._data.oMf[self._frame]
+            error = np.concatenate([pose.position_m - frame.translation, pin.log3(target @ frame.rotation.T)])
+            near_P = float(np.linalg.norm(error[:3]))
+            near_R = float(np.linalg.norm(error[3:]))
+            norm = near_P + 0.1 * near_R
+            reached = near_P < _POSITION_TOLERANCE_M and near_R < _ROTATION_TOLERANCE_RAD
+            damping = 1e-9 + 0.01 * min(norm * norm, 1.0)
+            free = np.ones(dof, dtype=bool)
+            pull = weight * (posture - q)
+            for _ in range(dof):
+                jf = j[:, free]
+                solved = np.linalg.solve(jf @ jf.T + damping * np.eye(6), np.stack([error, jf @ pull[free]], axis=1))
+                back = jf.T @ solved
+                dq = np.zeros(dof)
+                dq[free] = back[:, 0] + pull[free] - back[:, 1]
+                dq *= min(1.0, _LARGEST_STEP_RAD / max(float(np.abs(dq).max()), 1e-12))
+                out = free & (((q + dq > self.upper) & (dq > 0)) | ((q + dq < self.lower) & (dq < 0)))
+                if not out.any():
+                    break
+                # The joint goes to its limit now and drops out of what the others have to solve.
+                i = int(np.flatnonzero(out)[0])
+                limit = self.upper[i] if dq[i] > 0 else self.lower[i]
+                blocked = f"{self.description.joints[i].name} at its limit of {limit:.3f} rad"
+                error = error - j[:, i] * (limit - q[i])
+                q[i] = limit
+                free[i] = False
+            else:
+                dq = np.zeros(dof)
+            if free.all():
+                blocked = ""
+            if reached and (blocked or float(np.abs(dq).max()) < 1e-3):
+                return before, 0.0, ""
+            q = np.clip(q + dq, self.lower, self.upper)
+        return q, max(norm, 1e-12), blocked
+
+    def _checked(self, q: Array) -> Array:
+        if q.shape != self.home.shape:
+            raise ParamError("q", q.shape, f"an array of shape {self.home.shape}")
+        return q

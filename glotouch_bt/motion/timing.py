@@ -1,0 +1,107 @@
+"""When a path is travelled: speed-, acceleration- and jerk-limited profiles from ruckig, sampled at the control period.
+
+Only ruckig's local, state-to-state solutions are used: no position limits (the library ignores them) and no
+intermediate positions (the library would ask a web service).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import ruckig
+
+from glotouch_bt.robot import Array, BackendError
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far along a path, at the END of each control period; the last sample is at rest.
+
+    Attributes:
+        s: (n,) m.
+        v: (n,) m/s.
+        a: (n,) m/s2.
+    """
+
+    s: Array
+    v: Array
+    a: Array
+
+
+def _solve(dof: int, target: ruckig.InputParameter) -> ruckig.Trajectory:
+    trajectory = ruckig.Trajectory(dof)
+    result = ruckig.Ruckig(dof).calculate(target, trajectory)
+    if int(result) < 0:
+        raise BackendError(f"ruckig found no profile ({result}) for {target}")
+    return trajectory
+
+
+def _periods(duration_s: float, period_s: float) -> int:
+    # A whole number of periods must not gain one from rounding.
+    return max(1, int(np.ceil(duration_s / period_s - 1e-9)))
+
+
+def rest_to_rest(length_m: float, speed: float, acceleration: float, jerk: float, period_s: float) -> Progress:
+    """Fastest travel of `length_m` from rest to rest under limits (m/s, m/s2, m/s3).
+
+    Raises:
+        BackendError: Ruckig found no profile (a limit is not positive or not finite).
+    """
+    p = ruckig.InputParameter(1)
+    p.current_position, p.target_position = [0.0], [length_m]
+    p.max_velocity, p.max_acceleration, p.max_jerk = [speed], [acceleration], [jerk]
+    trajectory = _solve(1, p)
+    return _sample(trajectory, period_s, length_m)
+
+
+def stop(s: float, v: float, a: float, acceleration: float, jerk: float, period_s: float) -> Progress:
+    """Fastest halt from progress `s` with speed `v` and acceleration `a`, under the given deceleration and jerk."""
+    p = ruckig.InputParameter(1)
+    p.control_interface = ruckig.ControlInterface.Velocity
+    p.current_position, p.current_velocity, p.current_acceleration = [s], [v], [a]
+    p.target_velocity, p.target_acceleration = [0.0], [0.0]
+    p.max_acceleration, p.max_jerk = [acceleration], [jerk]
+    trajectory = _solve(1, p)
+    return _sample(trajectory, period_s, trajectory.at_time(trajectory.duration)[0][0])
+
+
+def _sample(trajectory: ruckig.Trajectory, period_s: float, end: float) -> Progress:
+    n = _periods(trajectory.duration, period_s)
+    rows = np.array([trajectory.at_time(k * period_s) for k in range(1, n)]).reshape(-1, 3)
+    rows = np.vstack([rows, [end, 0.0, 0.0]])
+    return Progress(rows[:, 0].copy(), rows[:, 1].copy(), rows[:, 2].copy())
+
+
+@dataclass(frozen=True)
+class JointProfile:
+    """A joint move at the END of each control period; the last sample is at rest.
+
+    Attributes:
+        q, dq, ddq: (n, dof) rad, rad/s, rad/s2.
+    """
+
+    q: Array
+    dq: Array
+    ddq: Array
+
+
+def joint_move(
+    start: Array, end: Array, velocity: Array, acceleration: Array, jerk: Array, period_s: float
+) -> JointProfile:
+    """Straight line in joint space from rest to rest, all joints in phase, under per-joint limits (dof,).
+
+    Raises:
+        BackendError: Ruckig found no profile.
+    """
+    dof = len(start)
+    p = ruckig.InputParameter(dof)
+    p.current_position, p.target_position = start.tolist(), end.tolist()
+    p.max_velocity, p.max_acceleration, p.max_jerk = velocity.tolist(), acceleration.tolist(), jerk.tolist()
+    p.synchronization = ruckig.Synchronization.Phase
+    trajectory = _solve(dof, p)
+    n = _periods(trajectory.duration, period_s)
+    rows = np.array([trajectory.at_time(k * period_s) for k in range(1, n)]).reshape(-1, 3, dof)
+    last = np.stack([end, np.zeros(dof), np.zeros(dof)])
+    rows = np.concatenate([rows, last[None]])
+    return JointProfile(*(np.ascontiguousarray(rows[:, i]) for i in range(3)))
