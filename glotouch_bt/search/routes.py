@@ -4,13 +4,13 @@ tight."""
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse import csgraph, csr_array
 
 from glotouch_bt.robot import Array
-from glotouch_bt.search.map import GRID_STEP_M, Exclusion, SearchMap
+from glotouch_bt.search.map import GRID_STEP_M, Exclusion, Mask, SearchMap
 
 CHECK_STEP_M = 0.001
 NODE_CLEARANCE_M = 0.0005
@@ -26,29 +26,40 @@ def segment_is_free(belief: SearchMap, start_K_m: Array, end_K_m: Array) -> bool
     return not bool(belief.inside_exclusion((1 - t) * start_K_m + t * end_K_m).any())
 
 
-class _Grid:
-    """Nodes of the permitted region with the free edges between neighbours."""
+Half = tuple[float, float]
 
-    def __init__(self, half_m: tuple[float, float], exclusions: tuple[Exclusion, ...]) -> None:
-        axes = [np.linspace(-h, h, max(round(2 * h / GRID_STEP_M) + 1, 2)) for h in half_m]
+
+class _Lattice:
+    """The 5 mm nodes of a permitted region and all edges between neighbours."""
+
+    def __init__(self, half_m: Half) -> None:
+        axes = [np.linspace(-h, h, grid_count(h)) for h in half_m]
         nx, ny = len(axes[0]), len(axes[1])
         self.nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-        self.free = np.ones(nx * ny, dtype=np.bool_)
-        for e in exclusions:
-            self.free &= e.clearance(self.nodes) >= NODE_CLEARANCE_M
-        index = np.arange(nx * ny).reshape(nx, ny)
+        index = np.arange(nx * ny, dtype=np.int32).reshape(nx, ny)
         pairs = [
             (index[:-1, :], index[1:, :]),
             (index[:, :-1], index[:, 1:]),
             (index[:-1, :-1], index[1:, 1:]),
             (index[:-1, 1:], index[1:, :-1]),
         ]
-        a = np.concatenate([p.ravel() for p, _ in pairs])
-        b = np.concatenate([q.ravel() for _, q in pairs])
-        keep = self.free[a] & self.free[b]
-        a, b = a[keep], b[keep]
-        length = np.linalg.norm(self.nodes[a] - self.nodes[b], axis=1)
-        self.graph = csr_array((length, (a, b)), shape=(nx * ny, nx * ny))
+        self.a = np.concatenate([p.ravel() for p, _ in pairs])
+        self.b = np.concatenate([q.ravel() for _, q in pairs])
+        self.length = np.linalg.norm(self.nodes[self.a] - self.nodes[self.b], axis=1)
+
+
+class _Grid:
+    """The lattice without what the exclusions forbid."""
+
+    def __init__(self, half_m: Half, exclusions: tuple[Exclusion, ...]) -> None:
+        lattice = _lattice(half_m)
+        self.nodes = lattice.nodes
+        self.free = np.ones(len(self.nodes), dtype=np.bool_)
+        for e in exclusions:
+            self.free &= _free_of(half_m, e)
+        keep = self.free[lattice.a] & self.free[lattice.b]
+        n = len(self.nodes)
+        self.graph: Any = csr_array((lattice.length[keep], (lattice.a[keep], lattice.b[keep])), shape=(n, n))
 
     def nearest_free(self, point: Array) -> int:
         """Index of the free node nearest to a point (2,); -1 if there is none."""
@@ -58,8 +69,23 @@ class _Grid:
         return int(np.argmin(distance))
 
 
+def grid_count(half_m: float) -> int:
+    """Nodes along one side of the grid."""
+    return max(round(2 * half_m / GRID_STEP_M) + 1, 2)
+
+
+@lru_cache(maxsize=2)
+def _lattice(half_m: Half) -> _Lattice:
+    return _Lattice(half_m)
+
+
+@lru_cache(maxsize=32)
+def _free_of(half_m: Half, exclusion: Exclusion) -> Mask:
+    return np.asarray(exclusion.clearance(_lattice(half_m).nodes) >= NODE_CLEARANCE_M)
+
+
 @lru_cache(maxsize=4)
-def _grid(half_m: tuple[float, float], exclusions: tuple[Exclusion, ...]) -> _Grid:
+def _grid(half_m: Half, exclusions: tuple[Exclusion, ...]) -> _Grid:
     return _Grid(half_m, exclusions)
 
 
@@ -83,16 +109,16 @@ class Routes:
         straight = np.linalg.norm(goals - self.start_K_m, axis=1)
         if not self._belief.exclusions or len(goals) == 0:
             return straight
-        grid, distance, _ = self._solve()
+        _, distance, _ = self._solve()
         half = self._belief.half_extent_m
-        shape = np.array([max(round(2 * h / GRID_STEP_M) + 1, 2) for h in half])
+        shape = np.array([grid_count(float(h)) for h in half])
         cell = np.clip(np.rint((goals + half) / (2 * half) * (shape - 1)), 0, shape - 1).astype(np.int64)
         by_grid = distance[cell[:, 0] * shape[1] + cell[:, 1]]
         # grid ways are up to 8 % longer than straight ones
         return np.asarray(np.where(np.isfinite(by_grid), np.maximum(by_grid / 1.04, straight), np.inf))
 
     def to(self, goal_K_m: Array) -> Array | None:
-        """Waypoints (k, 2) from the start (left out) to the goal (last), entering no envelope; None if there are none."""
+        """Waypoints (k, 2) from the start (left out) to the goal (last), entering no envelope; None if none."""
         goal = np.asarray(goal_K_m, dtype=np.float64)
         if segment_is_free(self._belief, self.start_K_m, goal):
             return goal[None, :]
@@ -117,7 +143,9 @@ class Routes:
                 n = len(grid.nodes)
                 self._tables = grid, np.full(n, np.inf), np.full(n, -1, dtype=np.int32)
             else:
-                distance, before = dijkstra(grid.graph, directed=False, indices=node, return_predecessors=True)
+                # the stubs know no single start index
+                solve: Any = csgraph.dijkstra
+                distance, before = solve(grid.graph, directed=False, indices=node, return_predecessors=True)
                 distance = distance + np.linalg.norm(grid.nodes[node] - self.start_K_m)
                 self._tables = grid, distance, before
         return self._tables

@@ -48,8 +48,11 @@ def signed_distance(contour: Contour, points_K_m: Array) -> Array:
     p = np.asarray(points_K_m, dtype=np.float64).reshape(-1, 2)
     if contour.kind == "round":
         return np.asarray(np.linalg.norm(p - contour.centre_K_m, axis=1) - 0.5 * contour.size_m[0])
-    params = np.array([[*contour.centre_K_m, contour.yaw_rad, 0.5 * contour.size_m[0], 0.5 * contour.size_m[1]]])
-    return np.asarray(_box(params, p)[0][0])
+    d = p - contour.centre_K_m
+    c, s = np.cos(contour.yaw_rad), np.sin(contour.yaw_rad)
+    x = np.abs(c * d[:, 0] + s * d[:, 1]) - 0.5 * contour.size_m[0]
+    y = np.abs(c * d[:, 1] - s * d[:, 0]) - 0.5 * contour.size_m[1]
+    return np.asarray(np.hypot(np.maximum(x, 0.0), np.maximum(y, 0.0)) + np.minimum(np.maximum(x, y), 0.0))
 
 
 def fit_contour(tip_K_m: Array, tip_radius_m: float, *, approach_K: Array | None = None) -> Contour:
