@@ -293,8 +293,9 @@ class Arm:
     def _travel(self, plans: Sequence[Plan], guard: Guard | None, tactile: bool) -> Motion[MoveResult]:
         limits = self.limits
         track: list[Array] = []
-        done_m, stopped = 0.0, None
-        pose = self.pose_B_P
+        done_m, travelled = 0.0, 0.0
+        stopped: object | None = None
+        observation: Observation | None = None
         for plan in plans:
             running: Plan | None = plan
             while running is not None:
@@ -304,7 +305,6 @@ class Arm:
                     observation = yield Command(now.setpoint(k), None, tactile)
                     self._see(observation)
                     track.append(observation.position_B_P[-1])
-                    pose = observation.pose_B_P
                     if guard is not None and stopped is None:
                         stopped = guard(observation)
                         if stopped is not None:
@@ -318,6 +318,7 @@ class Arm:
                 break
         total = float(sum(p.piece.length_m for p in plans))
         path = np.array(track).reshape(-1, 3)
+        pose = self.pose_B_P if observation is None else observation.pose_B_P
         return MoveResult(done_m >= total - 1e-9, stopped, done_m, path, pose)
 
     def _within_limits(self, speed: float, acceleration: float, jerk: float, what: str) -> None:

@@ -24,6 +24,16 @@ def se3(pose: Pose) -> pin.SE3:
     return pin.SE3(np.array(pose.rotation), np.array(pose.position_m))
 
 
+def known_pose(position_m: Array, quat: Array) -> Pose:
+    """A Pose from arrays that are known to be finite and of unit length; made read-only, not checked."""
+    position_m.setflags(write=False)
+    quat.setflags(write=False)
+    pose = object.__new__(Pose)
+    pose.__dict__["position_m"] = position_m
+    pose.__dict__["quat"] = quat
+    return pose
+
+
 def build_model(description: RobotDescription) -> pin.Model:
     """Pinocchio model of the arm: joints, limits, armature, link inertias and the frame "P".
 
@@ -90,12 +100,16 @@ class Kinematics:
         self.upper: Array = np.array([j.upper_rad for j in description.joints])
         self.velocity: Array = np.array([j.velocity_rad_s for j in description.joints])
         self.home: Array = np.array(description.home_q)
-        self._ridge = np.zeros((6, 6))
+        self._ridge = 1e-9 * np.eye(6)
+        self._error = 0.0
 
     def fk(self, q: Array) -> Pose:
         """Pose of P in B at joint positions `q` (dof,), rad."""
-        position, rotation = self.place(q)
-        return Pose.from_matrix(position, rotation)
+        pin.forwardKinematics(self.model, self._data, self._checked(q))
+        placement = pin.updateFramePlacement(self.model, self._data, self._frame)
+        x, y, z, qx, qy, qz, qw = pin.SE3ToXYZQUAT(placement).tolist()
+        sign = 1.0 if qw >= 0.0 else -1.0
+        return known_pose(np.array([x, y, z]), np.array([sign * qw, sign * qx, sign * qy, sign * qz]))
 
     def place(self, q: Array) -> tuple[Array, Array]:
         """Position (3,) and rotation (3, 3) of P in B at `q`; the same as `fk` without the quaternion."""
@@ -136,7 +150,7 @@ class Kinematics:
 
         Returns:
             The Newton correction (dof,) rad; dq/ds (dof,) rad/m at the path's twist plus the posture pull; and how far
-            P at `q` is from the target (m, plus rad at 0.1 m lever).
+            P at `q` is from the target (largest component of m and rad).
         """
         both = self._newton(position_m, rotation, q, twist_B, posture_gain)
         return both[:, 0], both[:, 1], self._error
@@ -144,26 +158,20 @@ class Kinematics:
     def _newton(
         self, position_m: Array, rotation: Array, q: Array, twist_B: Array | None, posture_gain: float = 0.0
     ) -> Array:
-        j = self.jacobian(q)
-        frame = self._data.oMf[self._frame]
-        error = np.zeros((6, 1 if twist_B is None else 2 if posture_gain == 0.0 else 3))
+        model, data = self.model, self._data
+        pin.computeJointJacobians(model, data, q)
+        frame = pin.updateFramePlacement(model, data, self._frame)
+        j = pin.getFrameJacobian(model, data, self._frame, pin.LOCAL_WORLD_ALIGNED)
+        error = np.zeros((6, 1 if twist_B is None else 2 if posture_gain == 0.0 else 3), order="F")
         error[:3, 0] = position_m - frame.translation
-        now = frame.rotation
-        # Small rotation vector from `now` to the target: half the sum of the crossed columns (Siciliano et al., 3.7.3).
-        m = rotation @ now.T
-        error[3, 0] = 0.5 * (m[2, 1] - m[1, 2])
-        error[4, 0] = 0.5 * (m[0, 2] - m[2, 0])
-        error[5, 0] = 0.5 * (m[1, 0] - m[0, 1])
-        e = error[:, 0]
-        self._error = float(np.sqrt(e[:3] @ e[:3]) + 0.1 * np.sqrt(e[3:] @ e[3:]))
+        error[3:, 0] = pin.log3(rotation @ frame.rotation.T)
         if twist_B is not None:
             error[:, 1] = twist_B
+            self._error = float(np.abs(error[:, 0]).max())
             if posture_gain != 0.0:
                 pull = posture_gain * (self.home - q)
                 error[:, 2] = j @ pull
-        gram = j @ j.T
-        gram.flat[::7] += 1e-9
-        x = j.T @ dgesv(gram, error, overwrite_a=1, overwrite_b=1)[2]
+        x = j.T @ dgesv(j @ j.T + self._ridge, error, overwrite_a=1, overwrite_b=1)[2]
         if twist_B is not None and posture_gain != 0.0:
             x[:, 1] += pull - x[:, 2]
         return np.asarray(x, dtype=np.float64)
@@ -173,7 +181,7 @@ class Kinematics:
         pose_B_P: Pose,
         q_seed: npt.ArrayLike,
         *,
-        posture_weight: float = 0.2,
+        posture_weight: float = 0.5,
         posture_q: npt.ArrayLike | None = None,
         what: str = "reaching a pose",
     ) -> Array:
