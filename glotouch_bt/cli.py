@@ -37,7 +37,9 @@ class TreeFormat(StrEnum):
     svg = "svg"
 
 
-Mission = Annotated[str, typer.Argument(help="path of a mission file, or the name of a shipped mission")]
+Mission = Annotated[
+    str, typer.Argument(metavar="MISSION", help="path of a mission file, or the name of a shipped mission")
+]
 Sets = Annotated[
     list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="a mission parameter or backend option")
 ]
@@ -181,7 +183,9 @@ def check(
 
 @app.command()
 @_guarded
-def skills(name: Annotated[str | None, typer.Argument(help="one skill")] = None, json_: Json = False) -> None:
+def skills(
+    name: Annotated[str | None, typer.Argument(metavar="NAME", help="one skill")] = None, json_: Json = False
+) -> None:
     """List the installed skills, or describe one: parameters, units, ranges, ports."""
     from glotouch_bt import console
     from glotouch_bt.mission.catalogue import describe_skill

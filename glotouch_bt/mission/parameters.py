@@ -164,7 +164,7 @@ def _valid(declared: Declaration) -> str:
 
 
 def _stl_usable(name: str, folder: Path, place: Place, findings: Findings) -> bool:
-    """An stl parameter names a file of the objects' folder, or is a path to an STL file; either must be a good solid."""
+    """An stl parameter names a file of the objects' folder, or is a path to one; it must be a good solid."""
     path = Path(name)
     if path.suffix.lower() != ".stl":
         files = {p.stem: p for p in sorted(folder.iterdir()) if p.suffix.lower() == ".stl"} if folder.is_dir() else {}

@@ -71,7 +71,8 @@ def run_mission(
     """Tick a mission to its end.
 
     Never raises for what happens while ticking: a safety stop, a failing backend, a fault in a skill and Ctrl-C all
-    give an `aborted` outcome whose `error` says what it was. The arm is held in every case.
+    give an `aborted` outcome whose `error` says what it was. The arm is held in every case. What goes wrong before the
+    first tick (an arm that cannot be planned for) does raise.
 
     Args:
         mission: A checked mission.

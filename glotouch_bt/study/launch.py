@@ -113,8 +113,7 @@ def launch(
         folder.clear()
         if on_start is not None:
             on_start(mission, folder.path)
-        referee = backend.referee(robot)
-        return _run(request, mission, conditions, robot, referee, folder, began, on_progress)
+        return _run(request, mission, conditions, robot, backend.referee(robot), folder, began, on_progress)
 
 
 def _run(
@@ -133,7 +132,13 @@ def _run(
     recorder = Recorder(folder.path / "run.mcap", _description(request, mission, conditions))
     result: dict[str, Any] | None = None
     try:
-        outcome = run_mission(mission, robot, recorder, on_progress=on_progress)
+        try:
+            outcome = run_mission(mission, robot, recorder, on_progress=on_progress)
+        except BaseException:  # it raises only before the first tick
+            recorder.close()
+            folder.clear()
+            folder.abandon()
+            raise
         ended = time.perf_counter()
         result = _result(request, mission, outcome, referee)
         result |= {"wall_time_s": round(ended - ready, 3), "wall_open_s": round(ready - began, 3)}

@@ -52,7 +52,7 @@ class RunFolder:
 
     def abandon(self) -> None:
         """The run did not begin: remove what was made for it."""
-        if self._made is not None and self._made.exists():
+        if self._made is not None:
             shutil.rmtree(self._made, ignore_errors=True)
 
     def write_text(self, name: str, text: str) -> None:
