@@ -122,7 +122,9 @@ def minimum_rectangle(points_m: Array) -> tuple[float, float, float, Array]:
     return float(du[i]), float(dv[i]), yaw, centre
 
 
-def traced_outline(solid: trimesh.Trimesh, directions: int = 24, tip_radius_m: float = 0.006) -> Array:
+def traced_outline(
+    solid: trimesh.Trimesh, directions: int = 24, tip_radius_m: float = 0.006, start_rad: float = 0.0
+) -> Array:
     """Points (k, 2) a probe would feel that comes from `directions` evenly spread sides towards the section's middle.
 
     The outermost surface at SENSING heights along each direction, bridged over dents narrower than the ball by taking the
@@ -131,7 +133,7 @@ def traced_outline(solid: trimesh.Trimesh, directions: int = 24, tip_radius_m: f
     top = float(solid.vertices[:, 2].max())
     z = np.clip(np.linspace(*SENSING_M, 5), 0.1 * top, 0.6 * top if top < SENSING_M[1] else 0.98 * top)
     middle = _section_middle(solid, z)
-    angle = np.linspace(0, 2 * np.pi, directions, endpoint=False)
+    angle = start_rad + np.linspace(0, 2 * np.pi, directions, endpoint=False)
     u = np.column_stack([np.cos(angle), np.sin(angle)])
     side = np.column_stack([-u[:, 1], u[:, 0]])
     across = np.array([-0.5, 0.0, 0.5]) * tip_radius_m
