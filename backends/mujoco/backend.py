@@ -1,0 +1,96 @@
+"""The factory of simulated robots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+from backends.mujoco.model import Handles, compile_world
+from backends.mujoco.referee import MujocoReferee
+from backends.mujoco.robot import MujocoRobot
+from backends.mujoco.safety import check_sane
+from backends.mujoco.truth import draw_truth
+from backends.rizon4 import RIZON4_XENSE
+from glotouch_bt.robot import (
+    Backend,
+    BackendError,
+    Conditions,
+    Limits,
+    ParamError,
+    Robot,
+    RobotDescription,
+    UnknownName,
+    World,
+)
+from glotouch_bt.robot.referee import Referee
+
+OPTIONS = ("layout",)
+SETTLE_S = 0.6
+START_APERTURE_M = 0.040
+Layout = dict[str, tuple[float, float, float]]
+
+
+def _read_layout(value: object) -> Layout:
+    """Option `layout`: {object: (x m, y m, yaw rad)} in K."""
+    rule = "a mapping of object names to (x m, y m, yaw rad)"
+    if not isinstance(value, Mapping):
+        raise ParamError("option layout", value, rule)
+    places: Layout = {}
+    for name, place in value.items():
+        try:
+            x, y, yaw = (float(v) for v in place)
+        except (TypeError, ValueError) as e:
+            raise ParamError(f"option layout[{name}]", place, rule) from e
+        places[str(name)] = (x, y, yaw)
+    return places
+
+
+def _settle(model: mujoco.MjModel, data: mujoco.MjData, handles: Handles, description: RobotDescription) -> None:
+    """Put the arm at home with half-open jaws, let everything come to rest, and start the clock at zero."""
+    home = np.array(description.home_q)
+    data.qpos[handles.arm_qpos] = home
+    data.qpos[handles.jaw_qpos] = 0.5 * START_APERTURE_M
+    data.ctrl[handles.arm_ctrl] = home
+    data.ctrl[handles.jaw_ctrl] = 0.5 * START_APERTURE_M
+    mujoco.mj_step(model, data, round(SETTLE_S / model.opt.timestep))
+    data.qvel[:] = 0.0
+    data.qpos[handles.arm_qpos] = home
+    data.time = 0.0
+    mujoco.mj_forward(model, data)
+    check_sane(data, data.sensordata)
+
+
+class MujocoBackend(Backend):
+    """A Rizon 4 with a tactile gripper, a probe in its stand and free objects in a box, in MuJoCo.
+
+    Args:
+        description: The robot; the servo gains are for this arm.
+        limits: Hard limits to enforce.
+    """
+
+    name = "mujoco"
+    summary = "MuJoCo: Rizon 4, tactile gripper, free objects in a container; seeded, no display needed"
+
+    def __init__(self, description: RobotDescription = RIZON4_XENSE, limits: Limits | None = None) -> None:
+        self._description, self._limits = description, limits or Limits()
+
+    def open(self, world: World, conditions: Conditions, seed: int, options: Mapping[str, object]) -> Robot:
+        """See `Backend`. Options: `layout`, {object: (x m, y m, yaw rad)} in K, instead of a random layout."""
+        for option in options:
+            if option not in OPTIONS:
+                raise UnknownName("option of backend mujoco", option, OPTIONS)
+        layout = _read_layout(options["layout"]) if "layout" in options else None
+        truth = draw_truth(world, conditions, seed, layout)
+        model, handles = compile_world(self._description, world, truth)
+        data = mujoco.MjData(model)
+        try:
+            _settle(model, data, handles, self._description)
+        except mujoco.FatalError as e:
+            raise BackendError(f"MuJoCo failed while the world {world.name!r} settled: {e}") from e
+        return MujocoRobot(self._description, self._limits, world, truth, model, data, handles, conditions, seed)
+
+    def referee(self, robot: Robot) -> Referee | None:
+        """See `Backend`."""
+        return MujocoReferee(robot) if isinstance(robot, MujocoRobot) else None

@@ -1,0 +1,258 @@
+"""The simulated robot: one `cycle` is ten steps of MuJoCo and as little Python as possible around them."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+
+from backends.mujoco.jaws import JawReports, Jaws
+from backends.mujoco.model import STEP_S, STEPS, Handles
+from backends.mujoco.probe import handle_mesh
+from backends.mujoco.requests import PAYLOAD_S, PendingPayload, PendingTare
+from backends.mujoco.safety import CHUNK, Guard, check_sane
+from backends.mujoco.servo import Servo
+from backends.mujoco.tactile import Tactile
+from backends.mujoco.truth import Truth
+from backends.mujoco.wrench import GRAVITY_M_S2, WristSensor
+from glotouch_bt.robot import (
+    Array,
+    BackendError,
+    Command,
+    Conditions,
+    GripperState,
+    Limits,
+    Observation,
+    ParamError,
+    Request,
+    Robot,
+    RobotDescription,
+    SetPayload,
+    Tare,
+    Ticket,
+    World,
+)
+
+HELD_DISTANCE_M = 0.02  # the probe counts as held while its handle is this near the pads' mid-point
+
+
+class MujocoRobot(Robot):
+    """See `Robot`. Made by `MujocoBackend.open`; the truth in it is for the referee only."""
+
+    def __init__(
+        self,
+        description: RobotDescription,
+        limits: Limits,
+        world: World,
+        truth: Truth,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        handles: Handles,
+        conditions: Conditions,
+        seed: int,
+    ) -> None:
+        self.description, self.limits, self.period_s = description, limits, STEPS * STEP_S
+        self.world, self.truth = world, truth
+        self.model, self.data, self.handles = model, data, handles
+        s = handles.sensors
+        self._s = s
+        aperture = float(data.qpos[handles.jaw_qpos].sum())
+        self._servo = Servo(model, data, handles, description, self.period_s, limits.stop_acceleration_m_s2)
+        self._servo.reset(np.array(data.qpos[handles.arm_qpos]))
+        self._jaws = Jaws(model, handles, description.gripper, aperture)
+        self._wrist = WristSensor(description, conditions, seed)
+        self._guard = Guard(limits)
+        self._tactile = Tactile(
+            model,
+            data,
+            handles,
+            description.gripper,
+            [
+                (handles.probe_body, handle_mesh(world.probe)),
+                *((b, o.mesh) for b, o in zip(handles.object_bodies, truth.objects, strict=True)),
+            ],
+            conditions,
+            seed,
+        )
+        self._ctrl = np.zeros((STEPS, model.nu))
+        self._arm_ctrl, self._jaw_ctrl = self._ctrl[:, handles.arm_ctrl], self._ctrl[:, handles.jaw_ctrl]
+        self._samples = np.zeros((STEPS, model.nsensordata))
+        self._external = np.zeros((STEPS, 4, 3))
+        self._ahead_s = np.arange(1, STEPS + 1) * STEP_S
+        self._jacobian = np.zeros((3, model.nv))
+        self._cycles = 0
+        self._tare: PendingTare | None = None
+        self._payload: PendingPayload | None = None
+        self._payload_load: tuple[float, Array] | None = None
+        self._failed: BackendError | None = None
+        self._closed = False
+        self.peak_force_N = 0.0
+
+        self._samples[:] = data.sensordata
+        self._wrist.fill(-self._samples[0, s.force.start : s.torque.stop])
+        self._expected = self._wrist.expected(self._samples[0, s.quat])
+        first = GripperState(0.0, aperture, 0.0, False)
+        self._reports = JawReports(conditions, seed, self.period_s, first)
+        self._observation = self._observe(Command())
+
+    def observe(self) -> Observation:
+        """See `Robot`."""
+        return self._observation
+
+    def cycle(self, command: Command) -> Observation:
+        """See `Robot`."""
+        if self._closed:
+            raise BackendError("the robot is closed")
+        if self._failed is not None:
+            raise self._failed
+        stopped = self._guard.tripped
+        target = None
+        if stopped is None:
+            try:
+                if command.gripper is not None:
+                    self._jaws.check(command.gripper)
+                if command.motion is not None:
+                    target = self._servo.check(command.motion)
+            except ParamError:
+                self.hold()
+                raise
+            if command.gripper is not None:
+                self._jaws.set(command.gripper)
+        if self._payload_load is not None:
+            self._servo.load(self._carry())
+        self._servo.plan(target, self._arm_ctrl)
+        self._jaws.plan(float(self._samples[-1, self._s.jaws].sum()), self.period_s, self._jaw_ctrl)
+        try:
+            self._advance()
+            check_sane(self.data, self._samples)
+        except mujoco.FatalError as e:
+            self._failed = BackendError(f"MuJoCo failed at t={self.data.time:.3f} s: {e}")
+            raise self._failed from e
+        except BackendError as e:
+            self._failed = e
+            raise
+        self._cycles += 1
+        self._observation = self._observe(command)
+        self._requests()
+        if self._guard.tripped is not None:
+            raise self._guard.stop()
+        return self._observation
+
+    def start(self, request: Request) -> Ticket:
+        """See `Robot`."""
+        if isinstance(request, Tare):
+            if not (math.isfinite(request.duration_s) and request.duration_s > 0):
+                raise ParamError("tare.duration_s", request.duration_s, "finite and positive")
+            if self._tare is not None:
+                self._tare.ticket.error, self._tare.ticket.done = "replaced by a newer tare", True
+            self._tare = PendingTare(request, max(1, round(request.duration_s / self.period_s)))
+            return self._tare.ticket
+        if not (math.isfinite(request.mass_kg) and request.mass_kg >= 0):
+            raise ParamError("payload.mass_kg", request.mass_kg, "finite and not negative")
+        if self._payload is not None:
+            self._payload.ticket.error, self._payload.ticket.done = "replaced by a newer payload", True
+        self._payload = PendingPayload(request, max(1, round(PAYLOAD_S / self.period_s)))
+        return self._payload.ticket
+
+    def hold(self) -> None:
+        """See `Robot`.
+
+        Time passes only in `cycle`, and a cycle without a motion brakes along the path to rest: nothing is left to do.
+        """
+
+    def close(self) -> None:
+        """See `Robot`."""
+        self.hold()
+        self._closed = True
+
+    def _advance(self) -> None:
+        """Ten steps, looking at the wrench after each chunk."""
+        model, data, ctrl, samples, external = self.model, self.data, self._ctrl, self._samples, self._external
+        step, hand, probe = mujoco.mj_step, self.handles.hand_bodies, self.handles.probe_body
+        ctrl_now, sensed = data.ctrl, data.sensordata
+        on_hand, on_probe = data.cfrc_ext[hand, 3:], data.cfrc_ext[probe, 3:]
+        hand_rows, probe_rows = external[:, :3], external[:, 3]
+        first, last = self._s.force.start, self._s.torque.stop
+        for begin in range(0, STEPS, CHUNK):
+            for i in range(begin, begin + CHUNK):
+                ctrl_now[:] = ctrl[i]
+                step(model, data)
+                samples[i] = sensed
+                hand_rows[i] = on_hand
+                probe_rows[i] = on_probe
+            if self._guard.tripped is None:
+                contact = -samples[begin : begin + CHUNK, first:last] - self._expected
+                if self._guard.look(contact, data.time):
+                    self._stop_here()
+
+    def _stop_here(self) -> None:
+        """Freeze the arm at its present posture, from the next step on; the jaws keep their grip."""
+        q = np.array(self.data.qpos[self.handles.arm_qpos])
+        self._servo.reset(q)
+        self._arm_ctrl[:] = q
+
+    def _carry(self) -> Array:
+        """Joint torques (dof,) that carry the believed payload: J^T of its weight."""
+        mass, com_P = self._payload_load or (0.0, np.zeros(3))
+        data, h = self.data, self.handles
+        point = data.site_xpos[h.pads_site] + data.site_xmat[h.pads_site].reshape(3, 3) @ com_P
+        mujoco.mj_jac(self.model, data, self._jacobian, None, point, h.hand_bodies.start)
+        return self._jacobian[2, h.arm_dof] * (mass * GRAVITY_M_S2)
+
+    def _observe(self, command: Command) -> Observation:
+        """The observation of the samples just taken."""
+        s, rows = self._s, self._samples.copy()
+        start_s = self._cycles * self.period_s - self.period_s
+        now_s = start_s + self.period_s
+        quat = rows[:, s.quat]
+        true = rows[:, s.force.start : s.torque.stop]
+        np.negative(true, out=true)
+        wrench = self._wrist.report(true, quat[-1])
+        self._expected = self._wrist.expected(quat[-1])
+        self._note_peak()
+        self._tactile.sample(now_s, command.tactile)
+        last = rows[-1]
+        aperture = float(last[s.jaws].sum())
+        gripper = self._reports.report(
+            now_s,
+            aperture - self._tactile.shift_m,
+            float(last[s.jaw_speeds].sum()),
+            max(0.0, -0.5 * float(last[s.jaw_forces].sum())),
+        )
+        return Observation(
+            stamp_s=start_s + self._ahead_s,
+            q=rows[:, s.q],
+            dq=rows[:, s.dq],
+            position_B_P=rows[:, s.position],
+            quat_B_P=quat,
+            wrench_S=wrench,
+            gripper=gripper,
+            tactile=self._tactile.arrived(now_s, command.tactile),
+        )
+
+    def _note_peak(self) -> None:
+        """Largest true contact force so far, on the hand and on the probe while it is in the hand."""
+        force = self._external[:, :3].sum(axis=1)
+        away = self.data.xpos[self.handles.probe_body] - self._samples[-1, self._s.position]
+        if away @ away < HELD_DISTANCE_M**2:
+            force += self._external[:, 3]
+        self.peak_force_N = max(self.peak_force_N, float((force * force).sum(axis=1).max()) ** 0.5)
+
+    def _requests(self) -> None:
+        """Advance the slow requests by one period."""
+        quat = self._samples[-1, self._s.quat]
+        if self._payload is not None:
+            self._payload.periods -= 1
+            if self._payload.periods <= 0:
+                request = self._payload.request
+                self._wrist.set_payload(request.mass_kg, request.com_P_m)
+                self._payload_load = (request.mass_kg, request.com_P_m)
+                self._payload.ticket.done = True
+                self._payload = None
+                self._expected = self._wrist.expected(quat)
+        if self._tare is not None and self._tare.add(self._wrist.untared):
+            self._wrist.tare(self._tare.mean, quat)
+            self._tare.ticket.done = True
+            self._tare = None
+            self._expected = self._wrist.expected(quat)

@@ -1,0 +1,53 @@
+"""The hard limits below the skill layer: contact wrench, and a simulation that is still sane."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from glotouch_bt.robot import Array, BackendError, Limits, SafetyStop
+
+CHUNK = 5  # consecutive samples that must all be beyond the limit; also how often it is looked at
+
+
+class Guard:
+    """Looks at every chunk of raw wrench samples; once tripped it stays tripped."""
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self.tripped: SafetyStop | None = None
+
+    def look(self, contact: Array, stamp_s: float) -> bool:
+        """Check a chunk (n, 6) of contact wrenches ending at `stamp_s`; True if a limit tripped now."""
+        squared = contact * contact
+        force2, torque2 = float(squared[:, :3].sum(axis=1).min()), float(squared[:, 3:].sum(axis=1).min())
+        limits = self._limits
+        if force2 > limits.hard_force_N**2:
+            self.tripped = SafetyStop("force_N", force2**0.5, limits.hard_force_N, stamp_s)
+        elif torque2 > limits.hard_torque_Nm**2:
+            self.tripped = SafetyStop("torque_Nm", torque2**0.5, limits.hard_torque_Nm, stamp_s)
+        else:
+            return False
+        return True
+
+    def stop(self) -> SafetyStop:
+        """A fresh copy of the stop that tripped, to raise in every cycle from then on."""
+        t = self.tripped
+        assert t is not None
+        return SafetyStop(t.quantity, t.value, t.limit, t.stamp_s)
+
+
+def check_sane(data: mujoco.MjData, samples: Array) -> None:
+    """Refuse a simulation that has blown up or run out of room.
+
+    Raises:
+        BackendError: MuJoCo raised a warning, or a sample is not finite.
+    """
+    warnings = data.warning.number
+    if warnings.any():
+        names = [
+            name for name, w in mujoco.mjtWarning.__members__.items() if int(w) < len(warnings) and warnings[int(w)]
+        ]
+        raise BackendError(f"the simulation became unstable at t={data.time:.3f} s ({', '.join(names)})")
+    if not np.isfinite(samples.sum()):
+        raise BackendError(f"the simulation gave readings that are not finite at t={data.time:.3f} s")
