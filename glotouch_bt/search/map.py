@@ -16,6 +16,8 @@ from glotouch_bt.touch import Contour, signed_distance
 
 PATH_STEP_M = 0.002
 GRID_STEP_M = 0.005
+LIMB_M = 0.010
+"""Most that contacts outside the fitted outline may widen its envelope: gaps between objects are 30 mm."""
 Mask = npt.NDArray[np.bool_]
 
 
@@ -87,10 +89,14 @@ class SearchMap:
         return replace(self, path_K_m=_frozen(np.concatenate([self.path_K_m, new])))
 
     def with_exclusion(self, contour: Contour, margin_m: float) -> SearchMap:
-        """With one more object traced; the tip's centre keeps `margin_m` from its outline."""
+        """With one more object traced; the tip's centre keeps `margin_m` from its outline.
+
+        Contacts that stick out of the outline (limbs of a figure) widen the margin, by 10 mm at most.
+        """
         if not (np.isfinite(margin_m) and margin_m >= 0):
             raise ParamError("margin_m", margin_m, "finite and not negative")
-        return replace(self, found=self.found + 1, exclusions=(*self.exclusions, Exclusion(contour, margin_m)))
+        out = float(np.clip(np.max(contour.residuals_m, initial=0.0), 0.0, LIMB_M))
+        return replace(self, found=self.found + 1, exclusions=(*self.exclusions, Exclusion(contour, margin_m + out)))
 
     def with_dropped(self, point_K_m: npt.ArrayLike) -> SearchMap:
         """With a place (2,) that the search shall not try again."""

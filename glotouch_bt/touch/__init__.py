@@ -19,7 +19,7 @@ from glotouch_bt.touch.fusion import TipFusion
 from glotouch_bt.touch.localisation import contact_direction, contact_point, disc_support, polygon_support
 from glotouch_bt.touch.patches import PatchStats, evidence_weight, patch_statistics, relative_nonplanarity
 from glotouch_bt.touch.plateau import Plateau, PlateauParams, find_plateau, make_layer, temporal_median
-from glotouch_bt.touch.tracing import largest_gap_direction, needs_more, widest_gap
+from glotouch_bt.touch.tracing import largest_gap_direction, needs_more, next_direction, widest_gap
 from glotouch_bt.touch.values import Candidate, Contact, Contour, ContourKind, Layer, TouchSequence, TouchSet
 
 __all__ = [
@@ -54,6 +54,7 @@ __all__ = [
     "largest_gap_direction",
     "make_layer",
     "needs_more",
+    "next_direction",
     "patch_statistics",
     "polygon_support",
     "reaction_direction",

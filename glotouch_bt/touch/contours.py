@@ -28,10 +28,11 @@ TYPICAL_M, LOG_SPREAD = 0.055, 0.5
 """Prior of every size: log-normal about a hand-sized object."""
 PRIOR_WEIGHT = 0.5
 """The prior counts as this much of one contact's information; its pull on a well-touched outline is below 0.1 mm."""
-BOX_GAIN, BOX_RMS_M = 5.0, 0.0016
-"""An outline is a box only if the circle's rms is above BOX_RMS_M ("its residual remains high") and the box lowers the
-loss by BOX_GAIN more than two spare parameters would by chance. Tuned on simulated traces of round, square and
-free-form outlines."""
+BOX_GAIN, ROUND_RMS_M, BOX_RMS_M = 5.0, 0.0016, 0.0022
+"""A box needs three things: a circle that does not fit (rms above ROUND_RMS_M), a rectangle that does (rms below
+BOX_RMS_M or a quarter of the circle's), and a loss lower by BOX_GAIN, more than two spare parameters gain by chance.
+What is neither round nor a box counts as round: it has no long side to align with. Tuned on simulated traces of all
+three sorts."""
 
 _Model = Callable[[Array, Array], tuple[Array, Array]]
 
@@ -99,12 +100,12 @@ def contour_quality(tips_K_m: Array, contour: Contour) -> float:
     """0..1: how well an outline is supported, coverage times fit.
 
     Coverage falls from 1 (no gap wider than 90 degrees between contacts, seen from the centre) to 0 (all on one side,
-    half a turn untouched); fit is 1 / (1 + (rms / 2 mm)^2).
+    half a turn untouched); fit is 1 / (1 + (rms / 4 mm)^2).
     """
     offset = np.asarray(tips_K_m, dtype=np.float64)[:, :2] - contour.centre_K_m
     _, gap = widest_gap(np.arctan2(offset[:, 1], offset[:, 0]))
     coverage = float(np.clip((np.pi - gap) / (0.5 * np.pi), 0.0, 1.0))
-    return coverage / (1.0 + (contour.rms_m / 0.002) ** 2)
+    return coverage / (1.0 + (contour.rms_m / 0.004) ** 2)
 
 
 def consistent(contour: Contour, tip_K_m: Array, tip_radius_m: float, tolerance_m: float = 0.008) -> bool:
@@ -114,8 +115,11 @@ def consistent(contour: Contour, tip_K_m: Array, tip_radius_m: float, tolerance_
 
 
 def _is_box(circle: _Fit, box: _Fit, k: int) -> bool:
-    rms = float(np.sqrt(np.mean(circle.residuals_m**2)))
-    return k >= 5 and rms > BOX_RMS_M and circle.loss - box.loss > BOX_GAIN
+    round_rms = float(np.sqrt(np.mean(circle.residuals_m**2)))
+    box_rms = float(np.sqrt(np.mean(box.residuals_m**2)))
+    if k < 5 or round_rms < ROUND_RMS_M or circle.loss - box.loss < BOX_GAIN:
+        return False
+    return box_rms < max(BOX_RMS_M, 0.25 * round_rms)
 
 
 def _round_contour(fit: _Fit) -> Contour:

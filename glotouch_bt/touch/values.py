@@ -63,6 +63,11 @@ class Contour:
             return 0.5 * self.size_m[0]
         return 0.5 * float(np.hypot(*self.size_m))
 
+    @property
+    def enclosing_radius_m(self) -> float:
+        """Radius about the centre that also holds the contacts sticking out of the outline (limbs of a figure)."""
+        return self.radius_m + max(0.0, float(np.max(self.residuals_m, initial=0.0)))
+
     def outline_K_m(self, n: int = 48) -> Array:
         """(m, 2) closed polyline of the outline, for maps."""
         if self.kind == "round":
