@@ -99,8 +99,8 @@ def print_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) 
     """A table on stdout; cells are plain text."""
     console = Console()
     table = Table(title=title, title_justify="left", header_style="bold", show_edge=False)
-    for name in head:
-        table.add_column(name, overflow="fold")
+    for i, name in enumerate(head):
+        table.add_column(name, overflow="fold", no_wrap=i == 0)
     for row in rows:
         table.add_row(*(escape(c) for c in row))
     console.print(table)

@@ -158,4 +158,6 @@ class _Builder:
         skill = spec.skill_type(spec.name, spec.params, self._context)
         wiring = {p: f"{self._namespace}/{w.key}" for p, w in (*spec.reads.items(), *spec.writes.items())}
         skill.setup_ports(wiring)
+        for port, value in spec.constants.items():
+            Keys(spec.name, self._namespace, (spec.reads[port].key,)).set(spec.reads[port].key, value)
         return skill

@@ -34,14 +34,20 @@ def details(node: NodeSpec) -> str:
         for name, field in type(model).model_fields.items():
             value = getattr(model, name)
             if name in model.model_fields_set and value != field.default and not hasattr(value, "model_fields"):
-                parts.append(f"{name}={value}")
+                parts.append(f"{name}={_plain(value)}")
     if node.kind == "repeat" and hasattr(getattr(node.settings, "until", None), "port"):
         parts.insert(0, f"until {node.reads['until'].key}")
     if node.kind == "skill":
-        reads = ", ".join(w.key for w in node.reads.values())
+        reads = ", ".join(p if p in node.constants else w.key for p, w in node.reads.items())
         writes = ", ".join(w.key for w in node.writes.values())
         parts.append(f"{reads or '·'} → {writes or '·'}")
     return "  ".join(parts)
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{k}→{v}" for k, v in value.items())
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def as_text(mission: Mission) -> str:
@@ -77,10 +83,9 @@ class _Box:
 
 def _layout(node: NodeSpec, left: float, depth: int) -> tuple[_Box, float]:
     """A box with its subtree from x = `left`; returns it and the x where the subtree ends."""
-    title = node.name if node.kind in ("skill", node.name) else f"{node.name}"
     text = details(node)
     text = text if len(text) <= 34 else text[:33] + "…"
-    width = max(len(f"{_SIGNS[node.kind]} {title}") * CHAR_PX * 1.08, len(text) * CHAR_PX * 0.82, 60) + 18
+    width = max(len(f"{_SIGNS[node.kind]} {node.name}") * CHAR_PX * 1.08, len(text) * CHAR_PX * 0.82, 60) + 18
     children: list[_Box] = []
     x = left
     for child in node.children:
@@ -91,7 +96,7 @@ def _layout(node: NodeSpec, left: float, depth: int) -> tuple[_Box, float]:
     centre = 0.5 * (children[0].middle + children[-1].middle) if children else left + 0.5 * width
     start = max(left, centre - 0.5 * width)
     y = MARGIN + depth * (BOX_H + GAP_Y)
-    return _Box(node, (title, text), start, y, width, children), max(end, start + width)
+    return _Box(node, (node.name, text), start, y, width, children), max(end, start + width)
 
 
 def as_svg(mission: Mission) -> str:
@@ -108,13 +113,14 @@ def as_svg(mission: Mission) -> str:
             bend = 0.5 * (y0 + y1)
             path = f"M{x0:.1f} {y0:.1f}C{x0:.1f} {bend:.1f} {x1:.1f} {bend:.1f} {x1:.1f} {y1:.1f}"
             shapes.append(f'<path d="{path}" fill="none" stroke="#8a94a3"/>')
+        title_y = box.y + (19 if box.lines[1] else 27)
         fill = _FILLS.get(box.node.kind, "#ffffff")
         radius = 3 if box.node.kind == "skill" else 14
         shapes.append(
             f"<g><title>{escape(box.node.kind)}: {escape(details(box.node))} ({escape(str(box.node.place))})</title>"
             f'<rect x="{box.x:.1f}" y="{box.y:.1f}" width="{box.width:.1f}" height="{BOX_H}" rx="{radius}" '
             f'fill="{fill}" stroke="#44505f"/>'
-            f'<text x="{box.middle:.1f}" y="{box.y + 19:.1f}" text-anchor="middle" font-weight="600">'
+            f'<text x="{box.middle:.1f}" y="{title_y:.1f}" text-anchor="middle" font-weight="600">'
             f"{_SIGNS[box.node.kind]} {escape(box.lines[0])}</text>"
             f'<text x="{box.middle:.1f}" y="{box.y + 36:.1f}" text-anchor="middle" font-size="10.5" fill="#5b6675">'
             f"{escape(box.lines[1])}</text></g>"

@@ -229,6 +229,8 @@ class _Flow:
             return state, state
         if report:
             for port, wire in node.reads.items():
+                if port in node.constants:
+                    continue
                 info = skill.INPUT_PORTS[port]
                 self._read(
                     node, wire.key, wire.place, info.data_type, state, port, must=info.required, soft=not info.required

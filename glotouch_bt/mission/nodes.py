@@ -135,6 +135,7 @@ class NodeSpec:
         skill: The skill's name and class, for kind "skill".
         params: The skill's parameters; None if they were faulty.
         reads, writes: Wired ports by port name.
+        constants: Input ports whose value stands in the mission.
     """
 
     kind: str
@@ -147,6 +148,7 @@ class NodeSpec:
     params: SkillParams | None = None
     reads: Mapping[str, Wire] = field(default_factory=dict)
     writes: Mapping[str, Wire] = field(default_factory=dict)
+    constants: Mapping[str, object] = field(default_factory=dict)
 
     def walk(self) -> Iterator[NodeSpec]:
         """This node and all below, parents first."""

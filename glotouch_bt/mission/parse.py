@@ -10,6 +10,7 @@ from pathlib import Path
 from glotouch_bt.mission.fields import validate
 from glotouch_bt.mission.findings import Findings
 from glotouch_bt.mission.library import shown
+from glotouch_bt.mission.literals import is_literal, read_literal
 from glotouch_bt.mission.nodes import KINDS, ConditionSettings, Kind, NodeSpec, RepeatSettings, SubtreeSettings, Wire
 from glotouch_bt.mission.parameters import Parameter, Value, read_parameters, substitute
 from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, read_yaml
@@ -233,9 +234,12 @@ def _skill(name: str, skill: type[Skill], place: Place, body: Node, scope: Scope
     keys = skill.default_keys()
     reads = {p: Wire(p, scope.key(keys[p]), place) for p in skill.INPUT_PORTS}
     writes = {p: Wire(p, scope.key(keys[p]), place) for p in skill.OUTPUT_PORTS}
-    for direction, wires, other in (("in", reads, skill.OUTPUT_PORTS), ("out", writes, skill.INPUT_PORTS)):
-        if direction in taken:
-            _rewire(name, direction, taken[direction][1], wires, other, scope)
+    constants: dict[str, object] = {}
+    if "in" in taken:
+        given, constants = _literals(skill, taken["in"][1], place, reads, scope)
+        _rewire(name, "in", given, reads, skill.OUTPUT_PORTS, scope)
+    if "out" in taken:
+        _rewire(name, "out", taken["out"][1], writes, skill.INPUT_PORTS, scope)
     return NodeSpec(
         "skill",
         _title(taken, name, scope),
@@ -245,7 +249,26 @@ def _skill(name: str, skill: type[Skill], place: Place, body: Node, scope: Scope
         params=params,
         reads=reads,
         writes=writes,
+        constants=constants,
     )
+
+
+def _literals(
+    skill: type[Skill], given: Node, place: Place, wires: dict[str, Wire], scope: Scope
+) -> tuple[Node, dict[str, object]]:
+    """Values written for input ports: (what is left to wire, the values); each gets a key nobody else can name."""
+    constants: dict[str, object] = {}
+    if not isinstance(given, Map):
+        return given, constants
+    left: list[tuple[Scalar, Node]] = []
+    for key, value in given.entries:
+        port = str(key.value)
+        if port not in wires or not is_literal(value):
+            left.append((key, value))
+            continue
+        wires[port] = Wire(port, f"{scope.prefix}{port}@{place.line}_{place.column}", value.place)
+        constants[port] = read_literal(value, skill.INPUT_PORTS[port].data_type, port, scope.findings)
+    return replace(given, entries=tuple(left)), constants
 
 
 def _rewire(
@@ -296,7 +319,8 @@ def _subtree(place: Place, body: Node, scope: Scope) -> NodeSpec:
     for key, value in _entries(rest.get("ports")):
         if isinstance(value, Scalar) and (wire := _keyed(str(key.value), str(value.value), value.place, scope)):
             ports[str(key.value)] = wire.key
-    prefix = f"{scope.prefix}{path.stem}@{place.line}.{place.column}/"
+    # py_trees splits keys at dots, so that none may stand in a key.
+    prefix = f"{scope.prefix}{re.sub('[^A-Za-z0-9]', '_', path.stem)}@{place.line}_{place.column}/"
     child_scope = replace(scope, file=path, prefix=prefix, ports=ports, trail=trail)
     child = parse_tree(substitute(tree, inner, scope.findings), child_scope)
     used = {w.key for n in child.walk() for w in (*n.reads.values(), *n.writes.values())}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, ClassVar
@@ -11,7 +12,7 @@ import pytest
 
 from glotouch_bt.mission.build import BuiltTree, build_tree
 from glotouch_bt.mission.load import Mission, load_mission
-from glotouch_bt.robot import HOLD, GripperState, Observation
+from glotouch_bt.robot import HOLD, Array, GripperState, Observation
 from skills.base import Context, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 
 
@@ -80,6 +81,24 @@ class Number(Skill):
         yield HOLD
 
 
+@dataclasses.dataclass(frozen=True)
+class Spot:
+    position_K_m: Array
+    yaw_rad: float
+    count: int = 1
+
+
+class GoTo(Skill):
+    """Go to a spot."""
+
+    spot = In(Spot, "where")
+    seen = Out(Spot, "where it was")
+
+    def run(self) -> SkillRun:
+        yield HOLD
+        self.seen = self.spot
+
+
 class DoParams(SkillParams):
     script: str = param("S success, F failure, R one more period, X raise; one letter a tick", default="S")
     code: str = param("failure code", default="scripted")
@@ -115,7 +134,14 @@ class Do(Skill):
             raise
 
 
-REGISTRY: dict[str, type[Skill]] = {"find": Find, "use": Use, "judge": Judge, "number": Number, "act": Do}
+REGISTRY: dict[str, type[Skill]] = {
+    "find": Find,
+    "use": Use,
+    "judge": Judge,
+    "number": Number,
+    "act": Do,
+    "go_to": GoTo,
+}
 
 
 class NoArm:

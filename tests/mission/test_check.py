@@ -55,6 +55,11 @@ MISTAKES: list[tuple[str, str, list[tuple[int, int, str, str]]]] = [
     ("compares text with a number", HEAD + "tree:\n  - find\n  - condition: {port: found, equals: three}\n", [(5, 23, "port_type", "as str")]),
     ("unreachable in a selector", HEAD + "tree:\n  selector: [succeed: find, act]\n", [(4, 29, "unreachable", "always succeeds")]),
     ("unreachable in a sequence", HEAD + "tree:\n  sequence: [invert: {succeed: act}, find]\n", [(4, 38, "unreachable", "always fails")]),
+    ("literal: unknown field", HEAD + "tree:\n  go_to: {in: {spot: {position_K_m: [0, 0, 0], yaw_rad: 0, cout: 1}}}\n", [(4, 60, "unknown_field", "did you mean 'count'")]),
+    ("literal: missing field", HEAD + "tree:\n  go_to: {in: {spot: {position_K_m: [0, 0, 0]}}}\n", [(4, 22, "missing_parameter", "'yaw_rad'")]),
+    ("literal: wrong unit", HEAD + "tree:\n  go_to: {in: {spot: {position_K_m: [0, 1 kg, 0], yaw_rad: 0}}}\n", [(4, 41, "wrong_unit", "in m, not 'kg'")]),
+    ("literal: wrong type", HEAD + "tree:\n  go_to: {in: {spot: {position_K_m: 3, yaw_rad: x}}}\n", [(4, 37, "wrong_type", "list of numbers"), (4, 49, "wrong_type", "a number")]),
+    ("literal for a type that has none", HEAD + "tree:\n  - use: {force_N: 1, in: {item: 7}}\n", [(4, 34, "wrong_type", "takes a Item")]),
     ("no children", HEAD + "tree:\n  sequence: []\n", [(4, 3, "no_children", "sequence")]),
     ("no child", HEAD + "tree:\n  retry: {attempts: 2}\n", [(4, 3, "no_children", "retry")]),
     ("missing setting", HEAD + "tree:\n  retry: {do: find}\n", [(4, 3, "missing_parameter", "'attempts'")]),
@@ -165,7 +170,7 @@ def test_a_subtree_keeps_its_keys_to_itself(tmp_path: Path, registry: dict[str, 
     mission = load_mission(path, skills=registry)
     find = next(n for n in mission.tree.walk() if n.skill == "find")
     assert find.writes["found"].key == "ours"
-    assert find.writes["items"].key.startswith("sub@4.5/")
+    assert find.writes["items"].key.startswith("sub@4_5/")
     path.write_text(
         HEAD + "tree:\n  - subtree: {file: sub.yaml, parameters: {m: 4}, ports: {fund: ours}}\n  - number\n"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -116,3 +117,28 @@ def test_two_trees_do_not_share_keys(built: Callable[[str], Any], robot: Any) ->
         context.observation = robot.cycle(None)
     assert first.value("found") == 1
     assert second.value("found") is None
+
+
+def test_a_port_takes_a_value_written_in_the_mission(built: Callable[[str], Any], robot: Any) -> None:
+    made, context = built("  go_to: {in: {spot: {position_K_m: [10 mm, 0, 0.5], yaw_rad: 90 deg}}}")
+    for _ in range(2):
+        made.root.tick_once()
+        context.observation = robot.cycle(None)
+    seen: Any = made.value("seen")
+    assert seen.position_K_m.tolist() == [0.01, 0.0, 0.5]
+    assert abs(seen.yaw_rad - 1.5707963267949) < 1e-12
+    made.forget()
+
+
+def test_a_subtree_s_keys_are_its_own(built: Callable[[str], Any], robot: Any, tmp_path: Path) -> None:
+    sub = "subtree: s\nparameters:\n  n: {type: int, default: 1}\ntree:\n  - find: {how_many: $n}\n  - number\n"
+    (tmp_path / "a.b.yaml").write_text(sub)
+    made, context = built(
+        "  - find\n  - subtree: {file: a.b.yaml, parameters: {n: 5}, ports: {complete: ours}}\n  - number\n"
+    )
+    for _ in range(5):
+        made.root.tick_once()
+        context.observation = robot.cycle(None)
+    assert made.root.status.value == "SUCCESS"
+    assert (made.value("found"), made.value("ours"), made.value("a_b@5_5/found")) == (3, True, 5)
+    made.forget()
