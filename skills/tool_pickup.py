@@ -16,6 +16,10 @@ from skills.probing import Prober
 from skills.requests import finish
 
 
+FLOOR_SEARCH_M = 0.005
+"""The floor is looked for this far below where the registration puts it."""
+
+
 class ToolPickupParams(SkillParams):
     """Parameters of `tool_pickup`."""
 
@@ -115,15 +119,15 @@ class ToolPickup(Skill):
         yield from prober.hop(np.array([*corner, 0.0]), max(high, float(prober.tip_K_m[2])), p.speed_m_s)
         near = 0.02
         yield from self.context.arm.line(tool.pose_B_P(world, np.array([*corner, near])), p.speed_m_s)
-        self.context.arm.scene.allow("tip", "floor")
-        probed = yield from prober.move(np.array([*corner, tool.tip_radius_m - 0.008]), 0.01)
+        self.context.arm.scene.allow("tool", "floor")
+        probed = yield from prober.move(np.array([*corner, tool.tip_radius_m - FLOOR_SEARCH_M]), 0.01)
         if probed.contact is None:
             raise SkillFailed(
                 "no_floor",
-                "the ball met no floor 8 mm below where the registration puts it",
+                f"the ball met no floor {FLOOR_SEARCH_M * 1e3:.0f} mm below where the registration puts it",
                 advice="check the container's pose and that the probe is held by its handle",
             )
         floor_z = float(probed.contact.tip_K_m[2]) - tool.tip_radius_m
         yield from prober.retreat(np.array([0.0, 0.0, 1.0]), 0.01, 0.05)
-        self.context.arm.scene.disallow("tip", "floor")
+        self.context.arm.scene.disallow("tool", "floor")
         return dataclasses.replace(tool, floor_z_K_m=floor_z)
