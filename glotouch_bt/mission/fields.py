@@ -153,7 +153,8 @@ def _report(
     if error["type"] == "extra_forbidden":
         parent = locate(given, loc[:-1])[0]
         at = parent.key_place(str(loc[-1])) if isinstance(parent, Map) else place
-        findings.unknown(at, "unknown_parameter", f"key of {name} in {what}:", str(loc[-1]), ())
+        names = _keys(model, loc[:-1])
+        findings.unknown(at, "unknown_parameter", f"key of {name} in {what}:", str(loc[-1]), names)
         return
     dotted = ".".join(str(s) for s in loc if not isinstance(s, str) or s in _written(given) or rest == ())
     shown = f" = {node.value!r}" if isinstance(node, Scalar) else ""
@@ -166,6 +167,16 @@ def _report(
     subject = f"{dotted}{shown}{source}" if dotted else what
     code = "wrong_range" if error["type"].startswith(("greater", "less")) else "wrong_type"
     findings.add(place, code, f"{subject}: {rule}{unit if code == 'wrong_range' else ''}", valid=_valid(field, unit))
+
+
+def _keys(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
+    """The keys valid at a location inside nested models; empty if it is not a plain nesting."""
+    for step in loc:
+        field = model.model_fields.get(str(step))
+        if field is None or not (isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel)):
+            return []
+        model = field.annotation
+    return list(model.model_fields)
 
 
 def _written(given: Map) -> set[str]:
@@ -183,7 +194,7 @@ def _written(given: Map) -> set[str]:
 
 def _valid(field: FieldInfo | None, unit: str) -> str:
     """The field's type, range and unit in words."""
-    if field is None:
+    if field is None or (isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel)):
         return ""
     kind = getattr(field.annotation, "__name__", str(field.annotation).replace("typing.", ""))
     rules = [
