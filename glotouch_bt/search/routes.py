@@ -106,7 +106,7 @@ class Routes:
     def lengths(self, goals_K_m: Array) -> Array:
         """(n,) length of the way to each goal (n, 2), to a grid step; infinite if there is none."""
         goals = np.asarray(goals_K_m, dtype=np.float64).reshape(-1, 2)
-        straight = np.linalg.norm(goals - self.start_K_m, axis=1)
+        straight = np.asarray(np.linalg.norm(goals - self.start_K_m, axis=1))
         if not self._belief.exclusions or len(goals) == 0:
             return straight
         _, distance, _ = self._solve()

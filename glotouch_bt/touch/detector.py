@@ -7,10 +7,12 @@ the total force (or the moment) above their thresholds for N samples running; th
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
+import numpy.typing as npt
 
 from glotouch_bt.robot import Array, Observation, ParamError, Pose
 from glotouch_bt.robot.geometry import frozen_array, quat_to_matrix
@@ -19,8 +21,8 @@ from glotouch_bt.touch.filtering import LowPass
 from glotouch_bt.touch.fusion import TipFusion
 from glotouch_bt.touch.onset import onset_index
 
-HISTORY = 90
-"""Samples kept for dating an onset: 30 that may belong to the contact and 60 before it."""
+HISTORY_BLOCKS = 10
+"""Blocks kept for dating an onset: 100 ms at 100 Hz, of which the last third may belong to the contact."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,7 +116,11 @@ class ContactGuard:
         self._fusion = TipFusion.for_tip(tip_P_m, pose_E_P, baseline.sd)
         self._R_P_E = pose_E_P.rotation.T
         self._low_pass = LowPass(6, params.cutoff_Hz, params.rate_Hz)
-        self._gain = params.sigmas * self._low_pass.noise_gain
+        self._gain = self._fusion.gain
+        self._sigmas = params.sigmas * self._low_pass.noise_gain
+        self._quat: Array = np.zeros(4)
+        self._R_B_S: Array = np.eye(3)
+        self._history: deque[tuple[Observation, Array]] = deque(maxlen=HISTORY_BLOCKS)
         self._approach_B: Array | None = None
         if approach_B is not None:
             a = frozen_array("approach_B", approach_B, (3,))
@@ -123,10 +129,6 @@ class ContactGuard:
                 raise ParamError("approach_B", a.tolist(), "a direction of some length, or None")
             self._approach_B = a / norm
         self._above = np.zeros(params.consecutive - 1, dtype=np.int64)
-        self._stamps: Array = np.zeros(0)
-        self._positions: Array = np.zeros((0, 3))
-        self._quats: Array = np.zeros((0, 4))
-        self._raw: Array = np.zeros((0, 3))
         self._onset: Onset | None = None
 
     def __call__(self, observation: Observation) -> Onset | None:
@@ -135,57 +137,57 @@ class ContactGuard:
             return self._onset
         residual = observation.wrench_S - self._baseline.median
         smooth = self._low_pass(residual)
-        self._remember(observation, self._fusion(residual))
-        force = self._fusion(smooth)
-        R_B_S = quat_to_matrix(observation.quat_B_P[-1]) @ self._R_P_E
-        above = self._soft_rule(force, smooth[:, 3:], R_B_S)
-        run = np.convolve(np.concatenate([self._above, above]), np.ones(self.params.consecutive, np.int64), "valid")
-        if self.params.consecutive > 1:
-            self._above = np.concatenate([self._above, above])[-(self.params.consecutive - 1) :]
-        tripped = np.nonzero(run == self.params.consecutive)[0]
+        self._history.append((observation, residual))
+        force = smooth @ self._gain.T
+        q = observation.quat_B_P[-1]
+        if not np.array_equal(q, self._quat):
+            self._quat, self._R_B_S = q.copy(), quat_to_matrix(q) @ self._R_P_E
+        above = self._soft_rule(force, smooth[:, 3:])
+        carried = np.concatenate([self._above, above])
+        n = self.params.consecutive
+        self._above = carried[len(carried) - n + 1 :]
+        if not above.any():
+            return None
+        tripped = np.nonzero(np.convolve(carried, np.ones(n, np.int64), "valid") == n)[0]
         if len(tripped):
-            self._onset = self._date(observation, int(tripped[0]), force[tripped[0]], R_B_S)
+            self._onset = self._date(observation, int(tripped[0]), force[tripped[0]])
         return self._onset
 
-    def _soft_rule(self, force_S: Array, moment_S: Array, R_B_S: Array) -> np.typing.NDArray[np.int64]:
+    def _soft_rule(self, force_S: Array, moment_S: Array) -> npt.NDArray[np.int64]:
+        """(n,) 1 where a sample fulfils the soft rule."""
         p = self.params
-        total = np.sqrt(np.einsum("ij,ij->i", force_S, force_S))
-        # sd along each sample's own direction, times its norm: compares without dividing by a norm that may be zero
-        along = np.sqrt(np.einsum("ij,jk,ik->i", force_S, self._fusion.covariance, force_S))
-        strong = (total > p.total_N) & (total * total > self._gain * along)
+        square = (force_S * force_S).sum(axis=1)
+        # sigma along each sample's own direction times its norm: compares without dividing by a norm that may be zero
+        variance = ((force_S @ self._fusion.covariance) * force_S).sum(axis=1)
+        strong = (square > p.total_N**2) & (square * square > self._sigmas**2 * variance)
         if self._approach_B is None:
             return np.asarray(strong, dtype=np.int64)
-        approach_S = R_B_S.T @ self._approach_B
-        opposing = -(force_S @ approach_S)
-        threshold = max(p.directional_N, self._gain * self._fusion.sd_along(approach_S))
-        moment = np.sqrt(np.einsum("ij,ij->i", moment_S, moment_S))
-        return np.asarray((opposing > threshold) & (strong | (moment > p.moment_Nm)), dtype=np.int64)
+        approach_S = self._approach_B @ self._R_B_S
+        threshold = max(p.directional_N, self._sigmas * self._fusion.sd_along(approach_S))
+        opposing = force_S @ approach_S < -threshold
+        if not opposing.any():
+            return np.zeros(len(force_S), dtype=np.int64)
+        moment = (moment_S * moment_S).sum(axis=1) > p.moment_Nm**2
+        return np.asarray(opposing & (strong | moment), dtype=np.int64)
 
-    def _remember(self, o: Observation, raw_S: Array) -> None:
-        self._stamps = np.concatenate([self._stamps, o.stamp_s])[-HISTORY:]
-        self._positions = np.concatenate([self._positions, o.position_B_P])[-HISTORY:]
-        self._quats = np.concatenate([self._quats, o.quat_B_P])[-HISTORY:]
-        self._raw = np.concatenate([self._raw, raw_S])[-HISTORY:]
-
-    def _date(self, o: Observation, trip: int, force_S: Array, R_B_S: Array) -> Onset:
+    def _date(self, o: Observation, trip: int, force_S: Array) -> Onset:
+        stamps = np.concatenate([b.stamp_s for b, _ in self._history])
+        positions = np.concatenate([b.position_B_P for b, _ in self._history])
+        quats = np.concatenate([b.quat_B_P for b, _ in self._history])
+        raw = self._fusion(np.concatenate([r for _, r in self._history]))
         direction = force_S / np.linalg.norm(force_S)
         if self._approach_B is not None:
-            direction = -R_B_S.T @ self._approach_B
-        trip_at = len(self._stamps) - len(o.stamp_s) + trip
-        first = onset_index(self._raw @ direction, trip_at, self._fusion.sd_along(direction))
-        # The force began between two samples.
-        stamp = self._stamps[first] - self.params.latency_s
-        if first > 0:
-            stamp -= 0.5 * (self._stamps[first] - self._stamps[first - 1])
-        stamp = float(max(stamp, self._stamps[0]))
-        position = np.array([np.interp(stamp, self._stamps, self._positions[:, i]) for i in range(3)])
-        nearest = int(np.argmin(np.abs(self._stamps - stamp)))
+            direction = -(self._approach_B @ self._R_B_S)
+        at = onset_index(raw @ direction, len(stamps) - len(o.stamp_s) + trip, self._fusion.sd_along(direction))
+        stamp = float(np.interp(at, np.arange(len(stamps)), stamps)) - self.params.latency_s
+        stamp = max(stamp, float(stamps[0]))
+        position = np.array([np.interp(stamp, stamps, positions[:, i]) for i in range(3)])
         return Onset(
             stamp_s=stamp,
             position_B_P=position,
-            quat_B_P=self._quats[nearest].copy(),
-            force_B=R_B_S @ force_S,
-            peak_N=float(np.sqrt(np.max(np.sum(self._raw**2, axis=1)))),
+            quat_B_P=quats[int(np.argmin(np.abs(stamps - stamp)))].copy(),
+            force_B=self._R_B_S @ force_S,
+            peak_N=float(np.sqrt(np.max(np.sum(raw**2, axis=1)))),
             detected_s=float(o.stamp_s[trip]),
         )
 

@@ -15,20 +15,18 @@ SIGMAS = 4.0
 """A sample this many standard deviations above the level before the contact belongs to the contact."""
 CLEAR_SIGMAS = 8.0
 """The signal must rise this high for walking back to be trusted."""
+SLOW_SAMPLES = 8
+"""A rise that takes this many samples from the noise to the trip is a ramp, not an impact."""
 
 
-def onset_index(signal_N: Array, trip: int, sd_N: float, quiet: int = 30) -> int:
-    """Index of the first sample that belongs to the contact.
+def onset_index(signal_N: Array, trip: int, sd_N: float, quiet: int = 30) -> float:
+    """When the contact began, as a fractional sample index in 0..trip.
 
     Args:
         signal_N: (n,) unfiltered contact force along the direction it acts in, oldest first.
         trip: Index at which the filtered signal tripped.
         sd_N: Noise of one sample.
-        quiet: How many samples before the trip surely belong to it; the level before the contact is taken from the
-        rest.
-
-    Returns:
-        0..trip.
+        quiet: How many samples before the trip may belong to the contact; the level before it is taken from the rest.
     """
     s = signal_N[: trip + 1]
     before = s[: max(len(s) - quiet, 0)]
@@ -40,21 +38,28 @@ def onset_index(signal_N: Array, trip: int, sd_N: float, quiet: int = 30) -> int
     lifted = s - level
     if float(np.max(lifted[-3:])) < CLEAR_SIGMAS * spread:
         return _ramp_start(lifted)
-    low = np.nonzero(lifted < SIGMAS * spread)[0]
-    # The last samples may dip below by ringing: walk back from the highest one near the trip.
-    top = len(s) - 3 + int(np.argmax(lifted[-3:]))
-    low = low[low < top]
-    return int(low[-1]) + 1 if len(low) else 0
+    # The last samples may dip by ringing: walk back from the highest one near the trip.
+    top = max(len(s) - 3, 0) + int(np.argmax(lifted[-3:]))
+    low = np.nonzero(lifted[:top] < SIGMAS * spread)[0]
+    first = int(low[-1]) + 1 if len(low) else 0
+    if top - first < SLOW_SAMPLES:
+        return max(first - 0.5, 0.0)  # it began between two samples
+    # A slow rise was under way before it left the noise: extend its line back to the level.
+    t = np.arange(first, top + 1)
+    slope, offset = np.polyfit(t, lifted[first : top + 1], 1)
+    if slope <= 0:
+        return max(first - 0.5, 0.0)
+    return float(np.clip(-offset / slope, max(first - quiet, 0), first))
 
 
-def _ramp_start(s: Array) -> int:
+def _ramp_start(s: Array) -> float:
     """Start of the least-squares ramp (zero, then a straight rise) of a noisy signal."""
     n = len(s)
     if n < 6:
-        return max(n - 1, 0)
+        return float(max(n - 1, 0))
     t = np.arange(n)
     starts = np.arange(0, n - 3)
     ramps = np.maximum(t[None, :] - starts[:, None] + 1, 0).astype(np.float64)
     energy = np.sum(ramps**2, axis=1)
     slope = np.maximum(ramps @ s, 0.0) / energy
-    return int(starts[int(np.argmax(slope**2 * energy))])
+    return float(starts[int(np.argmax(slope**2 * energy))])

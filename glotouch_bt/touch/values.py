@@ -77,7 +77,7 @@ class Contour:
             l, s = 0.5 * self.size_m[0], 0.5 * self.size_m[1]
             local = np.array([[l, s], [-l, s], [-l, -s], [l, -s], [l, s]])
         c, s_ = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
-        return local @ np.array([[c, s_], [-s_, c]]) + self.centre_K_m
+        return np.asarray(local @ np.array([[c, s_], [-s_, c]]) + self.centre_K_m)
 
 
 @dataclass(frozen=True)
