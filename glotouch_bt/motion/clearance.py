@@ -15,11 +15,19 @@ import numpy as np
 import numpy.typing as npt
 
 from glotouch_bt.motion.kinematics import Kinematics
-from glotouch_bt.robot import Array, ParamError, Pose, RobotDescription, UnknownName, World
+from glotouch_bt.motion.shapes import (
+    OWN_OBSTACLES,
+    WALLS,
+    Obstacle,
+    Part,
+    arm_parts,
+    make_obstacle,
+    stowed_probe,
+    tool_parts,
+    world_obstacles,
+)
+from glotouch_bt.robot import Array, ParamError, Pose, UnknownName, World
 
-# Between the handle's lower face and the holder block's top ("just below the handle").
-HOLDER_GAP_M = 0.001
-WALLS = ("wall +x", "wall -x", "wall +y", "wall -y")
 # A part that starts too near may leave, but not come nearer by more than this.
 _LEAVING_M = 2e-4
 
@@ -49,35 +57,13 @@ class Blocked:
         return f"{self.part} would pass {thing} at {self.distance_m * 1e3:.1f} mm (margin {self.margin_m * 1e3:.1f} mm)"
 
 
-@dataclass
-class _Part:
-    """A moving convex shape: its frame in a link's frame, and the half sizes of its box there."""
-
-    name: str
-    link: int
-    rotation: Array
-    origin_m: Array
-    half_m: Array
-    body: fcl.CollisionObject
-
-
-@dataclass
-class _Obstacle:
-    """A fixed convex shape in B and its axis-aligned box."""
-
-    name: str
-    centre_m: Array
-    half_m: Array
-    body: fcl.CollisionObject
-
-
 class Scene:
     """Everything that must not be touched, and what is allowed to be.
 
     Parts: "<link name>" of each moving link, "gripper body", "left finger", "right finger", and while the probe is
     held "tip", "shaft", "handle". Groups: "fingers", "tool" (tip, shaft, handle), "hand" (all but the arm's links),
-    "arm". Obstacles: "floor", "wall +x", "wall -x", "wall +y", "wall -y" (of the container, in K), "holder", "probe"
-    (its handle, while it stands in the holder) and whatever `add_obstacle` added.
+    "arm". Obstacles: "floor", "wall +x", "wall -x", "wall +y", "wall -y" (of the container, in K), "table" (under it),
+    "holder", "probe" (its handle, while it stands in the holder) and whatever `add_obstacle` added.
 
     The hand against the arm itself is not looked at: over a container in front of it the arm cannot fold that far.
 
@@ -92,15 +78,15 @@ class Scene:
         self._kinematics = kinematics
         self._world = world
         self._request = fcl.DistanceRequest(enable_nearest_points=False, enable_signed_distance=True)
-        self._arm_parts = _arm_parts(kinematics.description)
+        self._arm_parts = arm_parts(kinematics.description)
         self._hand_pose = kinematics.description.pose_last_E @ kinematics.description.gripper.pose_E_P
-        self._tool_parts = self._build_tool()
+        self._tool_parts = tool_parts(kinematics.description, world.probe)
         self._holding = False
         self._allowed: set[tuple[str, str]] = set()
-        self._obstacles: dict[str, _Obstacle] = {}
-        for obstacle in _container_and_holder(world):
+        self._obstacles: dict[str, Obstacle] = {}
+        for obstacle in world_obstacles(world):
             self._obstacles[obstacle.name] = obstacle
-        self._probe = _stowed_probe(world)
+        self._probe = stowed_probe(world)
         self._obstacles[self._probe.name] = self._probe
 
     # -- what is there -----------------------------------------------------------------------------------------------
@@ -153,7 +139,7 @@ class Scene:
         Raises:
             ParamError: A taken name, an unknown kind, or sizes that are not positive and finite.
         """
-        if name in (*WALLS, "floor", "holder", "probe"):
+        if name in OWN_OBSTACLES:
             raise ParamError("obstacle", name, "not one of the world's own names")
         if kind not in ("round", "box"):
             raise ParamError("obstacle.kind", kind, "'round' or 'box'")
@@ -168,7 +154,7 @@ class Scene:
             shape = fcl.Cylinder(0.5 * sizes[0], height_m)
         else:
             shape = fcl.Box(*sizes)
-        self._obstacles[name] = _obstacle(name, pose, 0.5 * sizes, shape)
+        self._obstacles[name] = make_obstacle(name, pose, 0.5 * sizes, shape)
 
     def remove_obstacle(self, name: str) -> None:
         """Forget an added obstacle and what was allowed to touch it.
@@ -176,7 +162,7 @@ class Scene:
         Raises:
             UnknownName: No such added obstacle.
         """
-        added = [n for n in self._obstacles if n not in (*WALLS, "floor", "holder", "probe")]
+        added = [n for n in self._obstacles if n not in OWN_OBSTACLES]
         if name not in added:
             raise UnknownName("obstacle", name, added)
         del self._obstacles[name]
@@ -184,7 +170,7 @@ class Scene:
 
     def clear_obstacles(self) -> None:
         """Forget every added obstacle."""
-        for name in [n for n in self._obstacles if n not in (*WALLS, "floor", "holder", "probe")]:
+        for name in [n for n in self._obstacles if n not in OWN_OBSTACLES]:
             self.remove_obstacle(name)
 
     def allow(self, part: str, obstacle: str) -> None:
@@ -266,7 +252,7 @@ class Scene:
         body.setTransform(fcl.Transform(rotations[0, 0], centres[0, 0]))
         return float(fcl.distance(body, self._obstacles[obstacle].body, self._request, fcl.DistanceResult()))
 
-    def _placed(self, parts: list[_Part], q: Array, aperture_m: float) -> tuple[Array, Array]:
+    def _placed(self, parts: list[Part], q: Array, aperture_m: float) -> tuple[Array, Array]:
         links = [self._kinematics.link_placements(row) for row in q]
         index = [p.link for p in parts]
         link_R = np.stack([r for r, _ in links])[:, index]
@@ -279,87 +265,3 @@ class Scene:
             elif part.name == "right finger":
                 origin[i] -= opening
         return link_R @ np.stack([p.rotation for p in parts]), link_p + (link_R @ origin[None, :, :, None])[..., 0]
-
-    def _build_tool(self) -> list[_Part]:
-        probe = self._world.probe
-        last = self._kinematics.description.dof - 1
-        half_handle = 0.5 * probe.handle_m[2]
-        radius = 0.5 * probe.shaft_diameter_m
-        shaft = probe.grasp_to_tip_m - half_handle
-        tip = self._hand_pose @ Pose(np.array([0.0, 0.0, probe.grasp_to_tip_m]))
-        middle = self._hand_pose @ Pose(np.array([0.0, 0.0, half_handle + 0.5 * shaft]))
-        return [
-            _part("tip", last, tip, np.full(3, probe.tip_radius_m), fcl.Sphere(probe.tip_radius_m)),
-            _part("shaft", last, middle, np.array([radius, radius, 0.5 * shaft]), fcl.Cylinder(radius, shaft)),
-            _part("handle", last, self._hand_pose, 0.5 * np.array(probe.handle_m), fcl.Box(*probe.handle_m)),
-        ]
-
-
-def _part(name: str, link: int, pose: Pose, half_m: Array, shape: fcl.CollisionGeometry) -> _Part:
-    return _Part(
-        name, link, pose.rotation.copy(), pose.position_m.copy(), half_m, fcl.CollisionObject(shape, fcl.Transform())
-    )
-
-
-def _arm_parts(description: RobotDescription) -> list[_Part]:
-    """Capsules of the moving links, then the gripper's body and fingers (closed)."""
-    parts = []
-    for i, joint in enumerate(description.joints):
-        for capsule in joint.link.capsules:
-            start, end = np.array(capsule.start_m), np.array(capsule.end_m)
-            pose = Pose.from_matrix(0.5 * (start + end), _rotation_to(end - start))
-            length, r = float(np.linalg.norm(end - start)), capsule.radius_m
-            half = np.array([r, r, r + 0.5 * length])
-            parts.append(_part(joint.link.name, i, pose, half, fcl.Capsule(r, length)))
-    last, hand = description.dof - 1, description.gripper
-    for box in hand.body:
-        pose = description.pose_last_E @ Pose(np.array(box.centre_m))
-        parts.append(_part("gripper body", last, pose, np.array(box.half_m), fcl.Box(*(2 * h for h in box.half_m))))
-    for name, side in (("left finger", 1.0), ("right finger", -1.0)):
-        centre = np.array(hand.finger.centre_m) * [1.0, side, 1.0]
-        pose = description.pose_last_E @ hand.pose_E_P @ Pose(centre)
-        half = np.array(hand.finger.half_m)
-        parts.append(_part(name, last, pose, half, fcl.Box(*(2 * half))))
-    return parts
-
-
-def _rotation_to(direction: Array) -> Array:
-    """A rotation (3, 3) whose z axis points along `direction`; identity for no direction."""
-    length = float(np.linalg.norm(direction))
-    if length < 1e-9:
-        return np.eye(3)
-    z = direction / length
-    x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z)
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(z, x), z], axis=1)
-
-
-def _obstacle(name: str, pose: Pose, half_m: Array, shape: fcl.CollisionGeometry) -> _Obstacle:
-    body = fcl.CollisionObject(shape, fcl.Transform(np.array(pose.rotation), np.array(pose.position_m)))
-    return _Obstacle(name, np.array(pose.position_m), np.abs(pose.rotation) @ half_m, body)
-
-
-def _container_and_holder(world: World) -> list[_Obstacle]:
-    box, t = world.container, world.container.wall_m
-    x, y, z = (0.5 * side for side in box.interior_m)
-    places = {
-        "floor": ((0.0, 0.0, -0.5 * t), (x + t, y + t, 0.5 * t)),
-        "wall +x": ((x + 0.5 * t, 0.0, z), (0.5 * t, y + t, z)),
-        "wall -x": ((-x - 0.5 * t, 0.0, z), (0.5 * t, y + t, z)),
-        "wall +y": ((0.0, y + 0.5 * t, z), (x + t, 0.5 * t, z)),
-        "wall -y": ((0.0, -y - 0.5 * t, z), (x + t, 0.5 * t, z)),
-    }
-    out = [
-        _obstacle(name, box.pose_B_K @ Pose(np.array(centre)), np.array(half), fcl.Box(*(2 * h for h in half)))
-        for name, (centre, half) in places.items()
-    ]
-    half = np.array(world.holder.half_m)
-    below = 0.5 * world.probe.handle_m[2] + HOLDER_GAP_M + half[2]
-    pose = world.holder.pose_B_grasp @ Pose(np.array([0.0, 0.0, below]))
-    out.append(_obstacle("holder", pose, half, fcl.Box(*(2 * half))))
-    return out
-
-
-def _stowed_probe(world: World) -> _Obstacle:
-    half = 0.5 * np.array(world.probe.handle_m)
-    return _obstacle("probe", world.holder.pose_B_grasp, half, fcl.Box(*(2 * half)))

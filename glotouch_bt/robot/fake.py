@@ -1,0 +1,345 @@
+"""A robot without physics, for tests that must be fast: it is exactly where it was told to be.
+
+Between two setpoints every quantity moves linearly over the samples of the period. What it touches is a few elastic
+walls (or a function the test gives), what it grips is a rigid width, its gels are flat. No randomness, no sleeping.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import acos, atan2, hypot, pi
+
+import numpy as np
+import numpy.typing as npt
+
+from glotouch_bt.robot.command import Command, GripperTarget, Request, SetPayload, Tare
+from glotouch_bt.robot.conditions import Conditions
+from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription
+from glotouch_bt.robot.errors import BadInput, ParamError, SafetyStop
+from glotouch_bt.robot.geometry import Array, Pose, frozen_array
+from glotouch_bt.robot.interface import Backend, Robot
+from glotouch_bt.robot.limits import Limits
+from glotouch_bt.robot.observation import GripperState, Observation, TactileFrame
+from glotouch_bt.robot.world import World
+
+WrenchFunction = Callable[[Array, Array, Array], Array]
+
+_UPPER_M, _FORE_M, _SHOULDER_M, _HAND_M = 0.40, 0.40, 0.30, 0.30
+
+
+def _fake_arm() -> RobotDescription:
+    """Seven revolute joints, z y z y z y z, in a straight column at q = 0. All numbers are made up."""
+    heights = (0.15, _SHOULDER_M - 0.15, 0.20, _UPPER_M - 0.20, 0.20, _FORE_M - 0.20, 0.05)
+    joints = []
+    for i, height in enumerate(heights):
+        reach = heights[i + 1] if i < 6 else 0.05
+        capsule = Capsule(start_m=(0.0, 0.0, 0.0), end_m=(0.0, 0.0, reach), radius_m=0.05)
+        link = Link(
+            name=f"link{i + 1}",
+            mass_kg=2.0,
+            com_m=(0.0, 0.0, 0.5 * reach),
+            inertia_kgm2=(0.01, 0.01, 0.005, 0.0, 0.0, 0.0),
+            capsules=(capsule,),
+        )
+        axis = (0.0, 1.0, 0.0) if i % 2 else (0.0, 0.0, 1.0)
+        joint = Joint(
+            name=f"joint{i + 1}",
+            origin_m=(0.0, 0.0, height),
+            origin_rpy_rad=(0.0, 0.0, 0.0),
+            axis=axis,
+            lower_rad=-2.8,
+            upper_rad=2.8,
+            velocity_rad_s=2.5,
+            torque_Nm=100.0,
+            armature_kgm2=0.1,
+            link=link,
+        )
+        joints.append(joint)
+    # Home: P at (0.60, 0, 0.10) m, hand straight down; the wrist stands _HAND_M above it (law of cosines, equal links).
+    x, z = 0.60, 0.10 + _HAND_M - _SHOULDER_M
+    bend = 2.0 * acos(hypot(x, z) / (_UPPER_M + _FORE_M))
+    lean = atan2(x, z) - 0.5 * bend
+    hand = Gripper(
+        pose_E_P=Pose(np.array([0.0, 0.0, 0.20])),
+        mass_kg=0.7,
+        com_E_m=(0.0, 0.0, 0.045),
+        finger_mass_kg=0.09,
+        stroke_m=0.085,
+        force_N=60.0,
+        speed_m_s=0.35,
+        body=(Box(centre_m=(0.0, 0.0, 0.0425), half_m=(0.04, 0.07, 0.0425)),),
+        finger=Box(centre_m=(0.0, 0.007, -0.0495), half_m=(0.011, 0.007, 0.0655)),
+        pad_window_m=(0.0172, 0.0285),
+        pad_shape=(35, 20),
+        pad_depth_m=0.0015,
+    )
+    return RobotDescription(
+        name="Fake 7R",
+        base=Link(name="base", mass_kg=5.0, com_m=(0.0, 0.0, 0.05), inertia_kgm2=(0.02, 0.02, 0.02, 0.0, 0.0, 0.0)),
+        joints=tuple(joints),
+        pose_last_E=Pose(np.array([0.0, 0.0, 0.05])),
+        home_q=(0.0, lean, 0.0, bend, 0.0, pi - lean - bend, 0.0),
+        gripper=hand,
+        source="made up",
+    )
+
+
+FAKE_ARM = _fake_arm()
+
+
+def forward(description: RobotDescription, q: npt.ArrayLike) -> Pose:
+    """Pose of P in B at `q` (dof,) rad, by chaining the description's frames one after the other."""
+    pose = Pose(np.zeros(3))
+    for joint, angle in zip(description.joints, np.asarray(q, dtype=np.float64), strict=True):
+        roll, pitch, yaw = joint.origin_rpy_rad
+        fixed = _about((0.0, 0.0, 1.0), yaw) @ _about((0.0, 1.0, 0.0), pitch) @ _about((1.0, 0.0, 0.0), roll)
+        pose = pose @ Pose.from_matrix(joint.origin_m, fixed @ _about(joint.axis, float(angle)))
+    return pose @ description.pose_last_E @ description.gripper.pose_E_P
+
+
+def _about(axis: tuple[float, float, float], angle: float) -> Array:
+    """Rotation matrix (3, 3) about a unit axis (Rodrigues)."""
+    x, y, z = axis
+    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class SpringWall:
+    """A frictionless elastic half space.
+
+    Attributes:
+        point_B_m: (3,) any point of its face.
+        normal_B: (3,) direction out of the wall, into free space.
+        stiffness_N_m: Force per metre of depth.
+    """
+
+    point_B_m: Array
+    normal_B: Array
+    stiffness_N_m: float
+
+    def __post_init__(self) -> None:
+        normal = frozen_array("wall.normal_B", self.normal_B, (3,))
+        length = float(np.linalg.norm(normal))
+        if length < 1e-9 or not self.stiffness_N_m > 0:
+            raise ParamError("wall", (normal.tolist(), self.stiffness_N_m), "a normal that is not zero, stiffness > 0")
+        object.__setattr__(self, "point_B_m", frozen_array("wall.point_B_m", self.point_B_m, (3,)))
+        object.__setattr__(self, "normal_B", frozen_array("wall.normal_B", normal / length, (3,)))
+
+    def force_B_N(self, ball_B_m: Array, radius_m: float) -> Array:
+        """(n, 3) force on a ball of `radius_m` at centres `ball_B_m` (n, 3): stiffness times depth along the normal."""
+        depth = np.maximum(radius_m - (ball_B_m - self.point_B_m) @ self.normal_B, 0.0)
+        return np.asarray(self.stiffness_N_m * depth[:, None] * self.normal_B, dtype=np.float64)
+
+
+@dataclass
+class FakeTicket:
+    """A request that is done after a number of cycles."""
+
+    cycles_left: int
+    error: str | None = None
+
+    @property
+    def done(self) -> bool:
+        """True once its cycles have passed."""
+        return self.cycles_left <= 0
+
+
+class FakeRobot(Robot):
+    """See the module's text.
+
+    Args:
+        description: The arm.
+        limits: Hard limits it enforces.
+        period_s: Control period.
+        samples: Samples per period.
+        walls: What the tip touches.
+        tip_P_m: (3,) centre of the ball that touches them, in P.
+        tip_radius_m: Its radius.
+        wrench: Instead of walls: (stamps (n,), positions (n, 3), quaternions (n, 4) of P in B) -> (n, 6) in S.
+        grip_width_m: Width of a rigid thing between the jaws, or None.
+        frame_rate_Hz: How often flat depth maps arrive while they are asked for.
+
+    Attributes:
+        cycles: Control periods so far.
+        peak_force_N: Largest norm of the untared contact force so far.
+        commands: Every command taken.
+    """
+
+    def __init__(
+        self,
+        description: RobotDescription = FAKE_ARM,
+        limits: Limits | None = None,
+        *,
+        period_s: float = 0.01,
+        samples: int = 10,
+        walls: Sequence[SpringWall] = (),
+        tip_P_m: npt.ArrayLike = (0.0, 0.0, 0.13),
+        tip_radius_m: float = 0.006,
+        wrench: WrenchFunction | None = None,
+        grip_width_m: float | None = None,
+        frame_rate_Hz: float = 60.0,
+    ) -> None:
+        self.description, self.period_s = description, period_s
+        self.limits = Limits() if limits is None else limits
+        self.walls, self.wrench, self.grip_width_m = tuple(walls), wrench, grip_width_m
+        self._tip_P = frozen_array("tip_P_m", tip_P_m, (3,))
+        self._tip_radius = tip_radius_m
+        self.cycles = 0
+        self.peak_force_N = 0.0
+        self.commands: list[Command] = []
+        self._samples = samples
+        self._frame_s = 1.0 / frame_rate_Hz
+        self._next_frame_s = 0.0
+        self._q = np.array(description.home_q)
+        self._pose = forward(description, self._q)
+        self._aperture = description.gripper.stroke_m
+        self._target = GripperTarget(self._aperture, description.gripper.speed_m_s, 10.0)
+        self._bias = np.zeros(6)
+        self._tare: tuple[FakeTicket, list[Array]] | None = None
+        self._stop: SafetyStop | None = None
+        self._lower = np.array([j.lower_rad for j in description.joints])
+        self._upper = np.array([j.upper_rad for j in description.joints])
+        self._newest = self._block(-period_s, self._q, self._pose, self._grip(), None)
+
+    def observe(self) -> Observation:
+        """The newest block."""
+        return self._newest
+
+    def cycle(self, command: Command) -> Observation:
+        """One control period; errors as in `Robot.cycle`."""
+        if self._stop is not None:
+            raise SafetyStop(self._stop.quantity, self._stop.value, self._stop.limit, self._stop.stamp_s)
+        q, pose = self._q, self._pose
+        if command.motion is not None:
+            q, pose = command.motion.q, command.motion.pose_B_P
+            self._check(q)
+        if command.gripper is not None:
+            self._target = command.gripper
+        begin = self.cycles * self.period_s
+        self.cycles += 1
+        self.commands.append(command)
+        state = self._grip()
+        frame = self._frame() if command.tactile else None
+        self._newest = self._block(begin, q, pose, state, frame)
+        self._q, self._pose = q, pose
+        self._take_tare()
+        self._enforce()
+        return self._newest
+
+    def start(self, request: Request) -> FakeTicket:
+        """Tare takes its duration, a payload one cycle."""
+        if isinstance(request, SetPayload):
+            ticket = FakeTicket(0)
+        else:
+            assert isinstance(request, Tare)
+            ticket = FakeTicket(max(1, round(request.duration_s / self.period_s)))
+            self._tare = (ticket, [])
+        return ticket
+
+    def hold(self) -> None:
+        """It holds by itself."""
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def _check(self, q: Array) -> None:
+        if q.shape != self._lower.shape or not np.isfinite(q).all():
+            raise ParamError("command.motion.q", q.tolist(), f"{len(self._lower)} finite numbers")
+        out = np.flatnonzero((q < self._lower - 1e-9) | (q > self._upper + 1e-9))
+        if len(out):
+            joint = self.description.joints[int(out[0])]
+            valid = f"within {joint.lower_rad}..{joint.upper_rad} rad"
+            raise ParamError(f"command.motion.q[{joint.name}]", float(q[out[0]]), valid)
+
+    def _grip(self) -> GripperState:
+        """Let the jaws move for one period and report them."""
+        step = self._target.speed_m_s * self.period_s
+        goal, now = self._target.aperture_m, self._aperture
+        stop = 0.0 if self.grip_width_m is None or self.grip_width_m > now + 1e-12 else self.grip_width_m
+        new = max(now - step, goal, stop) if goal < now else min(now + step, goal, self.description.gripper.stroke_m)
+        gripping = goal < stop and new <= stop
+        self._aperture = new
+        force = self._target.force_N if gripping else 0.0
+        return GripperState(self.cycles * self.period_s, new, force, abs(new - now) > 1e-12)
+
+    def _frame(self) -> TactileFrame | None:
+        now = self.cycles * self.period_s
+        if now < self._next_frame_s - 1e-9:
+            return None
+        # The next instant of a fixed frame clock.
+        self._next_frame_s = (np.floor(now / self._frame_s + 1e-6) + 1.0) * self._frame_s
+        flat = np.zeros(self.description.gripper.pad_shape)
+        return TactileFrame(now, flat, flat.copy())
+
+    def _block(
+        self, begin_s: float, q: Array, pose: Pose, state: GripperState, frame: TactileFrame | None
+    ) -> Observation:
+        share = np.arange(1, self._samples + 1)[:, None] / self._samples
+        stamp = begin_s + share[:, 0] * self.period_s
+        position = self._pose.position_m + share * (pose.position_m - self._pose.position_m)
+        goal = pose.quat if float(pose.quat @ self._pose.quat) >= 0 else -pose.quat
+        quat = self._pose.quat + share * (goal - self._pose.quat)
+        quat /= np.linalg.norm(quat, axis=1, keepdims=True)
+        joints = self._q + share * (q - self._q)
+        speed = np.broadcast_to((q - self._q) / self.period_s, joints.shape)
+        raw = self._felt(stamp, position, quat) if self.wrench is None else self.wrench(stamp, position, quat)
+        self._raw = raw
+        self.peak_force_N = max(self.peak_force_N, float(np.linalg.norm(raw[:, :3], axis=1).max()))
+        return Observation(stamp, joints, speed, position, quat, raw - self._bias, state, frame)
+
+    def _felt(self, stamp: Array, position: Array, quat: Array) -> Array:
+        """(n, 6) wrench of the walls on the tip, in S at S's origin."""
+        out = np.zeros((len(stamp), 6))
+        if not self.walls:
+            return out
+        E_P = self.description.gripper.pose_E_P
+        lever = E_P.apply(self._tip_P)
+        for i in range(len(stamp)):
+            pose = Pose(position[i], quat[i])
+            ball = pose.apply(self._tip_P)[None]
+            force_B = sum((wall.force_B_N(ball, self._tip_radius)[0] for wall in self.walls), np.zeros(3))
+            out[i, :3] = E_P.rotation @ pose.rotation.T @ force_B
+            out[i, 3:] = np.cross(lever, out[i, :3])
+        return out
+
+    def _take_tare(self) -> None:
+        if self._tare is None:
+            return
+        ticket, blocks = self._tare
+        blocks.append(self._raw)
+        ticket.cycles_left -= 1
+        if ticket.done:
+            self._bias = np.concatenate(blocks).mean(axis=0)
+            self._tare = None
+
+    def _enforce(self) -> None:
+        wrench, limits = self._newest.wrench_S, self.limits
+        for name, part, limit in (
+            ("force_N", wrench[:, :3], limits.hard_force_N),
+            ("torque_Nm", wrench[:, 3:], limits.hard_torque_Nm),
+        ):
+            norm = np.linalg.norm(part, axis=1)
+            over = np.flatnonzero(norm > limit)
+            if len(over):
+                i = int(over[0])
+                self._stop = SafetyStop(name, float(norm[i]), limit, float(self._newest.stamp_s[i]))
+                raise self._stop
+
+
+class FakeBackend(Backend):
+    """Entry point `fake`: an empty world and an arm that is always where it should be. Conditions have no effect."""
+
+    name = "fake"
+    summary = "no physics: follows every setpoint exactly and touches nothing (for trying missions and for tests)"
+
+    def open(self, world: World, conditions: Conditions, seed: int, options: Mapping[str, object]) -> FakeRobot:
+        """A new robot at home.
+
+        Raises:
+            BadInput: Any option: it has none.
+        """
+        if options:
+            raise BadInput(f"the fake backend has no options (given: {', '.join(sorted(options))})")
+        return FakeRobot()
