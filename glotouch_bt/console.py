@@ -82,13 +82,14 @@ def print_result(done: RunResult) -> None:
         f"{head}  {escape(str(r['mission']))}, seed {r['seed']}: {r['sim_time_s']:.1f} s of robot time in "
         f"{r['wall_time_s']:.1f} s ({speed:.0f}x), peak force {r['peak_force_N']:.1f} N",
         highlight=False,
+        soft_wrap=True,
     )
     if r["correct"] is not None:
         held = r["retrieved"] or "nothing"
         word = "[green]the target[/]" if r["correct"] else f"[red]not the target ({escape(str(r['target']))})[/]"
         console.print(f"in the gripper: [bold]{escape(str(held))}[/], {word}", highlight=False)
     for i, reason in enumerate(r["reasons"]):
-        console.print(f"{'  ' * i}{'because ' if i else ''}{reason}", markup=False, highlight=False)
+        console.print(f"{'  ' * i}{'because ' if i else ''}{reason}", markup=False, highlight=False, soft_wrap=True)
     if done.report is not None:
         console.print(f"report: {done.report}", markup=False, highlight=False, soft_wrap=True)
     else:

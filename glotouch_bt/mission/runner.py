@@ -96,7 +96,7 @@ def run_mission(
         with deferred_interrupt() as interrupted:
             loop.run(outcome, mission.timeout_s if timeout_s is None else timeout_s, interrupted)
     except (Exception, KeyboardInterrupt) as e:
-        _abort(outcome, e, loop.running_node())
+        _abort(outcome, e, loop.node_of(e))
     finally:
         robot.hold()
         outcome.end_s = context.observation.now_s
@@ -130,7 +130,6 @@ class _Loop:
         self._nodes = list(tree.root.iterate())
         self._status: dict[object, Status] = {n.id: Status.INVALID for n in self._nodes}
         self._written: dict[str, object] = {}
-        self._ticked: Behaviour | None = None
 
     def run(self, outcome: Outcome, timeout_s: float, interrupted: Callable[[], bool]) -> None:
         """Tick until the root has decided; fills `outcome`."""
@@ -157,17 +156,29 @@ class _Loop:
                 self._on_progress(now_s - start_s, tally)
 
     def running_node(self) -> str:
-        """The deepest node of the running path, or the root."""
+        """The running leaf, or the root."""
         running = [n for n in self._nodes if n.status is Status.RUNNING and not n.children]
-        node = running[0] if running else self._ticked or self._tree.root
-        return self._tree.paths.get(node.id, node.name)
+        return self._tree.paths[(running[0] if running else self._tree.root).id]
+
+    def node_of(self, error: BaseException) -> str:
+        """The node that raised: the innermost one on the error's traceback; else the running one.
+
+        A node that raises in its first update has no status yet, so that its status cannot tell.
+        """
+        found: str | None = None
+        step = error.__traceback__
+        while step is not None:
+            raising = step.tb_frame.f_locals.get("self")
+            if isinstance(raising, Behaviour):
+                found = self._tree.paths.get(raising.id, found)
+            step = step.tb_next
+        return found or self.running_node()
 
     def _tick(self, now_s: float) -> None:
         """Tick the tree once and write down what changed. Unchanged RUNNING nodes, nearly all, cost one comparison."""
         changed = False
         status = self._status
         for node in self._tree.root.tick():
-            self._ticked = node
             if node.status is Status.RUNNING and status[node.id] is Status.RUNNING:
                 continue
             changed = True

@@ -113,8 +113,9 @@ def test_whatever_is_raised_the_arm_is_held(
     assert log[-1] == "act!", "the running skill was closed"
 
 
-def test_a_raising_skill_is_named(go: Any, robot: Any) -> None:
-    outcome = go("  - act: {name: broken, script: RX}\n")
+@pytest.mark.parametrize("script", ["X", "RX"])
+def test_a_raising_skill_is_named(go: Any, robot: Any, script: str) -> None:
+    outcome = go(f"  - act\n  - act: {{name: broken, script: {script}}}\n")
     assert isinstance(outcome.error, ZeroDivisionError)
     assert outcome.reasons == ["m/sequence/broken: ZeroDivisionError: scripted"]
     assert robot.held == 1
