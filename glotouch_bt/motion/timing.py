@@ -89,19 +89,18 @@ class JointProfile:
 def joint_move(
     start: Array, end: Array, velocity: Array, acceleration: Array, jerk: Array, period_s: float
 ) -> JointProfile:
-    """Straight line in joint space from rest to rest, all joints in phase, under per-joint limits (dof,).
+    """Straight line in joint space from rest to rest under per-joint limits (dof,), rad/s, rad/s2, rad/s3.
+
+    One profile of the share of the way, 0 to 1, whose limits are the tightest joint's: the joints are exactly in phase,
+    so the line that was checked is the line that is travelled (ruckig's own phase synchronisation silently gives up).
 
     Raises:
         BackendError: Ruckig found no profile.
     """
-    dof = len(start)
-    p = ruckig.InputParameter(dof)
-    p.current_position, p.target_position = start.tolist(), end.tolist()
-    p.max_velocity, p.max_acceleration, p.max_jerk = velocity.tolist(), acceleration.tolist(), jerk.tolist()
-    p.synchronization = ruckig.Synchronization.Phase
-    trajectory = _solve(dof, p)
-    n = _periods(trajectory.duration, period_s)
-    rows = np.array([trajectory.at_time(k * period_s) for k in range(1, n)]).reshape(-1, 3, dof)
-    last = np.stack([end, np.zeros(dof), np.zeros(dof)])
-    rows = np.concatenate([rows, last[None]])
-    return JointProfile(*(np.ascontiguousarray(rows[:, i]) for i in range(3)))
+    way = end - start
+    size = np.maximum(np.abs(way), 1e-12)
+    v, a, j = (float((limit / size).min()) for limit in (velocity, acceleration, jerk))
+    share = rest_to_rest(1.0, v, a, j, period_s)
+    q = start + share.s[:, None] * way
+    q[-1] = end
+    return JointProfile(q, share.v[:, None] * way, share.a[:, None] * way)

@@ -105,6 +105,12 @@ def _about(axis: tuple[float, float, float], angle: float) -> Array:
     return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k), dtype=np.float64)
 
 
+def _turned(quat: Array, vector: Array) -> Array:
+    """Vectors (n, 3) turned by unit quaternions (n, 4): v + 2 u x (w v + u x v)."""
+    w, u = quat[:, :1], quat[:, 1:]
+    return np.asarray(vector + 2.0 * np.cross(u, w * vector + np.cross(u, vector)), dtype=np.float64)
+
+
 @dataclass(frozen=True)
 class SpringWall:
     """A frictionless elastic half space.
@@ -295,13 +301,10 @@ class FakeRobot(Robot):
         if not self.walls:
             return out
         E_P = self.description.gripper.pose_E_P
-        lever = E_P.apply(self._tip_P)
-        for i in range(len(stamp)):
-            pose = Pose(position[i], quat[i])
-            ball = pose.apply(self._tip_P)[None]
-            force_B = sum((wall.force_B_N(ball, self._tip_radius)[0] for wall in self.walls), np.zeros(3))
-            out[i, :3] = E_P.rotation @ pose.rotation.T @ force_B
-            out[i, 3:] = np.cross(lever, out[i, :3])
+        balls = position + _turned(quat, np.broadcast_to(self._tip_P, position.shape))
+        force_B = sum((wall.force_B_N(balls, self._tip_radius) for wall in self.walls), np.zeros_like(position))
+        out[:, :3] = _turned(quat * [1.0, -1.0, -1.0, -1.0], force_B) @ E_P.rotation.T
+        out[:, 3:] = np.cross(E_P.apply(self._tip_P), out[:, :3])
         return out
 
     def _take_tare(self) -> None:
