@@ -1,7 +1,7 @@
 """Which of the touched candidates is the target: finite-window model of an STL, matching loss, ranking. Pure.
 
-    model = TargetModel.from_mesh(mesh, PadSpec())
-    ranking = rank([match(model, touchset, LossParams()) for touchset in touchsets])
+model = TargetModel.from_mesh(mesh, PadSpec())
+ranking = rank([match(model, touchset, LossParams()) for touchset in touchsets])
 """
 
 from glotouch_bt.recognition.decision import Fit, Gates, Match, Ranking, rank

@@ -19,7 +19,7 @@ class Fit:
         z0_m: Height offset.
         scale: Model scale.
         bias_m: Aperture bias.
-        reflected: The first scan was fitted from behind: relative yaw in (90, 270] deg. A scan's reflection is a turn by 180.
+        reflected: Relative yaw of the first scan in (90, 270] deg (a scan's reflection is a turn by 180).
     """
 
     yaw_rad: float
@@ -117,6 +117,6 @@ def rank(matches: Sequence[Match], gates: Gates | None = None) -> Ranking:
         reasons.append(f"loss {best.loss:.3f} of candidate {best.index} is above {gates.loss:g}: none fits the target")
     if best.evidence < gates.evidence:
         reasons.append(
-            f"evidence {best.evidence:.2f} of candidate {best.index} is below {gates.evidence:g} layers felt by both pads"
+            f"evidence {best.evidence:.2f} of candidate {best.index} is below {gates.evidence:g} two-sided layers"
         )
     return Ranking(order, margin, not reasons, tuple(reasons))

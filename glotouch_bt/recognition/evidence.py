@@ -84,8 +84,9 @@ def read_evidence(touchset: TouchSet, pad: PadSpec, params: LossParams) -> Evide
             values += [p.rho for p in patches if p.valid and math.isfinite(p.rho)]
             if felt == 0:
                 continue
-            images = tuple(
-                image_feature(pool(d)) if p.valid else None for d, p in zip((layer.left_m, layer.right_m), patches, strict=True)
+            left, right = (
+                np.asarray(image_feature(pool(d)), dtype=np.float64) if p.valid else None
+                for d, p in zip((layer.left_m, layer.right_m), patches, strict=True)
             )
             x, _ = hand_axes(np.asarray(layer.yaw_rad))
             layers.append(
@@ -97,7 +98,7 @@ def read_evidence(touchset: TouchSet, pad: PadSpec, params: LossParams) -> Evide
                     felt < 2,
                     float(x @ (np.asarray(layer.position_K_m) - centre)),
                     layer.height_m,
-                    (images[0], images[1]),
+                    (left, right),
                     tuple(p.rho for p in patches if p.valid and math.isfinite(p.rho)),
                     (patches[0].top_m, patches[1].top_m),
                 )
@@ -130,6 +131,4 @@ def coupled_probability(touchset: TouchSet, params: LossParams) -> float:
     def sigma(x: float) -> float:
         return 1.0 / (1.0 + math.exp(-x))
 
-    return math.sqrt(
-        sigma(3 * math.log(travel / params.tau_t_m)) * sigma(-3 * math.log(rotation / params.tau_R_rad))
-    )
+    return math.sqrt(sigma(3 * math.log(travel / params.tau_t_m)) * sigma(-3 * math.log(rotation / params.tau_R_rad)))

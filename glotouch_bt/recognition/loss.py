@@ -1,4 +1,4 @@
-"""The matching loss of a TouchSet against a target, eq. (matching_loss), with the evidence the candidate itself carries."""
+"""The matching loss of a TouchSet against a target: eq. (matching_loss) and what the candidate itself tells."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from glotouch_bt.recognition.pads import Array32
 from glotouch_bt.recognition.params import LossParams
 from glotouch_bt.recognition.placement import fitted_pose, unfelt_pose
 from glotouch_bt.recognition.raster import hand_axes
-from glotouch_bt.recognition.volume import Grid, SequenceVolume, cross_loss, sequence_volume
+from glotouch_bt.recognition.volume import Grid, cross_loss, sequence_volume
 from glotouch_bt.robot import Array
 from glotouch_bt.touch.values import Candidate, TouchSet
 
@@ -87,7 +87,12 @@ def _width_loss(model: TargetModel, e: Evidence, candidate: Candidate, grid: Gri
         least = [np.take_along_axis(x, c[:, :, None], axis=2)[:, :, 0] for x, c in zip(losses, chosen, strict=True)]
         joint = sum(s * _drift(x[:, :, None], p)[:, :, 0] for s, x in zip(share, least, strict=True))
         picked = [
-            np.stack([np.take_along_axis(np.broadcast_to(r, (len(c), *r.shape)), c[:, :, None], axis=2)[:, :, 0] for r in v.residual_m])  # noqa: E501
+            np.stack(
+                [
+                    np.take_along_axis(np.broadcast_to(r, (len(c), *r.shape)), c[:, :, None], axis=2)[:, :, 0]
+                    for r in v.residual_m
+                ]
+            )
             for v, c in zip(volumes, chosen, strict=True)
         ]
         joint = joint + np.float32(p.w_cross) * cross_loss(picked, volumes, p) + common
@@ -128,14 +133,14 @@ def _refined(profile: Array32, i: int) -> float:
     return i + (float(np.clip(0.5 * (a - c) / curve, -0.5, 0.5)) if curve > 1e-9 else 0.0)
 
 
-def _shift_prior(model: TargetModel, candidate: Candidate, turn: float, flip: float, grid: Grid, p: LossParams) -> Array32:
+def _shift_prior(
+    model: TargetModel, candidate: Candidate, turn: float, flip: float, grid: Grid, p: LossParams
+) -> Array32:
     """(1, 72, nd, 1): the contour's centre is where the model's own outline, fitted alike, has its centre."""
-    o = model.outline
-    box = candidate.contour.kind == "box"
-    centre, rms = (o.box_centre_m, o.box_rms_m) if box else (o.circle_centre_m, o.circle_rms_m)
+    traced = model.outline.of(candidate.contour.kind)
     x, _ = hand_axes(model.phi_rad + turn)
-    off = flip * grid.shift_m[None, :] - (x @ centre)[:, None]
-    variance = p.shift_sd_m**2 + rms**2
+    off = flip * grid.shift_m[None, :] - (x @ traced.centre_m)[:, None]
+    variance = p.shift_sd_m**2 + traced.centre_sd_m**2
     return np.asarray(p.shift_prior * 0.5 * off**2 / variance, dtype=np.float32)[None, :, :, None]
 
 
@@ -143,13 +148,13 @@ def _pose_prior(model: TargetModel, candidate: Candidate, first: float, grid: Gr
     """(1, 72, nz): height offset near 0; a box's contour lies along the model's."""
     z = p.z0_prior * 0.5 * (grid.z0_m / p.z0_sd_m) ** 2
     yaw = np.zeros(len(model.phi_rad))
-    contour, o = candidate.contour, model.outline
+    contour, o = candidate.contour, model.outline.as_box
     if p.yaw_prior > 0 and contour.kind == "box":
         off = first - model.phi_rad + o.yaw_rad - contour.yaw_rad
         off = (off + np.pi / 2) % np.pi - np.pi / 2
         slender = min(o.size_m[0] / o.size_m[1], contour.size_m[0] / max(contour.size_m[1], 1e-3)) - 1
-        trust = float(np.clip(slender / 0.2, 0, 1)) / (1 + (o.box_rms_m / 2e-3) ** 2)
-        yaw = p.yaw_prior * trust * np.log1p(0.5 * (off / p.yaw_sd_rad) ** 2)
+        trust = float(np.clip(slender / 0.2, 0, 1))
+        yaw = p.yaw_prior * trust * np.log1p(0.5 * off**2 / (p.yaw_sd_rad**2 + o.yaw_sd_rad**2))
     return np.asarray(yaw[:, None] + z[None, :], dtype=np.float32)[None]
 
 
@@ -184,14 +189,10 @@ def height_loss(model: TargetModel, candidate: Candidate, p: LossParams) -> floa
 
 def contour_loss(model: TargetModel, candidate: Candidate, p: LossParams) -> float:
     """Contour's size against the model's own outline fitted as the same kind."""
-    o, c = model.outline, candidate.contour
-    if c.kind == "box":
-        variance = p.contour_sd_m**2 + 0.25 * (o.box_rms_m**2 + c.rms_m**2)
-        squared = (c.size_m[0] - o.size_m[0]) ** 2 + (c.size_m[1] - o.size_m[1]) ** 2
-    else:
-        variance = p.contour_sd_m**2 + 0.25 * (o.circle_rms_m**2 + c.rms_m**2)
-        squared = (c.size_m[0] - o.diameter_m) ** 2
-    return p.contour * math.log1p(0.5 * squared / variance)
-
-
-__all__ = ["SequenceVolume", "contour_loss", "depth_loss", "height_loss", "match", "mode_loss"]
+    contour = candidate.contour
+    traced = model.outline.of(contour.kind)
+    sides = 2 if contour.kind == "box" else 1
+    squared = 0.0
+    for felt, size, sd in zip(contour.size_m[:sides], traced.size_m[:sides], traced.size_sd_m[:sides], strict=True):
+        squared += (felt - size) ** 2 / (p.contour_sd_m**2 + sd**2)
+    return p.contour * math.log1p(0.5 * squared)

@@ -1,7 +1,7 @@
 """What the pads would feel of a target, from its STL alone: support widths, pad images, contour, nonplanarity.
 
-Everything is tabulated once per (mesh, pad) over relative yaw phi (hand against mesh), shift l along x_P from the middle of
-the mesh's traced outline, and height z of the pads' mid-point above the floor.
+Everything is tabulated once per (mesh, pad) over relative yaw phi (hand against mesh), shift l along x_P from the
+middle of the mesh's footprint, and height z of the pads' mid-point above the floor.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+import trimesh
 
-from glotouch_bt.recognition.outline import Outline, fit_outline, minimum_rectangle, traced_outline
+from glotouch_bt.recognition.outline import TIP_RADIUS_M, Outline, first_hit, minimum_rectangle, traced_outline
 from glotouch_bt.recognition.pads import FINE, Array32, PadSpec, image_feature
 from glotouch_bt.recognition.raster import mirrored, side_images, window_max
 from glotouch_bt.recognition.touches import pooled_images, simulated_statistics
@@ -39,15 +40,15 @@ class TargetModel:
         z_m: (nz,) table heights of the pads' mid-point.
         reach_m: (72, nl, nz) largest coordinate along y_P inside the left pad's window; NaN where it is empty.
         fine_m: (72, fl, fz) side images the tables come from (see `raster`); -inf where empty.
-        outline: Traced outline about `centre_m`.
-        centre_m: (2,) middle of the traced outline in the mesh's frame O.
+        outline: What tracing it would report, about `centre_m`.
+        centre_m: (2,) middle of the smallest rectangle round the footprint, in the mesh's frame O.
         height_m: Top above the floor.
         rho: Nonplanarity predicted for a 10 N touch, median over simulated touches (the paper's rho_M).
         rho_sd: Its spread over touches (half the 16-84 % range).
         normal_dispersion: 1 - |mean normal| over touched patches, mean over touches (the paper's d_M).
         anisotropy: 1 - short / long of the smallest rectangle round the footprint (the paper's a_M).
-        top_slope_m: How much lower than the top the probe may find it, within 4 mm of the outline's middle.
-        top_centre_m: Height found by touching the outline's middle from above.
+        top_slope_m: How much lower than the top the probe may find it, within 4 mm of the traced centre.
+        top_centre_m: Height found by touching the traced centre from above.
     """
 
     name: str
@@ -87,12 +88,12 @@ class TargetModel:
 
     @cached_property
     def middle_m(self) -> Array32:
-        """(72, nl, nz) y_P of the point halfway between the two supports: where centring jaws bring the hand's middle."""
+        """(72, nl, nz) y_P of the point halfway between the supports, where jaws that centre it have their middle."""
         return np.float32(0.5) * (self.reach_m - mirrored(self.reach_m))
 
     @property
     def images(self) -> Array32:
-        """(72, nl, nz, 35) predicted image features of the LEFT pad at `pad.force_N`; built at first use (about 1 s)."""
+        """(72, nl, nz, 35) image features the LEFT pad shows at `pad.force_N`; built at first use (0.4 s)."""
         if "images" not in self._lazy:
             self._lazy["images"] = image_feature(pooled_images(self.fine_m, STRIDE, self.pad)).astype(np.float32)
         return self._lazy["images"]
@@ -130,27 +131,26 @@ def _bracket(grid: Array, x: float) -> tuple[int, float]:
 
 def _build(mesh: Mesh, pad: PadSpec) -> TargetModel:
     solid = mesh.as_trimesh()
-    outline = fit_outline(traced_outline(solid))
-    long, short, _, centre = minimum_rectangle(mesh.vertices_m[:, :2])
-    middle = outline.box_centre_m if outline.p_box > 0.5 else outline.circle_centre_m
+    long, short, _, middle = minimum_rectangle(mesh.vertices_m[:, :2])
     solid.apply_translation([-middle[0], -middle[1], 0.0])
-    outline = fit_outline(traced_outline(solid))
+    outline = traced_outline(solid)
     top = float(mesh.vertices_m[:, 2].max())
     step_l, step_z = pad.window_m[0] / FINE[1], pad.window_m[1] / FINE[0]
     radius = float(np.hypot(*np.abs(solid.vertices[:, :2]).max(axis=0)))
     n = int(np.ceil((radius + 0.5 * pad.window_m[0]) / (STRIDE * step_l))) * STRIDE + FINE[1] // 2
-    fine_l = np.arange(-n, n + 1) * step_l
+    fine_l = np.asarray(np.arange(-n, n + 1) * step_l, dtype=np.float64)
     # Heights: pad centres from 8 mm to 8 mm above the top; the raster reaches half a window farther on both sides.
-    centres = np.arange(0.008, top + 0.008, STRIDE * step_z)
+    centres = np.asarray(np.arange(0.008, top + 0.008, STRIDE * step_z), dtype=np.float64)
     half = FINE[0] // 2
-    fine_z = centres[0] + (np.arange(STRIDE * (len(centres) - 1) + 1 + 2 * half) - half) * step_z
-    phi = np.arange(YAWS) * (2 * np.pi / YAWS)
+    rows = np.arange(STRIDE * (len(centres) - 1) + 1 + 2 * half) - half
+    fine_z = np.asarray(centres[0] + rows * step_z, dtype=np.float64)
+    phi = np.asarray(np.arange(YAWS) * (2 * np.pi / YAWS), dtype=np.float64)
     fine = side_images(solid, phi, fine_l, fine_z)
     h = FINE[1] // 2
     reach = window_max(fine)[:, h:-h:STRIDE, half:-half:STRIDE]
     reach = np.where(np.isfinite(reach), reach, np.nan).astype(np.float32)
     rho, rho_sd, dispersion = simulated_statistics(fine, STRIDE, pad)
-    top_centre, top_slope = _top(solid, top)
+    top_centre, top_slope = _top(solid, top, outline.likely.centre_m)
     for a in (reach, fine):
         a.setflags(write=False)
     return TargetModel(
@@ -159,18 +159,22 @@ def _build(mesh: Mesh, pad: PadSpec) -> TargetModel:
     )  # fmt: skip
 
 
-def _top(solid: object, top: float) -> tuple[float, float]:
-    """Height of the ball's contact from above at the middle, and its spread when the aim is off by up to 4 mm."""
-    ring = np.array([[0.0, 0.0], *(r * np.array([np.cos(a), np.sin(a)]) for r in (2e-3, 4e-3) for a in np.arange(8) * np.pi / 4)])  # noqa: E501
-    ball = np.array([[0.0, 0.0], *(r * np.array([np.cos(a), np.sin(a)]) for r in (2e-3, 4e-3) for a in np.arange(6) * np.pi / 3)])  # noqa: E501
-    sag = 0.006 - np.sqrt(0.006**2 - (ball**2).sum(axis=1))
-    points = (ring[:, None] + ball[None]).reshape(-1, 2)
-    o = np.column_stack([points, np.full(len(points), top + 0.01)])
-    d = np.tile([0.0, 0.0, -1.0], (len(o), 1))
-    hit = solid.ray.intersects_first(o, d)  # type: ignore[attr-defined]
-    n, p = solid.face_normals[hit], solid.triangles[hit, 0]  # type: ignore[attr-defined]
-    along = np.where(np.abs(n[:, 2]) < 1e-9, np.nan, n[:, 2])
-    z = p[:, 2] + ((p[:, :2] - points) * n[:, :2]).sum(axis=1) / along
-    z = np.where((hit >= 0) & np.isfinite(z), z, 0.0).reshape(len(ring), len(ball)) - sag
-    heights = z.max(axis=1)
-    return float(heights[0]), float(np.ptp(heights))
+def touched_top(solid: trimesh.Trimesh, aim_m: Array, top_m: float) -> Array:
+    """Heights (k,) at which a ball lowered onto each of the points `aim_m` (k, 2) stops (its lowest point)."""
+    angle = np.arange(8) * (np.pi / 4)
+    unit = np.column_stack([np.cos(angle), np.sin(angle)])
+    ball = np.concatenate([np.zeros((1, 2)), 2e-3 * unit, 4e-3 * unit, 5.5e-3 * unit])
+    sag = TIP_RADIUS_M - np.sqrt(TIP_RADIUS_M**2 - (ball**2).sum(axis=1))
+    points = (aim_m[:, None] + ball[None]).reshape(-1, 2)
+    o = np.column_stack([points, np.full(len(points), top_m + 0.01)])
+    t = first_hit(solid, o, np.tile([0.0, 0.0, -1.0], (len(o), 1)))
+    z = np.where(np.isfinite(t), top_m + 0.01 - t, 0.0).reshape(len(aim_m), len(ball)) - sag
+    return np.asarray(np.maximum(z.max(axis=1), 0.0))
+
+
+def _top(solid: trimesh.Trimesh, top_m: float, centre_m: Array) -> tuple[float, float]:
+    """Height felt at the outline's centre, and the range of heights when the aim is off by up to 4 mm."""
+    angle = np.arange(8) * (np.pi / 4)
+    unit = np.column_stack([np.cos(angle), np.sin(angle)])
+    heights = touched_top(solid, centre_m + np.concatenate([np.zeros((1, 2)), 2e-3 * unit, 4e-3 * unit]), top_m)
+    return float(np.median(heights)), float(np.ptp(heights))

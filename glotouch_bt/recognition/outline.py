@@ -1,6 +1,8 @@
-"""Outlines of a solid's lower part: what the probe would trace, as a circle or an oriented rectangle.
+"""What tracing a solid with the probe would report: its outline as a circle or a rectangle, and how far to trust it.
 
-The model's own section is fitted in the same way as the probe's contacts, so that the two can be compared.
+The model is traced many times from different sides with the probe's own geometry, and each trace is fitted by the
+same code as the real contacts; so systematic errors of the fit (a leg taken for a side) are predicted instead of held
+against the target.
 """
 
 from __future__ import annotations
@@ -10,99 +12,145 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-from scipy.optimize import least_squares
 from scipy.spatial import ConvexHull
 
 from glotouch_bt.robot import Array, ParamError
+from glotouch_bt.touch import Contour, ContourKind, fit_contour, fit_kind
 
-SENSING_M = (0.012, 0.022)
-"""Heights the probe's ball (radius 6 mm) feels when its centre is at about 17 mm above the floor."""
-BOX_RMS_M = 0.0015
-"""Circle residual at which round and box are equally likely."""
+TIP_RADIUS_M, SHAFT_RADIUS_M, SHAFT_M = 0.006, 0.004, 0.100
+"""The probe of CONDITIONS (its shaft's lower part)."""
+SENSING_M = 0.018
+"""Height of the ball's centre while tracing."""
+TRACES, CONTACTS = 10, 10
+"""Simulated traces of a model, and contacts in each."""
+CONTACT_SD_M, MIDDLE_SD_M = 5e-4, 3e-3
+"""Scatter of one simulated contact, and of the point the probe aims at."""
+
+
+@dataclass(frozen=True)
+class KindFit:
+    """Traces fitted as one kind. Means over traces, with spreads (sd) from trace to trace.
+
+    Attributes:
+        centre_m, centre_sd_m: (2,) mean centre in the frame of the solid; scalar spread of one coordinate.
+        size_m, size_sd_m: (long, short), and the spread of either.
+        yaw_rad, yaw_sd_rad: Axis of the long side (mod pi) and its spread; 0 and pi for a circle.
+    """
+
+    centre_m: Array
+    centre_sd_m: float
+    size_m: tuple[float, float]
+    size_sd_m: tuple[float, float]
+    yaw_rad: float
+    yaw_sd_rad: float
 
 
 @dataclass(frozen=True)
 class Outline:
-    """What fitting an outline gives, in the frame of its points.
+    """A model's outline, as each kind.
 
     Attributes:
-        circle_centre_m: (2,) of the circle.
-        diameter_m: Of the circle.
-        circle_rms_m: Its residual.
-        box_centre_m: (2,) of the rectangle.
-        size_m: (long, short) of the rectangle.
-        yaw_rad: Direction of its long side, in [-pi/2, pi/2).
-        box_rms_m: Its residual.
+        as_round, as_box: The traces fitted as that kind (those the fit itself called so, if at least three).
+        p_box: Probability that tracing calls it a box, by Laplace's rule.
     """
 
-    circle_centre_m: Array
-    diameter_m: float
-    circle_rms_m: float
-    box_centre_m: Array
-    size_m: tuple[float, float]
-    yaw_rad: float
-    box_rms_m: float
+    as_round: KindFit
+    as_box: KindFit
+    p_box: float
+
+    def of(self, kind: ContourKind) -> KindFit:
+        """The fit as `kind`."""
+        return self.as_box if kind == "box" else self.as_round
 
     @property
-    def p_box(self) -> float:
-        """Probability that a tracer calls it a box: logistic in the circle's residual (0.5 at BOX_RMS_M)."""
-        return 1.0 / (1.0 + math.exp(-(self.circle_rms_m - BOX_RMS_M) / (0.2 * BOX_RMS_M)))
+    def likely(self) -> KindFit:
+        """The fit as the likelier kind."""
+        return self.as_box if self.p_box > 0.5 else self.as_round
 
 
-def fit_outline(points_m: Array) -> Outline:
-    """Fit a circle (soft-l1, eq. (circle_fit)) and a rectangle (point to nearest edge) to outline points (k, 2).
+def traced_outline(solid: trimesh.Trimesh, traces: int = TRACES) -> Outline:
+    """Trace `solid` (z up, standing on z = 0) `traces` times and fit; deterministic.
 
     Raises:
-        ParamError: Fewer than 5 points, or all on one line.
+        ParamError: Fewer than 3 contacts can be made: the solid is lower than the probe's ball.
     """
-    p = np.asarray(points_m, dtype=np.float64)
-    if len(p) < 5 or np.linalg.matrix_rank(p - p.mean(axis=0), tol=1e-6) < 2:
-        raise ParamError("points_m", len(p), "at least 5 points that are not on one line")
-    # Algebraic circle (Kasa) as the start.
-    a = np.column_stack([2 * p, np.ones(len(p))])
-    s = np.linalg.lstsq(a, (p**2).sum(axis=1), rcond=None)[0]
-    r0 = math.sqrt(max(s[2] + s[0] ** 2 + s[1] ** 2, 1e-8))
-
-    def circle(v: Array) -> Array:
-        return np.asarray(np.hypot(p[:, 0] - v[0], p[:, 1] - v[1]) - v[2])
-
-    c = least_squares(circle, [s[0], s[1], r0], loss="soft_l1", f_scale=1e-3, max_nfev=30)
-    start_long, start_short, yaw, centre = minimum_rectangle(p)
-
-    def box(v: Array) -> Array:
-        return box_distance(p, v[:2], v[2], v[3], v[4])
-
-    best = None
-    for turn in (0.0, math.pi / 4):
-        b = least_squares(
-            box,
-            [centre[0], centre[1], start_long, start_short, yaw + turn],
-            loss="soft_l1",
-            f_scale=1e-3,
-            max_nfev=30,
-            x_scale=[0.01, 0.01, 0.02, 0.02, 0.2],
-        )
-        if best is None or b.cost < best.cost:
-            best = b
-    assert best is not None
-    v = best.x
-    long, short, yaw = float(abs(v[2])), float(abs(v[3])), float(v[4])
-    if short > long:
-        long, short, yaw = short, long, yaw + math.pi / 2
-    yaw = (yaw + math.pi / 2) % math.pi - math.pi / 2
-    rms_c = float(np.sqrt(np.mean(circle(c.x) ** 2)))
-    rms_b = float(np.sqrt(np.mean(box(v) ** 2)))
-    return Outline(c.x[:2], 2 * float(abs(c.x[2])), rms_c, v[:2], (long, short), yaw, rms_b)
+    rng = np.random.default_rng(0)
+    middle = minimum_rectangle(np.asarray(solid.vertices)[:, :2])[3]
+    chosen: list[Contour] = []
+    rounds: list[Contour] = []
+    boxes: list[Contour] = []
+    for i in range(traces):
+        aim = middle + rng.normal(0, MIDDLE_SD_M, 2)
+        tips = traced_tips(solid, aim, CONTACTS, i * math.radians(360 * 0.618) / CONTACTS)
+        if len(tips) < 3:
+            raise ParamError("solid", f"{len(tips)} contacts", "high enough to be traced: at least 12 mm")
+        tips = tips + rng.normal(0, CONTACT_SD_M, tips.shape)
+        chosen.append(fit_contour(tips, TIP_RADIUS_M))
+        rounds.append(chosen[-1] if chosen[-1].kind == "round" else fit_kind(tips, TIP_RADIUS_M, "round"))
+        boxes.append(chosen[-1] if chosen[-1].kind == "box" else fit_kind(tips, TIP_RADIUS_M, "box"))
+    called_box = [c for c in chosen if c.kind == "box"]
+    called_round = [c for c in chosen if c.kind == "round"]
+    return Outline(
+        _summary(called_round if len(called_round) > 2 else rounds),
+        _summary(called_box if len(called_box) > 2 else boxes),
+        (len(called_box) + 1) / (traces + 2),
+    )
 
 
-def box_distance(p: Array, centre: Array, long: float, short: float, yaw: float) -> Array:
-    """Signed distance (k,) of points (k, 2) from a rectangle's outline, outside positive."""
-    c, s = math.cos(yaw), math.sin(yaw)
-    d = p - centre
-    q = np.abs(np.column_stack([c * d[:, 0] + s * d[:, 1], -s * d[:, 0] + c * d[:, 1]]))
-    q = q - 0.5 * np.abs([long, short])
-    outside = np.hypot(np.maximum(q[:, 0], 0), np.maximum(q[:, 1], 0))
-    return np.asarray(outside + np.minimum(np.maximum(q[:, 0], q[:, 1]), 0))
+def _summary(fits: list[Contour]) -> KindFit:
+    centre = np.array([f.centre_K_m for f in fits])
+    size = np.array([f.size_m for f in fits])
+    yaw, yaw_sd = 0.0, math.pi
+    if fits[0].kind == "box":
+        mean = np.mean(np.exp(2j * np.array([f.yaw_rad for f in fits])))
+        yaw = 0.5 * float(np.angle(mean))
+        yaw_sd = 0.5 * math.sqrt(-2 * math.log(min(max(float(abs(mean)), 1e-6), 1 - 1e-9)))
+    spread = size.std(axis=0)
+    long, short = np.median(size, axis=0)
+    return KindFit(
+        np.median(centre, axis=0),
+        float(np.sqrt(centre.var(axis=0).mean())),
+        (float(long), float(short)),
+        (float(spread[0]), float(spread[1])),
+        yaw,
+        yaw_sd,
+    )
+
+
+def traced_tips(solid: trimesh.Trimesh, aim_m: Array, contacts: int, start_rad: float) -> Array:
+    """Ball centres (k, 2) at first contact, coming radially towards `aim_m` from `contacts` evenly spread sides.
+
+    The ball (or the shaft above it, on an overhang) stops where the first of a bundle of rays meets the surface.
+    """
+    a, b = np.meshgrid(np.linspace(-0.9, 0.9, 7), np.linspace(-0.9, 0.9, 7))
+    disc = np.column_stack([a.ravel(), b.ravel()])
+    disc = disc[(disc**2).sum(axis=1) < 0.95] * TIP_RADIUS_M
+    nose = np.sqrt(TIP_RADIUS_M**2 - (disc**2).sum(axis=1))
+    sa, sb = np.meshgrid(np.array([-0.9, 0.0, 0.9]) * SHAFT_RADIUS_M, np.arange(0.004, SHAFT_M, 0.004))
+    bundle = np.concatenate([disc, np.column_stack([sa.ravel(), sb.ravel()])])
+    nose = np.concatenate([nose, np.sqrt(SHAFT_RADIUS_M**2 - sa.ravel() ** 2)])
+    angle = start_rad + np.linspace(0, 2 * np.pi, contacts, endpoint=False)
+    u = np.column_stack([np.cos(angle), np.sin(angle)])
+    side = np.column_stack([-u[:, 1], u[:, 0]])
+    far = float(np.abs(solid.vertices[:, :2]).max()) * 3 + 0.02
+    o = np.zeros((contacts, len(bundle), 3))
+    o[..., :2] = aim_m + far * u[:, None, :] + bundle[None, :, :1] * side[:, None, :]
+    o[..., 2] = SENSING_M + bundle[:, 1]
+    d = np.zeros_like(o)
+    d[..., :2] = -u[:, None, :]
+    t = first_hit(solid, o.reshape(-1, 3), d.reshape(-1, 3)).reshape(contacts, len(bundle))
+    stop = (far - t + nose).max(axis=1)
+    met = np.isfinite(stop) & (stop > 0)
+    return np.asarray(aim_m + stop[met, None] * u[met])
+
+
+def first_hit(solid: trimesh.Trimesh, origins_m: Array, directions: Array) -> Array:
+    """(n,) distance along each ray (n, 3) to the solid's first surface; inf where there is none."""
+    hit = solid.ray.intersects_first(origins_m, directions)
+    n, p = solid.face_normals[hit], solid.triangles[hit, 0]
+    along = np.einsum("ij,ij->i", n, directions)
+    t = np.einsum("ij,ij->i", n, p - origins_m) / np.where(np.abs(along) < 1e-9, np.nan, along)
+    return np.where((hit >= 0) & np.isfinite(t), t, np.inf)
 
 
 def minimum_rectangle(points_m: Array) -> tuple[float, float, float, Array]:
@@ -120,47 +168,3 @@ def minimum_rectangle(points_m: Array) -> tuple[float, float, float, Array]:
     if dv[i] > du[i]:
         return float(dv[i]), float(du[i]), yaw + math.pi / 2, centre
     return float(du[i]), float(dv[i]), yaw, centre
-
-
-def traced_outline(
-    solid: trimesh.Trimesh, directions: int = 24, tip_radius_m: float = 0.006, start_rad: float = 0.0
-) -> Array:
-    """Points (k, 2) a probe would feel that comes from `directions` evenly spread sides towards the section's middle.
-
-    The outermost surface at SENSING heights along each direction, bridged over dents narrower than the ball by taking the
-    largest reach of a thin bundle of rays. An object lower than the band is felt at its half height.
-    """
-    top = float(solid.vertices[:, 2].max())
-    z = np.clip(np.linspace(*SENSING_M, 5), 0.1 * top, 0.6 * top if top < SENSING_M[1] else 0.98 * top)
-    middle = _section_middle(solid, z)
-    angle = start_rad + np.linspace(0, 2 * np.pi, directions, endpoint=False)
-    u = np.column_stack([np.cos(angle), np.sin(angle)])
-    side = np.column_stack([-u[:, 1], u[:, 0]])
-    across = np.array([-0.5, 0.0, 0.5]) * tip_radius_m
-    far = float(np.abs(solid.vertices[:, :2]).max()) * 3 + 0.02
-    o = np.zeros((directions, len(across), len(z), 3))
-    o[..., :2] = middle + far * u[:, None, None, :] + across[None, :, None, None] * side[:, None, None, :]
-    o[..., 2] = z
-    d = np.zeros_like(o)
-    d[..., :2] = -u[:, None, None, :]
-    flat_o, flat_d = o.reshape(-1, 3), d.reshape(-1, 3)
-    hit = solid.ray.intersects_first(flat_o, flat_d)
-    n, p = solid.face_normals[hit], solid.triangles[hit, 0]
-    along = np.einsum("ij,ij->i", n, flat_d)
-    t = np.einsum("ij,ij->i", n, p - flat_o) / np.where(np.abs(along) < 1e-9, np.nan, along)
-    sag = tip_radius_m - np.sqrt(tip_radius_m**2 - across**2)  # the ball's side reaches less far than its nose
-    reach = np.where(hit >= 0, far - t, np.nan).reshape(directions, len(across), len(z)) - sag[None, :, None]
-    reach = np.where(np.isfinite(reach), reach, -np.inf).max(axis=(1, 2))
-    ok = np.isfinite(reach)
-    return np.asarray(middle + reach[ok, None] * u[ok])
-
-
-def _section_middle(solid: trimesh.Trimesh, z: Array) -> Array:
-    """Middle of the smallest rectangle round the section at the heights `z`."""
-    points = []
-    for h in z[[0, len(z) // 2, -1]]:
-        lines = trimesh.intersections.mesh_plane(solid, plane_normal=[0, 0, 1], plane_origin=[0, 0, float(h)])
-        if len(lines):
-            points.append(lines.reshape(-1, 3)[:, :2])
-    cloud = np.concatenate(points) if points else np.asarray(solid.vertices[:, :2])
-    return minimum_rectangle(cloud)[3]

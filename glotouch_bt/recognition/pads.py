@@ -46,11 +46,13 @@ class PadSpec:
             raise ParamError("pad.depth_m", self.depth_m, f"<= limit_m = {self.limit_m}")
 
 
-def gel_shift(heights_m: npt.NDArray[np.floating], cell_m2: float, force_N: float, pad: PadSpec) -> npt.NDArray[np.floating]:
+def gel_shift(
+    heights_m: npt.NDArray[np.floating], cell_m2: float, force_N: float, pad: PadSpec
+) -> npt.NDArray[np.floating]:
     """How far the highest point sinks into the gel: s with sum k x / (1 - (x/limit)^2) dA = force, x = max(0, h + s).
 
     Args:
-        heights_m: (..., n) heights of the surface under the pad relative to its highest point (<= 0; -inf: nothing there).
+        heights_m: (..., n) heights of the surface under the pad relative to its highest point; -inf: nothing there.
         cell_m2: Area of one of the n cells.
         force_N: Normal force of the pad.
         pad: The gel.

@@ -101,8 +101,8 @@ class LossParams:
             values = v if isinstance(v, tuple) else (v,)
             if not values or not all(math.isfinite(x) and x >= 0 for x in values):
                 raise ParamError(f"loss.{f.name}", v, "finite and not negative")
-        positive = ("unit_m", "huber", "bias_limit_m", "shift_sd_m", "z0_sd_m", "tau_t_m", "tau_R_rad", "depth_sd",
-                    "depth_eps", "mode_floor", "height_sd_m", "contour_sd_m", "yaw_sd_rad", "image_sd", "image_cap")  # fmt: skip
+        scales = ("unit_m", "bias_limit_m", "shift_sd_m", "z0_sd_m", "tau_t_m", "tau_R_rad", "depth_sd", "height_sd_m")
+        positive = (*scales, "huber", "depth_eps", "mode_floor", "contour_sd_m", "yaw_sd_rad", "image_sd", "image_cap")
         for name in positive:
             if getattr(self, name) <= 0:
                 raise ParamError(f"loss.{name}", getattr(self, name), "positive")
@@ -113,12 +113,12 @@ class LossParams:
             raise ParamError("loss.scales", self.scales, "positive")
 
     def only(self, *terms: str) -> LossParams:
-        """The same loss with every term switched off but the width loss and `terms` (depth, mode, height, contour, image).
+        """The same loss with every term off but the width loss and `terms` (depth, mode, height, contour, image).
 
         Raises:
             ParamError: An unknown term.
         """
-        known = {"depth": ("depth",), "mode": ("mode",), "height": ("height",), "contour": ("contour", "yaw_prior"), "image": ("image",)}  # noqa: E501
+        known = {t: (t,) for t in ("depth", "mode", "height", "image")} | {"contour": ("contour", "yaw_prior")}
         for t in terms:
             if t not in known:
                 raise ParamError("terms", t, f"one of {', '.join(known)}")

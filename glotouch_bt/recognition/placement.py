@@ -39,8 +39,8 @@ def fitted_pose(
 ) -> tuple[Fit, tuple[float, float, float]]:
     """Fit and pose_K_O (x, y, yaw) by weighted least squares over the layers.
 
-    Each layer tells the object's place along x_P (fitted window shift) and, more sharply, along y_P: centring jaws put the
-    point halfway between the two supports, corrected for unequal sinking into the gels, at the hand's middle.
+    Each layer tells the object's place along x_P (fitted window shift) and, more sharply, along y_P: centring jaws put
+    the point halfway between the two supports, corrected for unequal sinking into the gels, at the hand's middle.
 
     Args:
         model: The target.

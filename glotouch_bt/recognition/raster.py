@@ -1,8 +1,9 @@
 """Side images of a solid: how far it reaches towards a pad, seen from every yaw.
 
-`reach[i, j, h]` at relative yaw phi_i is the largest y of the surface on the line (x = l_j, z = z_h), written in the frame
-with x axis (cos phi, sin phi) and y axis (sin phi, -cos phi): the planar part of the pads' frame P for a hand turned by phi
-against the mesh. The left pad (at +y_P) feels this image; the right pad feels that of phi + 180 deg with l reversed.
+`reach[i, j, h]` at relative yaw phi_i is the largest y of the surface on the line (x = l_j, z = z_h), written in the
+frame with x axis (cos phi, sin phi) and y axis (sin phi, -cos phi): the planar part of the pads' frame P for a hand
+turned by phi against the mesh. The left pad (at +y_P) feels this image; the right pad that of phi + 180 deg with l
+reversed.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import numpy as np
 import trimesh
 from scipy import ndimage
 
+from glotouch_bt.recognition.outline import first_hit
 from glotouch_bt.recognition.pads import FINE, Array32
 from glotouch_bt.robot import Array, ParamError
 
@@ -45,16 +47,8 @@ def side_images(solid: trimesh.Trimesh, phi_rad: Array, l_m: Array, z_m: Array) 
     o[..., 2] = z_m
     d = np.zeros_like(o)
     d[..., :2] = -y[:, None, None, :]
-    o, d = o.reshape(-1, 3), d.reshape(-1, 3)
-    hit = solid.ray.intersects_first(o, d)
-    reach = np.full(len(o), -np.inf, dtype=np.float32)
-    ok = np.flatnonzero(hit >= 0)
-    n = solid.face_normals[hit[ok]]
-    p = solid.triangles[hit[ok], 0]
-    along = np.einsum("ij,ij->i", n, d[ok])
-    t = np.einsum("ij,ij->i", n, p - o[ok]) / np.where(np.abs(along) < 1e-9, np.nan, along)
-    reach[ok] = np.where(np.isfinite(t) & (t >= 0) & (t <= 2 * far), far - t, -np.inf)
-    return reach.reshape(len(phi_rad), len(l_m), len(z_m))
+    reach = far - first_hit(solid, o.reshape(-1, 3), d.reshape(-1, 3))
+    return np.asarray(reach.reshape(len(phi_rad), len(l_m), len(z_m)), dtype=np.float32)
 
 
 def window_max(reach: Array32) -> Array32:
@@ -64,5 +58,5 @@ def window_max(reach: Array32) -> Array32:
 
 
 def mirrored(table: Array32) -> Array32:
-    """The same table as the RIGHT pad sees it: yaw + 180 deg, l reversed. Needs an even yaw count over the full turn."""
+    """The same table as the RIGHT pad sees it: yaw + 180 deg, l reversed. Needs an even count of yaws."""
     return np.roll(table, -(table.shape[0] // 2), axis=0)[:, ::-1]

@@ -1,8 +1,8 @@
 """Synthetic acquisition: what the probe and the pads would report of a mesh at a pose, without a simulator.
 
-For tests and tuning. It shares no table with `model`: every pad is ray-cast at full resolution at the true pose and the gel
-is solved for each frame (SIMULATION A4, recipe C). Jaws are coupled, so the object slides until it is centred between them.
-Not modelled: toppling, slip along x_P, gel shear, friction, fingers touching outside the gel other than by `one_sided`.
+For tests and tuning. It shares no table with `model`: every pad is ray-cast at full resolution at the true pose and the
+gel is solved for each frame (SIMULATION A4, recipe C). Jaws are coupled, so the object slides until it is centred
+between them. Not modelled: toppling, slip along x_P, gel shear, friction, touching outside the gel but by `one_sided`.
 """
 
 from __future__ import annotations
@@ -13,12 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from glotouch_bt.recognition.outline import BOX_RMS_M, fit_outline, traced_outline
+from glotouch_bt.recognition.model import touched_top
+from glotouch_bt.recognition.outline import TIP_RADIUS_M, first_hit, minimum_rectangle, traced_tips
 from glotouch_bt.recognition.pads import PadSpec, gel_shift
 from glotouch_bt.recognition.raster import hand_axes
 from glotouch_bt.robot import Array
 from glotouch_bt.robot.meshes import Mesh
-from glotouch_bt.touch.values import Candidate, Contour, Layer, TouchSequence, TouchSet
+from glotouch_bt.touch import fit_contour
+from glotouch_bt.touch.values import Candidate, Layer, TouchSequence, TouchSet
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,34 +121,16 @@ def acquire(
 
 
 def _trace(solid: trimesh.Trimesh, pose: Array, d: Disturbance, rng: np.random.Generator, index: int) -> Candidate:
-    points = traced_outline(solid, directions=12, start_rad=rng.uniform(0, 2 * np.pi))
+    middle = minimum_rectangle(np.asarray(solid.vertices)[:, :2])[3]
+    tips = traced_tips(solid, middle + rng.normal(0, 4e-3, 2), int(rng.integers(8, 13)), rng.uniform(0, 2 * np.pi))
     c, s = math.cos(pose[2]), math.sin(pose[2])
     turn = np.array([[c, -s], [s, c]])
-    points = points @ turn.T + pose[:2] + rng.normal(0, d.contact_sd_m, points.shape) + rng.normal(0, d.centre_sd_m, 2)
-    o = fit_outline(points)
-    if o.circle_rms_m < BOX_RMS_M:
-        contour = Contour("round", o.circle_centre_m, (o.diameter_m, o.diameter_m), 0.0, o.circle_rms_m, np.zeros(12))
-    else:
-        contour = Contour("box", o.box_centre_m, o.size_m, o.yaw_rad, o.box_rms_m, np.zeros(12))
+    tips = tips @ turn.T + pose[:2] + rng.normal(0, d.contact_sd_m, tips.shape) + rng.normal(0, d.centre_sd_m, 2)
+    contour = fit_contour(tips, TIP_RADIUS_M)
     below = turn.T @ (contour.centre_K_m + rng.normal(0, 5e-4, 2) - pose[:2])
-    ball = np.array([[0.0, 0.0]] + [[r * math.cos(a), r * math.sin(a)] for r in (2e-3, 4e-3) for a in np.arange(8) * np.pi / 4])  # noqa: E501
-    z = _height_at(solid, below + ball) - (0.006 - np.sqrt(0.006**2 - (ball**2).sum(axis=1)))
-    height = max(float(z.max()), 0.0) + rng.normal(0, d.height_sd_m)
+    top = float(solid.vertices[:, 2].max())
+    height = float(touched_top(solid, below[None], top)[0]) + rng.normal(0, d.height_sd_m)
     return Candidate(index, contour, height, 1.0, ())
-
-
-def _height_at(solid: trimesh.Trimesh, points: Array) -> Array:
-    o = np.column_stack([points, np.full(len(points), 1.0)])
-    return 1.0 - _first_hit(solid, o, np.tile([0.0, 0.0, -1.0], (len(o), 1)))
-
-
-def _first_hit(solid: trimesh.Trimesh, o: Array, d: Array) -> Array:
-    """Distance (n,) to the first surface; inf for none."""
-    hit = solid.ray.intersects_first(o, d)
-    n, p = solid.face_normals[hit], solid.triangles[hit, 0]
-    along = np.einsum("ij,ij->i", n, d)
-    t = np.einsum("ij,ij->i", n, p - o) / np.where(np.abs(along) < 1e-9, np.nan, along)
-    return np.where((hit >= 0) & np.isfinite(t), t, np.inf)
 
 
 def _squeeze(
@@ -169,7 +153,7 @@ def _squeeze(
         o[..., 2] = v[:, None]
         ray = np.zeros_like(o)
         ray[..., :2] = -sign * y_O
-        reach.append(far - _first_hit(solid, o.reshape(-1, 3), ray.reshape(-1, 3)))
+        reach.append(far - first_hit(solid, o.reshape(-1, 3), ray.reshape(-1, 3)))
     tops = [float(r.max()) for r in reach]
     empty = np.zeros((rows, cols))
     closed = Layer(height, 0.0, np.asarray(position), yaw, empty, empty, 0.0, False)

@@ -39,7 +39,7 @@ def _pool_touch(h: Array32, pad: PadSpec) -> Array32:
     rel = (h - np.where(np.isfinite(top), top, np.float32(0))).reshape(nl * nz, -1)[some]
     s = _fast_shift(rel, pad)
     x = np.maximum(rel + s, np.float32(0)).reshape(-1, POOLED[1], FINE[1] // POOLED[1], POOLED[0], FINE[0] // POOLED[0])
-    mean = x.sum(axis=(2, 4)) / np.float32(FINE[0] * FINE[1] / (POOLED[0] * POOLED[1]))  # (m, 5 columns, 7 rows upwards)
+    mean = x.sum(axis=(2, 4)) / np.float32(FINE[0] * FINE[1] / (POOLED[0] * POOLED[1]))  # (m, 5, 7), rows upwards
     pooled[some] = mean[:, :, ::-1].transpose(0, 2, 1).reshape(len(mean), -1)
     return pooled.reshape(nl, nz, -1)
 
@@ -85,15 +85,17 @@ def simulated_statistics(fine_m: Array32, stride: int, pad: PadSpec) -> tuple[fl
                     spread.append(_normal_dispersion(np.where(np.isfinite(h), h, np.nan), depth, pad))
     if not rho:
         return 0.3, 0.3, 0.0
-    low, mid, high = np.quantile(rho, [0.16, 0.5, 0.84])
+    low, mid, high = (float(np.quantile(rho, q)) for q in (0.16, 0.5, 0.84))
     return float(mid), float(0.5 * (high - low)), float(np.mean(spread))
 
 
 def _normal_dispersion(h: Array32, depth: object, pad: PadSpec) -> float:
-    gl, gz = np.gradient(h.astype(np.float64), pad.window_m[0] / FINE[1], pad.window_m[1] / FINE[0])
+    heights = h.astype(np.float64)
+    gl = np.gradient(heights, pad.window_m[0] / FINE[1], axis=0)
+    gz = np.gradient(heights, pad.window_m[1] / FINE[0], axis=1)
     use = (np.asarray(depth) > 6e-5) & np.isfinite(gl) & np.isfinite(gz)
     if not use.any():
         return 0.0
-    n = np.stack([gl[use], gz[use], np.ones(int(use.sum()))])
-    n /= np.linalg.norm(n, axis=0)
-    return float(1 - np.linalg.norm(n.mean(axis=1)))
+    length = np.sqrt(gl[use] ** 2 + gz[use] ** 2 + 1)
+    mean = [float(np.mean(c / length)) for c in (gl[use], gz[use], 1.0)]
+    return 1.0 - float(np.hypot(np.hypot(mean[0], mean[1]), mean[2]))

@@ -10,12 +10,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from glotouch_bt.recognition.evidence import LayerEvidence
 from glotouch_bt.recognition.model import TargetModel
 from glotouch_bt.recognition.pads import POOLED, Array32
 from glotouch_bt.recognition.params import LossParams
 from glotouch_bt.robot import Array
+
+Index = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
 
 NOTHING_FITS = 4.0
 """Width loss, in units, of a pose at which no layer has support."""
@@ -37,9 +41,7 @@ class Grid:
         def span(limit: float, n: int) -> Array:
             return np.linspace(-limit, limit, n) if n > 1 else np.zeros(1)
 
-        return cls(
-            span(p.bias_limit_m, p.bias_steps), span(p.shift_m, p.shift_steps), span(p.z0_m, p.z0_steps), scale
-        )
+        return cls(span(p.bias_limit_m, p.bias_steps), span(p.shift_m, p.shift_steps), span(p.z0_m, p.z0_steps), scale)
 
 
 @dataclass(frozen=True)
@@ -91,9 +93,9 @@ def sequence_volume(
     loss = np.float32(p.w_absolute) * _huber_rms(absolute, w[:, None], p.huber)
     if len(layers) > 1:
         mean = (r * w).sum(axis=0) / np.maximum(total, 1e-6)
-        both = w * np.where(upper, 0, 1).astype(np.float32)[:, None, None, None]
-        shape = np.float32(p.w_centred) * _huber_rms(r - mean, both, p.huber)
-        pairs = np.minimum(both[1:], both[:-1])
+        both = np.asarray(w * np.where(upper, 0, 1)[:, None, None, None], dtype=np.float32)
+        shape = np.float32(p.w_centred) * _huber_rms(np.asarray(r - mean, dtype=np.float32), both, p.huber)
+        pairs = np.asarray(np.minimum(both[1:], both[:-1]), dtype=np.float32)
         shape += np.float32(p.w_vertical) * _huber_rms(r[1:] - r[:-1], pairs, p.huber)
         loss = loss + shape
     loss = np.where(total > 0, loss, np.float32(NOTHING_FITS)) + np.float32(p.coverage) * (1 - covered)
@@ -104,9 +106,9 @@ def sequence_volume(
     return SequenceVolume(loss.astype(np.float32), residual, tuple(e.index for e in layers), weight, image)
 
 
-def _one_sided(r: Array32, upper: object) -> Array32:
+def _one_sided(r: Array32, upper: Mask) -> Array32:
     """A layer only one pad felt bounds the width from above: predicted widths below the measured one cost nothing."""
-    mask = np.asarray(upper)[:, None, None, None]
+    mask = upper[:, None, None, None]
     return np.where(mask, np.minimum(r, np.float32(0)), r)
 
 
@@ -140,7 +142,7 @@ def _predicted(model: TargetModel, e: LayerEvidence, roll: float, flip: float, g
     j, g, inside_z = _positions(model.z_m, (e.height_m + grid.z0_m) / grid.scale)
     t = model.width_m
     low, high = t[:, i], t[:, i + 1]
-    f = f[None, :, None]
+    f = np.asarray(f[None, :, None])
     a = low[:, :, j] * (1 - f) + high[:, :, j] * f
     b = low[:, :, j + 1] * (1 - f) + high[:, :, j + 1] * f
     out = (a * (1 - g) + b * g) * np.float32(grid.scale)
@@ -151,13 +153,13 @@ def _predicted(model: TargetModel, e: LayerEvidence, roll: float, flip: float, g
     first = np.roll(out, -whole, axis=0)
     if part < 1e-3:
         return first
-    return np.asarray((1 - part) * first + part * np.roll(out, -whole - 1, axis=0))
+    return np.asarray((1 - part) * first + part * np.roll(out, -whole - 1, axis=0), dtype=np.float32)
 
 
-def _positions(axis: Array, x: Array) -> tuple[object, Array32, object]:
+def _positions(axis: Array, x: Array) -> tuple[Index, Array32, Mask]:
     t = (x - axis[0]) / (axis[1] - axis[0])
     inside = (t >= 0) & (t <= len(axis) - 1)
-    i = np.clip(np.floor(t).astype(int), 0, len(axis) - 2)
+    i = np.clip(np.floor(t).astype(np.int64), 0, len(axis) - 2)
     return i, np.clip(t - i, 0, 1).astype(np.float32), inside
 
 
@@ -190,5 +192,5 @@ def _image_loss(
     return total / np.float32(count) if count else total
 
 
-def _nearest(axis: Array, x: Array) -> object:
-    return np.clip(np.rint((x - axis[0]) / (axis[1] - axis[0])).astype(int), 0, len(axis) - 1)
+def _nearest(axis: Array, x: Array) -> Index:
+    return np.asarray(np.clip(np.rint((x - axis[0]) / (axis[1] - axis[0])).astype(np.int64), 0, len(axis) - 1))
