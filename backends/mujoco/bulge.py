@@ -50,12 +50,16 @@ def bulge_m(mesh: Mesh, hulls: Sequence[Array], samples: int = 20_000) -> Array:
     """
     shells = [trimesh.convex.convex_hull(h) for h in hulls]
     area = np.array([s.area for s in shells])
-    points: list[Array] = []
-    for i, (shell, share) in enumerate(zip(shells, area / area.sum(), strict=True)):
-        on_shell, _ = trimesh.sample.sample_surface(shell, max(1, round(samples * share)), seed=i)
-        others = [h for j, h in enumerate(hulls) if j != i]
-        points.append(on_shell[inside_m(on_shell, others) < 1e-6] if others else on_shell)
-    found = np.concatenate(points)
+    counts = np.maximum(1, np.rint(samples * area / area.sum())).astype(int)
+    drawn = [
+        trimesh.sample.sample_surface(s, n, seed=i)[0] for i, (s, n) in enumerate(zip(shells, counts, strict=True))
+    ]
+    points, owner = np.concatenate(drawn), np.repeat(np.arange(len(hulls)), counts)
+    hidden = np.zeros(len(points), dtype=bool)
+    for i, hull in enumerate(hulls):
+        others = (owner != i) & ~hidden
+        hidden[others] = inside_m(points[others], [hull]) >= 1e-6
+    found = points[~hidden]
     distance = surface_distance_m(found, mesh)
     inside = mesh.as_trimesh().contains(found)
     # neighbours that abut instead of overlapping leave their common face visible deep inside the solid: not skin

@@ -60,7 +60,7 @@ def _hull(points: Array) -> ConvexHull:
 
 def _first_simplex(vertices: Array) -> list[int]:
     """Indices of four vertices far apart that span a volume."""
-    first = int(np.argmin(vertices[:, 0]))
+    first = int(np.argmax(np.linalg.norm(vertices - vertices.mean(axis=0), axis=1)))
     from_first = vertices - vertices[first]
     second = int(np.argmax(np.linalg.norm(from_first, axis=1)))
     axis = from_first[second] / np.linalg.norm(from_first[second])

@@ -9,8 +9,8 @@ object, so the result is looked up by what the mesh IS (`Mesh.digest`) and by th
     3. computed in a process of its own, then written to 2
 
 A file that is damaged, or made with other parameters, is as good as absent. Results are read back from the bytes that
-are stored, so that a first run and every later one see the same floats. docs/decisions/0003 has the measurements
-behind the parameters.
+are stored, so that a first run and every later one see the same floats. The measurements behind the parameters are in
+docs/decisions/0004-convex-decomposition.md.
 
 Redo: `python -m backends.mujoco.decompose FOLDER [--out DIR]`.
 """

@@ -23,7 +23,7 @@ Shift and aperture. Let q_L, q_R be the simulated distances of the two pad surfa
 contact is soft too, but by the solver's constants and not by the gel's: it sinks into the hull by some amount contained
 in h. A real pad with the same force stands where its gel carries it, which is s further along z_pad: towards the
 object if s > 0 (the gel is softer than the contact, or the hull bulges out of the true surface), away if s < 0. z_pad
-points to the mid-plane for both pads, so the aperture between the UNDEFORMED gel surfaces that a gripper would report is
+points to the mid-plane for both pads, so the aperture a gripper would report, UNDEFORMED gel to undeformed gel, is
 
     aperture = (q_L - s_L) + (q_R - s_R) = q_L + q_R - s_L - s_R
 
