@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glotouch_bt.motion import Arc, Motion, MoveResult
+from glotouch_bt.motion import Motion, MoveResult
 from glotouch_bt.robot import Array, MotionRefused, Pose
 from glotouch_bt.touch import Baseline, Contact, ContactGuard, GuardParams, Onset, contact_point, fit_baseline
 from skills.base import Context
@@ -16,6 +16,9 @@ BASELINE_S = 0.12
 SETTLE_S = 0.08
 GENTLE_ACCELERATION_M_S2, GENTLE_JERK_M_S3 = 0.3, 5.0
 """Limits while a guard listens: the hand's own inertia stays below 0.06 N at the tip (feasibility study)."""
+
+INERTIA_MARGIN = 1.5
+"""Thresholds along the probe exceed the hand's largest inertial force by this factor."""
 
 
 @dataclass(frozen=True)
@@ -55,14 +58,17 @@ class Prober:
         blocks = yield from self._context.arm.hold(BASELINE_S)
         return fit_baseline(np.concatenate([b.wrench_S for b in blocks]))
 
-    def move(self, tip_K_m: Array, speed_m_s: float) -> Motion[Probed]:
-        """Straight guarded move of the ball to `tip_K_m` (3,); stops at the first contact that opposes the motion."""
+    def move(self, tip_K_m: Array, speed_m_s: float, *, any_direction: bool = False) -> Motion[Probed]:
+        """Straight guarded move of the ball to `tip_K_m` (3,).
+
+        Stops at the first contact that opposes the motion, or, with `any_direction`, at any (a graze too).
+        """
         step = np.asarray(tip_K_m, dtype=np.float64) - self.tip_K_m
         length = float(np.linalg.norm(step))
         if length < 1e-4:
             return Probed(None, self.tip_K_m[None, :])
         step_B = self._world.container.pose_B_K.rotation @ step
-        guard = yield from self._listen(step_B / length)
+        guard = yield from self._listen(None if any_direction else step_B / length)
         result = yield from self._context.arm.shift(
             step_B,
             speed_m_s,
@@ -71,28 +77,6 @@ class Prober:
             guard=guard,
         )
         return self._outcome(result, step / length)
-
-    def orbit(self, centre_K_m: Array, angle_rad: float, speed_m_s: float) -> Motion[Probed]:
-        """Guarded arc of the ball about the vertical through `centre_K_m` (2,); counter-clockwise from above if > 0.
-
-        The hand keeps its yaw, so the tip's arc is the hand's arc about a centre shifted by the tip's offset.
-        """
-        tip = self.tip_K_m
-        centre_B = self._world.container.pose_B_K.apply(np.array([*centre_K_m, tip[2]]))
-        offset_B = self._world.container.pose_B_K.apply(tip) - self._context.arm.pose_B_P.position_m
-        up_B = self._world.container.pose_B_K.rotation[:, 2]
-        guard = yield from self._listen(None)
-        arc = Arc(self._context.arm.pose_B_P, centre_B - offset_B, up_B, angle_rad)
-        result = yield from self._context.arm.follow(
-            arc,
-            speed_m_s,
-            acceleration_m_s2=GENTLE_ACCELERATION_M_S2,
-            jerk_m_s3=GENTLE_JERK_M_S3,
-            guard=guard,
-        )
-        radial = tip[:2] - centre_K_m
-        tangent = np.sign(angle_rad) * np.array([-radial[1], radial[0], 0.0]) / max(float(np.linalg.norm(radial)), 1e-9)
-        return self._outcome(result, tangent)
 
     def retreat(self, direction_K: Array, distance_m: float, speed_m_s: float) -> Motion[None]:
         """Unguarded move away from a contact along `direction_K` (3,), then a short rest for the wrench to settle."""
@@ -109,8 +93,24 @@ class Prober:
 
     def _listen(self, approach_B: Array | None) -> Motion[ContactGuard]:
         baseline = yield from self.baseline()
-        return ContactGuard(
-            baseline, approach_B, self._tool.tip_P_m, self._context.arm.description.gripper.pose_E_P, self._guard
+        gripper = self._context.arm.description.gripper
+        return ContactGuard(baseline, approach_B, self._tool.tip_P_m, gripper.pose_E_P, self._params(approach_B))
+
+    def _params(self, approach_B: Array | None) -> GuardParams:
+        """Thresholds for a direction: along the probe only the force tells, and it feels the whole hand's inertia.
+
+        Across the probe the torque at the tip's lever tells a touch from inertia, so the thresholds stay as they are.
+        """
+        if approach_B is None:
+            return self._guard
+        gripper = self._context.arm.description.gripper
+        mass_kg = gripper.mass_kg + 2 * gripper.finger_mass_kg + self._world.probe.mass_kg
+        along = abs(float(approach_B @ self._context.arm.pose_B_P.rotation[:, 2]))
+        inertial_N = INERTIA_MARGIN * mass_kg * GENTLE_ACCELERATION_M_S2 * along
+        return replace(
+            self._guard,
+            directional_N=self._guard.directional_N + inertial_N,
+            total_N=self._guard.total_N + inertial_N,
         )
 
     def _outcome(self, result: MoveResult, approach_K: Array) -> Probed:

@@ -10,6 +10,8 @@ from glotouch_bt.touch import Candidate, Layer, TouchSequence, TouchSet, make_la
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.hand import hand_pose_B, require_clear
 
+LEAST_SIDE_GAP_M = 0.003
+"""The jaws go down only where they leave this much on each side of the traced extent."""
 HAND_CLEARANCE_M = 0.004
 """Fingertips stay this far above the floor, and the hand's body this far above a candidate's top."""
 
@@ -95,23 +97,24 @@ class Squeeze(Skill):
 
     def _plan(self, candidate: Candidate) -> list[list[tuple[Array, float, float]]]:
         """For each sequence its alternatives in order of preference: (position (2,) in K, yaw in K, opening)."""
-        p, contour = self.params, candidate.contour
-        stroke = self.context.arm.description.gripper.stroke_m
-        opening = min(contour.size_m[1] + 2 * p.side_gap_m, stroke)
+        contour, gripper = candidate.contour, self.context.arm.description.gripper
         if contour.kind == "round":
-            turns = np.deg2rad([0.0, 60.0, -60.0])
             slack = np.deg2rad([0.0, 12.0, -12.0, 24.0, -24.0])
-            return [[(contour.centre_K_m, float(t + s), opening) for s in slack] for t in turns]
-        along = np.array([np.cos(contour.yaw_rad), np.sin(contour.yaw_rad)])
-        reach = 0.5 * contour.size_m[0] - 0.5 * self.context.arm.description.gripper.pad_window_m[0]
-        tracks = np.clip(0.25 * contour.size_m[0], 0.0, max(reach, 0.0)) * np.array([-1.0, 0.0, 1.0])
-        return [
-            [
-                (contour.centre_K_m + t * along, contour.yaw_rad + turn, opening)
-                for turn in np.deg2rad([0.0, 180.0, 6.0, -6.0])
-            ]
-            for t in tracks
-        ]
+            return [[self._over(candidate, 0.0, float(t + s)) for s in slack] for t in np.deg2rad([0.0, 60.0, -60.0])]
+        reach = max(0.5 * contour.size_m[0] - 0.5 * gripper.pad_window_m[0], 0.0)
+        track = min(0.25 * contour.size_m[0], reach)
+        slack = np.deg2rad([0.0, 6.0, -6.0])
+        return [[self._over(candidate, t, contour.yaw_rad + float(s)) for s in slack] for t in (-track, 0.0, track)]
+
+    def _over(self, candidate: Candidate, along_m: float, yaw: float) -> tuple[Array, float, float]:
+        """Open hand over the candidate at `along_m` from its centre along `yaw`, midway of its extent across."""
+        x, y = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
+        low, high = candidate.span_m(yaw + 0.5 * np.pi)
+        position = (candidate.contour.centre_K_m @ x + along_m) * x + 0.5 * (low + high) * y
+        stroke = self.context.arm.description.gripper.stroke_m
+        if high - low > stroke - 2 * LEAST_SIDE_GAP_M:
+            return position, yaw, float("nan")
+        return position, yaw, min(high - low + 2 * self.params.side_gap_m, stroke)
 
     def _heights(self, candidate: Candidate) -> Array:
         """Pad-centre heights above the floor, lowest first."""
@@ -127,6 +130,8 @@ class Squeeze(Skill):
         """Open over the candidate, close at each height from below, rise."""
         p, arm = self.params, self.context.arm
         heights = self._heights(candidate)
+        if not np.isfinite(opening):
+            raise MotionRefused("squeeze", f"the object is wider than the jaws open at yaw {np.rad2deg(yaw_K):.0f} deg")
         above_z = candidate.height_m + arm.description.gripper.fingertip_below_P_m + 0.02
         yaw_K = (
             hand_pose_B(arm, self.context.world.container, np.zeros(3), yaw_K).yaw_rad

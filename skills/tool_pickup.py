@@ -15,7 +15,6 @@ from skills.held_tool import HeldTool
 from skills.probing import Prober
 from skills.requests import finish
 
-
 FLOOR_SEARCH_M = 0.005
 """The floor is looked for this far below where the registration puts it."""
 

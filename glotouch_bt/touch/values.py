@@ -98,6 +98,15 @@ class Candidate:
     quality: float
     contacts: tuple[Contact, ...]
 
+    def span_m(self, yaw_rad: float) -> tuple[float, float]:
+        """(least, greatest) coordinate of the contact points along the direction `yaw_rad` in K.
+
+        The way round leaves no wide gap, so this is the object's true extent in any direction, whatever outline was
+        fitted.
+        """
+        along = np.array([c.point_K_m for c in self.contacts]) @ np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
+        return float(along.min()), float(along.max())
+
 
 @dataclass(frozen=True)
 class Layer:
