@@ -11,6 +11,9 @@ from scipy.signal import butter, sosfilt
 
 from glotouch_bt.robot import Array, ParamError
 
+LONGEST_OPERATOR = 64
+"""Blocks up to this long are filtered by one matrix product."""
+
 
 class LowPass:
     """Streaming second-order Butterworth low-pass of several channels; starts at rest at zero.
@@ -35,6 +38,10 @@ class LowPass:
     def __call__(self, block: Array) -> Array:
         """Filter the next block (n, channels); the state carries over to the next call."""
         n = len(block)
+        if n > LONGEST_OPERATOR:
+            out, state = sosfilt(self._sos, block, axis=0, zi=self._state[None])
+            self._state = np.asarray(state[0])
+            return np.asarray(out)
         operator = self._operators.get(n)
         if operator is None:
             operator = self._operators[n] = self._operator(n)
