@@ -145,7 +145,8 @@ def fills_its_rectangle(points):
 def test_too_little_extent_never_gives_an_absurd_outline():
     """Contacts in a row, on two sides only, or nearly on one spot."""
     row = np.c_[np.linspace(-0.02, 0.02, 5), np.zeros(5)]
-    two = np.vstack([[*row, 0, 0.025], row - [0, 0.025]])
+    off = np.array([0.0, 0.025])
+    two = np.vstack([row + off, row - off])
     spot = 1e-4 * ring(4, 1.0)
     for tips in (row, two, spot, row[:3]):
         for c in (fit_contour(tips, R), fit_kind(tips, R, "box")):

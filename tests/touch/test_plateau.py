@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -20,7 +22,7 @@ def closure(*, opening=0.04, noise=0.0, force=10.0, drift=0.0, arm=0.0, seconds=
                 maps[0][5, 6] = np.nan
             frame = TactileFrame(float(stamps[-1]) - 0.03, *maps)
         aperture = opening + drift * i * 0.01 + rng.normal(0, noise)
-        position = [*np.tile([0.6, 0.0, 0.05], (10, 1)), arm * i, 0, 0]
+        position = np.tile([0.6, 0.0, 0.05], (10, 1)) + np.array([arm * i, 0, 0])
         gripper = GripperState(float(stamps[-1]), aperture, force, False)
         quat = np.tile([0.0, 1, 0, 0], (10, 1))
         zeros = np.zeros((10, 7))
@@ -62,9 +64,7 @@ def test_what_is_no_plateau(fault, why):
 def test_layer_holds_the_median_of_frames_taken_on_the_plateau():
     blocks = closure()
     early = TactileFrame(0.0, np.full(SHAPE, 9e-3), np.full(SHAPE, 9e-3))  # while the jaws moved
-    blocks[-1] = Observation(
-        **{f: getattr(blocks[-1], f) for f in Observation.__slots__ if f != "tactile"}, tactile=early
-    )
+    blocks[-1] = replace(blocks[-1], tactile=early)
     got = layer(blocks)
     assert got.stable
     np.testing.assert_allclose(got.right_m, 4e-4, atol=6e-5)
