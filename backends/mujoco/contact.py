@@ -1,7 +1,7 @@
 """Who touches whom, and how stiff and rough contacts are.
 
-Friction creep is the trap of rigid-body contact: with a pyramidal cone or a small impratio, objects turn and slide under
-loads that friction should hold. The options here (elliptic cone, large impratio, noslip iterations) hold them still.
+Friction creep is the trap of rigid-body contact: with a pyramidal cone or a small impratio, objects turn and slide
+under loads that friction should hold. The options here (elliptic cone, large impratio, noslip iterations) hold them still.
 """
 
 from __future__ import annotations

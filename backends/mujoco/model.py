@@ -45,7 +45,7 @@ class Handles:
     Attributes:
         arm_qpos, arm_dof, arm_ctrl: Slices of the arm in qpos, qvel and ctrl.
         jaw_ctrl: Slice of the two jaws in ctrl; jaw_qpos in qpos; jaw_act their actuator rows.
-        hand_bodies: Slice of the bodies hand, finger_left, finger_right.
+        hand_bodies: Slice of the bodies hand, finger_left, finger_right; held_bodies: the same and the probe.
         probe_body, tip_site, pads_site, sensor_site: Ids.
         object_bodies: (n,) body of each object.
         container_body, holder_body: Ids.
@@ -59,6 +59,7 @@ class Handles:
     jaw_qpos: slice
     jaw_ctrl: slice
     hand_bodies: slice
+    held_bodies: slice
     probe_body: int
     tip_site: int
     pads_site: int
@@ -106,7 +107,7 @@ def _handles(model: mujoco.MjModel, description: RobotDescription, objects: int)
     jaw = model.joint("jaw_left")
     dof = description.dof
     hand = model.body("hand").id
-    assert [model.body(hand + i).name for i in range(3)] == ["hand", "finger_left", "finger_right"]
+    assert [model.body(hand + i).name for i in range(4)] == ["hand", "finger_left", "finger_right", "probe"]
     assert last.dofadr[0] - first.dofadr[0] == dof - 1
     actuator, grip = model.actuator(description.joints[0].name).id, model.actuator("jaw_left").id
     return Handles(
@@ -116,6 +117,7 @@ def _handles(model: mujoco.MjModel, description: RobotDescription, objects: int)
         jaw_qpos=slice(int(jaw.qposadr[0]), int(jaw.qposadr[0]) + 2),
         jaw_ctrl=slice(grip, grip + 2),
         hand_bodies=slice(hand, hand + 3),
+        held_bodies=slice(hand, hand + 4),
         probe_body=model.body("probe").id,
         tip_site=model.site("tip").id,
         pads_site=model.site("P").id,
@@ -138,8 +140,8 @@ def build_spec(description: RobotDescription, world: World, truth: Truth) -> muj
     spec.worldbody.add_light(pos=(0.3, -0.8, 1.6), dir=(0.2, 0.6, -1.0))
     hand = add_arm(spec, description)
     add_gripper(spec, hand, description.gripper, truth.pad_friction)
-    add_container(spec, world.container, truth.pose_B_K)
     add_probe(spec, world.probe, world.holder, truth.pose_handle_shaft, truth.pad_friction)
+    add_container(spec, world.container, truth.pose_B_K)
     for index, item in enumerate(truth.objects):
         add_object(spec, index, item, truth.pose_B_K)
     _add_sensors(spec, description)

@@ -9,8 +9,7 @@ from backends.mujoco.contact import ENVIRONMENT, GROUP_VISUAL, OBJECT, set_categ
 from backends.mujoco.decompose import load_hulls
 from backends.mujoco.feet import FOOT_PROTRUSION_M, FOOT_RADIUS_M
 from backends.mujoco.truth import ObjectTruth
-from glotouch_bt.robot import Array, Pose
-from glotouch_bt.robot.meshes import Mesh
+from glotouch_bt.robot import Pose
 
 COLOURS = (
     (0.85, 0.33, 0.31, 1.0),

@@ -1,4 +1,4 @@
-"""Random layouts: upright objects in the container, each at a uniform position and yaw, none too near another or a wall.
+"""Random layouts: upright objects in the container, at a uniform position and yaw, none too near another or a wall.
 
 Rejection sampling, one object after another (largest first), restarted when it has painted itself into a corner.
 """
@@ -51,8 +51,8 @@ def _points_to_edges(points: Array, polygon: Array) -> float:
 def gap(first: Array, second: Array) -> float:
     """Distance between two convex polygons (n, 2), anticlockwise; 0 if they overlap.
 
-    Two disjoint convex polygons are separated along the normal of an edge of one of them, and the nearest points include
-    a vertex of one (Ericson, Real-Time Collision Detection, 5.4 and 9.1).
+    Two disjoint convex polygons are separated along the normal of an edge of one of them, and the nearest points
+    include a vertex of one (Ericson, Real-Time Collision Detection, 5.4 and 9.1).
     """
     separated = False
     for a, b in ((first, second), (second, first)):

@@ -28,7 +28,6 @@ from glotouch_bt.robot import (
     Request,
     Robot,
     RobotDescription,
-    SetPayload,
     Tare,
     Ticket,
     World,
@@ -57,7 +56,7 @@ class MujocoRobot(Robot):
         self.model, self.data, self.handles = model, data, handles
         s = handles.sensors
         self._s = s
-        aperture = float(data.qpos[handles.jaw_qpos].sum())
+        self._aperture = aperture = float(data.qpos[handles.jaw_qpos].sum())
         self._servo = Servo(model, data, handles, description, self.period_s, limits.stop_acceleration_m_s2)
         self._servo.reset(np.array(data.qpos[handles.arm_qpos]))
         self._jaws = Jaws(model, handles, description.gripper, aperture)
@@ -79,7 +78,16 @@ class MujocoRobot(Robot):
         self._arm_ctrl, self._jaw_ctrl = self._ctrl[:, handles.arm_ctrl], self._ctrl[:, handles.jaw_ctrl]
         self._samples = np.zeros((STEPS, model.nsensordata))
         self._external = np.zeros((STEPS, 4, 3))
-        self._ahead_s = np.arange(1, STEPS + 1) * STEP_S
+        # Views of one step each, made once: the loop round mj_step only copies.
+        rows = list(zip(self._ctrl, self._samples, self._external, strict=True))
+        wrenches = self._samples[:, s.force.start : s.torque.stop]
+        self._chunks = [(rows[i : i + CHUNK], wrenches[i : i + CHUNK]) for i in range(0, STEPS, CHUNK)]
+        self._ctrl_now, self._sensed = data.ctrl, data.sensordata
+        self._external_now = data.cfrc_ext[handles.held_bodies, 3:]
+        self._counted = np.array([1.0, 1.0, 1.0, 0.0])
+        self._warnings = data.warning.number
+        self._probe_now = data.xpos[handles.probe_body]
+        self._ago_s = (np.arange(1, STEPS + 1, dtype=np.float64) - STEPS) * STEP_S
         self._jacobian = np.zeros((3, model.nv))
         self._cycles = 0
         self._tare: PendingTare | None = None
@@ -122,10 +130,10 @@ class MujocoRobot(Robot):
         if self._payload_load is not None:
             self._servo.load(self._carry())
         self._servo.plan(target, self._arm_ctrl)
-        self._jaws.plan(float(self._samples[-1, self._s.jaws].sum()), self.period_s, self._jaw_ctrl)
+        self._jaws.plan(self._aperture, self.period_s, self._jaw_ctrl)
         try:
             self._advance()
-            check_sane(self.data, self._samples)
+            check_sane(self._warnings, self._samples, self.data.time)
         except mujoco.FatalError as e:
             self._failed = BackendError(f"MuJoCo failed at t={self.data.time:.3f} s: {e}")
             raise self._failed from e
@@ -168,23 +176,17 @@ class MujocoRobot(Robot):
 
     def _advance(self) -> None:
         """Ten steps, looking at the wrench after each chunk."""
-        model, data, ctrl, samples, external = self.model, self.data, self._ctrl, self._samples, self._external
-        step, hand, probe = mujoco.mj_step, self.handles.hand_bodies, self.handles.probe_body
-        ctrl_now, sensed = data.ctrl, data.sensordata
-        on_hand, on_probe = data.cfrc_ext[hand, 3:], data.cfrc_ext[probe, 3:]
-        hand_rows, probe_rows = external[:, :3], external[:, 3]
-        first, last = self._s.force.start, self._s.torque.stop
-        for begin in range(0, STEPS, CHUNK):
-            for i in range(begin, begin + CHUNK):
-                ctrl_now[:] = ctrl[i]
+        model, data, step = self.model, self.data, mujoco.mj_step
+        ctrl_now, sensed, external_now = self._ctrl_now, self._sensed, self._external_now
+        for rows, wrenches in self._chunks:
+            for ctrl, sample, external in rows:
+                ctrl_now[:] = ctrl
                 step(model, data)
-                samples[i] = sensed
-                hand_rows[i] = on_hand
-                probe_rows[i] = on_probe
-            if self._guard.tripped is None:
-                contact = -samples[begin : begin + CHUNK, first:last] - self._expected
-                if self._guard.look(contact, data.time):
-                    self._stop_here()
+                sample[:] = sensed
+                external[:] = external_now
+            # The sensor gives the force of hand on arm; the hand feels its opposite.
+            if self._guard.tripped is None and self._guard.look(-wrenches - self._expected, data.time):
+                self._stop_here()
 
     def _stop_here(self) -> None:
         """Freeze the arm at its present posture, from the next step on; the jaws keep their grip."""
@@ -203,25 +205,24 @@ class MujocoRobot(Robot):
     def _observe(self, command: Command) -> Observation:
         """The observation of the samples just taken."""
         s, rows = self._s, self._samples.copy()
-        start_s = self._cycles * self.period_s - self.period_s
-        now_s = start_s + self.period_s
-        quat = rows[:, s.quat]
-        true = rows[:, s.force.start : s.torque.stop]
-        np.negative(true, out=true)
-        wrench = self._wrist.report(true, quat[-1])
+        now_s = self._cycles * self.period_s
+        wrench, quat = rows[:, s.force.start : s.torque.stop], rows[:, s.quat]
+        np.negative(wrench, out=wrench)
+        wrench = self._wrist.report(wrench, quat[-1])
         self._expected = self._wrist.expected(quat[-1])
         self._note_peak()
-        self._tactile.sample(now_s, command.tactile)
-        last = rows[-1]
-        aperture = float(last[s.jaws].sum())
+        last = rows[-1].tolist()
+        jaws, speeds, forces = last[s.jaws], last[s.jaw_speeds], last[s.jaw_forces]
+        self._aperture = jaws[0] + jaws[1]
+        self._tactile.sample(now_s, command.tactile, jaws, forces)
         gripper = self._reports.report(
             now_s,
-            aperture - self._tactile.shift_m,
-            float(last[s.jaw_speeds].sum()),
-            max(0.0, -0.5 * float(last[s.jaw_forces].sum())),
+            self._aperture - self._tactile.shift_m,
+            speeds[0] + speeds[1],
+            max(0.0, -0.5 * (forces[0] + forces[1])),
         )
         return Observation(
-            stamp_s=start_s + self._ahead_s,
+            stamp_s=now_s + self._ago_s,
             q=rows[:, s.q],
             dq=rows[:, s.dq],
             position_B_P=rows[:, s.position],
@@ -233,11 +234,12 @@ class MujocoRobot(Robot):
 
     def _note_peak(self) -> None:
         """Largest true contact force so far, on the hand and on the probe while it is in the hand."""
-        force = self._external[:, :3].sum(axis=1)
-        away = self.data.xpos[self.handles.probe_body] - self._samples[-1, self._s.position]
-        if away @ away < HELD_DISTANCE_M**2:
-            force += self._external[:, 3]
-        self.peak_force_N = max(self.peak_force_N, float((force * force).sum(axis=1).max()) ** 0.5)
+        x, y, z = (self._probe_now - self._samples[-1, self._s.position]).tolist()
+        self._counted[3] = x * x + y * y + z * z < HELD_DISTANCE_M**2
+        force = self._counted @ self._external
+        flat = force.ravel()
+        if flat @ flat > self.peak_force_N**2:  # else not one of them can be a new peak
+            self.peak_force_N = max(self.peak_force_N, float((force * force).sum(axis=1).max()) ** 0.5)
 
     def _requests(self) -> None:
         """Advance the slow requests by one period."""

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from glotouch_bt.robot import Array, BackendError, Limits, SafetyStop
 
@@ -15,10 +18,14 @@ class Guard:
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
+        self._scale = np.array([1.0 / limits.hard_force_N] * 3 + [1.0 / limits.hard_torque_Nm] * 3)
         self.tripped: SafetyStop | None = None
 
     def look(self, contact: Array, stamp_s: float) -> bool:
         """Check a chunk (n, 6) of contact wrenches ending at `stamp_s`; True if a limit tripped now."""
+        scaled = (contact * self._scale).ravel()
+        if scaled @ scaled < 1.0:  # not one sample can be beyond a limit
+            return False
         squared = contact * contact
         force2, torque2 = float(squared[:, :3].sum(axis=1).min()), float(squared[:, 3:].sum(axis=1).min())
         limits = self._limits
@@ -37,17 +44,21 @@ class Guard:
         return SafetyStop(t.quantity, t.value, t.limit, t.stamp_s)
 
 
-def check_sane(data: mujoco.MjData, samples: Array) -> None:
+def check_sane(warnings: npt.NDArray[np.int32], samples: Array, time_s: float) -> None:
     """Refuse a simulation that has blown up or run out of room.
+
+    Args:
+        warnings: `data.warning.number`, how often each of MuJoCo's warnings was raised.
+        samples: Any shape; what was sensed.
+        time_s: For the message.
 
     Raises:
         BackendError: MuJoCo raised a warning, or a sample is not finite.
     """
-    warnings = data.warning.number
     if warnings.any():
         names = [
             name for name, w in mujoco.mjtWarning.__members__.items() if int(w) < len(warnings) and warnings[int(w)]
         ]
-        raise BackendError(f"the simulation became unstable at t={data.time:.3f} s ({', '.join(names)})")
-    if not np.isfinite(samples.sum()):
-        raise BackendError(f"the simulation gave readings that are not finite at t={data.time:.3f} s")
+        raise BackendError(f"the simulation became unstable at t={time_s:.3f} s ({', '.join(names)})")
+    if not math.isfinite(samples.sum()):
+        raise BackendError(f"the simulation gave readings that are not finite at t={time_s:.3f} s")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import mujoco
 import numpy as np
 
@@ -12,13 +10,14 @@ from backends.mujoco.model import STEPS, Handles
 from glotouch_bt.robot import Array, JointSetpoint, ParamError, RobotDescription
 
 BRAKE_REACH_M = 0.8  # the hand's distance from the axes, to turn a Cartesian deceleration into a joint one
+GREATEST_RAD_S2 = 1e3  # a feed-forward acceleration beyond this is a mistake
 VELOCITY_SLACK = 1.02  # of the implied velocity between setpoints, for rounding
 
 
 def hermite(period_s: float, steps: int) -> tuple[Array, Array]:
     """Position and velocity bases (steps, 4) on (q0, dq0, q1, dq1), at the START of each of the period's steps.
 
-    Standard cubic Hermite basis; the command of a step acts from its start, so the period's end is the next one's start.
+    Standard cubic Hermite basis; a step's command acts from its start, so the period's end is the next one's start.
     """
     s, t = np.arange(steps) / steps, period_s
     position = np.stack(
@@ -48,23 +47,28 @@ class Servo:
     ) -> None:
         self._model, self._data, self._dof = model, data, handles.arm_dof
         joints = description.joints
-        self._lower = np.array([j.lower_rad for j in joints]) - 1e-9
-        self._upper = np.array([j.upper_rad for j in joints]) + 1e-9
-        self._fastest = np.array([j.velocity_rad_s for j in joints])
+        n = description.dof
+        lower, upper = np.array([j.lower_rad for j in joints]), np.array([j.upper_rad for j in joints])
+        fastest = np.array([j.velocity_rad_s for j in joints])
+        # Rows: q, dq, ddq, implied velocity. |value - middle| <= half; false for NaN.
+        self._middle = np.stack([0.5 * (lower + upper), np.zeros(n), np.zeros(n), np.zeros(n)])
+        self._half = np.stack(
+            [0.5 * (upper - lower) + 1e-9, fastest, np.full(n, GREATEST_RAD_S2), VELOCITY_SLACK * fastest]
+        )
         self._names = [j.name for j in joints]
-        self._kp = np.array(STIFFNESS_NM_RAD)
-        self._per_kp = 1.0 / self._kp
-        self._lead = DAMPING_PER_STIFFNESS_S + JOINT_DAMPING / self._kp
+        kp = np.array(STIFFNESS_NM_RAD)
+        self._per_kp = 1.0 / kp
+        self._lead = DAMPING_PER_STIFFNESS_S + JOINT_DAMPING / kp
         self._period = period_s
         self._brake_step = stop_acceleration_m_s2 / BRAKE_REACH_M * period_s
-        self._position_basis, self._velocity_basis = hermite(period_s, STEPS)
-        self._along = (np.arange(STEPS) / STEPS)[:, None]
-        n = description.dof
-        self._knots = np.zeros((4, n))  # q0, dq0, q1, dq1
+        along = (np.arange(STEPS) / STEPS)[:, None]
+        # One product gives all commands: position basis on the knots, velocity basis on the led knots, ramped torques.
+        self._basis = np.hstack([*hermite(period_s, STEPS), 1.0 - along, along, np.ones((STEPS, 1))])
+        self._terms = np.zeros((11, n))
+        self._knots = self._terms[:4]  # q0, dq0, q1, dq1
+        self._asked = np.zeros((4, n))
         self._ddq = np.zeros(n)
         self._vector, self._product = np.zeros(model.nv), np.zeros(model.nv)
-        self._torque = np.zeros(n)
-        self._still = False
 
     @property
     def q(self) -> Array:
@@ -84,7 +88,7 @@ class Servo:
 
     def load(self, torque_Nm: Array) -> None:
         """Constant feed-forward torque (dof,) that carries a payload's weight."""
-        self._torque = torque_Nm * self._per_kp
+        self._terms[10] = torque_Nm * self._per_kp
 
     def check(self, setpoint: JointSetpoint) -> tuple[Array, Array, Array]:
         """The setpoint as arrays, if it is sane.
@@ -92,27 +96,21 @@ class Servo:
         Raises:
             ParamError: Wrong shape, not finite, or beyond a joint's position or velocity limit.
         """
-        q, dq, ddq = (np.asarray(v, dtype=np.float64) for v in (setpoint.q, setpoint.dq, setpoint.ddq))
-        shape = self.q.shape
-        for name, value in (("q", q), ("dq", dq), ("ddq", ddq)):
-            if value.shape != shape:
-                raise ParamError(f"setpoint.{name}", value.shape, f"an array of shape {shape}")
-        if not math.isfinite(q.sum() + dq.sum() + ddq.sum()):
-            raise ParamError("setpoint", (q.tolist(), dq.tolist(), ddq.tolist()), "finite")
-        if (q < self._lower).any() or (q > self._upper).any():
-            self._refuse("q", q, self._lower, self._upper, "rad")
-        if (np.abs(dq) > self._fastest).any():
-            self._refuse("dq", dq, -self._fastest, self._fastest, "rad/s")
-        implied = (q - self.q) / self._period
-        if (np.abs(implied) > VELOCITY_SLACK * self._fastest).any():
-            self._refuse("q step / period", implied, -self._fastest, self._fastest, "rad/s")
-        return q, dq, ddq
-
-    def _refuse(self, what: str, value: Array, lower: Array, upper: Array, unit: str) -> None:
-        i = int(np.argmax(np.maximum(lower - value, value - upper)))
-        raise ParamError(
-            f"setpoint.{what}[{self._names[i]}]", float(value[i]), f"within {lower[i]:.4f} .. {upper[i]:.4f} {unit}"
-        )
+        asked = self._asked
+        try:
+            asked[0], asked[1], asked[2] = setpoint.q, setpoint.dq, setpoint.ddq
+        except (ValueError, TypeError) as e:
+            raise ParamError("setpoint", setpoint, f"arrays of shape {self.q.shape}") from e
+        np.subtract(asked[0], self.q, out=asked[3])
+        asked[3] /= self._period
+        good = np.abs(asked - self._middle) <= self._half
+        if not good.all():
+            row, i = (int(v[0]) for v in np.nonzero(~good))
+            middle, half = self._middle[row, i], self._half[row, i]
+            what, unit = (("q", "rad"), ("dq", "rad/s"), ("ddq", "rad/s2"), ("(q - last q) / period", "rad/s"))[row]
+            rule = f"finite and within {middle - half:.4f} .. {middle + half:.4f} {unit}"
+            raise ParamError(f"setpoint.{what}[{self._names[i]}]", float(asked[row, i]), rule)
+        return asked[0], asked[1], asked[2]
 
     def _brake(self) -> tuple[Array, Array, Array]:
         """The next setpoint of a straight, even deceleration to rest (in joint space)."""
@@ -125,24 +123,24 @@ class Servo:
 
     def plan(self, target: tuple[Array, Array, Array] | None, ctrl: Array) -> None:
         """Fill ctrl (steps, dof) for the coming period: towards the target, or braking to rest if None."""
-        k = self._knots
-        if target is None and not k[3].any() and not k[1].any() and not self._ddq.any():
-            ctrl[:] = k[2] + self._torque
-            k[0] = k[2]
-            return
+        k, terms = self._knots, self._terms
+        if target is None and not k[3].any():
+            if not self._ddq.any():
+                k[0], k[1] = k[2], 0.0
+                ctrl[:] = k[2] + terms[10]
+                return
+            target = (k[2], k[3], np.zeros_like(k[2]))
         q, dq, ddq = self._brake() if target is None else target
-        k0, k1 = k[2].copy(), k[3].copy()
-        k[0], k[1], k[2], k[3] = k0, k1, q, dq
-        first, last = self._inertia(self._ddq), self._inertia(ddq)
-        np.matmul(self._velocity_basis, k, out=ctrl)
-        ctrl *= self._lead
-        ctrl += self._position_basis @ k
-        ctrl += first + self._along * (last - first)
-        ctrl += self._torque
+        k[0], k[1] = k[2], k[3]
+        k[2], k[3] = q, dq
+        np.multiply(k, self._lead, out=terms[4:8])
+        terms[8] = self._inertia(self._ddq)
+        terms[9] = self._inertia(ddq)
+        np.matmul(self._basis, terms, out=ctrl)
         self._ddq[:] = ddq
 
     def _inertia(self, ddq: Array) -> Array:
-        """M ddq / kp, with the present inertia matrix."""
+        """M ddq / kp, with the present inertia matrix (the armature is in M)."""
         self._vector[self._dof] = ddq
         mujoco.mj_mulM(self._model, self._data, self._product, self._vector)
-        return self._product[self._dof] * self._per_kp
+        return np.asarray(self._product[self._dof] * self._per_kp)

@@ -1,6 +1,6 @@
 """Random streams by purpose: a draw for one purpose never shifts the draws for another.
 
-So the layout of a seed stays the same whatever sensor noise is switched on, and conditions can be compared seed by seed.
+So the layout of a seed stays the same whatever sensor noise is switched on: conditions compare seed by seed.
 """
 
 from __future__ import annotations

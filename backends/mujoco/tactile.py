@@ -15,11 +15,11 @@ from backends.mujoco.gel import GelSensor, PairPress
 from backends.mujoco.model import Handles
 from backends.mujoco.rays import SurfaceRays
 from backends.mujoco.streams import stream
-from glotouch_bt.robot import Array, Conditions, Gripper, Pose, TactileFrame
+from glotouch_bt.robot import Conditions, Gripper, Pose, TactileFrame
 from glotouch_bt.robot.meshes import Mesh
 
 SAME_DISTANCE_M = 1e-5  # the gel is not solved again while pads and forces stay this near the last solution
-SAME_FORCE = 0.02
+SAME_FORCE_N = 0.5
 
 
 def body_pose(data: mujoco.MjData, body: int) -> Pose:
@@ -31,31 +31,31 @@ class Pads:
     """Contacts on the two pads, read from the solver at the present step."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, handles: Handles) -> None:
-        self._model, self._data, self._geoms = model, data, handles.pad_geoms
-        self._site = handles.pads_site
+        self._data, self._geoms = data, handles.pad_geoms
+        self._axes = data.site_xmat[handles.pads_site]
         self._body_of = model.geom_bodyid
-        self._row = np.zeros(6)
 
     def touch(self) -> tuple[tuple[float, float], set[int]]:
-        """Normal force on (left, right) pad, N, and the bodies that press on them."""
-        data = self._data
-        pairs = data.contact.geom
-        forces, bodies = [0.0, 0.0], set()
-        if len(pairs) == 0:
-            return (0.0, 0.0), bodies
-        for side, pad in enumerate(self._geoms):
-            closing = data.site_xmat[self._site].reshape(3, 3)[:, 1] * (1.0 if side == 0 else -1.0)
-            for i in np.flatnonzero((pairs == pad).any(axis=1)):
-                contact = data.contact[int(i)]
-                mujoco.mj_contactForce(self._model, data, int(i), self._row)
-                if self._row[0] <= 0.0:
-                    continue
-                on_second = self._row[:3] @ contact.frame.reshape(3, 3)  # force of geom 1 on geom 2, in B
-                first, second = int(contact.geom[0]), int(contact.geom[1])
-                push = on_second if second == pad else -on_second
-                forces[side] += float(push @ closing)  # outwards: what presses the gel into its finger
-                bodies.add(int(self._body_of[first if second == pad else second]))
-        return (max(forces[0], 0.0), max(forces[1], 0.0)), bodies
+        """Normal force on (left, right) pad, N, and the bodies that press on them.
+
+        An elliptic contact's first three constraint rows are its force on the second geom, in the contact's frame.
+        """
+        contact = self._data.contact
+        pairs, address = contact.geom, contact.efc_address
+        left, right = self._geoms
+        mine = np.flatnonzero(((pairs == left) | (pairs == right)).any(axis=1) & (address >= 0)) if len(pairs) else []
+        if len(mine) == 0:
+            return (0.0, 0.0), set()
+        pairs = pairs[mine]
+        pad_second = (pairs[:, 1] == left) | (pairs[:, 1] == right)
+        rows = self._data.efc_force[address[mine][:, None] + np.arange(3)]
+        force_B = np.einsum("ni,nij->nj", rows, contact.frame[mine].reshape(-1, 3, 3))
+        along = force_B @ self._axes[1::3]  # on y_P
+        along[~pad_second] *= -1.0  # what the pad feels
+        on_left = np.where(pad_second, pairs[:, 1], pairs[:, 0]) == left
+        other = np.where(pad_second, pairs[:, 0], pairs[:, 1])[rows[:, 0] > 0.0]
+        forces = (max(float(along[on_left].sum()), 0.0), max(-float(along[~on_left].sum()), 0.0))
+        return forces, set(self._body_of[other].tolist())
 
 
 class Tactile:
@@ -78,7 +78,7 @@ class Tactile:
     ) -> None:
         self._data = data
         self._pads = Pads(model, data, handles)
-        self._jaws, self._site = handles.jaw_qpos, handles.pads_site
+        self._site = handles.pads_site
         self._gel = GelSensor(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
         self._meshes = dict(surfaces)
         self._rays: dict[int, SurfaceRays] = {}
@@ -90,24 +90,40 @@ class Tactile:
         self._dead = fixed.random(shape) < conditions.tactile_dead_fraction
         self._frames: deque[tuple[float, TactileFrame]] = deque()
         self._tick = -1
-        self._solved: tuple[tuple[int, ...], Array] | None = None
+        self._solved = (np.inf, np.inf, 0.0, 0.0)
         self._press: PairPress | None = None
         self._zero = np.zeros(gripper.pad_shape)
         self.shift_m = 0.0
 
-    def sample(self, now_s: float, wanted: bool) -> None:
-        """Called once a period, after its last step: take a frame if one is due."""
+    def sample(self, now_s: float, wanted: bool, jaws: Sequence[float], jaw_forces: Sequence[float]) -> None:
+        """Called once a period, after its last step: take a frame if one is due.
+
+        Args:
+            now_s: Robot clock.
+            wanted: A frame is asked for; if not, the gel is solved again only when jaws or their forces have changed.
+            jaws, jaw_forces: (left, right) travel m and servo force N now.
+        """
         tick = int(now_s * self._c.tactile_rate_Hz + 1e-6)
         if tick == self._tick:
             return
         self._tick = tick
+        if not wanted and self._unchanged(jaws, jaw_forces):
+            return
+        self._solved = (*jaws, *jaw_forces)
         forces, bodies = self._pads.touch()
         if bodies:
-            self._solve(forces, bodies, wanted)
+            self._solve(forces, bodies, (jaws[0], jaws[1]))
         else:
-            self._solved, self._press, self.shift_m = None, None, 0.0
+            self._press, self.shift_m = None, 0.0
         if wanted:
             self._frames.append((now_s + self._c.tactile_latency_s, self._frame(now_s)))
+
+    def _unchanged(self, jaws: Sequence[float], jaw_forces: Sequence[float]) -> bool:
+        left, right, left_N, right_N = self._solved
+        return (
+            abs(jaws[0] - left) + abs(jaws[1] - right) < SAME_DISTANCE_M
+            and abs(jaw_forces[0] - left_N) + abs(jaw_forces[1] - right_N) < SAME_FORCE_N
+        )
 
     def arrived(self, now_s: float, wanted: bool) -> TactileFrame | None:
         """The newest frame that has arrived since the last call, if asked for."""
@@ -116,24 +132,15 @@ class Tactile:
             newest = self._frames.popleft()[1]
         return newest if wanted else None
 
-    def _solve(self, forces: tuple[float, float], bodies: set[int], wanted: bool) -> None:
+    def _solve(self, forces: tuple[float, float], bodies: set[int], jaws: tuple[float, float]) -> None:
         data = self._data
-        jaws = data.qpos[self._jaws]
-        key = tuple(sorted(bodies))
-        now = np.array([*jaws / SAME_DISTANCE_M, *np.log(np.maximum(forces, 1e-3)) / SAME_FORCE])
-        if self._solved is not None and not wanted:
-            before, then = self._solved
-            if before == key and np.abs(now - then).max() < 1.0:
-                return
-        self._solved = (key, now)
         pose_B_P = Pose.from_matrix(data.site_xpos[self._site], data.site_xmat[self._site].reshape(3, 3))
         surfaces = []
-        for body in key:
-            if body in self._meshes:
-                if body not in self._rays:
-                    self._rays[body] = SurfaceRays(self._meshes[body])
-                surfaces.append((self._rays[body], body_pose(data, body).inverse() @ pose_B_P))
-        self._press = self._gel.press_pair(surfaces, (float(jaws[0]), float(jaws[1])), forces)
+        for body in sorted(bodies & self._meshes.keys()):
+            if body not in self._rays:
+                self._rays[body] = SurfaceRays(self._meshes[body])
+            surfaces.append((self._rays[body], body_pose(data, body).inverse() @ pose_B_P))
+        self._press = self._gel.press_pair(surfaces, jaws, forces)
         self.shift_m = self._press.left_shift_m + self._press.right_shift_m
 
     def _frame(self, stamp_s: float) -> TactileFrame:

@@ -7,16 +7,25 @@ import numpy as np
 from backends.mujoco.model import STEP_S, STEPS
 from backends.mujoco.streams import stream
 from glotouch_bt.robot import Array, Conditions, RobotDescription
-from glotouch_bt.robot.geometry import quat_to_matrix
 
 GRAVITY_M_S2 = 9.81
 BLOCKS = 128  # noise is drawn for this many periods at a time
 
 
-def weight_wrench(mass_kg: float, com_S_m: Array, rotation_B_S: Array) -> Array:
-    """(6,) force N and torque Nm in S, at S, of a weight hanging on the sensor."""
-    force = -mass_kg * GRAVITY_M_S2 * rotation_B_S[2]
-    return np.concatenate([force, np.cross(com_S_m, force)])
+def weight_matrix(mass_kg: float, com_S_m: Array) -> Array:
+    """(6, 3) that maps `up` (B's z axis written in S) to the wrench of a weight hanging on the sensor, in S at S.
+
+    Force -m g up; torque com x force.
+    """
+    x, y, z = com_S_m
+    lever = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(-mass_kg * GRAVITY_M_S2 * np.vstack([np.eye(3), lever]))
+
+
+def up_in(quat_B_S: Array) -> Array:
+    """(3,) B's z axis written in S: the third row of the rotation matrix."""
+    w, x, y, z = quat_B_S.tolist()
+    return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
 
 
 def hand_mass(description: RobotDescription) -> tuple[float, Array]:
@@ -36,57 +45,53 @@ class WristSensor:
     """
 
     def __init__(self, description: RobotDescription, conditions: Conditions, seed: int) -> None:
-        self._c = conditions
         self._rng = stream(seed, "wrench")
         draw = stream(seed, "payload")
         self._mass_factor = 1.0 + conditions.payload_mass_error * float(draw.standard_normal())
         self._com_error = conditions.payload_com_error_m * draw.standard_normal(3)
         mass, com = hand_mass(description)
-        self._hand = (mass * self._mass_factor, com + self._com_error)
+        self._hand = weight_matrix(mass * self._mass_factor, com + self._com_error)
         self._P_in_S = description.gripper.pose_E_P
-        self._payload: tuple[float, Array] | None = None
+        self._payload = np.zeros((6, 3))
         self._bias = np.zeros(6)
-        self._rotation_at_tare: Array | None = None
+        self._up_at_tare: Array | None = None
         self._late = round(conditions.wrench_latency_s / STEP_S)
         self._line = np.zeros((self._late + STEPS, 6))
         self._sd = np.array([conditions.force_noise_sd_N] * 3 + [conditions.torque_noise_sd_Nm] * 3)
-        self._walk_sd = conditions.force_drift_N_per_sqrt_min * np.sqrt(STEP_S / 60.0)
+        self._walk_sd = conditions.force_drift_N_per_sqrt_min * float(np.sqrt(STEP_S / 60.0))
         self._walk = np.zeros(3)
         self._noisy = bool(self._sd.any() or self._walk_sd > 0)
         self._noise = np.zeros((BLOCKS, STEPS, 6))
         self._block = BLOCKS
-        self.untared = np.zeros((STEPS, 6))  # last block before bias, for the tare
+        self.untared = np.zeros((STEPS, 6))  # last block before the tare's bias
+        self._renew()
+
+    def _renew(self) -> None:
+        """Fold payload, tare and hand into two affine maps of `up`: what is subtracted, and what is expected."""
+        if self._up_at_tare is None:
+            self._offset = (self._payload, np.zeros(6))
+            self._expected = (self._payload + self._hand, np.zeros(6))
+        else:
+            self._offset = (self._payload + self._hand, -self._hand @ self._up_at_tare)
+            self._expected = (self._offset[0], self._offset[1] + self._bias)
 
     def set_payload(self, mass_kg: float, com_P_m: Array) -> None:
         """What the controller believes the hand carries, wrong by the condition's errors."""
-        self._payload = (mass_kg * self._mass_factor, self._P_in_S.apply(com_P_m) + self._com_error)
+        self._payload = weight_matrix(mass_kg * self._mass_factor, self._P_in_S.apply(com_P_m) + self._com_error)
+        self._renew()
 
     def tare(self, mean: Array, quat_B_S: Array) -> None:
         """Subtract `mean` (6,), an average of `untared`, taken at this orientation, from now on."""
-        rotation = quat_to_matrix(quat_B_S)
-        # `mean` still holds the hand's change since the last tare; the new reference orientation is here.
-        self._bias = mean + self._hand_change(rotation)
-        self._rotation_at_tare = rotation
-
-    def _hand_change(self, rotation: Array) -> Array:
-        if self._rotation_at_tare is None:
-            return np.zeros(6)
-        return weight_wrench(*self._hand, rotation) - weight_wrench(*self._hand, self._rotation_at_tare)
-
-    def compensation(self, quat_B_S: Array) -> Array:
-        """(6,) what is subtracted at this orientation, besides the tare's bias."""
-        rotation = quat_to_matrix(quat_B_S)
-        total = self._hand_change(rotation)
-        if self._payload is not None:
-            total = total + weight_wrench(*self._payload, rotation)
-        return total
+        up = up_in(quat_B_S)
+        change = np.zeros(6) if self._up_at_tare is None else self._hand @ (up - self._up_at_tare)
+        self._bias = mean + change  # `untared` had the change since the last tare taken out; the new one starts here
+        self._up_at_tare = up
+        self._renew()
 
     def expected(self, quat_B_S: Array) -> Array:
         """(6,) what the sensor should read without contact: the basis of the hard limit."""
-        offset = self.compensation(quat_B_S) + self._bias
-        if self._rotation_at_tare is None:
-            offset = offset + weight_wrench(*self._hand, quat_to_matrix(quat_B_S))
-        return offset
+        matrix, constant = self._expected
+        return np.asarray(matrix @ up_in(quat_B_S) + constant)
 
     def fill(self, wrench: Array) -> None:
         """Start the delay line as if the sensor had read `wrench` (6,) for ever."""
@@ -98,8 +103,9 @@ class WristSensor:
         if late:
             self._line[:late] = self._line[STEPS : STEPS + late]
         self._line[late:] = true
+        matrix, constant = self._offset
         out = self.untared
-        np.subtract(self._line[:STEPS], self.compensation(quat_B_S), out=out)
+        np.subtract(self._line[:STEPS], matrix @ up_in(quat_B_S) + constant, out=out)
         if self._noisy:
             if self._block == BLOCKS:
                 self._draw()
