@@ -6,18 +6,17 @@ Heavy imports stand inside the commands, so that `glotouch --help` is quick.
 
 from __future__ import annotations
 
-import functools
 import json
 import sys
 import traceback
-from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, ParamSpec
+from typing import Annotated, Any
 
 import typer
 
-P = ParamSpec("P")
+from glotouch_bt.cli_bench import bench
+from glotouch_bt.guarded import guarded, set_debug, showing_tracebacks
 
 app = typer.Typer(
     name="glotouch",
@@ -27,7 +26,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-_debug = False
+app.add_typer(bench)
 
 
 class TreeFormat(StrEnum):
@@ -51,43 +50,8 @@ Json = Annotated[bool, typer.Option("--json", help="print JSON on stdout, nothin
 
 @app.callback()
 def _options(debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False) -> None:
-    global _debug
-    _debug = _debug or debug
-
-
-def _guarded(command: Callable[P, int | None]) -> Callable[P, None]:
-    """Run a command; every error becomes one message on stderr and an exit code."""
-
-    @functools.wraps(command)
-    def run(*args: P.args, **kwargs: P.kwargs) -> None:
-        from glotouch_bt.robot import BadInput, GlotouchError, MissionFailed
-
-        try:
-            code = command(*args, **kwargs) or 0
-        except KeyboardInterrupt:
-            code = _fail(130, "interrupted")
-        except BrokenPipeError:
-            sys.stderr.close()
-            code = 0
-        except BadInput as e:
-            code = _fail(2, str(e))
-        except MissionFailed as e:
-            code = _fail(1, str(e))
-        except GlotouchError as e:
-            code = _fail(3, str(e))
-        except Exception as e:
-            code = _fail(3, f"internal error: {type(e).__name__}: {e} (--debug shows where)")
-        if code:
-            raise typer.Exit(code)
-
-    return run
-
-
-def _fail(code: int, message: str) -> int:
-    if _debug:
-        traceback.print_exc()
-    sys.stderr.write(f"glotouch: {message}\n")
-    return code
+    if debug:
+        set_debug()
 
 
 def _settings(given: list[str] | None) -> dict[str, str]:
@@ -109,7 +73,7 @@ def _print_json(data: object) -> None:
 
 
 @app.command()
-@_guarded
+@guarded
 def run(
     mission: Mission,
     backend: Annotated[str, typer.Option(help="a registered backend (see: glotouch backends)")] = "mujoco",
@@ -134,7 +98,7 @@ def run(
     if done.warning:
         console.print_error(done.warning)
     if done.outcome.error is not None:
-        if _debug:
+        if showing_tracebacks():
             traceback.print_exception(done.outcome.error)
         console.print_error(done.outcome.reasons[-1])
     elif done.exit_code and json_:
@@ -143,7 +107,7 @@ def run(
 
 
 @app.command()
-@_guarded
+@guarded
 def check(
     missions: Annotated[list[str], typer.Argument(metavar="MISSION...", help="mission files or shipped names")],
     set_: Sets = None,
@@ -182,7 +146,7 @@ def check(
 
 
 @app.command()
-@_guarded
+@guarded
 def skills(
     name: Annotated[str | None, typer.Argument(metavar="NAME", help="one skill")] = None, json_: Json = False
 ) -> None:
@@ -202,7 +166,7 @@ def skills(
 
 
 @app.command()
-@_guarded
+@guarded
 def backends(json_: Json = False) -> None:
     """List the installed backends and whether they can be used here."""
     from glotouch_bt import console
@@ -222,7 +186,7 @@ def backends(json_: Json = False) -> None:
 
 
 @app.command()
-@_guarded
+@guarded
 def tree(
     mission: Mission,
     format_: Annotated[TreeFormat, typer.Option("--format", help="how to draw it")] = TreeFormat.text,
@@ -247,7 +211,7 @@ def tree(
 
 
 @app.command()
-@_guarded
+@guarded
 def report(folder: Annotated[Path, typer.Argument(metavar="RUN", help="a run's folder")], json_: Json = False) -> None:
     """Make report.html of a run again."""
     from glotouch_bt.report import write_report
@@ -260,7 +224,7 @@ def report(folder: Annotated[Path, typer.Argument(metavar="RUN", help="a run's f
 
 
 @app.command()
-@_guarded
+@guarded
 def schema() -> None:
     """Print the JSON Schema of mission files, for editors."""
     from glotouch_bt.mission.library import SkillShelf
@@ -271,9 +235,8 @@ def schema() -> None:
 
 def main() -> None:
     """The `glotouch` command; `--debug` may stand anywhere."""
-    global _debug
     if "--debug" in sys.argv[1:]:
-        _debug = True
+        set_debug()
         sys.argv = [a for a in sys.argv if a != "--debug"]
     app()
 

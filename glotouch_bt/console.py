@@ -141,3 +141,24 @@ def print_skill(d: dict[str, Any]) -> None:
     sys.stdout.write("\n")
     sys.stdout.flush()
     print_table("ports", ("", "name", "type", "key", "what it is"), ports)
+
+
+def print_retrieve(summary: dict[str, Any], folder: Path) -> None:
+    """The table of a retrieval campaign: rates with Wilson 95 % intervals, causes of failure."""
+
+    def rate(r: dict[str, Any]) -> str:
+        return f"{r['rate'] * r['n']:.0f}/{r['n']}  {100 * r['rate']:.0f} % [{100 * r['lo']:.0f}, {100 * r['hi']:.0f}]"
+
+    rows = [(target, rate(r)) for target, r in summary["by_target"].items()]
+    rows += [(name, rate(summary[key])) for name, key in (
+        ("all targets", "success"), ("wrong object lifted", "wrong_object"), ("safety stops", "safety_stops"),
+        ("tracebacks", "tracebacks"))]  # fmt: skip
+    seeds = summary["seeds"]
+    title = f"retrieve, {summary['conditions']}, seeds {seeds[0]}-{seeds[-1]}"
+    print_table(title, ("", "rate [Wilson 95 %]"), rows)
+    if summary["causes"]:
+        print_table("causes of failure", ("cause", "trials"), [(c, str(n)) for c, n in summary["causes"].items()])
+    Console().print(
+        f"robot time {summary['sim_s']['mean']:.0f} s, wall {summary['wall_s']['mean']:.0f} s a mission; "
+        f"largest peak force {summary['largest_peak_force_N']:.1f} N\n{folder / 'summary.json'}"
+    )

@@ -18,7 +18,7 @@ class JointSetpoint:
         q: (dof,) rad.
         dq: (dof,) rad/s.
         ddq: (dof,) rad/s2, feed-forward.
-        pose_B_P: The pose of the pads' mid-point that `q` realises; devices that take Cartesian setpoints are sent this.
+        pose_B_P: The pose of the pads' mid-point that `q` realises; Cartesian devices are sent this.
     """
 
     q: Array

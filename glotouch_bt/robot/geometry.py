@@ -53,7 +53,7 @@ def matrix_to_quat(m: Array) -> Array:
         q[1 + j] = 1 + 2 * m[j, j] - t[0]
         q[1 + k] = m[k, j] + m[j, k]
         q[1 + l] = m[l, j] + m[j, l]
-    q = q / np.linalg.norm(q)
+    q /= float(np.linalg.norm(q))
     return q if q[0] >= 0 else -q
 
 

@@ -34,8 +34,8 @@ class GripperState:
 class TactileFrame:
     """One pair of gel depth maps taken together.
 
-    Both maps share one layout: row 0 is nearest the flange and rows run along +z_P (down, towards the fingertip); columns
-    run along +x_P for BOTH pads. Positive is indented, 0 is untouched gel.
+    Both maps share one layout: row 0 is nearest the flange and rows run along +z_P (down, towards the fingertip);
+    columns run along +x_P for BOTH pads. Positive is indented, 0 is untouched gel.
 
     Attributes:
         stamp_s: Robot clock when the frame was taken.
@@ -58,8 +58,8 @@ class Observation:
         dq: (n, dof) joint velocities, rad/s.
         position_B_P: (n, 3) pads' mid-point in B, m.
         quat_B_P: (n, 4) its orientation, w x y z.
-        wrench_S: (n, 6) force N then torque Nm that everything beyond the sensor FEELS (environment and gravity), written
-            in S at S's origin, minus the last tare. Pressing a down-pointing tool onto the floor gives +z_B force.
+        wrench_S: (n, 6) force N then torque Nm that all beyond the sensor FEELS (environment and gravity), written in
+            S at S's origin, minus the last tare. Pressing a down-pointing tool onto the floor gives +z_B force.
         gripper: Last report of the jaws.
         tactile: A NEW pair of depth maps, if one arrived this period and the command asked for frames; else None.
     """

@@ -1,6 +1,6 @@
-"""The world as the robot is told it: the registered container, the probe, its holder, and which objects may be inside.
+"""The world as the robot is told it: container, probe, holder, and which objects may be inside.
 
-Frames: B arm base, z up. K container: origin at the centre of the interior floor, z up, x along the interior's first side.
+Frames: B arm base, z up. K container: origin at the centre of the interior floor, z up, x along its first side.
 What is told is nominal; the true world differs from it by the conditions (registration, payload, grasp offset).
 """
 

@@ -44,7 +44,7 @@ def wilson(successes: int, n: int) -> Rate:
 
 
 def bootstrap_mean(values: npt.ArrayLike, resamples: int = 2000, seed: int = 0) -> Mean:
-    """Percentile bootstrap of the mean at 95 % (B. Efron, Ann. Statist. 7, 1979); seeded, so the same values give the same."""
+    """Percentile bootstrap of the mean at 95 % (B. Efron, Ann. Statist. 7, 1979); seeded."""
     x = np.asarray(values, dtype=np.float64)
     if x.size == 0:
         return {"mean": float("nan"), "lo": float("nan"), "hi": float("nan"), "n": 0}
