@@ -61,8 +61,8 @@ class Gates:
         evidence: Least evidence of the best: layers felt by both pads.
     """
 
-    margin: float = 0.05
-    loss: float = 1.5
+    margin: float = 0.1
+    loss: float = 2.0
     evidence: float = 3.0
 
     def __post_init__(self) -> None:

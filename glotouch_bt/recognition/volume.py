@@ -89,14 +89,15 @@ def sequence_volume(
     covered = total / weight.sum()
     r = np.where(ok, residual, np.float32(0)) / np.float32(p.unit_m)
     bias = (grid.bias_m / p.unit_m).astype(np.float32)
-    absolute = np.stack([_one_sided(r - b, upper) for b in bias], axis=1)
+    absolute = np.stack([_one_sided(np.asarray(r - b, dtype=np.float32), upper) for b in bias], axis=1)
     loss = np.float32(p.w_absolute) * _huber_rms(absolute, w[:, None], p.huber)
     if len(layers) > 1:
         mean = (r * w).sum(axis=0) / np.maximum(total, 1e-6)
         both = np.asarray(w * np.where(upper, 0, 1)[:, None, None, None], dtype=np.float32)
         shape = np.float32(p.w_centred) * _huber_rms(np.asarray(r - mean, dtype=np.float32), both, p.huber)
         pairs = np.asarray(np.minimum(both[1:], both[:-1]), dtype=np.float32)
-        shape += np.float32(p.w_vertical) * _huber_rms(r[1:] - r[:-1], pairs, p.huber)
+        steps = np.asarray(r[1:] - r[:-1], dtype=np.float32)
+        shape += np.float32(p.w_vertical) * _huber_rms(steps, pairs, p.huber)
         loss = loss + shape
     loss = np.where(total > 0, loss, np.float32(NOTHING_FITS)) + np.float32(p.coverage) * (1 - covered)
     image = np.zeros(loss.shape[1:], dtype=np.float32)
@@ -109,7 +110,7 @@ def sequence_volume(
 def _one_sided(r: Array32, upper: Mask) -> Array32:
     """A layer only one pad felt bounds the width from above: predicted widths below the measured one cost nothing."""
     mask = upper[:, None, None, None]
-    return np.where(mask, np.minimum(r, np.float32(0)), r)
+    return np.asarray(np.where(mask, np.minimum(r, np.float32(0)), r), dtype=np.float32)
 
 
 def _huber_rms(r: Array32, w: Array32, c: float) -> Array32:
@@ -145,14 +146,14 @@ def _predicted(model: TargetModel, e: LayerEvidence, roll: float, flip: float, g
     f = np.asarray(f[None, :, None])
     a = low[:, :, j] * (1 - f) + high[:, :, j] * f
     b = low[:, :, j + 1] * (1 - f) + high[:, :, j + 1] * f
-    out = (a * (1 - g) + b * g) * np.float32(grid.scale)
+    out = np.asarray((a * (1 - g) + b * g) * np.float32(grid.scale), dtype=np.float32)
     out[:, ~inside_l] = np.nan
     out[:, :, ~inside_z] = np.nan
     whole = int(np.floor(roll))
     part = np.float32(roll - whole)
     first = np.roll(out, -whole, axis=0)
     if part < 1e-3:
-        return first
+        return np.asarray(first, dtype=np.float32)
     return np.asarray((1 - part) * first + part * np.roll(out, -whole - 1, axis=0), dtype=np.float32)
 
 
