@@ -40,7 +40,7 @@ class Match:
         terms: What it is the sum of: width, image, depth, mode, height, contour.
         fit: The fitted pose; None if nothing was felt.
         pose_K_O: (x, y, yaw) of the mesh's frame O in K, m and rad; the contour's centre and yaw if nothing was felt.
-        evidence: Sum of layer weights (a layer both pads felt counts 1).
+        evidence: Layers both pads felt; all one-sided layers together add at most 1.
     """
 
     index: int
@@ -63,7 +63,7 @@ class Gates:
 
     margin: float = 0.1
     loss: float = 2.0
-    evidence: float = 3.0
+    evidence: float = 2.5
 
     def __post_init__(self) -> None:
         for name in ("margin", "loss", "evidence"):

@@ -54,7 +54,7 @@ class Evidence:
         p_coupled: Eq. (coupled_probability).
         q_depth: (K,) fraction of valid tactile patches, the paper's q_{D,k}.
         rho: (K,) median nonplanarity; NaN where no patch is valid.
-        weight: Sum of the layers' weights: how much was felt at all.
+        weight: How much was felt: layers both pads felt, plus the others' weights, which together count at most one.
     """
 
     layers: tuple[LayerEvidence, ...]
@@ -112,7 +112,7 @@ def read_evidence(touchset: TouchSet, pad: PadSpec, params: LossParams) -> Evide
         coupled_probability(touchset, params),
         np.array(q),
         np.array(rho),
-        sum(e.weight for e in layers),
+        sum(e.weight for e in layers if not e.upper_only) + min(sum(e.weight for e in layers if e.upper_only), 1.0),
     )
 
 
