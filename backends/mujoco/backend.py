@@ -10,7 +10,7 @@ import numpy as np
 from backends.mujoco.model import Handles, compile_world
 from backends.mujoco.referee import MujocoReferee
 from backends.mujoco.robot import MujocoRobot
-from backends.mujoco.safety import check_sane
+from backends.mujoco.safety import check_sane, silence_mujoco
 from backends.mujoco.truth import draw_truth
 from backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import (
@@ -82,6 +82,7 @@ class MujocoBackend(Backend):
             if option not in OPTIONS:
                 raise UnknownName("option of backend mujoco", option, OPTIONS)
         layout = _read_layout(options["layout"]) if "layout" in options else None
+        silence_mujoco()
         truth = draw_truth(world, conditions, seed, layout)
         model, handles = compile_world(self._description, world, truth)
         data = mujoco.MjData(model)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from backends.mujoco.contact import HAND, HAND_FRICTION, PAD, set_category, set_friction
+from backends.mujoco.contact import GEL_TORSION_M, HAND, HAND_FRICTION, PAD, set_category, set_friction
 from glotouch_bt.robot import Box, Gripper
 
 PAD_PROUD_M = 0.002
@@ -79,7 +79,7 @@ def add_gripper(spec: mujoco.MjSpec, hand: mujoco.MjsBody, gripper: Gripper, pad
         _box(finger, back, FINGER_COLOUR)
         gel = _box(finger, pad, PAD_COLOUR, f"pad_{name}")
         gel.solref = PAD
-        set_friction(gel, pad_friction, priority=2)
+        set_friction(gel, pad_friction, priority=2, torsion_m=GEL_TORSION_M)
         motor = spec.add_actuator(name=f"jaw_{name}", target=f"jaw_{name}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
         motor.set_to_position(kp=JAW_STIFFNESS_N_M, kv=JAW_DAMPING_NS_M)
         motor.forcelimited = True

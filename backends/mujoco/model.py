@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from backends.mujoco.arm_model import add_arm
-from backends.mujoco.contact import set_options
+from backends.mujoco.contact import GROUP_VISUAL, set_options
 from backends.mujoco.container import add_container
 from backends.mujoco.gripper_model import add_gripper
 from backends.mujoco.objects import add_object
@@ -130,14 +130,38 @@ def _handles(model: mujoco.MjModel, description: RobotDescription, objects: int)
     )
 
 
+def _dress(spec: mujoco.MjSpec, floor_z_m: float) -> None:
+    """What only a camera sees: light, sky and the pedestal the arm stands on."""
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1080
+    spec.visual.headlight.ambient = (0.35, 0.35, 0.35)
+    spec.worldbody.add_light(pos=(0.3, -0.8, 1.6), dir=(0.2, 0.6, -1.0))
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=(0.75, 0.82, 0.90),
+        rgb2=(0.95, 0.96, 0.98),
+        width=64,
+        height=384,
+    )
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        pos=(0.0, 0.0, 0.5 * floor_z_m),
+        size=(0.1, abs(0.5 * floor_z_m) + 1e-3, 0.0),
+        rgba=(0.4, 0.42, 0.45, 1.0),
+        contype=0,
+        conaffinity=0,
+        group=GROUP_VISUAL,
+    )
+
+
 def build_spec(description: RobotDescription, world: World, truth: Truth) -> mujoco.MjSpec:
     """Assemble the world of one trial; MuJoCo's world frame is B."""
     spec = mujoco.MjSpec()
     spec.modelname = world.name
     spec.compiler.degree = False
     set_options(spec, STEP_S)
-    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1080
-    spec.worldbody.add_light(pos=(0.3, -0.8, 1.6), dir=(0.2, 0.6, -1.0))
+    _dress(spec, float(world.container.pose_B_K.position_m[2]))
     hand = add_arm(spec, description)
     add_gripper(spec, hand, description.gripper, truth.pad_friction)
     add_probe(spec, world.probe, world.holder, truth.pose_handle_shaft, truth.pad_friction)

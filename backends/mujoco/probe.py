@@ -12,11 +12,12 @@ import trimesh
 
 from backends.mujoco.contact import (
     ENVIRONMENT,
+    GEL_TORSION_M,
     HOLDER_FRICTION,
     PAD,
     PAD_HANDLE_FRICTION,
     PROBE,
-    ROLLING,
+    ROLLING_M,
     TIP_FRICTION,
     set_category,
     set_friction,
@@ -71,7 +72,7 @@ def add_probe(spec: mujoco.MjSpec, probe: Probe, holder: Holder, pose_handle_sha
 
     for side in ("left", "right"):
         pair = spec.add_pair(name=f"grip_{side}", geomname1=f"pad_{side}", geomname2="handle", condim=4)
-        pair.friction = (pad_friction, pad_friction, ROLLING[0], ROLLING[1], ROLLING[1])
+        pair.friction = (pad_friction, pad_friction, GEL_TORSION_M, ROLLING_M, ROLLING_M)
         pair.solref = PAD
         pair.solreffriction = PAD_HANDLE_FRICTION
     _add_stand(spec, probe, holder)

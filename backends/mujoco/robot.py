@@ -142,7 +142,6 @@ class MujocoRobot(Robot):
             raise
         self._cycles += 1
         self._observation = self._observe(command)
-        self._requests()
         if self._guard.tripped is not None:
             raise self._guard.stop()
         return self._observation
@@ -208,7 +207,9 @@ class MujocoRobot(Robot):
         now_s = self._cycles * self.period_s
         wrench, quat = rows[:, s.force.start : s.torque.stop], rows[:, s.quat]
         np.negative(wrench, out=wrench)
-        wrench = self._wrist.report(wrench, quat[-1])
+        self._set_payload()
+        wrench = self._wrist.measure(wrench, quat[-1])
+        self._add_to_tare(wrench, quat[-1])
         self._expected = self._wrist.expected(quat[-1])
         self._note_peak()
         last = rows[-1].tolist()
@@ -227,7 +228,7 @@ class MujocoRobot(Robot):
             dq=rows[:, s.dq],
             position_B_P=rows[:, s.position],
             quat_B_P=quat,
-            wrench_S=wrench,
+            wrench_S=wrench - self._wrist.bias,
             gripper=gripper,
             tactile=self._tactile.arrived(now_s, command.tactile),
         )
@@ -241,20 +242,21 @@ class MujocoRobot(Robot):
         if flat @ flat > self.peak_force_N**2:  # else not one of them can be a new peak
             self.peak_force_N = max(self.peak_force_N, float((force * force).sum(axis=1).max()) ** 0.5)
 
-    def _requests(self) -> None:
-        """Advance the slow requests by one period."""
-        quat = self._samples[-1, self._s.quat]
-        if self._payload is not None:
-            self._payload.periods -= 1
-            if self._payload.periods <= 0:
-                request = self._payload.request
-                self._wrist.set_payload(request.mass_kg, request.com_P_m)
-                self._payload_load = (request.mass_kg, request.com_P_m)
-                self._payload.ticket.done = True
-                self._payload = None
-                self._expected = self._wrist.expected(quat)
-        if self._tare is not None and self._tare.add(self._wrist.untared):
-            self._wrist.tare(self._tare.mean, quat)
+    def _set_payload(self) -> None:
+        """Advance a payload request by one period; the block of the period in which it is done is compensated."""
+        if self._payload is None:
+            return
+        self._payload.periods -= 1
+        if self._payload.periods <= 0:
+            request = self._payload.request
+            self._wrist.set_payload(request.mass_kg, request.com_P_m)
+            self._payload_load = (request.mass_kg, request.com_P_m)
+            self._payload.ticket.done = True
+            self._payload = None
+
+    def _add_to_tare(self, measured: Array, quat_B_S: Array) -> None:
+        """Give a block to a tare under way; the block of the period in which it is done is tared."""
+        if self._tare is not None and self._tare.add(measured):
+            self._wrist.tare(self._tare.mean, quat_B_S)
             self._tare.ticket.done = True
             self._tare = None
-            self._expected = self._wrist.expected(quat)

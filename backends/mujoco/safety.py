@@ -44,6 +44,11 @@ class Guard:
         return SafetyStop(t.quantity, t.value, t.limit, t.stamp_s)
 
 
+def silence_mujoco() -> None:
+    """Keep MuJoCo from printing its warnings and writing MUJOCO_LOG.TXT; `check_sane` turns them into errors."""
+    mujoco.set_mju_user_warning(lambda _: None)
+
+
 def check_sane(warnings: npt.NDArray[np.int32], samples: Array, time_s: float) -> None:
     """Refuse a simulation that has blown up or run out of room.
 

@@ -65,7 +65,7 @@ class Servo:
         # One product gives all commands: position basis on the knots, velocity basis on the led knots, ramped torques.
         self._basis = np.hstack([*hermite(period_s, STEPS), 1.0 - along, along, np.ones((STEPS, 1))])
         self._terms = np.zeros((11, n))
-        self._knots = self._terms[:4]  # q0, dq0, q1, dq1
+        self._knots: Array = self._terms[:4]  # q0, dq0, q1, dq1
         self._asked = np.zeros((4, n))
         self._ddq = np.zeros(n)
         self._vector, self._product = np.zeros(model.nv), np.zeros(model.nv)
@@ -73,7 +73,7 @@ class Servo:
     @property
     def q(self) -> Array:
         """(dof,) the setpoint reached at the end of the last period, rad."""
-        return self._knots[2]
+        return np.asarray(self._knots[2])
 
     @property
     def moving(self) -> bool:

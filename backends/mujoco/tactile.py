@@ -43,7 +43,9 @@ class Pads:
         contact = self._data.contact
         pairs, address = contact.geom, contact.efc_address
         left, right = self._geoms
-        mine = np.flatnonzero(((pairs == left) | (pairs == right)).any(axis=1) & (address >= 0)) if len(pairs) else []
+        if len(pairs) == 0:
+            return (0.0, 0.0), set()
+        mine = np.flatnonzero(((pairs == left) | (pairs == right)).any(axis=1) & (address >= 0))
         if len(mine) == 0:
             return (0.0, 0.0), set()
         pairs = pairs[mine]
@@ -109,7 +111,7 @@ class Tactile:
         self._tick = tick
         if not wanted and self._unchanged(jaws, jaw_forces):
             return
-        self._solved = (*jaws, *jaw_forces)
+        self._solved = (jaws[0], jaws[1], jaw_forces[0], jaw_forces[1])
         forces, bodies = self._pads.touch()
         if bodies:
             self._solve(forces, bodies, (jaws[0], jaws[1]))

@@ -9,7 +9,7 @@ import numpy as np
 
 from backends.mujoco.placement import Placement, place_objects
 from backends.mujoco.streams import stream
-from glotouch_bt.robot import Array, Conditions, Pose, World
+from glotouch_bt.robot import Array, BadInput, Conditions, Pose, World
 from glotouch_bt.robot.meshes import Mesh, load_folder
 
 
@@ -75,7 +75,7 @@ def draw_truth(
         layout: (x m, y m, yaw rad) in K for some objects by name, instead of a random place; if given it must name all.
 
     Raises:
-        BadInput: Meshes that cannot be used, or that do not fit.
+        BadInput: Meshes that cannot be used, that do not fit, or that the layout leaves out.
     """
     meshes = load_folder(world.objects.folder, world.objects.names)
     if layout is None:
@@ -87,6 +87,11 @@ def draw_truth(
             stream(seed, "layout"),
         )
     else:
+        missing = [m.name for m in meshes if m.name not in layout]
+        if missing:
+            raise BadInput(
+                f"option layout: no place for {', '.join(missing)} (it names {', '.join(layout) or 'nothing'})"
+            )
         places = [Placement(*layout[m.name]) for m in meshes]
     rng = stream(seed, "objects")
     masses = rng.uniform(*conditions.object_mass_kg, len(meshes))

@@ -63,7 +63,7 @@ class WristSensor:
         self._noisy = bool(self._sd.any() or self._walk_sd > 0)
         self._noise = np.zeros((BLOCKS, STEPS, 6))
         self._block = BLOCKS
-        self.untared = np.zeros((STEPS, 6))  # last block before the tare's bias
+        self._measured = np.zeros((STEPS, 6))
         self._renew()
 
     def _renew(self) -> None:
@@ -81,10 +81,10 @@ class WristSensor:
         self._renew()
 
     def tare(self, mean: Array, quat_B_S: Array) -> None:
-        """Subtract `mean` (6,), an average of `untared`, taken at this orientation, from now on."""
+        """Subtract `mean` (6,), an average of `measure`, taken at this orientation, from now on."""
         up = up_in(quat_B_S)
         change = np.zeros(6) if self._up_at_tare is None else self._hand @ (up - self._up_at_tare)
-        self._bias = mean + change  # `untared` had the change since the last tare taken out; the new one starts here
+        self._bias = mean + change  # `measure` had the change since the last tare taken out; the new one starts here
         self._up_at_tare = up
         self._renew()
 
@@ -97,21 +97,29 @@ class WristSensor:
         """Start the delay line as if the sensor had read `wrench` (6,) for ever."""
         self._line[:] = wrench
 
-    def report(self, true: Array, quat_B_S: Array) -> Array:
-        """(n, 6) reported block for a true block (n, 6)."""
+    def measure(self, true: Array, quat_B_S: Array) -> Array:
+        """(n, 6) block for a true block (n, 6), before the tare's bias is taken off: what a tare averages.
+
+        The array is used again by the next call.
+        """
         late = self._late
         if late:
             self._line[:late] = self._line[STEPS : STEPS + late]
         self._line[late:] = true
         matrix, constant = self._offset
-        out = self.untared
+        out = self._measured
         np.subtract(self._line[:STEPS], matrix @ up_in(quat_B_S) + constant, out=out)
         if self._noisy:
             if self._block == BLOCKS:
                 self._draw()
             out += self._noise[self._block]
             self._block += 1
-        return out - self._bias
+        return out
+
+    @property
+    def bias(self) -> Array:
+        """(6,) what the last tare subtracts."""
+        return self._bias
 
     def _draw(self) -> None:
         n = BLOCKS * STEPS

@@ -29,7 +29,7 @@ from glotouch_bt.robot import (
 )
 
 K = Pose.planar((0.60, 0.0, -0.20), 0.0)
-GRASP = Pose.pointing_down((0.45, -0.32, -0.06), 0.0)
+GRASP = Pose.pointing_down((0.45, -0.32, -0.06), np.pi)
 BLOCK_M = (0.050, 0.036, 0.060)
 LAYOUT = {"block": (0.03, 0.08, 0.0)}
 
@@ -69,8 +69,8 @@ class Driver:
         self.observations: list[Observation] = [robot.observe()]
         self._scratch = mujoco.MjData(robot.model)
         self._scratch.qpos[:] = robot.data.qpos
+        self.planned: list[Pose] = []
         self.q = np.array(robot.description.home_q)
-        self.dq = np.zeros(7)
         self.pose = self._forward(self.q)
 
     @property
@@ -106,6 +106,7 @@ class Driver:
         speed_m_s: float = 0.10,
         yaw_rad: float = np.pi,
         until: Callable[[Observation], bool] | None = None,
+        settle_s: float = 0.05,
     ) -> Observation:
         """To `position_m` of P in B, pointing down; stops early (at once) when `until` says so."""
         start, end = self.pose, Pose.pointing_down(position_m, yaw_rad)
@@ -121,9 +122,10 @@ class Driver:
             dq = (q - self.q) / self.robot.period_s if t < 1.0 else np.zeros(7)
             self.cycle(Command(motion=JointSetpoint(q, dq, np.zeros(7), pose)))
             self.q, self.pose = q, pose
+            self.planned.append(pose)
             if until is not None and until(self.last):
                 break
-        return self.wait(0.05)
+        return self.wait(settle_s)
 
     def cycle(self, command: Command) -> Observation:
         self.observations.append(self.robot.cycle(command))
@@ -134,7 +136,9 @@ class Driver:
             self.cycle(command or Command())
         return self.last
 
-    def jaws(self, aperture_m: float, force_N: float = 60.0, speed_m_s: float = 0.08, time_s: float = 1.0) -> Observation:
+    def jaws(
+        self, aperture_m: float, force_N: float = 60.0, speed_m_s: float = 0.08, time_s: float = 1.0
+    ) -> Observation:
         self.cycle(Command(gripper=GripperTarget(aperture_m, speed_m_s, force_N)))
         return self.wait(time_s)
 
@@ -162,11 +166,19 @@ class Driver:
 
 
 @pytest.fixture
+def drive() -> Callable[[MujocoRobot], Driver]:
+    """Makes a driver of a robot."""
+    return Driver
+
+
+@pytest.fixture
 def open_robot(world: World) -> Iterator[Callable[..., MujocoRobot]]:
     """Open robots in the small world; all are closed at the end."""
     opened: list[MujocoRobot] = []
 
-    def make(conditions: Conditions | None = None, seed: int = 0, layout: dict[str, tuple[float, float, float]] | None = None) -> MujocoRobot:
+    def make(
+        conditions: Conditions | None = None, seed: int = 0, layout: dict[str, tuple[float, float, float]] | None = None
+    ) -> MujocoRobot:
         robot = MujocoBackend().open(world, conditions or Conditions(), seed, {"layout": layout or LAYOUT})
         assert isinstance(robot, MujocoRobot)
         opened.append(robot)
