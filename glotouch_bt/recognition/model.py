@@ -6,7 +6,6 @@ middle of the mesh's footprint, and height z of the pads' mid-point above the fl
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -112,12 +111,6 @@ class TargetModel:
             t = self.width_m[j, a : a + 2, b : b + 2]
             total += w * float(np.array([1 - wl, wl]) @ t.astype(np.float64) @ np.array([1 - wz, wz]))
         return total
-
-    def to_bytes(self) -> bytes:
-        """The expensive part (side images) as an npz, for a cache on disk kept by the caller."""
-        buffer = io.BytesIO()
-        np.savez_compressed(buffer, fine_m=self.fine_m.astype(np.float32), digest=np.array(self.digest))
-        return buffer.getvalue()
 
 
 def _bracket(grid: Array, x: float) -> tuple[int, float]:
