@@ -8,10 +8,9 @@ from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose
 from glotouch_bt.touch import Candidate, Layer, TouchSequence, TouchSet, make_layer
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
-from skills.hand import hand_pose_B, require_clear
+from skills.hand import glide, hand_pose_B, keep_clear_of
+from skills.squeeze_plan import Stance, plan_stances
 
-LEAST_SIDE_GAP_M = 0.003
-"""The jaws go down only where they leave this much on each side of the traced extent."""
 HAND_CLEARANCE_M = 0.004
 """Fingertips stay this far above the floor, and the hand's body this far above a candidate's top."""
 
@@ -25,7 +24,8 @@ class SqueezeParams(SkillParams):
     layer_gap_m: float = param("Least distance between two layers", unit="m", default=0.012, ge=0.002, le=0.05)
     side_gap_m: float = param("Open jaw to the contour, each side", unit="m", default=0.010, ge=0.004, le=0.03)
     travel_speed_m_s: float = param("Speed of the empty hand", unit="m/s", default=0.25, gt=0.0, le=0.25)
-    descent_speed_m_s: float = param("Speed down over the object", unit="m/s", default=0.10, gt=0.0, le=0.25)
+    descent_speed_m_s: float = param("Speed down beside the object", unit="m/s", default=0.025, gt=0.0, le=0.04)
+    headroom_m: float = param("Fingertips above the floor on the way", unit="m", default=0.13, ge=0.05, le=0.25)
     settle_s: float = param("How long the plateau is watched", unit="s", default=0.15, ge=0.05, le=1.0)
     top_overlap_m: float = param(
         "Pad centre of the highest layer below the top", unit="m", default=0.008, ge=0.0, le=0.03
@@ -52,33 +52,25 @@ class Squeeze(Skill):
     def run(self) -> SkillRun:
         """See the class."""
         candidate = self.candidate
-        others = [c for c in (self.known or ()) if c.index != candidate.index]
         arm = self.context.arm
-        for other in others:
-            outline = other.contour
-            arm.scene.add_obstacle(
-                f"candidate {other.index}",
-                outline.kind,
-                centre_K_m=outline.centre_K_m,
-                size_m=outline.size_m,
-                height_m=other.height_m,
-                yaw_rad=outline.yaw_rad,
-            )
+        others = tuple(c for c in (self.known or ()) if c.index != candidate.index)
+        obstacles = keep_clear_of(arm, others)
         sequences: list[TouchSequence] = []
-        refusals: list[str] = []
+        refusals: list[str]
         try:
-            for choices in self._plan(candidate):
-                for position, yaw, opening in choices:
-                    try:
-                        sequence = yield from self._sequence(candidate, position, yaw, opening)
-                    except MotionRefused as refusal:
-                        refusals.append(str(refusal))
-                        continue
-                    sequences.append(sequence)
-                    break
+            heights = self._heights(candidate)
+            container = self.context.world.container
+            stances, refusals = yield from plan_stances(
+                candidate, arm, container, float(heights[0]), (self.params.side_gap_m, 0.5 * self.params.side_gap_m)
+            )
+            for at in stances:
+                try:
+                    sequences.append((yield from self._sequence(candidate, at, heights)))
+                except MotionRefused as refusal:
+                    refusals.append(str(refusal))
         finally:
-            for other in others:
-                arm.scene.remove_obstacle(f"candidate {other.index}")
+            for name in obstacles:
+                arm.scene.remove_obstacle(name)
         touchset = TouchSet(candidate, tuple(sequences))
         stable = sum(layer.stable for layer in touchset.layers)
         self.event("touchset", touchset=touchset, refusals=refusals)
@@ -95,27 +87,6 @@ class Squeeze(Skill):
             )
         self.touchset = touchset
 
-    def _plan(self, candidate: Candidate) -> list[list[tuple[Array, float, float]]]:
-        """For each sequence its alternatives in order of preference: (position (2,) in K, yaw in K, opening)."""
-        contour, gripper = candidate.contour, self.context.arm.description.gripper
-        if contour.kind == "round":
-            slack = np.deg2rad([0.0, 12.0, -12.0, 24.0, -24.0])
-            return [[self._over(candidate, 0.0, float(t + s)) for s in slack] for t in np.deg2rad([0.0, 60.0, -60.0])]
-        reach = max(0.5 * contour.size_m[0] - 0.5 * gripper.pad_window_m[0], 0.0)
-        track = min(0.25 * contour.size_m[0], reach)
-        slack = np.deg2rad([0.0, 6.0, -6.0])
-        return [[self._over(candidate, t, contour.yaw_rad + float(s)) for s in slack] for t in (-track, 0.0, track)]
-
-    def _over(self, candidate: Candidate, along_m: float, yaw: float) -> tuple[Array, float, float]:
-        """Open hand over the candidate at `along_m` from its centre along `yaw`, midway of its extent across."""
-        x, y = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
-        low, high = candidate.span_m(yaw + 0.5 * np.pi)
-        position = (candidate.contour.centre_K_m @ x + along_m) * x + 0.5 * (low + high) * y
-        stroke = self.context.arm.description.gripper.stroke_m
-        if high - low > stroke - 2 * LEAST_SIDE_GAP_M:
-            return position, yaw, float("nan")
-        return position, yaw, min(high - low + 2 * self.params.side_gap_m, stroke)
-
     def _heights(self, candidate: Candidate) -> Array:
         """Pad-centre heights above the floor, lowest first."""
         p, gripper = self.params, self.context.arm.description.gripper
@@ -126,29 +97,36 @@ class Squeeze(Skill):
         count = int(np.clip(np.floor((highest - lowest) / p.layer_gap_m) + 1, 1, p.layers))
         return np.linspace(lowest, highest, count)
 
-    def _sequence(self, candidate: Candidate, position: Array, yaw_K: float, opening: float) -> Motion[TouchSequence]:
+    def _sequence(self, candidate: Candidate, at: Stance, heights: Array) -> Motion[TouchSequence]:
         """Open over the candidate, close at each height from below, rise."""
-        p, arm = self.params, self.context.arm
-        heights = self._heights(candidate)
-        if not np.isfinite(opening):
-            raise MotionRefused("squeeze", f"the object is wider than the jaws open at yaw {np.rad2deg(yaw_K):.0f} deg")
-        above_z = candidate.height_m + arm.description.gripper.fingertip_below_P_m + 0.02
-        yaw_K = (
-            hand_pose_B(arm, self.context.world.container, np.zeros(3), yaw_K).yaw_rad
-            - self.context.world.container.pose_B_K.yaw_rad
-        )
-        yield from arm.jaws(opening, speed_m_s=0.2)
-        above = self._pose(position, above_z, yaw_K)
+        p, arm, position = self.params, self.context.arm, at.position_K_m
+        container = self.context.world.container
+        tips = arm.description.gripper.fingertip_below_P_m
+        yaw_K = hand_pose_B(arm, container, np.zeros(3), at.yaw_K_rad).yaw_rad - container.pose_B_K.yaw_rad
+        above = self._pose(position, p.headroom_m + tips, yaw_K)
+        yield from arm.jaws(at.opening_m, speed_m_s=0.2)
         travel_z = max(float(arm.pose_B_P.position_m[2]), float(above.position_m[2]))
-        require_clear(arm, self._pose(position, float(heights[0]), yaw_K), opening)
         yield from arm.transit(above, height_B_m=travel_z, speed_m_s=p.travel_speed_m_s)
+        near = min(candidate.height_m + 0.02, p.headroom_m) + tips
+        yield from glide(self.context, self._pose(position, near, yaw_K), 2 * p.descent_speed_m_s)
         layers: list[Layer] = []
+        reached = yield from glide(self.context, self._pose(position, float(heights[0]), yaw_K), p.descent_speed_m_s)
+        if not reached:
+            height = self._pads_height()
+            yield from arm.line(above, p.travel_speed_m_s, check=False)
+            raise MotionRefused("squeeze", f"the fingers met something {height * 1e3:.0f} mm above the floor")
         for height in heights:
-            yield from arm.line(self._pose(position, float(height), yaw_K), p.descent_speed_m_s)
+            if not (yield from glide(self.context, self._pose(position, float(height), yaw_K), p.descent_speed_m_s)):
+                break  # caught under something that sticks out; the layers below are good
             layers.append((yield from self._close(float(height), position, yaw_K)))
-            yield from arm.jaws(opening, speed_m_s=0.2)
-        yield from arm.line(above, p.descent_speed_m_s)
+            yield from arm.jaws(at.opening_m, speed_m_s=0.2)
+        yield from arm.line(above, p.travel_speed_m_s, check=False)
         return TouchSequence(np.asarray(position), yaw_K, tuple(layers))
+
+    def _pads_height(self) -> float:
+        """Pads' mid-point above the container floor, as commanded."""
+        pose_K_B = self.context.world.container.pose_B_K.inverse()
+        return float(pose_K_B.apply(self.context.arm.pose_B_P.position_m)[2])
 
     def _close(self, height: float, position: Array, yaw_K: float) -> Motion[Layer]:
         p, arm = self.params, self.context.arm

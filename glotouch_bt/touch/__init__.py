@@ -14,6 +14,7 @@ from glotouch_bt.touch.detector import (
     reaction_direction,
     settled,
 )
+from glotouch_bt.touch.envelope import envelope
 from glotouch_bt.touch.filtering import LowPass
 from glotouch_bt.touch.fusion import TipFusion
 from glotouch_bt.touch.localisation import contact_direction, contact_point, disc_support, polygon_support
@@ -46,6 +47,7 @@ __all__ = [
     "contact_point",
     "contour_quality",
     "disc_support",
+    "envelope",
     "evidence_weight",
     "find_plateau",
     "fit_baseline",
