@@ -11,7 +11,7 @@ from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, para
 from skills.hand import glide, hand_pose_B, keep_clear_of
 from skills.squeeze_plan import Stance, plan_stances
 
-HAND_CLEARANCE_M = 0.004
+HAND_CLEARANCE_M = 0.005
 """Fingertips stay this far above the floor, and the hand's body this far above a candidate's top."""
 
 
@@ -24,7 +24,7 @@ class SqueezeParams(SkillParams):
     layer_gap_m: float = param("Least distance between two layers", unit="m", default=0.012, ge=0.002, le=0.05)
     side_gap_m: float = param("Open jaw to the contour, each side", unit="m", default=0.010, ge=0.004, le=0.03)
     travel_speed_m_s: float = param("Speed of the empty hand", unit="m/s", default=0.25, gt=0.0, le=0.25)
-    descent_speed_m_s: float = param("Speed down beside the object", unit="m/s", default=0.025, gt=0.0, le=0.04)
+    descent_speed_m_s: float = param("Speed down beside the object", unit="m/s", default=0.015, gt=0.0, le=0.04)
     headroom_m: float = param("Fingertips above the floor on the way", unit="m", default=0.13, ge=0.05, le=0.25)
     settle_s: float = param("How long the plateau is watched", unit="s", default=0.15, ge=0.05, le=1.0)
     top_overlap_m: float = param(
@@ -108,7 +108,7 @@ class Squeeze(Skill):
         travel_z = max(float(arm.pose_B_P.position_m[2]), float(above.position_m[2]))
         yield from arm.transit(above, height_B_m=travel_z, speed_m_s=p.travel_speed_m_s)
         near = min(candidate.height_m + 0.02, p.headroom_m) + tips
-        yield from glide(self.context, self._pose(position, near, yaw_K), 2 * p.descent_speed_m_s)
+        yield from glide(self.context, self._pose(position, near, yaw_K), 3 * p.descent_speed_m_s)
         layers: list[Layer] = []
         reached = yield from glide(self.context, self._pose(position, float(heights[0]), yaw_K), p.descent_speed_m_s)
         if not reached:

@@ -1,4 +1,4 @@
-"""Where the open jaws may stand: at three yaws round a round candidate, on three parallel tracks over a box-like one."""
+"""Where the open jaws may stand: at three yaws over a round candidate, on three parallel tracks over a box."""
 
 from __future__ import annotations
 

@@ -20,10 +20,11 @@ GROUP_VISUAL, GROUP_COLLISION = 2, 3
 
 # Time constant s and damping ratio. MuJoCo scales stiffness with the masses that meet: 4 ms is right for light objects,
 # but makes the hand (some 15 kg with the motors' inertia) hit the floor like a hammer: 120 N at 20 mm/s. Its housing is
-# softer against what is fixed; against free bodies their own, stiffer constant decides (solmix weighs the average).
+# softer: 50 ms against what is fixed; 10 ms against free bodies (solmix weighs the average), some 2 N/mm a contact
+# point, as slender fingers are. Pads have a constant of their own.
 STIFF = (0.004, 1.0)
 HOUSING = (0.050, 1.0)
-MIX = {ENVIRONMENT: 1.0, OBJECT: 1000.0, HAND: 10.0, PROBE: 1000.0}
+MIX = {ENVIRONMENT: 1.0, OBJECT: 1000.0, HAND: 150.0, PROBE: 1000.0}
 PAD = (0.005, 1.0)  # gel skin; what the gel gives beyond this is added by the gel model
 PAD_HANDLE_FRICTION = (0.002, 1.0)  # friction of pads on the probe's handle: stiffer, or it drifts in transits
 

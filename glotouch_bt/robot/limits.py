@@ -32,7 +32,7 @@ class Limits:
     tcp_acceleration_m_s2: float = 1.0
     tcp_jerk_m_s3: float = 20.0
     stop_acceleration_m_s2: float = 2.0
-    stop_jerk_m_s3: float = 200.0
+    stop_jerk_m_s3: float = 1000.0
     max_age_s: float = 0.2
 
     def __post_init__(self) -> None:
