@@ -19,7 +19,7 @@ class SqueezeParams(SkillParams):
     """Parameters of `squeeze`."""
 
     force_N: float = param("Closing force of one jaw", unit="N", default=10.0, gt=0.0, le=10.0)
-    closing_speed_m_s: float = param("Closing speed", unit="m/s", default=0.04, gt=0.0, le=0.2)
+    closing_speed_m_s: float = param("Closing speed", unit="m/s", default=0.03, gt=0.0, le=0.2)
     layers: int = param("Closures per sequence", default=4, ge=1, le=10)
     layer_gap_m: float = param("Least distance between two layers", unit="m", default=0.012, ge=0.002, le=0.05)
     side_gap_m: float = param("Open jaw to the contour, each side", unit="m", default=0.010, ge=0.004, le=0.03)
