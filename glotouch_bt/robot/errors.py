@@ -1,14 +1,14 @@
 """Every error this project raises has one root, carries data, and says what was expected.
 
-    GlotouchError
-    +-- BadInput            the user's file, option or mesh is wrong; nothing moved     (exit 2)
-    |   +-- ParamError      one named value breaks one stated rule
-    |   +-- UnknownName     a name nobody registered; lists the valid ones
-    +-- MissionFailed       the mission ran and did not reach its goal                  (exit 1)
-    +-- MotionRefused       a plan that would collide or leave the joint limits; not tried
-    +-- BackendError        the device or simulator failed; cause chained               (exit 3)
-        +-- SafetyStop      a hard limit tripped below the skills; the arm is held
-        +-- StaleReading    a sensor stopped delivering
+GlotouchError
++-- BadInput            the user's file, option or mesh is wrong; nothing moved     (exit 2)
+|   +-- ParamError      one named value breaks one stated rule
+|   +-- UnknownName     a name nobody registered; lists the valid ones
++-- MissionFailed       the mission ran and did not reach its goal                  (exit 1)
++-- MotionRefused       a plan that would collide or leave the joint limits; not tried
++-- BackendError        the device or simulator failed; cause chained               (exit 3)
+    +-- SafetyStop      a hard limit tripped below the skills; the arm is held
+    +-- StaleReading    a sensor stopped delivering
 """
 
 from __future__ import annotations

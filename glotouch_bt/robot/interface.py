@@ -17,7 +17,7 @@ from glotouch_bt.robot.world import World
 
 
 class Robot(ABC):
-    """An arm with a wrist force sensor and a tactile parallel gripper. As a context manager it holds the arm on leaving.
+    """An arm with a wrist force sensor and a tactile gripper. As a context manager it holds the arm on leaving.
 
     Attributes:
         description: Kinematics, inertia, limits, gripper.
