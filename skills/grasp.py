@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from glotouch_bt.robot import Pose
+from glotouch_bt.motion import Motion
+from glotouch_bt.robot import MotionRefused, Pose
+from glotouch_bt.touch import Candidate
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.grasp_plan import GraspPlan
-from skills.hand import glide, hand_pose_B
+from skills.hand import CLEARANCE_M, glide, hand_pose_B, keep_clear_of, require_clear
 
 
 class GraspParams(SkillParams):
@@ -18,49 +20,93 @@ class GraspParams(SkillParams):
     travel_speed_m_s: float = param("Speed above the objects", unit="m/s", default=0.25, gt=0.0, le=0.25)
     descent_speed_m_s: float = param("Speed down beside the object", unit="m/s", default=0.015, gt=0.0, le=0.04)
     headroom_m: float = param("Fingertips above the floor on the way", unit="m", default=0.14, ge=0.05, le=0.25)
+    side_gap_m: float = param("Least gap between open jaw and object", unit="m", default=0.005, ge=0.001, le=0.03)
     least_aperture_m: float = param("Closed farther than this: nothing held", unit="m", default=0.003, ge=0.0)
 
 
 class Grasp(Skill):
-    """Go down over the object with open jaws and close on it with limited force.
+    """Go down over the object with open jaws and close on it with limited force; try the plan's alternatives in turn.
 
     SUCCESS: the jaws stopped on something; `grip_m` is their aperture.
-    FAILURE `nothing_held`: they closed on nothing.
-    FAILURE `way_down_blocked`: the fingers stand on something; the hand has risen again.
-    FAILURE `motion_refused`: the pose cannot be reached without hitting the container.
+    FAILURE `no_grasp`: no grasp of the plan could be made: no room, the fingers stood on something on the way down,
+    or the jaws closed on nothing. The hand has risen again, jaws open.
     """
 
     Params = GraspParams
     params: GraspParams
     plan = In(GraspPlan, "where and how wide")
+    known = In(tuple, "all candidates, to keep clear of", key="candidates", element=Candidate, required=False)
     grip_m = Out(float, "aperture of the closed jaws, m")
 
     def run(self) -> SkillRun:
         """See the class."""
-        arm, p, plan = self.context.arm, self.params, self.plan
-        pose_B_K = self.context.world.container.pose_B_K
-        gripper = arm.description.gripper
-        goal = hand_pose_B(arm, self.context.world.container, plan.position_K_m, plan.yaw_rad)
-        high = np.array([*plan.position_K_m[:2], p.headroom_m + gripper.fingertip_below_P_m])
-        above = Pose(pose_B_K.apply(high), goal.quat)
-        yield from arm.jaws(min(plan.opening_m, gripper.stroke_m), speed_m_s=0.2)
+        plan = self.plan
+        others = tuple(c for c in (self.known or ()) if c.index != plan.candidate)
+        scene = self.context.arm.scene
+        obstacles = keep_clear_of(self.context.arm, others)
+        tried: list[str] = []
+        try:
+            for option in (plan, *plan.alternatives):
+                try:
+                    self.grip_m = yield from self._attempt(option)
+                    return
+                except MotionRefused as refusal:
+                    tried.append(str(refusal))
+                    self.event("note", text=f"a grasp was given up: {refusal}")
+        finally:
+            for name in obstacles:
+                scene.remove_obstacle(name)
+        raise SkillFailed(
+            "no_grasp",
+            f"none of {len(tried)} grasps could be made; the last: {tried[-1]}",
+            advice="the object or a neighbour was moved; squeeze it again",
+            grasps=len(tried),
+        )
+
+    def _attempt(self, plan: GraspPlan) -> Motion[float]:
+        """One grasp; the aperture of the closed jaws.
+
+        Raises:
+            MotionRefused: It could not be made; the hand is above the objects with open jaws.
+        """
+        arm, p = self.context.arm, self.params
+        container = self.context.world.container
+        goal = hand_pose_B(arm, container, plan.position_K_m, plan.yaw_rad)
+        high = np.array([*plan.position_K_m[:2], p.headroom_m + arm.description.gripper.fingertip_below_P_m])
+        above = Pose(container.pose_B_K.apply(high), goal.quat)
+        opening = self._opening(goal, plan)
+        yield from arm.jaws(opening, speed_m_s=0.2)
         travel_z = max(float(arm.pose_B_P.position_m[2]), float(above.position_m[2]))
         yield from arm.transit(above, height_B_m=travel_z, speed_m_s=p.travel_speed_m_s)
         if not (yield from glide(self.context, goal, p.descent_speed_m_s)):
             yield from arm.line(above, p.travel_speed_m_s, check=False)
-            raise SkillFailed(
-                "way_down_blocked",
-                "the fingers met something on the way down to the grasp",
-                advice="the object or a neighbour was moved; squeeze it again",
-            )
+            raise MotionRefused("grasp", "the fingers stood on something on the way down")
         state = yield from arm.jaws(0.0, speed_m_s=p.closing_speed_m_s, force_N=p.force_N)
         yield from arm.hold(0.1)
         self.event("grasp", aperture_m=state.aperture_m, expected_m=plan.aperture_m, force_N=state.force_N)
         if state.aperture_m < p.least_aperture_m:
-            raise SkillFailed(
-                "nothing_held",
-                f"the jaws closed to {state.aperture_m * 1e3:.1f} mm; {plan.aperture_m * 1e3:.1f} mm were expected",
-                advice="the object was moved; squeeze it again",
-                aperture_m=state.aperture_m,
+            yield from arm.jaws(opening, speed_m_s=0.2)
+            yield from arm.line(above, p.travel_speed_m_s, check=False)
+            raise MotionRefused(
+                "grasp",
+                f"the jaws closed to {state.aperture_m * 1e3:.1f} mm, {plan.aperture_m * 1e3:.1f} mm were expected",
             )
-        self.grip_m = state.aperture_m
+        return state.aperture_m
+
+    def _opening(self, goal: Pose, plan: GraspPlan) -> float:
+        """The plan's opening, or a narrower one where neighbours leave no room for it.
+
+        Raises:
+            MotionRefused: Not even the narrowest has room.
+        """
+        stroke = self.context.arm.description.gripper.stroke_m
+        widest = min(plan.opening_m, stroke)
+        narrowest = min(max(plan.aperture_m + 2 * self.params.side_gap_m, widest - 0.012), widest)
+        for opening in (widest, 0.5 * (widest + narrowest)):
+            try:
+                require_clear(self.context.arm, goal, opening, CLEARANCE_M)
+            except MotionRefused:
+                continue
+            return opening
+        require_clear(self.context.arm, goal, narrowest)
+        return narrowest

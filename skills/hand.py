@@ -11,6 +11,8 @@ from glotouch_bt.robot import Array, Container, MotionRefused, Pose
 from glotouch_bt.touch import Candidate, ContactGuard, GuardParams, envelope, fit_baseline
 from skills.base import Context
 
+CLEARANCE_M = 0.004
+"""Room kept from neighbours: they may have been pushed a few millimetres since they were traced."""
 BUMP_N = 2.5
 """Force on the fingertips that means they stand on something: above the hand's inertia, far below what harms."""
 BUMP_CUTOFF_HZ = 100.0

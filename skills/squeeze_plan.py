@@ -10,10 +10,8 @@ import numpy as np
 from glotouch_bt.motion import Arm, Motion
 from glotouch_bt.robot import HOLD, Array, Container, Gripper, MotionRefused
 from glotouch_bt.touch import Candidate
-from skills.hand import hand_pose_B, require_clear
+from skills.hand import CLEARANCE_M, hand_pose_B, require_clear
 
-CLEARANCE_M = 0.004
-"""Room kept from neighbours: they may have been pushed a few millimetres since they were traced."""
 LEAST_SIDE_GAP_M = 0.004
 TURNS_RAD = np.deg2rad([0.0, 60.0, -60.0])
 BASES_RAD = np.deg2rad([0.0, 15.0, -15.0, 30.0])

@@ -98,8 +98,7 @@ def cause(result: Mapping[str, Any]) -> str:
     if not chain:
         return str(result["status"])
     root = chain[-1]
-    reason = root.get("reason") or {}
-    return f"{reason.get('node') or root.get('node')}: {reason.get('code', 'failed')}"
+    return f"{root['node'].rsplit('/', 1)[-1]}: {root['code'] or 'failed'}"
 
 
 def run_campaign(
