@@ -17,7 +17,8 @@
             self.contact = ...
 
 `run` returns: SUCCESS. `SkillFailed` or `MotionRefused`: FAILURE with its reason. Anything else reaches the runner,
-which holds the arm. A preempted skill's generator is closed (its `finally` blocks run) and the arm is held.
+which holds the arm. A preempted skill's generator is closed (its `finally` blocks run) and the arm is held; since it
+brakes past its last setpoint, the next skill first waits for it to stand and takes up the setpoint from there.
 """
 
 from __future__ import annotations
@@ -39,6 +40,9 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 SkillRun = Generator[Command, Observation, None]
+
+REST_RAD_S, REST_PERIODS, LONGEST_BRAKING_PERIODS = 0.01, 5, 300
+"""The arm stands once every joint was this slow for so many periods; it must within the last number of them."""
 
 
 class SkillParams(BaseModel):
@@ -178,6 +182,7 @@ class Context:
         journal: The run's record.
         observation: The newest observation; set by the runner before each tick.
         command: What the active skill wants next; reset to hold by the runner before each tick.
+        preempted: A skill was broken off, and no other has made sure since that the arm stands.
     """
 
     world: World
@@ -186,6 +191,29 @@ class Context:
     journal: Journal
     observation: Observation
     command: Command = HOLD
+    preempted: bool = False
+
+
+def come_to_rest(context: Context) -> SkillRun:
+    """Hold until the braking arm stands, then plan from where it stands.
+
+    Raises:
+        SkillFailed: `not_at_rest` if it still moves after 300 control periods.
+    """
+    still = 0
+    for _ in range(LONGEST_BRAKING_PERIODS):
+        observation = yield HOLD
+        still = still + 1 if bool((abs(observation.dq) < REST_RAD_S).all()) else 0
+        if still >= REST_PERIODS:
+            context.arm.sync(observation)
+            context.preempted = False
+            return
+    raise SkillFailed(
+        "not_at_rest",
+        "the arm still moves after the skill before was broken off",
+        advice="something pushes it, or the servo does not settle",
+        joint_rad_s=float(abs(context.observation.dq).max()),
+    )
 
 
 class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: ignore[call-arg]
@@ -235,8 +263,13 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
     def initialise(self) -> None:
         """Start the body; its first command comes with the first update."""
         self.reason = None
-        self._run = self.run()
+        self._run = self._body()
         self._started = False
+
+    def _body(self) -> SkillRun:
+        if self.context.preempted:
+            yield from come_to_rest(self.context)
+        yield from self.run()
 
     def update(self) -> Status:
         """Hand the newest observation to the body, take its next command."""
@@ -262,8 +295,12 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
 
     def terminate(self, new_status: Status) -> None:
         """Close the body; a preempted skill leaves the arm holding."""
-        if self._run is not None:
-            self._run.close()
+        preempted = self._run is not None and new_status is Status.INVALID
+        try:
+            if self._run is not None:
+                self._run.close()
+        finally:
             self._run = None
-        if new_status is Status.INVALID:
-            self.context.command = HOLD
+            if new_status is Status.INVALID:
+                self.context.command = HOLD
+                self.context.preempted |= preempted

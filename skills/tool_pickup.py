@@ -9,6 +9,7 @@ import numpy as np
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Pose, SetPayload, Tare
 from glotouch_bt.touch import GuardParams
+from skills.allowance import may_touch
 from skills.base import Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.hand import easy_yaw
 from skills.held_tool import HeldTool
@@ -17,6 +18,9 @@ from skills.requests import finish
 
 FLOOR_SEARCH_M = 0.005
 """The floor is looked for this far below where the registration puts it."""
+HANDLE_TOLERANCE_M = 0.004
+"""The jaws hold the handle if they are this near to its width: twice the largest bias of their report, and its give."""
+GRAVITY_M_S2 = 9.81
 
 
 class ToolPickupParams(SkillParams):
@@ -32,9 +36,13 @@ class ToolPickupParams(SkillParams):
 class ToolPickup(Skill):
     """Grasp the probe in its holder, draw it out, tell the controller its weight, tare, and touch the floor.
 
+    Started with the probe in the jaws (it was broken off before), it goes on from there and never lets go of it.
+
     SUCCESS: the probe is held and its floor height is known.
     FAILURE `no_probe`: the jaws closed on nothing (or on something of another width).
     FAILURE `probe_not_lifted`: the hand came up without the probe's weight.
+    FAILURE `no_floor`: the ball met nothing where the container's floor should be; the probe is held.
+    FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
     FAILURE `motion_refused`: the holder cannot be reached.
     """
 
@@ -45,41 +53,22 @@ class ToolPickup(Skill):
     def run(self) -> SkillRun:
         """See the class."""
         arm, world, p = self.context.arm, self.context.world, self.params
-        stowed = world.holder.pose_B_grasp
-        yaw = easy_yaw(arm, stowed.yaw_rad)
-        grasp = Pose.pointing_down(stowed.position_m, yaw)
-        probe, gripper = world.probe, arm.description.gripper
-        opening = min(probe.handle_m[1] + 0.03, gripper.stroke_m)
-        above = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, 0.06]))
-
-        yield from arm.jaws(opening, speed_m_s=0.15)
-        yield from arm.transit(
-            above, height_B_m=max(above.position_m[2], arm.pose_B_P.position_m[2]), speed_m_s=p.free_speed_m_s
-        )
-        yield from finish(self.context.requests.start(Tare()), "tare")
-        arm.scene.allow("hand", "probe")
-        arm.scene.allow("hand", "holder")
-        yield from arm.line(grasp, 0.05)
-        state = yield from arm.jaws(0.0, speed_m_s=0.04, force_N=p.grip_N)
-        if abs(state.aperture_m - probe.handle_m[1]) > 0.004:
-            yield from arm.jaws(opening, speed_m_s=0.1)
-            yield from arm.line(above, 0.05)
-            raise SkillFailed(
-                "no_probe",
-                f"the jaws closed to {state.aperture_m * 1e3:.1f} mm, the handle is {probe.handle_m[1] * 1e3:.1f}",
-                advice="check that the probe stands in its holder and that the holder's pose is right",
-                aperture_m=state.aperture_m,
-            )
-        arm.scene.hold_tool(True)
-        out_of_hole = probe.length_m + 0.06
-        yield from arm.shift(np.array([0.0, 0.0, out_of_hole]), p.speed_m_s, check=False)
-        arm.scene.disallow("hand", "holder")
-        arm.scene.disallow("hand", "probe")
-        weight_N = yield from self._weight_N()
-        if weight_N < 0.5 * probe.mass_kg * 9.81:
+        probe = world.probe
+        weight_N = probe.mass_kg * GRAVITY_M_S2
+        if arm.scene.holding_tool and self._handle_wide(arm.aperture_m):
+            aperture, yaw = arm.aperture_m, arm.pose_B_P.yaw_rad
+            yield from self._rise(float(world.holder.pose_B_grasp.position_m[2] - arm.pose_B_P.position_m[2]))
+        else:
+            arm.scene.hold_tool(False)
+            yaw = easy_yaw(arm, world.holder.pose_B_grasp.yaw_rad)
+            aperture = yield from self._grip(yaw)
+            yield from self._rise(0.0)
+            weight_N = yield from self._weight_N()
+        if weight_N < 0.5 * probe.mass_kg * GRAVITY_M_S2:
+            arm.scene.hold_tool(False)
             raise SkillFailed(
                 "probe_not_lifted",
-                f"the hand carries {weight_N:.2f} N; the probe weighs {probe.mass_kg * 9.81:.2f} N",
+                f"the hand carries {weight_N:.2f} N; the probe weighs {probe.mass_kg * GRAVITY_M_S2:.2f} N",
                 advice="raise grip_N, or check the handle",
                 weight_N=weight_N,
             )
@@ -91,7 +80,7 @@ class ToolPickup(Skill):
             tip_P_m=np.array([0.0, 0.0, probe.grasp_to_tip_m]),
             tip_radius_m=probe.tip_radius_m,
             shaft_radius_m=0.5 * probe.shaft_diameter_m,
-            aperture_m=state.aperture_m,
+            aperture_m=aperture,
             yaw_B_rad=yaw,
         )
         if p.floor_touch:
@@ -100,6 +89,43 @@ class ToolPickup(Skill):
             "tool", held=True, grasp_to_tip_m=probe.grasp_to_tip_m, floor_z_K_m=tool.floor_z_K_m, weight_N=weight_N
         )
         self.tool = tool
+
+    def _handle_wide(self, aperture_m: float) -> bool:
+        """True if the jaws are as far apart as the handle is wide."""
+        return abs(aperture_m - self.context.world.probe.handle_m[1]) <= HANDLE_TOLERANCE_M
+
+    def _grip(self, yaw_B_rad: float) -> Motion[float]:
+        """Go down over the stowed probe with open jaws and close them on its handle; their aperture."""
+        arm, world, p = self.context.arm, self.context.world, self.params
+        grasp = Pose.pointing_down(world.holder.pose_B_grasp.position_m, yaw_B_rad)
+        above = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, 0.06]))
+        handle = world.probe.handle_m[1]
+        opening = min(handle + 0.03, arm.description.gripper.stroke_m)
+        yield from arm.jaws(opening, speed_m_s=0.15)
+        yield from arm.transit(
+            above, height_B_m=max(above.position_m[2], arm.pose_B_P.position_m[2]), speed_m_s=p.free_speed_m_s
+        )
+        yield from finish(self.context.requests.start(Tare()), "tare")
+        with may_touch(arm, "hand", "probe", "holder"):
+            yield from arm.line(grasp, 0.05)
+            state = yield from arm.jaws(0.0, speed_m_s=0.04, force_N=p.grip_N)
+            if not self._handle_wide(state.aperture_m):
+                yield from arm.jaws(opening, speed_m_s=0.1)
+                yield from arm.line(above, 0.05)
+                raise SkillFailed(
+                    "no_probe",
+                    f"the jaws closed to {state.aperture_m * 1e3:.1f} mm, the handle is {handle * 1e3:.1f}",
+                    advice="check that the probe stands in its holder and that the holder's pose is right",
+                    aperture_m=state.aperture_m,
+                )
+        arm.scene.hold_tool(True)
+        return state.aperture_m
+
+    def _rise(self, short_m: float) -> Motion[None]:
+        """Straight up until the ball is well above the holder, from `short_m` below the stowed probe's grasp."""
+        up = self.context.world.probe.length_m + 0.06 + short_m
+        if up > 1e-4:
+            yield from self.context.arm.shift(np.array([0.0, 0.0, up]), self.params.speed_m_s, check=False)
 
     def _weight_N(self) -> Motion[float]:
         blocks = yield from self.context.arm.hold(0.2)
@@ -118,15 +144,14 @@ class ToolPickup(Skill):
         yield from prober.hop(np.array([*corner, 0.0]), max(high, float(prober.tip_K_m[2])), p.speed_m_s)
         near = 0.02
         yield from self.context.arm.line(tool.pose_B_P(world, np.array([*corner, near])), p.speed_m_s)
-        self.context.arm.scene.allow("tool", "floor")
-        probed = yield from prober.move(np.array([*corner, tool.tip_radius_m - FLOOR_SEARCH_M]), 0.01)
-        if probed.contact is None:
-            raise SkillFailed(
-                "no_floor",
-                f"the ball met no floor {FLOOR_SEARCH_M * 1e3:.0f} mm below where the registration puts it",
-                advice="check the container's pose and that the probe is held by its handle",
-            )
-        floor_z = float(probed.contact.tip_K_m[2]) - tool.tip_radius_m
-        yield from prober.retreat(np.array([0.0, 0.0, 1.0]), 0.01, 0.05)
-        self.context.arm.scene.disallow("tool", "floor")
+        with may_touch(self.context.arm, "tool", "floor"):
+            probed = yield from prober.move(np.array([*corner, tool.tip_radius_m - FLOOR_SEARCH_M]), 0.01)
+            if probed.contact is None:
+                raise SkillFailed(
+                    "no_floor",
+                    f"the ball met no floor {FLOOR_SEARCH_M * 1e3:.0f} mm below where the registration puts it",
+                    advice="check the container's pose and that the probe is held by its handle",
+                )
+            floor_z = float(probed.contact.tip_K_m[2]) - tool.tip_radius_m
+            yield from prober.retreat(np.array([0.0, 0.0, 1.0]), 0.01, 0.05)
         return dataclasses.replace(tool, floor_z_K_m=floor_z)

@@ -22,7 +22,10 @@ class ToolReturnParams(SkillParams):
 class ToolReturn(Skill):
     """Carry the probe over its holder, lower it in, open the jaws, rise, and tare the empty hand.
 
+    The probe is let go of nowhere but in the holder, also when the skill is broken off.
+
     SUCCESS: the jaws are empty and above the holder.
+    FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
     FAILURE `motion_refused`: the holder cannot be reached from here.
     """
 
@@ -40,9 +43,9 @@ class ToolReturn(Skill):
         height = max(float(arm.pose_B_P.position_m[2]), float(above.position_m[2]))
         yield from arm.transit(above, height_B_m=height, speed_m_s=p.speed_m_s)
         yield from arm.line(grasp, p.insert_speed_m_s, check=False)
-        arm.scene.hold_tool(False)
         opening = min(self.tool.aperture_m + 0.03, arm.description.gripper.stroke_m)
         yield from arm.jaws(opening, speed_m_s=0.08)
+        arm.scene.hold_tool(False)
         yield from arm.shift(np.array([0.0, 0.0, 0.08]), 0.08, check=False)
         yield from finish(self.context.requests.start(SetPayload(0.0, np.zeros(3))), "payload")
         yield from arm.hold(0.2)
