@@ -26,7 +26,7 @@ from glotouch_bt.robot import (
 )
 from glotouch_bt.robot.referee import Referee
 
-OPTIONS = ("layout",)
+OPTIONS = ("layout", "trace")
 SETTLE_S = 0.6
 START_APERTURE_M = 0.040
 Layout = dict[str, tuple[float, float, float]]
@@ -45,6 +45,15 @@ def _read_layout(value: object) -> Layout:
             raise ParamError(f"option layout[{name}]", place, rule) from e
         places[str(name)] = (x, y, yaw)
     return places
+
+
+def _read_trace(value: object) -> bool:
+    """Option `trace`: remember every control, for `Referee.replay_bare_steps`."""
+    words = {"true": True, "false": False}
+    found = value if isinstance(value, bool) else words.get(str(value).lower())
+    if found is None:
+        raise ParamError("option trace", value, "true or false")
+    return found
 
 
 def _settle(model: mujoco.MjModel, data: mujoco.MjData, handles: Handles, description: RobotDescription) -> None:
@@ -77,11 +86,16 @@ class MujocoBackend(Backend):
         self._description, self._limits = description, limits or Limits()
 
     def open(self, world: World, conditions: Conditions, seed: int, options: Mapping[str, object]) -> Robot:
-        """See `Backend`. Options: `layout`, {object: (x m, y m, yaw rad)} in K, instead of a random layout."""
+        """See `Backend`.
+
+        Options: `layout`, {object: (x m, y m, yaw rad)} in K, instead of a random layout; `trace` (true or false),
+        remember every control so that the referee can repeat the bare steps (some 80 kB a second of robot time).
+        """
         for option in options:
             if option not in OPTIONS:
                 raise UnknownName("option of backend mujoco", option, OPTIONS)
         layout = _read_layout(options["layout"]) if "layout" in options else None
+        traced = _read_trace(options.get("trace", False))
         silence_mujoco()
         truth = draw_truth(world, conditions, seed, layout)
         model, handles = compile_world(self._description, world, truth)
@@ -90,7 +104,9 @@ class MujocoBackend(Backend):
             _settle(model, data, handles, self._description)
         except mujoco.FatalError as e:
             raise BackendError(f"MuJoCo failed while the world {world.name!r} settled: {e}") from e
-        return MujocoRobot(self._description, self._limits, world, truth, model, data, handles, conditions, seed)
+        return MujocoRobot(
+            self._description, self._limits, world, truth, model, data, handles, conditions, seed, traced
+        )
 
     def referee(self, robot: Robot) -> Referee | None:
         """See `Backend`."""

@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull
 from backends.mujoco.robot import MujocoRobot
 from backends.mujoco.tactile import body_pose
 from glotouch_bt.robot import Array, Pose
-from glotouch_bt.robot.referee import TrueObject
+from glotouch_bt.robot.referee import BareSteps, TrueObject
 
 STOWED_M = 0.005  # the handle's centre this near its place in the stand
 STOWED_TILT = 0.996  # cosine of 5 degrees
@@ -55,6 +55,11 @@ class MujocoReferee:
     def peak_force_N(self) -> float:
         """Largest true contact force on the hand and on the probe it holds, so far."""
         return self._robot.peak_force_N
+
+    def replay_bare_steps(self) -> BareSteps | None:
+        """The run's steps once more; None unless the backend's option `trace` was on."""
+        trace = self._robot.trace
+        return None if trace is None else trace.replay(self._robot.data)
 
     def _touching(self) -> dict[int, set[int]]:
         """Bodies in contact with each geom."""

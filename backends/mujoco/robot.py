@@ -14,6 +14,7 @@ from backends.mujoco.requests import PAYLOAD_S, PendingPayload, PendingTare
 from backends.mujoco.safety import CHUNK, Guard, check_sane
 from backends.mujoco.servo import Servo
 from backends.mujoco.tactile import Tactile
+from backends.mujoco.trace import Trace
 from backends.mujoco.truth import Truth
 from backends.mujoco.wrench import GRAVITY_M_S2, WristSensor
 from glotouch_bt.robot import (
@@ -50,6 +51,7 @@ class MujocoRobot(Robot):
         handles: Handles,
         conditions: Conditions,
         seed: int,
+        traced: bool = False,
     ) -> None:
         self.description, self.limits, self.period_s = description, limits, STEPS * STEP_S
         self.world, self.truth = world, truth
@@ -81,7 +83,8 @@ class MujocoRobot(Robot):
         # Views of one step each, made once: the loop round mj_step only copies.
         rows = list(zip(self._ctrl, self._samples, self._external, strict=True))
         wrenches = self._samples[:, s.force.start : s.torque.stop]
-        self._chunks = [(rows[i : i + CHUNK], wrenches[i : i + CHUNK]) for i in range(0, STEPS, CHUNK)]
+        chunks = [slice(i, i + CHUNK) for i in range(0, STEPS, CHUNK)]
+        self._chunks = [(self._ctrl[c], rows[c], wrenches[c]) for c in chunks]
         self._ctrl_now, self._sensed = data.ctrl, data.sensordata
         self._external_now = data.cfrc_ext[handles.held_bodies, 3:]
         self._counted = np.array([1.0, 1.0, 1.0, 0.0])
@@ -96,6 +99,8 @@ class MujocoRobot(Robot):
         self._failed: BackendError | None = None
         self._closed = False
         self.peak_force_N = 0.0
+
+        self.trace = Trace(model, data) if traced else None
 
         self._samples[:] = data.sensordata
         self._wrist.fill(-self._samples[0, s.force.start : s.torque.stop])
@@ -177,7 +182,10 @@ class MujocoRobot(Robot):
         """Ten steps, looking at the wrench after each chunk."""
         model, data, step = self.model, self.data, mujoco.mj_step
         ctrl_now, sensed, external_now = self._ctrl_now, self._sensed, self._external_now
-        for rows, wrenches in self._chunks:
+        trace = self.trace
+        for controls, rows, wrenches in self._chunks:
+            if trace is not None:
+                trace.add(controls, model.actuator_forcerange)
             for ctrl, sample, external in rows:
                 ctrl_now[:] = ctrl
                 step(model, data)

@@ -27,6 +27,21 @@ class TrueObject:
     in_gripper: bool
 
 
+@dataclass(frozen=True)
+class BareSteps:
+    """The physics of a run done once more with nothing round it.
+
+    Attributes:
+        steps: Solver steps.
+        wall_s: What they took.
+        same_end_state: They ended bit for bit where the run ended, so that nothing but its controls moved the world.
+    """
+
+    steps: int
+    wall_s: float
+    same_end_state: bool
+
+
 class Referee(Protocol):
     """What a simulation backend offers to those who score a run."""
 
@@ -48,4 +63,8 @@ class Referee(Protocol):
 
     def peak_force_N(self) -> float:
         """Largest norm of the true contact force on the hand and what it holds, so far."""
+        ...
+
+    def replay_bare_steps(self) -> BareSteps | None:
+        """Repeat the run's physics in a copy of the world; None unless the backend was opened with `trace`."""
         ...
