@@ -11,6 +11,9 @@ from skills.base import In, Skill, SkillParams, SkillRun, param
 from skills.held_tool import HeldTool
 from skills.requests import finish
 
+OVER_HOLDER_M = 0.002
+"""This near to the holder's axis the probe is in it, or on its way in (the skill was broken off there)."""
+
 
 class ToolReturnParams(SkillParams):
     """Parameters of `tool_return`."""
@@ -40,8 +43,10 @@ class ToolReturn(Skill):
         above = dataclasses.replace(
             grasp, position_m=grasp.position_m + np.array([0.0, 0.0, world.probe.length_m + 0.06])
         )
-        height = max(float(arm.pose_B_P.position_m[2]), float(above.position_m[2]))
-        yield from arm.transit(above, height_B_m=height, speed_m_s=p.speed_m_s)
+        here = arm.pose_B_P.position_m
+        if here[2] > above.position_m[2] or np.linalg.norm(here[:2] - above.position_m[:2]) > OVER_HOLDER_M:
+            height = max(float(here[2]), float(above.position_m[2]))
+            yield from arm.transit(above, height_B_m=height, speed_m_s=p.speed_m_s)
         yield from arm.line(grasp, p.insert_speed_m_s, check=False)
         opening = min(self.tool.aperture_m + 0.03, arm.description.gripper.stroke_m)
         yield from arm.jaws(opening, speed_m_s=0.08)

@@ -1,0 +1,263 @@
+"""A bench for skills: the runner's tick without a tree, on a fake robot that brakes and feels what a test says."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from py_trees.blackboard import Blackboard
+from py_trees.common import Status
+
+from backends.rizon4 import RIZON4_XENSE
+from glotouch_bt.motion import Arm
+from glotouch_bt.robot import (
+    HOLD,
+    Array,
+    Command,
+    Container,
+    Holder,
+    JointSetpoint,
+    ObjectSet,
+    Observation,
+    Pose,
+    Probe,
+    Robot,
+    World,
+)
+from glotouch_bt.robot.fake import FakeRobot, forward
+from skills.base import Context, Skill
+from skills.held_tool import HeldTool
+
+BRAKE_RAD_S2 = 2.5
+JUMP_RAD_S = 0.3  # a setpoint's velocity may change by this in a period; the hardest stop changes it by 0.05
+STIFFNESS_N_M = 3000.0
+_spaces = itertools.count()
+
+Thing = Callable[[Array, float], Array]  # (n, 3) ball centres in K, ball radius -> (n, 3) force in K
+
+
+def floor(top_m: float = 0.0) -> Thing:
+    """An elastic floor."""
+
+    def force(ball: Array, radius: float) -> Array:
+        out = np.zeros_like(ball)
+        out[:, 2] = STIFFNESS_N_M * np.maximum(top_m + radius - ball[:, 2], 0.0)
+        return out
+
+    return force
+
+
+def post(centre_m: tuple[float, float], radius_m: float, top_m: float) -> Thing:
+    """An elastic upright cylinder that pushes the ball out the nearest way: sideways, or up."""
+
+    def force(ball: Array, radius: float) -> Array:
+        out = np.zeros_like(ball)
+        offset = ball[:, :2] - centre_m
+        away = np.linalg.norm(offset, axis=1)
+        side, above = radius_m + radius - away, top_m + radius - ball[:, 2]
+        inside = (side > 0) & (above > 0)
+        up = inside & (above < side)
+        out[up, 2] = STIFFNESS_N_M * above[up]
+        out_of = inside & ~up
+        out[out_of, :2] = STIFFNESS_N_M * (side / np.maximum(away, 1e-9))[out_of, None] * offset[out_of]
+        return out
+
+    return force
+
+
+class BenchRobot(FakeRobot):
+    """Brakes along its way when it is told to hold, and lets no setpoint jump, as real arms do.
+
+    Args:
+        world: Its container and probe.
+        things: What the ball (at `tip_P_m`) touches.
+        weight_N: Weight in the hand for a position (3,) of P in B and an aperture, m.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        things: Sequence[Thing] = (),
+        weight_N: Callable[[Array, float], float] = lambda position, aperture: 0.0,
+        tip_P_m: float = 0.13,
+        grip_width_m: float | None = None,
+    ) -> None:
+        self.world, self.things, self.weight_N, self.tip_P_m = world, things, weight_N, tip_P_m
+        self.speed_rad_s = np.zeros(7)
+        super().__init__(RIZON4_XENSE, wrench=self._all_felt, grip_width_m=grip_width_m)
+
+    def cycle(self, command: Command) -> Observation:
+        q, v, dt = self.observe().q[-1], self.speed_rad_s, self.period_s
+        if command.motion is not None:
+            self.speed_rad_s = (np.asarray(command.motion.q) - q) / dt
+            jump = float(np.abs(self.speed_rad_s - v).max())
+            assert jump < JUMP_RAD_S, f"the setpoint jumps by {jump:.2f} rad/s in one period"
+        elif v.any():
+            slower = v * max(0.0, 1.0 - BRAKE_RAD_S2 * dt / float(np.abs(v).max()))
+            q = q + 0.5 * dt * (v + slower)
+            self.speed_rad_s = slower
+            setpoint = JointSetpoint(q, slower, np.zeros(7), forward(self.description, q))
+            command = Command(setpoint, command.gripper, command.tactile)
+        return super().cycle(command)
+
+    def _all_felt(self, stamp: Array, position: Array, quat: Array) -> Array:
+        pose, K = Pose(position[-1], quat[-1]), self.world.container.pose_B_K
+        tip_P = np.array([0.0, 0.0, self.tip_P_m])
+        ball = K.inverse().apply(position + pose.rotation @ tip_P)
+        force_B = sum((t(ball, 0.006) for t in self.things), np.zeros_like(ball)) @ K.rotation.T
+        contact = force_B @ pose.rotation
+        lever = self.description.gripper.pose_E_P.apply(tip_P)
+        down_S = pose.rotation.T @ np.array([0.0, 0.0, -1.0])
+        weight = np.array([self.weight_N(p, self._aperture) for p in position])[:, None] * down_S
+        return np.hstack([contact + weight, np.cross(lever, contact)])
+
+
+class Bench:
+    """One skill at a time on one robot, ticked as the runner does."""
+
+    def __init__(self, world: World, robot: Robot) -> None:
+        self.world, self.robot = world, robot
+        self.arm = Arm(robot.description, robot.limits, world, robot.period_s)
+        self.arm.sync(robot.observe())
+        self.events: list[tuple[str, Mapping[str, Any]]] = []
+        self.context = Context(world, self.arm, robot, self, robot.observe())
+        self.commands: list[Command] = []
+
+    def event(self, kind: str, stamp_s: float, data: Mapping[str, object]) -> None:
+        self.events.append((kind, data))
+
+    def of_kind(self, kind: str) -> list[Mapping[str, Any]]:
+        """Data of the events of one kind."""
+        return [d for k, d in self.events if k == kind]
+
+    def make(self, skill: type[Skill], *, inputs: Mapping[str, object] | None = None, **params: object) -> Skill:
+        """A skill wired to keys of its own."""
+        space = f"/bench{next(_spaces)}"
+        made = skill("skill", skill.Params(**params), self.context)
+        keys = skill.default_keys()
+        made.setup_ports({p: f"{space}/{k}" for p, k in keys.items()})
+        for port, value in (inputs or {}).items():
+            Blackboard.set(f"{space}/{keys[port]}", value)
+        return made
+
+    def tick(self, skill: Skill) -> Status:
+        """One tick, and one control period if the skill goes on."""
+        self.context.command = HOLD
+        skill.tick_once()
+        if skill.status is Status.RUNNING:
+            self.pass_time(self.context.command)
+        return skill.status
+
+    def pass_time(self, command: Command = HOLD) -> None:
+        self.commands.append(command)
+        self.context.observation = self.robot.cycle(command)
+
+    def run(self, skill: Skill, ticks: int = 30_000) -> int:
+        """Tick to the end, or `ticks` times; how many ticks it took."""
+        for n in range(ticks):
+            if self.tick(skill) is not Status.RUNNING:
+                return n + 1
+        return ticks
+
+    def go(self, motion: Any) -> Any:
+        """Drive one motion generator to its end."""
+        try:
+            command = next(motion)
+            while True:
+                self.pass_time(command)
+                command = motion.send(self.context.observation)
+        except StopIteration as end:
+            return end.value
+
+    def preempt(self, skill: Skill) -> None:
+        """Break the skill off in mid-tick, as a timeout does, and see that it left everything as it must."""
+        scene = self.arm.scene
+        self.context.command = HOLD
+        skill.tick_once()
+        if skill.status is not Status.RUNNING:
+            return
+        skill.stop(Status.INVALID)
+        assert self.context.command is HOLD
+        assert not [o for o in scene.obstacles if o.startswith("candidate")]
+        assert not scene._allowed
+        speed = float(np.abs(self.context.observation.dq[-1]).max())
+        before = self.context.observation
+        periods = 0
+        while periods < 200:
+            self.pass_time(self.context.command)
+            periods += 1
+            if np.abs(self.context.observation.dq).max() < 1e-3:
+                break
+        assert periods < 200, "the arm does not come to rest"
+        # An even deceleration of all joints takes max|dq| / a, in which P goes half as far as at its first speed.
+        v = float(np.linalg.norm(before.position_B_P[-1] - before.position_B_P[-2])) / 1e-3
+        way = float(np.linalg.norm(self.context.observation.position_B_P[-1] - before.position_B_P[-1]))
+        longest = 1.1 * 0.5 * v * speed / BRAKE_RAD_S2 + v * self.robot.period_s + 1e-3
+        assert way <= longest, f"stopped after {way * 1e3:.1f} mm from {v:.3f} m/s, {speed:.2f} rad/s"
+
+
+@pytest.fixture(scope="session")
+def things() -> SimpleNamespace:
+    """What can stand in the container: `floor(top_m)`, `post(centre_m, radius_m, top_m)`."""
+    return SimpleNamespace(floor=floor, post=post)
+
+
+Make = Callable[[], tuple[Bench, Skill]]
+
+
+@pytest.fixture(scope="session")
+def preempt_all_along() -> Callable[..., None]:
+    """Break a skill off at points spread over its run, a fresh bench each; it must be startable again."""
+
+    def check(
+        make: Make,
+        points: int,
+        *,
+        finish: bool = True,
+        after: Callable[[Bench], None] = lambda bench: None,
+    ) -> None:
+        bench, skill = make()
+        total = bench.run(skill)
+        assert skill.status is Status.SUCCESS, skill.feedback_message
+        for k in np.linspace(1, total - 2, points).astype(int):
+            bench, skill = make()
+            bench.run(skill, int(k))
+            bench.preempt(skill)
+            after(bench)
+            bench.run(skill, 30_000 if finish else 60)
+            if finish:
+                assert skill.status is Status.SUCCESS, f"broken off at tick {k}: {skill.feedback_message}"
+
+    return check
+
+
+@pytest.fixture(scope="session")
+def world(tmp_path_factory: pytest.TempPathFactory) -> World:
+    return World(
+        name="bench",
+        container=Container(pose_B_K=Pose(np.array([0.6, 0.0, -0.2])), interior_m=(0.30, 0.40, 0.08)),
+        probe=Probe(),
+        holder=Holder(pose_B_grasp=Pose.pointing_down((0.45, -0.32, -0.06), np.pi)),
+        objects=ObjectSet(folder=Path(tmp_path_factory.mktemp("objects"))),
+    )
+
+
+@pytest.fixture
+def bench(world: World) -> Iterator[Callable[..., Bench]]:
+    """Makes a bench; keywords as of `BenchRobot`."""
+    yield lambda **keywords: Bench(world, BenchRobot(world, **keywords))
+    Blackboard.clear()
+
+
+@pytest.fixture
+def tool(world: World) -> HeldTool:
+    """The probe perfectly grasped, at the yaw of the hand at home."""
+    probe = world.probe
+    home_yaw = forward(RIZON4_XENSE, np.array(RIZON4_XENSE.home_q)).yaw_rad
+    tip = np.array([0.0, 0.0, probe.grasp_to_tip_m])
+    return HeldTool(tip, probe.tip_radius_m, 0.5 * probe.shaft_diameter_m, probe.handle_m[1], home_yaw)
