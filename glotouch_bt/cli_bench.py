@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
+from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
@@ -74,3 +75,50 @@ def retrieve(
         sys.stdout.write(json.dumps(summary, indent=2) + "\n")
     else:
         console.print_retrieve(summary, campaign.out)
+
+
+@bench.command()
+@guarded
+def speed(
+    mission: Annotated[str, typer.Option(help="the mission to time")] = "retrieve",
+    set_: Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="a mission parameter")] = None,
+    trials: Annotated[int, typer.Option(min=1, help="seeds")] = 10,
+    seed: Seed = 0,
+    conditions: Conditions = "nominal",
+    objects: Objects = None,
+    backend: Annotated[str, typer.Option(help="a registered simulation backend")] = "mujoco",
+    out: Out = None,
+    json_: Json = False,
+) -> None:
+    """A mission's wall time against its simulated time, and against its bare solver steps."""
+    from glotouch_bt import console
+    from glotouch_bt.robot import BadInput
+    from glotouch_bt.study.speed import SpeedStudy, run_study
+
+    settings = {}
+    for item in set_ or []:
+        name, equals, value = item.partition("=")
+        if not equals or not name.strip():
+            raise BadInput(f"--set {item}: must be NAME=VALUE")
+        settings[name.strip()] = value
+    study = SpeedStudy(
+        mission=mission,
+        settings=settings,
+        seeds=tuple(range(seed, seed + trials)),
+        conditions=conditions,
+        objects=objects,
+        backend=backend,
+        out=_folder(out, "speed"),
+    )
+
+    def show(row: Mapping[str, Any], done: int, total: int) -> None:
+        sys.stderr.write(
+            f"[{done}/{total}] seed {row['seed']}: {row['status']}, {row['sim_s']:.0f} s in {row['wall_s']:.1f} s "
+            f"({row['realtime_factor']:.1f}x), {row['over_physics']:.2f}x the bare steps\n"
+        )
+
+    summary = run_study(study, show)
+    if json_:
+        sys.stdout.write(json.dumps(summary, indent=2) + "\n")
+    else:
+        console.print_speed(summary, study.out)

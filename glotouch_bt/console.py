@@ -162,3 +162,53 @@ def print_retrieve(summary: dict[str, Any], folder: Path) -> None:
         f"robot time {summary['sim_s']['mean']:.0f} s, wall {summary['wall_s']['mean']:.0f} s a mission; "
         f"largest peak force {summary['largest_peak_force_N']:.1f} N\n{folder / 'summary.json'}"
     )
+
+
+def print_speed(summary: dict[str, Any], folder: Path) -> None:
+    """The tables of a speed study: factors with their range, cycle times, where a mission's wall time goes."""
+
+    def span(key: str) -> str:
+        r = summary[key]
+        return f"{r['median']:.2f} [{r['min']:.2f}, {r['max']:.2f}]"
+
+    def verdict(key: str) -> str:
+        goal = summary["targets"][key]
+        bound = f">= {goal['least']:g}" if "least" in goal else f"<= {goal['most']:g}"
+        return f"{bound}: {'met' if goal['met'] else 'NOT met'}"
+
+    seeds = summary["seeds"]
+    rows = [
+        ("simulated time / wall time", span("realtime_factor"), verdict("realtime_factor")),
+        ("wall time / bare steps", span("over_physics"), verdict("over_physics")),
+        ("simulated time / bare steps", span("bare_factor"), ""),
+    ]
+    title = f"speed of {summary['mission']}, {summary['conditions']}, seeds {seeds[0]}-{seeds[-1]}"
+    print_table(title, ("", "median [min, max]", "target"), rows)
+    cycles = [
+        (name, *(f"{summary[key][p]:.0f}" for p in ("p50", "p99", "max")))
+        for name, key in (
+            ("whole control cycle", "control_cycle_us"),
+            ("Robot.cycle", "robot_cycle_us"),
+            ("tick of the tree", "tick_us"),
+            ("record", "record_us"),
+        )
+    ]
+    print_table("one control cycle, us", ("", "p50", "p99", "max"), cycles)
+    names = {
+        "physics": "bare solver steps",
+        "robot": "rest of Robot.cycle",
+        "tree": "tree: skills, motion, touch, matching",
+        "record": "record",
+        "rest": "rest of the loop",
+    }
+    wall = summary["wall_s"]
+    parts = [(names[k], f"{s:.2f}", f"{100 * s / wall:.0f} %") for k, s in summary["breakdown_s"].items()]
+    parts += [(f"  tree: {k}", f"{s:.2f}", f"{100 * s / wall:.0f} %") for k, s in summary["leaves_s"].items()]
+    print_table(f"a mission's {wall:.1f} s, mean", ("", "s", "share"), parts)
+    same = "every replay ended in the same state" if summary["same_end_state"] else "a REPLAY ENDED ELSEWHERE"
+    Console().print(
+        f"not in the wall time: opening {summary['open_s']:.1f} s, report {summary['report_s']:.1f} s\n"
+        f"{same}; {summary['succeeded']} of {len(seeds)} missions succeeded\n{folder / 'summary.json'}",
+        highlight=False,
+        soft_wrap=True,
+    )
