@@ -9,7 +9,7 @@ import numpy as np
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.search import SearchMap
-from glotouch_bt.touch import Candidate, Contact, Contour, GuardParams, contour_quality, fit_contour
+from glotouch_bt.touch import Candidate, Contact, Contour, GuardParams, contour_quality, envelope, fit_contour
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.held_tool import HeldTool
 from skills.probing import Probed, Prober
@@ -119,7 +119,7 @@ class OrbitProbe(Skill):
             contacts=tuple(trace.contacts),
         )
         self.event("candidate", candidate=candidate)
-        belief = belief.with_exclusion(contour, self.params.exclusion_m + max(0.0, float(contour.residuals_m.max())))
+        belief = belief.with_exclusion(envelope(candidate), self.params.exclusion_m)
         self.map, self.candidates = belief, (*known, candidate)
         self.found, self.complete = len(known) + 1, belief.complete
 
