@@ -30,6 +30,7 @@ from glotouch_bt.robot import (
     World,
 )
 from glotouch_bt.robot.fake import FakeRobot, forward
+from glotouch_bt.touch import Candidate, Contact, Contour, fit_contour
 from skills.base import Context, Skill
 from skills.held_tool import HeldTool
 
@@ -261,3 +262,50 @@ def tool(world: World) -> HeldTool:
     home_yaw = forward(RIZON4_XENSE, np.array(RIZON4_XENSE.home_q)).yaw_rad
     tip = np.array([0.0, 0.0, probe.grasp_to_tip_m])
     return HeldTool(tip, probe.tip_radius_m, 0.5 * probe.shaft_diameter_m, probe.handle_m[1], home_yaw)
+
+
+def traced(index: int, outline_K_m: Array, height_m: float) -> Candidate:
+    """A candidate as tracing an outline (n, 2) gives it: the ball met it at each point from outside."""
+    middle = outline_K_m.mean(axis=0)
+    contacts = []
+    for point in outline_K_m:
+        out = (point - middle) / np.linalg.norm(point - middle)
+        flat = np.array([*out, 0.0])
+        contacts.append(Contact(0.0, np.array([*(point + 0.006 * out), 0.018]), -flat, flat, point, 1.0))
+    contour = fit_contour(np.array([c.tip_K_m[:2] for c in contacts]), 0.006)
+    return Candidate(index, contour, height_m, 1.0, tuple(contacts))
+
+
+def round_thing(centre_m: tuple[float, float], radius_m: float, height_m: float = 0.06, index: int = 0) -> Candidate:
+    a = np.linspace(0.0, 2 * np.pi, 16, endpoint=False)
+    return traced(index, np.array(centre_m) + radius_m * np.column_stack([np.cos(a), np.sin(a)]), height_m)
+
+
+def box_thing(
+    centre_m: tuple[float, float],
+    size_m: tuple[float, float],
+    yaw_rad: float = 0.0,
+    height_m: float = 0.06,
+    index: int = 0,
+) -> Candidate:
+    """A box traced face by face (its contour is given, not fitted: contacts on faces push straight outwards)."""
+    l, s = 0.5 * size_m[0], 0.5 * size_m[1]
+    u = np.linspace(-0.9, 0.9, 5)
+    sides = [((u * l, np.full(5, e * s)), (0.0, e)) for e in (1, -1)] + [
+        ((np.full(5, e * l), u * s), (e, 0.0)) for e in (1, -1)
+    ]
+    turn = np.array([[np.cos(yaw_rad), -np.sin(yaw_rad)], [np.sin(yaw_rad), np.cos(yaw_rad)]])
+    contacts = []
+    for (x, y), out in sides:
+        for p in np.column_stack([x, y]):
+            point, normal = turn @ p + centre_m, np.array([*(turn @ out), 0.0])
+            tip = np.array([*(point + 0.006 * normal[:2]), 0.018])
+            contacts.append(Contact(0.0, tip, -normal, normal, point, 1.0))
+    contour = Contour("box", np.array(centre_m), size_m, yaw_rad, 0.0, np.zeros(len(contacts)))
+    return Candidate(index, contour, height_m, 1.0, tuple(contacts))
+
+
+@pytest.fixture(scope="session")
+def found() -> SimpleNamespace:
+    """Candidates as the probe would find them: `round(centre, radius)`, `box(centre, size, yaw)`."""
+    return SimpleNamespace(round=round_thing, box=box_thing, traced=traced)

@@ -1,0 +1,100 @@
+"""squeeze on the fake robot, whose jaws stop on a rigid width and whose gels are flat."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from py_trees.common import Status
+
+from skills.squeeze import Squeeze
+
+WIDTH = 0.05
+
+
+@pytest.fixture
+def make(bench, found, things):
+    def make_one(candidate=None, known=(), grip_width_m=WIDTH, stuff=(), tip_P_m=0.13, **params):
+        b = bench(grip_width_m=grip_width_m, things=stuff, tip_P_m=tip_P_m)
+        candidate = candidate or found.round((0.0, 0.02), 0.5 * WIDTH)
+        return b, b.make(Squeeze, inputs={"candidate": candidate, "known": (candidate, *known)}, **params)
+
+    return make_one
+
+
+def test_a_round_thing_is_felt_at_every_height_of_three_sequences(make) -> None:
+    b, skill = make()
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    touchset = skill.touchset
+    assert len(touchset.sequences) == 3
+    first, second, third = (s.yaw_rad for s in touchset.sequences)
+    for turn in (second - first, third - second, first - third):  # 60 degrees, but for half turns
+        assert abs(np.sin(turn)) == pytest.approx(np.sin(np.pi / 3), abs=1e-6)
+    for sequence in touchset.sequences:
+        heights = [layer.height_m for layer in sequence.layers]
+        assert heights == sorted(heights)
+        assert heights[0] >= 0.016 + 0.005 - 1e-9, "the fingertips stay off the floor"
+        assert heights[-1] <= 0.06 - 0.008 + 1e-9, "the pads stay below the top"
+        assert np.diff(heights).min() >= 0.012 - 1e-9
+        for layer in sequence.layers:
+            assert layer.stable
+            assert layer.aperture_m == pytest.approx(WIDTH, abs=1e-6)
+            np.testing.assert_allclose(layer.position_K_m, [0.0, 0.02], atol=1e-4)
+            assert layer.left_m.shape == b.arm.description.gripper.pad_shape
+    assert not [o for o in b.arm.scene.obstacles if o.startswith("candidate")]
+    assert all(c.gripper is None or c.gripper.force_N <= 10.0 for c in b.commands)
+
+
+def test_a_box_is_felt_on_three_parallel_tracks(make, found) -> None:
+    b, skill = make(found.box((0.0, 0.02), (0.08, WIDTH), 0.3))
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    at = np.array([s.position_K_m for s in skill.touchset.sequences])
+    np.testing.assert_allclose(at - at[1], np.outer([-0.02, 0, 0.02], [np.cos(0.3), np.sin(0.3)]), atol=1e-6)
+
+
+def test_a_low_thing_gets_one_closure(make, found) -> None:
+    b, skill = make(found.round((0, 0), 0.025, 0.02))
+    b.run(skill)
+    assert [len(s.layers) for s in skill.touchset.sequences] == [1, 1, 1]
+
+
+def test_nothing_felt(make) -> None:
+    b, skill = make(grip_width_m=None)
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "nothing_felt")
+    (event,) = b.of_kind("touchset")
+    assert not any(layer.stable for layer in event["touchset"].layers)
+
+
+def test_too_wide(make, found) -> None:
+    b, skill = make(found.round((0, 0), 0.045))
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "too_wide")
+    assert not [c for c in b.commands if c.motion is not None], "nothing moves towards what cannot be squeezed"
+
+
+def test_no_room_among_neighbours(make, found) -> None:
+    ring = tuple(
+        found.round((0.058 * np.cos(a), 0.02 + 0.058 * np.sin(a)), 0.028, index=int(a) + 1) for a in np.arange(6)
+    )
+    b, skill = make(known=ring)
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "too_wide")
+    assert "candidate" in skill.reason.message
+    assert not [o for o in b.arm.scene.obstacles if o.startswith("candidate")]
+
+
+def test_fingers_on_something_rise_again(make, things) -> None:
+    """Something lies where nothing was traced: every sequence is given up, and the hand is high again."""
+    b, skill = make(stuff=[things.floor(0.045)], tip_P_m=0.022)
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "too_wide")
+    assert "met something" in skill.reason.message
+    assert float(b.arm.pose_B_P.position_m[2]) > -0.2 + 0.13
+    assert b.robot.peak_force_N < 10.0
+
+
+def test_broken_off_anywhere(make, found, preempt_all_along) -> None:
+    neighbour = found.round((0.0, -0.12), 0.02, index=1)
+    preempt_all_along(lambda: make(known=(neighbour,), layers=2), 12, finish=False)
