@@ -16,7 +16,7 @@ from backends.mujoco.servo import Servo
 from backends.mujoco.tactile import Tactile
 from backends.mujoco.trace import Trace
 from backends.mujoco.truth import Truth
-from backends.mujoco.wrench import GRAVITY_M_S2, WristSensor
+from backends.mujoco.wrench import GRAVITY_M_S2, WristSensor, up_in
 from glotouch_bt.robot import (
     Array,
     BackendError,
@@ -79,17 +79,21 @@ class MujocoRobot(Robot):
         self._ctrl = np.zeros((STEPS, model.nu))
         self._arm_ctrl, self._jaw_ctrl = self._ctrl[:, handles.arm_ctrl], self._ctrl[:, handles.jaw_ctrl]
         self._samples = np.zeros((STEPS, model.nsensordata))
-        self._external = np.zeros((STEPS, 4, 3))
-        # Views of one step each, made once: the loop round mj_step only copies.
-        rows = list(zip(self._ctrl, self._samples, self._external, strict=True))
+        self._external = np.zeros((STEPS, 4, 6))  # torque, force
+        # Views of one step each, made once: the loop round mj_step only copies. Memoryviews copy three times faster.
+        rows = [
+            (c.data, s.data, e.data)
+            for c, s, e in zip(self._ctrl, self._samples, self._external.reshape(STEPS, -1), strict=True)
+        ]
         wrenches = self._samples[:, s.force.start : s.torque.stop]
         chunks = [slice(i, i + CHUNK) for i in range(0, STEPS, CHUNK)]
         self._chunks = [(self._ctrl[c], rows[c], wrenches[c]) for c in chunks]
-        self._ctrl_now, self._sensed = data.ctrl, data.sensordata
-        self._external_now = data.cfrc_ext[handles.held_bodies, 3:]
+        self._ctrl_now, self._sensed = memoryview(data.ctrl), memoryview(data.sensordata)
+        self._external_now = memoryview(data.cfrc_ext[handles.held_bodies].reshape(-1))
         self._counted = np.array([1.0, 1.0, 1.0, 0.0])
         self._warnings = data.warning.number
         self._probe_now = data.xpos[handles.probe_body]
+        self._pads_now = data.site_xpos[handles.pads_site], data.site_xmat[handles.pads_site].reshape(3, 3)
         self._ago_s = (np.arange(1, STEPS + 1, dtype=np.float64) - STEPS) * STEP_S
         self._jacobian = np.zeros((3, model.nv))
         self._cycles = 0
@@ -104,7 +108,7 @@ class MujocoRobot(Robot):
 
         self._samples[:] = data.sensordata
         self._wrist.fill(-self._samples[0, s.force.start : s.torque.stop])
-        self._expected = self._wrist.expected(self._samples[0, s.quat])
+        self._expected = self._wrist.expected(up_in(self._samples[0, s.quat]))
         first = GripperState(0.0, aperture, 0.0, False)
         self._reports = JawReports(conditions, seed, self.period_s, first)
         self._observation = self._observe(Command())
@@ -204,9 +208,8 @@ class MujocoRobot(Robot):
     def _carry(self) -> Array:
         """Joint torques (dof,) that carry the believed payload: J^T of its weight."""
         mass, com_P = self._payload_load or (0.0, np.zeros(3))
-        data, h = self.data, self.handles
-        point = data.site_xpos[h.pads_site] + data.site_xmat[h.pads_site].reshape(3, 3) @ com_P
-        mujoco.mj_jac(self.model, data, self._jacobian, None, point, h.hand_bodies.start)
+        h, (origin, rotation) = self.handles, self._pads_now
+        mujoco.mj_jac(self.model, self.data, self._jacobian, None, origin + rotation @ com_P, h.hand_bodies.start)
         return self._jacobian[2, h.arm_dof] * (mass * GRAVITY_M_S2)
 
     def _observe(self, command: Command) -> Observation:
@@ -216,9 +219,10 @@ class MujocoRobot(Robot):
         wrench, quat = rows[:, s.force.start : s.torque.stop], rows[:, s.quat]
         np.negative(wrench, out=wrench)
         self._set_payload()
-        wrench = self._wrist.measure(wrench, quat[-1])
-        self._add_to_tare(wrench, quat[-1])
-        self._expected = self._wrist.expected(quat[-1])
+        up = up_in(quat[-1])
+        wrench = self._wrist.measure(wrench, up)
+        self._add_to_tare(wrench, up)
+        self._expected = self._wrist.expected(up)
         self._note_peak()
         last = rows[-1].tolist()
         jaws, speeds, forces = last[s.jaws], last[s.jaw_speeds], last[s.jaw_forces]
@@ -245,7 +249,7 @@ class MujocoRobot(Robot):
         """Largest true contact force so far, on the hand and on the probe while it is in the hand."""
         x, y, z = (self._probe_now - self._samples[-1, self._s.position]).tolist()
         self._counted[3] = x * x + y * y + z * z < HELD_DISTANCE_M**2
-        force = self._counted @ self._external
+        force = (self._counted @ self._external)[:, 3:]
         flat = force.ravel()
         if flat @ flat > self.peak_force_N**2:  # else not one of them can be a new peak
             self.peak_force_N = max(self.peak_force_N, float((force * force).sum(axis=1).max()) ** 0.5)
@@ -262,9 +266,9 @@ class MujocoRobot(Robot):
             self._payload.ticket.done = True
             self._payload = None
 
-    def _add_to_tare(self, measured: Array, quat_B_S: Array) -> None:
+    def _add_to_tare(self, measured: Array, up_S: Array) -> None:
         """Give a block to a tare under way; the block of the period in which it is done is tared."""
         if self._tare is not None and self._tare.add(measured):
-            self._wrist.tare(self._tare.mean, quat_B_S)
+            self._wrist.tare(self._tare.mean, up_S)
             self._tare.ticket.done = True
             self._tare = None

@@ -54,16 +54,17 @@ def check_sane(warnings: npt.NDArray[np.int32], samples: Array, time_s: float) -
 
     Args:
         warnings: `data.warning.number`, how often each of MuJoCo's warnings was raised.
-        samples: Any shape; what was sensed.
+        samples: Any shape; what was sensed. A square that overflows counts as not finite.
         time_s: For the message.
 
     Raises:
         BackendError: MuJoCo raised a warning, or a sample is not finite.
     """
-    if warnings.any():
+    if np.count_nonzero(warnings):
         names = [
             name for name, w in mujoco.mjtWarning.__members__.items() if int(w) < len(warnings) and warnings[int(w)]
         ]
         raise BackendError(f"the simulation became unstable at t={time_s:.3f} s ({', '.join(names)})")
-    if not math.isfinite(samples.sum()):
+    flat = samples.ravel()
+    if not math.isfinite(flat @ flat):
         raise BackendError(f"the simulation gave readings that are not finite at t={time_s:.3f} s")

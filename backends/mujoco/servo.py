@@ -104,7 +104,7 @@ class Servo:
         np.subtract(asked[0], self.q, out=asked[3])
         asked[3] /= self._period
         good = np.abs(asked - self._middle) <= self._half
-        if not good.all():
+        if np.count_nonzero(good) < good.size:
             row, i = (int(v[0]) for v in np.nonzero(~good))
             middle, half = self._middle[row, i], self._half[row, i]
             what, unit = (("q", "rad"), ("dq", "rad/s"), ("ddq", "rad/s2"), ("(q - last q) / period", "rad/s"))[row]
@@ -124,8 +124,8 @@ class Servo:
     def plan(self, target: tuple[Array, Array, Array] | None, ctrl: Array) -> None:
         """Fill ctrl (steps, dof) for the coming period: towards the target, or braking to rest if None."""
         k, terms = self._knots, self._terms
-        if target is None and not k[3].any():
-            if not self._ddq.any():
+        if target is None and not np.count_nonzero(k[3]):
+            if not np.count_nonzero(self._ddq):
                 k[0], k[1] = k[2], 0.0
                 ctrl[:] = k[2] + terms[10]
                 return

@@ -80,25 +80,26 @@ class WristSensor:
         self._payload = weight_matrix(mass_kg * self._mass_factor, self._P_in_S.apply(com_P_m) + self._com_error)
         self._renew()
 
-    def tare(self, mean: Array, quat_B_S: Array) -> None:
-        """Subtract `mean` (6,), an average of `measure`, taken at this orientation, from now on."""
-        up = up_in(quat_B_S)
+    def tare(self, mean: Array, up: Array) -> None:
+        """Subtract `mean` (6,), an average of `measure`, taken at this orientation (see `up_in`), from now on."""
         change = np.zeros(6) if self._up_at_tare is None else self._hand @ (up - self._up_at_tare)
         self._bias = mean + change  # `measure` had the change since the last tare taken out; the new one starts here
         self._up_at_tare = up
         self._renew()
 
-    def expected(self, quat_B_S: Array) -> Array:
-        """(6,) what the sensor should read without contact: the basis of the hard limit."""
+    def expected(self, up: Array) -> Array:
+        """(6,) what the sensor should read without contact, with `up_in` its orientation: basis of the hard limit."""
         matrix, constant = self._expected
-        return np.asarray(matrix @ up_in(quat_B_S) + constant)
+        return np.asarray(matrix @ up + constant)
 
     def fill(self, wrench: Array) -> None:
         """Start the delay line as if the sensor had read `wrench` (6,) for ever."""
         self._line[:] = wrench
 
-    def measure(self, true: Array, quat_B_S: Array) -> Array:
+    def measure(self, true: Array, up: Array) -> Array:
         """(n, 6) block for a true block (n, 6), before the tare's bias is taken off: what a tare averages.
+
+        `up` (3,) is `up_in` of the sensor's orientation.
 
         The array is used again by the next call.
         """
@@ -108,7 +109,7 @@ class WristSensor:
         self._line[late:] = true
         matrix, constant = self._offset
         out = self._measured
-        np.subtract(self._line[:STEPS], matrix @ up_in(quat_B_S) + constant, out=out)
+        np.subtract(self._line[:STEPS], matrix @ up + constant, out=out)
         if self._noisy:
             if self._block == BLOCKS:
                 self._draw()

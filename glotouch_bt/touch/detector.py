@@ -118,7 +118,6 @@ class ContactGuard:
         self._low_pass = LowPass(6, params.cutoff_Hz, params.rate_Hz)
         self._gain = self._fusion.gain
         self._sigmas = params.sigmas * self._low_pass.noise_gain
-        self._quat: Array = np.zeros(4)
         self._R_B_S: Array = np.eye(3)
         self._history: deque[tuple[Observation, Array]] = deque(maxlen=HISTORY_BLOCKS)
         self._approach_B: Array | None = None
@@ -139,10 +138,12 @@ class ContactGuard:
         smooth = self._low_pass(residual)
         self._history.append((observation, residual))
         force = smooth @ self._gain.T
-        q = observation.quat_B_P[-1]
-        if not np.array_equal(q, self._quat):
-            self._quat, self._R_B_S = q.copy(), quat_to_matrix(q) @ self._R_P_E
+        self._R_B_S = quat_to_matrix(observation.quat_B_P[-1]) @ self._R_P_E
         above = self._soft_rule(force, smooth[:, 3:])
+        if above is None:
+            if not np.count_nonzero(self._above):
+                return None
+            above = np.zeros(len(force), dtype=np.int64)
         carried = np.concatenate([self._above, above])
         n = self.params.consecutive
         self._above = carried[len(carried) - n + 1 :]
@@ -153,20 +154,25 @@ class ContactGuard:
             self._onset = self._date(observation, int(tripped[0]), force[tripped[0]])
         return self._onset
 
-    def _soft_rule(self, force_S: Array, moment_S: Array) -> npt.NDArray[np.int64]:
-        """(n,) 1 where a sample fulfils the soft rule."""
-        p = self.params
+    def _soft_rule(self, force_S: Array, moment_S: Array) -> npt.NDArray[np.int64] | None:
+        """(n,) 1 where a sample fulfils the soft rule; None if surely none does, told as early as it is clear."""
+        p, opposing = self.params, None
+        if self._approach_B is not None:
+            approach_S = self._approach_B @ self._R_B_S
+            against = force_S @ approach_S
+            if not np.count_nonzero(against < -p.directional_N):
+                return None
+            opposing = against < -max(p.directional_N, self._sigmas * self._fusion.sd_along(approach_S))
+            if not np.count_nonzero(opposing):
+                return None
         square = (force_S * force_S).sum(axis=1)
+        if opposing is None and not np.count_nonzero(square > p.total_N**2):
+            return None
         # sigma along each sample's own direction times its norm: compares without dividing by a norm that may be zero
         variance = ((force_S @ self._fusion.covariance) * force_S).sum(axis=1)
         strong = (square > p.total_N**2) & (square * square > self._sigmas**2 * variance)
-        if self._approach_B is None:
+        if opposing is None:
             return np.asarray(strong, dtype=np.int64)
-        approach_S = self._approach_B @ self._R_B_S
-        threshold = max(p.directional_N, self._sigmas * self._fusion.sd_along(approach_S))
-        opposing = force_S @ approach_S < -threshold
-        if not opposing.any():
-            return np.zeros(len(force_S), dtype=np.int64)
         moment = (moment_S * moment_S).sum(axis=1) > p.moment_Nm**2
         return np.asarray(opposing & (strong | moment), dtype=np.int64)
 
@@ -218,11 +224,17 @@ class HardStop:
             ("residual_force_N", params.hard_residual_N),
             ("residual_torque_Nm", params.hard_residual_Nm),
         )
+        force, torque, residual_force, residual_torque = (1.0 / limit for _, limit in self._limits)
+        self._scale = np.array([force] * 3 + [torque] * 3)
+        self._residual_scale = np.array([residual_force] * 3 + [residual_torque] * 3)
 
     def __call__(self, observation: Observation) -> HardTrip | None:
         """The earliest sample of the block beyond a limit, or None."""
         w = observation.wrench_S
         r = w - self._median
+        whole, rest = (w * self._scale).ravel(), (r * self._residual_scale).ravel()
+        if whole @ whole < 1.0 and rest @ rest < 1.0:  # not one sample can be beyond a limit, nor a NaN among them
+            return None
         norms = [np.linalg.norm(v, axis=1) for v in (w[:, :3], w[:, 3:], r[:, :3], r[:, 3:])]
         trips = []
         for (quantity, limit), norm in zip(self._limits, norms, strict=True):

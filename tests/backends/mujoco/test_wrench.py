@@ -34,7 +34,7 @@ def test_weight_in_any_orientation() -> None:
 
 
 def report(sensor: WristSensor, true: Array, quat_B_S: Array) -> Array:
-    return sensor.measure(true, quat_B_S) - sensor.bias
+    return sensor.measure(true, up_in(quat_B_S)) - sensor.bias
 
 
 def test_latency_is_a_delay() -> None:
@@ -71,7 +71,7 @@ def test_tare_then_tilt_leaves_only_the_payload_error() -> None:
     for sensor in (ideal, wrong):
         at_rest = np.tile(weight(mass, com, down), (10, 1))
         assert report(sensor, at_rest, DOWN)[0, 2] == pytest.approx(mass * 9.81)  # before: the whole weight
-        sensor.tare(sensor.measure(at_rest, DOWN).mean(axis=0), DOWN)
+        sensor.tare(sensor.measure(at_rest, up_in(DOWN)).mean(axis=0), up_in(DOWN))
         assert np.abs(report(sensor, at_rest, DOWN)).max() < 1e-12
     there = np.tile(weight(mass, com, tilted), (10, 1))
     assert np.abs(report(ideal, there, quat)).max() < 1e-9
