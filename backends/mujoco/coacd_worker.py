@@ -13,13 +13,29 @@ from __future__ import annotations
 import json
 import os
 import sys
+import threading
 
 import coacd
 import numpy as np
 
+_ALONE_S = 0.5
+
+
+def _end_with_parent() -> None:
+    """Do not go on for minutes for a parent that was killed before it could kill this process."""
+    parent, wake = os.getppid(), threading.Event()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            wake.wait(_ALONE_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
 
 def main(source: str, target: str, parameters: str) -> None:
     """Decompose one mesh; any failure is a non-zero exit."""
+    _end_with_parent()
     if hasattr(os, "nice"):
         os.nice(10)  # minutes of background work must not slow a control loop beside it
     with np.load(source) as data:

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
 import os
 import subprocess
 import sys
@@ -33,11 +34,13 @@ from backends.mujoco.bulge import bulge_m, inside_m
 from backends.mujoco.convex_parts import trimmed_hull
 from backends.mujoco.feet import foot_centres
 from backends.mujoco.hull_files import Parts, locked, package_file, read_parts, user_folder, write_parts
-from glotouch_bt.robot.errors import BackendError, BadInput
+from backends.mujoco.thinning import thinned
+from glotouch_bt.robot.errors import BadInput
 from glotouch_bt.robot.geometry import Array, frozen_array
 from glotouch_bt.robot.meshes import Mesh, load_folder
 
 Progress = Callable[[str], None]
+_log = logging.getLogger(__name__)
 
 MAX_VERTICES = 256
 """Of one hull. With 64 an apple's one large part falls 0.6 mm (p95) short of its surface, with 256 0.1 mm; MuJoCo walks
@@ -111,12 +114,14 @@ def load_hulls(mesh: Mesh, progress: Progress | None = None) -> Hulls:
 
     Args:
         mesh: A checked solid.
-        progress: Told, in one line each, when something takes long or had to be made coarser.
+        progress: Told, in one line each, when something takes long or had to be made coarser. By default that is
+            logged as a warning, which Python shows on stderr unless told otherwise: a minute's silence looks like a
+            hang, in a worker process too.
 
     Raises:
-        BackendError: The hulls cannot be computed: the solid has no volume.
+        BadInput: The hulls cannot be computed: the solid has no volume.
     """
-    say = progress or (lambda _: None)
+    say = progress or _log.warning
     name = f"{mesh.digest}.npz"
     parts = read_parts(package_file(name), KEY)
     if parts is None:
@@ -143,9 +148,9 @@ def decompose(mesh: Mesh, progress: Progress | None = None) -> Parts:
     Tries `FINE`, then `COARSE`, then settles for the plain convex hull; the result's note says so.
 
     Raises:
-        BackendError: Not even the convex hull exists.
+        BadInput: Not even the convex hull exists.
     """
-    say = progress or (lambda _: None)
+    say = progress or _log.warning
     say(f"{mesh.name}: cutting into convex parts (once per mesh, 10-60 s)")
     for attempt, note in (
         (FINE, ""),
@@ -160,7 +165,7 @@ def decompose(mesh: Mesh, progress: Progress | None = None) -> Parts:
         return Parts(hulls, note)
     hull = trimmed_hull(mesh.vertices_m, MAX_VERTICES, TOLERANCE_M)
     if hull is None:
-        raise BackendError(f"{mesh.name}: no collision shape can be made; the mesh must enclose a volume")
+        raise BadInput(f"{mesh.name}: no collision shape can be made; the mesh must enclose a volume")
     return Parts((hull,), "collision shape is the plain convex hull: cutting failed; repair the mesh for a true one")
 
 
@@ -194,7 +199,8 @@ def _run_coacd(mesh: Mesh, attempt: Attempt, say: Progress) -> list[Array]:
     worker = Path(__file__).with_name("coacd_worker.py")
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "mesh.npz", Path(folder) / "parts.npz"
-        np.savez(source, vertices=mesh.vertices_m, faces=mesh.faces)
+        vertices, faces = thinned(mesh)
+        np.savez(source, vertices=vertices, faces=faces)
         process = subprocess.Popen(
             # -P: without it the worker's own folder is on sys.path, and its files shadow installed modules
             [sys.executable, "-P", str(worker), str(source), str(target), json.dumps(attempt.parameters)],
