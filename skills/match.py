@@ -23,12 +23,14 @@ class Match(Skill):
 
     SUCCESS: the best candidate passes margin, fit and evidence; `plan` says how to grasp it.
     FAILURE `not_recognised`: it does not; `ranking` is written all the same.
+    FAILURE `too_wide`: the same, and the jaws do not open wide enough for the target.
     FAILURE `no_touch`: nothing was squeezed.
     """
 
     Params = MatchParams
     params: MatchParams
     touchsets = In(tuple, "one TouchSet per candidate squeezed", required=False)
+    known = In(tuple, "all candidates, to say which were not squeezed", key="candidates", required=False)
     ranking = Out(Ranking, "all candidates, best first")
     plan = Out(GraspPlan, "how to grasp the best one")
 
@@ -46,9 +48,20 @@ class Match(Skill):
         self.ranking = ranking
         self.event("ranking", target=mesh.name, ranking=ranking)
         if not ranking.accepted:
+            felt = {t.candidate.index for t in touchsets}
+            missed = [str(c.index) for c in self.known or () if c.index not in felt]
+            why = "; ".join(ranking.reasons) + (f"; not squeezed: candidate {', '.join(missed)}" if missed else "")
+            if model.narrowest_m > gripper.stroke_m:
+                raise SkillFailed(
+                    "too_wide",
+                    f"{mesh.name} is {model.narrowest_m * 1e3:.0f} mm across at its narrowest and the jaws open "
+                    f"{gripper.stroke_m * 1e3:.0f} mm ({why})",
+                    advice="use a wider gripper",
+                    narrowest_m=model.narrowest_m,
+                )
             raise SkillFailed(
                 "not_recognised",
-                f"no candidate is surely {mesh.name}: {'; '.join(ranking.reasons)}",
+                f"no candidate is surely {mesh.name}: {why}",
                 advice="touch more, or lower the gates",
                 margin=ranking.margin,
             )

@@ -14,6 +14,9 @@ from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, para
 from skills.held_tool import HeldTool
 from skills.probing import Probed, Prober
 
+RIM_PLACES, RIM_INSET_M = 3, 0.002
+"""Where a hollow object's top is felt: so far inside of so many of the contacts."""
+
 
 class OrbitProbeParams(SkillParams):
     """Parameters of `orbit_probe`.
@@ -110,7 +113,7 @@ class OrbitProbe(Skill):
                 contacts=len(trace.contacts),
             )
         contour = fit_contour(trace.tips, self.tool.tip_radius_m)
-        height = yield from self._touch_top(prober, contour)
+        height = yield from self._top(prober, trace, contour)
         candidate = Candidate(
             index=len(known),
             contour=contour,
@@ -187,15 +190,31 @@ class OrbitProbe(Skill):
         if distance > 1e-3:
             yield from prober.retreat(np.array([*normal, 0.0]), distance, self.params.orbit_speed_m_s)
 
-    def _touch_top(self, prober: Prober, contour: Contour) -> Motion[float]:
-        """Lower the ball onto the fitted centre; height of what it meets above the floor."""
+    def _top(self, prober: Prober, trace: _Trace, contour: Contour) -> Motion[float]:
+        """Height of the top above the floor: over the middle, or if that is hollow, the highest of places on the rim.
+
+        Hollow means lower than the sides were touched at, so that something must be higher.
+        """
+        height = yield from self._touch_from_above(prober, contour.centre_K_m)
+        touched_m = float(np.median([c.tip_K_m[2] for c in trace.contacts])) - self.tool.floor_z_K_m
+        if height > touched_m:
+            return height
+        every = max(len(trace.contacts) // RIM_PLACES, 1)
+        for contact in trace.contacts[::every][:RIM_PLACES]:
+            inwards = _unit(contour.centre_K_m - contact.point_K_m)
+            at_rim = yield from self._touch_from_above(prober, contact.point_K_m + RIM_INSET_M * inwards)
+            height = max(height, at_rim)
+        return height
+
+    def _touch_from_above(self, prober: Prober, place_K_m: Array) -> Motion[float]:
+        """Lower the ball onto a place (2,); height of what it meets above the floor."""
         p, tool = self.params, self.tool
         top = tool.floor_z_K_m + p.headroom_m
-        yield from prober.hop(np.array([*contour.centre_K_m, 0.0]), top, p.travel_speed_m_s)
-        lowest = np.array([*contour.centre_K_m, tool.floor_z_K_m + tool.tip_radius_m + 0.004])
+        yield from prober.hop(np.array([*place_K_m, 0.0]), top, p.travel_speed_m_s)
+        lowest = np.array([*place_K_m, tool.floor_z_K_m + tool.tip_radius_m + 0.004])
         probed = yield from prober.move(lowest, p.top_speed_m_s)
         tip_z = float(prober.tip_K_m[2]) if probed.contact is None else float(probed.contact.tip_K_m[2])
         if probed.contact is not None:
             self.event("contact", contact=probed.contact)
-        yield from prober.hop(np.array([*contour.centre_K_m, 0.0]), top, p.travel_speed_m_s)
+        yield from prober.hop(np.array([*place_K_m, 0.0]), top, p.travel_speed_m_s)
         return tip_z - tool.tip_radius_m - tool.floor_z_K_m

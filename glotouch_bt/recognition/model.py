@@ -12,7 +12,15 @@ from functools import cached_property
 import numpy as np
 import trimesh
 
-from glotouch_bt.recognition.outline import TIP_RADIUS_M, Outline, first_hit, minimum_rectangle, traced_outline
+from glotouch_bt.recognition.outline import (
+    SENSING_M,
+    TIP_RADIUS_M,
+    Outline,
+    first_hit,
+    minimum_rectangle,
+    traced_outline,
+    traced_tips,
+)
 from glotouch_bt.recognition.pads import FINE, Array32, PadSpec, image_feature
 from glotouch_bt.recognition.raster import mirrored, side_images, window_max
 from glotouch_bt.recognition.touches import pooled_images, simulated_statistics
@@ -22,6 +30,8 @@ from glotouch_bt.robot.meshes import Mesh
 YAWS = 72
 STRIDE = 2
 """Table cells are two raster cells apart: 2.3 mm along x_P, 2.7 mm in height."""
+RIM_PLACES, RIM_INSET_M = 24, 0.002
+"""Places on a hollow object's rim that are tried, and how far inside of its outline the probe aims."""
 _CACHE_SIZE = 64
 _cache: dict[tuple[str, PadSpec], TargetModel] = {}
 
@@ -47,7 +57,7 @@ class TargetModel:
         normal_dispersion: 1 - |mean normal| over touched patches, mean over touches (the paper's d_M).
         anisotropy: 1 - short / long of the smallest rectangle round the footprint (the paper's a_M).
         top_slope_m: How much lower than the top the probe may find it, within 4 mm of the traced centre.
-        top_centre_m: Height found by touching the traced centre from above.
+        top_centre_m: Height found by touching the traced centre from above (a hollow object's rim).
     """
 
     name: str
@@ -84,6 +94,12 @@ class TargetModel:
     def width_m(self) -> Array32:
         """(72, nl, nz) support width W(l, z; phi), eq. (finite_window_width); NaN where a window is empty."""
         return self.reach_m + mirrored(self.reach_m)
+
+    @property
+    def narrowest_m(self) -> float:
+        """Least support width at the middle of the footprint, over all yaws and heights."""
+        through = self.width_m[:, len(self.l_m) // 2]
+        return float(np.nanmin(through)) if np.isfinite(through).any() else float("inf")
 
     @cached_property
     def middle_m(self) -> Array32:
@@ -166,8 +182,19 @@ def touched_top(solid: trimesh.Trimesh, aim_m: Array, top_m: float) -> Array:
 
 
 def _top(solid: trimesh.Trimesh, top_m: float, centre_m: Array) -> tuple[float, float]:
-    """Height felt at the outline's centre, and the range of heights when the aim is off by up to 4 mm."""
+    """Height felt at the outline's centre, and the range of heights when the aim is off by up to 4 mm.
+
+    A centre lower than the sensing height is a hollow; there the probe feels the highest of three places on the rim
+    instead, most likely the upper quartile of all places.
+    """
     angle = np.arange(8) * (np.pi / 4)
     unit = np.column_stack([np.cos(angle), np.sin(angle)])
     heights = touched_top(solid, centre_m + np.concatenate([np.zeros((1, 2)), 2e-3 * unit, 4e-3 * unit]), top_m)
-    return float(np.median(heights)), float(np.ptp(heights))
+    if np.median(heights) > SENSING_M:
+        return float(np.median(heights)), float(np.ptp(heights))
+    inwards = centre_m - traced_tips(solid, centre_m, RIM_PLACES, 0.0)
+    inset = TIP_RADIUS_M + RIM_INSET_M
+    distance = np.maximum(np.linalg.norm(inwards, axis=1, keepdims=True), inset)
+    places = centre_m - inwards * (1.0 - inset / distance)
+    heights = touched_top(solid, places, top_m)
+    return float(np.quantile(heights, 0.75)), float(np.ptp(heights))

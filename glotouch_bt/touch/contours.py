@@ -20,7 +20,7 @@ from glotouch_bt.robot import Array, ParamError
 from glotouch_bt.touch.tracing import widest_gap
 from glotouch_bt.touch.values import Contour
 
-SMALLEST_M, LARGEST_M = 0.015, 0.150
+SMALLEST_M, LARGEST_M = 0.005, 0.150
 """No outline is smaller or larger: what a 0-85 mm gripper and a hand-sized container hold, with a margin."""
 SCALE_M = 0.001
 """Residual at which the loss turns from squared to linear: contact scatter plus how far real objects deviate."""
