@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -17,6 +17,7 @@ M = TypeVar("M", bound=BaseModel)
 
 # pydantic's error types in our words; {} are its context values
 _WORDS = {
+    "several": "{rules}",
     "int_type": "must be a whole number",
     "int_from_float": "must be a whole number",
     "float_type": "must be a number",
@@ -79,12 +80,26 @@ def validate(model: type[M], given: Map, what: str, findings: Findings, *, where
         made = model.model_validate_json(json.dumps(values), strict=True)
     except ValidationError as e:
         before = len(findings)
-        for error in e.errors():
+        for error in _one_a_scalar(e.errors(), given):
             _report(error, model, given, what, findings, poisoned, where or given.place)
         if len(findings) == before and not poisoned and known:
             findings.add(where or given.place, "wrong_value", f"{what}: {e.errors()[0]['msg']}")
         return None
     return made if known and not poisoned else None
+
+
+def _one_a_scalar(errors: Sequence[Any], given: Map) -> list[Any]:
+    """Where a scalar fits none of the types a field may have, pydantic reports one error a type: make one of them."""
+    kept: dict[object, Any] = {}
+    for i, error in enumerate(errors):
+        name = error["loc"][0] if error["loc"] else ""
+        scalar = isinstance(name, str) and isinstance(given.get(name), Scalar) and error["type"] in _WORDS
+        known = kept.setdefault(name if scalar else i, error)
+        if known is not error:
+            rules = [_WORDS[e["type"]].format(**e.get("ctx", {})) for e in (known, error)]
+            both = rules[0] + " or " + rules[1].removeprefix("must be ")
+            kept[name] = {**known, "type": "several", "loc": (name,), "ctx": {"rules": both}}
+    return list(kept.values())
 
 
 def _value(node: Node, unit: str, name: str, findings: Findings) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,9 +83,24 @@ def load_mission(
     return mission
 
 
-def split_settings(mission: Mission, settings: Mapping[str, str]) -> dict[str, str]:
-    """The `--set` values that no mission parameter takes; they are backend options."""
-    return {k: v for k, v in settings.items() if k not in mission.parameters}
+def split_settings(mission: Mission, settings: Mapping[str, object]) -> dict[str, object]:
+    """The `--set` values that no mission parameter takes; they are backend options.
+
+    Text that begins as a JSON object or list does is read as one: `--set 'layout={"apple": [0, 0.05, 0]}'`.
+
+    Raises:
+        BadInput: It begins so, but is not JSON.
+    """
+    return {k: _option(k, v) for k, v in settings.items() if k not in mission.parameters}
+
+
+def _option(name: str, value: object) -> object:
+    if not isinstance(value, str) or not value.lstrip().startswith(("{", "[")):
+        return value
+    try:
+        return json.loads(value)
+    except (ValueError, RecursionError) as e:
+        raise BadInput(f"--set {name}: begins like JSON but is not: {e}") from e
 
 
 def _read(

@@ -14,7 +14,7 @@ from glotouch_bt.mission.fields import validate
 from glotouch_bt.mission.findings import Findings
 from glotouch_bt.mission.library import shown
 from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, plain
-from glotouch_bt.mission.units import UNITS, convert, split_quantity
+from glotouch_bt.mission.units import UNITS, convert, split_quantity, units_for
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.meshes import load_mesh
 
@@ -109,6 +109,10 @@ def _valued(
     elif given is None:
         findings.add(at, "missing_parameter", f"parameter {name!r} has no default: give it with --set {name}=...")
         return Parameter(name, declared, None, place)
+    if unit := _wrong_unit(given, declared):
+        valid = ", ".join(units_for(declared.unit))
+        findings.add(place, "wrong_unit", f"{name} is in {declared.unit}, not {unit!r}", valid=valid)
+        return Parameter(name, declared, None, place)
     fault = _fault(given, declared)
     if fault:
         findings.add(place, "wrong_value", f"{name} = {given!r}: {fault}", valid=_valid(declared))
@@ -133,6 +137,14 @@ def _from_text(given: str | Value, declared: Declaration) -> Value:
         return int(text) if declared.type == "int" else float(text)
     except ValueError:
         return given
+
+
+def _wrong_unit(value: Value, declared: Declaration) -> str:
+    """The unit of a number's text that measures something else than the parameter does, or empty."""
+    if not isinstance(value, str) or declared.type not in ("int", "float") or not declared.unit:
+        return ""
+    quantity = split_quantity(value)
+    return quantity[1] if quantity else ""
 
 
 def _fault(value: Value, declared: Declaration) -> str:
