@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -22,7 +23,7 @@ def frozen_array(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> Arr
     a = np.array(value, dtype=np.float64)
     if a.shape != shape:
         raise ParamError(name, a.shape, f"an array of shape {shape}")
-    if not np.isfinite(a).all():
+    if np.count_nonzero(np.isfinite(a)) < a.size:
         raise ParamError(name, a.tolist(), "finite")
     a.setflags(write=False)
     return a
@@ -42,18 +43,20 @@ def quat_to_matrix(q: Array) -> Array:
 
 def matrix_to_quat(m: Array) -> Array:
     """Unit quaternion (4,) w x y z, w >= 0, of a rotation matrix (3, 3) (Shepperd's method)."""
-    t = np.array([m.trace(), m[0, 0], m[1, 1], m[2, 2]])
-    i = int(np.argmax(t))
+    r = m.tolist()
+    trace = r[0][0] + r[1][1] + r[2][2]
+    t = (trace, r[0][0], r[1][1], r[2][2])
+    i = t.index(max(t))
     if i == 0:
-        q = np.array([1 + t[0], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]])
+        q = np.array([1 + trace, r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]])
     else:
         j, k, l = i - 1, i % 3, (i + 1) % 3
         q = np.zeros(4)
-        q[0] = m[l, k] - m[k, l]
-        q[1 + j] = 1 + 2 * m[j, j] - t[0]
-        q[1 + k] = m[k, j] + m[j, k]
-        q[1 + l] = m[l, j] + m[j, l]
-    q /= float(np.linalg.norm(q))
+        q[0] = r[l][k] - r[k][l]
+        q[1 + j] = 1 + 2 * r[j][j] - trace
+        q[1 + k] = r[k][j] + r[j][k]
+        q[1 + l] = r[l][j] + r[j][l]
+    q /= math.sqrt(q.dot(q))
     return q if q[0] >= 0 else -q
 
 
@@ -72,7 +75,7 @@ class Pose:
     def __post_init__(self) -> None:
         object.__setattr__(self, "position_m", frozen_array("position_m", self.position_m, (3,)))
         q = frozen_array("quat", self.quat, (4,))
-        norm = float(np.linalg.norm(q))
+        norm = math.sqrt(q.dot(q))
         if abs(norm - 1.0) > 1e-6:
             raise ParamError("quat", q.tolist(), "a unit quaternion (w x y z)")
         unit = q / norm

@@ -69,7 +69,7 @@ class Clockwork:
         tree: Between two cycles, without the record: the tree's tick, so skills, motion, touch, matching.
         record: Inside the record.
         whole: From one command to the next.
-        leaf: Tree time by the leaf that ran.
+        leaf: Tree time by leaf: up to an event the one that wrote it, then the one that runs after the tick.
     """
 
     robot: list[float] = field(default_factory=list)
@@ -91,6 +91,7 @@ class TimedRobot(Robot):
         self._robot, self._clockwork = robot, clockwork
         self.description, self.limits, self.period_s = robot.description, robot.limits, robot.period_s
         self._left = 0.0
+        self._booked = 0.0
         self.writing = 0.0
         self.running = ""
 
@@ -117,8 +118,14 @@ class TimedRobot(Robot):
         c.tree.append(tree)
         c.record.append(self.writing)
         c.whole.append(outside + (c.robot[-1] if c.robot else 0.0))
-        c.leaf[self.running] = c.leaf.get(self.running, 0.0) + tree
-        self.writing = 0.0
+        self.book(self.running, now)
+        self.writing = self._booked = 0.0
+
+    def book(self, leaf: str, now: float) -> None:
+        """Give a leaf the tree time of this tick that nobody has got yet."""
+        spent = now - self._left - self.writing
+        self._clockwork.leaf[leaf] = self._clockwork.leaf.get(leaf, 0.0) + spent - self._booked
+        self._booked = spent
 
     def start(self, request: Request) -> Ticket:
         """See `Robot`."""
@@ -159,6 +166,7 @@ class TimedRecord:
     def event(self, kind: str, stamp_s: float, data: Mapping[str, object]) -> None:
         """See `Record`."""
         began = time.perf_counter()
+        self._robot.book(str(data.get("node", self._robot.running)), began)
         self._record.event(kind, stamp_s, data)
         self._robot.writing += time.perf_counter() - began
 
