@@ -129,6 +129,11 @@ class Bench:
         self.context = Context(world, self.arm, robot, self, robot.observe())
         self.commands: list[Command] = []
 
+    @staticmethod
+    def on(world: World, robot: Robot) -> Bench:
+        """A bench for another robot."""
+        return Bench(world, robot)
+
     def event(self, kind: str, stamp_s: float, data: Mapping[str, object]) -> None:
         self.events.append((kind, data))
 

@@ -26,7 +26,7 @@ def make(bench, things, tool):
     def make_one(stands=True, belief=None, **params):
         b = bench(things=[things.floor()] + [things.post(POST, RADIUS, TOP)] * stands)
         b.arm.scene.hold_tool(True)
-        off = TOUCH + [0, 0.006, 0]
+        off = TOUCH + np.array([0, 0.006, 0])
         b.go(b.arm.joints(b.arm.kinematics.ik(tool.pose_B_P(b.world, off), b.arm.q)))
         belief = belief or SearchMap.blank(np.array([0.138, 0.188]), expected=1)
         return b, b.make(
