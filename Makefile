@@ -10,7 +10,7 @@ demo: $(VENV)
 	$(BIN)/glotouch run retrieve --set target=apple --seed 0
 
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2
 
 check: $(VENV)/.dev
 	$(BIN)/ruff format --check .

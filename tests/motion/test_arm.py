@@ -144,7 +144,9 @@ def test_guard_takes_effect_in_the_next_command(arm: Arm, robot: FakeRobot, driv
     drive(robot, arm.shift((0, 0.1, 0), 0.06, guard=guard))
     speeds = [float((arm.kinematics.jacobian(c.motion.q) @ c.motion.dq)[1]) for c in robot.commands if c.motion]
     assert speeds[59] == pytest.approx(0.06, abs=1e-5)
-    assert speeds[60] == pytest.approx(0.06 - 0.5 * 200.0 * 0.01**2, abs=1e-4)  # jerk-limited fall over one period
+    a, j = arm.limits.stop_acceleration_m_s2, arm.limits.stop_jerk_m_s3
+    fall = a * (0.01 - 0.5 * a / j) if a / j < 0.01 else 0.5 * j * 0.01**2  # jerk-limited, over one period
+    assert speeds[60] == pytest.approx(0.06 - fall, abs=1e-4)
     assert len(speeds) == 60 + 4  # 0.06/2 + 2/200 s = 40 ms
 
 
