@@ -167,8 +167,8 @@ def print_retrieve(summary: dict[str, Any], folder: Path) -> None:
 def print_speed(summary: dict[str, Any], folder: Path) -> None:
     """The tables of a speed study: factors with their range, cycle times, where a mission's wall time goes."""
 
-    def span(key: str) -> str:
-        r = summary[key]
+    def span(key: str, of: dict[str, Any] = summary) -> str:
+        r = of[key]
         return f"{r['median']:.2f} [{r['min']:.2f}, {r['max']:.2f}]"
 
     def verdict(key: str) -> str:
@@ -181,6 +181,8 @@ def print_speed(summary: dict[str, Any], folder: Path) -> None:
         ("simulated time / wall time", span("realtime_factor"), verdict("realtime_factor")),
         ("wall time / bare steps", span("over_physics"), verdict("over_physics")),
         ("simulated time / bare steps", span("bare_factor"), ""),
+        ("simulated time / processor time", span("realtime_factor", summary["by_cpu"]), "differ from the"),
+        ("processor time / that of the bare steps", span("over_physics", summary["by_cpu"]), "above on a shared core"),
     ]
     title = f"speed of {summary['mission']}, {summary['conditions']}, seeds {seeds[0]}-{seeds[-1]}"
     print_table(title, ("", "median [min, max]", "target"), rows)

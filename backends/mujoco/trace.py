@@ -60,13 +60,13 @@ class Trace:
             (list(rows), limits if i == 0 or limits is not self._limits[i - 1] else None)
             for i, (rows, limits) in enumerate(zip(self._controls, self._limits, strict=True))
         ]
-        began = time.perf_counter()
+        cpu, began = time.process_time(), time.perf_counter()
         for rows, limits in work:
             if limits is not None:
                 limits_now[:] = limits
             for row in rows:
                 ctrl_now[:] = row
                 step(model, fresh)
-        wall_s = time.perf_counter() - began
+        wall_s, cpu_s = time.perf_counter() - began, time.process_time() - cpu
         same = np.array_equal(state_of(model, fresh), state_of(model, data))
-        return BareSteps(sum(len(rows) for rows, _ in work), wall_s, bool(same))
+        return BareSteps(sum(len(rows) for rows, _ in work), wall_s, cpu_s, bool(same))

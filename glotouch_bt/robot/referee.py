@@ -33,12 +33,13 @@ class BareSteps:
 
     Attributes:
         steps: Solver steps.
-        wall_s: What they took.
+        wall_s, cpu_s: What they took on the wall's clock and of the processor.
         same_end_state: They ended bit for bit where the run ended, so that nothing but its controls moved the world.
     """
 
     steps: int
     wall_s: float
+    cpu_s: float
     same_end_state: bool
 
 

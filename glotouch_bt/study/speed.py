@@ -4,7 +4,8 @@ Each seed's mission is run as `glotouch run` runs it (same tree, same record, sa
 caused are repeated with nothing round them. Both must end in the same state, bit for bit: the denominator of
 `over_physics` is the very same physics, and nothing but the robot's controls moved the world.
 
-Times are wall times of this process (`time.perf_counter`), missions one after the other: run it alone on a core.
+Times are wall times of this process (`time.perf_counter`), missions one after the other: run it alone on a core. The
+same factors by processor time (`time.process_time`) stand beside them: where they differ, the core was shared.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from glotouch_bt.study.run_folder import RunFolder
 
 COLUMNS = (
     "seed", "status", "sim_s", "wall_s", "bare_s", "steps", "same_end_state", "realtime_factor", "bare_factor",
-    "over_physics", "cpu_s", "robot_s", "tree_s", "record_s", "open_s", "report_s",
+    "over_physics", "cpu_s", "bare_cpu_s", "robot_s", "tree_s", "record_s", "open_s", "report_s",
 )  # fmt: skip
 TARGET_REALTIME = 15.0
 """Least simulated time over wall time. Source: the project's speed requirement."""
@@ -218,6 +219,7 @@ def run_trial(study: SpeedStudy, seed: int) -> SpeedTrial:
         "seed": seed, "status": outcome.status, "sim_s": sim_s, "wall_s": wall_s, "bare_s": bare.wall_s,
         "steps": bare.steps, "same_end_state": bare.same_end_state, "realtime_factor": sim_s / wall_s,
         "bare_factor": sim_s / bare.wall_s, "over_physics": wall_s / bare.wall_s, "cpu_s": cpu_s,
+        "bare_cpu_s": bare.cpu_s,
         "robot_s": sum(clockwork.robot), "tree_s": sum(clockwork.tree),
         "record_s": sum(clockwork.record) + ended - ticked, "open_s": began - opening, "report_s": report_s,
     }  # fmt: skip
@@ -293,7 +295,7 @@ def summarise(trials: Sequence[SpeedTrial]) -> dict[str, Any]:
     Keys: realtime_factor, bare_factor (the same of the bare steps), over_physics; control_cycle_us (command to
     command), robot_cycle_us, tick_us, record_us; breakdown_s, the mean seconds a mission: `physics` (the bare steps),
     `robot` (the rest of Robot.cycle), `tree` (the tick), `record`, `rest`; then `open` and `report`, which are not part
-    of the wall time; leaves_s (tree time by leaf); same_end_state; targets and whether they are met.
+    of the wall time; by_cpu, the factors by processor time; leaves_s (tree time by leaf); same_end_state; targets and whether they are met.
     """
     rows = [t.row for t in trials]
 
@@ -320,6 +322,10 @@ def summarise(trials: Sequence[SpeedTrial]) -> dict[str, Any]:
         "realtime_factor": realtime,
         "bare_factor": spread([r["bare_factor"] for r in rows]),
         "over_physics": over,
+        "by_cpu": {
+            "realtime_factor": spread([r["sim_s"] / r["cpu_s"] for r in rows]),
+            "over_physics": spread([r["cpu_s"] / r["bare_cpu_s"] for r in rows]),
+        },
         "control_cycle_us": cycles("whole"),
         "robot_cycle_us": cycles("robot"),
         "tick_us": cycles("tree"),

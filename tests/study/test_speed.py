@@ -94,7 +94,7 @@ def test_a_study_of_known_durations(
     house: ModuleType, clock: Clock, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """31 cycles of 2 ms for 0.31 s of robot time: 5x real time; twice as long as 310 bare steps of 0.1 ms."""
-    furnish(house, clock, monkeypatch, BareSteps(310, 0.031, True))
+    furnish(house, clock, monkeypatch, BareSteps(310, 0.031, 0.031, True))
     seen = []
     found = speed.run_study(study(tmp_path), lambda row, done, total: seen.append((row["seed"], done, total)))
     assert seen == [(3, 1, 2), (4, 2, 2)]
@@ -119,7 +119,7 @@ def test_a_study_of_known_durations(
 def test_a_replay_that_ends_elsewhere_is_told(
     house: ModuleType, clock: Clock, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    furnish(house, clock, monkeypatch, BareSteps(300, 0.030, False))
+    furnish(house, clock, monkeypatch, BareSteps(300, 0.030, 0.030, False))
     assert speed.run_study(study(tmp_path, seeds=(0,)))["same_end_state"] is False
 
 
