@@ -295,7 +295,8 @@ def summarise(trials: Sequence[SpeedTrial]) -> dict[str, Any]:
     Keys: realtime_factor, bare_factor (the same of the bare steps), over_physics; control_cycle_us (command to
     command), robot_cycle_us, tick_us, record_us; breakdown_s, the mean seconds a mission: `physics` (the bare steps),
     `robot` (the rest of Robot.cycle), `tree` (the tick), `record`, `rest`; then `open` and `report`, which are not part
-    of the wall time; by_cpu, the factors by processor time; leaves_s (tree time by leaf); same_end_state; targets and whether they are met.
+    of the wall time; by_cpu, the factors by processor time; leaves_s (tree time by leaf); same_end_state; targets and
+    whether they are met.
     """
     rows = [t.row for t in trials]
 
