@@ -4,7 +4,8 @@ Why a process: CoACD is C++ that can neither be interrupted nor given a time lim
 process on a failed assertion (seen in its self-intersection test on a mesh that is merely finely tessellated). Imports
 nothing of this project, so that starting it is cheap. Read by `decompose`.
 
-IN.npz holds `vertices` (v, 3) in any unit and `faces` (f, 3); OUT.npz gets `vertices` (n, 3) in the same unit, all
+IN.npz holds `vertices` (v, 3) in any unit, `faces` (f, 3) and `shells` (f,), the number of the closed surface each face
+is of (-1: left out); each is cut by itself. OUT.npz gets `vertices` (n, 3) in the same unit, all
 hulls behind one another, and `counts` (k,), the number of vertices of each.
 """
 
@@ -39,12 +40,19 @@ def main(source: str, target: str, parameters: str) -> None:
     if hasattr(os, "nice"):
         os.nice(10)  # minutes of background work must not slow a control loop beside it
     with np.load(source) as data:
-        vertices, faces = data["vertices"], data["faces"]
+        vertices, faces, shells = data["vertices"], data["faces"], data["shells"]
     # CoACD's float32 geometry tests want a mesh of about unit size, not one of centimetres written in metres
     centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     scale = 0.5 * float(np.ptp(vertices, axis=0).max())
     coacd.set_log_level("off")
-    parts = coacd.run_coacd(coacd.Mesh((vertices - centre) / scale, faces.astype(np.int32)), **json.loads(parameters))
+    given = json.loads(parameters)
+    count = int(shells.max()) + 1
+    given["max_convex_hull"] = max(1, given["max_convex_hull"] // count)
+    parts = []
+    for i in range(count):
+        used, corners = np.unique(faces[shells == i], return_inverse=True)
+        shell = coacd.Mesh((vertices[used] - centre) / scale, corners.reshape(-1, 3).astype(np.int32))
+        parts += coacd.run_coacd(shell, **given)
     np.savez(
         target,
         vertices=np.concatenate([v for v, _ in parts]) * scale + centre,

@@ -34,6 +34,7 @@ from backends.mujoco.bulge import bulge_m, inside_m
 from backends.mujoco.convex_parts import trimmed_hull
 from backends.mujoco.feet import foot_centres
 from backends.mujoco.hull_files import Parts, locked, package_file, read_parts, user_folder, write_parts
+from backends.mujoco.shells import shell_labels
 from backends.mujoco.thinning import thinned
 from glotouch_bt.robot.errors import BadInput
 from glotouch_bt.robot.geometry import Array, frozen_array
@@ -200,7 +201,7 @@ def _run_coacd(mesh: Mesh, attempt: Attempt, say: Progress) -> list[Array]:
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "mesh.npz", Path(folder) / "parts.npz"
         vertices, faces = thinned(mesh)
-        np.savez(source, vertices=vertices, faces=faces)
+        np.savez(source, vertices=vertices, faces=faces, shells=shell_labels(vertices, faces))
         process = subprocess.Popen(
             # -P: without it the worker's own folder is on sys.path, and its files shadow installed modules
             [sys.executable, "-P", str(worker), str(source), str(target), json.dumps(attempt.parameters)],

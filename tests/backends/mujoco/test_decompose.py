@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import os
+import signal
 import subprocess
+import sys
+import time
 from importlib import resources
 from pathlib import Path
 
@@ -290,3 +295,68 @@ def test_command_writes_a_folder_and_names_bad_input(tmp_path: Path, capsys: pyt
     assert "1 parts" in capsys.readouterr().out
     assert room.main([str(tmp_path / "nowhere")]) == 2
     assert "no such folder" in capsys.readouterr().err
+
+
+def mushroom() -> trimesh.Trimesh:
+    return trimesh.creation.revolve(
+        [(0, 0), (0.02, 0), (0.02, 0.008), (0.01, 0.012), (0.01, 0.04), (0.03, 0.045), (0, 0.065)]
+    )
+
+
+def test_an_overhang_stays_open(tmp_path: Path) -> None:
+    mesh = as_mesh(mushroom(), tmp_path, "mushroom")
+    hulls = load_hulls(mesh).vertices
+    below_the_cap = np.array([(0.025, 0.0, 0.035), (0.0, -0.02, 0.025), (-0.016, 0.0, 0.02)])
+    assert inside_m(below_the_cap, hulls).max() < -1e-3
+    assert np.percentile(bulge_m(mesh, hulls, 3000), 95) < 1e-3
+
+
+def test_overlapping_shells_are_cut_one_by_one(tmp_path: Path) -> None:
+    boxes = [trimesh.creation.box(size) for size in ((0.07, 0.02, 0.04), (0.02, 0.06, 0.03), (0.01, 0.01, 0.01))]
+    boxes[2].invert()  # a hollow in the middle
+    hulls = load_hulls(as_mesh(trimesh.util.concatenate(boxes), tmp_path, "cross")).vertices
+    found = sorted(np.ptp(h, axis=0).round(5).tolist() for h in hulls)
+    assert found == [pytest.approx(size, abs=2e-5) for size in ([0.02, 0.06, 0.03], [0.07, 0.02, 0.04])]
+
+
+def test_progress_is_a_warning_unless_somebody_else_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    load_hulls(as_mesh(l_shape(), tmp_path, "shape"))
+    assert any(r.levelname == "WARNING" and "cutting into convex parts" in r.message for r in caplog.records)
+
+
+def test_a_killed_parent_takes_the_cutter_along(tmp_path: Path) -> None:
+    """A parent that is killed outright cannot kill its worker, which would go on for minutes."""
+    source = tmp_path / "in.npz"
+    solid = trimesh.creation.torus(0.03, 0.01, major_sections=128, minor_sections=64)
+    np.savez(source, vertices=solid.vertices, faces=solid.faces, shells=np.zeros(len(solid.faces), dtype=int))
+    worker = Path(room.__file__).with_name("coacd_worker.py")
+    parameters = json.dumps({**room.FINE.parameters, "mcts_iterations": 2000})
+    command = [sys.executable, "-P", str(worker), str(source), str(tmp_path / "out.npz"), parameters]
+    parent = subprocess.Popen(
+        [
+            sys.executable,
+            "-c",
+            f"import subprocess; p = subprocess.Popen({command!r}); print(p.pid, flush=True); p.wait()",
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    pid = int(parent.stdout.readline())
+    parent.stdout.close()
+    time.sleep(2.0)
+    parent.kill()
+    parent.wait()
+    for _ in range(100):
+        if not _running(pid):
+            return
+        time.sleep(0.1)
+    os.kill(pid, signal.SIGKILL)
+    pytest.fail("the cutter outlived its parent")
+
+
+def _running(pid: int) -> bool:
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except OSError:
+        return False
+    return state != "Z"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,9 +25,10 @@ def meshes(tmp_path_factory: pytest.TempPathFactory) -> list[Mesh]:
     found = []
     for name, size in SIZES.items():
         solid = trimesh.creation.box(size)
-        solid.apply_translation((0.01, -0.02, 0.0))  # the mesh frame is not the middle
         solid.export(folder / f"{name}.stl")
-        found.append(load_mesh(Path(folder / f"{name}.stl")))
+        mesh = load_mesh(Path(folder / f"{name}.stl"))
+        off_centre = mesh.vertices_m + np.array([0.01, -0.02, 0.0])  # the frame is not the middle
+        found.append(replace(mesh, vertices_m=off_centre))
     return found
 
 
@@ -91,3 +93,16 @@ def test_too_many_are_refused(meshes: list[Mesh]) -> None:
     with pytest.raises(BadInput, match="do not fit") as caught:
         place_objects(meshes * 3, (0.15, 0.20), 0.030, 0.030, stream(0, "layout"))
     assert "fewer or smaller" in str(caught.value)
+
+
+def test_an_object_far_from_its_files_origin_has_the_same_place(tmp_path: Path) -> None:
+    found = []
+    for name, shift_m in (("near", (0.0, 0.0, 0.0)), ("far", (3.0, -2.0, 1.5))):
+        solid = trimesh.creation.box((0.06, 0.04, 0.05))
+        solid.apply_translation(shift_m)
+        solid.export(tmp_path / f"{name}.stl")
+        mesh = load_mesh(tmp_path / f"{name}.stl")
+        (place,) = place_objects([mesh], INTERIOR, 0.030, 0.030, stream(3, "layout"))
+        found.append(transformed(outline(mesh), place))
+    order = [np.lexsort(f.round(4).T) for f in found]
+    assert found[0][order[0]] == pytest.approx(found[1][order[1]], abs=2e-6)

@@ -1,0 +1,50 @@
+"""Recognition of the stand-in shapes of tests/shapes.py: nothing may lean on the shipped five."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from glotouch_bt.recognition import LossParams, TargetModel, match, rank
+from glotouch_bt.recognition.synthetic import IDEAL, acquire
+from glotouch_bt.robot.meshes import load_mesh
+
+SHAPES = Path(__file__).parents[1] / "shapes.py"
+POSE = (0.03, -0.02, 0.7)
+
+
+@pytest.fixture(scope="module")
+def meshes(tmp_path_factory: pytest.TempPathFactory):
+    spec = importlib.util.spec_from_file_location("stand_in_shapes", SHAPES)
+    shapes = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(shapes)
+    folder = tmp_path_factory.mktemp("stl")
+    names = ["cup", "l_block", "plate", "mushroom", "star", "disc", "wide"]
+    shapes.write(folder, names)
+    return {n: load_mesh(folder / f"{n}.stl") for n in names}
+
+
+def test_the_top_of_a_hollow_is_its_rim(meshes) -> None:
+    model = TargetModel.from_mesh(meshes["cup"])
+    assert model.top_centre_m == pytest.approx(0.070, abs=1e-3)
+    assert TargetModel.from_mesh(meshes["disc"]).top_centre_m == pytest.approx(0.025, abs=2e-4)
+
+
+def test_the_narrowest_way_through(meshes) -> None:
+    """Through the middle: a block of 92 x 90 is 90 wide, a plate 8, a mushroom 22 at its stem."""
+    assert TargetModel.from_mesh(meshes["wide"]).narrowest_m == pytest.approx(0.090, abs=1e-4)
+    assert TargetModel.from_mesh(meshes["plate"]).narrowest_m == pytest.approx(0.008, abs=1e-4)
+    assert TargetModel.from_mesh(meshes["mushroom"]).narrowest_m == pytest.approx(0.022, abs=2e-3)
+
+
+def test_every_shape_knows_itself_among_all(meshes) -> None:
+    names = [n for n in meshes if n != "wide"]
+    touched = [acquire(meshes[n], POSE, IDEAL, np.random.default_rng(i), i)[0] for i, n in enumerate(names)]
+    for i, name in enumerate(names):
+        model = TargetModel.from_mesh(meshes[name])
+        ranking = rank([match(model, t, LossParams()) for t in touched])
+        assert ranking.best.index == i, (name, [(names[m.index], round(m.loss, 2)) for m in ranking.matches])
+        assert ranking.best.loss < 2.0
