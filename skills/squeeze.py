@@ -14,6 +14,9 @@ from skills.squeeze_plan import Stance, plan_stances
 HAND_CLEARANCE_M = 0.005
 """Fingertips stay this far above the floor, and the hand's body this far above a candidate's top."""
 
+LEAST_GAP_M = 0.003
+"""Two closures nearer to each other than this are one."""
+
 
 class SqueezeParams(SkillParams):
     """Parameters of `squeeze`."""
@@ -88,13 +91,18 @@ class Squeeze(Skill):
         self.touchset = touchset
 
     def _heights(self, candidate: Candidate) -> Array:
-        """Pad-centre heights above the floor, lowest first."""
+        """Pad-centre heights above the floor, lowest first.
+
+        A low object is squeezed up to where only the lower half of the pads still feels it: one layer a sequence would
+        leave no spare.
+        """
         p, gripper = self.params, self.context.arm.description.gripper
         lowest = gripper.fingertip_below_P_m + HAND_CLEARANCE_M
         body_limit = candidate.height_m + HAND_CLEARANCE_M - (gripper.pose_E_P.position_m[2] - body_bottom_m(gripper))
         lowest = max(lowest, body_limit)
-        highest = max(candidate.height_m - p.top_overlap_m, lowest)
-        count = int(np.clip(np.floor((highest - lowest) / p.layer_gap_m) + 1, 1, p.layers))
+        highest = max(candidate.height_m - p.top_overlap_m, min(lowest + p.layer_gap_m, candidate.height_m), lowest)
+        least = 1 if highest - lowest < LEAST_GAP_M else min(2, p.layers)
+        count = int(np.clip(np.floor((highest - lowest) / p.layer_gap_m) + 1, least, p.layers))
         return np.linspace(lowest, highest, count)
 
     def _sequence(self, candidate: Candidate, at: Stance, heights: Array) -> Motion[TouchSequence]:
