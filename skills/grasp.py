@@ -7,9 +7,10 @@ import numpy as np
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import MotionRefused, Pose
 from glotouch_bt.touch import Candidate
+from skills.allowance import keeping_clear_of
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.grasp_plan import GraspPlan
-from skills.hand import CLEARANCE_M, glide, hand_pose_B, keep_clear_of, require_clear
+from skills.hand import CLEARANCE_M, glide, hand_pose_B, require_clear
 
 
 class GraspParams(SkillParams):
@@ -42,10 +43,8 @@ class Grasp(Skill):
         """See the class."""
         plan = self.plan
         others = tuple(c for c in (self.known or ()) if c.index != plan.candidate)
-        scene = self.context.arm.scene
-        obstacles = keep_clear_of(self.context.arm, others)
         tried: list[str] = []
-        try:
+        with keeping_clear_of(self.context.arm, others):
             for option in (plan, *plan.alternatives):
                 try:
                     self.grip_m = yield from self._attempt(option)
@@ -53,9 +52,6 @@ class Grasp(Skill):
                 except MotionRefused as refusal:
                     tried.append(str(refusal))
                     self.event("note", text=f"a grasp was given up: {refusal}")
-        finally:
-            for name in obstacles:
-                scene.remove_obstacle(name)
         raise SkillFailed(
             "no_grasp",
             f"none of {len(tried)} grasps could be made; the last: {tried[-1]}",

@@ -8,7 +8,7 @@ import numpy as np
 
 from glotouch_bt.motion import Arm, Motion
 from glotouch_bt.robot import Array, Container, MotionRefused, Pose
-from glotouch_bt.touch import Candidate, ContactGuard, GuardParams, envelope, fit_baseline
+from glotouch_bt.touch import ContactGuard, GuardParams, fit_baseline
 from skills.base import Context
 
 CLEARANCE_M = 0.004
@@ -47,24 +47,6 @@ def require_clear(arm: Arm, pose_B_P: Pose, aperture_m: float, margin_m: float |
     blocked = arm.scene.why_blocked(q, aperture_m, margin_m)
     if blocked is not None:
         raise MotionRefused("pose", blocked)
-
-
-def keep_clear_of(arm: Arm, candidates: tuple[Candidate, ...]) -> list[str]:
-    """Put what was found into the arm's scene; returns the obstacles' names, for `Scene.remove_obstacle`."""
-    names = []
-    for candidate in candidates:
-        room = envelope(candidate)
-        name = f"candidate {candidate.index}"
-        arm.scene.add_obstacle(
-            name,
-            room.kind,
-            centre_K_m=room.centre_K_m,
-            size_m=room.size_m,
-            height_m=max(candidate.height_m, 0.01),
-            yaw_rad=room.yaw_rad,
-        )
-        names.append(name)
-    return names
 
 
 def glide(context: Context, pose_B_P: Pose, speed_m_s: float) -> Motion[bool]:

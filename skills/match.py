@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from glotouch_bt.recognition import LossParams, PadSpec, Ranking, TargetModel, match, rank
-from glotouch_bt.robot import HOLD, BadInput
+from glotouch_bt.robot import HOLD, BadInput, ParamError
 from glotouch_bt.robot.meshes import Mesh, load_folder, load_mesh
 from glotouch_bt.touch import TouchSet
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
@@ -24,6 +24,7 @@ class Match(Skill):
     SUCCESS: the best candidate passes margin, fit and evidence; `plan` says how to grasp it.
     FAILURE `not_recognised`: it does not; `ranking` is written all the same.
     FAILURE `too_wide`: the same, and the jaws do not open wide enough for the target.
+    FAILURE `too_low`: the target is lower than the probe and the pads reach.
     FAILURE `no_touch`: nothing was squeezed.
     """
 
@@ -42,7 +43,10 @@ class Match(Skill):
         yield HOLD  # matching takes longer than a control period; on hardware the arm holds meanwhile
         gripper = self.context.arm.description.gripper
         mesh = self._target()
-        model = TargetModel.from_mesh(mesh, PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m))
+        try:
+            model = TargetModel.from_mesh(mesh, PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m))
+        except ParamError as e:
+            raise SkillFailed("too_low", f"{mesh.name} cannot be felt: {e}", advice="sweep lower") from e
         matches = [match(model, t, LossParams()) for t in touchsets]
         ranking = rank(matches)
         self.ranking = ranking

@@ -7,8 +7,9 @@ import numpy as np
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose
 from glotouch_bt.touch import Candidate, Layer, TouchSequence, TouchSet, make_layer
+from skills.allowance import keeping_clear_of
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
-from skills.hand import glide, hand_pose_B, keep_clear_of
+from skills.hand import glide, hand_pose_B
 from skills.squeeze_plan import Stance, plan_stances
 
 HAND_CLEARANCE_M = 0.005
@@ -43,7 +44,7 @@ class Squeeze(Skill):
 
     SUCCESS: at least one stable layer; `touchset` holds all of them.
     FAILURE `nothing_felt`: no closure reached a plateau on anything.
-    FAILURE `too_wide`: the object does not fit between the open jaws in any direction tried.
+    FAILURE `no_squeeze`: the object does not fit between the open jaws, or its neighbours leave the fingers no room.
     """
 
     Params = SqueezeParams
@@ -57,10 +58,9 @@ class Squeeze(Skill):
         candidate = self.candidate
         arm = self.context.arm
         others = tuple(c for c in (self.known or ()) if c.index != candidate.index)
-        obstacles = keep_clear_of(arm, others)
         sequences: list[TouchSequence] = []
         refusals: list[str]
-        try:
+        with keeping_clear_of(arm, others):
             heights = self._heights(candidate)
             container = self.context.world.container
             stances, refusals = yield from plan_stances(
@@ -71,15 +71,12 @@ class Squeeze(Skill):
                     sequences.append((yield from self._sequence(candidate, at, heights)))
                 except MotionRefused as refusal:
                     refusals.append(str(refusal))
-        finally:
-            for name in obstacles:
-                arm.scene.remove_obstacle(name)
         touchset = TouchSet(candidate, tuple(sequences))
         stable = sum(layer.stable for layer in touchset.layers)
         self.event("touchset", touchset=touchset, refusals=refusals)
         if not sequences:
             raise SkillFailed(
-                "too_wide", f"no squeeze of candidate {candidate.index} is possible: {'; '.join(refusals[:3])}"
+                "no_squeeze", f"no squeeze of candidate {candidate.index} is possible: {'; '.join(refusals[:3])}"
             )
         if stable == 0:
             raise SkillFailed(

@@ -1,6 +1,6 @@
 """Makes docs/images/mission.png: six moments of one retrieval. Needs an OpenGL (MUJOCO_GL=egl works in software).
 
-    MUJOCO_GL=egl python docs/images/mission.py
+MUJOCO_GL=egl python docs/images/mission.py
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ class Photographer:
         self.node, self.since = "", 0.0
 
     def tick(self, stamp_s: float, changes: list[tuple[str, Any, Any]]) -> None:
+        """Note which of the nodes in SHOTS began."""
         for path, _, new in changes:
             name = path.rsplit("/", 1)[-1]
             if str(getattr(new, "value", new)) == "RUNNING" and any(name == shot[0] for shot in SHOTS):
@@ -57,7 +58,9 @@ def main() -> None:
         if waiting and watch.node == waiting[0][0] and observation.now_s - watch.since >= waiting[0][1]:
             _, _, camera, caption = waiting.pop(0)
             picture = Image.fromarray(render(robot, *(2 * s for s in SIZE), camera)).resize(SIZE, Image.LANCZOS)
-            ImageDraw.Draw(picture).text((12, 10), caption, fill=(20, 24, 32), font_size=18, stroke_width=2, stroke_fill="white")
+            ImageDraw.Draw(picture).text(
+                (12, 10), caption, fill=(20, 24, 32), font_size=18, stroke_width=2, stroke_fill="white"
+            )
             pictures.append(np.asarray(picture))
         return observation
 

@@ -115,7 +115,7 @@ class Arm:
         return self._aperture_m
 
     def sync(self, observation: Observation) -> None:
-        """Take the measured joint positions and aperture as the present setpoint. Call once, at the start."""
+        """Take the measured joint positions and aperture as the present setpoint: at the start, after a preemption."""
         self._q = np.array(observation.q[-1])
         self._see(observation)
 

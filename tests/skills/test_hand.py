@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from glotouch_bt.robot import MotionRefused, Pose
-from skills.hand import BUMP_N, easy_yaw, glide, hand_pose_B, keep_clear_of, require_clear
+from skills.allowance import keeping_clear_of
+from skills.hand import BUMP_N, easy_yaw, glide, hand_pose_B, require_clear
 
 
 @pytest.mark.parametrize("yaw", np.linspace(-7.0, 7.0, 29))
@@ -30,10 +31,11 @@ def test_no_room_is_said_with_the_pair(bench, found) -> None:
     b = bench()
     pose = hand_pose_B(b.arm, b.world.container, np.array([0.0, 0.0, 0.03]), 0.0)
     require_clear(b.arm, pose, 0.06)
-    names = keep_clear_of(b.arm, (found.round((0.0, 0.04), 0.02, index=3),))
-    assert names == ["candidate 3"]
-    with pytest.raises(MotionRefused, match=r"finger would .* candidate 3"):
-        require_clear(b.arm, pose, 0.06)
+    with keeping_clear_of(b.arm, (found.round((0.0, 0.04), 0.02, index=3),)):
+        assert "candidate 3" in b.arm.scene.obstacles
+        with pytest.raises(MotionRefused, match=r"finger would .* candidate 3"):
+            require_clear(b.arm, pose, 0.06)
+    require_clear(b.arm, pose, 0.06)
     with pytest.raises(MotionRefused):
         require_clear(b.arm, Pose.pointing_down((3.0, 0.0, 0.0), 0.0), 0.06)
 

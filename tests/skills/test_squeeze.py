@@ -67,10 +67,10 @@ def test_nothing_felt(make) -> None:
     assert not any(layer.stable for layer in event["touchset"].layers)
 
 
-def test_too_wide(make, found) -> None:
+def test_no_squeeze(make, found) -> None:
     b, skill = make(found.round((0, 0), 0.045))
     b.run(skill)
-    assert (skill.status, skill.reason.code) == (Status.FAILURE, "too_wide")
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_squeeze")
     assert not [c for c in b.commands if c.motion is not None], "nothing moves towards what cannot be squeezed"
 
 
@@ -80,7 +80,7 @@ def test_no_room_among_neighbours(make, found) -> None:
     )
     b, skill = make(known=ring)
     b.run(skill)
-    assert (skill.status, skill.reason.code) == (Status.FAILURE, "too_wide")
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_squeeze")
     assert "candidate" in skill.reason.message
     assert not [o for o in b.arm.scene.obstacles if o.startswith("candidate")]
 
@@ -89,7 +89,7 @@ def test_fingers_on_something_rise_again(make, things) -> None:
     """Something lies where nothing was traced: every sequence is given up, and the hand is high again."""
     b, skill = make(stuff=[things.floor(0.045)], tip_P_m=0.022)
     b.run(skill)
-    assert (skill.status, skill.reason.code) == (Status.FAILURE, "too_wide")
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_squeeze")
     assert "met something" in skill.reason.message
     assert float(b.arm.pose_B_P.position_m[2]) > -0.2 + 0.13
     assert b.robot.peak_force_N < 10.0

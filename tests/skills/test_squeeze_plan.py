@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from skills.hand import keep_clear_of
+from skills.allowance import keeping_clear_of
 from skills.squeeze_plan import LEAST_SIDE_GAP_M, plan_stances, schemes, stance
 
 STROKE = 0.085
@@ -57,7 +57,7 @@ def test_three_stances_in_the_open_and_none_between_walls_of_neighbours(found, b
     stances, refusals = b.go(plan_stances(candidate, b.arm, b.world.container, 0.021, (0.01, 0.005)))
     assert (len(stances), refusals) == (3, [])
     ring = [found.round((0.058 * np.cos(a), 0.058 * np.sin(a)), 0.028, index=i + 1) for i, a in enumerate(np.arange(6))]
-    keep_clear_of(b.arm, tuple(ring))
-    stances, refusals = b.go(plan_stances(candidate, b.arm, b.world.container, 0.021, (0.01, 0.005)))
+    with keeping_clear_of(b.arm, ring):
+        stances, refusals = b.go(plan_stances(candidate, b.arm, b.world.container, 0.021, (0.01, 0.005)))
     assert stances == []
     assert any("candidate" in r for r in refusals)
