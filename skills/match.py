@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from glotouch_bt.recognition import LossParams, PadSpec, Ranking, TargetModel, match, rank
+from glotouch_bt.recognition import Gates, LossParams, PadSpec, Ranking, TargetModel, match, rank
 from glotouch_bt.robot import HOLD, BadInput, ParamError
 from glotouch_bt.robot.meshes import Mesh, load_folder, load_mesh
 from glotouch_bt.touch import TouchSet
@@ -48,9 +48,10 @@ class Match(Skill):
         except ParamError as e:
             raise SkillFailed("too_low", f"{mesh.name} cannot be felt: {e}", advice="sweep lower") from e
         matches = [match(model, t, LossParams()) for t in touchsets]
-        ranking = rank(matches)
+        gates = Gates()
+        ranking = rank(matches, gates)
         self.ranking = ranking
-        self.event("ranking", target=mesh.name, ranking=ranking)
+        self.event("ranking", target=mesh.name, ranking=ranking, gates=gates)
         if not ranking.accepted:
             felt = {t.candidate.index for t in touchsets}
             missed = [str(c.index) for c in self.known or () if c.index not in felt]
