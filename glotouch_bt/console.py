@@ -84,6 +84,11 @@ def print_result(done: RunResult) -> None:
         highlight=False,
         soft_wrap=True,
     )
+    expected = r["parameters"].get("expected_objects")
+    if expected is not None:
+        found = len(r["candidates"])
+        colour = "green" if found == expected else "yellow"
+        console.print(f"objects found: [{colour}]{found} of {expected}[/] expected", highlight=False)
     if r["correct"] is not None:
         held = r["retrieved"] or "nothing"
         word = "[green]the target[/]" if r["correct"] else f"[red]not the target ({escape(str(r['target']))})[/]"
