@@ -54,10 +54,12 @@ def retrieve(
     from glotouch_bt.mission.load import load_mission
     from glotouch_bt.study.retrieve import Campaign, run_campaign, targets_of
 
-    world = load_mission(mission, {}, objects=objects).world
+    names = tuple(target) if target else targets_of(objects) if objects else ()
+    # A mission's default target need not be among other objects: check it with one that is.
+    world = load_mission(mission, {"target": names[0]} if names else {}, objects=objects).world
     campaign = Campaign(
         mission=mission,
-        targets=tuple(target or targets_of(world.objects.folder)),
+        targets=names or targets_of(world.objects.folder),
         seeds=tuple(range(seed, seed + trials)),
         conditions=conditions,
         objects=objects,
