@@ -100,7 +100,11 @@ class OrbitProbe(Skill):
             self.map = belief.with_dropped(first.point_K_m)
             raise SkillFailed("known_object", "the contact lies on an object that is traced already")
         prober = Prober(self.context, self.tool, GuardParams())
-        trace = yield from self._go_round(prober, first)
+        trace = _Trace([first])
+        try:
+            yield from self._go_round(prober, trace)
+        except MotionRefused as refusal:  # what was felt so far may do
+            self.event("note", text=f"the way round ended early: {refusal}")
         path = np.concatenate(trace.paths) if trace.paths else first.tip_K_m[None, :]
         belief = belief.with_path(path[:, :2])
         self.event("sweep", path_K_m=path)
@@ -126,10 +130,10 @@ class OrbitProbe(Skill):
         self.map, self.candidates = belief, (*known, candidate)
         self.found, self.complete = len(known) + 1, belief.complete
 
-    def _go_round(self, prober: Prober, first: Contact) -> Motion[_Trace]:
-        """Follow the outline until it closes, or the ball is stuck."""
+    def _go_round(self, prober: Prober, trace: _Trace) -> Motion[None]:
+        """Follow the outline from the first contact until it closes, or the ball is stuck; fills `trace`."""
         p = self.params
-        trace = _Trace([first])
+        first = trace.contacts[0]
         normal = _unit(_unit(first.reaction_K[:2]) - first.approach_K[:2])
         yield from self._back_off(prober, trace, normal)
         corners, step = 0, p.step_m
@@ -161,7 +165,6 @@ class OrbitProbe(Skill):
                 break
             yield from self._back_off(prober, trace, normal)
         yield from self._back_off(prober, trace, normal)
-        return trace
 
     def _normal(self, trace: _Trace, contact: Contact, *, ahead: bool) -> Array:
         """Outward normal at a new contact: across the chord from the last one, and against the approach."""
