@@ -36,7 +36,7 @@ format:
 	$(BIN)/ruff check --fix .
 
 # Renew the pinned, hashed requirements (no registry address is written).
-PIP_COMPILE = $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --no-header
+PIP_COMPILE = $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras --no-emit-options --no-header
 pins: $(VENV)/.dev
 	$(PIP_COMPILE) --build-deps-for editable -o requirements.txt pyproject.toml
 	$(PIP_COMPILE) --build-deps-for editable --extra dev -c requirements.txt -o requirements-dev.txt pyproject.toml

@@ -104,7 +104,7 @@ def test_no_code_knows_an_object_by_name() -> None:
 
 
 REGISTRY = re.compile(
-    rb"(?i)https?://[^\s)\"'>]*(pypi|pythonhosted|artifactory|nexus|mirror|/simple\b)|--(extra-)?index-url|--trusted-host"
+    rb"(?i)https?://[^\s)\"'>]*(pypi|pythonhosted|artifactory|nexus|mirror|/simple\b)|--(extra-)?index[-]url|--trusted-host"
     rb"|--find-links|index[-_]url *="
 )
 MACHINE = re.compile(

@@ -147,7 +147,7 @@ def test_guard_takes_effect_in_the_next_command(arm: Arm, robot: FakeRobot, driv
     a, j = arm.limits.stop_acceleration_m_s2, arm.limits.stop_jerk_m_s3
     fall = a * (0.01 - 0.5 * a / j) if a / j < 0.01 else 0.5 * j * 0.01**2  # jerk-limited, over one period
     assert speeds[60] == pytest.approx(0.06 - fall, abs=1e-4)
-    assert len(speeds) == 60 + 4  # 0.06/2 + 2/200 s = 40 ms
+    assert len(speeds) == 60 + 4  # v/a + a/j = 32 ms, rounded up to whole periods
 
 
 def test_wall_is_refused_by_name_before_any_command(arm: Arm, robot: FakeRobot, drive) -> None:  # type: ignore[no-untyped-def]
