@@ -5,7 +5,7 @@ K: origin at the centre of the container's floor, z up. Planar quantities are (x
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -26,6 +26,8 @@ class Contact:
         reaction_K: (3,) unit direction of the force the tip felt.
         point_K_m: (2,) contact point: the support-plane intercept (paper III-B).
         force_N: Norm of the filtered contact force when the guard tripped.
+        pushed_K_m: (2,) how far the ball went on past its onset before it stopped: what it touched was pushed at most
+            so far, and stands where the ball left it.
     """
 
     stamp_s: float
@@ -34,6 +36,7 @@ class Contact:
     reaction_K: Array
     point_K_m: Array
     force_N: float
+    pushed_K_m: Array = field(default_factory=lambda: np.zeros(2))
 
 
 @dataclass(frozen=True)
