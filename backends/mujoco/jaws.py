@@ -10,8 +10,8 @@ import numpy as np
 
 from backends.mujoco.gripper_model import JAW_STIFFNESS_N_M
 from backends.mujoco.model import STEPS, Handles
-from backends.mujoco.streams import stream
 from glotouch_bt.robot import Array, Conditions, Gripper, GripperState, GripperTarget, ParamError
+from glotouch_bt.robot.streams import stream
 
 MOVING_M_S = 0.002  # aperture rate above which the jaws are reported as moving
 WINDUP_M = 0.001  # how far the ramp may lead the jaws beyond what the force limit needs

@@ -14,9 +14,9 @@ import numpy as np
 from backends.mujoco.gel import GelSensor, PairPress
 from backends.mujoco.model import Handles
 from backends.mujoco.rays import SurfaceRays
-from backends.mujoco.streams import stream
 from glotouch_bt.robot import Conditions, Gripper, Pose, TactileFrame
 from glotouch_bt.robot.meshes import Mesh
+from glotouch_bt.robot.streams import stream
 
 SAME_DISTANCE_M = 1e-5  # the gel is not solved again while pads and forces stay this near the last solution
 SAME_FORCE_N = 0.5

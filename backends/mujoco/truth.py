@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backends.mujoco.placement import Placement, place_objects
-from backends.mujoco.streams import stream
 from glotouch_bt.robot import Array, BadInput, Conditions, Pose, World
 from glotouch_bt.robot.meshes import Mesh, load_folder
+from glotouch_bt.robot.placement import Placement, draw_layout
+from glotouch_bt.robot.streams import stream
 
 
 @dataclass(frozen=True)
@@ -79,13 +79,7 @@ def draw_truth(
     """
     meshes = load_folder(world.objects.folder, world.objects.names)
     if layout is None:
-        places = place_objects(
-            meshes,
-            world.container.interior_m[:2],
-            world.objects.min_gap_m,
-            world.objects.min_wall_gap_m,
-            stream(seed, "layout"),
-        )
+        places = draw_layout(meshes, world, seed)
     else:
         missing = [m.name for m in meshes if m.name not in layout]
         if missing:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from backends.mujoco.model import STEP_S, STEPS
-from backends.mujoco.streams import stream
 from glotouch_bt.robot import Array, Conditions, RobotDescription
+from glotouch_bt.robot.streams import stream
 
 GRAVITY_M_S2 = 9.81
 BLOCKS = 128  # noise is drawn for this many periods at a time

@@ -11,8 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from glotouch_bt.robot import Array, BadInput
+from glotouch_bt.robot.errors import BadInput
+from glotouch_bt.robot.geometry import Array
 from glotouch_bt.robot.meshes import Mesh
+from glotouch_bt.robot.streams import stream
+from glotouch_bt.robot.world import World
 
 TRIES_PER_OBJECT = 400
 RESTARTS = 60
@@ -128,4 +131,17 @@ def place_objects(
         f"(outlines cover {sum(areas) * 1e4:.0f} of {interior_m[0] * interior_m[1] * 1e4:.0f} cm2, gaps of "
         f"{min_gap_m * 1e3:.0f} mm between objects and {min_wall_gap_m * 1e3:.0f} mm to walls asked); "
         "use fewer or smaller objects, smaller gaps or a larger container"
+    )
+
+
+def draw_layout(meshes: Sequence[Mesh], world: World, seed: int) -> list[Placement]:
+    """The layout of a trial: every simulator that asks with the same seed places the same objects alike.
+
+    Raises:
+        BadInput: As `place_objects`.
+    """
+    objects = world.objects
+    interior = world.container.interior_m
+    return place_objects(
+        meshes, (interior[0], interior[1]), objects.min_gap_m, objects.min_wall_gap_m, stream(seed, "layout")
     )

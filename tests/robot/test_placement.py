@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from backends.mujoco.placement import Placement, gap, outline, place_objects, transformed
-from backends.mujoco.streams import stream
 from glotouch_bt.robot import Array, BadInput
 from glotouch_bt.robot.meshes import Mesh, load_mesh
+from glotouch_bt.robot.placement import Placement, gap, outline, place_objects, transformed
+from glotouch_bt.robot.streams import stream
 
 SIZES = {"bar": (0.09, 0.03, 0.04), "cube": (0.05, 0.05, 0.05), "plate": (0.07, 0.04, 0.02), "peg": (0.02, 0.02, 0.06)}
 INTERIOR = (0.30, 0.40)
