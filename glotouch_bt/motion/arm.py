@@ -88,6 +88,8 @@ class Arm:
     Attributes:
         kinematics: Forward and inverse kinematics.
         scene: What must not be hit; skills add what they find to it.
+        along_m_s2: Commanded acceleration along the path at the end of the newest period of a motion along a path;
+            what a guard needs to know the inertia it will feel.
     """
 
     def __init__(self, description: RobotDescription, limits: Limits, world: World, period_s: float) -> None:
@@ -96,6 +98,7 @@ class Arm:
         self.scene = Scene(self.kinematics, world)
         self._q: Array = self.kinematics.home.copy()
         self._aperture_m = description.gripper.stroke_m
+        self.along_m_s2 = 0.0
 
     # -- where it is -------------------------------------------------------------------------------------------------
 
@@ -302,6 +305,7 @@ class Arm:
                 now, running = running, None
                 for k in range(len(now)):
                     self._q = now.q[k]
+                    self.along_m_s2 = float(now.progress.a[k])
                     observation = yield Command(now.setpoint(k), None, tactile)
                     self._see(observation)
                     track.append(observation.position_B_P[-1])

@@ -5,27 +5,26 @@ Pure: arrays in, values out. Knows no robot, tree or file.
 
 from glotouch_bt.touch.baseline import Baseline, fit_baseline
 from glotouch_bt.touch.contours import consistent, contour_quality, fit_contour, fit_kind, signed_distance
-from glotouch_bt.touch.detector import (
-    ContactGuard,
-    GuardParams,
-    HardStop,
-    HardTrip,
-    Onset,
-    reaction_direction,
-    settled,
-)
+from glotouch_bt.touch.detector import ContactGuard, Onset
 from glotouch_bt.touch.envelope import envelope
 from glotouch_bt.touch.filtering import LowPass
 from glotouch_bt.touch.fusion import TipFusion
+from glotouch_bt.touch.guard_params import GuardParams
+from glotouch_bt.touch.hard_stop import HardStop, HardTrip
+from glotouch_bt.touch.inertia import Carried, CommandedInertia
+from glotouch_bt.touch.latency import LatencyEstimate, latency_from_two_speeds
 from glotouch_bt.touch.localisation import contact_direction, contact_point, disc_support, polygon_support
 from glotouch_bt.touch.patches import PatchStats, evidence_weight, patch_statistics, relative_nonplanarity
 from glotouch_bt.touch.plateau import Plateau, PlateauParams, find_plateau, make_layer, temporal_median
+from glotouch_bt.touch.settling import reaction_direction, settled
 from glotouch_bt.touch.tracing import largest_gap_direction, needs_more, next_direction, widest_gap
 from glotouch_bt.touch.values import Candidate, Contact, Contour, ContourKind, Layer, TouchSequence, TouchSet
 
 __all__ = [
     "Baseline",
     "Candidate",
+    "Carried",
+    "CommandedInertia",
     "Contact",
     "ContactGuard",
     "Contour",
@@ -33,6 +32,7 @@ __all__ = [
     "GuardParams",
     "HardStop",
     "HardTrip",
+    "LatencyEstimate",
     "Layer",
     "LowPass",
     "Onset",
@@ -54,6 +54,7 @@ __all__ = [
     "fit_contour",
     "fit_kind",
     "largest_gap_direction",
+    "latency_from_two_speeds",
     "make_layer",
     "needs_more",
     "next_direction",

@@ -1,0 +1,54 @@
+"""Thresholds of the contact guard and of the hard stop, with their sources."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+from glotouch_bt.robot import ParamError
+
+
+@dataclass(frozen=True, kw_only=True)
+class GuardParams:
+    """Thresholds of the contact guard and of the hard stop.
+
+    Attributes:
+        directional_N: Tip force against the motion that counts as touch. Source: 0.10-0.15 N is the usable range
+            measured with fused force and torque; free motion at 0.3 m/s2 stays below 0.08 N.
+        total_N: Norm of the tip force that must go with it. Source: as above.
+        moment_Nm: Moment at the sensor that may stand in for the total force: `total_N` on a 0.34 m lever.
+        consecutive: Samples in a row. Source: 3 at 1 kHz, one tenth of the filter's rise time: outliers only.
+        sigmas: No threshold is ever below this many standard deviations of the filtered estimate in its direction, so
+            that a noisy sensor does not trip by itself (5.5: one false alarm in hours).
+        cutoff_Hz, rate_Hz: Low-pass and sampling rate. Source: 15-60 Hz change the result by < 0.2 mm.
+        latency_s: Age of a wrench sample when it arrives. Source: the wrist sensor's declared latency.
+        hard_force_N, hard_torque_Nm: Absolute limits of the tared wrench. Source: `robot.Limits`.
+        hard_residual_N, hard_residual_Nm: Limits of the wrench minus its baseline: below what makes the grasped probe
+            slip (12.8 N measured at 60 N grip), on the same lever for the torque.
+    """
+
+    directional_N: float = 0.15
+    total_N: float = 0.15
+    moment_Nm: float = 0.05
+    consecutive: int = 3
+    sigmas: float = 5.5
+    cutoff_Hz: float = 30.0
+    rate_Hz: float = 1000.0
+    latency_s: float = 0.003
+    hard_force_N: float = 30.0
+    hard_torque_Nm: float = 10.2
+    hard_residual_N: float = 20.0
+    hard_residual_Nm: float = 6.8
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value = getattr(self, f.name)
+            least = 0.0 if f.name == "latency_s" else math.ulp(0.0)
+            if not (math.isfinite(value) and value >= least):
+                raise ParamError(f.name, value, "finite and positive (latency_s may be 0)")
+        if self.consecutive != int(self.consecutive) or self.consecutive < 1:
+            raise ParamError("consecutive", self.consecutive, "a whole number >= 1")
+        if max(self.directional_N, self.total_N) >= min(self.hard_force_N, self.hard_residual_N):
+            raise ParamError("directional_N, total_N", max(self.directional_N, self.total_N), "below the hard limits")
+        if self.cutoff_Hz >= 0.5 * self.rate_Hz:
+            raise ParamError("cutoff_Hz", self.cutoff_Hz, "below half of rate_Hz")
