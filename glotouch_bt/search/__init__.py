@@ -1,7 +1,28 @@
-"""Where to probe next. Pure: a map in, waypoints out."""
+"""Where to probe next. Pure: a map in, moves out."""
 
-from glotouch_bt.search.frontier import NearestFrontier, SearchPolicy
+from glotouch_bt.search.expectation import ExpectationParams, ExpectedFind
+from glotouch_bt.search.frontier import PAPER_PASSES, NearestFrontier
 from glotouch_bt.search.map import Exclusion, SearchMap
+from glotouch_bt.search.moves import Felt, Move, MoveKind, Plan
+from glotouch_bt.search.policy import SearchPolicy, Stretch
 from glotouch_bt.search.routes import Routes, segment_is_free
+from glotouch_bt.search.seeking import Sought, seek
 
-__all__ = ["Exclusion", "NearestFrontier", "Routes", "SearchMap", "SearchPolicy", "segment_is_free"]
+__all__ = [
+    "PAPER_PASSES",
+    "Exclusion",
+    "ExpectationParams",
+    "ExpectedFind",
+    "Felt",
+    "Move",
+    "MoveKind",
+    "NearestFrontier",
+    "Plan",
+    "Routes",
+    "SearchMap",
+    "SearchPolicy",
+    "Sought",
+    "Stretch",
+    "seek",
+    "segment_is_free",
+]

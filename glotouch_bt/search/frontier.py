@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 
 from glotouch_bt.robot import Array, ParamError
 from glotouch_bt.search.map import SearchMap
+from glotouch_bt.search.policy import Stretch
 from glotouch_bt.search.routes import Routes
 
 DROP_RADIUS_M = 0.012
@@ -19,14 +18,6 @@ PAPER_PASSES = ((1.0, 0.0),)
 PASSES = ((1.6, 0.03), (1.0, 0.03), (1.0, 0.0), (0.6, 0.0))
 """Tuned on random layouts of five objects of 4-11 cm; the last pass is for what was missed."""
 TURN_M = 0.02
-
-
-class SearchPolicy(Protocol):
-    """Chooses the next stretch of a search."""
-
-    def next_path(self, belief: SearchMap, tip_K_m: Array) -> Array | None:
-        """Waypoints (k, 2) in K for the tip at tip_K_m (2,), entering no envelope; None: nothing is left to explore."""
-        ...
 
 
 class NearestFrontier:
@@ -79,8 +70,13 @@ class NearestFrontier:
         inner = np.all(np.abs(samples) <= np.maximum(belief.half_extent_m - border, 0.0), axis=1)
         return unexplored(belief, samples[inner], factor * self.coverage_radius_m)
 
-    def next_path(self, belief: SearchMap, tip_K_m: Array) -> Array | None:
+    def next_stretch(self, belief: SearchMap, tip_K_m: Array) -> Stretch | None:
         """See `SearchPolicy`."""
+        way = self.next_path(belief, tip_K_m)
+        return None if way is None else Stretch(way)
+
+    def next_path(self, belief: SearchMap, tip_K_m: Array) -> Array | None:
+        """Waypoints (k, 2) in K to the nearest unexplored place; None if none can be reached."""
         tip = np.asarray(tip_K_m, dtype=np.float64)[:2]
         routes = Routes(belief, tip)
         for step in range(len(self._passes)):
