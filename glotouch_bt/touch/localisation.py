@@ -1,10 +1,67 @@
-"""Where the probe touched: support function of its section and the combined contact direction (paper III-B)."""
+"""Where the tool touched: support function of its section and the combined contact direction (paper III-B)."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from glotouch_bt.robot import Array, ParamError
+from glotouch_bt.robot.geometry import frozen_array
+
+
+class Section(Protocol):
+    """The tool's section at the height of contact: a set of points about the tool's reference point."""
+
+    def support_m(self, direction: Array) -> float:
+        """Support distance max d.p over the section's points p, for d (2,) written in the section's axes."""
+        ...
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A ball, or a round shaft, about its centre.
+
+    Attributes:
+        radius_m: Its radius.
+    """
+
+    radius_m: float
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.radius_m) and self.radius_m >= 0):
+            raise ParamError("disc.radius_m", self.radius_m, "finite and not negative")
+
+    def support_m(self, direction: Array) -> float:
+        """See `Section`: the radius, whatever the direction."""
+        return disc_support(self.radius_m, direction)
+
+
+@dataclass(frozen=True)
+class Polygon:
+    """A convex section with corners, for instance the outline of two closed fingers.
+
+    Attributes:
+        vertices_m: (n, 2), n >= 3, in the section's axes.
+    """
+
+    vertices_m: Array
+
+    def __post_init__(self) -> None:
+        corners = np.asarray(self.vertices_m, dtype=np.float64)
+        if corners.ndim != 2 or len(corners) < 3:
+            raise ParamError("polygon.vertices_m", corners.shape, "(n, 2) with n >= 3")
+        object.__setattr__(self, "vertices_m", frozen_array("polygon.vertices_m", corners, (len(corners), 2)))
+
+    @classmethod
+    def rectangle(cls, half_x_m: float, half_y_m: float) -> Polygon:
+        """A rectangle about the reference point."""
+        return cls(np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * (half_x_m, half_y_m))
+
+    def support_m(self, direction: Array) -> float:
+        """See `Section`."""
+        return polygon_support(self.vertices_m, direction)
 
 
 def disc_support(radius_m: float, direction: Array) -> float:
@@ -41,16 +98,25 @@ def contact_direction(approach: Array, reaction: Array | None) -> Array:
     return np.asarray(d / np.linalg.norm(d))
 
 
-def contact_point(tip_m: Array, tip_radius_m: float, approach: Array, reaction: Array | None = None) -> Array:
-    """Contact point (2,) of a ball: x + h(d) d, the support-plane intercept (eq. contact_point).
+def section_point(
+    place_m: Array, section: Section, axes: Array, approach: Array, reaction: Array | None = None
+) -> Array:
+    """Contact point (2,) of a tool: x + h(d) d, the support-plane intercept (eq. contact_point).
 
     Args:
-        tip_m: (2,) ball centre at the onset.
-        tip_radius_m: Its radius at the height of contact.
-        approach: (2,) direction the tip moved in; a vertical approach (no planar part) gives the tip's own place.
+        place_m: (2,) the tool's reference point at the onset, in some planar frame.
+        section: Its section about that point.
+        axes: (2, 2) the section's axes in the planar frame, as columns (may mirror: a hand that points down does).
+        approach: (2,) direction the tool moved in; a vertical approach (no planar part) gives the reference itself.
         reaction: (2,) direction of the force it felt, or None.
     """
-    tip = np.asarray(tip_m, dtype=np.float64)
+    place = np.asarray(place_m, dtype=np.float64)
     if np.linalg.norm(approach) < 1e-6:
-        return tip.copy()
-    return np.asarray(tip + tip_radius_m * contact_direction(approach, reaction))
+        return place.copy()
+    d = contact_direction(approach, reaction)
+    return np.asarray(place + section.support_m(np.asarray(axes, dtype=np.float64).T @ d) * d)
+
+
+def contact_point(tip_m: Array, tip_radius_m: float, approach: Array, reaction: Array | None = None) -> Array:
+    """Contact point (2,) of a ball of `tip_radius_m` whose centre is at tip_m (2,); the rest as in `section_point`."""
+    return section_point(tip_m, Disc(tip_radius_m), np.eye(2), approach, reaction)
