@@ -29,12 +29,26 @@ class Progress:
     a: Array
 
 
+EASED = (1.0, 1.0 - 1e-6, 1.0 - 1e-4)
+"""Parts of the acceleration tried. Where two sorts of profile meet (speed times jerk is exactly the acceleration
+squared, and the way just long enough) the library's root finding fails by rounding; a hair beside it does not."""
+
+
 def _solve(dof: int, target: ruckig.InputParameter) -> ruckig.Trajectory:
-    trajectory = ruckig.Trajectory(dof)
-    result = ruckig.Ruckig(dof).calculate(target, trajectory)
-    if int(result) < 0:
-        raise BackendError(f"ruckig found no profile ({result}) for {target}")
-    return trajectory
+    acceleration = list(target.max_acceleration)
+    failure: Exception | None = None
+    for part in EASED:
+        target.max_acceleration = [part * a for a in acceleration]
+        trajectory = ruckig.Trajectory(dof)
+        try:
+            result = ruckig.Ruckig(dof).calculate(target, trajectory)
+        except ruckig.RuckigError as e:
+            failure = e
+            continue
+        if int(result) >= 0:
+            return trajectory
+        failure = None
+    raise BackendError(f"ruckig found no profile for {target}") from failure
 
 
 def _periods(duration_s: float, period_s: float) -> int:

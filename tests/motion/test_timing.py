@@ -69,3 +69,12 @@ def test_joint_move_is_straight_and_within_limits() -> None:
     share = (profile.q[:, 0] - start[0]) / (end[0] - start[0])
     np.testing.assert_allclose(profile.q[:, 1], start[1] + share * (end[1] - start[1]), atol=1e-9)
     np.testing.assert_allclose(np.gradient(profile.q[:, 0], PERIOD)[1:-1], profile.dq[1:-1, 0], atol=1e-3)
+
+
+@pytest.mark.parametrize("ulps", range(-8, 9))
+def test_ways_that_just_reach_full_speed_have_a_profile(ulps: int) -> None:
+    """Speed times jerk is exactly the acceleration squared: to full speed and back takes exactly 2 v a / j metres."""
+    way = 0.005 + ulps * np.spacing(0.005)
+    profile = rest_to_rest(way, 0.05, 1.0, 20.0, PERIOD)
+    assert profile.s[-1] == way
+    assert np.abs(profile.v).max() <= 0.05 + 1e-9 and np.abs(profile.a).max() <= 1.0 + 1e-9
