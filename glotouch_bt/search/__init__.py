@@ -4,12 +4,15 @@ from glotouch_bt.search.expectation import ExpectationParams, ExpectedFind
 from glotouch_bt.search.frontier import PAPER_PASSES, NearestFrontier
 from glotouch_bt.search.map import Exclusion, SearchMap
 from glotouch_bt.search.moves import Felt, Move, MoveKind, Plan
+from glotouch_bt.search.policies import POLICIES, search_policy
 from glotouch_bt.search.policy import SearchPolicy, Stretch
 from glotouch_bt.search.routes import Routes, segment_is_free
 from glotouch_bt.search.seeking import Sought, seek
+from glotouch_bt.search.tracing import Trace, TraceParams, trace
 
 __all__ = [
     "PAPER_PASSES",
+    "POLICIES",
     "Exclusion",
     "ExpectationParams",
     "ExpectedFind",
@@ -23,6 +26,10 @@ __all__ = [
     "SearchPolicy",
     "Sought",
     "Stretch",
+    "Trace",
+    "TraceParams",
+    "search_policy",
     "seek",
     "segment_is_free",
+    "trace",
 ]

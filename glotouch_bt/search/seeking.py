@@ -15,6 +15,8 @@ from glotouch_bt.touch import Contact
 MAX_HOPS = 12
 """Most changes of place by lifting the ball because no way leads on, per search."""
 WAYS_IN_APART_M = 0.03
+RETREAT_M = 0.005
+"""Way back from a contact (paper III-A)."""
 TAKEN_M = 0.004
 """A place this near a dropped one is not tried for coming down."""
 BESIDE_M = (0.025, 0.040, 0.055, 0.070)
@@ -38,7 +40,8 @@ class Sought:
 
 
 def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bool) -> Plan[Sought]:
-    """Sweep, or descend, as the policy says until an object that is not traced yet is touched from the side.
+    """Sweep, or descend, as the policy says until an object that is not traced yet is touched from the side; the ball
+    has retreated from it.
 
     Every stretch of way that was gone at sensing height becomes evidence; a way that is refused drops its frontier; a
     contact within a traced object's envelope drops its place, and the search goes on.
@@ -72,12 +75,15 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
                 continue
             if bool(belief.inside_exclusion(felt.contact.tip_K_m[None, :2])[0]):
                 belief = belief.with_dropped(felt.contact.tip_K_m)
+                if not stretch.raised:
+                    tip = (yield Move("retreat", tip - RETREAT_M * felt.contact.approach_K[:2])).tip_K_m
                 break
-            if not stretch.raised:
-                return Sought(belief, felt.contact, True)
-            belief, side, tip, lowered = yield from _from_its_side(belief, felt)
+            side: Contact | None = felt.contact
+            if stretch.raised:
+                belief, side, tip, lowered = yield from _from_its_side(belief, felt)
             if side is not None:
-                return Sought(belief, side, True)
+                felt = yield Move("retreat", tip - RETREAT_M * side.approach_K[:2])
+                return Sought(belief.with_path(felt.path_K_m), side, True)
             belief = belief.with_dropped(felt.contact.tip_K_m)
             break
 

@@ -1,0 +1,32 @@
+"""The search policies by name, as missions call them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from types import MappingProxyType
+
+from glotouch_bt.robot import UnknownName
+from glotouch_bt.search.expectation import ExpectedFind
+from glotouch_bt.search.frontier import PAPER_PASSES, NearestFrontier
+from glotouch_bt.search.policy import SearchPolicy
+
+POLICIES: MappingProxyType[str, Callable[[], SearchPolicy]] = MappingProxyType(
+    {
+        "expected_find": ExpectedFind,
+        "nearest_frontier": lambda: NearestFrontier(passes=PAPER_PASSES, turn_m=0.0),
+    }
+)
+"""expected_find: ours (the default). nearest_frontier, random_descent: the paper's, as baselines."""
+
+
+@lru_cache(maxsize=8)
+def search_policy(name: str) -> SearchPolicy:
+    """The policy of that name; stateless, so one does for all.
+
+    Raises:
+        UnknownName: There is none of that name.
+    """
+    if name not in POLICIES:
+        raise UnknownName("search policy", name, tuple(POLICIES))
+    return POLICIES[name]()

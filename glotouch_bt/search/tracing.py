@@ -1,0 +1,264 @@
+"""Round an object: where the next probe says most for the way it costs, and when enough is known (paper III-D)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from glotouch_bt.robot import Array
+from glotouch_bt.search.moves import Felt, Move, Plan
+from glotouch_bt.search._standin import OutlineBelief, believe_outline
+from glotouch_bt.touch import Contact, Contour
+
+BEARINGS = 72
+"""Directions a next probe is chosen from."""
+INSIDE_M = 0.004
+"""A probe that came this near to the object's supposed middle has passed through: nothing is there."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TraceParams:
+    """How an outline is traced. Lengths in metres.
+
+    Attributes:
+        clearance_m: Ball to predicted outline while going round.
+        margin_sds: So many standard deviations of the prediction are added to the clearance.
+        widest_margin_m: No more than this is added.
+        centre_sd_m: Enough is known when the centre's standard deviation is below this ...
+        radial_sd_m: ... and the outline's nowhere above this.
+        least_contacts, most_contacts: Bounds whatever the covariance says.
+        step_rad: Farthest that one way round goes before the ball probes again.
+        way_m: Travel that every probe costs beside the way to it (in and out).
+        reach_sds: A probe goes so many standard deviations past the prediction.
+        misses: So many probes may meet nothing, or be refused, one after another.
+    """
+
+    clearance_m: float = 0.005
+    margin_sds: float = 0.7
+    widest_margin_m: float = 0.010
+    centre_sd_m: float = 0.0010
+    radial_sd_m: float = 0.0035
+    least_contacts: int = 4
+    most_contacts: int = 14
+    step_rad: float = np.deg2rad(100.0)
+    way_m: float = 0.03
+    reach_sds: float = 2.5
+    misses: int = 5
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What going round an object gave.
+
+    Attributes:
+        contacts: In the order they were made, moved along with the object to where it stands now.
+        outline: What they say, or None if they say nothing.
+        displaced_K_m: (2,) how far the object was pushed in all.
+        path_K_m: (n, 2) where the ball has been at sensing height.
+        strays: Contacts that belong to something else.
+        ended: Why no more probes were made.
+    """
+
+    contacts: tuple[Contact, ...]
+    outline: OutlineBelief | None
+    displaced_K_m: Array
+    path_K_m: Array
+    strays: tuple[Contact, ...] = ()
+    ended: str = ""
+
+    @property
+    def contour(self) -> Contour | None:
+        """The fitted outline."""
+        return None if self.outline is None else self.outline.contour
+
+
+@dataclass
+class _State:
+    tip: Array
+    radius: float
+    raw: list[Contact]
+    paths: list[Array] = field(default_factory=list)
+    strays: list[Contact] = field(default_factory=list)
+    blocked: list[float] = field(default_factory=list)
+
+    def present(self) -> tuple[Contact, ...]:
+        """The contacts moved to where the object stands now: each by all pushes from its own on."""
+        push = np.array([c.pushed_K_m for c in self.raw])
+        later = np.cumsum(push[::-1], axis=0)[::-1]
+        return tuple(
+            replace(c, tip_K_m=c.tip_K_m + np.array([*s, 0.0]), point_K_m=c.point_K_m + s)
+            for c, s in zip(self.raw, later, strict=True)
+        )
+
+    def outline(self) -> OutlineBelief:
+        """What the contacts say."""
+        now = self.present()
+        return believe_outline(
+            np.array([c.tip_K_m[:2] for c in now]),
+            self.radius,
+            approach_K=np.array([c.approach_K[:2] for c in now]),
+            reaction_K=np.array([c.reaction_K[:2] for c in now]),
+            free_K_m=self.free(),
+        )
+
+    def free(self) -> Array:
+        """(n, 2) places the ball has been since the object was last pushed a millimetre or more."""
+        return np.concatenate(self.paths) if self.paths else np.zeros((0, 2))
+
+    def felt(self, felt: Felt) -> None:
+        """Take note of a move."""
+        self.tip = np.asarray(felt.tip_K_m)
+        if len(felt.path_K_m):
+            self.paths.append(np.asarray(felt.path_K_m))
+
+
+def trace(first: Contact, tip_K_m: Array, tip_radius_m: float, params: TraceParams | None = None) -> Plan[Trace]:
+    """Trace the outline of what was touched. The ball ends beside it, at sensing height.
+
+    Args:
+        first: The contact that found it; the ball has not been retreated from it.
+        tip_K_m: (2,) where the ball is.
+        tip_radius_m: Its radius.
+        params: See `TraceParams`.
+    """
+    p = params or TraceParams()
+    s = _State(np.asarray(tip_K_m, dtype=np.float64)[:2], tip_radius_m, [first])
+    yield from _retreat(s, p)
+    outline, missed, ended = s.outline(), 0, ""
+    while not ended:
+        ended = _enough(outline, s, p)
+        if ended:
+            break
+        bearing, side = _choose(outline, s, p)
+        if bearing is None:
+            ended = "no side is left that can be reached"
+            break
+        found = yield from _probe_at(outline, s, p, bearing, side)
+        if found is None:
+            missed += 1
+            s.blocked.append(bearing)
+            ended = "" if missed <= p.misses else f"{missed} probes in a row met nothing"
+        elif outline.belongs(found.tip_K_m[:2]):
+            missed = 0
+            s.raw.append(found)
+            yield from _retreat(s, p)
+        else:
+            missed += 1
+            s.strays.append(found)
+            s.blocked.append(bearing)
+            back = Move("retreat", s.tip - p.clearance_m * found.approach_K[:2])
+            s.felt((yield back))
+        outline = s.outline()
+    return Trace(
+        s.present(),
+        outline,
+        np.sum([c.pushed_K_m for c in s.raw], axis=0),
+        np.concatenate(s.paths) if s.paths else s.tip[None],
+        tuple(s.strays),
+        ended,
+    )
+
+
+def _retreat(s: _State, p: TraceParams) -> Plan[None]:
+    """Away from the last contact, along what the approach and the reaction say is outwards."""
+    last = s.raw[-1]
+    out = last.reaction_K[:2] - 2.0 * last.approach_K[:2]
+    out = out / max(float(np.linalg.norm(out)), 1e-9)
+    s.felt((yield Move("retreat", s.tip + p.clearance_m * out)))
+
+
+def _enough(outline: OutlineBelief, s: _State, p: TraceParams) -> str:
+    n = len(s.raw)
+    if n >= p.most_contacts:
+        return f"{n} contacts"
+    if n < p.least_contacts:
+        return ""
+    _, sd = outline.predict(_bearings())
+    if np.max(outline.centre_sd_m) <= p.centre_sd_m and float(np.max(sd)) <= p.radial_sd_m:
+        return "the outline is known"
+    return ""
+
+
+def _bearings() -> Array:
+    return np.linspace(-np.pi, np.pi, BEARINGS, endpoint=False)
+
+
+def _wrap(a: Array) -> Array:
+    return np.asarray((a + np.pi) % (2 * np.pi) - np.pi)
+
+
+def _choose(outline: OutlineBelief, s: _State, p: TraceParams) -> tuple[float | None, float]:
+    """The bearing with the most uncertainty for the way to it, and which way round (+1 counter-clockwise)."""
+    bearings = _bearings()
+    distance, sd = outline.predict(bearings)
+    offset = s.tip - outline.centre_K_m
+    here = float(np.arctan2(offset[1], offset[0]))
+    best: tuple[float, float, float] | None = None
+    step = 2 * np.pi / BEARINGS
+    for side in (1.0, -1.0):
+        turn = _wrap(side * (bearings - here)) % (2 * np.pi)
+        order = np.argsort(turn, kind="stable")
+        way = np.zeros(BEARINGS)
+        way[order] = np.cumsum((distance + p.clearance_m)[order] * step)
+        gain = sd / (way + p.way_m)
+        gain[turn > p.step_rad] = 0.0
+        if s.blocked:
+            near = np.min(np.abs(_wrap(bearings[:, None] - np.array(s.blocked)[None, :])), axis=1)
+            gain[near < np.deg2rad(12.0)] = 0.0
+        i = int(np.argmax(gain))
+        if gain[i] > 0 and (best is None or gain[i] > best[0]):
+            best = (float(gain[i]), float(bearings[i]), side)
+    return (None, 1.0) if best is None else (best[1], best[2])
+
+
+def _probe_at(outline: OutlineBelief, s: _State, p: TraceParams, bearing: float, side: float) -> Plan[Contact | None]:
+    """Round to `bearing`, and inwards. A touch on the way round is as good as the one that was meant."""
+    for waypoint in _way_round(outline, s, p, bearing, side):
+        felt = yield Move("step", waypoint)
+        s.felt(felt)
+        if felt.refused:
+            return None
+        if felt.contact is not None:
+            return felt.contact
+    distance, sd = (float(v[0]) for v in outline.predict(np.array([bearing])))
+    inner = max(distance - p.reach_sds * sd - 0.003, INSIDE_M)
+    u = np.array([np.cos(bearing), np.sin(bearing)])
+    felt = yield Move("probe", outline.centre_K_m + inner * u)
+    s.felt(felt)
+    return felt.contact
+
+
+def _way_round(outline: OutlineBelief, s: _State, p: TraceParams, bearing: float, side: float) -> Array:
+    """(k, 2) waypoints outside the predicted outline, from where the ball is to `bearing`, pulled tight."""
+    offset = s.tip - outline.centre_K_m
+    here = float(np.arctan2(offset[1], offset[0]))
+    turn = float(_wrap(np.array(side * (bearing - here))) % (2 * np.pi))
+    n = max(int(np.ceil(turn / np.deg2rad(5.0))), 1)
+    angles = here + side * np.linspace(0.0, turn, n + 1)[1:]
+    distance, sd = outline.predict(angles)
+    ring = distance + p.clearance_m + np.minimum(p.margin_sds * sd, p.widest_margin_m)
+    points = outline.centre_K_m + ring[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    return _tight(s.tip, points, outline, p)
+
+
+def _tight(start: Array, points: Array, outline: OutlineBelief, p: TraceParams) -> Array:
+    """Leave out what can be cut without coming nearer to the predicted outline than the clearance."""
+    kept: list[Array] = []
+    here, i = start, 0
+    while i < len(points):
+        j = len(points) - 1
+        while j > i and not _clear(here, points[j], outline, p):
+            j -= 1
+        here = points[j]
+        kept.append(here)
+        i = j + 1
+    return np.array(kept)
+
+
+def _clear(a: Array, b: Array, outline: OutlineBelief, p: TraceParams) -> bool:
+    t = np.linspace(0.0, 1.0, 12)[1:-1, None]
+    d = (1 - t) * a + t * b - outline.centre_K_m
+    distance, sd = outline.predict(np.arctan2(d[:, 1], d[:, 0]))
+    least = distance + 0.7 * p.clearance_m + 0.5 * np.minimum(p.margin_sds * sd, p.widest_margin_m)
+    return bool(np.all(np.hypot(d[:, 0], d[:, 1]) >= least))

@@ -1,0 +1,114 @@
+"""Drives an exploration plan (glotouch_bt.search) with the arm: each move of the plan is a guarded move of the ball."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from glotouch_bt.motion import Motion
+from glotouch_bt.robot import Array, MotionRefused
+from glotouch_bt.search import Felt, Move, Plan
+from glotouch_bt.search.moves import T
+from glotouch_bt.touch import Contact
+from skills.held_tool import HeldTool
+from skills.probing import Prober
+
+AT_HEIGHT_M = 0.004
+"""The ball counts as lowered within this of the sensing height."""
+OFF_TOP_M = 0.006
+"""The ball is raised so far off what it landed on."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExploringSpeeds:
+    """Speeds of each kind of move, m/s; heights of the ball's centre above the floor, m."""
+
+    sweep_m_s: float = 0.04
+    step_m_s: float = 0.05
+    probe_m_s: float = 0.03
+    travel_m_s: float = 0.10
+    height_m: float = 0.018
+    headroom_m: float = 0.13
+
+
+class Explorer:
+    """Moves the ball as a plan asks.
+
+    Args:
+        prober: The guarded moves.
+        tool: The held probe.
+        speeds: How fast and how high.
+        journal: Called with (kind, data) of every event: "contact", "sweep" (the path at sensing height), "note".
+    """
+
+    def __init__(self, prober: Prober, tool: HeldTool, speeds: ExploringSpeeds, journal: Callable[..., None]) -> None:
+        self._prober, self._tool, self._speeds, self._journal = prober, tool, speeds, journal
+
+    @property
+    def lowered(self) -> bool:
+        """The ball is at sensing height."""
+        return abs(float(self._prober.tip_K_m[2]) - self._height_m) < AT_HEIGHT_M
+
+    @property
+    def tip_K_m(self) -> Array:
+        """(2,) where the ball is."""
+        return self._prober.tip_K_m[:2]
+
+    @property
+    def _height_m(self) -> float:
+        return self._tool.floor_z_K_m + self._speeds.height_m
+
+    def run(self, plan: Plan[T]) -> Motion[T]:
+        """All of a plan; what the plan returns."""
+        try:
+            move = next(plan)
+            while True:
+                move = plan.send((yield from self._make(move)))
+        except StopIteration as end:
+            result: T = end.value
+            return result
+
+    def _make(self, move: Move) -> Motion[Felt]:
+        try:
+            if move.kind == "hop":
+                contact, path = yield from self._hop(move.goal_K_m)
+            elif move.kind == "retreat":
+                contact, path = yield from self._retreat(move.goal_K_m)
+            else:
+                contact, path = yield from self._go(move)
+        except MotionRefused as refusal:
+            self._journal("note", text=f"{move.kind} refused: {refusal}")
+            return Felt(self.tip_K_m, np.zeros((0, 2)), refused=str(refusal))
+        if len(path):
+            self._journal("sweep", path_K_m=path)
+        if contact is not None:
+            self._journal("contact", contact=contact)
+        return Felt(self.tip_K_m, path[:, :2], contact)
+
+    def _go(self, move: Move) -> Motion[tuple[Contact | None, Array]]:
+        s = self._speeds
+        speed = {"sweep": s.sweep_m_s, "step": s.step_m_s, "probe": s.probe_m_s}[move.kind]
+        goal = np.array([*move.goal_K_m, self._height_m])
+        probed = yield from self._prober.move(goal, speed, any_direction=move.kind == "step")
+        return probed.contact, probed.path_K_m
+
+    def _retreat(self, goal_K_m: Array) -> Motion[tuple[None, Array]]:
+        before = self._prober.tip_K_m
+        way = goal_K_m - before[:2]
+        length = float(np.linalg.norm(way))
+        if length > 1e-4:
+            yield from self._prober.retreat(np.array([*(way / length), 0.0]), length, self._speeds.step_m_s)
+        return None, np.array([before, self._prober.tip_K_m])
+
+    def _hop(self, goal_K_m: Array) -> Motion[tuple[Contact | None, Array]]:
+        s, tip = self._speeds, self._prober.tip_K_m
+        if np.linalg.norm(goal_K_m - tip[:2]) > 0.002:
+            above = max(float(tip[2]), self._tool.floor_z_K_m + s.headroom_m)
+            yield from self._prober.hop(np.array([*goal_K_m, 0.0]), above, s.travel_m_s)
+        probed = yield from self._prober.move(np.array([*goal_K_m, self._height_m]), s.sweep_m_s)
+        if probed.contact is not None:
+            yield from self._prober.retreat(np.array([0.0, 0.0, 1.0]), OFF_TOP_M, s.step_m_s)
+            return probed.contact, np.zeros((0, 3))
+        return None, probed.path_K_m[-1:]
