@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from glotouch_bt.motion import Motion, MoveResult
-from glotouch_bt.robot import Array, MotionRefused, Pose
-from glotouch_bt.touch import Baseline, Contact, ContactGuard, GuardParams, Onset, contact_point, fit_baseline
-from skills.base import Context
+from glotouch_bt.robot import Array, MotionRefused, Observation, Pose
+from glotouch_bt.touch import (
+    Baseline,
+    Carried,
+    CommandedInertia,
+    Contact,
+    ContactGuard,
+    GuardParams,
+    HardStop,
+    HardTrip,
+    Onset,
+    fit_baseline,
+    pushed,
+    settled,
+)
+from skills.base import Context, SkillFailed
 from skills.held_tool import HeldTool
 
-BASELINE_S = 0.12
-SETTLE_S = 0.08
-GENTLE_ACCELERATION_M_S2, GENTLE_JERK_M_S3 = 0.3, 5.0
-"""Limits while a guard listens: the hand's own inertia stays below 0.06 N at the tip (feasibility study)."""
-
-INERTIA_MARGIN = 1.5
-"""Thresholds along the probe exceed the hand's largest inertial force by this factor."""
+REST_S, LONGEST_REST_S = 0.12, 0.6
+"""The wrench and the twist must have been steady for so long before a guard listens; waited for at most so long."""
+LISTENING_ACCELERATION_M_S2, LISTENING_JERK_M_S3 = 0.3, 5.0
+"""Limits while a guard listens."""
 
 
 @dataclass(frozen=True)
@@ -40,49 +51,77 @@ class Prober:
     Args:
         context: The skill's context.
         tool: The held probe.
-        guard: Contact thresholds.
+        guard: Contact thresholds; the sensor's latency is the tool's, where it may have been measured.
+        carried: What hangs below the wrist; by default the described hand, and the world's probe if it is held.
     """
 
-    def __init__(self, context: Context, tool: HeldTool, guard: GuardParams) -> None:
-        self._context, self._tool, self._guard = context, tool, guard
+    def __init__(
+        self,
+        context: Context,
+        tool: HeldTool,
+        guard: GuardParams,
+        *,
+        carried: Carried | None = None,
+    ) -> None:
+        self._context, self._tool = context, tool
+        self._guard = replace(guard, latency_s=tool.latency_s)
         self._world = context.world
         self._pose_K_B = context.world.container.pose_B_K.inverse()
+        probe = context.world.probe if context.arm.scene.holding_tool else None
+        self._carried = carried or Carried.hand(context.arm.description.gripper, probe)
+        self._rested: tuple[float, Baseline] | None = None
 
     @property
     def tip_K_m(self) -> Array:
         """(3,) where the ball's centre is commanded to be."""
         return self._tool.tip_K_m(self._world, self._context.arm.pose_B_P)
 
-    def baseline(self) -> Motion[Baseline]:
-        """Hold still and take the wrench that means "nothing touched"."""
-        blocks = yield from self._context.arm.hold(BASELINE_S)
-        return fit_baseline(np.concatenate([b.wrench_S for b in blocks]))
+    def rest(self) -> Motion[Baseline]:
+        """Hold still until wrench and twist have settled, at most `LONGEST_REST_S`; the wrench of "nothing touched".
+
+        If no time has passed since the last rest, that one stands.
+        """
+        if self._rested is not None and self._rested[0] == self._context.observation.now_s:
+            return self._rested[1]
+        period_s = self._context.arm.period_s
+        window: deque[Observation] = deque(maxlen=round(REST_S / period_s))
+        for _ in range(round(LONGEST_REST_S / period_s)):
+            window.extend((yield from self._context.arm.hold(period_s)))
+            if len(window) == window.maxlen and settled(list(window)):
+                break
+        baseline = fit_baseline(np.concatenate([o.wrench_S for o in window]))
+        self._rested = (window[-1].now_s, baseline)
+        return baseline
 
     def move(self, tip_K_m: Array, speed_m_s: float, *, any_direction: bool = False) -> Motion[Probed]:
         """Straight guarded move of the ball to `tip_K_m` (3,).
 
         Stops at the first contact that opposes the motion, or, with `any_direction`, at any (a graze too).
+
+        Raises:
+            SkillFailed: `hard_contact`: the wrench passed a hard limit on the way; the arm stands.
+            MotionRefused: The way is not clear.
         """
         step = np.asarray(tip_K_m, dtype=np.float64) - self.tip_K_m
         length = float(np.linalg.norm(step))
         if length < 1e-4:
             return Probed(None, self.tip_K_m[None, :])
         step_B = self._world.container.pose_B_K.rotation @ step
-        guard = yield from self._listen(None if any_direction else step_B / length)
+        guard = yield from self._listen(step_B / length, any_direction)
         result = yield from self._context.arm.shift(
             step_B,
             speed_m_s,
-            acceleration_m_s2=GENTLE_ACCELERATION_M_S2,
-            jerk_m_s3=GENTLE_JERK_M_S3,
+            acceleration_m_s2=LISTENING_ACCELERATION_M_S2,
+            jerk_m_s3=LISTENING_JERK_M_S3,
             guard=guard,
         )
         return self._outcome(result, step / length)
 
     def retreat(self, direction_K: Array, distance_m: float, speed_m_s: float) -> Motion[None]:
-        """Unguarded move away from a contact along `direction_K` (3,), then a short rest for the wrench to settle."""
+        """Unguarded move away from a contact along `direction_K` (3,), then rest until the wrench has settled."""
         step_B = self._world.container.pose_B_K.rotation @ (np.asarray(direction_K) * distance_m)
         yield from self._context.arm.shift(step_B, speed_m_s)
-        yield from self._context.arm.hold(SETTLE_S)
+        yield from self.rest()
 
     def hop(self, tip_K_m: Array, height_K_m: float, speed_m_s: float) -> Motion[None]:
         """Straight up until the ball's centre is at `height_K_m`, then across to above `tip_K_m`; unguarded."""
@@ -91,41 +130,54 @@ class Prober:
             if np.linalg.norm(goal - self.tip_K_m) > 1e-4:
                 yield from self._context.arm.line(self._tool.pose_B_P(self._world, goal), speed_m_s)
 
-    def _listen(self, approach_B: Array | None) -> Motion[ContactGuard]:
-        baseline = yield from self.baseline()
-        gripper = self._context.arm.description.gripper
-        return ContactGuard(baseline, approach_B, self._tool.tip_P_m, gripper.pose_E_P, self._params(approach_B))
-
-    def _params(self, approach_B: Array | None) -> GuardParams:
-        """Thresholds for a direction: along the probe only the force tells, and it feels the whole hand's inertia.
-
-        Across the probe the torque at the tip's lever tells a touch from inertia, so the thresholds stay as they are.
-        """
-        if approach_B is None:
-            return self._guard
-        gripper = self._context.arm.description.gripper
-        mass_kg = gripper.mass_kg + 2 * gripper.finger_mass_kg + self._world.probe.mass_kg
-        along = abs(float(approach_B @ self._context.arm.pose_B_P.rotation[:, 2]))
-        inertial_N = INERTIA_MARGIN * mass_kg * GENTLE_ACCELERATION_M_S2 * along
-        return replace(
-            self._guard,
-            directional_N=self._guard.directional_N + inertial_N,
-            total_N=self._guard.total_N + inertial_N,
+    def _listen(self, direction_B: Array, any_direction: bool) -> Motion[_Listener]:
+        baseline = yield from self.rest()
+        arm, params = self._context.arm, self._guard
+        gripper = arm.description.gripper
+        R_S_B = gripper.pose_E_P.rotation @ arm.pose_B_P.rotation.T
+        inertial = CommandedInertia(
+            self._carried, R_S_B @ direction_B, lambda: arm.along_m_s2, params.latency_s, params.rate_Hz
         )
+        approach_B = None if any_direction else direction_B
+        soft = ContactGuard(baseline, approach_B, self._tool.tip_P_m, gripper.pose_E_P, params, inertial)
+        return _Listener(HardStop(baseline, params), soft)
 
     def _outcome(self, result: MoveResult, approach_K: Array) -> Probed:
         poses = result.path_B_m + self._context.arm.pose_B_P.rotation @ self._tool.tip_P_m
         path_K = self._pose_K_B.apply(poses)
-        if result.stop is None:
+        stop = result.stop
+        if stop is None:
             return Probed(None, path_K)
-        if not isinstance(result.stop, Onset):
-            raise MotionRefused("guarded move", f"the guard answered {result.stop!r}, not an onset")
-        return Probed(self._contact(result.stop, approach_K), path_K)
+        if isinstance(stop, HardTrip):
+            raise SkillFailed(
+                "hard_contact",
+                f"{stop.quantity} {stop.value:.1f} passed its limit {stop.limit:.1f} during a guarded move",
+                advice="something hard or heavy is in the way; go slower",
+                quantity=stop.quantity,
+                value=stop.value,
+                limit=stop.limit,
+            )
+        if not isinstance(stop, Onset):
+            raise MotionRefused("guarded move", f"the guard answered {stop!r}, not an onset")
+        return Probed(self._contact(stop, approach_K, path_K[-1]), path_K)
 
-    def _contact(self, onset: Onset, approach_K: Array) -> Contact:
-        tip_K = self._tool.tip_K_m(self._world, Pose(onset.position_B_P, onset.quat_B_P))
+    def _contact(self, onset: Onset, approach_K: Array, end_K_m: Array) -> Contact:
+        pose = Pose(onset.position_B_P, onset.quat_B_P)
+        tip_K = self._tool.tip_K_m(self._world, pose)
         force_K = self._pose_K_B.rotation @ onset.force_B
         norm = float(np.linalg.norm(force_K))
         reaction = force_K / norm if norm > 1e-6 else -approach_K
-        point = contact_point(tip_K[:2], self._tool.tip_radius_m, approach_K[:2], reaction[:2])
-        return Contact(onset.stamp_s, tip_K, approach_K, reaction, point, norm)
+        point = self._tool.contact_point_K_m(self._world, pose, approach_K, reaction)
+        return Contact(
+            onset.stamp_s, tip_K, approach_K, reaction, point, norm, pushed(end_K_m[:2] - tip_K[:2], reaction[:2])
+        )
+
+
+class _Listener:
+    """Both rules on the same samples; what passes a hard limit is no touch, whatever the soft rule says."""
+
+    def __init__(self, hard: HardStop, soft: ContactGuard) -> None:
+        self._hard, self._soft = hard, soft
+
+    def __call__(self, observation: Observation) -> HardTrip | Onset | None:
+        return self._hard(observation) or self._soft(observation)

@@ -16,6 +16,7 @@ from glotouch_bt.touch.latency import LatencyEstimate, latency_from_two_speeds
 from glotouch_bt.touch.localisation import contact_direction, contact_point, disc_support, polygon_support
 from glotouch_bt.touch.patches import PatchStats, evidence_weight, patch_statistics, relative_nonplanarity
 from glotouch_bt.touch.plateau import Plateau, PlateauParams, find_plateau, make_layer, temporal_median
+from glotouch_bt.touch.pushing import pushed
 from glotouch_bt.touch.settling import reaction_direction, settled
 from glotouch_bt.touch.tracing import largest_gap_direction, needs_more, next_direction, widest_gap
 from glotouch_bt.touch.values import Candidate, Contact, Contour, ContourKind, Layer, TouchSequence, TouchSet
@@ -60,6 +61,7 @@ __all__ = [
     "next_direction",
     "patch_statistics",
     "polygon_support",
+    "pushed",
     "reaction_direction",
     "relative_nonplanarity",
     "settled",

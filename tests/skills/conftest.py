@@ -30,7 +30,7 @@ from glotouch_bt.robot import (
     World,
 )
 from glotouch_bt.robot.fake import FakeRobot, forward
-from glotouch_bt.touch import Candidate, Contact, Contour, fit_contour
+from glotouch_bt.touch import Candidate, Carried, Contact, Contour, fit_contour
 from skills.base import Context, Skill
 from skills.held_tool import HeldTool
 
@@ -90,6 +90,7 @@ class BenchRobot(FakeRobot):
     ) -> None:
         self.world, self.things, self.weight_N, self.tip_P_m = world, things, weight_N, tip_P_m
         self.speed_rad_s = np.zeros(7)
+        self.velocity_B: Array | None = None
         super().__init__(RIZON4_XENSE, wrench=self._all_felt, grip_width_m=grip_width_m)
 
     def cycle(self, command: Command) -> Observation:
@@ -115,7 +116,16 @@ class BenchRobot(FakeRobot):
         lever = self.description.gripper.pose_E_P.apply(tip_P)
         down_S = pose.rotation.T @ np.array([0.0, 0.0, -1.0])
         weight = np.array([self.weight_N(p, self._aperture) for p in position])[:, None] * down_S
-        return np.hstack([contact + weight, np.cross(lever, contact)])
+        force = np.hstack([contact + weight, np.cross(lever, contact)])
+        return force + self._inertial(position, pose, float(stamp[-1] - stamp[0]))
+
+    def _inertial(self, position: Array, pose: Pose, span_s: float) -> Array:
+        """(6,) what the hand with the probe feels of the change of velocity since the last period."""
+        velocity = (position[-1] - position[0]) / span_s
+        change = velocity - (velocity if self.velocity_B is None else self.velocity_B)
+        self.velocity_B = velocity
+        hand = Carried.hand(self.description.gripper, self.world.probe)
+        return np.asarray(hand.wrench_S(pose.rotation.T @ change / self.period_s))
 
 
 class Bench:

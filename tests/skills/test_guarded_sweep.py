@@ -46,17 +46,6 @@ def test_a_guarded_move_through_nothing_runs_its_whole_way(make, tool) -> None:
     np.testing.assert_allclose(probed.path_K_m[:, 1:], [[0.1, 0.018]] * len(probed.path_K_m), atol=1e-5)
 
 
-def test_the_thresholds_grow_along_the_probe_only(make, tool) -> None:
-    b, _ = make()
-    prober, guard = Prober(b.context, tool, GuardParams()), GuardParams()
-    assert prober._params(np.array([0.0, 1.0, 0.0])).directional_N == pytest.approx(guard.directional_N, abs=1e-6)
-    assert prober._params(None) == guard
-    hand = b.arm.description.gripper
-    mass = hand.mass_kg + 2 * hand.finger_mass_kg + b.world.probe.mass_kg
-    grown = prober._params(np.array([0.0, 0.0, -1.0])).directional_N - guard.directional_N
-    assert grown == pytest.approx(1.5 * mass * 0.3, rel=1e-6)
-
-
 def test_a_hop_goes_up_and_across(make, tool) -> None:
     b, _ = make()
     prober = Prober(b.context, tool, GuardParams())
