@@ -11,6 +11,7 @@ SAMPLE_M^2 / (8 s): a few hundredths of a millimetre. It is then drawn as polygo
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -26,7 +27,8 @@ from glotouch_bt.robot.meshes import Mesh
 
 SENSING_HEIGHT_M = 0.018
 GRID_M = 0.0005
-SAMPLE_M = 0.0005
+SAMPLE_M, THIN_M = 0.0005, 0.0002
+COARSE = 4
 BORDER_M = 0.010
 """The grid reaches this far beyond the forbidden set; farther out distances are lower bounds."""
 
@@ -160,12 +162,20 @@ def _section(key: _Keyed, probe: Probe, height_m: float) -> FeltSection:
     low = points[:, :2].min(axis=0) - r - BORDER_M
     high = points[:, :2].max(axis=0) + r + BORDER_M
     shape = np.ceil((high - low) / GRID_M).astype(np.int64) + 1
-    nodes = low + GRID_M * np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1).reshape(-1, 2)
-    ball = _distance(points, np.column_stack([nodes, np.full(len(nodes), height_m)])) - r
+    shape += -shape % COARSE  # whole coarse cells
+    by_ball = cKDTree(points, balanced_tree=False)
     upper = points[points[:, 2] >= height_m, :2]
-    axis = _distance(upper, nodes) if len(upper) else np.full(len(nodes), np.inf)
-    side = _signed(solid, low, shape, np.minimum(ball, axis - s), height_m)
-    above = _signed(solid, low, shape, np.minimum(ball, axis - r), height_m)
+    by_shaft = cKDTree(_thinned(upper), balanced_tree=False) if len(upper) else None
+
+    def gap(places: Array, shaft_m: float) -> Array:
+        """Distance of the probe, its shaft so thick, from the surface, with the ball at places (n, 2)."""
+        ball = by_ball.query(np.column_stack([places, np.full(len(places), height_m)]))[0] - r
+        return np.asarray(ball if by_shaft is None else np.minimum(ball, by_shaft.query(places)[0] - shaft_m))
+
+    side, above = (
+        _signed(solid, low, _near_zero(lambda places, t=t: gap(places, t), low, shape), height_m)  # type: ignore[misc]
+        for t in (s, r)
+    )
     shrunk = side.level(-r)
     corners = np.concatenate(shrunk)
     hull = ConvexHull(corners)
@@ -195,26 +205,65 @@ def _surface(solid: trimesh.Trimesh, low_m: float, high_m: float) -> Array:
     near = (z.max(axis=1) >= low_m) & (z.min(axis=1) <= high_m)
     if not near.any():
         return np.zeros((0, 3))
-    part = triangles[near]
-    corners = part.reshape(-1, 3)
-    faces = np.arange(len(corners)).reshape(-1, 3)
-    points, _ = trimesh.remesh.subdivide_to_size(corners, faces, SAMPLE_M, max_iter=20)
-    points = np.asarray(points, dtype=np.float64)
-    return points[(points[:, 2] >= low_m) & (points[:, 2] <= high_m)]
+    points = _lattice(triangles[near])
+    return _thinned(points[(points[:, 2] >= low_m) & (points[:, 2] <= high_m)])
 
 
-def _distance(points: Array, queries: Array) -> Array:
-    return np.asarray(cKDTree(points).query(queries)[0], dtype=np.float64)
+def _lattice(triangles: Array) -> Array:
+    """(m, 3) points on triangles (n, 3, 3), corners included: rows along each longest edge, SAMPLE_M apart at most."""
+    length = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
+    turn = (np.argmax(length, axis=1)[:, None] + np.arange(3)) % 3
+    a, b, c = np.take_along_axis(triangles, turn[:, :, None], axis=1).transpose(1, 0, 2)
+    longest = length.max(axis=1)
+    height = np.linalg.norm(np.cross(b - a, c - a), axis=1) / np.maximum(longest, 1e-12)
+    rows = np.ceil(height / SAMPLE_M).astype(np.int64) + 1
+    of, row = _counted(rows)
+    t = (row / np.maximum(rows[of] - 1, 1))[:, None]
+    start, end = a[of] + t * (c - a)[of], b[of] + t * (c - b)[of]
+    columns = np.ceil(longest[of] * (1.0 - t[:, 0]) / SAMPLE_M).astype(np.int64) + 1
+    of, column = _counted(columns)
+    u = (column / np.maximum(columns[of] - 1, 1))[:, None]
+    return np.asarray(start[of] + u * (end - start)[of])
 
 
-def _signed(
-    solid: trimesh.Trimesh, origin: Array, shape: npt.NDArray[np.int64], gap: Array, height_m: float
-) -> SignedGrid:
-    """True signed distance from the gap to the surface (n,), which knows no inside.
+def _counted(counts: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """For each of `counts` (n,): its index so many times, and a running number from 0 beside it."""
+    of = np.repeat(np.arange(len(counts)), counts)
+    return of, np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
+def _thinned(points: Array) -> Array:
+    """One point of every cube of THIN_M: faces that meet repeat their edges, and walls repeat themselves from above."""
+    cell = np.floor(points / THIN_M).astype(np.int64)
+    cell -= cell.min(axis=0)
+    key = np.ravel_multi_index(tuple(cell.T), tuple(cell.max(axis=0) + 1))
+    return np.asarray(points[np.unique(key, return_index=True)[1]])
+
+
+def _nodes(origin: Array, shape: npt.NDArray[np.int64]) -> Array:
+    """(nx, ny, 2) places of a grid's nodes."""
+    return np.asarray(origin + GRID_M * np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1))
+
+
+def _near_zero(gap: Callable[[Array], Array], origin: Array, shape: npt.NDArray[np.int64]) -> Array:
+    """(nx, ny) values of a distance at the nodes: exact near its zero level, elsewhere of the right sign.
+
+    The value at every fourth node says, as distances do, how far away the zero level is at least.
+    """
+    nodes = _nodes(origin, shape)
+    coarse = nodes[COARSE // 2 :: COARSE, COARSE // 2 :: COARSE]
+    rough = gap(coarse.reshape(-1, 2)).reshape(coarse.shape[:2])
+    field = np.kron(rough, np.ones((COARSE, COARSE)))
+    near = np.abs(field) < 2 * COARSE * GRID_M
+    field[near] = gap(nodes[near])
+    return np.asarray(field)
+
+
+def _signed(solid: trimesh.Trimesh, origin: Array, field: Array, height_m: float) -> SignedGrid:
+    """True signed distance from the gap to the surface (nx, ny), which knows no inside.
 
     Regions of positive gap that the ball could be in are outside; those within the solid are inside.
     """
-    field = gap.reshape(tuple(shape))
     parts, count = label(field > 0.0)
     solidly = np.zeros(count + 1, dtype=np.bool_)
     deepest = [int(np.argmax(np.where(parts == k, field, -np.inf))) for k in range(1, count + 1)]
@@ -226,7 +275,7 @@ def _signed(
     signed = np.where(within, -np.abs(field) - GRID_M, field)
     # gaps between the two kinds of region are negative everywhere: the only zero level is the boundary
     grid = SignedGrid(np.asarray(origin), signed)
-    nodes = origin + GRID_M * np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1).reshape(-1, 2)
+    nodes = _nodes(origin, np.array(field.shape)).reshape(-1, 2)
     distance = _to_polygons(grid.level(0.0), nodes).reshape(field.shape)
     return SignedGrid(np.asarray(origin), np.where(signed > 0.0, distance, -distance))
 
