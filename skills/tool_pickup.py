@@ -11,6 +11,7 @@ from glotouch_bt.robot import Pose, SetPayload, Tare
 from glotouch_bt.touch import GuardParams
 from skills.allowance import may_touch
 from skills.base import Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from skills.corner import corner_place
 from skills.hand import easy_yaw
 from skills.held_tool import HeldTool
 from skills.probing import Prober
@@ -136,9 +137,7 @@ class ToolPickup(Skill):
     def _feel_floor(self, tool: HeldTool) -> Motion[HeldTool]:
         """Lower the ball in the corner nearest to the holder; a touch far from the nominal floor is not the floor."""
         world, p = self.context.world, self.params
-        half = 0.5 * np.array(world.container.interior_m[:2]) - p.corner_gap_m
-        holder_K = world.container.pose_B_K.inverse().apply(world.holder.pose_B_grasp.position_m)
-        corner = np.where(holder_K[:2] >= 0, half, -half)
+        corner = corner_place(world, p.corner_gap_m)
         prober = Prober(self.context, tool, GuardParams())
         high = world.container.interior_m[2] + 0.06
         yield from prober.hop(np.array([*corner, 0.0]), max(high, float(prober.tip_K_m[2])), p.speed_m_s)

@@ -1,0 +1,169 @@
+"""Where the tip really is in the hand, from touching walls at several yaws; and how late the wrist sensor reports.
+
+A wall touched with the hand turned about the vertical gives, for each yaw, one equation
+
+    a . x + u . b - v e = w - r
+
+with a the unit direction of approach in K, x the believed ball centre at the onset, u the same direction written in P,
+b the unknown error of the tip in P, v the speed, e how much longer than assumed the sensor's latency is (a longer one
+dates the onset too late, so the ball is placed too far on), w the wall's place along a and r the ball's radius. Walls
+are unknowns of their own: what the registration of the container is wrong by does not matter. Linear, so that the
+covariance is exact for Gaussian noise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from glotouch_bt.robot import Array, ParamError
+
+LARGEST_TIP_ERROR_M = 0.005
+"""Prior standard deviation of the tip's error, per axis: far above any grasp's, so that it only keeps the problem
+solvable when the hand could not be turned."""
+SMOOTH_S = 0.004
+"""Both signals are smoothed with a Gaussian so wide before their delay is taken: narrower than what a shake contains."""
+
+
+@dataclass(frozen=True)
+class WallTouch:
+    """One touch of one wall.
+
+    Attributes:
+        wall: Which wall, from 0.
+        approach: (2,) unit direction of approach in K.
+        tip_m: (2,) believed ball centre in K at the onset, dated with the assumed latency.
+        approach_P: (2,) the direction of approach in P's x and y.
+        speed_m_s: Speed at the onset.
+    """
+
+    wall: int
+    approach: Array
+    tip_m: Array
+    approach_P: Array
+    speed_m_s: float
+
+
+@dataclass(frozen=True)
+class TipCalibration:
+    """The solution.
+
+    Attributes:
+        tip_error_P_m: (2,) true minus believed tip in P.
+        tip_covariance_m2: (2, 2) of it.
+        late_s: How much longer than assumed the latency is.
+        late_sd_s: Its standard deviation.
+        walls_m: (k,) place of each wall along its direction of approach, in K as registered.
+        residuals_m: (n,) what is left of each touch.
+    """
+
+    tip_error_P_m: Array
+    tip_covariance_m2: Array
+    late_s: float
+    late_sd_s: float
+    walls_m: Array
+    residuals_m: Array
+
+    @property
+    def tip_sd_m(self) -> float:
+        """Standard deviation per axis: root of the mean variance."""
+        return float(np.sqrt(0.5 * np.trace(self.tip_covariance_m2)))
+
+
+def solve_tip(
+    touches: Sequence[WallTouch], tip_radius_m: float, *, touch_sd_m: float, late_sd_s: float
+) -> TipCalibration:
+    """Weighted linear least squares over all touches.
+
+    Args:
+        touches: At least one; walls numbered without gaps.
+        tip_radius_m: Radius of the ball.
+        touch_sd_m: Standard deviation of one onset's place.
+        late_sd_s: Prior standard deviation of the latency's error about 0 (what the wrist was measured to).
+
+    Raises:
+        ParamError: No touches, a wall number left out, or deviations that are not positive.
+    """
+    if not touches:
+        raise ParamError("touches", 0, "at least one")
+    walls = max(t.wall for t in touches) + 1
+    if {t.wall for t in touches} != set(range(walls)):
+        raise ParamError("touches.wall", sorted({t.wall for t in touches}), "numbers from 0 without gaps")
+    for name, value in (("touch_sd_m", touch_sd_m), ("late_sd_s", late_sd_s)):
+        if not (math.isfinite(value) and value > 0):
+            raise ParamError(name, value, "finite and positive")
+    rows = np.zeros((len(touches), 3 + walls))
+    right = np.zeros(len(touches))
+    for row, t in enumerate(touches):
+        rows[row, :2] = -np.asarray(t.approach_P)
+        rows[row, 2] = t.speed_m_s
+        rows[row, 3 + t.wall] = 1.0
+        right[row] = float(np.asarray(t.approach) @ np.asarray(t.tip_m)) + tip_radius_m
+    prior = np.zeros((3, 3 + walls))
+    prior[:, :3] = np.diag([1 / LARGEST_TIP_ERROR_M, 1 / LARGEST_TIP_ERROR_M, 1 / late_sd_s])
+    a = np.vstack([rows / touch_sd_m, prior])
+    covariance = np.linalg.inv(a.T @ a)
+    found = covariance @ (a.T @ np.concatenate([right / touch_sd_m, np.zeros(3)]))
+    return TipCalibration(
+        tip_error_P_m=found[:2],
+        tip_covariance_m2=covariance[:2, :2],
+        late_s=float(found[2]),
+        late_sd_s=float(np.sqrt(covariance[2, 2])),
+        walls_m=found[3:],
+        residuals_m=right - rows @ found,
+    )
+
+
+def wrench_delay(
+    position_m: Array, force_N: Array, rate_Hz: float, *, longest_s: float = 0.02, steps: int = 401
+) -> tuple[float, float]:
+    """How late the wrist's force follows the hand's own acceleration: (delay s, its standard deviation s).
+
+    In free motion without turning, the wrist feels the inertia of what it carries, F(t) = -m a(t - delay) + constant.
+    Both are smoothed alike and the delay of the least squared error is taken (m and the constant fitted with it).
+
+    Args:
+        position_m: (n,) measured position along the direction of the shake, undelayed.
+        force_N: (n,) wrist force along it at the same stamps.
+        rate_Hz: Of both.
+        longest_s: Delays up to this are looked at.
+        steps: How many.
+
+    Raises:
+        ParamError: Wrong shapes, or too short to hold a shake.
+    """
+    x, f = np.asarray(position_m, dtype=np.float64), np.asarray(force_N, dtype=np.float64)
+    width = SMOOTH_S * rate_Hz
+    edge = round(longest_s * rate_Hz + 4 * width)
+    if x.ndim != 1 or f.shape != x.shape or len(x) < 4 * edge:
+        raise ParamError("position_m, force_N", (x.shape, f.shape), f"both (n,) with n >= {4 * edge}")
+    smooth = gaussian_filter1d(x, width)
+    acceleration = np.gradient(np.gradient(smooth)) * rate_Hz**2
+    felt = _centred(gaussian_filter1d(f, width)[edge:-edge])
+    samples = np.arange(len(x), dtype=np.float64)
+    delays = np.linspace(0.0, longest_s, steps)
+    errors, change = np.zeros(steps), np.zeros(steps)
+    for k, delay in enumerate(delays):
+        late = _centred(np.interp(samples - delay * rate_Hz, samples, acceleration)[edge:-edge])
+        mass = float(late @ felt) / max(float(late @ late), 1e-12)
+        left = felt - mass * late
+        errors[k] = left @ left
+        change[k] = np.sum((mass * np.gradient(late) * rate_Hz) ** 2)
+    best = int(np.argmin(errors))
+    delay = float(delays[best])
+    if 0 < best < steps - 1:
+        before, here, after = errors[best - 1 : best + 2]
+        bend = before - 2 * here + after
+        if bend > 0:
+            delay += float(0.5 * (before - after) / bend) * float(delays[1] - delays[0])
+    # Smoothing makes neighbours agree: so many samples carry one independent value.
+    variance = errors[best] / len(felt) * max(2 * math.sqrt(math.pi) * width, 1.0)
+    return delay, float(np.sqrt(variance / max(change[best], 1e-12)))
+
+
+def _centred(x: Array) -> Array:
+    return np.asarray(x - x.mean())

@@ -1,0 +1,63 @@
+"""Touch with the fingers themselves: the closed hand as a tool with the fingers' outline as its section."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glotouch_bt.robot import Array, Gripper, Pose, SetPayload, Tare
+from glotouch_bt.touch.localisation import Polygon
+from skills.base import Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from skills.hand import easy_yaw
+from skills.held_tool import HeldTool
+from skills.requests import finish
+
+
+class BareHandParams(SkillParams):
+    """Parameters of `bare_hand`."""
+
+    aperture_m: float = param("Opening of the jaws while touching", unit="m", default=0.0, ge=0.0, le=0.085)
+    yaw_deg: float = param("Direction of the fingers' width in B", unit="deg", default=0.0, ge=-180.0, le=180.0)
+
+
+class BareHand(Skill):
+    """Close the empty jaws, turn to the yaw that is kept while touching, and zero the wrist sensor.
+
+    SUCCESS: `tool` is the hand: it touches with the outline of its fingers.
+    FAILURE `probe_held`: the probe is in the jaws.
+    FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
+    FAILURE `motion_refused`: the hand cannot be turned here.
+    """
+
+    Params = BareHandParams
+    params: BareHandParams
+    tool = Out(HeldTool, "the fingers as a tool")
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        arm = self.context.arm
+        if arm.scene.holding_tool:
+            raise SkillFailed("probe_held", "the probe is in the jaws", advice="return it first with tool_return")
+        state = yield from arm.jaws(self.params.aperture_m)
+        here = arm.pose_B_P
+        yaw = easy_yaw(arm, np.deg2rad(self.params.yaw_deg))
+        yield from arm.line(Pose.pointing_down(here.position_m, yaw), 0.1)
+        yield from finish(self.context.requests.start(SetPayload(0.0, np.zeros(3))), "payload")
+        yield from arm.hold(0.2)
+        yield from finish(self.context.requests.start(Tare()), "tare")
+        gripper = arm.description.gripper
+        half = finger_outline_half_m(gripper, state.aperture_m)
+        self.tool = HeldTool(
+            tip_P_m=np.array([gripper.finger.centre_m[0], 0.0, gripper.fingertip_below_P_m]),
+            tip_radius_m=float(np.sqrt(4.0 * half[0] * half[1] / np.pi)),
+            shaft_radius_m=float(np.sqrt(4.0 * half[0] * half[1] / np.pi)),
+            aperture_m=state.aperture_m,
+            yaw_B_rad=yaw,
+            section=Polygon.rectangle(*half),
+        )
+        self.event("tool", held=True, section_half_m=half)
+
+
+def finger_outline_half_m(gripper: Gripper, aperture_m: float) -> Array:
+    """(2,) half size along x_P and y_P of the rectangle round both fingers at an aperture."""
+    outer = gripper.finger.centre_m[1] + gripper.finger.half_m[1]
+    return np.array([gripper.finger.half_m[0], outer + 0.5 * aperture_m])
