@@ -1,0 +1,127 @@
+"""Touch the top of a traced object: how high is it?"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from glotouch_bt.motion import Motion
+from glotouch_bt.robot import Array, MotionRefused
+from glotouch_bt.search.top import BallMove, Met, Top, TopPlan, TopRule, top_plan, tracks
+from glotouch_bt.touch import Candidate, GuardParams
+from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from skills.held_tool import HeldTool
+from skills.probing import Prober
+
+RIM_PLACES, RIM_INSET_M = 4, 0.003
+"""Where a hollow object is touched: so far inside of so many places of its rim, a quarter of the way round apart."""
+
+
+class TouchTopParams(SkillParams):
+    """Parameters of `touch_top`."""
+
+    down_speed_m_s: float = param("Speed down onto the top", unit="m/s", default=0.02, gt=0.0, le=0.06)
+    pass_speed_m_s: float = param("Speed of the passes above it", unit="m/s", default=0.03, gt=0.0, le=0.06)
+    travel_speed_m_s: float = param("Speed above all objects", unit="m/s", default=0.10, gt=0.0, le=0.15)
+    clearance_m: float = param("Passes go so far above what is known", unit="m", default=0.0008, ge=0.0003, le=0.01)
+    spacing_m: float = param("Widest gap between neighbouring passes", unit="m", default=0.028, ge=0.004, le=0.05)
+    inset_m: float = param("Passes keep so far inside the outline", unit="m", default=0.012, ge=0.0, le=0.03)
+    headroom_m: float = param("Ball's height above the floor when crossing an object", unit="m", default=0.13,
+                              ge=0.02, le=0.2)  # fmt: skip
+
+
+class TouchTop(Skill):
+    """From a traced candidate to its height: touch down in the middle, pass above it, touch whatever is higher.
+
+    SUCCESS: `measured` is the candidate with the height of the highest place found.
+    FAILURE `no_top`: nothing was met above where its sides had been touched: it is gone, or was moved. `measured` is
+    the candidate, at least as high as that.
+    FAILURE `motion_refused`: the ball cannot be brought above it; `measured` as for `no_top`.
+    """
+
+    Params = TouchTopParams
+    params: TouchTopParams
+    tool = In(HeldTool, "the held probe")
+    candidate = In(Candidate, "the object, as traced")
+    measured = Out(Candidate, "the same with its height", always=True)
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        candidate, tool = self.candidate, self.tool
+        touched_m = float(np.median([c.tip_K_m[2] for c in candidate.contacts])) - tool.floor_z_K_m
+        self.measured = replace(candidate, height_m=max(candidate.height_m, touched_m))
+        top = yield from self._drive(Prober(self.context, tool, GuardParams()), self._plan(candidate, touched_m))
+        if top.ball_K_m is None:
+            raise SkillFailed(
+                "no_top",
+                f"nothing higher than {touched_m * 1e3:.0f} mm was met where candidate {candidate.index} was traced",
+                advice="trace it again: it was moved or is gone",
+                sides_m=touched_m,
+            )
+        height = float(top.ball_K_m[2]) - tool.tip_radius_m - tool.floor_z_K_m
+        self.measured = replace(candidate, height_m=height)
+        self.event("top", candidate=candidate.index, height_m=height, touches=top.touches, passed=top.passed)
+
+    def _plan(self, candidate: Candidate, touched_m: float) -> TopPlan:
+        p, tool = self.params, self.tool
+        rule = TopRule(clearance_m=p.clearance_m, spacing_m=p.spacing_m, inset_m=p.inset_m)
+        points = np.array([c.point_K_m for c in candidate.contacts])
+        yaw = candidate.contour.yaw_rad if candidate.contour.kind == "box" else longest(points)
+        floor = tool.floor_z_K_m
+        return top_plan(
+            candidate.contour.centre_K_m,
+            tracks(points, yaw, rule),
+            self._rim(candidate, points),
+            floor + touched_m + tool.tip_radius_m,
+            floor + p.headroom_m,
+            rule,
+        )
+
+    def _rim(self, candidate: Candidate, points: Array) -> Array:
+        every = max(len(points) // RIM_PLACES, 1)
+        rim = points[::every][:RIM_PLACES]
+        inwards = candidate.contour.centre_K_m - rim
+        far = np.maximum(np.linalg.norm(inwards, axis=1, keepdims=True), 1e-9)
+        return np.asarray(rim + RIM_INSET_M * inwards / far)
+
+    def _drive(self, prober: Prober, plan: TopPlan) -> Motion[Top]:
+        """Make the plan's moves until it ends."""
+        move = next(plan)
+        while True:
+            met = yield from self._make(prober, move)
+            try:
+                move = plan.send(met)
+            except StopIteration as end:
+                return end.value  # type: ignore[no-any-return]
+
+    def _make(self, prober: Prober, move: BallMove) -> Motion[Met]:
+        p = self.params
+        goal, tip = move.goal_K_m, prober.tip_K_m
+        try:
+            if move.kind == "over":
+                yield from prober.hop(goal, float(goal[2]), p.travel_speed_m_s)
+            elif move.kind in ("lift", "back"):
+                way = goal - tip
+                length = float(np.linalg.norm(way))
+                if length > 1e-4:
+                    yield from prober.retreat(way / length, length, p.travel_speed_m_s)
+            else:
+                speed = p.down_speed_m_s if move.kind == "down" else p.pass_speed_m_s
+                probed = yield from prober.move(goal, speed, any_direction=move.kind == "pass")
+                if probed.contact is not None:
+                    self.event("contact", contact=probed.contact)
+                    return Met(prober.tip_K_m, probed.contact.tip_K_m)
+        except MotionRefused as refusal:
+            if move.kind != "pass":
+                raise
+            self.event("note", text=f"a pass above candidate {self.candidate.index} was left out: {refusal}")
+            return Met(prober.tip_K_m, refused=True)
+        return Met(prober.tip_K_m)
+
+
+def longest(points_K_m: Array) -> float:
+    """Direction (rad) across which points (n, 2) are narrowest."""
+    yaws = np.linspace(0.0, np.pi, 60, endpoint=False)
+    across = points_K_m @ np.stack([-np.sin(yaws), np.cos(yaws)])
+    return float(yaws[np.argmin(np.ptp(across, axis=0))])
