@@ -11,12 +11,15 @@ from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.search import Felt, Move, Plan
 from glotouch_bt.search.moves import T
-from glotouch_bt.touch import Contact
+from glotouch_bt.touch import Contact, GuardParams
+from skills.base import Context, SkillFailed
 from skills.held_tool import HeldTool
 from skills.probing import Prober
 
 AT_HEIGHT_M = 0.004
 """The ball counts as lowered within this of the sensing height."""
+HELD_TOLERANCE_M = 0.004
+"""The tool is still held if the jaws are this near to where they closed on it: as for taking it."""
 OFF_TOP_M = 0.006
 """The ball is raised so far off what it landed on."""
 
@@ -37,14 +40,15 @@ class Explorer:
     """Moves the ball as a plan asks.
 
     Args:
-        prober: The guarded moves.
+        context: The skill's context.
         tool: The held probe.
         speeds: How fast and how high.
         journal: Called with (kind, data) of every event: "contact", "sweep" (the path at sensing height), "note".
     """
 
-    def __init__(self, prober: Prober, tool: HeldTool, speeds: ExploringSpeeds, journal: Callable[..., None]) -> None:
-        self._prober, self._tool, self._speeds, self._journal = prober, tool, speeds, journal
+    def __init__(self, context: Context, tool: HeldTool, speeds: ExploringSpeeds, journal: Callable[..., None]) -> None:
+        self._prober = Prober(context, tool, GuardParams())
+        self._arm, self._tool, self._speeds, self._journal = context.arm, tool, speeds, journal
 
     @property
     def lowered(self) -> bool:
@@ -61,7 +65,11 @@ class Explorer:
         return self._tool.floor_z_K_m + self._speeds.height_m
 
     def run(self, plan: Plan[T]) -> Motion[T]:
-        """All of a plan; what the plan returns."""
+        """All of a plan; what the plan returns.
+
+        Raises:
+            SkillFailed: `tool_lost`, `hard_contact`.
+        """
         try:
             move = next(plan)
             while True:
@@ -71,6 +79,7 @@ class Explorer:
             return result
 
     def _make(self, move: Move) -> Motion[Felt]:
+        self._require_tool()
         try:
             if move.kind == "hop":
                 contact, path = yield from self._hop(move.goal_K_m)
@@ -86,6 +95,17 @@ class Explorer:
         if contact is not None:
             self._journal("contact", contact=contact)
         return Felt(self.tip_K_m, path[:, :2], contact)
+
+    def _require_tool(self) -> None:
+        """The jaws must be as far apart as when they took the tool; without it nothing would ever be touched."""
+        apart, taken = self._arm.aperture_m, self._tool.aperture_m
+        if abs(apart - taken) > HELD_TOLERANCE_M:
+            raise SkillFailed(
+                "tool_lost",
+                f"the jaws are {apart * 1e3:.1f} mm apart, with the tool in them they were {taken * 1e3:.1f}",
+                advice="the tool lies in the container or beside it; take it out by hand",
+                aperture_m=apart,
+            )
 
     def _go(self, move: Move) -> Motion[tuple[Contact | None, Array]]:
         s = self._speeds

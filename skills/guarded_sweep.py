@@ -7,11 +7,10 @@ from typing import Literal
 import numpy as np
 
 from glotouch_bt.search import SearchMap, search_policy, seek
-from glotouch_bt.touch import Contact, GuardParams
+from glotouch_bt.touch import Contact
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.exploring import Explorer, ExploringSpeeds
 from skills.held_tool import HeldTool
-from skills.probing import Prober
 
 
 class GuardedSweepParams(SkillParams):
@@ -36,6 +35,7 @@ class GuardedSweep(Skill):
     SUCCESS: something was touched; `contact` says where, the probe has retreated from it.
     FAILURE `search_exhausted`: nothing is left to explore, or to reach.
     FAILURE `hard_contact`: the wrench passed a hard limit on the way.
+    FAILURE `tool_lost`: the jaws are not as far apart as when they took the tool.
     """
 
     Params = GuardedSweepParams
@@ -44,19 +44,22 @@ class GuardedSweep(Skill):
     previous = In(SearchMap, "what has been explored so far", key="map", required=False)
     map = Out(SearchMap, "what has been explored now")
     contact = Out(Contact, "the contact that ended the sweep")
+    exhausted = Out(bool, "nothing is left to explore, or to reach", always=True)
 
     def run(self) -> SkillRun:
         """See the class."""
+        self.exhausted = False
         p, tool = self.params, self.tool
         speeds = ExploringSpeeds(
             sweep_m_s=p.speed_m_s, travel_m_s=p.travel_speed_m_s, height_m=p.height_m, headroom_m=p.headroom_m
         )
-        explorer = Explorer(Prober(self.context, tool, GuardParams()), tool, speeds, self.event)
+        explorer = Explorer(self.context, tool, speeds, self.event)
         belief = self.previous or self._blank_map()
         plan = seek(belief, search_policy(p.policy), explorer.tip_K_m, lowered=explorer.lowered)
         sought = yield from explorer.run(plan)
         self.map = sought.belief
         if sought.contact is None:
+            self.exhausted = True
             raise SkillFailed(
                 "search_exhausted",
                 f"nothing unexplored is left; {belief.found} of {p.expected_objects} objects were found",

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from glotouch_bt.search import SearchMap, Trace, TraceParams, trace
-from glotouch_bt.touch import Candidate, Contact, GuardParams, contour_quality, envelope
+from glotouch_bt.touch import Candidate, Contact, contour_quality, envelope
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.exploring import Explorer, ExploringSpeeds
 from skills.held_tool import HeldTool
-from skills.probing import Prober
 
 LEAST_CONTACTS = 3
 """An outline fitted to fewer is a guess."""
@@ -44,6 +43,7 @@ class OrbitProbe(Skill):
     FAILURE `known_object`: the contact belongs to an object traced before; its place is dropped from the search.
     FAILURE `not_traced`: too few contacts were made to fit an outline.
     FAILURE `hard_contact`: the wrench passed a hard limit on the way.
+    FAILURE `tool_lost`: the jaws are not as far apart as when they took the tool.
     """
 
     Params = OrbitProbeParams
@@ -66,7 +66,7 @@ class OrbitProbe(Skill):
             self.map = belief.with_dropped(first.point_K_m)
             raise SkillFailed("known_object", "the contact lies on an object that is traced already")
         speeds = ExploringSpeeds(step_m_s=p.orbit_speed_m_s, probe_m_s=p.probe_speed_m_s, height_m=p.height_m)
-        explorer = Explorer(Prober(self.context, self.tool, GuardParams()), self.tool, speeds, self.event)
+        explorer = Explorer(self.context, self.tool, speeds, self.event)
         params = TraceParams(
             clearance_m=p.clearance_m,
             centre_sd_m=p.centre_sd_m,
@@ -74,7 +74,8 @@ class OrbitProbe(Skill):
             least_contacts=p.least_contacts,
             most_contacts=p.most_contacts,
         )
-        traced = yield from explorer.run(trace(first, explorer.tip_K_m, self.tool.tip_radius_m, params))
+        plan = trace(first, explorer.tip_K_m, self.tool.tip_radius_m, params, round_tip=self.tool.round)
+        traced = yield from explorer.run(plan)
         belief = belief.with_path(traced.path_K_m)
         if traced.outline is None or len(traced.contacts) < LEAST_CONTACTS:
             self.map = belief.with_dropped(first.point_K_m)

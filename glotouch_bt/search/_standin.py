@@ -1,7 +1,9 @@
 """Temporary stand-in for touch.believe_outline: periodic GP of the polar distance of the offset outline."""
 
 from __future__ import annotations
+
 import numpy as np
+
 from glotouch_bt.robot import Array
 from glotouch_bt.touch import Contour, fit_contour
 

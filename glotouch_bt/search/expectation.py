@@ -1,11 +1,11 @@
 """Where to sweep next: the way on which most of the objects still hidden are expected soonest.
 
-The belief is a weight for every place and size an unseen object may have: discs on a grid, of a few radii. A disc that a
-swept path would have touched, or that overlaps a traced object, is ruled out; one nearer to a wall or to an object than
-objects usually stand is unlikely, not impossible. A way finds what lies within its swath. The way chosen maximises the
-weight found, each find discounted by the travel up to it (the usual surrogate of expected search time; Stone, Theory of
-Optimal Search, 1975), over sequences of straight legs between the nodes of a lattice, by beam search; only its first leg
-is gone before the question is asked anew.
+The belief is a weight for every place and size an unseen object may have: discs on a grid, of a few radii. A disc that
+a swept path would have touched, or that overlaps a traced object, is ruled out; one nearer to a wall or to an object
+than objects usually stand is unlikely, not impossible. A way finds what lies within its swath. The way chosen maximises
+the weight found, each find discounted by the travel up to it (a usual surrogate of expected search time; Stone, Theory
+of Optimal Search, 1975), over sequences of straight legs between the nodes of a lattice, by beam search; only its first
+leg is gone before the question is asked anew.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def touched(centre: Array, reach: Array, a: Array, b: Array) -> Mask:
 @lru_cache(maxsize=4)
 def _lattice(half: tuple[float, float], p: ExpectationParams) -> _Lattice:
     inner = np.array(half) + p.wall_m
-    axes = [np.linspace(-h, h, max(int(round(2 * h / p.grid_m)) + 1, 2)) for h in inner]
+    axes = [np.linspace(-h, h, max(round(2 * h / p.grid_m) + 1, 2)) for h in inner]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     centre = np.concatenate([grid] * len(p.radii_m))
     radius = np.repeat(np.array(p.radii_m), len(grid))
@@ -110,7 +110,7 @@ def _lattice(half: tuple[float, float], p: ExpectationParams) -> _Lattice:
     centre, radius, prior = centre[keep], radius[keep], prior[keep]
     for r in p.radii_m:  # every size as likely
         prior[radius == r] /= max(prior[radius == r].sum(), 1e-9) * len(p.radii_m)
-    node_axes = [np.linspace(-h, h, max(int(round(2 * h / p.node_m)) + 1, 2)) for h in half]
+    node_axes = [np.linspace(-h, h, max(round(2 * h / p.node_m) + 1, 2)) for h in half]
     nodes = np.stack(np.meshgrid(*node_axes, indexing="ij"), axis=-1).reshape(-1, 2)
     distance = np.linalg.norm(nodes[:, None] - nodes[None], axis=2)
     start, end = np.nonzero((distance > 0) & (distance <= p.leg_m))
@@ -186,7 +186,9 @@ class ExpectedFind:
         straight = np.linalg.norm(lattice.nodes - tip, axis=1)
         # a first leg beyond the lattice's longest is for coming out of places where all near is known
         near = np.argsort(np.where(np.isfinite(lengths), lengths, 9.0), kind="stable")[: 4 * p.width + 16]
-        near = near[np.isfinite(lengths[near]) & (straight[near] > 1e-3) & ~belief.inside_exclusion(lattice.nodes[near])]
+        near = near[
+            np.isfinite(lengths[near]) & (straight[near] > 1e-3) & ~belief.inside_exclusion(lattice.nodes[near])
+        ]
         if len(near) == 0:
             return None
         swath = touched(lattice.centre, reach, np.broadcast_to(tip, (len(near), 2)), lattice.nodes[near])

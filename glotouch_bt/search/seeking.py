@@ -78,13 +78,14 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
                 if not stretch.raised:
                     tip = (yield Move("retreat", tip - RETREAT_M * felt.contact.approach_K[:2])).tip_K_m
                 break
+            place = felt.contact.tip_K_m
             side: Contact | None = felt.contact
             if stretch.raised:
                 belief, side, tip, lowered = yield from _from_its_side(belief, felt)
             if side is not None:
                 felt = yield Move("retreat", tip - RETREAT_M * side.approach_K[:2])
                 return Sought(belief.with_path(felt.path_K_m), side, True)
-            belief = belief.with_dropped(felt.contact.tip_K_m)
+            belief = belief.with_dropped(place)
             break
 
 

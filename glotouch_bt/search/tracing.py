@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from glotouch_bt.robot import Array
-from glotouch_bt.search.moves import Felt, Move, Plan
 from glotouch_bt.search._standin import OutlineBelief, believe_outline
+from glotouch_bt.search.moves import Felt, Move, Plan
 from glotouch_bt.touch import Contact, Contour
 
 BEARINGS = 72
@@ -75,8 +75,21 @@ class Trace:
 
 @dataclass
 class _State:
+    """Everything felt so far.
+
+    Attributes:
+        tip: (2,) where the tool's reference point is.
+        radius: Of the tool, m.
+        round: Its section is a disc: outlines are fitted to its centres, exactly. Else to contact points.
+        raw: The contacts as they were felt.
+        paths: Where it has been.
+        strays: Contacts with something else.
+        blocked: Bearings that were tried in vain, rad.
+    """
+
     tip: Array
     radius: float
+    round: bool
     raw: list[Contact]
     paths: list[Array] = field(default_factory=list)
     strays: list[Contact] = field(default_factory=list)
@@ -95,12 +108,21 @@ class _State:
         """What the contacts say."""
         now = self.present()
         return believe_outline(
-            np.array([c.tip_K_m[:2] for c in now]),
-            self.radius,
+            np.array([self.place(c) for c in now]),
+            self.radius if self.round else 0.0,
             approach_K=np.array([c.approach_K[:2] for c in now]),
             reaction_K=np.array([c.reaction_K[:2] for c in now]),
             free_K_m=self.free(),
         )
+
+    def place(self, contact: Contact) -> Array:
+        """(2,) what the outline is fitted to."""
+        return contact.tip_K_m[:2] if self.round else contact.point_K_m
+
+    def ring(self, outline: OutlineBelief, bearings: Array) -> tuple[Array, Array]:
+        """Distance from the outline's middle at which the reference point would touch, (n,) m, and its deviation."""
+        distance, sd = outline.predict(bearings)
+        return distance + (0.0 if self.round else self.radius), sd
 
     def free(self) -> Array:
         """(n, 2) places the ball has been since the object was last pushed a millimetre or more."""
@@ -113,17 +135,20 @@ class _State:
             self.paths.append(np.asarray(felt.path_K_m))
 
 
-def trace(first: Contact, tip_K_m: Array, tip_radius_m: float, params: TraceParams | None = None) -> Plan[Trace]:
+def trace(
+    first: Contact, tip_K_m: Array, tip_radius_m: float, params: TraceParams | None = None, *, round_tip: bool = True
+) -> Plan[Trace]:
     """Trace the outline of what was touched. The ball ends beside it, at sensing height.
 
     Args:
-        first: The contact that found it; the ball has not been retreated from it.
+        first: The contact that found it; the ball may have been retreated from it.
         tip_K_m: (2,) where the ball is.
-        tip_radius_m: Its radius.
+        tip_radius_m: Its radius; of another section, that of a disc about as large.
         params: See `TraceParams`.
+        round_tip: The section is a disc: outlines are fitted to its centres. Else to the contacts' points.
     """
     p = params or TraceParams()
-    s = _State(np.asarray(tip_K_m, dtype=np.float64)[:2], tip_radius_m, [first])
+    s = _State(np.asarray(tip_K_m, dtype=np.float64)[:2], tip_radius_m, round_tip, [first])
     yield from _retreat(s, p)
     outline, missed, ended = s.outline(), 0, ""
     while not ended:
@@ -139,7 +164,7 @@ def trace(first: Contact, tip_K_m: Array, tip_radius_m: float, params: TracePara
             missed += 1
             s.blocked.append(bearing)
             ended = "" if missed <= p.misses else f"{missed} probes in a row met nothing"
-        elif outline.belongs(found.tip_K_m[:2]):
+        elif outline.belongs(s.place(found)):
             missed = 0
             s.raw.append(found)
             yield from _retreat(s, p)
@@ -161,11 +186,14 @@ def trace(first: Contact, tip_K_m: Array, tip_radius_m: float, params: TracePara
 
 
 def _retreat(s: _State, p: TraceParams) -> Plan[None]:
-    """Away from the last contact, along what the approach and the reaction say is outwards."""
+    """Away from the last contact until the clearance is reached, along what the force, rather than the approach, says
+    is outwards (they differ for a graze)."""
     last = s.raw[-1]
-    out = last.reaction_K[:2] - 2.0 * last.approach_K[:2]
+    out = 2.0 * last.reaction_K[:2] - last.approach_K[:2]
     out = out / max(float(np.linalg.norm(out)), 1e-9)
-    s.felt((yield Move("retreat", s.tip + p.clearance_m * out)))
+    way = p.clearance_m - float((s.tip - last.tip_K_m[:2]) @ out)
+    if way > 5e-4:
+        s.felt((yield Move("retreat", s.tip + way * out)))
 
 
 def _enough(outline: OutlineBelief, s: _State, p: TraceParams) -> str:
@@ -191,7 +219,7 @@ def _wrap(a: Array) -> Array:
 def _choose(outline: OutlineBelief, s: _State, p: TraceParams) -> tuple[float | None, float]:
     """The bearing with the most uncertainty for the way to it, and which way round (+1 counter-clockwise)."""
     bearings = _bearings()
-    distance, sd = outline.predict(bearings)
+    distance, sd = s.ring(outline, bearings)
     offset = s.tip - outline.centre_K_m
     here = float(np.arctan2(offset[1], offset[0]))
     best: tuple[float, float, float] | None = None
@@ -221,7 +249,7 @@ def _probe_at(outline: OutlineBelief, s: _State, p: TraceParams, bearing: float,
             return None
         if felt.contact is not None:
             return felt.contact
-    distance, sd = (float(v[0]) for v in outline.predict(np.array([bearing])))
+    distance, sd = (float(v[0]) for v in s.ring(outline, np.array([bearing])))
     inner = max(distance - p.reach_sds * sd - 0.003, INSIDE_M)
     u = np.array([np.cos(bearing), np.sin(bearing)])
     felt = yield Move("probe", outline.centre_K_m + inner * u)
@@ -236,19 +264,19 @@ def _way_round(outline: OutlineBelief, s: _State, p: TraceParams, bearing: float
     turn = float(_wrap(np.array(side * (bearing - here))) % (2 * np.pi))
     n = max(int(np.ceil(turn / np.deg2rad(5.0))), 1)
     angles = here + side * np.linspace(0.0, turn, n + 1)[1:]
-    distance, sd = outline.predict(angles)
+    distance, sd = s.ring(outline, angles)
     ring = distance + p.clearance_m + np.minimum(p.margin_sds * sd, p.widest_margin_m)
     points = outline.centre_K_m + ring[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
-    return _tight(s.tip, points, outline, p)
+    return _tight(s, points, outline, p)
 
 
-def _tight(start: Array, points: Array, outline: OutlineBelief, p: TraceParams) -> Array:
+def _tight(s: _State, points: Array, outline: OutlineBelief, p: TraceParams) -> Array:
     """Leave out what can be cut without coming nearer to the predicted outline than the clearance."""
     kept: list[Array] = []
-    here, i = start, 0
+    here, i = s.tip, 0
     while i < len(points):
         j = len(points) - 1
-        while j > i and not _clear(here, points[j], outline, p):
+        while j > i and not _clear(s, here, points[j], outline, p):
             j -= 1
         here = points[j]
         kept.append(here)
@@ -256,9 +284,9 @@ def _tight(start: Array, points: Array, outline: OutlineBelief, p: TraceParams) 
     return np.array(kept)
 
 
-def _clear(a: Array, b: Array, outline: OutlineBelief, p: TraceParams) -> bool:
+def _clear(s: _State, a: Array, b: Array, outline: OutlineBelief, p: TraceParams) -> bool:
     t = np.linspace(0.0, 1.0, 12)[1:-1, None]
     d = (1 - t) * a + t * b - outline.centre_K_m
-    distance, sd = outline.predict(np.arctan2(d[:, 1], d[:, 0]))
+    distance, sd = s.ring(outline, np.arctan2(d[:, 1], d[:, 0]))
     least = distance + 0.7 * p.clearance_m + 0.5 * np.minimum(p.margin_sds * sd, p.widest_margin_m)
     return bool(np.all(np.hypot(d[:, 0], d[:, 1]) >= least))
