@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -26,7 +27,7 @@ from glotouch_bt.robot import (
 )
 from glotouch_bt.robot.referee import Referee
 
-OPTIONS = ("layout", "trace")
+OPTIONS = ("fixed", "layout", "trace")
 SETTLE_S = 0.6
 START_APERTURE_M = 0.040
 Layout = dict[str, tuple[float, float, float]]
@@ -47,12 +48,12 @@ def _read_layout(value: object) -> Layout:
     return places
 
 
-def _read_trace(value: object) -> bool:
-    """Option `trace`: remember every control, for `Referee.replay_bare_steps`."""
+def _read_switch(name: str, value: object) -> bool:
+    """An option that is on or off."""
     words = {"true": True, "false": False}
     found = value if isinstance(value, bool) else words.get(str(value).lower())
     if found is None:
-        raise ParamError("option trace", value, "true or false")
+        raise ParamError(f"option {name}", value, "true or false")
     return found
 
 
@@ -88,16 +89,18 @@ class MujocoBackend(Backend):
     def open(self, world: World, conditions: Conditions, seed: int, options: Mapping[str, object]) -> Robot:
         """See `Backend`.
 
-        Options: `layout`, {object: (x m, y m, yaw rad)} in K, instead of a random layout; `trace` (true or false),
-        remember every control so that the referee can repeat the bare steps (some 80 kB a second of robot time).
+        Options: `layout`, {object: (x m, y m, yaw rad)} in K, instead of a random layout; `fixed` (true or false),
+        bolt the objects to the floor, as a calibration artefact is; `trace` (true or false), remember every control so
+        that the referee can repeat the bare steps (some 80 kB a second of robot time).
         """
         for option in options:
             if option not in OPTIONS:
                 raise UnknownName("option of backend mujoco", option, OPTIONS)
         layout = _read_layout(options["layout"]) if "layout" in options else None
-        traced = _read_trace(options.get("trace", False))
+        traced = _read_switch("trace", options.get("trace", False))
+        fixed = _read_switch("fixed", options.get("fixed", False))
         silence_mujoco()
-        truth = draw_truth(world, conditions, seed, layout)
+        truth = replace(draw_truth(world, conditions, seed, layout), fixed=fixed)
         model, handles = compile_world(self._description, world, truth)
         data = mujoco.MjData(model)
         try:

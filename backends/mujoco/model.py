@@ -167,7 +167,7 @@ def build_spec(description: RobotDescription, world: World, truth: Truth) -> muj
     add_probe(spec, world.probe, world.holder, truth.pose_handle_shaft, truth.pad_friction)
     add_container(spec, world.container, truth.pose_B_K)
     for index, item in enumerate(truth.objects):
-        add_object(spec, index, item, truth.pose_B_K)
+        add_object(spec, index, item, truth.pose_B_K, fixed=truth.fixed)
     _add_sensors(spec, description)
     return spec
 

@@ -20,12 +20,17 @@ COLOURS = (
 )
 
 
-def add_object(spec: mujoco.MjSpec, index: int, truth: ObjectTruth, pose_B_K: Pose) -> None:
-    """Add the free body `object{index}`, standing on the container's floor; its frame is the mesh frame."""
+def add_object(spec: mujoco.MjSpec, index: int, truth: ObjectTruth, pose_B_K: Pose, *, fixed: bool = False) -> None:
+    """Add the body `object{index}`, standing on the container's floor; its frame is the mesh frame.
+
+    It is free, or, if `fixed`, a part of the container.
+    """
+    category = ENVIRONMENT if fixed else OBJECT
     mesh = truth.mesh
     place = pose_B_K @ Pose.planar((truth.place.x_m, truth.place.y_m, FOOT_PROTRUSION_M), truth.place.yaw_rad)
     body = spec.worldbody.add_body(name=f"object{index}", pos=place.position_m, quat=place.quat)
-    body.add_freejoint(name=f"object{index}")
+    if not fixed:
+        body.add_freejoint(name=f"object{index}")
 
     solid = mesh.as_trimesh()
     solid.density = truth.mass_kg / solid.volume
@@ -39,11 +44,11 @@ def add_object(spec: mujoco.MjSpec, index: int, truth: ObjectTruth, pose_B_K: Po
     for k, vertices in enumerate(shape_of.vertices):
         shape = spec.add_mesh(name=f"object{index}_hull{k}", uservert=vertices.ravel())
         geom = body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=shape.name, mass=0.0)
-        set_category(geom, OBJECT)
+        set_category(geom, category)
         set_friction(geom, truth.friction)
     for centre in shape_of.feet:
         geom = body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, pos=centre, size=(FOOT_RADIUS_M, 0.0, 0.0), mass=0.0)
-        set_category(geom, OBJECT)
+        set_category(geom, category)
         geom.contype, geom.conaffinity = 0, ENVIRONMENT  # they stick out sideways: floor and walls only
         set_friction(geom, truth.friction)
     skin = spec.add_mesh(

@@ -33,12 +33,14 @@ class Truth:
             the grasp offset, so that the ball is not exactly where the nominal grasp says.
         pad_friction: Pads on anything.
         objects: In the order of the world's object set.
+        fixed: The objects are bolted to the container's floor instead of standing on it.
     """
 
     pose_B_K: Pose
     pose_handle_shaft: Pose
     pad_friction: float
     objects: tuple[ObjectTruth, ...]
+    fixed: bool = False
 
 
 def rotation_vector(v: Array) -> Pose:

@@ -26,7 +26,7 @@ LARGEST_TIP_ERROR_M = 0.005
 """Prior standard deviation of the tip's error, per axis: far above any grasp's, so that it only keeps the problem
 solvable when the hand could not be turned."""
 SMOOTH_S = 0.004
-"""Both signals are smoothed with a Gaussian so wide before their delay is taken: narrower than what a shake contains."""
+"""Both signals are smoothed with a Gaussian so wide before their delay is taken: a shake is slower."""
 
 
 @dataclass(frozen=True)
