@@ -14,7 +14,7 @@ import numpy as np
 from glotouch_bt.robot import Array
 from glotouch_bt.search.moves import Felt, Move, MoveKind
 from glotouch_bt.study.planar.section import SENSING_HEIGHT_M, FeltSection
-from glotouch_bt.touch import Contact, contact_point
+from glotouch_bt.touch import Contact, contact_point, pushed
 
 MARCH_M = 0.0005
 """Places along a move at which the distances are looked at; a graze shallower than a micrometre may be missed."""
@@ -35,6 +35,7 @@ class ContactModel:
         direction_sd_rad: Scatter of the felt direction of the force.
         pressure_radius: Radius of gyration of the object's pressure on the floor, as a fraction of its reach: how
             much a push beside the centre turns it.
+        give_m: Of the way past an onset so much bends probe and arm instead of moving the object.
         touch_force_N: What is reported as the force.
     """
 
@@ -46,6 +47,7 @@ class ContactModel:
     friction: float = 0.2
     direction_sd_rad: float = np.deg2rad(3.0)
     pressure_radius: float = 0.5
+    give_m: float = 0.0002
     touch_force_N: float = 1.0
 
 
@@ -121,7 +123,9 @@ class PlanarWorld:
         if not self.lowered:
             return self._refuse("the ball is raised; only a hop brings it down")
         if move.kind == "retreat":
-            return self._go(np.clip(goal, -self.half_m, self.half_m), None)
+            felt = self._go(np.clip(goal, -self.half_m, self.half_m), None)
+            self._make_room()
+            return felt
         return self._guarded(move.kind, goal)
 
     def _refuse(self, why: str) -> Felt:
@@ -237,7 +241,7 @@ class PlanarWorld:
         turn = float(arm[0] * force[1] - arm[1] * force[0]) / rho**2
         at_contact = force + turn * np.array([-arm[1], arm[0]])
         inwards = float(at_contact @ -normal)
-        needed = float(way @ -normal)
+        needed = float(way @ -normal) - self._model.give_m
         if needed <= 0.0 or inwards <= 1e-6:
             return
         scale = needed / inwards
@@ -247,15 +251,24 @@ class PlanarWorld:
         origin = np.array([[c, -s], [s, c]]) @ (np.array([x, y]) - centre) + centre + scale * force
         self.poses[i] = (*origin, yaw + angle)
 
-    def _contact(self, onset: Array, u: Array, reaction: Array, pushed: Array) -> Contact:
+    def _make_room(self) -> None:
+        """An unguarded move ends where it was meant to: what stands there is pushed aside."""
+        for i in range(len(self.sections)):
+            gap = float(self.clearance(self.tip_K_m[None], i)[0])
+            if gap < 0.0:
+                self.poses[i, :2] += gap * self._normal(i, self.tip_K_m)
+                self.note("pushed aside", i)
+
+    def _contact(self, onset: Array, u: Array, reaction: Array, way: Array) -> Contact:
         """As the wrist would report it."""
         m = self._model
         felt = onset + m.localisation_sd_m * self._rng.normal(size=2)
         direction = _turned(reaction, m.direction_sd_rad * float(self._rng.normal()))
         point = contact_point(felt, self.tip_radius_m, u, direction)
+        way = pushed(way, direction)
         tip = np.array([*felt, SENSING_HEIGHT_M])
         return Contact(
-            0.0, tip, np.array([*u, 0.0]), np.array([*direction, 0.0]), point, m.touch_force_N, pushed_K_m=pushed
+            0.0, tip, np.array([*u, 0.0]), np.array([*direction, 0.0]), point, m.touch_force_N, pushed_K_m=way
         )
 
 
