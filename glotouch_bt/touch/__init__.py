@@ -4,6 +4,7 @@ Pure: arrays in, values out. Knows no robot, tree or file.
 """
 
 from glotouch_bt.touch.baseline import Baseline, fit_baseline
+from glotouch_bt.touch.belief import OutlineBelief, believe_outline, informative_direction, present_tips
 from glotouch_bt.touch.contours import consistent, contour_quality, fit_contour, fit_kind, signed_distance
 from glotouch_bt.touch.detector import ContactGuard, Onset
 from glotouch_bt.touch.envelope import envelope
@@ -14,12 +15,22 @@ from glotouch_bt.touch.hard_stop import HardStop, HardTrip
 from glotouch_bt.touch.inertia import Carried, CommandedInertia
 from glotouch_bt.touch.latency import LatencyEstimate, latency_from_two_speeds
 from glotouch_bt.touch.localisation import contact_direction, contact_point, disc_support, polygon_support
+from glotouch_bt.touch.moved import believe_contacts, split_moved
 from glotouch_bt.touch.patches import PatchStats, evidence_weight, patch_statistics, relative_nonplanarity
 from glotouch_bt.touch.plateau import Plateau, PlateauParams, find_plateau, make_layer, temporal_median
 from glotouch_bt.touch.pushing import pushed
 from glotouch_bt.touch.settling import reaction_direction, settled
 from glotouch_bt.touch.tracing import largest_gap_direction, needs_more, next_direction, widest_gap
-from glotouch_bt.touch.values import Candidate, Contact, Contour, ContourKind, Layer, TouchSequence, TouchSet
+from glotouch_bt.touch.values import (
+    Candidate,
+    Contact,
+    Contour,
+    ContourFamily,
+    ContourKind,
+    Layer,
+    TouchSequence,
+    TouchSet,
+)
 
 __all__ = [
     "Baseline",
@@ -29,6 +40,7 @@ __all__ = [
     "Contact",
     "ContactGuard",
     "Contour",
+    "ContourFamily",
     "ContourKind",
     "GuardParams",
     "HardStop",
@@ -37,12 +49,15 @@ __all__ = [
     "Layer",
     "LowPass",
     "Onset",
+    "OutlineBelief",
     "PatchStats",
     "Plateau",
     "PlateauParams",
     "TipFusion",
     "TouchSequence",
     "TouchSet",
+    "believe_contacts",
+    "believe_outline",
     "consistent",
     "contact_direction",
     "contact_point",
@@ -54,6 +69,7 @@ __all__ = [
     "fit_baseline",
     "fit_contour",
     "fit_kind",
+    "informative_direction",
     "largest_gap_direction",
     "latency_from_two_speeds",
     "make_layer",
@@ -61,11 +77,13 @@ __all__ = [
     "next_direction",
     "patch_statistics",
     "polygon_support",
+    "present_tips",
     "pushed",
     "reaction_direction",
     "relative_nonplanarity",
     "settled",
     "signed_distance",
+    "split_moved",
     "temporal_median",
     "widest_gap",
 ]

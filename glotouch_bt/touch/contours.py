@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glotouch_bt.robot import Array, ParamError
+from glotouch_bt.touch.polygons import polygon_distance
 from glotouch_bt.touch.tracing import widest_gap
 from glotouch_bt.touch.values import Contour
 
@@ -45,9 +46,11 @@ class _Fit:
 
 
 def signed_distance(contour: Contour, points_K_m: Array) -> Array:
-    """(n,) distance of points (n, 2) in K from the outline; negative inside. Exact for circle and rectangle."""
+    """(n,) distance of points (n, 2) in K from the outline; negative inside. Exact for every family."""
     p = np.asarray(points_K_m, dtype=np.float64).reshape(-1, 2)
-    if contour.kind == "round":
+    if contour.family == "free":
+        return polygon_distance(contour.boundary_K_m, p)
+    if contour.family == "circle":
         return np.asarray(np.linalg.norm(p - contour.centre_K_m, axis=1) - 0.5 * contour.size_m[0])
     d = p - contour.centre_K_m
     c, s = np.cos(contour.yaw_rad), np.sin(contour.yaw_rad)

@@ -13,6 +13,7 @@ import numpy as np
 from glotouch_bt.robot import Array
 
 ContourKind = Literal["round", "box"]
+ContourFamily = Literal["circle", "rectangle", "free"]
 
 
 @dataclass(frozen=True)
@@ -44,12 +45,16 @@ class Contour:
     """A planar outline fitted to contacts.
 
     Attributes:
-        kind: "round" (circle) or "box" (oriented rectangle).
-        centre_K_m: (2,).
-        size_m: (long, short); a circle has its diameter twice.
+        kind: How it is squeezed: "round" (from three directions) or "box" (in three parallel tracks).
+        centre_K_m: (2,); of a free outline, the area centroid of its convex hull.
+        size_m: (long, short); a circle has its diameter twice, a free outline the sides of its least rectangle.
         yaw_rad: Direction of the long side in K, in [-pi/2, pi/2); 0 for a circle.
         rms_m: Root mean square of the residuals.
         residuals_m: (k,) signed distance of each contact from the outline, outside positive.
+        family: What was fitted; if not given, what `kind` says.
+        covariance: Of the family's parameters, SI: circle (x, y, radius), rectangle (x, y, yaw, half long side, half
+            short side), free (x, y) of the centre; (0, 0) if it is not known.
+        boundary_K_m: (n, 2) corners of a free outline, counter-clockwise, not closed; (0, 2) for the other families.
     """
 
     kind: ContourKind
@@ -58,11 +63,20 @@ class Contour:
     yaw_rad: float
     rms_m: float
     residuals_m: Array
+    family: ContourFamily | None = None
+    covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    boundary_K_m: Array = field(default_factory=lambda: np.zeros((0, 2)))
+
+    def __post_init__(self) -> None:
+        if self.family is None:
+            object.__setattr__(self, "family", "circle" if self.kind == "round" else "rectangle")
 
     @property
     def radius_m(self) -> float:
-        """Radius of the circle round the whole outline."""
-        if self.kind == "round":
+        """Radius of the circle about the centre round the whole outline."""
+        if self.family == "free":
+            return float(np.max(np.linalg.norm(self.boundary_K_m - self.centre_K_m, axis=1)))
+        if self.family == "circle":
             return 0.5 * self.size_m[0]
         return 0.5 * float(np.hypot(*self.size_m))
 
@@ -72,8 +86,10 @@ class Contour:
         return self.radius_m + max(0.0, float(np.max(self.residuals_m, initial=0.0)))
 
     def outline_K_m(self, n: int = 48) -> Array:
-        """(m, 2) closed polyline of the outline, for maps."""
-        if self.kind == "round":
+        """(m, 2) closed polyline of the outline, for maps; of a circle with `n` sides."""
+        if self.family == "free":
+            return np.concatenate([self.boundary_K_m, self.boundary_K_m[:1]])
+        if self.family == "circle":
             a = np.linspace(0.0, 2 * np.pi, n + 1)
             local = 0.5 * self.size_m[0] * np.stack([np.cos(a), np.sin(a)], axis=1)
         else:
@@ -102,13 +118,18 @@ class Candidate:
     contacts: tuple[Contact, ...]
 
     def span_m(self, yaw_rad: float) -> tuple[float, float]:
-        """(least, greatest) coordinate of the contact points along the direction `yaw_rad` in K.
+        """(least, greatest) coordinate along the direction `yaw_rad` in K of the contact points and the outline.
 
-        The way round leaves no wide gap, so this is the object's true extent in any direction, whatever outline was
-        fitted.
+        Both, because few contacts leave wide gaps, and an outline leaves out what sticks out of it.
         """
-        along = np.array([c.point_K_m for c in self.contacts]) @ np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
+        along = self.extent_K_m @ np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
         return float(along.min()), float(along.max())
+
+    @property
+    def extent_K_m(self) -> Array:
+        """(n, 2) the contact points and the outline's corners (of a circle: many), in K."""
+        points = np.array([c.point_K_m for c in self.contacts]).reshape(-1, 2)
+        return np.concatenate([points, self.contour.outline_K_m(180)])
 
 
 @dataclass(frozen=True)

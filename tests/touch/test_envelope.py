@@ -9,7 +9,7 @@ def _candidate(points: np.ndarray) -> Candidate:
     contacts = tuple(
         Contact(0.0, np.array([*p, 0.0]), np.array([1.0, 0, 0]), np.array([-1.0, 0, 0]), p, 1.0) for p in points
     )
-    outline = Contour("round", points.mean(axis=0), (0.05, 0.05), 0.0, 0.0, np.zeros(len(points)))
+    outline = Contour("round", points.mean(axis=0), (0.01, 0.01), 0.0, 0.0, np.zeros(len(points)))
     return Candidate(0, outline, 0.05, 1.0, contacts)
 
 

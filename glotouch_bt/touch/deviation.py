@@ -1,0 +1,147 @@
+"""A primitive plus a smooth periodic deviation, seen through contacts: Gaussian posterior and evidence in closed form.
+
+The offset outline is the primitive's, displaced along its normal by g(bearing) = sum_h a_h cos(h t) + b_h sin(h t) with
+independent normal coefficients (a periodic Gaussian process in its weight space). Near the fitted primitive everything
+observed is linear in x = (parameters' correction, coefficients):
+
+    contact       distance + J dp - phi(t) w         = ball's radius, +- CONTACT_SD_M
+    reaction      normal + J_n dp - phi'(t) w / rho  = its bearing, +- its scatter
+    free place    as a contact, one-sided: counted only while the outline would lie beyond it
+
+so the posterior is a ridge regression and the evidence a determinant. With all coefficients zero it is the primitive
+alone.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from glotouch_bt.robot import Array
+from glotouch_bt.touch.primitives import FREE_SD_M, LARGEST_M, SMALLEST_M, Shape, Touches, circle, prior, wrapped
+
+CONTACT_SD_M = 0.00045
+"""Scatter of a ball's centre at the onset, and what a plain primitive may leave of an object's outline."""
+HARMONICS = np.arange(1, 11)
+COEFFICIENT_SD_M = np.where(HARMONICS == 1, 0.001, 0.018 / HARMONICS**1.8)
+"""Spread of the coefficients of cos and sin about the best circle: power law through the root mean squares of 1500
+random offset outlines (rectangles, ellipses, convex polygons, unions of discs, lobed rings; ball of 6 mm)."""
+REST_SD_M = 0.0004
+"""What such outlines keep beyond the last harmonic, typically."""
+MIN_COSINE = 0.35
+"""A ray is taken to meet the outline no more obliquely than this: beyond, the linear picture says nothing."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One explanation of the contacts.
+
+    Attributes:
+        shape: The primitive.
+        params: (p,) its parameters at which everything is linearised; see `primitives`.
+        amplitude: Scale of the deviations' spread; 0 for none.
+        mean, covariance: (n,), (n, n) posterior of the correction of `params`, followed by the coefficients if any.
+        log_evidence: Log density of the contacts, up to a constant common to all hypotheses about them.
+        residuals_m: (k,) what the contacts leave of the posterior mean, outside positive.
+        radius_m: Radius of the ball.
+    """
+
+    shape: Shape
+    params: Array
+    amplitude: float
+    mean: Array
+    covariance: Array
+    log_evidence: float
+    residuals_m: Array
+    radius_m: float
+
+    @property
+    def corrected(self) -> Array:
+        """(p,) posterior mean of the primitive's parameters; sizes within the physical limits."""
+        p = self.params + self.mean[: len(self.params)]
+        first = 2 if len(p) == 3 else 3
+        p[first:] = np.clip(p[first:], 0.5 * SMALLEST_M, 0.5 * LARGEST_M)
+        return p
+
+    def polar(self, origin_m: Array, bearing_rad: Array) -> tuple[Array, Array]:
+        """Mean (n,) and linear map (n, dim) of the distance from `origin_m` to the offset outline along bearings (n,).
+
+        The map times `covariance` times its transpose is the distances' covariance.
+        """
+        base = self.params if self.amplitude > 0 else self.corrected
+        u = np.stack([np.cos(bearing_rad), np.sin(bearing_rad)], axis=1)
+        far = float(np.linalg.norm(base[:2] - origin_m)) + float(np.hypot(*base[-2:])) + self.radius_m + 0.01
+        rho = np.full(len(u), far)
+        for _ in range(6):  # the distance is convex along a ray: Newton from outside comes down without overshoot
+            g = self.shape(base[None], origin_m + rho[:, None] * u)
+            slope = -np.sum(g.by_params[0, :, :2] * u, axis=1)
+            rho = np.maximum(rho - (g.distance_m[0] - self.radius_m) / np.maximum(slope, MIN_COSINE), 1e-3)
+        rows = -g.by_params[0]
+        if self.amplitude > 0:
+            points = origin_m + rho[:, None] * u - base[:2]
+            rows = np.concatenate([rows, _waves(np.arctan2(points[:, 1], points[:, 0]))[0]], axis=1)
+        rows = rows / np.maximum(slope, MIN_COSINE)[:, None]
+        shift = rows @ self.mean if self.amplitude > 0 else 0.0
+        return np.maximum(rho + shift, 1e-3), rows
+
+
+def explain(shape: Shape, params: Array, amplitude: float, touches: Touches) -> Hypothesis:
+    """The posterior about one fitted primitive (p,), with deviations of the given amplitude."""
+    k, r = len(touches.tips_m), touches.radius_m
+    points = np.concatenate([touches.tips_m, touches.free_m])
+    g = shape(params[None], points)
+    rows, turn = g.by_params[0], g.normal_by_params[0, :k]
+    before, sd = prior(shape, touches)
+    sd = np.where(np.isfinite(sd), sd, math.sqrt(math.pi / 8))  # the density of a yaw anywhere in a quarter turn
+    start = np.where(np.isfinite(prior(shape, touches)[1]), before - params, 0.0)
+    noise = CONTACT_SD_M
+    if amplitude > 0:
+        offset = points - params[:2]
+        rho = np.maximum(np.linalg.norm(offset, axis=1), 0.5 * SMALLEST_M)
+        bearing = np.arctan2(offset[:, 1], offset[:, 0])
+        waves, slopes = _waves(bearing)
+        cosine = np.maximum(np.cos(wrapped(g.normal_rad[0] - bearing)), MIN_COSINE)
+        rows = np.concatenate([rows, -waves], axis=1)
+        turn = np.concatenate([turn, -slopes[:k] * (cosine / rho)[:k, None]], axis=1)
+        spread = amplitude * np.tile(COEFFICIENT_SD_M, 2)
+        if shape is not circle:
+            spread = np.minimum(spread, amplitude * COEFFICIENT_SD_M[2])
+        sd = np.concatenate([sd, spread])
+        start = np.concatenate([start, np.zeros(len(spread))])
+        noise = math.hypot(CONTACT_SD_M, min(amplitude, 1.0) * REST_SD_M)
+    y = np.concatenate([r - g.distance_m[0, :k], wrapped(touches.normal_rad - g.normal_rad[0, :k])])
+    h = np.concatenate([rows[:k], turn])
+    inverse_sd = np.concatenate([np.full(k, 1.0 / noise), 1.0 / touches.normal_sd_rad])
+    y, h = y * inverse_sd, h * inverse_sd[:, None]
+    beyond, free_rows = (r - g.distance_m[0, k:]) / FREE_SD_M, rows[k:] / FREE_SD_M
+    precision = np.diag(1.0 / sd**2) + h.T @ h
+    vector = start / sd**2 + h.T @ y
+    constant = float(y @ y + np.sum((start / sd) ** 2))
+    active = np.zeros(len(beyond), dtype=bool)
+    mean = np.linalg.solve(precision, vector)
+    full, right, square = precision, vector, constant
+    for _ in range(4):
+        inside = free_rows @ mean < beyond
+        if bool(np.all(inside <= active)):
+            break
+        active |= inside
+        a, b = free_rows[active], beyond[active]
+        full, right, square = precision + a.T @ a, vector + a.T @ b, constant + float(b @ b)
+        mean = np.linalg.solve(full, right)
+    covariance = np.linalg.inv(full)
+    determinant = float(np.linalg.slogdet(full)[1]) + 2.0 * float(np.sum(np.log(sd)))
+    fit = max(square - float(right @ mean), 0.0)
+    evidence = -0.5 * fit - 0.5 * determinant - k * math.log(noise)
+    outwards = np.stack([np.cos(g.normal_rad[0, :k]), np.sin(g.normal_rad[0, :k])], axis=1)
+    evidence -= 10.0 * float(np.sum(np.sum(outwards * touches.approach, axis=1) > 0.3))
+    residuals = g.distance_m[0, :k] - r + rows[:k] @ mean
+    return Hypothesis(shape, params, amplitude, mean, covariance, evidence, residuals, r)
+
+
+def _waves(bearing_rad: Array) -> tuple[Array, Array]:
+    """(n, 2 h) cosines and sines of the harmonics, and their derivatives by the bearing."""
+    phase = bearing_rad[:, None] * HARMONICS
+    c, s = np.cos(phase), np.sin(phase)
+    return np.concatenate([c, s], axis=1), np.concatenate([-HARMONICS * s, HARMONICS * c], axis=1)

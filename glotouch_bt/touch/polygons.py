@@ -1,0 +1,89 @@
+"""Plane geometry of closed polygons (n, 2), vertices in order, the last joined to the first."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from glotouch_bt.robot import Array, ParamError
+
+
+def convex_hull(points_m: Array) -> Array:
+    """(m, 2) corners of the convex hull of points (n, 2), counter-clockwise.
+
+    Raises:
+        ParamError: The points span no area.
+    """
+    try:
+        return np.asarray(points_m[ConvexHull(points_m).vertices], dtype=np.float64)
+    except (QhullError, ValueError) as error:
+        raise ParamError("points_m", np.shape(points_m), "at least three points that span an area") from error
+
+
+def area_and_centroid(polygon_m: Array) -> tuple[float, Array]:
+    """Signed area (counter-clockwise positive) and area centroid (2,): Green's theorem."""
+    middle = polygon_m.mean(axis=0)
+    p = polygon_m - middle
+    q = np.roll(p, -1, axis=0)
+    cross = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
+    area = 0.5 * float(cross.sum())
+    if abs(area) < 1e-12:
+        return area, middle
+    return area, np.asarray(middle + (cross[:, None] * (p + q)).sum(axis=0) / (6.0 * area))
+
+
+def minimum_rectangle(points_m: Array) -> tuple[Array, tuple[float, float], float]:
+    """Centre (2,), (long, short) and yaw of the long side, in [-pi/2, pi/2), of the least rectangle by area.
+
+    One of its sides lies along an edge of the convex hull (Freeman and Shapira, CACM 18, 1975).
+
+    Raises:
+        ParamError: The points span no area.
+    """
+    hull = convex_hull(points_m)
+    edges = np.roll(hull, -1, axis=0) - hull
+    yaws = np.unique(np.round(np.arctan2(edges[:, 1], edges[:, 0]) % (0.5 * np.pi), 9))
+    c, s = np.cos(yaws)[:, None], np.sin(yaws)[:, None]
+    u, v = c * hull[:, 0] + s * hull[:, 1], c * hull[:, 1] - s * hull[:, 0]
+    low, high = np.stack([u.min(1), v.min(1)], 1), np.stack([u.max(1), v.max(1)], 1)
+    i = int(np.argmin(np.prod(high - low, axis=1)))
+    yaw, size, middle = float(yaws[i]), high[i] - low[i], 0.5 * (low[i] + high[i])
+    centre = np.array([[c[i, 0], -s[i, 0]], [s[i, 0], c[i, 0]]]) @ middle
+    if size[1] > size[0]:
+        size, yaw = size[::-1], yaw + 0.5 * np.pi
+    return centre, (float(size[0]), float(size[1])), float((yaw + 0.5 * np.pi) % np.pi - 0.5 * np.pi)
+
+
+def shrunk_convex(hull_m: Array, by_m: float) -> Array:
+    """A convex polygon without everything nearer than `by_m` to its outline: (m, 2) corners, counter-clockwise.
+
+    What is left is where the half planes of all edges, moved inwards, meet; found as the hull of their dual points
+    about the centroid. For a polygon too small to keep its centroid, the centroid alone (1, 2).
+    """
+    middle = area_and_centroid(hull_m)[1]
+    edge = np.roll(hull_m, -1, axis=0) - hull_m
+    length = np.linalg.norm(edge, axis=1)
+    keep = length > 1e-9
+    normal = np.stack([edge[keep, 1], -edge[keep, 0]], axis=1) / length[keep, None]
+    offset = np.sum(normal * (hull_m[keep] - middle), axis=1) - by_m
+    if np.min(offset) <= 1e-6:
+        return middle[None, :]
+    dual = convex_hull(normal / offset[:, None])
+    following = np.roll(dual, -1, axis=0)
+    cross = dual[:, 0] * following[:, 1] - dual[:, 1] * following[:, 0]
+    step = following - dual
+    return np.asarray(middle + np.stack([step[:, 1], -step[:, 0]], axis=1) / cross[:, None])
+
+
+def polygon_distance(polygon_m: Array, points_m: Array) -> Array:
+    """(k,) distance of points (k, 2) from a polygon's outline, negative inside (even-odd rule)."""
+    a, b = polygon_m, np.roll(polygon_m, -1, axis=0)
+    edge, d = b - a, points_m[:, None, :] - a
+    t = np.clip(np.einsum("knj,nj->kn", d, edge) / np.maximum(np.sum(edge * edge, axis=1), 1e-18), 0.0, 1.0)
+    gap = d - t[..., None] * edge
+    distance = np.sqrt(np.min(np.sum(gap * gap, axis=2), axis=1))
+    x, y = points_m[:, :1], points_m[:, 1:]
+    spans = (a[:, 1] > y) != (b[:, 1] > y)
+    rise = np.where(edge[:, 1] == 0.0, 1.0, edge[:, 1])
+    crossed = spans & (x < a[:, 0] + (y - a[:, 1]) / rise * edge[:, 0])
+    return np.asarray(np.where(np.sum(crossed, axis=1) % 2 == 1, -distance, distance))
