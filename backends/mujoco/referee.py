@@ -42,6 +42,12 @@ class MujocoReferee:
         """(3,) true centre of the ball."""
         return np.array(self._robot.data.site_xpos[self._robot.handles.tip_site])
 
+    def push_tip(self, force_B_N: Array) -> None:
+        """A force (3,) in B on the probe at the ball's centre, from now on."""
+        r, body = self._robot, self._robot.handles.probe_body
+        lever = self.tip_B_m() - r.data.xipos[body]
+        r.data.xfrc_applied[body] = np.concatenate([force_B_N, np.cross(lever, force_B_N)])
+
     def probe_in_holder(self) -> bool:
         """True if the handle is at its place, upright, and nobody touches it."""
         r = self._robot

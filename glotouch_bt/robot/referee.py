@@ -58,6 +58,10 @@ class Referee(Protocol):
         """(3,) true centre of the probe's ball, wherever the probe is."""
         ...
 
+    def push_tip(self, force_B_N: Array) -> None:
+        """From now on pull the probe by a force (3,) at the ball's centre, until told otherwise; zero ends it."""
+        ...
+
     def probe_in_holder(self) -> bool:
         """True if the probe stands in its holder."""
         ...

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +34,11 @@ class Baseline:
         if (sd < 0).any():
             raise ParamError("baseline.sd", sd.tolist(), "not negative")
         object.__setattr__(self, "sd", sd)
+
+    @property
+    def median_variance(self) -> float:
+        """Variance of the median over that of one sample: pi / (2 n) for normal noise."""
+        return math.pi / (2 * self.n)
 
 
 def fit_baseline(wrench_S: Array) -> Baseline:

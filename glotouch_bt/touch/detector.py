@@ -6,6 +6,7 @@ opposes the motion AND the total force (or the moment) above their thresholds fo
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -80,7 +81,7 @@ class ContactGuard:
         self._R_P_E = pose_E_P.rotation.T
         self._low_pass = LowPass(6, params.cutoff_Hz, params.rate_Hz)
         self._gain = self._fusion.gain
-        self._sigmas = params.sigmas * self._low_pass.noise_gain
+        self._sigmas = params.sigmas * math.sqrt(self._low_pass.noise_gain**2 + baseline.median_variance)
         self._R_B_S: Array = np.eye(3)
         self._history: deque[tuple[Observation, Array]] = deque(maxlen=HISTORY_BLOCKS)
         self._approach_B: Array | None = None

@@ -13,13 +13,14 @@ class GuardParams:
     """Thresholds of the contact guard and of the hard stop.
 
     Attributes:
-        directional_N: Tip force against the motion that counts as touch. Source: 0.10-0.15 N is the usable range
-            measured with fused force and torque; free motion at 0.3 m/s2 stays below 0.08 N.
+        directional_N: Tip force against the motion that counts as touch. Source: three times what free motion at
+            0.5 m/s2 leaves with its inertia taken out (0.05 N in simulation); see `bench detection`.
         total_N: Norm of the tip force that must go with it. Source: as above.
         moment_Nm: Moment at the sensor that may stand in for the total force: `total_N` on a 0.34 m lever.
         consecutive: Samples in a row. Source: 3 at 1 kHz, one tenth of the filter's rise time: outliers only.
         sigmas: No threshold is ever below this many standard deviations of the filtered estimate in its direction, so
-            that a noisy sensor does not trip by itself (5.5: one false alarm in hours).
+            that a noisy sensor does not trip by itself. Source: `bench detection`, harsh, downward moves: 5.5 gives a
+            false alarm in minutes to an hour (drift and a wrong latency add to the noise), 6.5 one in hours.
         cutoff_Hz, rate_Hz: Low-pass and sampling rate. Source: 15-60 Hz change the result by < 0.2 mm.
         latency_s: Age of a wrench sample when it arrives. Source: the wrist sensor's declared latency.
         hard_force_N, hard_torque_Nm: Absolute limits of the tared wrench. Source: `robot.Limits`.
@@ -31,7 +32,7 @@ class GuardParams:
     total_N: float = 0.15
     moment_Nm: float = 0.05
     consecutive: int = 3
-    sigmas: float = 5.5
+    sigmas: float = 6.5
     cutoff_Hz: float = 30.0
     rate_Hz: float = 1000.0
     latency_s: float = 0.003
