@@ -7,6 +7,7 @@ from functools import lru_cache
 from types import MappingProxyType
 
 from glotouch_bt.robot import UnknownName
+from glotouch_bt.search.descent import RandomDescent
 from glotouch_bt.search.expectation import ExpectedFind
 from glotouch_bt.search.frontier import PAPER_PASSES, NearestFrontier
 from glotouch_bt.search.policy import SearchPolicy
@@ -15,6 +16,7 @@ POLICIES: MappingProxyType[str, Callable[[], SearchPolicy]] = MappingProxyType(
     {
         "expected_find": ExpectedFind,
         "nearest_frontier": lambda: NearestFrontier(passes=PAPER_PASSES, turn_m=0.0),
+        "random_descent": RandomDescent,
     }
 )
 """expected_find: ours (the default). nearest_frontier, random_descent: the paper's, as baselines."""

@@ -13,7 +13,7 @@ from glotouch_bt.robot.streams import stream
 from glotouch_bt.study.planar.section import felt_section
 from glotouch_bt.study.planar.world import ContactModel, PlanarWorld
 
-CORNER_GAP_M = 0.014
+CORNER_GAP_M = 0.018
 """The ball hangs this far from both walls of the corner nearest to the holder, where it has felt the floor."""
 
 
