@@ -147,6 +147,7 @@ def _run(
     folder.write_json("result.json", result)
     if referee is not None:
         truth = {"start": _truth(objects_at_start), "end": _truth(referee.objects())}
+        truth["tip_B_m"] = referee.tip_B_m().tolist()
         folder.write_json("truth.json", truth)
     report, warning = _report(folder.path)
     return RunResult(folder.path, result, outcome, report, warning)

@@ -74,11 +74,20 @@ def polygon_support(vertices_m: Array, direction: Array) -> float:
     return float(np.max(np.asarray(vertices_m, dtype=np.float64) @ direction))
 
 
-def contact_direction(approach: Array, reaction: Array | None) -> Array:
-    """Object-facing unit direction (2,): d = (u - r) / |u - r| from approach u and reaction r (eq. contact_direction).
+APPROACH_WEIGHT = 0.1
+"""Weight of the approach against the reaction's 1 in the combined direction. The paper adds them equally, for probes
+that are aimed at the surface. Traced outlines are met at up to 70 degrees from their normal (40 rms), while friction
+keeps the reaction within 12 degrees of it (polished ball): inverse variances are as 0.1 to 1."""
+SIDEWAYS = 0.2
+"""A reaction that pushes along the motion by more than this share is no evidence about a surface ahead; a graze, whose
+reaction is at right angles, is."""
 
-    `reaction=None` is the radial trace probe: d = u. A reaction that does not oppose the approach (u.r >= 0) is no
-    evidence about a surface ahead and is left out too: a verified directional consistency is what the paper asks for.
+
+def contact_direction(approach: Array, reaction: Array | None, approach_weight: float = APPROACH_WEIGHT) -> Array:
+    """Object-facing unit direction (2,): d along w u - r, approach u, reaction r (eq. contact_direction: w = 1).
+
+    `reaction=None` is the radial trace probe: d = u. A reaction that pushes along the motion is left out too: a
+    verified directional consistency is what the paper asks for.
 
     Raises:
         ParamError: The approach has no planar length.
@@ -92,9 +101,9 @@ def contact_direction(approach: Array, reaction: Array | None) -> Array:
         return u
     r = np.asarray(reaction, dtype=np.float64)
     length = float(np.linalg.norm(r))
-    if length < 1e-9 or float(u @ r) >= 0.0:
+    if length < 1e-9 or float(u @ r) > SIDEWAYS * length:
         return u
-    d = u - r / length
+    d = approach_weight * u - r / length
     return np.asarray(d / np.linalg.norm(d))
 
 
