@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import ConvexHull
 from scipy.special import ndtr
 
 from glotouch_bt.robot import Array, ParamError
@@ -22,10 +23,10 @@ from glotouch_bt.touch.polygons import (
     polygon_distance,
     shrunk_convex,
 )
-from glotouch_bt.touch.primitives import APPROACH_SD_RAD, NORMAL_SD_RAD, Touches, circle, fit, rectangle, wrapped
+from glotouch_bt.touch.primitives import APPROACH_SD_RAD, NORMAL_SD_RAD, Touches, circle, fit, rounded, wrapped
 from glotouch_bt.touch.values import Contour, ContourFamily, ContourKind
 
-AMPLITUDES: tuple[float, ...] = (0.3, 1.0)
+AMPLITUDES: tuple[float, ...] = (0.3, 1.0, 2.0)
 """Deviations a circle is given (a rectangle: the first); scales of the spread over random objects."""
 MODES, MODE_LOSS = 3, 12.0
 """So many optima of the rectangle are kept, if their loss is within so much of the best one's."""
@@ -34,8 +35,10 @@ BOX_RATIO = 1.25
 wide; else like something round, from three directions."""
 BEARINGS = 72
 """Rays an outline is drawn with: 5 degrees apart, 3 mm on an object 60 mm wide."""
-FREE_BINS = 36
+FREE_BINS = 18
 """Of free places, the nearest to the middle in each of so many sectors forbids the others too."""
+TEMPER = 0.5
+"""Power of the evidence: every hypothesis takes its misfit for independent from contact to contact, which it is not."""
 DULL_WEIGHT = 1e-3
 """Hypotheses of less weight are dropped."""
 
@@ -142,7 +145,7 @@ class OutlineBelief:
     @cached_property
     def log_evidence(self) -> float:
         """Log density of the contacts, averaged over families; for comparing ways to group the same contacts."""
-        return self.hypotheses[0].log_evidence - math.log(self.weights[0])
+        return self.hypotheses[0].log_evidence - math.log(self.weights[0]) / TEMPER
 
     @cached_property
     def family(self) -> ContourFamily:
@@ -216,7 +219,7 @@ class OutlineBelief:
         """
         mean, sd, weights = self._components(self.centre_K_m, bearing_rad)
         middle = weights @ mean
-        return middle, np.sqrt(weights @ (sd**2 + (mean - middle) ** 2))
+        return middle, np.asarray(np.sqrt(weights @ (sd**2 + (mean - middle) ** 2)))
 
     def offset_path_K_m(self, n: int = BEARINGS, *, sds: float = 0.0) -> Array:
         """(n + 1, 2) closed polyline of the predicted offset outline, `sds` standard deviations further out."""
@@ -250,7 +253,7 @@ class OutlineBelief:
         for h in self.hypotheses:
             mean, rows = h.polar(origin, np.asarray(bearing, dtype=np.float64))
             means.append(mean)
-            sds.append(np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", rows, h.covariance, rows), 0.0)))
+            sds.append(h.sd(rows))
         return np.array(means), np.array(sds), self.weights
 
     @cached_property
@@ -265,10 +268,7 @@ class OutlineBelief:
             origin, u = h.corrected[:2], _unit(_grid())
             distance, rows = h.polar(origin, _grid())
             means.append(self._middle_of(origin + distance[:, None] * u))
-            # Area centroid of a polar curve: c = (2/3) sum r^3 u / sum r^2, so dc/dr = 2 (r^2 u - c r) / sum r^2.
-            centroid = (2 / 3) * (distance**3 @ u) / np.sum(distance**2)
-            slope = 2 * (distance[:, None] ** 2 * u - distance[:, None] * centroid) / np.sum(distance**2)
-            by = slope.T @ rows
+            by = _centroid_by_distance(distance, u) @ rows
             covariances.append(by @ h.covariance @ by.T)
         return np.array(means), np.array(covariances)
 
@@ -320,21 +320,21 @@ def _hypotheses(touches: Touches) -> tuple[tuple[Hypothesis, ...], Array]:
     found: list[Hypothesis] = []
     prior: list[float] = []
     rounds, _ = fit(circle, touches)
-    boxes, losses = fit(rectangle, touches)
+    boxes, losses = fit(rounded, touches)
     found.append(explain(circle, rounds[0], 0.0, touches))
     prior.append(1 / 3)
+    middle = explain(circle, rounds[0], AMPLITUDES[1], touches).corrected
     for amplitude in AMPLITUDES:
-        first = explain(circle, rounds[0], amplitude, touches)
-        found.append(explain(circle, first.corrected, amplitude, touches))
-        prior.append(1 / 9)
+        found.append(explain(circle, middle, amplitude, touches))
+        prior.append(1 / 15)
     modes = _distinct(boxes[losses < losses[0] + MODE_LOSS])
     for i, params in enumerate(modes):
-        found.append(explain(rectangle, params, 0.0, touches))
+        found.append(explain(rounded, params, 0.0, touches))
         prior.append(1 / 3)
-        if i == 0:
-            found.append(explain(rectangle, params, AMPLITUDES[0], touches))
-            prior.append(1 / 9)
-    score = np.array([h.log_evidence for h in found]) + np.log(prior)
+        for amplitude in AMPLITUDES[:2] if i == 0 else ():
+            found.append(explain(rounded, params, amplitude, touches))
+            prior.append(1 / 15)
+    score = TEMPER * np.array([h.log_evidence for h in found]) + np.log(prior)
     weights = np.exp(score - score.max())
     weights /= weights.sum()
     order = [int(i) for i in np.argsort(-weights, kind="stable") if weights[i] > DULL_WEIGHT]
@@ -343,18 +343,18 @@ def _hypotheses(touches: Touches) -> tuple[tuple[Hypothesis, ...], Array]:
 
 
 def _distinct(boxes: Array) -> list[Array]:
-    """The first of boxes (s, 5) that are not each other's likes (a quarter turn with the sides swapped is the same)."""
+    """The first of boxes (s, 6) that are not each other's likes (a quarter turn with the sides swapped is the same)."""
     kept: list[Array] = []
     for p in boxes:
         turns = round(float(p[2]) / (0.5 * math.pi))
         a, b = (p[3], p[4]) if turns % 2 == 0 else (p[4], p[3])
-        like = np.array([p[0], p[1], (p[2] - turns * 0.5 * math.pi) * 0.03, a, b])
-        same = np.array([p[0], p[1], -like[2] if abs(like[2]) > 0.02 else like[2], b, a])
+        like = np.array([p[0], p[1], (p[2] - turns * 0.5 * math.pi) * 0.03, a, b, p[5]])
+        same = np.array([p[0], p[1], -like[2] if abs(like[2]) > 0.02 else like[2], b, a, p[5]])
         if all(min(np.abs(like - q).max(), np.abs(same - q).max()) > 0.002 for q in kept):
             kept.append(like)
         if len(kept) == MODES:
             break
-    return [np.array([q[0], q[1], q[2] / 0.03, q[3], q[4]]) for q in kept]
+    return [np.array([q[0], q[1], q[2] / 0.03, q[3], q[4], q[5]]) for q in kept]
 
 
 def _nearest_free(free: Array, touches: Touches) -> Array:
@@ -394,6 +394,29 @@ def _shrunk(offset_outline: Array, r: float) -> Array:
     inner = offset_outline - r * np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
     depth = -polygon_distance(offset_outline, inner)
     return np.asarray(inner[depth > 0.93 * r])
+
+
+def _centroid_by_distance(distance: Array, u: Array) -> Array:
+    """(2, n) derivative of the hull's area centroid by the distances (n,) of an outline along unit vectors u (n, 2).
+
+    Of A = sum v x v' / 2 and M = sum (v x v') (v + v') / 6 over the hull's corners v and the following ones v'.
+    """
+    by = np.zeros((2, len(distance)))
+    points = distance[:, None] * u
+    corners = ConvexHull(points).vertices
+    v, e = points[corners], u[corners]
+    after, before = np.roll(v, -1, axis=0), np.roll(v, 1, axis=0)
+    cross, into = _cross(v, after), _cross(before, v)
+    area = 0.5 * float(cross.sum())
+    centroid = (cross[:, None] * (v + after)).sum(axis=0) / (6 * area)
+    right, left = _cross(e, after), _cross(before, e)
+    moment = (right[:, None] * (v + after) + left[:, None] * (before + v) + (cross + into)[:, None] * e) / 6
+    by[:, corners] = ((moment - 0.5 * (right + left)[:, None] * centroid) / area).T
+    return by
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
 def _grid() -> Array:

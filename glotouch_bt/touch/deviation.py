@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glotouch_bt.robot import Array
-from glotouch_bt.touch.primitives import FREE_SD_M, LARGEST_M, SMALLEST_M, Shape, Touches, circle, prior, wrapped
+from glotouch_bt.touch.primitives import FREE_SD_M, SMALLEST_M, Shape, Touches, circle, clipped, prior, ray_m, wrapped
 
 CONTACT_SD_M = 0.00045
 """Scatter of a ball's centre at the onset, and what a plain primitive may leave of an object's outline."""
@@ -28,8 +28,8 @@ HARMONICS = np.arange(1, 11)
 COEFFICIENT_SD_M = np.where(HARMONICS == 1, 0.001, 0.018 / HARMONICS**1.8)
 """Spread of the coefficients of cos and sin about the best circle: power law through the root mean squares of 1500
 random offset outlines (rectangles, ellipses, convex polygons, unions of discs, lobed rings; ball of 6 mm)."""
-REST_SD_M = 0.0004
-"""What such outlines keep beyond the last harmonic, typically."""
+REST_SD_M = 0.0006
+"""What such outlines keep beyond the last harmonic, root mean square 0.7 mm."""
 MIN_COSINE = 0.35
 """A ray is taken to meet the outline no more obliquely than this: beyond, the linear picture says nothing."""
 
@@ -60,10 +60,12 @@ class Hypothesis:
     @property
     def corrected(self) -> Array:
         """(p,) posterior mean of the primitive's parameters; sizes within the physical limits."""
-        p = self.params + self.mean[: len(self.params)]
-        first = 2 if len(p) == 3 else 3
-        p[first:] = np.clip(p[first:], 0.5 * SMALLEST_M, 0.5 * LARGEST_M)
-        return p
+        return clipped((self.params + self.mean[: len(self.params)])[None])[0]
+
+    def sd(self, rows: Array) -> Array:
+        """(n,) standard deviation of the distances whose map (n, dim) `polar` gave, what no harmonic draws included."""
+        slant = np.linalg.norm(rows[:, :2], axis=1) * self.amplitude * REST_SD_M
+        return np.sqrt(np.maximum(np.sum((rows @ self.covariance) * rows, axis=1), 0.0) + slant**2)
 
     def polar(self, origin_m: Array, bearing_rad: Array) -> tuple[Array, Array]:
         """Mean (n,) and linear map (n, dim) of the distance from `origin_m` to the offset outline along bearings (n,).
@@ -72,12 +74,9 @@ class Hypothesis:
         """
         base = self.params if self.amplitude > 0 else self.corrected
         u = np.stack([np.cos(bearing_rad), np.sin(bearing_rad)], axis=1)
-        far = float(np.linalg.norm(base[:2] - origin_m)) + float(np.hypot(*base[-2:])) + self.radius_m + 0.01
-        rho = np.full(len(u), far)
-        for _ in range(6):  # the distance is convex along a ray: Newton from outside comes down without overshoot
-            g = self.shape(base[None], origin_m + rho[:, None] * u)
-            slope = -np.sum(g.by_params[0, :, :2] * u, axis=1)
-            rho = np.maximum(rho - (g.distance_m[0] - self.radius_m) / np.maximum(slope, MIN_COSINE), 1e-3)
+        rho = np.maximum(ray_m(base, self.radius_m, origin_m, u), 1e-3)
+        g = self.shape(base[None], origin_m + rho[:, None] * u)
+        slope = -np.sum(g.by_params[0, :, :2] * u, axis=1)
         rows = -g.by_params[0]
         if self.amplitude > 0:
             points = origin_m + rho[:, None] * u - base[:2]
@@ -94,8 +93,8 @@ def explain(shape: Shape, params: Array, amplitude: float, touches: Touches) -> 
     g = shape(params[None], points)
     rows, turn = g.by_params[0], g.normal_by_params[0, :k]
     before, sd = prior(shape, touches)
+    start = np.where(np.isfinite(sd), before - params, 0.0)
     sd = np.where(np.isfinite(sd), sd, math.sqrt(math.pi / 8))  # the density of a yaw anywhere in a quarter turn
-    start = np.where(np.isfinite(prior(shape, touches)[1]), before - params, 0.0)
     noise = CONTACT_SD_M
     if amplitude > 0:
         offset = points - params[:2]
@@ -110,7 +109,7 @@ def explain(shape: Shape, params: Array, amplitude: float, touches: Touches) -> 
             spread = np.minimum(spread, amplitude * COEFFICIENT_SD_M[2])
         sd = np.concatenate([sd, spread])
         start = np.concatenate([start, np.zeros(len(spread))])
-        noise = math.hypot(CONTACT_SD_M, min(amplitude, 1.0) * REST_SD_M)
+        noise = math.hypot(CONTACT_SD_M, amplitude * REST_SD_M)
     y = np.concatenate([r - g.distance_m[0, :k], wrapped(touches.normal_rad - g.normal_rad[0, :k])])
     h = np.concatenate([rows[:k], turn])
     inverse_sd = np.concatenate([np.full(k, 1.0 / noise), 1.0 / touches.normal_sd_rad])

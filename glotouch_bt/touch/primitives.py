@@ -16,14 +16,18 @@ from glotouch_bt.robot import Array
 
 SMALLEST_M, LARGEST_M = 0.015, 0.150
 """No outline is smaller or larger: what a 0-85 mm gripper and a hand-sized container hold, with a margin."""
-TYPICAL_M, SIZE_SD_M = 0.055, 0.022
+TYPICAL_M, SIZE_SD_M = 0.060, 0.028
 """Prior of every size (diameter, side): objects are 40-110 mm long, and less across."""
+CORNER_M, CORNER_SD_M = 0.002, 0.004
+"""Prior of a corner's radius."""
 PLACE_SD_M = 0.025
 """Prior of the centre about the place half a typical size behind the contacts."""
 SCALE_M = 0.001
 """Residual at which the loss turns from squared to linear: contact scatter plus how far real objects deviate."""
 NORMAL_SD_RAD, APPROACH_SD_RAD = 0.20, 0.60
 """Scatter of the true outward normal about the reaction, and, where no reaction is known, against the approach."""
+SIFT_STEP, SIFTED = 5, 6
+"""After so many steps only the best so many starts are followed."""
 FREE_SD_M = 0.001
 """How sharply a place where the ball has been forbids the outline."""
 
@@ -107,13 +111,66 @@ def rectangle(params: Array, points_m: Array) -> Geometry:
     return Geometry(distance, by, params[:, 2, None] + np.arctan2(gy, gx), turn)
 
 
+def rounded(params: Array, points_m: Array) -> Geometry:
+    """Rectangles with rounded corners (s, 6) = as `rectangle`, and the corners' radius; seen from points (k, 2).
+
+    What real things have for corners: on a chamfer or a nose a ball is not held against a sharp corner, which would
+    fix the end of a box that nothing has touched.
+    """
+    inner = params[:, :5].copy()
+    inner[:, 3:] -= params[:, 5:]
+    g = rectangle(inner, points_m)
+    # Along a face the radius cancels; on a corner's bisector it moves the outline by sqrt(2) - 1 of itself.
+    by_radius = -g.by_params[..., 3] - g.by_params[..., 4] - 1.0
+    turn = -g.normal_by_params[..., 3] - g.normal_by_params[..., 4]
+    return Geometry(
+        g.distance_m - params[:, 5:],
+        np.concatenate([g.by_params, by_radius[..., None]], axis=2),
+        g.normal_rad,
+        np.concatenate([g.normal_by_params, turn[..., None]], axis=2),
+    )
+
+
+def ray_m(params: Array, grown_m: float, origin_m: Array, unit: Array) -> Array:
+    """(n,) distance along unit vectors (n, 2) from a place inside to a primitive (p,) grown by `grown_m` all round.
+
+    From a place outside, where a ray may miss it, to where the ray passes nearest.
+    """
+    if len(params) == 3:
+        return _far_root(unit, origin_m - params[:2], params[2] + grown_m)
+    c, s = np.cos(params[2]), np.sin(params[2])
+    turn = np.array([[c, -s], [s, c]])
+    start, u = (origin_m - params[:2]) @ turn, unit @ turn
+    radius = params[5] if len(params) == 6 else 0.0
+    inner, outer = params[3:5] - radius, params[3:5] + grown_m
+    steep = np.where(np.abs(u) > 1e-9, u, 1e-9)
+    exits = (np.where(u < 0, -1.0, 1.0) * outer - start) / steep
+    side = np.argmin(exits, axis=1)
+    t = np.min(exits, axis=1)
+    place = start + t[:, None] * u
+    other = np.take_along_axis(place, 1 - side[:, None], axis=1)[:, 0]
+    rounded_off = np.abs(other) > inner[1 - side]
+    corner = np.where(place < 0, -1.0, 1.0) * inner
+    return np.asarray(np.where(rounded_off, _far_root(u, start - corner, radius + grown_m), t))
+
+
+def _far_root(unit: Array, offset: Array, radius: float) -> Array:
+    """(n,) where rays from `offset`, (2,) or (n, 2) from a circle's centre, leave the circle."""
+    along = np.sum(unit * offset, axis=1)
+    square = along**2 - np.sum(offset * offset, axis=-1) + radius**2
+    return np.asarray(-along + np.sqrt(np.maximum(square, 0.0)))
+
+
 def prior(shape: Shape, touches: Touches) -> tuple[Array, Array]:
     """Mean (p,) and sd (p,) of a shape's parameters before any contact; a yaw has none (inf)."""
     half, half_sd = 0.5 * TYPICAL_M, 0.5 * SIZE_SD_M
     middle = touches.likely_middle_m
     if shape is circle:
         return np.array([*middle, half]), np.array([PLACE_SD_M, PLACE_SD_M, half_sd])
-    return np.array([*middle, 0.0, half, half]), np.array([PLACE_SD_M, PLACE_SD_M, np.inf, half_sd, half_sd])
+    mean, sd = [*middle, 0.0, half, half], [PLACE_SD_M, PLACE_SD_M, np.inf, half_sd, half_sd]
+    if shape is rounded:
+        mean, sd = [*mean, CORNER_M], [*sd, CORNER_SD_M]
+    return np.array(mean), np.array(sd)
 
 
 def wrapped(angle_rad: Array) -> Array:
@@ -126,18 +183,25 @@ def fit(shape: Shape, touches: Touches, *, steps: int = 20) -> tuple[Array, Arra
 
     Levenberg-Marquardt by iterated reweighting, all starts at once.
     """
-    params = _clip(_circle_starts(touches) if shape is circle else _rectangle_starts(touches))
+    params = _circle_starts(touches) if shape is circle else _rectangle_starts(touches)
+    if shape is rounded:
+        params = np.concatenate([params, np.full((len(params), 1), CORNER_M)], axis=1)
+    params = clipped(params)
     mean, sd = prior(shape, touches)
     n, first = params.shape[1], 2 if shape is circle else 3
     points = np.concatenate([touches.tips_m, touches.free_m])
     damping = np.full(len(params), 1e-2)
     loss, gradient, hessian = _normal_equations(shape, params, points, touches, mean, sd)
-    for _ in range(steps):
+    idle = 0
+    for step in range(steps):
+        if step == SIFT_STEP and len(params) > SIFTED:
+            keep = np.argsort(loss, kind="stable")[:SIFTED]
+            params, damping, loss, gradient, hessian = (v[keep] for v in (params, damping, loss, gradient, hessian))
         damped = hessian + (damping[:, None] * np.einsum("sii->si", hessian) + 1e-9)[:, :, None] * np.eye(n)
         move = -np.linalg.solve(damped, gradient[..., None])[..., 0]
         move[:, :2] = np.clip(move[:, :2], -0.02, 0.02)
         move[:, 2:first] = np.clip(move[:, 2:first], -0.3, 0.3)
-        trial = _clip(params + move)
+        trial = clipped(params + move)
         trial_loss, trial_gradient, trial_hessian = _normal_equations(shape, trial, points, touches, mean, sd)
         better = trial_loss < loss
         gained = float(np.max(np.where(better, loss - trial_loss, 0.0)))
@@ -146,7 +210,8 @@ def fit(shape: Shape, touches: Touches, *, steps: int = 20) -> tuple[Array, Arra
         hessian = np.where(better[:, None, None], trial_hessian, hessian)
         loss = np.where(better, trial_loss, loss)
         damping = np.where(better, 0.3 * damping, 5.0 * damping)
-        if gained < 1e-4 and bool(np.all(better | (damping > 1e1))):
+        idle = idle + 1 if gained < 1e-3 else 0
+        if idle == 2:
             break
     order = np.argsort(loss, kind="stable")
     return params[order], loss[order]
@@ -177,10 +242,12 @@ def _normal_equations(
     return loss, gradient, np.swapaxes(weighted, 1, 2) @ j + np.diag(1.0 / sd**2)
 
 
-def _clip(params: Array) -> Array:
-    """Keep half sizes (every column after the pose) within the physical limits."""
-    first = 2 if params.shape[1] == 3 else 3
-    params[:, first:] = np.clip(params[:, first:], 0.5 * SMALLEST_M, 0.5 * LARGEST_M)
+def clipped(params: Array) -> Array:
+    """Parameters (s, p) with sizes and corners within the physical limits; in place."""
+    sizes = params[:, 2:3] if params.shape[1] == 3 else params[:, 3:5]
+    np.clip(sizes, 0.5 * SMALLEST_M, 0.5 * LARGEST_M, out=sizes)
+    if params.shape[1] == 6:
+        np.clip(params[:, 5], 0.0, 0.8 * sizes.min(axis=1), out=params[:, 5])
     return params
 
 
