@@ -60,12 +60,12 @@ class Hypothesis:
     @property
     def corrected(self) -> Array:
         """(p,) posterior mean of the primitive's parameters; sizes within the physical limits."""
-        return clipped((self.params + self.mean[: len(self.params)])[None])[0]
+        return np.asarray(clipped((self.params + self.mean[: len(self.params)])[None])[0])
 
     def sd(self, rows: Array) -> Array:
         """(n,) standard deviation of the distances whose map (n, dim) `polar` gave, what no harmonic draws included."""
         slant = np.linalg.norm(rows[:, :2], axis=1) * self.amplitude * REST_SD_M
-        return np.sqrt(np.maximum(np.sum((rows @ self.covariance) * rows, axis=1), 0.0) + slant**2)
+        return np.asarray(np.sqrt(np.maximum(np.sum((rows @ self.covariance) * rows, axis=1), 0.0) + slant**2))
 
     def polar(self, origin_m: Array, bearing_rad: Array) -> tuple[Array, Array]:
         """Mean (n,) and linear map (n, dim) of the distance from `origin_m` to the offset outline along bearings (n,).
