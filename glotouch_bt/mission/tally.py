@@ -109,12 +109,21 @@ class Tally:
         if kind == "contact":
             self.contacts += 1
         elif kind == "candidate":
-            self.candidates.append(_candidate(to_json(data.get("candidate", data))))
+            self._keep(_candidate(to_json(data.get("candidate", data))))
         elif kind == "ranking":
             self.ranking = to_json(data.get("ranking", data), summarise=True)
         elif kind == "tool":
             self.settle()
             self._probe_held = bool(data.get("held", False))
+
+    def _keep(self, candidate: Json) -> None:
+        """A candidate that comes again, measured better, replaces what was known of it."""
+        index = candidate.get("index") if isinstance(candidate, dict) else None
+        for i, known in enumerate(self.candidates):
+            if index is not None and isinstance(known, dict) and known.get("index") == index:
+                self.candidates[i] = candidate
+                return
+        self.candidates.append(candidate)
 
 
 def _candidate(data: Json) -> Json:

@@ -23,7 +23,7 @@ BallMoveKind = Literal["over", "lift", "back", "down", "pass"]
 
 over   up above everything, across, and no farther; the goal's height is not used.
 lift   straight up; unguarded.
-back   straight back from a contact just made in a pass; unguarded.
+back   straight back and up from a contact just made in a pass; unguarded.
 down   straight down; what opposes it stops it.
 pass   level, just above what is known; any touch stops it.
 """
@@ -76,11 +76,8 @@ class TopRule:
 
     Attributes:
         clearance_m: Passes go so far above what is known.
-        spacing_m: Between neighbouring tracks. A peak of no width between two of them hides as deep as the ball's
-            section there is.
-        inset_m: Tracks keep so far inside the outline.
-        rim_inset_m, rim_reach_m: Places of the rim, moved inwards by the inset (about the ball's radius, which reaches
-            out again), must be within the reach of a track; what is not gets a way out of its own (limbs of a figure).
+        inset_m: The way round keeps so far inside the outline; the ball reaches out again by about its radius.
+        reach_m: No place inside is farther from the passes. A peak between them hides as deep as the ball is round.
         onward_m: From where a pass met something, so much farther on it is touched from above.
         back_m: Way back from there before the ball is lifted.
         lift_m: First lift there; doubled for as long as the way on is still blocked.
@@ -90,10 +87,8 @@ class TopRule:
     """
 
     clearance_m: float = 0.0008
-    spacing_m: float = 0.028
-    inset_m: float = 0.012
-    rim_inset_m: float = 0.006
-    rim_reach_m: float = 0.010
+    inset_m: float = 0.008
+    reach_m: float = 0.014
     onward_m: float = 0.004
     back_m: float = 0.003
     lift_m: float = 0.004
@@ -102,51 +97,84 @@ class TopRule:
     most_touches: int = 20
 
     def __post_init__(self) -> None:
-        for name in ("clearance_m", "spacing_m", "onward_m", "back_m", "lift_m"):
+        for name in ("clearance_m", "reach_m", "onward_m", "back_m", "lift_m"):
             if not getattr(self, name) > 0.0:
                 raise ParamError(name, getattr(self, name), "positive")
 
 
-def tracks(points_K_m: Array, yaw_rad: float, rule: TopRule) -> Array:
-    """Waypoints (k, 2) of a zigzag over the hull of `points_K_m` (n, 2), its tracks along `yaw_rad`.
-
-    The tracks are evenly spread across, at most `spacing_m` apart; each is the hull's chord there less the inset. Then
-    the places of the rim that are out of reach are put in where they lengthen the way least, farthest first.
+def rounds(points_K_m: Array, centre_K_m: Array, rule: TopRule) -> Array:
+    """Waypoints (k, 2) of the passes: once round, `inset_m` inside of the hull of `points_K_m` (n, 2), and through
+    whatever that leaves out of reach within. Begins where the way round is nearest to `centre_K_m` (2,).
     """
     points = np.asarray(points_K_m, dtype=np.float64)[:, :2]
-    c, s = np.cos(yaw_rad), np.sin(yaw_rad)
-    turn = np.array([[c, -s], [s, c]])  # K <- track frame
-    local = points @ turn
-    low, high = local[:, 1].min(), local[:, 1].max()
-    inner = max(high - low - 2 * rule.inset_m, 0.0)
-    count = int(np.ceil(inner / rule.spacing_m - 1e-9)) + 1
-    across = np.linspace(-0.5, 0.5, count) * inner + 0.5 * (low + high) if count > 1 else np.array([0.5 * (low + high)])
-    hull = _hull(local)
-    way: list[Array] = []
-    for k, y in enumerate(across):
-        left, right = _chord(hull, float(y))
-        middle, half = 0.5 * (left + right), max(0.5 * (right - left) - rule.inset_m, 0.0)
-        ends = [np.array([middle - half, y]), np.array([middle + half, y])]
-        way += ends if k % 2 == 0 else ends[::-1]
-    return np.asarray(_with_rim(way, local, rule) @ turn.T)
-
-
-def _with_rim(way: list[Array], points: Array, rule: TopRule) -> Array:
-    """The way with detours to every place of the rim that it leaves out of reach."""
+    centre = np.asarray(centre_K_m, dtype=np.float64)[:2]
     inwards = points.mean(axis=0) - points
     far = np.linalg.norm(inwards, axis=1)
-    rim = points + inwards * np.minimum(rule.rim_inset_m / np.maximum(far, 1e-9), 1.0)[:, None]
-    for _ in range(len(rim)):
-        away = _distance(rim, np.array(way))
-        place = rim[int(np.argmax(away))]
-        if away.max() <= rule.rim_reach_m:
+    inset = points + inwards * np.minimum(rule.inset_m / np.maximum(far, 1e-9), 1.0)[:, None]
+    ring = _plain(_hull(inset), STRAIGHT_M)
+    edges = list(zip(ring, np.roll(ring, -1, axis=0), strict=True))
+    starts = np.array([_nearest(centre, a, b) for a, b in edges])
+    first = int(np.argmin(np.linalg.norm(starts - centre, axis=1)))
+    way = [starts[first], *np.roll(ring, -first - 1, axis=0), starts[first]]
+    return _with_all(way, centre, _inside(ring), rule)
+
+
+STRAIGHT_M, GRID_M = 0.0015, 0.004
+"""The way round leaves out corners flatter than the first; places inside are this far apart."""
+
+
+def _with_all(way: list[Array], centre: Array, places: Array, rule: TopRule) -> Array:
+    """The way with detours to every place (n, 2) that it leaves out of reach, farthest first, each where it lengthens
+    the way least. The ball comes from the centre."""
+    for _ in range(len(places)):
+        away = _distance(places, np.array([centre, *way]))
+        if away.max() <= rule.reach_m:
             break
-        after = [0.0, *(np.linalg.norm(b - a) for a, b in pairwise(way)), 0.0]
-        to = [float(np.linalg.norm(place - w)) for w in way]
-        longer = [(to[k - 1] if k else 0.0) + (to[k] if k < len(way) else 0.0) - after[k] for k in range(len(way) + 1)]
-        way = way[:]
+        place = places[int(np.argmax(away))]
+        step = [float(np.linalg.norm(b - a)) for a, b in pairwise([centre, *way])]
+        to = [float(np.linalg.norm(place - w)) for w in (centre, *way)]
+        longer = [to[k] + to[k + 1] - step[k] for k in range(len(way))] + [to[-1]]
         way.insert(int(np.argmin(longer)), place)
     return np.array(way)
+
+
+def _nearest(place: Array, a: Array, b: Array) -> Array:
+    """The point of the segment a-b next to a place; all (2,)."""
+    step = b - a
+    share = float(np.clip((place - a) @ step / max(float(step @ step), 1e-18), 0.0, 1.0))
+    return np.asarray(a + share * step)
+
+
+def _hull(points: Array) -> Array:
+    """Corners of the convex hull, anticlockwise; the two ends of points in a row."""
+    try:
+        return np.asarray(points[ConvexHull(points).vertices])
+    except (QhullError, ValueError):
+        along = np.linalg.svd(points - points.mean(axis=0))[2][0]
+        return np.asarray(points[[int(np.argmin(points @ along)), int(np.argmax(points @ along))]])
+
+
+def _plain(ring: Array, tolerance_m: float) -> Array:
+    """A convex ring (n, 2) without the corners that lie within a tolerance of the line past them, flattest first."""
+    while len(ring) > 3:
+        a, b = np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0)
+        chord = b - a
+        off = np.abs(chord[:, 0] * (ring - a)[:, 1] - chord[:, 1] * (ring - a)[:, 0])
+        off = off / np.maximum(np.linalg.norm(chord, axis=1), 1e-9)
+        if off.min() > tolerance_m:
+            break
+        ring = np.delete(ring, int(np.argmin(off)), axis=0)
+    return ring
+
+
+def _inside(ring: Array) -> Array:
+    """Places (n, 2) of a grid within a convex ring, anticlockwise."""
+    low, high = ring.min(axis=0), ring.max(axis=0)
+    x, y = (np.arange(low[i], high[i] + 1e-9, GRID_M) for i in range(2))
+    grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    edge = np.roll(ring, -1, axis=0) - ring
+    offset = grid[:, None] - ring
+    return np.asarray(grid[(edge[:, 0] * offset[..., 1] - edge[:, 1] * offset[..., 0] >= -1e-9).all(axis=1)])
 
 
 def _distance(points: Array, way: Array) -> Array:
@@ -155,28 +183,6 @@ def _distance(points: Array, way: Array) -> Array:
     square = np.maximum((step * step).sum(axis=1), 1e-18)
     share = np.clip(((points[:, None] - a) * step).sum(axis=2) / square, 0.0, 1.0)
     return np.asarray(np.linalg.norm(points[:, None] - a - share[..., None] * step, axis=2).min(axis=1))
-
-
-def _hull(points: Array) -> Array:
-    try:
-        return np.asarray(points[ConvexHull(points).vertices])
-    except (QhullError, ValueError):
-        return points
-
-
-def _chord(hull: Array, y: float) -> tuple[float, float]:
-    """Least and greatest x of a convex polygon (n, 2) on the line of height y."""
-    a, b = hull, np.roll(hull, -1, axis=0)
-    cuts = (a[:, 1] - y) * (b[:, 1] - y) <= 0
-    a, b = a[cuts], b[cuts]
-    if not len(a):
-        only = float(hull[int(np.argmin(np.abs(hull[:, 1] - y))), 0])
-        return only, only
-    rise = b[:, 1] - a[:, 1]
-    flat = np.abs(rise) < 1e-12
-    share = np.where(flat, 0.0, (y - a[:, 1]) / np.where(flat, 1.0, rise))
-    x = np.concatenate([a[:, 0] + share * (b[:, 0] - a[:, 0]), b[flat, 0]])
-    return float(x.min()), float(x.max())
 
 
 def top_plan(
@@ -201,8 +207,6 @@ def top_plan(
     else:
         return Top(None, 0, 0.0)
     way = np.asarray(way_K_m, dtype=np.float64)
-    if np.linalg.norm(way[-1] - search.xy) < np.linalg.norm(way[0] - search.xy):
-        way = way[::-1]
     done = 0
     for goal in way:
         done += yield from search.pass_to(goal)
@@ -222,6 +226,7 @@ class _Search:
     def __init__(self, rule: TopRule, lowest_m: float, ceiling_m: float) -> None:
         self.rule, self.lowest_m, self.ceiling_m = rule, lowest_m, ceiling_m
         self.tip: Array = np.zeros(3)
+        self.came_m = 0.0  # how far across by the last move
         self.best: Array | None = None
         self.touches = 0
 
@@ -236,8 +241,10 @@ class _Search:
         return float(self.best[2]) + self.rule.clearance_m
 
     def _go(self, kind: BallMoveKind, goal: Array) -> Generator[BallMove, Met, Met]:
+        before = self.tip
         met = yield BallMove(kind, np.asarray(goal, dtype=np.float64))
         self.tip = np.asarray(met.tip_K_m, dtype=np.float64)
+        self.came_m = float(np.linalg.norm((self.tip - before)[:2]))
         if met.touch_K_m is not None and (self.best is None or met.touch_K_m[2] > self.best[2]):
             self.best = np.asarray(met.touch_K_m, dtype=np.float64)
         return met
@@ -290,11 +297,13 @@ class _Search:
         level = float(self.tip[2])
         lift = rule.lift_m
         while True:
-            yield from self._go("back", np.array([*(self.xy - rule.back_m * heading), self.tip[2]]))
-            if self.tip[2] + lift >= self.ceiling_m - 1e-4:
+            up = float(self.tip[2]) + lift
+            off = self.xy - min(rule.back_m, self.came_m) * heading  # no farther than it is known to be free
+            if up >= self.ceiling_m - 1e-4:
+                yield from self._go("back", np.array([*off, self.tip[2]]))
                 yield from self.over(aim)
                 break
-            yield from self.lift(float(self.tip[2]) + lift)
+            yield from self._go("back", np.array([*off, up]))
             met = yield from self._go("pass", np.array([*aim, self.tip[2]]))
             if met.refused:
                 return False

@@ -7,12 +7,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from glotouch_bt.robot import Array
-from glotouch_bt.search._standin import OutlineBelief, believe_outline
 from glotouch_bt.search.moves import Felt, Move, Plan
 from glotouch_bt.touch import Contact, Contour
+from glotouch_bt.touch.belief import OutlineBelief, believe_outline
 
 BEARINGS = 72
 """Directions a next probe is chosen from."""
+NEAR_CONTACT_M = 0.004
+"""A place this near to a contact is no evidence of free space."""
 INSIDE_M = 0.004
 """A probe that came this near to the object's supposed middle has passed through: nothing is there."""
 
@@ -28,9 +30,16 @@ class TraceParams:
         centre_sd_m: Enough is known when the centre's standard deviation is below this ...
         radial_sd_m: ... and the outline's nowhere above this.
         least_contacts, most_contacts: Bounds whatever the covariance says.
-        step_rad: Farthest that one way round goes before the ball probes again.
+        step_m: Longest way round before the ball probes again.
+        back: How much a bearing counts that lies behind, against the way round so far.
         way_m: Travel that every probe costs beside the way to it (in and out).
         reach_sds: A probe goes so many standard deviations past the prediction.
+        own_m: A contact within this (and twice the deviation) of the prediction is the object's own; farther out the
+            evidence for one object or two decides.
+        other: Odds, before it is looked at, that a contact on the way round belongs to another object.
+        unmodelled_m: What no contact is near is not known better than this, whatever the families say that have been
+            thought of ...
+        near_m, far_m: ... fully so from the second of these distances on, not at all within the first.
         misses: So many probes may meet nothing, or be refused, one after another.
     """
 
@@ -41,9 +50,15 @@ class TraceParams:
     radial_sd_m: float = 0.0035
     least_contacts: int = 4
     most_contacts: int = 14
-    step_rad: float = np.deg2rad(100.0)
+    step_m: float = 0.045
+    back: float = 0.4
     way_m: float = 0.03
     reach_sds: float = 2.5
+    own_m: float = 0.010
+    other: float = 0.02
+    unmodelled_m: float = 0.006
+    near_m: float = 0.024
+    far_m: float = 0.042
     misses: int = 5
 
 
@@ -85,6 +100,7 @@ class _State:
         paths: Where it has been.
         strays: Contacts with something else.
         blocked: Bearings that were tried in vain, rad.
+        side: The way round so far: +1 counter-clockwise, 0 not chosen yet.
     """
 
     tip: Array
@@ -94,6 +110,7 @@ class _State:
     paths: list[Array] = field(default_factory=list)
     strays: list[Contact] = field(default_factory=list)
     blocked: list[float] = field(default_factory=list)
+    side: float = 0.0
 
     def present(self) -> tuple[Contact, ...]:
         """The contacts moved to where the object stands now: each by all pushes from its own on."""
@@ -104,9 +121,9 @@ class _State:
             for c, s in zip(self.raw, later, strict=True)
         )
 
-    def outline(self) -> OutlineBelief:
-        """What the contacts say."""
-        now = self.present()
+    def outline(self, more: tuple[Contact, ...] = (), *, alone: bool = False) -> OutlineBelief:
+        """What the contacts say, with some more, or those alone."""
+        now = more if alone else (*self.present(), *more)
         return believe_outline(
             np.array([self.place(c) for c in now]),
             self.radius if self.round else 0.0,
@@ -119,14 +136,33 @@ class _State:
         """(2,) what the outline is fitted to."""
         return contact.tip_K_m[:2] if self.round else contact.point_K_m
 
-    def ring(self, outline: OutlineBelief, bearings: Array) -> tuple[Array, Array]:
+    def ring(self, outline: OutlineBelief, bearings: Array, p: TraceParams) -> tuple[Array, Array]:
         """Distance from the outline's middle at which the reference point would touch, (n,) m, and its deviation."""
         distance, sd = outline.predict(bearings)
-        return distance + (0.0 if self.round else self.radius), sd
+        at = outline.centre_K_m + distance[:, None] * np.column_stack([np.cos(bearings), np.sin(bearings)])
+        known = np.array([self.place(c) for c in self.present()])
+        apart = np.linalg.norm(at[:, None] - known[None], axis=2).min(axis=1)
+        share = np.clip((apart - p.near_m) / (p.far_m - p.near_m), 0.0, 1.0)
+        return distance + (0.0 if self.round else self.radius), np.hypot(sd, share * p.unmodelled_m)
+
+    def belongs(self, outline: OutlineBelief, contact: Contact, p: TraceParams) -> bool:
+        """Whether a new contact is near to the prediction, or one object explains it with the others better than two."""
+        off = contact.tip_K_m[:2] - outline.centre_K_m
+        distance, sd = self.ring(outline, np.array([np.arctan2(off[1], off[0])]), p)
+        if float(np.hypot(off[0], off[1])) < float(distance[0]) + p.own_m + 2.0 * float(sd[0]):
+            return True
+        one = self.outline((contact,)).log_evidence - outline.log_evidence
+        two = self.outline((contact,), alone=True).log_evidence
+        return one > two + np.log(p.other)
 
     def free(self) -> Array:
-        """(n, 2) places the ball has been since the object was last pushed a millimetre or more."""
-        return np.concatenate(self.paths) if self.paths else np.zeros((0, 2))
+        """(n, 2) places the ball has been, but for those so near to a contact that a push or the ball's own scatter
+        could have put the object there."""
+        if not self.paths:
+            return np.zeros((0, 2))
+        path = np.concatenate(self.paths)
+        touched = np.array([c.tip_K_m[:2] for c in (*self.raw, *self.present())])
+        return path[np.linalg.norm(path[:, None] - touched[None], axis=2).min(axis=1) > NEAR_CONTACT_M]
 
     def felt(self, felt: Felt) -> None:
         """Take note of a move."""
@@ -159,12 +195,13 @@ def trace(
         if bearing is None:
             ended = "no side is left that can be reached"
             break
+        s.side = s.side or side
         found = yield from _probe_at(outline, s, p, bearing, side)
         if found is None:
             missed += 1
             s.blocked.append(bearing)
             ended = "" if missed <= p.misses else f"{missed} probes in a row met nothing"
-        elif outline.belongs(s.place(found)):
+        elif s.belongs(outline, found, p):
             missed = 0
             s.raw.append(found)
             yield from _retreat(s, p)
@@ -202,7 +239,7 @@ def _enough(outline: OutlineBelief, s: _State, p: TraceParams) -> str:
         return f"{n} contacts"
     if n < p.least_contacts:
         return ""
-    _, sd = outline.predict(_bearings())
+    _, sd = s.ring(outline, _bearings(), p)
     if np.max(outline.centre_sd_m) <= p.centre_sd_m and float(np.max(sd)) <= p.radial_sd_m:
         return "the outline is known"
     return ""
@@ -219,7 +256,7 @@ def _wrap(a: Array) -> Array:
 def _choose(outline: OutlineBelief, s: _State, p: TraceParams) -> tuple[float | None, float]:
     """The bearing with the most uncertainty for the way to it, and which way round (+1 counter-clockwise)."""
     bearings = _bearings()
-    distance, sd = s.ring(outline, bearings)
+    distance, sd = s.ring(outline, bearings, p)
     offset = s.tip - outline.centre_K_m
     here = float(np.arctan2(offset[1], offset[0]))
     best: tuple[float, float, float] | None = None
@@ -230,7 +267,9 @@ def _choose(outline: OutlineBelief, s: _State, p: TraceParams) -> tuple[float | 
         way = np.zeros(BEARINGS)
         way[order] = np.cumsum((distance + p.clearance_m)[order] * step)
         gain = sd / (way + p.way_m)
-        gain[turn > p.step_rad] = 0.0
+        gain[(way > p.step_m) | (turn > np.pi)] = 0.0
+        if side == -s.side:
+            gain *= p.back
         if s.blocked:
             near = np.min(np.abs(_wrap(bearings[:, None] - np.array(s.blocked)[None, :])), axis=1)
             gain[near < np.deg2rad(12.0)] = 0.0
@@ -249,7 +288,7 @@ def _probe_at(outline: OutlineBelief, s: _State, p: TraceParams, bearing: float,
             return None
         if felt.contact is not None:
             return felt.contact
-    distance, sd = (float(v[0]) for v in s.ring(outline, np.array([bearing])))
+    distance, sd = (float(v[0]) for v in s.ring(outline, np.array([bearing]), p))
     inner = max(distance - p.reach_sds * sd - 0.003, INSIDE_M)
     u = np.array([np.cos(bearing), np.sin(bearing)])
     felt = yield Move("probe", outline.centre_K_m + inner * u)
@@ -264,7 +303,7 @@ def _way_round(outline: OutlineBelief, s: _State, p: TraceParams, bearing: float
     turn = float(_wrap(np.array(side * (bearing - here))) % (2 * np.pi))
     n = max(int(np.ceil(turn / np.deg2rad(5.0))), 1)
     angles = here + side * np.linspace(0.0, turn, n + 1)[1:]
-    distance, sd = s.ring(outline, angles)
+    distance, sd = s.ring(outline, angles, p)
     ring = distance + p.clearance_m + np.minimum(p.margin_sds * sd, p.widest_margin_m)
     points = outline.centre_K_m + ring[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
     return _tight(s, points, outline, p)
@@ -287,6 +326,6 @@ def _tight(s: _State, points: Array, outline: OutlineBelief, p: TraceParams) -> 
 def _clear(s: _State, a: Array, b: Array, outline: OutlineBelief, p: TraceParams) -> bool:
     t = np.linspace(0.0, 1.0, 12)[1:-1, None]
     d = (1 - t) * a + t * b - outline.centre_K_m
-    distance, sd = s.ring(outline, np.arctan2(d[:, 1], d[:, 0]))
+    distance, sd = s.ring(outline, np.arctan2(d[:, 1], d[:, 0]), p)
     least = distance + 0.7 * p.clearance_m + 0.5 * np.minimum(p.margin_sds * sd, p.widest_margin_m)
     return bool(np.all(np.hypot(d[:, 0], d[:, 1]) >= least))
