@@ -24,6 +24,8 @@ from glotouch_bt.touch.primitives import FREE_SD_M, SMALLEST_M, Shape, Touches, 
 
 CONTACT_SD_M = 0.00045
 """Scatter of a ball's centre at the onset, and what a plain primitive may leave of an object's outline."""
+CORNER_CONTACT_SD_M = 0.0012
+"""The same beside a corner: a recess or a nose of a real thing looks like one, and would fix an end nobody touched."""
 HARMONICS = np.arange(1, 11)
 COEFFICIENT_SD_M = np.where(HARMONICS == 1, 0.001, 0.018 / HARMONICS**1.8)
 """Spread of the coefficients of cos and sin about the best circle: power law through the root mean squares of 1500
@@ -95,7 +97,9 @@ def explain(shape: Shape, params: Array, amplitude: float, touches: Touches) -> 
     before, sd = prior(shape, touches)
     start = np.where(np.isfinite(sd), before - params, 0.0)
     sd = np.where(np.isfinite(sd), sd, math.sqrt(math.pi / 8))  # the density of a yaw anywhere in a quarter turn
-    noise = CONTACT_SD_M
+    noise = np.full(k, CONTACT_SD_M)
+    if shape is not circle:  # the normal turns with the place beside a corner only
+        noise = np.where(np.any(g.normal_by_params[0, :k, :2] != 0.0, axis=1), CORNER_CONTACT_SD_M, noise)
     if amplitude > 0:
         offset = points - params[:2]
         rho = np.maximum(np.linalg.norm(offset, axis=1), 0.5 * SMALLEST_M)
@@ -109,10 +113,10 @@ def explain(shape: Shape, params: Array, amplitude: float, touches: Touches) -> 
             spread = np.minimum(spread, amplitude * COEFFICIENT_SD_M[2])
         sd = np.concatenate([sd, spread])
         start = np.concatenate([start, np.zeros(len(spread))])
-        noise = math.hypot(CONTACT_SD_M, amplitude * REST_SD_M)
+        noise = np.hypot(noise, amplitude * REST_SD_M)
     y = np.concatenate([r - g.distance_m[0, :k], wrapped(touches.normal_rad - g.normal_rad[0, :k])])
     h = np.concatenate([rows[:k], turn])
-    inverse_sd = np.concatenate([np.full(k, 1.0 / noise), 1.0 / touches.normal_sd_rad])
+    inverse_sd = np.concatenate([1.0 / noise, 1.0 / touches.normal_sd_rad])
     y, h = y * inverse_sd, h * inverse_sd[:, None]
     beyond, free_rows = (r - g.distance_m[0, k:]) / FREE_SD_M, rows[k:] / FREE_SD_M
     precision = np.diag(1.0 / sd**2) + h.T @ h
@@ -132,7 +136,7 @@ def explain(shape: Shape, params: Array, amplitude: float, touches: Touches) -> 
     covariance = np.linalg.inv(full)
     determinant = float(np.linalg.slogdet(full)[1]) + 2.0 * float(np.sum(np.log(sd)))
     fit = max(square - float(right @ mean), 0.0)
-    evidence = -0.5 * fit - 0.5 * determinant - k * math.log(noise)
+    evidence = -0.5 * fit - 0.5 * determinant - float(np.sum(np.log(noise)))
     outwards = np.stack([np.cos(g.normal_rad[0, :k]), np.sin(g.normal_rad[0, :k])], axis=1)
     evidence -= 10.0 * float(np.sum(np.sum(outwards * touches.approach, axis=1) > 0.3))
     residuals = g.distance_m[0, :k] - r + rows[:k] @ mean
