@@ -17,6 +17,8 @@ CLEAR_SIGMAS = 8.0
 """The signal must rise this high for walking back to be trusted."""
 SLOW_SAMPLES = 8
 """A rise that takes this many samples from the noise to the trip is a ramp, not an impact."""
+RAMP_SHARE = 0.6
+"""What leaves the noise at 4 sigma and passes 8 as a ramp has half its height at the beginning; more, and it is none."""
 
 
 def onset_index(signal_N: Array, trip: int, sd_N: float, quiet: int = 30) -> float:
@@ -47,8 +49,8 @@ def onset_index(signal_N: Array, trip: int, sd_N: float, quiet: int = 30) -> flo
     # A slow rise was under way before it left the noise: extend its line back to the level.
     t = np.arange(first, top + 1)
     slope, offset = np.polyfit(t, lifted[first : top + 1], 1)
-    if slope <= 0:
-        return max(first - 0.5, 0.0)
+    if slope <= 0 or slope * first + offset > RAMP_SHARE * (slope * top + offset):
+        return max(first - 0.5, 0.0)  # no ramp but a step that the filter took its time over
     return float(np.clip(-offset / slope, max(first - quiet, 0), first))
 
 

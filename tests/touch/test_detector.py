@@ -153,3 +153,19 @@ def test_bad_approach_is_refused():
     baseline = fit_baseline(np.zeros((5, 6)))
     with pytest.raises(ParamError, match="approach_B"):
         ContactGuard(baseline, np.zeros(3), TIP_P, POSE_E_P, GuardParams())
+
+
+@pytest.mark.parametrize("approach", ["along x", "down"])
+@pytest.mark.parametrize("force_N", [0.3, 0.6, 2.0])
+def test_a_sudden_force_is_dated_where_it_began(bench, approach, force_N):
+    """A step that then stays: the filter trips late on a small one, which must not make it look like a ramp."""
+    u = APPROACH[approach]
+    errors = []
+    for seed in range(60):
+        guard, noise = guard_for(bench, np.random.default_rng(seed), "nominal", u)
+        force = -u * np.where(np.arange(600) >= 300, force_N, 0.0)[:, None]
+        onset = next((o for o in map(guard, bench.blocks(force @ R_B_S, **noise)) if o is not None), None)
+        errors.append(onset.stamp_s - 0.3)
+    bound = 2.5e-3 if force_N > 0.5 or approach == "along x" else 9e-3
+    assert np.abs(np.median(errors)) < bound
+    assert np.percentile(np.abs(errors), 95) < 2 * bound

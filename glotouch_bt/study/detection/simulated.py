@@ -22,7 +22,7 @@ from skills.held_tool import HeldTool
 from skills.probing import Probed, Prober
 from skills.tool_pickup import ToolPickup
 
-WORLD, CORNER_K = "container_five", (0.12, 0.13, 0.0)
+WORLD, CORNER_K = "container_five", (0.075, 0.13, 0.0)
 """One object of the world, out of the way, in a corner of the container."""
 LOW_M, HIGH_M = 0.03, 0.12
 """Heights of the ball above the floor in free motion."""
@@ -171,12 +171,12 @@ def push_once(rig: Rig, force_N: float, kind: str, grows_s: float) -> PushTrial:
             rig.go(rig.prober.hop(start, HIGH_M, 0.10))
             move = rig.prober.move(start + 0.05 * way, 0.04)
             rig.go(rig.prober.rest())
-            begins = rig.context.observation.now_s + float(rig.rng.uniform(0.3, 0.7))
+            begins = rig.context.observation.now_s + round(float(rig.rng.uniform(0.3, 0.7)), 2)
             against_B = -(rig.world.container.pose_B_K.rotation @ way)
 
             def push(observation: Observation, begins: float = begins, against_B: Array = against_B) -> None:
-                share = float(np.clip((observation.now_s + rig.robot.period_s - begins) / grows_s, 0.0, 1.0))
-                rig.referee.push_tip(force_N * share * against_B)
+                share = float(np.clip((observation.now_s - begins + 0.002) / grows_s, 0.0, 1.0))
+                rig.referee.push_tip(force_N * share * against_B)  # for the coming period
 
             probed: Probed = rig.go(move, push)
         except MotionRefused:
