@@ -8,7 +8,7 @@ import numpy as np
 
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Array, MotionRefused
-from glotouch_bt.search.top import BallMove, Met, Top, TopPlan, TopRule, top_plan, tracks
+from glotouch_bt.search.top import BallMove, Met, Top, TopPlan, TopRule, rounds, top_plan
 from glotouch_bt.touch import Candidate, GuardParams
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.held_tool import HeldTool
@@ -25,8 +25,8 @@ class TouchTopParams(SkillParams):
     pass_speed_m_s: float = param("Speed of the passes above it", unit="m/s", default=0.03, gt=0.0, le=0.06)
     travel_speed_m_s: float = param("Speed above all objects", unit="m/s", default=0.10, gt=0.0, le=0.15)
     clearance_m: float = param("Passes go so far above what is known", unit="m", default=0.0008, ge=0.0003, le=0.01)
-    spacing_m: float = param("Widest gap between neighbouring passes", unit="m", default=0.028, ge=0.004, le=0.05)
-    inset_m: float = param("Passes keep so far inside the outline", unit="m", default=0.012, ge=0.0, le=0.03)
+    inset_m: float = param("Passes keep so far inside the outline", unit="m", default=0.008, ge=0.0, le=0.03)
+    reach_m: float = param("No place is farther from the passes", unit="m", default=0.012, ge=0.003, le=0.05)
     headroom_m: float = param("Ball's height above the floor when crossing an object", unit="m", default=0.13,
                               ge=0.02, le=0.2)  # fmt: skip
 
@@ -65,13 +65,12 @@ class TouchTop(Skill):
 
     def _plan(self, candidate: Candidate, touched_m: float) -> TopPlan:
         p, tool = self.params, self.tool
-        rule = TopRule(clearance_m=p.clearance_m, spacing_m=p.spacing_m, inset_m=p.inset_m)
+        rule = TopRule(clearance_m=p.clearance_m, inset_m=p.inset_m, reach_m=p.reach_m)
         points = np.array([c.point_K_m for c in candidate.contacts])
-        yaw = candidate.contour.yaw_rad if candidate.contour.kind == "box" else longest(points)
         floor = tool.floor_z_K_m
         return top_plan(
             candidate.contour.centre_K_m,
-            tracks(points, yaw, rule),
+            rounds(points, candidate.contour.centre_K_m, rule),
             self._rim(candidate, points),
             floor + touched_m + tool.tip_radius_m,
             floor + p.headroom_m,
@@ -118,10 +117,3 @@ class TouchTop(Skill):
             self.event("note", text=f"a pass above candidate {self.candidate.index} was left out: {refusal}")
             return Met(prober.tip_K_m, refused=True)
         return Met(prober.tip_K_m)
-
-
-def longest(points_K_m: Array) -> float:
-    """Direction (rad) across which points (n, 2) are narrowest."""
-    yaws = np.linspace(0.0, np.pi, 60, endpoint=False)
-    across = points_K_m @ np.stack([-np.sin(yaws), np.cos(yaws)])
-    return float(yaws[np.argmin(np.ptp(across, axis=0))])
