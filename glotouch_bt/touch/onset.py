@@ -18,7 +18,7 @@ CLEAR_SIGMAS = 8.0
 SLOW_SAMPLES = 8
 """A rise that takes this many samples from the noise to the trip is a ramp, not an impact."""
 RAMP_SHARE = 0.6
-"""What leaves the noise at 4 sigma and passes 8 as a ramp has half its height at the beginning; more, and it is none."""
+"""What leaves the noise at 4 sigma and passes 8 as a ramp begins at half its height; more, and it is a step."""
 
 
 def onset_index(signal_N: Array, trip: int, sd_N: float, quiet: int = 30) -> float:

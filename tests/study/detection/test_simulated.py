@@ -25,7 +25,7 @@ def test_a_small_study_writes_its_folder(tmp_path):
     assert simulated["false_contacts_per_hour"]["hours"] >= 0.25 / 60
     assert simulated["found_0.6N"]["rate"] == 1.0
     assert simulated["found_0.6N"]["n"] == 4
-    rows = list(csv.DictReader((study.out / "trials.csv").open()))
+    rows = list(csv.DictReader((study.out / "trials.csv").read_text().splitlines()))
     assert {r["part"] for r in rows} == {"free", "pushed", "false_alarms", "uncompensated", "found"}
     assert (study.out / "detection.png").read_bytes().startswith(b"\x89PNG")
     assert lines
