@@ -185,3 +185,23 @@ def test_closed_and_registered(open_robot: Open) -> None:
     robot.close()
     with pytest.raises(BackendError, match="closed"):
         robot.cycle(HOLD)
+
+
+def test_fixed_objects_do_not_move(world: World) -> None:
+    """20 N push a free block along, a bolted one not at all."""
+    with pytest.raises(ParamError, match="fixed"):
+        MujocoBackend().open(world, Conditions(), 0, {"fixed": "perhaps"})
+    moved = {}
+    for fixed in ("true", "false"):
+        robot = MujocoBackend().open(world, Conditions(), 0, {"layout": {"block": (0.03, 0.08, 0.0)}, "fixed": fixed})
+        assert isinstance(robot, MujocoRobot)
+        body = robot.handles.object_bodies[0]
+        assert bool(robot.model.body_dofnum[body]) is (fixed == "false")
+        before = robot.data.xpos[body].copy()
+        robot.data.xfrc_applied[body, 0] = 20.0
+        for _ in range(20):
+            robot.cycle(HOLD)
+        moved[fixed] = float(np.linalg.norm(robot.data.xpos[body] - before))
+        robot.close()
+    assert moved["true"] == 0.0
+    assert moved["false"] > 0.01
