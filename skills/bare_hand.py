@@ -7,9 +7,12 @@ import numpy as np
 from glotouch_bt.robot import Array, Gripper, Pose, SetPayload, Tare
 from glotouch_bt.touch.localisation import Polygon
 from skills.base import Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from skills.corner import corner_place
 from skills.hand import easy_yaw
 from skills.held_tool import HeldTool
 from skills.requests import finish
+
+TRAVEL_M_S = 0.1
 
 
 class BareHandParams(SkillParams):
@@ -17,15 +20,19 @@ class BareHandParams(SkillParams):
 
     aperture_m: float = param("Opening of the jaws while touching", unit="m", default=0.0, ge=0.0, le=0.085)
     yaw_deg: float = param("Direction of the fingers' width in B", unit="deg", default=0.0, ge=-180.0, le=180.0)
+    corner_gap_m: float = param(
+        "The hand is brought over the corner by the holder, so far from both walls, where it can be lowered",
+        unit="m", default=0.026, ge=0.02, le=0.05,
+    )  # fmt: skip
 
 
 class BareHand(Skill):
-    """Close the empty jaws, turn to the yaw that is kept while touching, and zero the wrist sensor.
+    """Close the empty jaws, go over an empty corner, turn to the yaw kept while touching, zero the wrist sensor.
 
     SUCCESS: `tool` is the hand: it touches with the outline of its fingers.
     FAILURE `probe_held`: the probe is in the jaws.
     FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
-    FAILURE `motion_refused`: the hand cannot be turned here.
+    FAILURE `motion_refused`: the hand cannot be turned there.
     """
 
     Params = BareHandParams
@@ -40,7 +47,9 @@ class BareHand(Skill):
         state = yield from arm.jaws(self.params.aperture_m)
         here = arm.pose_B_P
         yaw = easy_yaw(arm, np.deg2rad(self.params.yaw_deg))
-        yield from arm.line(Pose.pointing_down(here.position_m, yaw), 0.1)
+        container = self.context.world.container.pose_B_K
+        over = container.apply(np.array([*corner_place(self.context.world, self.params.corner_gap_m), 0.0]))
+        yield from arm.line(Pose.pointing_down((*over[:2], here.position_m[2]), yaw), TRAVEL_M_S)
         yield from finish(self.context.requests.start(SetPayload(0.0, np.zeros(3))), "payload")
         yield from arm.hold(0.2)
         yield from finish(self.context.requests.start(Tare()), "tare")
