@@ -22,11 +22,13 @@ class TouchTopParams(SkillParams):
     """Parameters of `touch_top`."""
 
     down_speed_m_s: float = param("Speed down onto the top", unit="m/s", default=0.02, gt=0.0, le=0.06)
-    pass_speed_m_s: float = param("Speed of the passes above it", unit="m/s", default=0.03, gt=0.0, le=0.06)
+    pass_speed_m_s: float = param("Speed of the passes above it", unit="m/s", default=0.04, gt=0.0, le=0.06)
+    feel_speed_m_s: float = param("Speed of those that are likely to meet something", unit="m/s", default=0.02, gt=0.0,
+                                  le=0.06)  # fmt: skip
     travel_speed_m_s: float = param("Speed above all objects", unit="m/s", default=0.10, gt=0.0, le=0.15)
     clearance_m: float = param("Passes go so far above what is known", unit="m", default=0.0008, ge=0.0003, le=0.01)
-    inset_m: float = param("Passes keep so far inside the outline", unit="m", default=0.008, ge=0.0, le=0.03)
-    reach_m: float = param("No place is farther from the passes", unit="m", default=0.012, ge=0.003, le=0.05)
+    inset_m: float = param("Passes keep so far inside the outline", unit="m", default=0.010, ge=0.0, le=0.03)
+    reach_m: float = param("No place is farther from the passes", unit="m", default=0.014, ge=0.003, le=0.05)
     headroom_m: float = param("Ball's height above the floor when crossing an object", unit="m", default=0.13,
                               ge=0.02, le=0.2)  # fmt: skip
 
@@ -106,13 +108,13 @@ class TouchTop(Skill):
                 if length > 1e-4:
                     yield from prober.retreat(way / length, length, p.travel_speed_m_s)
             else:
-                speed = p.down_speed_m_s if move.kind == "down" else p.pass_speed_m_s
-                probed = yield from prober.move(goal, speed, any_direction=move.kind == "pass")
+                speed = {"down": p.down_speed_m_s, "feel": p.feel_speed_m_s, "pass": p.pass_speed_m_s}[move.kind]
+                probed = yield from prober.move(goal, speed, any_direction=move.kind != "down")
                 if probed.contact is not None:
                     self.event("contact", contact=probed.contact)
                     return Met(prober.tip_K_m, probed.contact.tip_K_m)
         except MotionRefused as refusal:
-            if move.kind != "pass":
+            if move.kind not in ("pass", "feel"):
                 raise
             self.event("note", text=f"a pass above candidate {self.candidate.index} was left out: {refusal}")
             return Met(prober.tip_K_m, refused=True)

@@ -18,7 +18,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from glotouch_bt.robot import Array, ParamError
 
-BallMoveKind = Literal["over", "lift", "back", "down", "pass"]
+BallMoveKind = Literal["over", "lift", "back", "down", "pass", "feel"]
 """How the ball goes; speeds and guards are the driver's.
 
 over   up above everything, across, and no farther; the goal's height is not used.
@@ -26,6 +26,7 @@ lift   straight up; unguarded.
 back   straight back and up from a contact just made in a pass; unguarded.
 down   straight down; what opposes it stops it.
 pass   level, just above what is known; any touch stops it.
+feel   the same over a short way on which a touch is likely: slowly, since what is hit high up is easily pushed.
 """
 
 
@@ -80,18 +81,18 @@ class TopRule:
         reach_m: No place inside is farther from the passes. A peak between them hides as deep as the ball is round.
         onward_m: From where a pass met something, so much farther on it is touched from above.
         back_m: Way back from there before the ball is lifted.
-        lift_m: First lift there; doubled for as long as the way on is still blocked.
+        lift_m: First lift there; three times as much for as long as the way on is still blocked.
         near_m: Round the highest place the ball looks so far in four directions.
         climbs: Most rounds of that, each about the highest place by then.
         most_touches: The plan ends after so many touches from above.
     """
 
     clearance_m: float = 0.0008
-    inset_m: float = 0.008
+    inset_m: float = 0.010
     reach_m: float = 0.014
     onward_m: float = 0.004
     back_m: float = 0.003
-    lift_m: float = 0.004
+    lift_m: float = 0.006
     near_m: float = 0.004
     climbs: int = 3
     most_touches: int = 20
@@ -119,7 +120,7 @@ def rounds(points_K_m: Array, centre_K_m: Array, rule: TopRule) -> Array:
     return _with_all(way, centre, _inside(ring), rule)
 
 
-STRAIGHT_M, GRID_M = 0.0015, 0.004
+STRAIGHT_M, GRID_M = 0.003, 0.004
 """The way round leaves out corners flatter than the first; places inside are this far apart."""
 
 
@@ -216,6 +217,8 @@ def top_plan(
     return Top(search.best, search.touches, done / max(len(way), 1))
 
 
+LIFT_GROWTH = 3.0
+"""Every hit pushes the object, so few are better than a low last lift."""
 NEAR_M, FARTHEST_ONWARD_M = 0.012, 0.012
 """Stopped again within NEAR_M of the last touch, a pass is on a slope: it looks twice as far on, at most so far."""
 
@@ -304,12 +307,12 @@ class _Search:
                 yield from self.over(aim)
                 break
             yield from self._go("back", np.array([*off, up]))
-            met = yield from self._go("pass", np.array([*aim, self.tip[2]]))
+            met = yield from self._go("feel", np.array([*aim, self.tip[2]]))
             if met.refused:
                 return False
             if met.touch_K_m is None:
                 break
-            lift *= 2
+            lift *= LIFT_GROWTH
         known = float(self.best[2]) if self.best is not None else level
         yield from self.down(max(known, level))
         return True

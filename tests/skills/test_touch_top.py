@@ -43,7 +43,7 @@ def play(plan, height: Height) -> tuple[Top, list[BallMove]]:
         goal, touch = np.array(move.goal_K_m), None
         path = tip + np.linspace(0, 1, 400)[1:, None] * (goal - tip)
         low = height(path[:, :2]) - path[:, 2]
-        if move.kind in ("down", "pass"):
+        if move.kind in ("down", "pass", "feel"):
             if (low > 1e-9).any():
                 at = int(np.argmax(low > 1e-9))
                 touch = path[at - 1].copy() if at else tip.copy()  # the last place that is free
