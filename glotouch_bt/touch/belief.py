@@ -15,7 +15,7 @@ from scipy.spatial import ConvexHull
 from scipy.special import ndtr
 
 from glotouch_bt.robot import Array, ParamError
-from glotouch_bt.touch.deviation import CONTACT_SD_M, Hypothesis, explain
+from glotouch_bt.touch.deviation import Hypothesis, explain
 from glotouch_bt.touch.polygons import (
     area_and_centroid,
     convex_hull,
@@ -23,16 +23,28 @@ from glotouch_bt.touch.polygons import (
     polygon_distance,
     shrunk_convex,
 )
-from glotouch_bt.touch.primitives import APPROACH_SD_RAD, NORMAL_SD_RAD, Touches, circle, fit, rounded, wrapped
+from glotouch_bt.touch.primitives import (
+    APPROACH_SD_RAD,
+    CONTACT_SD_M,
+    NORMAL_SD_RAD,
+    Touches,
+    circle,
+    fit,
+    rounded,
+    wrapped,
+)
 from glotouch_bt.touch.values import Contour, ContourFamily, ContourKind
 
 AMPLITUDES: tuple[float, ...] = (0.3, 1.0, 2.0)
 """Deviations a circle is given (a rectangle: the first); scales of the spread over random objects."""
+LOOSENESS = ((1.0, 0.3), (2.2, 0.03))
+"""A plain circle or rectangle leaves the contacts' scatter, or so many times as much; each with its prior."""
 MODES, MODE_LOSS = 3, 12.0
 """So many optima of the rectangle are kept, if their loss is within so much of the best one's."""
-BOX_RATIO = 1.25
-"""A free outline is squeezed like a box, in three parallel tracks across its long side, if it is so much longer than
-wide; else like something round, from three directions."""
+BOX_RATIO, BOX_FILL, SLENDER_RATIO, WIDEST_M = 1.25, 0.8, 1.6, 0.080
+"""When a free outline is squeezed like a box, in three parallel tracks across its long side, instead of from three
+directions like something round: if it is BOX_RATIO longer than wide and its hull fills BOX_FILL of its rectangle (a
+figure fills less, an ellipse 0.79), or if it is slender, or too long for jaws that open 85 mm to close across."""
 BEARINGS = 72
 """Rays an outline is drawn with: 5 degrees apart, 3 mm on an object 60 mm wide."""
 FREE_BINS = 18
@@ -51,6 +63,7 @@ def believe_outline(
     reaction_K: Array | None = None,
     pushed_K_m: Array | None = None,
     free_K_m: Array | None = None,
+    contact_sd_m: float = CONTACT_SD_M,
 ) -> OutlineBelief:
     """The belief after k >= 1 contacts with one object.
 
@@ -61,6 +74,7 @@ def believe_outline(
         reaction_K: (k, 2) or (k, 3) directions of the force it felt; rows of zeros or NaN are not known.
         pushed_K_m: (k, 2) how far each contact shoved the object; all contacts are moved to where it stands now.
         free_K_m: (m, 2) places the ball's centre has been without touching the object as it stands now.
+        contact_sd_m: Scatter of a ball's centre at the onset.
 
     Raises:
         ParamError: No contact, wrong shapes, or values that are not finite.
@@ -80,10 +94,10 @@ def believe_outline(
     normal = np.where(felt[:, None], reaction, -approach)
     sd = np.where(felt, NORMAL_SD_RAD, np.where(seen, APPROACH_SD_RAD, np.inf))
     bearing = np.arctan2(normal[:, 1], normal[:, 0])
-    touches = Touches(tips, bearing, sd, approach, np.zeros((0, 2)), tip_radius_m)
+    touches = Touches(tips, bearing, sd, approach, np.zeros((0, 2)), tip_radius_m, contact_sd_m)
     if free_K_m is not None and len(free_K_m) > 0:
         free = _nearest_free(np.asarray(free_K_m, dtype=np.float64)[:, :2], touches)
-        touches = Touches(tips, bearing, sd, approach, free, tip_radius_m)
+        touches = Touches(tips, bearing, sd, approach, free, tip_radius_m, contact_sd_m)
     return OutlineBelief(*_hypotheses(touches), touches)
 
 
@@ -243,7 +257,7 @@ class OutlineBelief:
         or the object has moved."""
         off = np.asarray(tip_K_m, dtype=np.float64)[:2] - self.centre_K_m
         mean, sd, weights = self._components(self.centre_K_m, np.array([math.atan2(off[1], off[0])]))
-        spread = np.hypot(sd[:, 0], 1.5 * CONTACT_SD_M)
+        spread = np.hypot(sd[:, 0], 1.5 * self.touches.contact_sd_m)
         below = float(weights @ ndtr((float(np.linalg.norm(off)) - mean[:, 0]) / spread))
         return 2.0 * min(below, 1.0 - below)
 
@@ -288,14 +302,14 @@ class OutlineBelief:
         boundary = _shrunk(offset, self.touches.radius_m)
         if len(hull) < 3 or len(boundary) < 8:
             boundary = hull = convex_hull(offset)
-        centre = area_and_centroid(hull)[1]
+        area, centre = area_and_centroid(hull)
         _, size, yaw = minimum_rectangle(hull)
         means, covariances = self._middles
         off = means - centre
         covariance = np.einsum("h,hij->ij", weights, covariances + off[:, :, None] * off[:, None, :])
         residuals = polygon_distance(offset, self.touches.tips_m)
         rms = float(np.sqrt(np.mean(residuals**2)))
-        kind: ContourKind = "box" if size[0] > BOX_RATIO * size[1] else "round"
+        kind: ContourKind = "box" if _boxlike(size, area) else "round"
         return Contour(kind, centre, size, yaw, rms, residuals, "free", covariance, boundary)
 
     def _samples(self, n: int) -> Array:
@@ -307,6 +321,12 @@ class OutlineBelief:
         draws = np.random.default_rng(0).normal(size=(n, len(root)))
         distance = np.maximum(mean + draws @ (rows @ root).T, 1e-3)
         return np.asarray(self.centre_K_m + distance[:, :, None] * _unit(bearing))
+
+
+def _boxlike(size: tuple[float, float], area: float) -> bool:
+    ratio = size[0] / size[1]
+    filled = ratio > BOX_RATIO and area > BOX_FILL * size[0] * size[1]
+    return filled or ratio > SLENDER_RATIO or (size[0] > WIDEST_M and ratio > 1.1)
 
 
 def _family(h: Hypothesis) -> ContourFamily:
@@ -321,16 +341,17 @@ def _hypotheses(touches: Touches) -> tuple[tuple[Hypothesis, ...], Array]:
     prior: list[float] = []
     rounds, _ = fit(circle, touches)
     boxes, losses = fit(rounded, touches)
-    found.append(explain(circle, rounds[0], 0.0, touches))
-    prior.append(1 / 3)
+    for looseness, chance in LOOSENESS:
+        found.append(explain(circle, rounds[0], 0.0, touches, looseness))
+        prior.append(chance)
     middle = explain(circle, rounds[0], AMPLITUDES[1], touches).corrected
     for amplitude in AMPLITUDES:
         found.append(explain(circle, middle, amplitude, touches))
         prior.append(1 / 15)
-    modes = _distinct(boxes[losses < losses[0] + MODE_LOSS])
-    for i, params in enumerate(modes):
-        found.append(explain(rounded, params, 0.0, touches))
-        prior.append(1 / 3)
+    for i, params in enumerate(_distinct(boxes[losses < losses[0] + MODE_LOSS])):
+        for looseness, chance in LOOSENESS if i == 0 else LOOSENESS[:1]:
+            found.append(explain(rounded, params, 0.0, touches, looseness))
+            prior.append(chance)
         for amplitude in AMPLITUDES[:2] if i == 0 else ():
             found.append(explain(rounded, params, amplitude, touches))
             prior.append(1 / 15)

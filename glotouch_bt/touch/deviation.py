@@ -4,7 +4,7 @@ The offset outline is the primitive's, displaced along its normal by g(bearing) 
 independent normal coefficients (a periodic Gaussian process in its weight space). Near the fitted primitive everything
 observed is linear in x = (parameters' correction, coefficients):
 
-    contact       distance + J dp - phi(t) w         = ball's radius, +- CONTACT_SD_M
+    contact       distance + J dp - phi(t) w         = ball's radius, +- its scatter
     reaction      normal + J_n dp - phi'(t) w / rho  = its bearing, +- its scatter
     free place    as a contact, one-sided: counted only while the outline would lie beyond it
 
@@ -22,10 +22,9 @@ import numpy as np
 from glotouch_bt.robot import Array
 from glotouch_bt.touch.primitives import FREE_SD_M, SMALLEST_M, Shape, Touches, circle, clipped, prior, ray_m, wrapped
 
-CONTACT_SD_M = 0.00045
-"""Scatter of a ball's centre at the onset, and what a plain primitive may leave of an object's outline."""
 CORNER_CONTACT_SD_M = 0.0012
-"""The same beside a corner: a recess or a nose of a real thing looks like one, and would fix an end nobody touched."""
+"""Least scatter of a contact beside a corner: a recess or a nose of a real thing looks like a corner, and would fix an
+end that nobody touched."""
 HARMONICS = np.arange(1, 11)
 COEFFICIENT_SD_M = np.where(HARMONICS == 1, 0.001, 0.018 / HARMONICS**1.8)
 """Spread of the coefficients of cos and sin about the best circle: power law through the root mean squares of 1500
@@ -88,8 +87,9 @@ class Hypothesis:
         return np.maximum(rho + shift, 1e-3), rows
 
 
-def explain(shape: Shape, params: Array, amplitude: float, touches: Touches) -> Hypothesis:
-    """The posterior about one fitted primitive (p,), with deviations of the given amplitude."""
+def explain(shape: Shape, params: Array, amplitude: float, touches: Touches, looseness: float = 1.0) -> Hypothesis:
+    """The posterior about one fitted primitive (p,), with deviations of the given amplitude; contacts scatter so many
+    times as much as they are said to."""
     k, r = len(touches.tips_m), touches.radius_m
     points = np.concatenate([touches.tips_m, touches.free_m])
     g = shape(params[None], points)
@@ -97,9 +97,11 @@ def explain(shape: Shape, params: Array, amplitude: float, touches: Touches) -> 
     before, sd = prior(shape, touches)
     start = np.where(np.isfinite(sd), before - params, 0.0)
     sd = np.where(np.isfinite(sd), sd, math.sqrt(math.pi / 8))  # the density of a yaw anywhere in a quarter turn
-    noise = np.full(k, CONTACT_SD_M)
+    noise = np.full(k, looseness * touches.contact_sd_m)
     if shape is not circle:  # the normal turns with the place beside a corner only
-        noise = np.where(np.any(g.normal_by_params[0, :k, :2] != 0.0, axis=1), CORNER_CONTACT_SD_M, noise)
+        noise = np.where(
+            np.any(g.normal_by_params[0, :k, :2] != 0.0, axis=1), np.maximum(noise, CORNER_CONTACT_SD_M), noise
+        )
     if amplitude > 0:
         offset = points - params[:2]
         rho = np.maximum(np.linalg.norm(offset, axis=1), 0.5 * SMALLEST_M)

@@ -24,6 +24,8 @@ PLACE_SD_M = 0.025
 """Prior of the centre about the place half a typical size behind the contacts."""
 SCALE_M = 0.001
 """Residual at which the loss turns from squared to linear: contact scatter plus how far real objects deviate."""
+CONTACT_SD_M = 0.00045
+"""Scatter of a contact unless it is given: of the onset, 0.2-0.4 mm, and of what is nearly a circle or a rectangle."""
 NORMAL_SD_RAD, APPROACH_SD_RAD = 0.20, 0.60
 """Scatter of the true outward normal about the reaction, and, where no reaction is known, against the approach."""
 SIFT_STEP, SIFTED = 5, 6
@@ -43,6 +45,7 @@ class Touches:
         approach: (k, 2) unit directions of approach, zeros where not known.
         free_m: (m, 2) places where the ball's centre was without touching; few, near the outline.
         radius_m: Radius of the ball.
+        contact_sd_m: Scatter of a ball's centre at the onset, and what a plain primitive may leave of an outline.
     """
 
     tips_m: Array
@@ -51,6 +54,7 @@ class Touches:
     approach: Array
     free_m: Array
     radius_m: float
+    contact_sd_m: float = CONTACT_SD_M
 
     @property
     def likely_middle_m(self) -> Array:

@@ -64,7 +64,7 @@ def trace(discs, rng, noise, tools, contacts=None):
     while True:
         t = np.array(tips)
         if len(t) >= 3:
-            contour = tools.fit_contour(t, TIP)
+            contour = tools.fit_contour(t, TIP, contact_sd_m=max(noise, 4.5e-4))
             centre = contour.centre_K_m
             if (contacts is None and not tools.needs_more(t, contour)) or len(t) == contacts:
                 return t, contour
