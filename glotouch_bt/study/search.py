@@ -14,13 +14,12 @@ from typing import Any
 from glotouch_bt.robot import BadInput
 from glotouch_bt.search import POLICIES
 from glotouch_bt.study.launch import RunRequest
+from glotouch_bt.study.planar.explore import BUDGET_M
 from glotouch_bt.study.search_plots import plot_discovered, plot_layout
 from glotouch_bt.study.search_scoring import discovered_at
 from glotouch_bt.study.search_summary import COMPLETE_AT_M, MEAN_AT_M, summarise
 from glotouch_bt.study.search_trial import mission_trial, planar_trials, scene, sections_of
 
-BUDGET_M = 8.0
-"""Planar explorations are broken off here; the mission goes on until it is done."""
 CHUNK = 25
 """Planar layouts a task."""
 COLUMNS = (
@@ -48,6 +47,7 @@ class Campaign:
         backend: Registered name of a simulation.
         out: Folder of the campaign; each mission's run folder goes below it.
         mission: Path or shipped name; it must take a parameter `policy`.
+        planar_budget_m: Planar explorations are broken off here; the mission goes on until it is done.
     """
 
     policies: tuple[str, ...]
@@ -58,6 +58,7 @@ class Campaign:
     backend: str
     out: Path
     mission: str = "survey"
+    planar_budget_m: float = BUDGET_M
 
     def __post_init__(self) -> None:
         unknown = [p for p in self.policies if p not in POLICIES]
@@ -105,7 +106,8 @@ def run_campaign(campaign: Campaign, executor: Executor, on_row: OnRow | None = 
     order = {p: i for i, p in enumerate(campaign.policies)}
     rows.sort(key=lambda r: (r["simulator"], order[r["policy"]], r["seed"]))
     _write_csv(campaign, rows, objects)
-    summary = _finite(summarise(rows, campaign.policies, objects)) | {
+    figures: dict[str, Any] = _finite(summarise(rows, campaign.policies, objects))
+    summary = figures | {
         "conditions": campaign.conditions,
         "seeds": list(campaign.seeds),
         "planar_seeds": _span(campaign.planar_seeds),
@@ -125,13 +127,14 @@ def run_campaign(campaign: Campaign, executor: Executor, on_row: OnRow | None = 
 def _run(campaign: Campaign, executor: Executor, on_row: OnRow | None) -> list[dict[str, Any]]:
     """Missions first, seeds outermost, so that a broken-off campaign has all policies on the same layouts."""
     plane = tuple(dict.fromkeys(campaign.seeds + campaign.planar_seeds))
+    budget = campaign.planar_budget_m
     futures: list[Future[Any]] = [
         executor.submit(mission_trial, campaign.request(policy, seed), policy)
         for seed in campaign.seeds
         for policy in campaign.policies
     ]
     futures += [
-        executor.submit(planar_trials, campaign.mission, campaign.objects, policy, plane[k : k + CHUNK], BUDGET_M)
+        executor.submit(planar_trials, campaign.mission, campaign.objects, policy, plane[k : k + CHUNK], budget)
         for k in range(0, len(plane), CHUNK)
         for policy in campaign.policies
     ]
