@@ -25,7 +25,7 @@ WALL = -1
 
 @dataclass(frozen=True, kw_only=True)
 class ContactModel:
-    """How a touch goes.
+    """How a touch goes. The defaults are what MuJoCo showed under nominal conditions.
 
     Attributes:
         localisation_sd_m: Scatter of where an onset is felt to be, each axis.
@@ -39,11 +39,11 @@ class ContactModel:
         touch_force_N: What is reported as the force.
     """
 
-    localisation_sd_m: float = 0.0002
+    localisation_sd_m: float = 0.0001
     overshoot_m: Mapping[MoveKind, float] = field(
-        default_factory=lambda: {"sweep": 0.0010, "step": 0.0012, "probe": 0.0008}
+        default_factory=lambda: {"sweep": 0.00095, "step": 0.00135, "probe": 0.00065}
     )
-    overshoot_spread: float = 0.3
+    overshoot_spread: float = 0.12
     friction: float = 0.2
     direction_sd_rad: float = np.deg2rad(3.0)
     pressure_radius: float = 0.5
