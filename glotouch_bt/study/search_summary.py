@@ -81,7 +81,7 @@ def validation(real: Sequence[Row], plane: Sequence[Row], objects: int) -> dict[
     """The planar stand-in against the physics on the layouts that both explored.
 
     `travel_to_complete` compares, layout by layout, where both completed; `discovered` the paired difference, planar
-    minus physics; `contact_gap_mm` how far the ball was from the true felt section at the physics' contacts.
+    minus physics; `contact_gap_mm` how far the ball was from the true felt section where the physics stopped a sweep.
     """
     by_seed = {r["seed"]: r for r in plane}
     pairs = [(r, by_seed[r["seed"]]) for r in real if r["seed"] in by_seed]
@@ -91,7 +91,7 @@ def validation(real: Sequence[Row], plane: Sequence[Row], objects: int) -> dict[
         if min(len(a["discovered_m"]), len(b["discovered_m"])) >= objects
     ]
     travel = np.array(both).reshape(-1, 2)
-    gaps = np.array([g for r in real for c in r.get("contact_gap_mm", ()) for g in c])
+    gaps = np.array([g for r in real for g in r.get("contact_gap_mm", ())])
     return {
         "layouts": len(pairs),
         "both_complete": len(both),

@@ -78,8 +78,9 @@ def scene(mission: str, objects: Path | None) -> tuple[World, Sequence[Mesh]]:
 
 
 def score_run(record: RunRecord, sections: dict[str, FeltSection]) -> dict[str, Any]:
-    """What a recorded run discovered at which travel, held against its truth; `contact_gap_mm` are, per candidate,
-    the distances of the ball from touching the true object at the contacts it was fitted to.
+    """What a recorded run discovered at which travel, held against its truth.
+
+    `contact_gap_mm` are the distances of the ball from touching the true felt section where the sweeps were stopped.
 
     Raises:
         BadInput: The record has no truth beside it.
@@ -96,7 +97,7 @@ def score_run(record: RunRecord, sections: dict[str, FeltSection]) -> dict[str, 
     found = [_found(way.travel_m(stamp), c, heights.get(i)) for i, (stamp, c) in sorted(first.items())]
     row = score(found, layout)
     row["contacts"] = sum(len(c["contacts"]) for _, c in first.values())
-    row["contact_gap_mm"] = _gaps([c for _, c in first.values()], layout)
+    row["contact_gap_mm"] = _gaps(record, layout)
     return row | {"travel_m": way.total_m, "before_m": way.before_m, "start_K_m": way.start_K_m}
 
 
@@ -117,15 +118,23 @@ def true_layout(truth: Any, pose_B_K: Pose, sections: dict[str, FeltSection]) ->
     return TrueLayout(tuple(sections[n] for n in names), planar(truth["start"]), planar(truth["end"]))
 
 
-def _gaps(candidates: Sequence[Any], layout: TrueLayout) -> list[list[float]]:
+def _gaps(record: RunRecord, layout: TrueLayout) -> list[float]:
+    """Distance, mm, of the ball from touching the nearest object at each side contact of a sweep.
+
+    Objects are where they stood at the beginning: a sweep's contact is the first with its object, but for the few that
+    were touched before and not traced.
+    """
     out = []
-    for c in candidates:
-        tips = np.array([contact["tip_K_m"][:2] for contact in c["contacts"]]).reshape(-1, 2)
-        centre = np.array(c["contour"]["centre_K_m"])
-        i = int(np.argmin(np.linalg.norm(layout.centres_K_m - centre, axis=1)))
-        x, y, yaw = layout.after[i]
-        local = (tips - (x, y)) @ np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-        out.append([round(1e3 * float(g), 4) for g in layout.sections[i].side(local)])
+    for e in record.of_kind("contact"):
+        contact = e.data["contact"]
+        if e.data.get("node") != SWEEP_NODE or abs(contact["approach_K"][2]) > 0.5:
+            continue
+        tip = np.array(contact["tip_K_m"][:2])
+        gaps = []
+        for section, (x, y, yaw) in zip(layout.sections, layout.before, strict=True):
+            c, s = np.cos(yaw), np.sin(yaw)
+            gaps.append(float(section.side((tip - (x, y))[None] @ np.array([[c, -s], [s, c]]))[0]))
+        out.append(round(1e3 * min(gaps, key=abs), 4))
     return out
 
 
