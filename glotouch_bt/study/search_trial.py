@@ -119,12 +119,11 @@ def true_layout(truth: Any, pose_B_K: Pose, sections: dict[str, FeltSection]) ->
 
 
 def _gaps(record: RunRecord, layout: TrueLayout) -> list[float]:
-    """Distance, mm, of the ball from touching the nearest object at each side contact of a sweep.
+    """Distance, mm, of the ball from touching the nearest object at the first side contact of a sweep with each.
 
-    Objects are where they stood at the beginning: a sweep's contact is the first with its object, but for the few that
-    were touched before and not traced.
+    Objects are where they stood at the beginning; later contacts find them pushed.
     """
-    out = []
+    out: dict[int, float] = {}
     for e in record.of_kind("contact"):
         contact = e.data["contact"]
         if e.data.get("node") != SWEEP_NODE or abs(contact["approach_K"][2]) > 0.5:
@@ -134,8 +133,9 @@ def _gaps(record: RunRecord, layout: TrueLayout) -> list[float]:
         for section, (x, y, yaw) in zip(layout.sections, layout.before, strict=True):
             c, s = np.cos(yaw), np.sin(yaw)
             gaps.append(float(section.side((tip - (x, y))[None] @ np.array([[c, -s], [s, c]]))[0]))
-        out.append(round(1e3 * min(gaps, key=abs), 4))
-    return out
+        nearest = int(np.argmin(np.abs(gaps)))
+        out.setdefault(nearest, round(1e3 * gaps[nearest], 4))
+    return list(out.values())
 
 
 @dataclass(frozen=True)
