@@ -25,6 +25,8 @@ from glotouch_bt.touch.primitives import FREE_SD_M, SMALLEST_M, Shape, Touches, 
 CORNER_CONTACT_SD_M = 0.0012
 """Least scatter of a contact beside a corner: a recess or a nose of a real thing looks like a corner, and would fix an
 end that nobody touched."""
+SHIFT_SD_M = 0.008
+"""How far an object is shoved unseen, if it is, along x and along y."""
 HARMONICS = np.arange(1, 11)
 COEFFICIENT_SD_M = np.where(HARMONICS == 1, 0.001, 0.018 / HARMONICS**1.8)
 """Spread of the coefficients of cos and sin about the best circle: power law through the root mean squares of 1500
@@ -116,6 +118,13 @@ def explain(shape: Shape, params: Array, amplitude: float, touches: Touches, loo
         sd = np.concatenate([sd, spread])
         start = np.concatenate([start, np.zeros(len(spread))])
         noise = np.hypot(noise, amplitude * REST_SD_M)
+    if touches.strays:
+        moved = np.where(np.arange(k) < touches.strays, 1.0, 0.0)[:, None]
+        slide = np.zeros((len(points), 2))
+        slide[:k] = -moved * g.by_params[0, :k, :2]
+        rows = np.concatenate([rows, slide], axis=1)
+        turn = np.concatenate([turn, -moved * g.normal_by_params[0, :k, :2]], axis=1)
+        sd, start = np.concatenate([sd, [SHIFT_SD_M] * 2]), np.concatenate([start, [0.0, 0.0]])
     y = np.concatenate([r - g.distance_m[0, :k], wrapped(touches.normal_rad - g.normal_rad[0, :k])])
     h = np.concatenate([rows[:k], turn])
     inverse_sd = np.concatenate([1.0 / noise, 1.0 / touches.normal_sd_rad])
@@ -142,6 +151,8 @@ def explain(shape: Shape, params: Array, amplitude: float, touches: Touches, loo
     outwards = np.stack([np.cos(g.normal_rad[0, :k]), np.sin(g.normal_rad[0, :k])], axis=1)
     evidence -= 10.0 * float(np.sum(np.sum(outwards * touches.approach, axis=1) > 0.3))
     residuals = g.distance_m[0, :k] - r + rows[:k] @ mean
+    if touches.strays:
+        mean, covariance = mean[:-2], covariance[:-2, :-2]
     return Hypothesis(shape, params, amplitude, mean, covariance, evidence, residuals, r)
 
 

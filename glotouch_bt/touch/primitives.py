@@ -46,6 +46,7 @@ class Touches:
         free_m: (m, 2) places where the ball's centre was without touching; few, near the outline.
         radius_m: Radius of the ball.
         contact_sd_m: Scatter of a ball's centre at the onset, and what a plain primitive may leave of an outline.
+        strays: So many of the first contacts were made before the object moved, by a common, unknown shift.
     """
 
     tips_m: Array
@@ -55,6 +56,14 @@ class Touches:
     free_m: Array
     radius_m: float
     contact_sd_m: float = CONTACT_SD_M
+    strays: int = 0
+
+    @property
+    def rooted(self) -> Touches:
+        """Those made since the object moved."""
+        s = self.strays
+        tips, normal, sd = self.tips_m[s:], self.normal_rad[s:], self.normal_sd_rad[s:]
+        return Touches(tips, normal, sd, self.approach[s:], self.free_m, self.radius_m, self.contact_sd_m)
 
     @property
     def likely_middle_m(self) -> Array:
@@ -147,7 +156,7 @@ def ray_m(params: Array, grown_m: float, origin_m: Array, unit: Array) -> Array:
     start, u = (origin_m - params[:2]) @ turn, unit @ turn
     radius = params[5] if len(params) == 6 else 0.0
     inner, outer = params[3:5] - radius, params[3:5] + grown_m
-    steep = np.where(np.abs(u) > 1e-9, u, 1e-9)
+    steep = np.where(np.abs(u) > 1e-9, u, np.where(u < 0, -1e-9, 1e-9))
     exits = (np.where(u < 0, -1.0, 1.0) * outer - start) / steep
     side = np.argmin(exits, axis=1)
     t = np.min(exits, axis=1)
