@@ -41,6 +41,8 @@ LOOSENESS = ((1.0, 0.3), (2.2, 0.03))
 """A plain circle or rectangle leaves the contacts' scatter, or so many times as much; each with its prior."""
 MODES, MODE_LOSS = 3, 12.0
 """So many optima of the rectangle are kept, if their loss is within so much of the best one's."""
+ROUND_CORNER_M = 0.006
+"""A rectangle with rounder corners is a free outline: sharp ones would stick out by 0.41 of their radius."""
 BOX_RATIO, BOX_FILL, SLENDER_RATIO, WIDEST_M = 1.25, 0.8, 1.6, 0.080
 """When a free outline is squeezed like a box, in three parallel tracks across its long side, instead of from three
 directions like something round: if it is BOX_RATIO longer than wide and its hull fills BOX_FILL of its rectangle (a
@@ -334,9 +336,9 @@ def _boxlike(size: tuple[float, float], area: float) -> bool:
 
 
 def _family(h: Hypothesis) -> ContourFamily:
-    if h.amplitude > 0:
-        return "free"
-    return "circle" if h.shape is circle else "rectangle"
+    if h.shape is circle:
+        return "circle" if h.amplitude == 0 else "free"
+    return "rectangle" if h.amplitude == 0 and h.corrected[5] < ROUND_CORNER_M else "free"
 
 
 def _hypotheses(touches: Touches) -> tuple[tuple[Hypothesis, ...], Array]:

@@ -68,7 +68,7 @@ def fit_kind(tip_K_m: Array, tip_radius_m: float, kind: str) -> Contour:
     nothing = np.zeros((k, 2))
     touches = Touches(tips, np.zeros(k), np.full(k, np.inf), nothing, nothing[:0], tip_radius_m)
     shape = circle if kind == "round" else rectangle
-    params = fit(shape, touches)[0][0]
+    params = fit(shape, touches, steps=30, gain=1e-6)[0][0]
     residuals = shape(params[None], tips).distance_m[0] - tip_radius_m
     rms = float(np.sqrt(np.mean(residuals**2)))
     if kind == "round":

@@ -14,7 +14,7 @@ import numpy as np
 
 from glotouch_bt.robot import Array
 
-SMALLEST_M, LARGEST_M = 0.015, 0.150
+SMALLEST_M, LARGEST_M = 0.005, 0.150
 """No outline is smaller or larger: what a 0-85 mm gripper and a hand-sized container hold, with a margin."""
 TYPICAL_M, SIZE_SD_M = 0.060, 0.028
 """Prior of every size (diameter, side): objects are 40-110 mm long, and less across."""
@@ -28,7 +28,7 @@ CONTACT_SD_M = 0.00045
 """Scatter of a contact unless it is given: of the onset, 0.2-0.4 mm, and of what is nearly a circle or a rectangle."""
 NORMAL_SD_RAD, APPROACH_SD_RAD = 0.20, 0.60
 """Scatter of the true outward normal about the reaction, and, where no reaction is known, against the approach."""
-SIFT_STEP, SIFTED = 5, 6
+SIFT_STEP, SIFTED = 4, 5
 """After so many steps only the best so many starts are followed."""
 FREE_SD_M = 0.001
 """How sharply a place where the ball has been forbids the outline."""
@@ -191,10 +191,10 @@ def wrapped(angle_rad: Array) -> Array:
     return np.asarray(np.pi - np.mod(np.pi - angle_rad, 2 * np.pi))
 
 
-def fit(shape: Shape, touches: Touches, *, steps: int = 20) -> tuple[Array, Array]:
+def fit(shape: Shape, touches: Touches, *, steps: int = 14, gain: float = 1e-2) -> tuple[Array, Array]:
     """Local optima of the soft-L1 loss from many starts: parameters (s, p) and losses (s,), best first.
 
-    Levenberg-Marquardt by iterated reweighting, all starts at once.
+    Levenberg-Marquardt by iterated reweighting, all starts at once; ends when two steps running gain less than `gain`.
     """
     params = _circle_starts(touches) if shape is circle else _rectangle_starts(touches)
     if shape is rounded:
@@ -223,7 +223,7 @@ def fit(shape: Shape, touches: Touches, *, steps: int = 20) -> tuple[Array, Arra
         hessian = np.where(better[:, None, None], trial_hessian, hessian)
         loss = np.where(better, trial_loss, loss)
         damping = np.where(better, 0.3 * damping, 5.0 * damping)
-        idle = idle + 1 if gained < 1e-3 else 0
+        idle = idle + 1 if gained < gain else 0
         if idle == 2:
             break
     order = np.argsort(loss, kind="stable")
