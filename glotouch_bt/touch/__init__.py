@@ -4,7 +4,7 @@ Pure: arrays in, values out. Knows no robot, tree or file.
 """
 
 from glotouch_bt.touch.baseline import Baseline, fit_baseline
-from glotouch_bt.touch.belief import OutlineBelief, believe_outline, informative_direction, present_tips
+from glotouch_bt.touch.belief import believe_outline, present_tips
 from glotouch_bt.touch.contours import consistent, contour_quality, fit_contour, fit_kind, signed_distance
 from glotouch_bt.touch.detector import ContactGuard, Onset
 from glotouch_bt.touch.envelope import envelope
@@ -15,6 +15,7 @@ from glotouch_bt.touch.hard_stop import HardStop, HardTrip
 from glotouch_bt.touch.inertia import Carried, CommandedInertia
 from glotouch_bt.touch.latency import LatencyEstimate, latency_from_two_speeds
 from glotouch_bt.touch.localisation import contact_direction, contact_point, disc_support, polygon_support
+from glotouch_bt.touch.mixture import OutlineBelief, informative_direction
 from glotouch_bt.touch.moved import believe_contacts, split_moved
 from glotouch_bt.touch.patches import PatchStats, evidence_weight, patch_statistics, relative_nonplanarity
 from glotouch_bt.touch.plateau import Plateau, PlateauParams, find_plateau, make_layer, temporal_median

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from glotouch_bt.robot import Array
-from glotouch_bt.touch.belief import OutlineBelief, believe_outline
+from glotouch_bt.touch.belief import believe_outline
+from glotouch_bt.touch.mixture import OutlineBelief
 from glotouch_bt.touch.values import Contact
 
 MOVED_PRIOR = 0.005
