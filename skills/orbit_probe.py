@@ -76,7 +76,7 @@ class OrbitProbe(Skill):
         )
         plan = trace(first, explorer.tip_K_m, self.tool.tip_radius_m, params, round_tip=self.tool.round)
         traced = yield from explorer.run(plan)
-        belief = belief.with_path(traced.path_K_m)
+        belief = belief.with_path(traced.path_K_m).with_hints((*belief.hints, *traced.strays))
         if traced.outline is None or len(traced.contacts) < LEAST_CONTACTS:
             self.map = belief.with_dropped(first.point_K_m)
             raise SkillFailed(

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from glotouch_bt.robot import Array, ParamError
 from glotouch_bt.robot.geometry import frozen_array
-from glotouch_bt.touch import Contour, signed_distance
+from glotouch_bt.touch import Contact, Contour, signed_distance
 
 PATH_STEP_M = 0.002
 GRID_STEP_M = 0.005
@@ -47,6 +47,7 @@ class SearchMap:
         path_K_m: (n, 2) where the tip's centre has been at sensing height, every 2 mm, oldest first.
         exclusions: Traced objects.
         dropped: (m, 2) places given up: frontiers that cannot be reached, contacts that gave no object.
+        hints: Contacts with something that was not what was being traced: where to look first.
     """
 
     half_extent_m: Array
@@ -55,6 +56,7 @@ class SearchMap:
     path_K_m: Array
     exclusions: tuple[Exclusion, ...]
     dropped: Array
+    hints: tuple[Contact, ...] = ()
 
     @classmethod
     def blank(cls, half_extent_m: npt.ArrayLike, expected: int) -> SearchMap:
@@ -102,6 +104,18 @@ class SearchMap:
         """With a place (2,) that the search shall not try again."""
         point = np.asarray(point_K_m, dtype=np.float64).ravel()[None, :2]
         return replace(self, dropped=_frozen(np.concatenate([self.dropped, point])))
+
+    def with_obstacle(self, point_K_m: npt.ArrayLike, radius_m: float) -> SearchMap:
+        """With a disc about a place (2,) that the tip's centre shall not enter; it counts as no object."""
+        if not (np.isfinite(radius_m) and radius_m > 0):
+            raise ParamError("radius_m", radius_m, "finite and positive")
+        point = np.asarray(point_K_m, dtype=np.float64).ravel()[:2]
+        disc = Contour("round", point, (2 * radius_m, 2 * radius_m), 0.0, 0.0, np.zeros(0))
+        return replace(self, exclusions=(*self.exclusions, Exclusion(disc, 0.0)))
+
+    def with_hints(self, contacts: tuple[Contact, ...]) -> SearchMap:
+        """With these hints, and no others."""
+        return replace(self, hints=contacts)
 
     def clearance(self, points_K_m: Array) -> Array:
         """(n,) distance of points (n, 2) from the nearest envelope; negative inside one, infinite if there is none."""

@@ -10,6 +10,7 @@ from glotouch_bt.robot import Array
 from glotouch_bt.search.map import SearchMap
 from glotouch_bt.search.moves import Felt, Move, Plan
 from glotouch_bt.search.policy import SearchPolicy, Stretch
+from glotouch_bt.search.routes import Routes
 from glotouch_bt.touch import Contact
 
 MAX_HOPS = 12
@@ -17,6 +18,10 @@ MAX_HOPS = 12
 WAYS_IN_APART_M = 0.03
 RETREAT_M = 0.005
 """Way back from a contact (paper III-A)."""
+OBSTACLE_M = 0.012
+"""What was touched where nothing new can be is kept clear of by this much from the contact point."""
+HINT_BEFORE_M, HINT_PAST_M = 0.015, 0.006
+"""A hint is approached from so far before the contact it was, and looked for so far past it."""
 TAKEN_M = 0.004
 """A place this near a dropped one is not tried for coming down."""
 BESIDE_M = (0.025, 0.040, 0.055, 0.070)
@@ -53,6 +58,12 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
         lowered: It is at sensing height.
     """
     tip, hops = np.asarray(tip_K_m, dtype=np.float64)[:2], 0
+    while lowered and belief.hints:
+        hint, belief = belief.hints[0], belief.with_hints(belief.hints[1:])
+        belief, contact, tip = yield from _follow(belief, hint, tip)
+        if contact is not None:
+            felt = yield Move("retreat", tip - RETREAT_M * contact.approach_K[:2])
+            return Sought(belief.with_path(felt.path_K_m), contact, True)
     while True:
         stretch = policy.next_stretch(belief, tip)
         if stretch is not None and not lowered and not stretch.raised:
@@ -75,6 +86,7 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
                 continue
             if bool(belief.inside_exclusion(felt.contact.tip_K_m[None, :2])[0]):
                 belief = belief.with_dropped(felt.contact.tip_K_m)
+                belief = belief.with_obstacle(felt.contact.point_K_m, OBSTACLE_M)
                 if not stretch.raised:
                     tip = (yield Move("retreat", tip - RETREAT_M * felt.contact.approach_K[:2])).tip_K_m
                 break
@@ -87,6 +99,26 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
                 return Sought(belief.with_path(felt.path_K_m), side, True)
             belief = belief.with_dropped(place)
             break
+
+
+def _follow(belief: SearchMap, hint: Contact, tip: Array) -> Plan[tuple[SearchMap, Contact | None, Array]]:
+    """To where something was touched by the way, and touch it again. Map, contact or None, where the ball is."""
+    against = hint.reaction_K[:2] / max(float(np.linalg.norm(hint.reaction_K[:2])), 1e-9)
+    before = hint.tip_K_m[:2] + HINT_BEFORE_M * against
+    past = hint.tip_K_m[:2] - HINT_PAST_M * against
+    if bool(belief.inside_exclusion(hint.point_K_m[None]).any()) or not bool(belief.inside_extent(before[None])[0]):
+        return belief, None, tip
+    way = Routes(belief, tip).to(before)
+    if way is None:
+        return belief, None, tip
+    for waypoint in (*way, past):
+        felt = yield Move("sweep", waypoint)
+        tip, belief = felt.tip_K_m, belief.with_path(felt.path_K_m)
+        if felt.refused or felt.contact is not None:
+            break
+    if felt.contact is None or bool(belief.inside_exclusion(felt.contact.tip_K_m[None, :2])[0]):
+        return belief, None, tip
+    return belief, felt.contact, tip
 
 
 def _from_its_side(belief: SearchMap, landed: Felt) -> Plan[tuple[SearchMap, Contact | None, Array, bool]]:

@@ -34,6 +34,9 @@ class TraceParams:
         back: How much a bearing counts that lies behind, against the way round so far.
         way_m: Travel that every probe costs beside the way to it (in and out).
         reach_sds: A probe goes so many standard deviations past the prediction.
+        facing: Cosine between the force on the ball and the direction from the object's middle below which the contact
+            is with something else.
+        same_m: A contact so near to an earlier one says nothing new.
         own_m: A contact within this (and twice the deviation) of the prediction is the object's own; farther out the
             evidence for one object or two decides.
         other: Odds, before it is looked at, that a contact on the way round belongs to another object.
@@ -54,6 +57,8 @@ class TraceParams:
     back: float = 0.4
     way_m: float = 0.03
     reach_sds: float = 2.5
+    facing: float = -0.4
+    same_m: float = 0.003
     own_m: float = 0.010
     other: float = 0.02
     unmodelled_m: float = 0.006
@@ -145,15 +150,27 @@ class _State:
         share = np.clip((apart - p.near_m) / (p.far_m - p.near_m), 0.0, 1.0)
         return distance + (0.0 if self.round else self.radius), np.hypot(sd, share * p.unmodelled_m)
 
+    def is_new(self, contact: Contact, p: TraceParams) -> bool:
+        """Whether a contact is not where there was one before."""
+        known = np.array([self.place(c) for c in self.present()])
+        return bool(np.linalg.norm(known - self.place(contact), axis=1).min() > p.same_m)
+
     def belongs(self, outline: OutlineBelief, contact: Contact, p: TraceParams) -> bool:
-        """Whether a new contact is near to the prediction, or one object explains it with the others better than two."""
+        """Whether a new contact was made with this object.
+
+        Not if the surface it met faces the object's middle. Else if it is near to the prediction, or one object
+        explains it together with the others better than two.
+        """
         off = contact.tip_K_m[:2] - outline.centre_K_m
+        far = float(np.hypot(off[0], off[1]))
+        if float(contact.reaction_K[:2] @ off) < p.facing * far:
+            return False
         distance, sd = self.ring(outline, np.array([np.arctan2(off[1], off[0])]), p)
-        if float(np.hypot(off[0], off[1])) < float(distance[0]) + p.own_m + 2.0 * float(sd[0]):
+        if far < float(distance[0]) + p.own_m + 2.0 * float(sd[0]):
             return True
         one = self.outline((contact,)).log_evidence - outline.log_evidence
         two = self.outline((contact,), alone=True).log_evidence
-        return one > two + np.log(p.other)
+        return bool(one > two + np.log(p.other))
 
     def free(self) -> Array:
         """(n, 2) places the ball has been, but for those so near to a contact that a push or the ball's own scatter
@@ -200,17 +217,21 @@ def trace(
         if found is None:
             missed += 1
             s.blocked.append(bearing)
-            ended = "" if missed <= p.misses else f"{missed} probes in a row met nothing"
         elif s.belongs(outline, found, p):
-            missed = 0
+            if s.is_new(found, p):
+                missed = 0
+            else:
+                missed += 1
+                s.blocked.append(bearing)
             s.raw.append(found)
             yield from _retreat(s, p)
         else:
             missed += 1
             s.strays.append(found)
             s.blocked.append(bearing)
-            back = Move("retreat", s.tip - p.clearance_m * found.approach_K[:2])
-            s.felt((yield back))
+            s.felt((yield Move("retreat", s.tip + p.clearance_m * _unit(found.reaction_K[:2]))))
+        if missed > p.misses:
+            ended = f"{missed} probes in a row told nothing"
         outline = s.outline()
     return Trace(
         s.present(),
@@ -226,8 +247,7 @@ def _retreat(s: _State, p: TraceParams) -> Plan[None]:
     """Away from the last contact until the clearance is reached, along what the force, rather than the approach, says
     is outwards (they differ for a graze)."""
     last = s.raw[-1]
-    out = 2.0 * last.reaction_K[:2] - last.approach_K[:2]
-    out = out / max(float(np.linalg.norm(out)), 1e-9)
+    out = _unit(2.0 * last.reaction_K[:2] - last.approach_K[:2])
     way = p.clearance_m - float((s.tip - last.tip_K_m[:2]) @ out)
     if way > 5e-4:
         s.felt((yield Move("retreat", s.tip + way * out)))
@@ -249,8 +269,12 @@ def _bearings() -> Array:
     return np.linspace(-np.pi, np.pi, BEARINGS, endpoint=False)
 
 
+def _unit(v: Array) -> Array:
+    return np.asarray(v / max(float(np.linalg.norm(v)), 1e-9), dtype=np.float64)
+
+
 def _wrap(a: Array) -> Array:
-    return np.asarray((a + np.pi) % (2 * np.pi) - np.pi)
+    return np.asarray((np.asarray(a) + np.pi) % (2 * np.pi) - np.pi, dtype=np.float64)
 
 
 def _choose(outline: OutlineBelief, s: _State, p: TraceParams) -> tuple[float | None, float]:

@@ -77,4 +77,5 @@ def test_ways_that_just_reach_full_speed_have_a_profile(ulps: int) -> None:
     way = 0.005 + ulps * np.spacing(0.005)
     profile = rest_to_rest(way, 0.05, 1.0, 20.0, PERIOD)
     assert profile.s[-1] == way
-    assert np.abs(profile.v).max() <= 0.05 + 1e-9 and np.abs(profile.a).max() <= 1.0 + 1e-9
+    assert np.abs(profile.v).max() <= 0.05 + 1e-9
+    assert np.abs(profile.a).max() <= 1.0 + 1e-9

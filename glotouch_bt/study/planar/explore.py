@@ -104,7 +104,7 @@ def explore(
                 ended = "exhausted"
                 break
             traced = drive(trace(sought.contact, world.tip_K_m, world.tip_radius_m, tracing), limited)
-            belief = belief.with_path(traced.path_K_m)
+            belief = belief.with_path(traced.path_K_m).with_hints((*belief.hints, *traced.strays))
             if traced.outline is None or len(traced.contacts) < LEAST_CONTACTS:
                 belief = belief.with_dropped(sought.contact.point_K_m)
                 untraced += 1
