@@ -31,6 +31,19 @@ Out = Annotated[Path | None, typer.Option(metavar="DIR", help="where trials and 
 Json = Annotated[bool, typer.Option("--json", help="print summary.json on stdout, nothing else")]
 
 
+def _check(conditions: str, backend: str) -> None:
+    """Before anything is written: both must exist.
+
+    Raises:
+        BadInput: One does not; the message lists those that do.
+    """
+    from glotouch_bt.mission.worlds import load_conditions
+    from glotouch_bt.robot import load_backend
+
+    load_conditions(conditions)
+    load_backend(backend)
+
+
 def _folder(out: Path | None, name: str) -> Path:
     return out or Path("runs") / f"{time.strftime('%Y%m%d-%H%M%S')}-bench-{name}"
 
@@ -50,7 +63,7 @@ def retrieve(
     json_: Json = False,
 ) -> None:
     """The whole mission for every target on every seed."""
-    from glotouch_bt import console
+    from glotouch_bt import console_bench
     from glotouch_bt.mission.load import load_mission
     from glotouch_bt.study.retrieve import Campaign, run_campaign, targets_of
 
@@ -76,7 +89,7 @@ def retrieve(
     if json_:
         sys.stdout.write(json.dumps(summary, indent=2) + "\n")
     else:
-        console.print_retrieve(summary, campaign.out)
+        console_bench.print_retrieve(summary, campaign.out)
 
 
 @bench.command()
@@ -93,7 +106,7 @@ def speed(
     json_: Json = False,
 ) -> None:
     """A mission's wall time against its simulated time, and against its bare solver steps."""
-    from glotouch_bt import console
+    from glotouch_bt import console_bench
     from glotouch_bt.robot import BadInput
     from glotouch_bt.study.speed import SpeedStudy, run_study
 
@@ -123,4 +136,110 @@ def speed(
     if json_:
         sys.stdout.write(json.dumps(summary, indent=2) + "\n")
     else:
-        console.print_speed(summary, study.out)
+        console_bench.print_speed(summary, study.out)
+
+
+@bench.command()
+@guarded
+def search(
+    policies: Annotated[str, typer.Option(help="search policies, comma-separated; the first is reported on")] = (
+        "expected_find,nearest_frontier,random_descent"
+    ),
+    trials: Annotated[int, typer.Option(min=0, help="missions per policy, each on a layout of its own")] = 100,
+    planar: Annotated[int, typer.Option(min=0, help="layouts explored in the plane alone")] = 0,
+    seed: Seed = 0,
+    conditions: Conditions = "nominal",
+    objects: Objects = None,
+    backend: Annotated[str, typer.Option(help="a registered simulation backend")] = "mujoco",
+    workers: Workers = 2,
+    out: Out = None,
+    json_: Json = False,
+) -> None:
+    """How soon every object is found, by policy: the mission, and its planar stand-in on the same and more layouts."""
+    from glotouch_bt import console_bench
+    from glotouch_bt.study.search import Campaign, run_campaign
+
+    _check(conditions, backend)
+    campaign = Campaign(
+        policies=tuple(p.strip() for p in policies.split(",") if p.strip()),
+        seeds=tuple(range(seed, seed + trials)),
+        planar_seeds=tuple(range(seed, seed + planar)),
+        conditions=conditions,
+        objects=objects,
+        backend=backend,
+        out=_folder(out, "search"),
+    )
+
+    def show(row: Mapping[str, Any], done: int, total: int) -> None:
+        sys.stderr.write(
+            f"[{done}/{total}] {row['simulator']} {row['policy']} seed {row['seed']}: "
+            f"{len(row['discovered_m'])} found, {row['travel_m']:.2f} m, {row['ended']}\n"
+        )
+
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        summary = run_campaign(campaign, pool, show)
+    if json_:
+        sys.stdout.write(json.dumps(summary, indent=2) + "\n")
+    else:
+        console_bench.print_search(summary, campaign.out)
+
+
+@bench.command()
+@guarded
+def contact(
+    trials: Trials = 20,
+    seed: Seed = 100,
+    conditions: Conditions = "nominal",
+    per_side: Annotated[int, typer.Option(min=1, max=15, help="contacts per side")] = 4,
+    workers: Workers = 2,
+    out: Out = None,
+    json_: Json = False,
+) -> None:
+    """Calibration square traced by probe and by bare gripper, bolted down and free: errors and the paper's."""
+    from glotouch_bt import console_bench
+    from glotouch_bt.study.contact import Campaign, run_campaign
+
+    _check(conditions, "mujoco")
+    campaign = Campaign(tuple(range(seed, seed + trials)), conditions, per_side, "mujoco", _folder(out, "contact"))
+
+    def show(row: dict[str, Any], done: int, total: int) -> None:
+        said = row["cause"] or f"centre {row['centre_error_mm']:.2f} mm"
+        sys.stderr.write(f"[{done}/{total}] {row['tool']} {row['square']} seed {row['seed']}: {said}\n")
+
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        summary = run_campaign(campaign, pool, show)
+    if json_:
+        sys.stdout.write(json.dumps(summary, indent=2) + "\n")
+    else:
+        console_bench.print_contact(summary, campaign.out)
+
+
+@bench.command()
+@guarded
+def detection(
+    conditions: Annotated[
+        list[str] | None, typer.Option(help="disturbances, may be repeated (default: nominal and harsh)")
+    ] = None,
+    trials: Annotated[int, typer.Option(min=1, help="synthetic pushes of each kind and force")] = 100,
+    seed: Seed = 100,
+    hours: Annotated[float, typer.Option(min=0.001, help="synthetic signal per kind of move, h")] = 2.0,
+    minutes: Annotated[float, typer.Option(min=0.1, help="simulated free motion under guard, min")] = 31.0,
+    pushes: Annotated[int, typer.Option(min=1, help="simulated pushes of 0.6 N")] = 40,
+    robots: Annotated[int, typer.Option(min=1, help="simulated robots, on the first seeds")] = 1,
+    backend: Annotated[str, typer.Option(help="a registered simulation backend")] = "mujoco",
+    out: Out = None,
+    json_: Json = False,
+) -> None:
+    """The guard's false alarms while the arm moves freely, and the smallest pushes it finds."""
+    from glotouch_bt.study.detection import DetectionStudy, run_study, table
+
+    profiles = tuple(conditions or ("nominal", "harsh"))
+    for profile in profiles:
+        _check(profile, backend)
+    seeds = tuple(range(seed, seed + trials))
+    study = DetectionStudy(profiles, seeds, hours, minutes, pushes, robots, backend, _folder(out, "detection"))
+    summary = run_study(study, lambda line: print(line, file=sys.stderr))
+    if json_:
+        sys.stdout.write(json.dumps(summary, indent=2) + "\n")
+    else:
+        sys.stdout.write("\n".join(table(summary)) + f"\n{study.out / 'summary.json'}\n")

@@ -63,6 +63,7 @@ class TouchTop(Skill):
             )
         height = float(top.ball_K_m[2]) - tool.tip_radius_m - tool.floor_z_K_m
         self.measured = replace(candidate, height_m=height)
+        self.event("candidate", candidate=self.measured)  # the last word on this candidate: now with its height
         self.event("top", candidate=candidate.index, height_m=height, touches=top.touches, passed=top.passed)
 
     def _plan(self, candidate: Candidate, touched_m: float) -> TopPlan:

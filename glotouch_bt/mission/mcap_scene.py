@@ -87,12 +87,17 @@ def event_scene(kind: str, stamp_ns: int, data: Json) -> Iterator[Message]:
                 "text": f"candidate {candidate['index']}",
             }
             yield _entity(stamp_ns, f"candidate {candidate['index']}", lines=[line], texts=[text])
-    except (KeyError, TypeError, ValueError):
+    except (AttributeError, KeyError, TypeError, ValueError):
         return  # an event of another shape is recorded all the same, only not drawn
 
 
 def _outline(contour: Any) -> list[tuple[float, float]]:
     """Closed polyline in K of a journaled contour."""
+    if contour.get("family") == "free":
+        corners = [_floats(p, 2) for p in contour["boundary_K_m"]]
+        if len(corners) < 3:
+            raise ValueError(f"{len(corners)} corners of an outline")
+        return [(x, y) for x, y in (*corners, corners[0])]
     cx, cy = _floats(contour["centre_K_m"], 2)
     long, short = _floats(contour["size_m"], 2)
     yaw = float(contour["yaw_rad"])

@@ -40,9 +40,19 @@ def contour_of(candidate: dict[str, Any]) -> Contour | None:
             yaw_rad=float(c["yaw_rad"]),
             rms_m=float(c["rms_m"] or 0.0),
             residuals_m=np.asarray(c.get("residuals_m") or [], float),
+            family=c.get("family"),
+            boundary_K_m=_corners(c) if c.get("family") == "free" else np.zeros((0, 2)),
         )
     except (KeyError, TypeError, ValueError, IndexError):
         return None
+
+
+def _corners(contour: dict[str, Any]) -> Array:
+    """(n, 2) corners of a journaled free outline; ValueError if they are none."""
+    corners = np.asarray(contour["boundary_K_m"], float)
+    if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3 or not np.isfinite(corners).all():
+        raise ValueError("not the corners of an outline")
+    return corners
 
 
 def tip_path_K_m(record: RunRecord) -> Array:

@@ -27,8 +27,8 @@ class Contact:
         reaction_K: (3,) unit direction of the force the tip felt.
         point_K_m: (2,) contact point: the support-plane intercept (paper III-B).
         force_N: Norm of the filtered contact force when the guard tripped.
-        pushed_K_m: (2,) how far the ball went on past its onset before it stopped: what it touched was pushed at most
-            so far, and stands where the ball left it.
+        pushed_K_m: (2,) estimated displacement of what was touched, between the onset and the ball's standstill: along
+            the force on it, less what bent of probe and grasp (`touch.pushing`); at most so far, for a wall stands.
     """
 
     stamp_s: float
