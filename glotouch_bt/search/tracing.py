@@ -31,6 +31,8 @@ class TraceParams:
         radial_sd_m: ... and the outline's nowhere above this.
         least_contacts, most_contacts: Bounds whatever the covariance says.
         step_m: Longest way round before the ball probes again.
+        doubt_m: With a deviation above this on the way round, the ball goes along the surface instead ...
+        along_m, along_reach_m: ... so far, and then looks for it so far deeper than it was.
         back: How much a bearing counts that lies behind, against the way round so far.
         way_m: Travel that every probe costs beside the way to it (in and out).
         reach_sds: A probe goes so many standard deviations past the prediction.
@@ -54,6 +56,9 @@ class TraceParams:
     least_contacts: int = 4
     most_contacts: int = 14
     step_m: float = 0.045
+    doubt_m: float = 0.008
+    along_m: float = 0.026
+    along_reach_m: float = 0.014
     back: float = 0.4
     way_m: float = 0.03
     reach_sds: float = 2.5
@@ -270,11 +275,13 @@ def _bearings() -> Array:
 
 
 def _unit(v: Array) -> Array:
-    return np.asarray(v / max(float(np.linalg.norm(v)), 1e-9), dtype=np.float64)
+    unit: Array = v / max(float(np.linalg.norm(v)), 1e-9)
+    return unit
 
 
 def _wrap(a: Array) -> Array:
-    return np.asarray((np.asarray(a) + np.pi) % (2 * np.pi) - np.pi, dtype=np.float64)
+    wrapped: Array = (np.asarray(a) + np.pi) % (2 * np.pi) - np.pi
+    return wrapped
 
 
 def _choose(outline: OutlineBelief, s: _State, p: TraceParams) -> tuple[float | None, float]:
@@ -304,7 +311,13 @@ def _choose(outline: OutlineBelief, s: _State, p: TraceParams) -> tuple[float | 
 
 
 def _probe_at(outline: OutlineBelief, s: _State, p: TraceParams, bearing: float, side: float) -> Plan[Contact | None]:
-    """Round to `bearing`, and inwards. A touch on the way round is as good as the one that was meant."""
+    """Round to `bearing`, and inwards. A touch on the way round is as good as the one that was meant.
+
+    Where the way round is too uncertain to be planned, the ball goes on along the surface it touched last.
+    """
+    beside = float(np.linalg.norm(s.tip - s.raw[-1].tip_K_m[:2])) < 3.0 * p.clearance_m
+    if beside and _doubt(outline, s, p, bearing, side) > p.doubt_m:
+        return (yield from _along(s, p, side))
     for waypoint in _way_round(outline, s, p, bearing, side):
         felt = yield Move("step", waypoint)
         s.felt(felt)
@@ -320,13 +333,37 @@ def _probe_at(outline: OutlineBelief, s: _State, p: TraceParams, bearing: float,
     return felt.contact
 
 
-def _way_round(outline: OutlineBelief, s: _State, p: TraceParams, bearing: float, side: float) -> Array:
-    """(k, 2) waypoints outside the predicted outline, from where the ball is to `bearing`, pulled tight."""
+def _doubt(outline: OutlineBelief, s: _State, p: TraceParams, bearing: float, side: float) -> float:
+    """Largest standard deviation of the outline on the way round to `bearing`."""
+    _, sd = s.ring(outline, _angles(outline, s, bearing, side), p)
+    return float(np.max(sd))
+
+
+def _along(s: _State, p: TraceParams, side: float) -> Plan[Contact | None]:
+    """A step along the tangent of the last contact, and inwards from there."""
+    last = s.raw[-1]
+    normal = _unit(2.0 * last.reaction_K[:2] - last.approach_K[:2])
+    goal = s.tip + p.along_m * side * np.array([-normal[1], normal[0]])
+    for move in (Move("step", goal), Move("probe", goal - (p.clearance_m + p.along_reach_m) * normal)):
+        felt = yield move
+        s.felt(felt)
+        if felt.refused or felt.contact is not None:
+            return felt.contact
+    return None
+
+
+def _angles(outline: OutlineBelief, s: _State, bearing: float, side: float) -> Array:
+    """(k,) bearings on the way round from where the ball is, this left out, to `bearing`."""
     offset = s.tip - outline.centre_K_m
     here = float(np.arctan2(offset[1], offset[0]))
     turn = float(_wrap(np.array(side * (bearing - here))) % (2 * np.pi))
     n = max(int(np.ceil(turn / np.deg2rad(5.0))), 1)
-    angles = here + side * np.linspace(0.0, turn, n + 1)[1:]
+    return np.asarray(here + side * np.linspace(0.0, turn, n + 1)[1:])
+
+
+def _way_round(outline: OutlineBelief, s: _State, p: TraceParams, bearing: float, side: float) -> Array:
+    """(k, 2) waypoints outside the predicted outline, from where the ball is to `bearing`, pulled tight."""
+    angles = _angles(outline, s, bearing, side)
     distance, sd = s.ring(outline, angles, p)
     ring = distance + p.clearance_m + np.minimum(p.margin_sds * sd, p.widest_margin_m)
     points = outline.centre_K_m + ring[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
