@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from glotouch_bt.search import SearchMap, Trace, TraceParams, trace
-from glotouch_bt.touch import Candidate, Contact, contour_quality, envelope
+from glotouch_bt.search import SearchMap, TraceParams, admit, trace
+from glotouch_bt.touch import Candidate, Contact
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.exploring import Explorer, ExploringSpeeds
 from skills.held_tool import HeldTool
-
-LEAST_CONTACTS = 3
-"""An outline fitted to fewer is a guess."""
 
 
 class OrbitProbeParams(SkillParams):
@@ -74,36 +71,29 @@ class OrbitProbe(Skill):
             least_contacts=p.least_contacts,
             most_contacts=p.most_contacts,
         )
-        plan = trace(first, explorer.tip_K_m, self.tool.tip_radius_m, params, round_tip=self.tool.round)
+        plan = trace(
+            first,
+            explorer.tip_K_m,
+            self.tool.tip_radius_m,
+            params,
+            round_tip=self.tool.round,
+            half_extent_m=belief.half_extent_m,
+        )
         traced = yield from explorer.run(plan)
-        belief = belief.with_path(traced.path_K_m).with_hints((*belief.hints, *traced.strays))
-        if traced.outline is None or len(traced.contacts) < LEAST_CONTACTS:
-            self.map = belief.with_dropped(first.point_K_m)
+        admitted = admit(belief, known, first, traced, p.height_m, p.exclusion_m)
+        self.map = admitted.belief
+        if admitted.index is None:
             raise SkillFailed(
                 "not_traced",
                 f"{len(traced.contacts)} contacts: no outline fits; {traced.ended}",
                 advice="raise the sensing height if the object is flat",
                 contacts=len(traced.contacts),
             )
-        candidate = self._candidate(traced, len(known))
         self.event(
             "candidate",
-            candidate=candidate,
+            candidate=admitted.candidates[admitted.index],
             displaced_m=float(np.linalg.norm(traced.displaced_K_m)),
             ended=traced.ended,
         )
-        belief = belief.with_exclusion(envelope(candidate), p.exclusion_m)
-        self.map, self.candidates = belief, (*known, candidate)
-        self.found, self.complete = len(known) + 1, belief.complete
-
-    def _candidate(self, traced: Trace, index: int) -> Candidate:
-        assert traced.outline is not None
-        contour = traced.outline.contour
-        tips = np.array([c.tip_K_m[:2] for c in traced.contacts])
-        return Candidate(
-            index=index,
-            contour=contour,
-            height_m=self.params.height_m,
-            quality=contour_quality(tips, contour),
-            contacts=traced.contacts,
-        )
+        self.candidates = admitted.candidates
+        self.found, self.complete = len(admitted.candidates), admitted.belief.complete

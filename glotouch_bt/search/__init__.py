@@ -1,5 +1,6 @@
 """Where to probe next. Pure: a map in, moves out."""
 
+from glotouch_bt.search.candidates import Admitted, admit
 from glotouch_bt.search.expectation import ExpectationParams, ExpectedFind
 from glotouch_bt.search.frontier import PAPER_PASSES, NearestFrontier
 from glotouch_bt.search.map import Exclusion, SearchMap
@@ -13,6 +14,7 @@ from glotouch_bt.search.tracing import Trace, TraceParams, trace
 __all__ = [
     "PAPER_PASSES",
     "POLICIES",
+    "Admitted",
     "Exclusion",
     "ExpectationParams",
     "ExpectedFind",
@@ -30,6 +32,7 @@ __all__ = [
     "TraceParams",
     "search_policy",
     "seek",
+    "admit",
     "segment_is_free",
     "trace",
 ]

@@ -90,15 +90,17 @@ class SearchMap:
             new = new[int(np.argmax(far)) :] if far.any() else new[:0]
         return replace(self, path_K_m=_frozen(np.concatenate([self.path_K_m, new])))
 
-    def with_exclusion(self, contour: Contour, margin_m: float) -> SearchMap:
+    def with_exclusion(self, contour: Contour, margin_m: float, *, new: bool = True) -> SearchMap:
         """With one more object traced; the tip's centre keeps `margin_m` from its outline.
+
+        `new=False`: more of an object that was counted before.
 
         Contacts that stick out of the outline (limbs of a figure) widen the margin, by 10 mm at most.
         """
         if not (np.isfinite(margin_m) and margin_m >= 0):
             raise ParamError("margin_m", margin_m, "finite and not negative")
         out = float(np.clip(np.max(contour.residuals_m, initial=0.0), 0.0, LIMB_M))
-        return replace(self, found=self.found + 1, exclusions=(*self.exclusions, Exclusion(contour, margin_m + out)))
+        return replace(self, found=self.found + new, exclusions=(*self.exclusions, Exclusion(contour, margin_m + out)))
 
     def with_dropped(self, point_K_m: npt.ArrayLike) -> SearchMap:
         """With a place (2,) that the search shall not try again."""

@@ -22,6 +22,8 @@ OBSTACLE_M = 0.012
 """What was touched where nothing new can be is kept clear of by this much from the contact point."""
 HINT_BEFORE_M, HINT_PAST_M = 0.015, 0.006
 """A hint is approached from so far before the contact it was, and looked for so far past it."""
+KNOWN_M = 0.005
+"""A contact this near to the envelope of a traced object is one with that object: the next stands farther off."""
 TAKEN_M = 0.004
 """A place this near a dropped one is not tried for coming down."""
 BESIDE_M = (0.025, 0.040, 0.055, 0.070)
@@ -84,7 +86,7 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
                 lowered = felt.contact is None
             if felt.contact is None:
                 continue
-            if bool(belief.inside_exclusion(felt.contact.tip_K_m[None, :2])[0]):
+            if _known(belief, felt.contact):
                 belief = belief.with_dropped(felt.contact.tip_K_m)
                 belief = belief.with_obstacle(felt.contact.point_K_m, OBSTACLE_M)
                 if not stretch.raised:
@@ -99,6 +101,11 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
                 return Sought(belief.with_path(felt.path_K_m), side, True)
             belief = belief.with_dropped(place)
             break
+
+
+def _known(belief: SearchMap, contact: Contact) -> bool:
+    """True if a contact belongs to what is traced already: in an envelope, or hardly outside."""
+    return bool(belief.clearance(contact.tip_K_m[None, :2])[0] < KNOWN_M)
 
 
 def _follow(belief: SearchMap, hint: Contact, tip: Array) -> Plan[tuple[SearchMap, Contact | None, Array]]:
@@ -116,7 +123,7 @@ def _follow(belief: SearchMap, hint: Contact, tip: Array) -> Plan[tuple[SearchMa
         tip, belief = felt.tip_K_m, belief.with_path(felt.path_K_m)
         if felt.refused or felt.contact is not None:
             break
-    if felt.contact is None or bool(belief.inside_exclusion(felt.contact.tip_K_m[None, :2])[0]):
+    if felt.contact is None or _known(belief, felt.contact):
         return belief, None, tip
     return belief, felt.contact, tip
 

@@ -107,6 +107,7 @@ class _State:
         radius: Of the tool, m.
         round: Its section is a disc: outlines are fitted to its centres, exactly. Else to contact points.
         raw: The contacts as they were felt.
+        half: (2,) it keeps within |x|, |y| of this.
         paths: Where it has been.
         strays: Contacts with something else.
         blocked: Bearings that were tried in vain, rad.
@@ -117,6 +118,7 @@ class _State:
     radius: float
     round: bool
     raw: list[Contact]
+    half: Array
     paths: list[Array] = field(default_factory=list)
     strays: list[Contact] = field(default_factory=list)
     blocked: list[float] = field(default_factory=list)
@@ -184,7 +186,8 @@ class _State:
             return np.zeros((0, 2))
         path = np.concatenate(self.paths)
         touched = np.array([c.tip_K_m[:2] for c in (*self.raw, *self.present())])
-        return path[np.linalg.norm(path[:, None] - touched[None], axis=2).min(axis=1) > NEAR_CONTACT_M]
+        far = np.linalg.norm(path[:, None] - touched[None], axis=2).min(axis=1) > NEAR_CONTACT_M
+        return np.asarray(path[far])
 
     def felt(self, felt: Felt) -> None:
         """Take note of a move."""
@@ -194,7 +197,13 @@ class _State:
 
 
 def trace(
-    first: Contact, tip_K_m: Array, tip_radius_m: float, params: TraceParams | None = None, *, round_tip: bool = True
+    first: Contact,
+    tip_K_m: Array,
+    tip_radius_m: float,
+    params: TraceParams | None = None,
+    *,
+    round_tip: bool = True,
+    half_extent_m: Array | None = None,
 ) -> Plan[Trace]:
     """Trace the outline of what was touched. The ball ends beside it, at sensing height.
 
@@ -204,9 +213,11 @@ def trace(
         tip_radius_m: Its radius; of another section, that of a disc about as large.
         params: See `TraceParams`.
         round_tip: The section is a disc: outlines are fitted to its centres. Else to the contacts' points.
+        half_extent_m: (2,) the ball's centre keeps within |x|, |y| of it in K; None: no walls near.
     """
     p = params or TraceParams()
-    s = _State(np.asarray(tip_K_m, dtype=np.float64)[:2], tip_radius_m, round_tip, [first])
+    half = np.full(2, np.inf) if half_extent_m is None else np.asarray(half_extent_m, dtype=np.float64)
+    s = _State(np.asarray(tip_K_m, dtype=np.float64)[:2], tip_radius_m, round_tip, [first], half)
     yield from _retreat(s, p)
     outline, missed, ended = s.outline(), 0, ""
     while not ended:
@@ -343,7 +354,7 @@ def _along(s: _State, p: TraceParams, side: float) -> Plan[Contact | None]:
     """A step along the tangent of the last contact, and inwards from there."""
     last = s.raw[-1]
     normal = _unit(2.0 * last.reaction_K[:2] - last.approach_K[:2])
-    goal = s.tip + p.along_m * side * np.array([-normal[1], normal[0]])
+    goal = np.clip(s.tip + p.along_m * side * np.array([-normal[1], normal[0]]), -s.half, s.half)
     for move in (Move("step", goal), Move("probe", goal - (p.clearance_m + p.along_reach_m) * normal)):
         felt = yield move
         s.felt(felt)
@@ -367,6 +378,7 @@ def _way_round(outline: OutlineBelief, s: _State, p: TraceParams, bearing: float
     distance, sd = s.ring(outline, angles, p)
     ring = distance + p.clearance_m + np.minimum(p.margin_sds * sd, p.widest_margin_m)
     points = outline.centre_K_m + ring[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    points = np.clip(points, -s.half, s.half)
     return _tight(s, points, outline, p)
 
 

@@ -91,12 +91,14 @@ def score_run(record: RunRecord, sections: dict[str, FeltSection]) -> dict[str, 
     layout = true_layout(record.truth, pose_B_K, sections)
     way = Way.of(record)
     heights = {e.data["candidate"]: float(e.data["height_m"]) for e in record.of_kind("top")}
-    first: dict[int, tuple[float, Any]] = {}
+    # An object traced in parts counts from its last part on; what only measures its height comes later still.
+    last: dict[int, tuple[float, Any]] = {}
     for e in record.of_kind("candidate"):
-        first.setdefault(int(e.data["candidate"]["index"]), (e.stamp_s, e.data["candidate"]))
-    found = [_found(way.travel_m(stamp), c, heights.get(i)) for i, (stamp, c) in sorted(first.items())]
+        if "displaced_m" in e.data:
+            last[int(e.data["candidate"]["index"])] = (e.stamp_s, e.data["candidate"])
+    found = [_found(way.travel_m(stamp), c, heights.get(i)) for i, (stamp, c) in sorted(last.items())]
     row = score(found, layout)
-    row["contacts"] = sum(len(c["contacts"]) for _, c in first.values())
+    row["contacts"] = sum(len(c["contacts"]) for _, c in last.values())
     row["contact_gap_mm"] = _gaps(record, layout)
     return row | {"travel_m": way.total_m, "before_m": way.before_m, "start_K_m": way.start_K_m}
 

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from glotouch_bt.robot import Array
-from glotouch_bt.search import SearchMap, SearchPolicy, TraceParams, seek, trace
+from glotouch_bt.search import SearchMap, SearchPolicy, TraceParams, admit, seek, trace
 from glotouch_bt.search.moves import Felt, Move
 from glotouch_bt.study.planar.drive import drive
 from glotouch_bt.study.planar.world import PlanarWorld
-from glotouch_bt.touch import Candidate, contour_quality, envelope
+from glotouch_bt.touch import Candidate
 from skills.guarded_sweep import GuardedSweepParams
-from skills.orbit_probe import LEAST_CONTACTS, OrbitProbeParams
+from skills.orbit_probe import OrbitProbeParams
 
 BUDGET_M = 8.0
 MOST_MOVES = 5000
@@ -22,7 +19,7 @@ MOST_MOVES = 5000
 
 @dataclass(frozen=True)
 class Traced:
-    """A candidate, and the planar travel at which it was added."""
+    """A candidate, and the planar travel at which it (or the last part of it) was traced."""
 
     travel_m: float
     candidate: Candidate
@@ -94,7 +91,8 @@ def explore(
     sweep, orbit = sweep or GuardedSweepParams(), orbit or OrbitProbeParams()
     tracing = tracing or trace_params(orbit)
     belief = SearchMap.blank(world.half_m + world.tip_radius_m - sweep.wall_gap_m, expected)
-    found: list[Traced] = []
+    found: dict[int, Traced] = {}
+    candidates: tuple[Candidate, ...] = ()
     limited, untraced, ended = _Budget(world, budget_m), 0, "complete"
     try:
         while not belief.complete:
@@ -103,21 +101,17 @@ def explore(
             if sought.contact is None:
                 ended = "exhausted"
                 break
-            traced = drive(trace(sought.contact, world.tip_K_m, world.tip_radius_m, tracing), limited)
-            belief = belief.with_path(traced.path_K_m).with_hints((*belief.hints, *traced.strays))
-            if traced.outline is None or len(traced.contacts) < LEAST_CONTACTS:
-                belief = belief.with_dropped(sought.contact.point_K_m)
+            plan = trace(sought.contact, world.tip_K_m, world.tip_radius_m, tracing, half_extent_m=belief.half_extent_m)
+            traced = drive(plan, limited)
+            admitted = admit(belief, candidates, sought.contact, traced, orbit.height_m, orbit.exclusion_m)
+            belief, candidates = admitted.belief, admitted.candidates
+            if admitted.index is None:
                 untraced += 1
                 continue
-            contour = traced.outline.contour
-            tips: Array = np.array([c.tip_K_m[:2] for c in traced.contacts])
-            quality = contour_quality(tips, contour)
-            candidate = Candidate(len(found), contour, orbit.height_m, quality, traced.contacts)
-            found.append(Traced(world.travel_m, candidate))
-            belief = belief.with_exclusion(envelope(candidate), orbit.exclusion_m)
+            found[admitted.index] = Traced(world.travel_m, candidates[admitted.index])
     except _OutOfBudget:
         ended = "budget"
-    return Explored(tuple(found), world.travel_m, ended, belief, untraced)
+    return Explored(tuple(found[i] for i in sorted(found)), world.travel_m, ended, belief, untraced)
 
 
 def trace_params(orbit: OrbitProbeParams) -> TraceParams:

@@ -1,0 +1,90 @@
+"""What a trace adds to what is known: a new object, or more of one that had been traced in part."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from glotouch_bt.robot import Array
+from glotouch_bt.search.map import SearchMap
+from glotouch_bt.search.tracing import Trace
+from glotouch_bt.touch import Candidate, Contact, believe_outline, contour_quality, envelope, signed_distance
+
+LEAST_CONTACTS = 3
+"""An outline fitted to fewer is a guess."""
+SAME_M = 0.010
+"""Contacts this near to the room a known object takes are its own: objects stand farther apart."""
+LARGEST_M = 0.125
+"""Nothing that is looked for is longer; two things that touch are not made one beyond it."""
+
+
+@dataclass(frozen=True)
+class Admitted:
+    """What is known after a trace.
+
+    Attributes:
+        belief: The map.
+        candidates: All of them.
+        index: Of the one that is new, or better known; None: the trace gave none.
+    """
+
+    belief: SearchMap
+    candidates: tuple[Candidate, ...]
+    index: int | None
+
+
+def admit(
+    belief: SearchMap, known: tuple[Candidate, ...], first: Contact, traced: Trace, height_m: float, exclusion_m: float
+) -> Admitted:
+    """Add a trace to the map and to the candidates.
+
+    Its way is evidence, its strays are hints. With too few contacts for an outline the first one's place is dropped. A
+    trace beside or over a known candidate is more of that one: both are fitted as one, and nothing is counted again.
+
+    Args:
+        belief: The map before.
+        known: The candidates before.
+        first: The contact that started the trace.
+        traced: What it gave.
+        height_m: Of the sensing plane: the object is at least so high.
+        exclusion_m: Margin round it that the search keeps out of.
+    """
+    belief = belief.with_path(traced.path_K_m).with_hints((*belief.hints, *traced.strays))
+    if traced.outline is None or len(traced.contacts) < LEAST_CONTACTS:
+        return Admitted(belief.with_dropped(first.point_K_m), known, None)
+    radius = traced.outline.touches.radius_m
+    for old in known:
+        more = _merged(old, traced, radius, height_m)
+        if more is not None:
+            belief = belief.with_exclusion(envelope(more), exclusion_m, new=False)
+            return Admitted(belief, tuple(more if c.index == old.index else c for c in known), old.index)
+    contour = traced.outline.contour
+    quality = contour_quality(np.array([c.tip_K_m[:2] for c in traced.contacts]), contour)
+    candidate = Candidate(len(known), contour, height_m, quality, traced.contacts)
+    return Admitted(belief.with_exclusion(envelope(candidate), exclusion_m), (*known, candidate), candidate.index)
+
+
+def _merged(old: Candidate, traced: Trace, radius_m: float, height_m: float) -> Candidate | None:
+    """The candidate that both are, or None if they are two."""
+    points = np.array([c.point_K_m for c in traced.contacts])
+    if float(signed_distance(envelope(old), points).min()) > SAME_M:
+        return None
+    shift = np.array([*traced.displaced_K_m, 0.0])
+    before = (replace(c, tip_K_m=c.tip_K_m + shift, point_K_m=c.point_K_m + shift[:2]) for c in old.contacts)
+    contacts = (*before, *traced.contacts)
+    contour = believe_outline(
+        _places(contacts, radius_m),
+        radius_m,
+        approach_K=np.array([c.approach_K[:2] for c in contacts]),
+        reaction_K=np.array([c.reaction_K[:2] for c in contacts]),
+    ).contour
+    if max(contour.size_m) > LARGEST_M:
+        return None
+    quality = contour_quality(np.array([c.tip_K_m[:2] for c in contacts]), contour)
+    return Candidate(old.index, contour, max(old.height_m, height_m), quality, contacts)
+
+
+def _places(contacts: tuple[Contact, ...], radius_m: float) -> Array:
+    """(k, 2) what outlines are fitted to: ball centres, or contact points of what is no ball."""
+    return np.array([c.tip_K_m[:2] if radius_m > 0 else c.point_K_m for c in contacts])
