@@ -9,6 +9,7 @@ from glotouch_bt.robot import MotionRefused, Pose
 from glotouch_bt.touch import Candidate
 from skills.allowance import keeping_clear_of
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from skills.closing import close_gently
 from skills.grasp_plan import GraspPlan
 from skills.hand import CLEARANCE_M, glide, hand_pose_B, require_clear
 
@@ -77,7 +78,11 @@ class Grasp(Skill):
         if not (yield from glide(self.context, goal, p.descent_speed_m_s)):
             yield from arm.line(above, p.travel_speed_m_s, check=False)
             raise MotionRefused("grasp", "the fingers stood on something on the way down")
-        state = yield from arm.jaws(0.0, speed_m_s=p.closing_speed_m_s, force_N=p.force_N)
+        try:
+            state = yield from close_gently(arm, p.closing_speed_m_s, p.force_N)
+        except MotionRefused:
+            yield from arm.line(above, p.travel_speed_m_s, check=False)
+            raise
         yield from arm.hold(0.1)
         self.event("grasp", aperture_m=state.aperture_m, expected_m=plan.aperture_m, force_N=state.force_N)
         if state.aperture_m < p.least_aperture_m:

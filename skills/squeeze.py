@@ -9,6 +9,7 @@ from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefu
 from glotouch_bt.touch import Candidate, Layer, TouchSequence, TouchSet, make_layer
 from skills.allowance import keeping_clear_of
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from skills.closing import close_gently
 from skills.hand import glide, hand_pose_B
 from skills.squeeze_plan import Stance, plan_stances
 
@@ -123,7 +124,11 @@ class Squeeze(Skill):
         for height in heights:
             if not (yield from glide(self.context, self._pose(position, float(height), yaw_K), p.descent_speed_m_s)):
                 break  # caught under something that sticks out; the layers below are good
-            layers.append((yield from self._close(float(height), position, yaw_K)))
+            try:
+                layers.append((yield from self._close(float(height), position, yaw_K)))
+            except MotionRefused as refusal:  # what slopes or stands free here does so higher up, too
+                self.event("note", text=f"a closure {height * 1e3:.0f} mm above the floor was given up: {refusal}")
+                break
             yield from arm.jaws(at.opening_m, speed_m_s=0.2)
         yield from arm.line(above, p.travel_speed_m_s, check=False)
         return TouchSequence(np.asarray(position), yaw_K, tuple(layers))
@@ -135,7 +140,7 @@ class Squeeze(Skill):
 
     def _close(self, height: float, position: Array, yaw_K: float) -> Motion[Layer]:
         p, arm = self.params, self.context.arm
-        yield from arm.jaws(0.0, speed_m_s=p.closing_speed_m_s, force_N=p.force_N)
+        yield from close_gently(arm, p.closing_speed_m_s, p.force_N)
         command = Command(gripper=GripperTarget(0.0, p.closing_speed_m_s, p.force_N), tactile=True)
         blocks: list[Observation] = []
         for _ in range(round(p.settle_s / arm.period_s)):

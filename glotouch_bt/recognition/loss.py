@@ -10,13 +10,17 @@ import numpy as np
 from glotouch_bt.recognition.decision import Match
 from glotouch_bt.recognition.evidence import Evidence, read_evidence
 from glotouch_bt.recognition.model import TargetModel
+from glotouch_bt.recognition.outline import SENSING_M
 from glotouch_bt.recognition.pads import Array32
 from glotouch_bt.recognition.params import LossParams
 from glotouch_bt.recognition.placement import fitted_pose, unfelt_pose
 from glotouch_bt.recognition.raster import hand_axes
 from glotouch_bt.recognition.volume import Grid, cross_loss, sequence_volume
 from glotouch_bt.robot import Array
-from glotouch_bt.touch.values import Candidate, TouchSet
+from glotouch_bt.touch.values import Candidate, Contour, TouchSet
+
+UNFELT_M = 0.003
+"""A candidate not higher than this above where its sides were touched: its top was not felt."""
 
 
 def match(model: TargetModel, touchset: TouchSet, params: LossParams | None = None) -> Match:
@@ -182,17 +186,30 @@ def mode_loss(model: TargetModel, e: Evidence, candidate: Candidate, p: LossPara
 
 
 def height_loss(model: TargetModel, candidate: Candidate, p: LossParams) -> float:
-    """Top felt against the model's top at its outline's middle; the shape's own slope there widens the spread."""
-    variance = p.height_sd_m**2 + (0.5 * model.top_slope_m) ** 2
-    return p.height * math.log1p(0.5 * (candidate.height_m - model.top_centre_m) ** 2 / variance)
+    """Highest place felt against the model's top; a top that was not felt says only how high the object is at least."""
+    off = candidate.height_m - model.height_m
+    if candidate.height_m < SENSING_M + UNFELT_M:
+        off = max(off, 0.0)
+    return p.height * math.log1p(0.5 * (off / p.height_sd_m) ** 2)
 
 
 def contour_loss(model: TargetModel, candidate: Candidate, p: LossParams) -> float:
-    """Contour's size against the model's own outline fitted as the same kind."""
+    """Contour's size against the model's own outline fitted as the same kind.
+
+    The model's spread is that of evenly spread contacts; a trace that ended early is less sure, and says how much.
+    """
     contour = candidate.contour
     traced = model.outline.of(contour.kind)
     sides = 2 if contour.kind == "box" else 1
     squared = 0.0
-    for felt, size, sd in zip(contour.size_m[:sides], traced.size_m[:sides], traced.size_sd_m[:sides], strict=True):
-        squared += (felt - size) ** 2 / (p.contour_sd_m**2 + sd**2)
+    for i in range(sides):
+        variance = p.contour_sd_m**2 + traced.size_sd_m[i] ** 2 + _size_variance_m2(contour, i)
+        squared += (contour.size_m[i] - traced.size_m[i]) ** 2 / variance
     return p.contour * math.log1p(0.5 * squared)
+
+
+def _size_variance_m2(contour: Contour, side: int) -> float:
+    """Variance of a whole side from the fit's covariance of the half; 0 where the fit does not tell."""
+    at = {"circle": 2, "rectangle": 3 + side}.get(contour.family or "", len(contour.covariance))
+    variance = 4.0 * float(contour.covariance[at, at]) if at < len(contour.covariance) else 0.0
+    return variance if math.isfinite(variance) else 0.0

@@ -10,17 +10,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-import trimesh
 
-from glotouch_bt.recognition.outline import (
-    SENSING_M,
-    TIP_RADIUS_M,
-    Outline,
-    first_hit,
-    minimum_rectangle,
-    traced_outline,
-    traced_tips,
-)
+from glotouch_bt.recognition.outline import Outline, minimum_rectangle, traced_outline
 from glotouch_bt.recognition.pads import FINE, Array32, PadSpec, image_feature
 from glotouch_bt.recognition.raster import mirrored, side_images, window_max
 from glotouch_bt.recognition.touches import pooled_images, simulated_statistics
@@ -30,8 +21,6 @@ from glotouch_bt.robot.meshes import Mesh
 YAWS = 72
 STRIDE = 2
 """Table cells are two raster cells apart: 2.3 mm along x_P, 2.7 mm in height."""
-RIM_PLACES, RIM_INSET_M = 24, 0.002
-"""Places on a hollow object's rim that are tried, and how far inside of its outline the probe aims."""
 _CACHE_SIZE = 64
 _cache: dict[tuple[str, PadSpec], TargetModel] = {}
 
@@ -51,13 +40,11 @@ class TargetModel:
         fine_m: (72, fl, fz) side images the tables come from (see `raster`); -inf where empty.
         outline: What tracing it would report, about `centre_m`.
         centre_m: (2,) middle of the smallest rectangle round the footprint, in the mesh's frame O.
-        height_m: Top above the floor.
+        height_m: Top above the floor; what touching it from above finds.
         rho: Nonplanarity predicted for a 10 N touch, median over simulated touches (the paper's rho_M).
         rho_sd: Its spread over touches (half the 16-84 % range).
         normal_dispersion: 1 - |mean normal| over touched patches, mean over touches (the paper's d_M).
         anisotropy: 1 - short / long of the smallest rectangle round the footprint (the paper's a_M).
-        top_slope_m: How much lower than the top the probe may find it, within 4 mm of the traced centre.
-        top_centre_m: Height found by touching the traced centre from above (a hollow object's rim).
     """
 
     name: str
@@ -75,8 +62,6 @@ class TargetModel:
     rho_sd: float
     normal_dispersion: float
     anisotropy: float
-    top_slope_m: float
-    top_centre_m: float
     _lazy: dict[str, Array32] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -159,42 +144,9 @@ def _build(mesh: Mesh, pad: PadSpec) -> TargetModel:
     reach = window_max(fine)[:, h:-h:STRIDE, half:-half:STRIDE]
     reach = np.where(np.isfinite(reach), reach, np.nan).astype(np.float32)
     rho, rho_sd, dispersion = simulated_statistics(fine, STRIDE, pad)
-    top_centre, top_slope = _top(solid, top, outline.likely.centre_m)
     for a in (reach, fine):
         a.setflags(write=False)
     return TargetModel(
         mesh.name, mesh.digest, pad, phi, fine_l[h:-h:STRIDE], centres, reach, fine, outline, middle, top, rho, rho_sd,
-        dispersion, 1.0 - short / long, top_slope, top_centre,
+        dispersion, 1.0 - short / long,
     )  # fmt: skip
-
-
-def touched_top(solid: trimesh.Trimesh, aim_m: Array, top_m: float) -> Array:
-    """Heights (k,) at which a ball lowered onto each of the points `aim_m` (k, 2) stops (its lowest point)."""
-    angle = np.arange(8) * (np.pi / 4)
-    unit = np.column_stack([np.cos(angle), np.sin(angle)])
-    ball = np.concatenate([np.zeros((1, 2)), 2e-3 * unit, 4e-3 * unit, 5.5e-3 * unit])
-    sag = TIP_RADIUS_M - np.sqrt(TIP_RADIUS_M**2 - (ball**2).sum(axis=1))
-    points = (aim_m[:, None] + ball[None]).reshape(-1, 2)
-    o = np.column_stack([points, np.full(len(points), top_m + 0.01)])
-    t = first_hit(solid, o, np.tile([0.0, 0.0, -1.0], (len(o), 1)))
-    z = np.where(np.isfinite(t), top_m + 0.01 - t, 0.0).reshape(len(aim_m), len(ball)) - sag
-    return np.asarray(np.maximum(z.max(axis=1), 0.0))
-
-
-def _top(solid: trimesh.Trimesh, top_m: float, centre_m: Array) -> tuple[float, float]:
-    """Height felt at the outline's centre, and the range of heights when the aim is off by up to 4 mm.
-
-    A centre lower than the sensing height is a hollow; there the probe feels the highest of three places on the rim
-    instead, most likely the upper quartile of all places.
-    """
-    angle = np.arange(8) * (np.pi / 4)
-    unit = np.column_stack([np.cos(angle), np.sin(angle)])
-    heights = touched_top(solid, centre_m + np.concatenate([np.zeros((1, 2)), 2e-3 * unit, 4e-3 * unit]), top_m)
-    if np.median(heights) > SENSING_M:
-        return float(np.median(heights)), float(np.ptp(heights))
-    inwards = centre_m - traced_tips(solid, centre_m, RIM_PLACES, 0.0)
-    inset = TIP_RADIUS_M + RIM_INSET_M
-    distance = np.maximum(np.linalg.norm(inwards, axis=1, keepdims=True), inset)
-    places = centre_m - inwards * (1.0 - inset / distance)
-    heights = touched_top(solid, places, top_m)
-    return float(np.quantile(heights, 0.75)), float(np.ptp(heights))

@@ -40,7 +40,7 @@ class LossParams:
         mode_floor: Smallest probability given to a contour kind.
         paper_mode: Use the paper's a_M^2 (1 - p_c) instead of -log P(kind | model).
         height: Weight of the top height's evidence.
-        height_sd_m: Its spread besides the shape's own.
+        height_sd_m: Its spread: the floor's datum, and what a ball feels of a point.
         contour: Weight of the contour size's evidence.
         contour_sd_m: Its spread besides the outline's own misfit.
         yaw_prior: Weight of the contour's direction (boxes only).
@@ -86,7 +86,7 @@ class LossParams:
     height: float = 0.25
     height_sd_m: float = 3e-3
     contour: float = 0.25
-    contour_sd_m: float = 2.5e-3
+    contour_sd_m: float = 4e-3
     yaw_prior: float = 0.1
     yaw_sd_rad: float = math.radians(8.0)
     image: float = 1.0

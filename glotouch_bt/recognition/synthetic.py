@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from glotouch_bt.recognition.model import touched_top
 from glotouch_bt.recognition.outline import TIP_RADIUS_M, first_hit, minimum_rectangle, traced_tips
 from glotouch_bt.recognition.pads import PadSpec, gel_shift
 from glotouch_bt.recognition.raster import hand_axes
@@ -127,9 +126,7 @@ def _trace(solid: trimesh.Trimesh, pose: Array, d: Disturbance, rng: np.random.G
     turn = np.array([[c, -s], [s, c]])
     tips = tips @ turn.T + pose[:2] + rng.normal(0, d.contact_sd_m, tips.shape) + rng.normal(0, d.centre_sd_m, 2)
     contour = fit_contour(tips, TIP_RADIUS_M)
-    below = turn.T @ (contour.centre_K_m + rng.normal(0, 5e-4, 2) - pose[:2])
-    top = float(solid.vertices[:, 2].max())
-    height = float(touched_top(solid, below[None], top)[0]) + rng.normal(0, d.height_sd_m)
+    height = float(solid.vertices[:, 2].max()) + rng.normal(0, d.height_sd_m)
     return Candidate(index, contour, height, 1.0, ())
 
 

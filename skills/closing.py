@@ -1,0 +1,81 @@
+"""Closing the jaws on something that is not in their middle: the hand gives way to it and never presses hard."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from glotouch_bt.motion import Arm, Motion
+from glotouch_bt.motion.jaws import JawWatch
+from glotouch_bt.robot import Array, GripperState, MotionRefused, Observation
+
+YIELD_N = 3.0
+"""Force along y_P at which the hand gives way: an object that slides on the floor resists with less."""
+RELEASED_N = 1.0
+"""Given way far enough; and a push from the other side of more than this means that both jaws touch."""
+GIVE_UP_N = 20.0
+"""Force on the hand at which a closure ends. Source: two thirds of the robot's own limit; it rises by 0.1 N/ms."""
+PACE = 0.75
+"""Speed of giving way against the closing speed; half of it would only keep the jaw that touches where it is."""
+LEAST_STEP_M = 0.0005
+TIMEOUT_S = 4.0
+
+
+def close_gently(arm: Arm, speed_m_s: float, force_N: float) -> Motion[GripperState]:
+    """Close until the jaws rest; while only one of them meets something, the hand moves that jaw's way.
+
+    What stands high or is held below cannot slide between the jaws as it does near the floor: a jaw that met it first
+    would tilt it and press ever harder. So the hand follows the force along y_P, never farther than the jaws have
+    closed: the fingers stay within the room they had when open.
+
+    Args:
+        arm: At rest, jaws open; its hand points down.
+        speed_m_s: Rate of the aperture.
+        force_N: Largest force of one jaw.
+
+    Returns:
+        The last report of the jaws.
+
+    Raises:
+        MotionRefused: The hand was pressed with more than `GIVE_UP_N`; the jaws have opened again.
+    """
+    opening = arm.aperture_m
+    start_B = arm.pose_B_P.position_m
+    yield from arm.jaws(0.0, speed_m_s=speed_m_s, force_N=force_N, timeout_s=arm.period_s)
+    watch = JawWatch(arm.period_s)
+    for _ in range(round(TIMEOUT_S / arm.period_s)):
+        (seen,) = yield from arm.hold(arm.period_s)
+        if watch.still(seen.now_s, seen.gripper):
+            break
+        force = _force_P(seen)
+        if not np.linalg.norm(force) <= GIVE_UP_N:
+            yield from arm.jaws(opening, speed_m_s=0.2)
+            raise MotionRefused(
+                "closing", f"the hand was pressed with {np.linalg.norm(force):.0f} N while the jaws closed"
+            )
+        if seen.gripper.moving and abs(force[1]) > YIELD_N:
+            side = float(np.sign(force[1]))
+            y_B = np.asarray(arm.pose_B_P.rotation[:, 1])
+            given = side * float((arm.pose_B_P.position_m - start_B) @ y_B)
+            room = 0.5 * (opening - arm.aperture_m) - given
+            if room > LEAST_STEP_M:
+                yield from arm.shift(
+                    side * room * y_B, PACE * speed_m_s, guard=_until_released(side), check=False, what="give way"
+                )
+    return watch.state()
+
+
+def _until_released(side: float) -> Callable[[Observation], str | None]:
+    def guard(seen: Observation) -> str | None:
+        force = _force_P(seen)
+        if not np.linalg.norm(force) <= GIVE_UP_N:
+            return "pressed"
+        return "released" if side * force[1] < RELEASED_N else None
+
+    return guard
+
+
+def _force_P(seen: Observation) -> Array:
+    """Mean tared force (3,) of one period in P's axes, which are the sensor's."""
+    return np.asarray(seen.wrench_S[:, :3].mean(axis=0))
