@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from glotouch_bt.search import SearchMap, TraceParams, admit, trace
+from glotouch_bt.search import Move, Plan, SearchMap, TraceParams, admit, trace
 from glotouch_bt.touch import Candidate, Contact
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.exploring import Explorer, ExploringSpeeds
 from skills.held_tool import HeldTool
+
+NEAR_M = 0.015
+"""Farther than this from the first contact the ball goes back to it from above: a trace that was broken off may have
+left it on the object's other side."""
 
 
 class OrbitProbeParams(SkillParams):
@@ -64,6 +68,8 @@ class OrbitProbe(Skill):
             raise SkillFailed("known_object", "the contact lies on an object that is traced already")
         speeds = ExploringSpeeds(step_m_s=p.orbit_speed_m_s, probe_m_s=p.probe_speed_m_s, height_m=p.height_m)
         explorer = Explorer(self.context, self.tool, speeds, self.event)
+        if float(np.linalg.norm(explorer.tip_K_m - first.tip_K_m[:2])) > NEAR_M:
+            yield from explorer.run(_back_to(first, p.clearance_m))
         params = TraceParams(
             clearance_m=p.clearance_m,
             centre_sd_m=p.centre_sd_m,
@@ -97,3 +103,8 @@ class OrbitProbe(Skill):
         )
         self.candidates = admitted.candidates
         self.found, self.complete = len(admitted.candidates), admitted.belief.complete
+
+
+def _back_to(first: Contact, clearance_m: float) -> Plan[None]:
+    """Over the object, and down again beside its first contact."""
+    yield Move("hop", first.tip_K_m[:2] - clearance_m * first.approach_K[:2])
