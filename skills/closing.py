@@ -20,6 +20,8 @@ PACE = 0.75
 """Speed of giving way against the closing speed; half of it would only keep the jaw that touches where it is."""
 LEAST_STEP_M = 0.0005
 TIMEOUT_S = 4.0
+LETTING_GO_M_S, LETTING_GO_S, OPENING_M_S = 0.03, 0.08, 0.2
+"""Speed and time of the first of opening, and the speed of the rest: an object held askew springs back."""
 
 
 def close_gently(arm: Arm, speed_m_s: float, force_N: float) -> Motion[GripperState]:
@@ -50,7 +52,7 @@ def close_gently(arm: Arm, speed_m_s: float, force_N: float) -> Motion[GripperSt
             break
         force = _force_P(seen)
         if not np.linalg.norm(force) <= GIVE_UP_N:
-            yield from arm.jaws(opening, speed_m_s=0.2)
+            yield from let_go(arm, opening)
             raise MotionRefused(
                 "closing", f"the hand was pressed with {np.linalg.norm(force):.0f} N while the jaws closed"
             )
@@ -64,6 +66,12 @@ def close_gently(arm: Arm, speed_m_s: float, force_N: float) -> Motion[GripperSt
                     side * room * y_B, PACE * speed_m_s, guard=_until_released(side), check=False, what="give way"
                 )
     return watch.state()
+
+
+def let_go(arm: Arm, opening_m: float) -> Motion[None]:
+    """Open the jaws to `opening_m`, slowly until they are off what they held."""
+    yield from arm.jaws(opening_m, speed_m_s=LETTING_GO_M_S, timeout_s=LETTING_GO_S)
+    yield from arm.jaws(opening_m, speed_m_s=OPENING_M_S)
 
 
 def _until_released(side: float) -> Callable[[Observation], str | None]:

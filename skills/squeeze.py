@@ -9,7 +9,7 @@ from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefu
 from glotouch_bt.touch import Candidate, Layer, TouchSequence, TouchSet, make_layer
 from skills.allowance import keeping_clear_of
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
-from skills.closing import close_gently
+from skills.closing import close_gently, let_go
 from skills.hand import glide, hand_pose_B
 from skills.squeeze_plan import Stance, plan_stances
 
@@ -129,7 +129,7 @@ class Squeeze(Skill):
             except MotionRefused as refusal:  # what slopes or stands free here does so higher up, too
                 self.event("note", text=f"a closure {height * 1e3:.0f} mm above the floor was given up: {refusal}")
                 break
-            yield from arm.jaws(at.opening_m, speed_m_s=0.2)
+            yield from let_go(arm, at.opening_m)
         yield from arm.line(above, p.travel_speed_m_s, check=False)
         return TouchSequence(np.asarray(position), yaw_K, tuple(layers))
 

@@ -1,0 +1,61 @@
+"""Closing on a springy post that cannot slide: where the hand ends, and how hard it was pressed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from backends.rizon4 import RIZON4_XENSE
+from glotouch_bt.robot import MotionRefused, Pose
+from glotouch_bt.robot.fake import FakeRobot
+from skills.closing import GIVE_UP_N, YIELD_N, close_gently
+
+STIFFNESS_N_M = 2500.0
+"""Of a standing object pushed sideways by one jaw, as MuJoCo showed it (1.5 N in 0.6 mm)."""
+WIDTH_M, SPEED_M_S = 0.030, 0.03
+
+
+class Post(FakeRobot):
+    """A post `off_m` along y_P from the hand's first place; pushes the hand up by `up_N_m` per metre it is pushed."""
+
+    def __init__(self, off_m: float, up_N_m: float = 0.0) -> None:
+        self.off_m, self.up_N_m = off_m, up_N_m
+        self.middle_B = None
+        self.felt_N: list[float] = []
+        super().__init__(RIZON4_XENSE, wrench=self._pushed, grip_width_m=WIDTH_M)
+
+    def _pushed(self, stamp, position, quat):
+        y_B = Pose(position[-1], quat[-1]).rotation[:, 1]
+        if self.middle_B is None:
+            self.middle_B = position[-1] + self.off_m * y_B
+        away = (self.middle_B - position) @ y_B
+        into = [np.maximum(s * away + 0.5 * WIDTH_M - 0.5 * self._aperture, 0.0) for s in (1.0, -1.0)]
+        out = np.zeros((len(position), 6))
+        out[:, 1] = STIFFNESS_N_M * (into[0] - into[1])
+        out[:, 2] = -self.up_N_m * np.maximum(*into)
+        self.felt_N += list(np.linalg.norm(out[:, :3], axis=1))
+        return out
+
+
+@settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(off_mm=st.floats(-12.0, 12.0))
+def test_the_hand_comes_to_the_post(bench, world, off_mm: float) -> None:
+    robot = Post(off_mm * 1e-3)
+    b = bench().on(world, robot)
+    state = b.go(close_gently(b.arm, SPEED_M_S, 10.0))
+    assert state.aperture_m == pytest.approx(WIDTH_M, abs=1e-4)
+    y_B = b.arm.pose_B_P.rotation[:, 1]
+    rest = abs((robot.middle_B - b.arm.pose_B_P.position_m) @ y_B)
+    assert rest * STIFFNESS_N_M <= YIELD_N + 1.0
+    assert max(robot.felt_N) < 8.0, "without giving way 12 mm would be 30 N"
+
+
+def test_what_presses_the_hand_away_ends_the_closure(bench, world) -> None:
+    robot = Post(0.002, up_N_m=40e3)
+    b = bench().on(world, robot)
+    with pytest.raises(MotionRefused, match="pressed"):
+        b.go(close_gently(b.arm, SPEED_M_S, 10.0))
+    assert max(robot.felt_N) < 1.3 * GIVE_UP_N
+    assert b.arm.aperture_m == pytest.approx(RIZON4_XENSE.gripper.stroke_m, abs=1e-3)
