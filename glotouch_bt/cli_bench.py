@@ -45,7 +45,16 @@ def _check(conditions: str, backend: str) -> None:
 
 
 def _folder(out: Path | None, name: str) -> Path:
-    return out or Path("runs") / f"{time.strftime('%Y%m%d-%H%M%S')}-bench-{name}"
+    """Where the experiment's files go; nothing is left there yet.
+
+    Raises:
+        BadInput: No file can be written there.
+    """
+    from glotouch_bt.study.run_folder import RunFolder
+
+    folder = out or Path("runs") / f"{time.strftime('%Y%m%d-%H%M%S')}-bench-{name}"
+    RunFolder(folder).abandon()
+    return folder
 
 
 @bench.command()

@@ -105,8 +105,8 @@ def print_search(summary: dict[str, Any], folder: Path) -> None:
         for name, f in summary["paper"].items()
     ]  # fmt: skip
     print_table(
-        f"search, {summary['conditions']}, {summary['objects']} objects",
-        ("policy", "layouts", "at 1 m", "at 3 m", "at 5 m", "all at 3 m", "all at 5 m"),
+        f"found of {summary['objects']} after 1, 3, 5 m of travel on n layouts, {summary['conditions']}",
+        ("policy", "n", "at 1 m", "at 3 m", "at 5 m", "all at 3 m", "all at 5 m"),
         rows,
     )
     if summary["candidates"]:
@@ -133,7 +133,7 @@ def print_contact(summary: dict[str, Any], folder: Path) -> None:
     head: list[str] = ["mean [95 %]"]
     columns = []
     for tool in TOOLS:
-        head += [tool, f"{tool}, paper", f"{tool}, square free"]
+        head += [tool, "paper", "free"]
         columns.append((summary[tool], summary["paper"][tool], summary["free"][tool]))
     rows = [
         (metric, *(c for fixed, paper, free in columns
