@@ -20,8 +20,8 @@ PACE = 0.75
 """Speed of giving way against the closing speed; half of it would only keep the jaw that touches where it is."""
 LEAST_STEP_M = 0.0005
 TIMEOUT_S = 4.0
-LETTING_GO_M_S, LETTING_GO_S, OPENING_M_S = 0.03, 0.08, 0.2
-"""Speed and time of the first of opening, and the speed of the rest: an object held askew springs back."""
+LETTING_GO_M_S, LET_GO_M, LETTING_GO_S, OPENING_M_S = 0.04, 0.003, 0.3, 0.2
+"""Opening begins slowly until the jaws are so much farther apart, or so long: what is held askew springs back."""
 
 
 def close_gently(arm: Arm, speed_m_s: float, force_N: float) -> Motion[GripperState]:
@@ -70,7 +70,12 @@ def close_gently(arm: Arm, speed_m_s: float, force_N: float) -> Motion[GripperSt
 
 def let_go(arm: Arm, opening_m: float) -> Motion[None]:
     """Open the jaws to `opening_m`, slowly until they are off what they held."""
-    yield from arm.jaws(opening_m, speed_m_s=LETTING_GO_M_S, timeout_s=LETTING_GO_S)
+    held = arm.aperture_m
+    yield from arm.jaws(opening_m, speed_m_s=LETTING_GO_M_S, timeout_s=arm.period_s)
+    for _ in range(round(LETTING_GO_S / arm.period_s)):
+        if arm.aperture_m > held + LET_GO_M:
+            break
+        yield from arm.hold(arm.period_s)
     yield from arm.jaws(opening_m, speed_m_s=OPENING_M_S)
 
 

@@ -32,6 +32,7 @@ class ExploringSpeeds:
     step_m_s: float = 0.05
     probe_m_s: float = 0.03
     travel_m_s: float = 0.10
+    lower_m_s: float = 0.02
     height_m: float = 0.018
     headroom_m: float = 0.13
 
@@ -127,7 +128,7 @@ class Explorer:
         if np.linalg.norm(goal_K_m - tip[:2]) > 0.002:
             above = max(float(tip[2]), self._tool.floor_z_K_m + s.headroom_m)
             yield from self._prober.hop(np.array([*goal_K_m, 0.0]), above, s.travel_m_s)
-        probed = yield from self._prober.move(np.array([*goal_K_m, self._height_m]), s.sweep_m_s)
+        probed = yield from self._prober.move(np.array([*goal_K_m, self._height_m]), s.lower_m_s)
         if probed.contact is not None:
             yield from self._prober.retreat(np.array([0.0, 0.0, 1.0]), OFF_TOP_M, s.step_m_s)
             return probed.contact, np.zeros((0, 3))

@@ -23,10 +23,10 @@ class OrbitProbeParams(SkillParams):
         "Enough is known when the centre's standard deviation is below this", unit="m", default=0.0010, gt=0.0, le=0.02
     )
     radial_sd_m: float = param(
-        "... and the outline's, in every direction, below this", unit="m", default=0.0035, gt=0.0, le=0.03
+        "... and the outline's, in every direction, below this", unit="m", default=0.006, gt=0.0, le=0.03
     )
     least_contacts: int = param("Fewest contacts, whatever the covariance says", default=4, ge=3, le=60)
-    most_contacts: int = param("Most contacts", default=14, ge=3, le=60)
+    most_contacts: int = param("Most contacts", default=6, ge=3, le=60)
     orbit_speed_m_s: float = param("Speed beside the object", unit="m/s", default=0.05, gt=0.0, le=0.08)
     probe_speed_m_s: float = param("Probing speed", unit="m/s", default=0.03, gt=0.0, le=0.06)
     height_m: float = param("Ball centre above the floor while tracing", unit="m", default=0.018, ge=0.009, le=0.06)
@@ -38,7 +38,8 @@ class OrbitProbe(Skill):
     """From one contact to a candidate: centre, outline, how far it was pushed. Its height is touched by `touch_top`.
 
     Contacts are made where the outline is least known for the way there, until the fit's covariance is small enough.
-    A contact that cannot belong to the object is set aside.
+    A contact that cannot belong to the object is set aside. The defaults give a coarse outline, so that the next object
+    is found soon; `refine_outline` makes it exact once all are found.
 
     SUCCESS: a new candidate was added to `candidates`, and its envelope to the map's exclusions.
     FAILURE `known_object`: the contact belongs to an object traced before; its place is dropped from the search.

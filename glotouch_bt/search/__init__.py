@@ -9,7 +9,7 @@ from glotouch_bt.search.policies import POLICIES, search_policy
 from glotouch_bt.search.policy import SearchPolicy, Stretch
 from glotouch_bt.search.routes import Routes, segment_is_free
 from glotouch_bt.search.seeking import Sought, seek
-from glotouch_bt.search.tracing import Trace, TraceParams, trace
+from glotouch_bt.search.tracing import Trace, TraceParams, trace, trace_more
 
 __all__ = [
     "PAPER_PASSES",
@@ -35,4 +35,5 @@ __all__ = [
     "admit",
     "segment_is_free",
     "trace",
+    "trace_more",
 ]

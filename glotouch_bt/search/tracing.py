@@ -83,6 +83,7 @@ class Trace:
         path_K_m: (n, 2) where the ball has been at sensing height.
         strays: Contacts that belong to something else.
         ended: Why no more probes were made.
+        missing: It was not met where it had been traced.
     """
 
     contacts: tuple[Contact, ...]
@@ -91,6 +92,7 @@ class Trace:
     path_K_m: Array
     strays: tuple[Contact, ...] = ()
     ended: str = ""
+    missing: bool = False
 
     @property
     def contour(self) -> Contour | None:
@@ -189,6 +191,17 @@ class _State:
         far = np.linalg.norm(path[:, None] - touched[None], axis=2).min(axis=1) > NEAR_CONTACT_M
         return np.asarray(path[far])
 
+    def trace(self, outline: OutlineBelief, ended: str) -> Trace:
+        """All of it."""
+        return Trace(
+            self.present(),
+            outline,
+            np.sum([c.pushed_K_m for c in self.raw], axis=0),
+            np.concatenate(self.paths) if self.paths else np.zeros((0, 2)),
+            tuple(self.strays),
+            ended,
+        )
+
     def felt(self, felt: Felt) -> None:
         """Take note of a move."""
         self.tip = np.asarray(felt.tip_K_m)
@@ -219,6 +232,64 @@ def trace(
     half = np.full(2, np.inf) if half_extent_m is None else np.asarray(half_extent_m, dtype=np.float64)
     s = _State(np.asarray(tip_K_m, dtype=np.float64)[:2], tip_radius_m, round_tip, [first], half)
     yield from _retreat(s, p)
+    return (yield from _until_known(s, p))
+
+
+def trace_more(
+    known: tuple[Contact, ...],
+    tip_K_m: Array,
+    tip_radius_m: float,
+    params: TraceParams | None = None,
+    *,
+    round_tip: bool = True,
+    half_extent_m: Array | None = None,
+) -> Plan[Trace]:
+    """Go on tracing what was traced before, from above: come down where the outline is least certain.
+
+    Args:
+        known: Its contacts, where it stands now.
+        tip_K_m, tip_radius_m, params, round_tip, half_extent_m: As for `trace`; the ball may be raised.
+    """
+    p = params or TraceParams()
+    half = np.full(2, np.inf) if half_extent_m is None else np.asarray(half_extent_m, dtype=np.float64)
+    still = [replace(c, pushed_K_m=np.zeros(2)) for c in known]
+    s = _State(np.asarray(tip_K_m, dtype=np.float64)[:2], tip_radius_m, round_tip, still, half)
+    outline = s.outline()
+    if _enough(outline, s, p):
+        return s.trace(outline, "the outline is known")
+    bearings = _bearings()
+    distance, sd = s.ring(outline, bearings, p)
+    ring = distance + p.clearance_m + np.minimum(2.0 * sd, p.widest_margin_m)
+    places = outline.centre_K_m + ring[:, None] * np.column_stack([np.cos(bearings), np.sin(bearings)])
+    within = np.all(np.abs(places) <= s.half, axis=1)
+    for i in _apart(np.where(within, sd, -1.0), p.misses):
+        felt = yield Move("hop", places[i])
+        s.felt(felt)
+        if felt.refused or felt.contact is not None:
+            continue
+        felt = yield Move("probe", outline.centre_K_m + INSIDE_M * (places[i] - outline.centre_K_m) / ring[i])
+        s.felt(felt)
+        if felt.contact is not None and s.belongs(outline, felt.contact, p):
+            s.raw.append(felt.contact)
+            yield from _retreat(s, p)
+            return (yield from _until_known(s, p))
+    return replace(s.trace(outline, "it was not met again"), missing=True)
+
+
+def _apart(worth: Array, n: int) -> list[int]:
+    """Indices of up to n bearings of the most worth, none next to another; those below zero left out."""
+    chosen: list[int] = []
+    for i in np.argsort(-worth, kind="stable"):
+        gaps = [min(abs(int(i) - j), BEARINGS - abs(int(i) - j)) for j in chosen]
+        if worth[i] >= 0 and all(g >= BEARINGS // 12 for g in gaps):
+            chosen.append(int(i))
+        if len(chosen) == n:
+            break
+    return chosen
+
+
+def _until_known(s: _State, p: TraceParams) -> Plan[Trace]:
+    """Probe on until enough is known, from beside the object."""
     outline, missed, ended = s.outline(), 0, ""
     while not ended:
         ended = _enough(outline, s, p)
@@ -249,14 +320,7 @@ def trace(
         if missed > p.misses:
             ended = f"{missed} probes in a row told nothing"
         outline = s.outline()
-    return Trace(
-        s.present(),
-        outline,
-        np.sum([c.pushed_K_m for c in s.raw], axis=0),
-        np.concatenate(s.paths) if s.paths else s.tip[None],
-        tuple(s.strays),
-        ended,
-    )
+    return s.trace(outline, ended)
 
 
 def _retreat(s: _State, p: TraceParams) -> Plan[None]:

@@ -95,10 +95,16 @@ def errors(found: Found, i: int, layout: TrueLayout) -> dict[str, Any]:
     }
 
 
-def score(found: Sequence[Found], layout: TrueLayout) -> dict[str, Any]:
-    """`discovered_m` (travel at each object's discovery), `false_candidates`, and `candidates` (errors of each)."""
+def score(found: Sequence[Found], layout: TrueLayout, measured: Sequence[Found] | None = None) -> dict[str, Any]:
+    """`discovered_m` (travel at each object's discovery), `false_candidates`, and `candidates` (errors of each).
+
+    Args:
+        found: As they were when discovered: this says whose they are.
+        layout: The truth.
+        measured: As they were at the end, in the same order; the errors are theirs. None: the same.
+    """
     whose = assign(found, layout)
-    real = [(f, i) for f, i in zip(found, whose, strict=True) if i is not None]
+    real = [(f, i) for f, i in zip(measured or found, whose, strict=True) if i is not None]
     return {
         "discovered_m": sorted(f.travel_m for f, _ in real),
         "false_candidates": len(found) - len(real),

@@ -93,11 +93,15 @@ def score_run(record: RunRecord, sections: dict[str, FeltSection]) -> dict[str, 
     heights = {e.data["candidate"]: float(e.data["height_m"]) for e in record.of_kind("top")}
     # An object traced in parts counts from its last part on; what only measures its height comes later still.
     last: dict[int, tuple[float, Any]] = {}
+    final: dict[int, Any] = {}
     for e in record.of_kind("candidate"):
+        index = int(e.data["candidate"]["index"])
+        final[index] = e.data["candidate"]
         if "displaced_m" in e.data:
-            last[int(e.data["candidate"]["index"])] = (e.stamp_s, e.data["candidate"])
+            last[index] = (e.stamp_s, e.data["candidate"])
     found = [_found(way.travel_m(stamp), c, heights.get(i)) for i, (stamp, c) in sorted(last.items())]
-    row = score(found, layout)
+    measured = [_found(f.travel_m, final[i], heights.get(i)) for f, i in zip(found, sorted(last), strict=True)]
+    row = score(found, layout, measured)
     row["contacts"] = sum(len(c["contacts"]) for _, c in last.values())
     row["contact_gap_mm"] = _gaps(record, layout)
     return row | {"travel_m": way.total_m, "before_m": way.before_m, "start_K_m": way.start_K_m}
