@@ -3,7 +3,7 @@ import pytest
 
 from glotouch_bt.robot import ParamError
 from glotouch_bt.search import SearchMap
-from glotouch_bt.touch import Contour
+from glotouch_bt.touch import Contact, Contour
 
 DISC = Contour("round", np.array([0.05, 0.0]), (0.06, 0.06), 0.0, 0.0, np.zeros(0))
 
@@ -67,3 +67,23 @@ def test_bad_values_are_refused():
         blank().with_exclusion(DISC, -1.0)
     with pytest.raises(ParamError, match="points_K_m"):
         blank().with_path([[np.nan, 0.0]])
+
+
+def test_an_obstacle_is_kept_clear_of_and_is_no_object():
+    belief = blank().with_obstacle([0.05, 0.02], 0.012)
+    points = np.array([[0.05, 0.02], [0.05, 0.0319], [0.05, 0.0321]])
+    np.testing.assert_array_equal(belief.inside_exclusion(points), [True, True, False])
+    np.testing.assert_allclose(belief.clearance(points), [-0.012, -0.0001, 0.0001], atol=1e-9)
+    assert (belief.found, belief.complete) == (0, False)
+    for radius in (0.0, -0.01, np.nan, np.inf):
+        with pytest.raises(ParamError, match="radius_m"):
+            blank().with_obstacle([0.0, 0.0], radius)
+
+
+def test_hints_are_those_given_last():
+    up = np.array([0.0, 0.0, 1.0])
+    one, two = (Contact(t, np.zeros(3), -up, up, np.zeros(2), 1.0) for t in (1.0, 2.0))
+    belief = blank().with_hints((one,))
+    assert belief.with_path([[0.0, 0.0]]).hints == (one,)
+    assert belief.with_hints((two, one)).hints == (two, one)
+    assert belief.hints == (one,)

@@ -1,0 +1,98 @@
+"""Tracing driven through planar worlds whose outlines are known in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from glotouch_bt.search import Felt, Move, Trace, TraceParams, trace
+from glotouch_bt.study.planar import PlanarWorld
+from glotouch_bt.study.planar.drive import drive
+from glotouch_bt.touch import Contact
+
+from .conftest import TIP, WorldOf, box, cylinder
+
+CENTRE = np.array([0.02, -0.03])
+INNER = np.array([0.138, 0.188])
+
+
+def touched_from(world: PlanarWorld, angle: float) -> Contact:
+    """The first contact: straight towards the first object from a direction."""
+    out = np.array([np.cos(angle), np.sin(angle)])
+    centre = world.centres_K_m()[0]
+    world.lowered, world.tip_K_m = True, centre + 0.085 * out
+    felt = world.execute(Move("sweep", centre))
+    assert felt.contact is not None
+    return felt.contact
+
+
+def traced(world: PlanarWorld, first: Contact, params: TraceParams | None = None) -> Trace:
+    return drive(trace(first, world.tip_K_m, TIP, params, half_extent_m=INNER), world)
+
+
+@pytest.mark.parametrize("radius", [0.02, 0.03, 0.04])
+@pytest.mark.parametrize("angle", [0.3, 2.5, -1.9])
+def test_a_disc_is_where_it_is_and_as_large(world_of: WorldOf, radius: float, angle: float) -> None:
+    world = world_of([cylinder(radius)], [(*CENTRE, 0)])
+    result = traced(world, touched_from(world, angle))
+    assert result.contour is not None
+    assert result.contour.family == "circle"
+    # in the world's own words: contacts are exact, the object stands where it is now
+    np.testing.assert_allclose(result.contour.centre_K_m, world.centres_K_m()[0], atol=3e-4)
+    assert result.contour.size_m[0] == pytest.approx(2 * radius, abs=6e-4)
+    assert TraceParams().least_contacts <= len(result.contacts) <= TraceParams().most_contacts
+    assert result.strays == ()
+    assert result.ended
+    assert np.linalg.norm(result.displaced_K_m - (world.centres_K_m()[0] - CENTRE)) < 5e-4
+
+
+def test_a_box_is_traced_within_its_bounds(world_of: WorldOf) -> None:
+    world = world_of([box(0.09, 0.05)], [(*CENTRE, 0.4)])
+    result = traced(world, touched_from(world, 1.2))
+    assert result.contour is not None
+    np.testing.assert_allclose(result.contour.centre_K_m, world.centres_K_m()[0], atol=2e-3)
+    np.testing.assert_allclose(sorted(result.contour.size_m), [0.05, 0.09], atol=5e-3)
+    assert len(result.contacts) <= TraceParams().most_contacts
+
+
+def test_the_most_contacts_are_a_bound(world_of: WorldOf) -> None:
+    world = world_of([cylinder(0.03)], [(*CENTRE, 0)])
+    params = TraceParams(centre_sd_m=1e-9, radial_sd_m=1e-9, least_contacts=3, most_contacts=6)
+    assert len(traced(world, touched_from(world, 0.0), params).contacts) == 6
+
+
+def test_what_has_gone_ends_with_few_contacts(world_of: WorldOf) -> None:
+    world = world_of([cylinder(0.03)], [(*CENTRE, 0)])
+    first = touched_from(world, 0.7)
+    world.poses[0, :2] = (-0.1, 0.14)
+    result = traced(world, first)
+    assert len(result.contacts) < 3
+    assert result.ended
+    assert world.travel_m < 2.5
+
+
+def test_a_contact_that_faces_the_middle_is_with_something_else(world_of: WorldOf) -> None:
+    """On the way round something pushes the ball towards what is traced: no surface of its own can."""
+
+    class Intruded:
+        met: Contact | None = None
+
+        def execute(self, move: Move) -> Felt:
+            felt = world.execute(move)
+            if self.met is not None or move.kind != "step" or felt.contact is not None:
+                return felt
+            towards = CENTRE - felt.tip_K_m
+            away = -np.array([*towards, 0.0]) / np.linalg.norm(towards)
+            tip = np.array([*felt.tip_K_m, 0.018])
+            self.met = Contact(1.0, tip, away, -away, felt.tip_K_m + TIP * away[:2], 1.0)
+            return replace(felt, contact=self.met)
+
+    world, intruded = world_of([cylinder(0.03)], [(*CENTRE, 0)]), Intruded()
+    first = touched_from(world, np.pi)
+    result = drive(trace(first, world.tip_K_m, TIP, half_extent_m=INNER), intruded)
+    assert intruded.met is not None
+    assert [s is intruded.met for s in result.strays] == [True]
+    assert result.contour is not None
+    np.testing.assert_allclose(result.contour.centre_K_m, world.centres_K_m()[0], atol=5e-4)
