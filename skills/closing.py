@@ -29,7 +29,8 @@ def close_gently(arm: Arm, speed_m_s: float, force_N: float) -> Motion[GripperSt
 
     What stands high or is held below cannot slide between the jaws as it does near the floor: a jaw that met it first
     would tilt it and press ever harder. So the hand follows the force along y_P, never farther than the jaws have
-    closed: the fingers stay within the room they had when open.
+    closed: the fingers stay within the room they had when open. The jaws are coupled: one that pushes alone passes
+    twice the reported jaw force on to the hand; where less arrives, both of them touch.
 
     Args:
         arm: At rest, jaws open; its hand points down.
@@ -56,7 +57,7 @@ def close_gently(arm: Arm, speed_m_s: float, force_N: float) -> Motion[GripperSt
             raise MotionRefused(
                 "closing", f"the hand was pressed with {np.linalg.norm(force):.0f} N while the jaws closed"
             )
-        if seen.gripper.moving and abs(force[1]) > YIELD_N:
+        if seen.gripper.moving and abs(force[1]) > max(YIELD_N, seen.gripper.force_N):
             side = float(np.sign(force[1]))
             y_B = np.asarray(arm.pose_B_P.rotation[:, 1])
             given = side * float((arm.pose_B_P.position_m - start_B) @ y_B)
@@ -84,7 +85,8 @@ def _until_released(side: float) -> Callable[[Observation], str | None]:
         force = _force_P(seen)
         if not np.linalg.norm(force) <= GIVE_UP_N:
             return "pressed"
-        return "released" if side * force[1] < RELEASED_N else None
+        both = seen.gripper.force_N > max(YIELD_N, side * force[1])
+        return "released" if both or side * force[1] < RELEASED_N else None
 
     return guard
 

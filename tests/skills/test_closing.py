@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from backends.rizon4 import RIZON4_XENSE
-from glotouch_bt.robot import MotionRefused, Pose
+from glotouch_bt.robot import Array, MotionRefused, Pose, World
 from glotouch_bt.robot.fake import FakeRobot
 from skills.closing import GIVE_UP_N, YIELD_N, close_gently
 
@@ -22,11 +24,11 @@ class Post(FakeRobot):
 
     def __init__(self, off_m: float, up_N_m: float = 0.0) -> None:
         self.off_m, self.up_N_m = off_m, up_N_m
-        self.middle_B = None
+        self.middle_B: Array | None = None
         self.felt_N: list[float] = []
         super().__init__(RIZON4_XENSE, wrench=self._pushed, grip_width_m=WIDTH_M)
 
-    def _pushed(self, stamp, position, quat):
+    def _pushed(self, stamp: Array, position: Array, quat: Array) -> Array:
         y_B = Pose(position[-1], quat[-1]).rotation[:, 1]
         if self.middle_B is None:
             self.middle_B = position[-1] + self.off_m * y_B
@@ -41,18 +43,19 @@ class Post(FakeRobot):
 
 @settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(off_mm=st.floats(-12.0, 12.0))
-def test_the_hand_comes_to_the_post(bench, world, off_mm: float) -> None:
+def test_the_hand_comes_to_the_post(bench: Any, world: World, off_mm: float) -> None:
     robot = Post(off_mm * 1e-3)
     b = bench().on(world, robot)
     state = b.go(close_gently(b.arm, SPEED_M_S, 10.0))
     assert state.aperture_m == pytest.approx(WIDTH_M, abs=1e-4)
     y_B = b.arm.pose_B_P.rotation[:, 1]
+    assert robot.middle_B is not None
     rest = abs((robot.middle_B - b.arm.pose_B_P.position_m) @ y_B)
     assert rest * STIFFNESS_N_M <= YIELD_N + 1.0
     assert max(robot.felt_N) < 8.0, "without giving way 12 mm would be 30 N"
 
 
-def test_what_presses_the_hand_away_ends_the_closure(bench, world) -> None:
+def test_what_presses_the_hand_away_ends_the_closure(bench: Any, world: World) -> None:
     robot = Post(0.002, up_N_m=40e3)
     b = bench().on(world, robot)
     with pytest.raises(MotionRefused, match="pressed"):
