@@ -1,4 +1,4 @@
-"""Explorations that cannot end as expected end all the same, with the reason: in MuJoCo, from the command line's words."""
+"""Explorations that cannot end as expected end all the same, with the reason; in MuJoCo, from words."""
 
 from __future__ import annotations
 
