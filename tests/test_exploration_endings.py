@@ -1,4 +1,4 @@
-"""Explorations that cannot end as expected end all the same, with the reason; in MuJoCo, from words."""
+"""Explorations that cannot end as expected end all the same, with the reason: in MuJoCo, as from the command line."""
 
 from __future__ import annotations
 
