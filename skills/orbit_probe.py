@@ -20,13 +20,13 @@ class OrbitProbeParams(SkillParams):
 
     clearance_m: float = param("Ball to outline while going round", unit="m", default=0.005, ge=0.003, le=0.03)
     centre_sd_m: float = param(
-        "Enough is known when the centre's standard deviation is below this", unit="m", default=0.0010, gt=0.0, le=0.02
+        "Enough is known when the centre's standard deviation is below this", unit="m", default=0.005, gt=0.0, le=0.02
     )
     radial_sd_m: float = param(
-        "... and the outline's, in every direction, below this", unit="m", default=0.006, gt=0.0, le=0.03
+        "... and the outline's, in every direction, below this", unit="m", default=0.02, gt=0.0, le=0.03
     )
-    least_contacts: int = param("Fewest contacts, whatever the covariance says", default=4, ge=3, le=60)
-    most_contacts: int = param("Most contacts", default=6, ge=3, le=60)
+    least_contacts: int = param("Fewest contacts, whatever the covariance says", default=5, ge=3, le=60)
+    most_contacts: int = param("Most contacts", default=9, ge=3, le=60)
     orbit_speed_m_s: float = param("Speed beside the object", unit="m/s", default=0.05, gt=0.0, le=0.08)
     probe_speed_m_s: float = param("Probing speed", unit="m/s", default=0.03, gt=0.0, le=0.06)
     height_m: float = param("Ball centre above the floor while tracing", unit="m", default=0.018, ge=0.009, le=0.06)
