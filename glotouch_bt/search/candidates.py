@@ -8,7 +8,7 @@ import numpy as np
 
 from glotouch_bt.robot import Array
 from glotouch_bt.search.map import SearchMap
-from glotouch_bt.search.tracing import Trace
+from glotouch_bt.search.trace_state import Trace
 from glotouch_bt.touch import Candidate, Contact, believe_outline, contour_quality, envelope, signed_distance
 
 LEAST_CONTACTS = 3
