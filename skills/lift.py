@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from glotouch_bt.motion import Motion
-from glotouch_bt.robot import Array
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from skills.weighing import weigh_N
 
 
 class LiftParams(SkillParams):
@@ -34,9 +33,8 @@ class Lift(Skill):
         """See the class."""
         arm, p = self.context.arm, self.params
         yield from arm.shift(np.array([0.0, 0.0, p.height_m]), p.speed_m_s, check=False)
-        after = yield from self._force_B()
+        weight = yield from weigh_N(arm)
         state = self.context.observation.gripper
-        weight = -float(after[2])
         self.event("lift", weight_N=weight, aperture_m=state.aperture_m)
         if weight < p.least_weight_N or state.aperture_m < p.least_aperture_m:
             raise SkillFailed(
@@ -47,9 +45,3 @@ class Lift(Skill):
                 aperture_m=state.aperture_m,
             )
         self.weight_N = weight
-
-    def _force_B(self) -> Motion[Array]:
-        """Mean tared force (3,) in B over a short rest; the tare was taken with the hand empty and pointing down."""
-        blocks = yield from self.context.arm.hold(0.3)
-        wrench = np.concatenate([b.wrench_S[:, :3] for b in blocks]).mean(axis=0)
-        return np.asarray(self.context.arm.pose_B_P.rotation @ wrench)

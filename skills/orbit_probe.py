@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from glotouch_bt.search import Move, Plan, SearchMap, TraceParams, admit, trace
+from glotouch_bt.search import Move, Plan, SearchMap, admit, trace
 from glotouch_bt.touch import Candidate, Contact
-from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
-from skills.exploring import Explorer, ExploringSpeeds
+from skills.base import In, Out, Skill, SkillFailed, SkillRun, param
+from skills.exploring import Explorer
 from skills.held_tool import HeldTool
+from skills.tracing_params import TracingParams
 
 NEAR_M = 0.015
 """Farther than this from the first contact the ball goes back to it from above: a trace that was broken off may have
 left it on the object's other side."""
 
 
-class OrbitProbeParams(SkillParams):
-    """Parameters of `orbit_probe`."""
+class OrbitProbeParams(TracingParams):
+    """Parameters of `orbit_probe`: a coarse outline, so that the next object is found soon."""
 
-    clearance_m: float = param("Ball to outline while going round", unit="m", default=0.005, ge=0.003, le=0.03)
     centre_sd_m: float = param(
         "Enough is known when the centre's standard deviation is below this", unit="m", default=0.005, gt=0.0, le=0.02
     )
@@ -27,9 +27,6 @@ class OrbitProbeParams(SkillParams):
     )
     least_contacts: int = param("Fewest contacts, whatever the covariance says", default=5, ge=3, le=60)
     most_contacts: int = param("Most contacts", default=9, ge=3, le=60)
-    orbit_speed_m_s: float = param("Speed beside the object", unit="m/s", default=0.05, gt=0.0, le=0.08)
-    probe_speed_m_s: float = param("Probing speed", unit="m/s", default=0.03, gt=0.0, le=0.06)
-    height_m: float = param("Ball centre above the floor while tracing", unit="m", default=0.018, ge=0.009, le=0.06)
     exclusion_m: float = param("Margin round a traced object that the search keeps out of", unit="m", default=0.010,
                                ge=0.0, le=0.05)  # fmt: skip
 
@@ -41,7 +38,7 @@ class OrbitProbe(Skill):
     A contact that cannot belong to the object is set aside. The defaults give a coarse outline, so that the next object
     is found soon; `refine_outline` makes it exact once all are found.
 
-    SUCCESS: a new candidate was added to `candidates`, and its envelope to the map's exclusions.
+    SUCCESS: `candidates` has a new one, or knows one better that was traced in part; the map keeps out of its envelope.
     FAILURE `known_object`: the contact belongs to an object traced before; its place is dropped from the search.
     FAILURE `not_traced`: too few contacts were made to fit an outline.
     FAILURE `hard_contact`: the wrench passed a hard limit on the way.
@@ -67,22 +64,14 @@ class OrbitProbe(Skill):
         if bool(belief.inside_exclusion(first.tip_K_m[None, :2])[0]):
             self.map = belief.with_dropped(first.point_K_m)
             raise SkillFailed("known_object", "the contact lies on an object that is traced already")
-        speeds = ExploringSpeeds(step_m_s=p.orbit_speed_m_s, probe_m_s=p.probe_speed_m_s, height_m=p.height_m)
-        explorer = Explorer(self.context, self.tool, speeds, self.event)
+        explorer = Explorer(self.context, self.tool, p.speeds(), self.event)
         if float(np.linalg.norm(explorer.tip_K_m - first.tip_K_m[:2])) > NEAR_M:
             yield from explorer.run(_back_to(first, p.clearance_m))
-        params = TraceParams(
-            clearance_m=p.clearance_m,
-            centre_sd_m=p.centre_sd_m,
-            radial_sd_m=p.radial_sd_m,
-            least_contacts=p.least_contacts,
-            most_contacts=p.most_contacts,
-        )
         plan = trace(
             first,
             explorer.tip_K_m,
             self.tool.tip_radius_m,
-            params,
+            p.rule(),
             round_tip=self.tool.round,
             half_extent_m=belief.half_extent_m,
         )

@@ -6,28 +6,17 @@ import dataclasses
 
 import numpy as np
 
-from glotouch_bt.search import TraceParams, trace_more
+from glotouch_bt.search import trace_more
 from glotouch_bt.touch import Candidate, contour_quality
-from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
-from skills.exploring import Explorer, ExploringSpeeds
+from skills.base import In, Out, Skill, SkillFailed, SkillRun, param
+from skills.exploring import Explorer
 from skills.held_tool import HeldTool
+from skills.tracing_params import TracingParams
 
 
-class RefineOutlineParams(SkillParams):
-    """Parameters of `refine_outline`."""
+class RefineOutlineParams(TracingParams):
+    """Parameters of `refine_outline`; contacts it had before count."""
 
-    clearance_m: float = param("Ball to outline while going round", unit="m", default=0.005, ge=0.003, le=0.03)
-    centre_sd_m: float = param(
-        "Enough is known when the centre's standard deviation is below this", unit="m", default=0.0010, gt=0.0, le=0.02
-    )
-    radial_sd_m: float = param(
-        "... and the outline's, in every direction, below this", unit="m", default=0.004, gt=0.0, le=0.03
-    )
-    most_contacts: int = param("Most contacts, those it had included", default=14, ge=3, le=60)
-    orbit_speed_m_s: float = param("Speed beside the object", unit="m/s", default=0.05, gt=0.0, le=0.08)
-    probe_speed_m_s: float = param("Probing speed", unit="m/s", default=0.03, gt=0.0, le=0.06)
-    lower_speed_m_s: float = param("Speed down beside it", unit="m/s", default=0.02, gt=0.0, le=0.06)
-    height_m: float = param("Ball centre above the floor while tracing", unit="m", default=0.018, ge=0.009, le=0.06)
     wall_gap_m: float = param("Ball centre kept from the walls", unit="m", default=0.012, ge=0.008, le=0.05)
 
 
@@ -49,19 +38,10 @@ class RefineOutline(Skill):
         """See the class."""
         p, tool, before = self.params, self.tool, self.candidate
         self.refined = before
-        speeds = ExploringSpeeds(
-            step_m_s=p.orbit_speed_m_s, probe_m_s=p.probe_speed_m_s, lower_m_s=p.lower_speed_m_s, height_m=p.height_m
-        )
-        explorer = Explorer(self.context, tool, speeds, self.event)
-        params = TraceParams(
-            clearance_m=p.clearance_m,
-            centre_sd_m=p.centre_sd_m,
-            radial_sd_m=p.radial_sd_m,
-            most_contacts=p.most_contacts,
-        )
+        explorer = Explorer(self.context, tool, p.speeds(), self.event)
         half = 0.5 * np.array(self.context.world.container.interior_m[:2]) - p.wall_gap_m
         plan = trace_more(
-            before.contacts, explorer.tip_K_m, tool.tip_radius_m, params, round_tip=tool.round, half_extent_m=half
+            before.contacts, explorer.tip_K_m, tool.tip_radius_m, p.rule(), round_tip=tool.round, half_extent_m=half
         )
         traced = yield from explorer.run(plan)
         if traced.outline is None or len(traced.contacts) == len(before.contacts):

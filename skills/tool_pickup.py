@@ -16,6 +16,7 @@ from skills.hand import easy_yaw
 from skills.held_tool import HeldTool
 from skills.probing import Prober
 from skills.requests import finish
+from skills.weighing import weigh_N
 
 FLOOR_SEARCH_M = 0.005
 """The floor is looked for this far below where the registration puts it."""
@@ -64,7 +65,7 @@ class ToolPickup(Skill):
             yaw = easy_yaw(arm, world.holder.pose_B_grasp.yaw_rad)
             aperture = yield from self._grip(yaw)
             yield from self._rise(0.0)
-            weight_N = yield from self._weight_N()
+            weight_N = yield from weigh_N(arm)
         if weight_N < 0.5 * probe.mass_kg * GRAVITY_M_S2:
             arm.scene.hold_tool(False)
             raise SkillFailed(
@@ -127,12 +128,6 @@ class ToolPickup(Skill):
         up = self.context.world.probe.length_m + 0.06 + short_m
         if up > 1e-4:
             yield from self.context.arm.shift(np.array([0.0, 0.0, up]), self.params.speed_m_s, check=False)
-
-    def _weight_N(self) -> Motion[float]:
-        blocks = yield from self.context.arm.hold(0.2)
-        wrench = np.concatenate([b.wrench_S for b in blocks])[:, :3].mean(axis=0)
-        down_E = self.context.arm.pose_B_P.rotation.T @ np.array([0.0, 0.0, -1.0])
-        return float(wrench @ down_E)
 
     def _feel_floor(self, tool: HeldTool) -> Motion[HeldTool]:
         """Lower the ball in the corner nearest to the holder; a touch far from the nominal floor is not the floor."""

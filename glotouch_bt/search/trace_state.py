@@ -28,12 +28,6 @@ def unit(v: Array) -> Array:
     return scaled
 
 
-def wrapped(a: Array) -> Array:
-    """Angles in [-pi, pi), rad."""
-    turned: Array = (np.asarray(a) + np.pi) % (2 * np.pi) - np.pi
-    return turned
-
-
 @dataclass(frozen=True, kw_only=True)
 class TraceParams:
     """How an outline is traced. Lengths in metres.
@@ -140,6 +134,14 @@ class TraceState:
     strays: list[Contact] = field(default_factory=list)
     blocked: list[float] = field(default_factory=list)
     side: float = 0.0
+
+    @classmethod
+    def begin(
+        cls, contacts: list[Contact], tip_K_m: Array, radius_m: float, round_tip: bool, half_extent_m: Array | None
+    ) -> TraceState:
+        """With the contacts there are; no half extent: no walls near."""
+        half = np.full(2, np.inf) if half_extent_m is None else np.asarray(half_extent_m, dtype=np.float64)
+        return cls(np.asarray(tip_K_m, dtype=np.float64)[:2], radius_m, round_tip, contacts, half)
 
     def present(self) -> tuple[Contact, ...]:
         """The contacts moved to where the object stands now: each by all pushes from its own on."""

@@ -8,9 +8,10 @@ import numpy as np
 
 from glotouch_bt.robot import Array
 from glotouch_bt.search.moves import Move, Plan
-from glotouch_bt.search.trace_state import BEARINGS, Trace, TraceParams, TraceState, all_bearings, unit, wrapped
+from glotouch_bt.search.trace_state import BEARINGS, Trace, TraceParams, TraceState, all_bearings, unit
 from glotouch_bt.touch import Contact
 from glotouch_bt.touch.belief import OutlineBelief
+from glotouch_bt.touch.primitives import wrapped
 
 INSIDE_M = 0.004
 """A probe that came this near to the object's supposed middle has passed through: nothing is there."""
@@ -36,8 +37,7 @@ def trace(
         half_extent_m: (2,) the ball's centre keeps within |x|, |y| of it in K; None: no walls near.
     """
     p = params or TraceParams()
-    half = np.full(2, np.inf) if half_extent_m is None else np.asarray(half_extent_m, dtype=np.float64)
-    s = TraceState(np.asarray(tip_K_m, dtype=np.float64)[:2], tip_radius_m, round_tip, [first], half)
+    s = TraceState.begin([first], tip_K_m, tip_radius_m, round_tip, half_extent_m)
     yield from _retreat(s, p)
     return (yield from _until_known(s, p))
 
@@ -58,9 +58,8 @@ def trace_more(
         tip_K_m, tip_radius_m, params, round_tip, half_extent_m: As for `trace`; the ball may be raised.
     """
     p = params or TraceParams()
-    half = np.full(2, np.inf) if half_extent_m is None else np.asarray(half_extent_m, dtype=np.float64)
-    still = [replace(c, pushed_K_m=np.zeros(2)) for c in known]
-    s = TraceState(np.asarray(tip_K_m, dtype=np.float64)[:2], tip_radius_m, round_tip, still, half)
+    still = [replace(c, pushed_K_m=np.zeros(2)) for c in known]  # they are where the object stands now
+    s = TraceState.begin(still, tip_K_m, tip_radius_m, round_tip, half_extent_m)
     outline = s.outline()
     if _enough(outline, s, p):
         return s.trace(outline, "the outline is known")

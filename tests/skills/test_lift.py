@@ -32,7 +32,7 @@ def test_the_weight_is_what_hangs_in_the_hand(make) -> None:
     begun = len(b.commands)
     b.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message
-    assert skill.weight_N == pytest.approx(2.5, abs=2e-3)
+    assert skill.weight_N == pytest.approx(2.5, abs=1e-9)
     assert float(b.arm.pose_B_P.position_m[2]) == pytest.approx(z + 0.12, abs=1e-6)
     assert all(c.gripper is None for c in b.commands[begun:]), "the jaws are left alone"
 

@@ -27,9 +27,13 @@ def test_a_stance_is_midway_of_what_was_traced_not_of_the_fit(found) -> None:
     """A limb on one side: the jaws stand midway between its tip and the other side."""
     body = found.round((0.0, 0.0), 0.02)
     points = np.vstack([[c.point_K_m for c in body.contacts], [0.0, 0.03]])
-    at = stance(found.traced(0, points, 0.06), 0.0, 0.0, 0.01, STROKE)
-    assert at.position_K_m[1] == pytest.approx(0.5 * (0.03 - 0.02), abs=1e-3)  # the outline drawn round them adds some
-    assert at.opening_m == pytest.approx(0.05 + 0.02, abs=1.5e-3)
+    candidate = found.traced(0, points, 0.06)
+    low, high = candidate.span_m(0.5 * np.pi)
+    assert low == pytest.approx(-0.02, abs=1e-3)  # the outline drawn round the points adds some
+    assert high == pytest.approx(0.03, abs=1e-3)
+    at = stance(candidate, 0.0, 0.0, 0.01, STROKE)
+    assert at.position_K_m[1] == pytest.approx(0.5 * (low + high), abs=1e-9)
+    assert at.opening_m == pytest.approx(high - low + 0.02, abs=1e-9)
 
 
 def test_the_opening_is_no_wider_than_the_stroke_and_what_is_too_wide_has_no_stance(found) -> None:

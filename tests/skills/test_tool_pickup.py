@@ -42,7 +42,7 @@ def test_the_probe_is_held_and_the_floor_felt(make) -> None:
     assert not b.arm.scene._allowed
     assert b.robot.peak_force_N < 5.0
     (event,) = b.of_kind("tool")
-    assert event["weight_N"] == pytest.approx(WEIGHT_N, rel=1e-2)  # the hold begins as the hand stops
+    assert event["weight_N"] == pytest.approx(WEIGHT_N, rel=1e-6)  # the hold begins as the hand stops
 
 
 def test_without_the_touch_the_floor_is_where_it_is_said_to_be(make) -> None:

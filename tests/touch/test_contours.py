@@ -80,13 +80,15 @@ def test_box_reaches_the_optimum_of_a_global_search(bench):
     assert loss([*got.centre_K_m, got.yaw_rad, *got.size_m]) < best.fun + 0.3
 
 
-@pytest.mark.parametrize(("noise", "centre_mm", "right"), [(3e-4, 0.7, 17), (1e-3, 3.0, 14)])
+@pytest.mark.parametrize(("noise", "centre_mm"), [(3e-4, 0.7), (1e-3, 3.0)])
 @pytest.mark.parametrize("size", [(0.04, 0.04), (0.06, 0.045), (0.107, 0.042)])
-def test_traced_rectangles_at_random_poses(bench, size, noise, centre_mm, right):
-    """Centre error and sides of what an orbit-and-probe trace gives; of 20 classes `right` are right.
+def test_traced_rectangles_at_random_poses(bench, size, noise, centre_mm):
+    """Centre error and sides of what an orbit-and-probe trace gives; 17 of 20 classes right.
 
-    A square of 40 mm felt to 1 mm by a ball of 6 mm is hard to tell from something round.
+    But 15 for a 40 mm square felt to 1 mm (twice the nominal scatter): told from something round by its 6 mm corners,
+    it was right in 17 while outlines could only be circles and rectangles.
     """
+    right = 15 if (size, noise) == ((0.04, 0.04), 1e-3) else 17
     rng, boxes, errors, sides = np.random.default_rng(7), 0, [], []
     for _ in range(20):
         yaw, shift = rng.uniform(0, np.pi), rng.uniform(-0.1, 0.1, 2)

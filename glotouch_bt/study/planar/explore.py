@@ -89,7 +89,7 @@ def explore(
         sweep, orbit: Parameters of the skills; their defaults by default.
     """
     sweep, orbit = sweep or GuardedSweepParams(), orbit or OrbitProbeParams()
-    tracing = tracing or trace_params(orbit)
+    tracing = tracing or orbit.rule()
     belief = SearchMap.blank(world.half_m + world.tip_radius_m - sweep.wall_gap_m, expected)
     found: dict[int, Traced] = {}
     candidates: tuple[Candidate, ...] = ()
@@ -112,14 +112,3 @@ def explore(
     except _OutOfBudget:
         ended = "budget"
     return Explored(tuple(found[i] for i in sorted(found)), world.travel_m, ended, belief, untraced)
-
-
-def trace_params(orbit: OrbitProbeParams) -> TraceParams:
-    """As `orbit_probe` makes them."""
-    return TraceParams(
-        clearance_m=orbit.clearance_m,
-        centre_sd_m=orbit.centre_sd_m,
-        radial_sd_m=orbit.radial_sd_m,
-        least_contacts=orbit.least_contacts,
-        most_contacts=orbit.most_contacts,
-    )
