@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
-from glotouch_bt.recognition import Gates, LossParams, PadSpec, Ranking, TargetModel, match, rank
+from glotouch_bt.recognition import MATCHERS, Gates, PadSpec, Ranking, TargetModel
 from glotouch_bt.robot import HOLD, BadInput, ParamError
 from glotouch_bt.robot.meshes import Mesh, load_folder, load_mesh
 from glotouch_bt.touch import TouchSet
@@ -16,6 +17,7 @@ class MatchParams(SkillParams):
     """Parameters of `match`."""
 
     target: str = param("The object to find: an STL file, or the name of one in the world's object folder")
+    matcher: Literal["likelihood", "paper"] = param("How candidates are compared", default="likelihood")
 
 
 class Match(Skill):
@@ -47,9 +49,8 @@ class Match(Skill):
             model = TargetModel.from_mesh(mesh, PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m))
         except ParamError as e:
             raise SkillFailed("too_low", f"{mesh.name} cannot be felt: {e}", advice="sweep lower") from e
-        matches = [match(model, t, LossParams()) for t in touchsets]
         gates = Gates()
-        ranking = rank(matches, gates)
+        ranking = MATCHERS[self.params.matcher](model, touchsets)
         self.ranking = ranking
         self.event("ranking", target=mesh.name, ranking=ranking, gates=gates)
         if not ranking.accepted:

@@ -4,10 +4,26 @@ model = TargetModel.from_mesh(mesh, PadSpec())
 ranking = rank([match(model, touchset, LossParams()) for touchset in touchsets])
 """
 
-from glotouch_bt.recognition.decision import Fit, Gates, Match, Ranking, rank
+from glotouch_bt.recognition.decision import Closure, Fit, Gates, Match, Ranking, rank
 from glotouch_bt.recognition.loss import match
+from glotouch_bt.recognition.matchers import DEFAULT_MATCHER, MATCHERS, Matcher
 from glotouch_bt.recognition.model import TargetModel
 from glotouch_bt.recognition.pads import PadSpec
 from glotouch_bt.recognition.params import LossParams, MatchParams
 
-__all__ = ["Fit", "Gates", "LossParams", "Match", "MatchParams", "PadSpec", "Ranking", "TargetModel", "match", "rank"]
+__all__ = [
+    "DEFAULT_MATCHER",
+    "MATCHERS",
+    "Closure",
+    "Fit",
+    "Gates",
+    "LossParams",
+    "Match",
+    "MatchParams",
+    "Matcher",
+    "PadSpec",
+    "Ranking",
+    "TargetModel",
+    "match",
+    "rank",
+]

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from glotouch_bt.robot import ParamError
+from glotouch_bt.robot import Array, ParamError
+
+ABSENT_LOSS, LOSS_TEMPERATURE = 2.0, 0.2
+"""What a loss is worth as a probability, for matchers that have no better: the loss of "none of these" (the gate), and
+the loss that makes a factor e."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,7 @@ class Match:
         fit: The fitted pose; None if nothing was felt.
         pose_K_O: (x, y, yaw) of the mesh's frame O in K, m and rad; the contour's centre and yaw if nothing was felt.
         evidence: Layers both pads felt; all one-sided layers together add at most 1.
+        probability: That this candidate is the target, given all TouchSets of the ranking; NaN outside a ranking.
     """
 
     index: int
@@ -49,6 +54,26 @@ class Match:
     fit: Fit | None
     pose_K_O: tuple[float, float, float]
     evidence: float
+    probability: float = math.nan
+
+
+@dataclass(frozen=True)
+class Closure:
+    """One closure of the jaws that could be made next.
+
+    Attributes:
+        candidate: Index of the candidate.
+        yaw_K_rad: Direction of x_P in K.
+        height_m: Of the pads' mid-point above the floor.
+        position_K_m: (2,) pads' mid-point in K.
+        gain_nats: Expected information gain over "which candidate, or none, is the target"; NaN if not reckoned.
+    """
+
+    candidate: int
+    yaw_K_rad: float
+    height_m: float
+    position_K_m: Array
+    gain_nats: float = math.nan
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,12 +106,16 @@ class Ranking:
         margin: Second loss minus best loss; infinite for a single candidate that was felt, 0 if nothing was felt.
         accepted: All gates passed.
         reasons: What failed, in words; empty if accepted.
+        p_absent: Probability that none of them is the target; the matches' probabilities and this sum to 1.
+        next_touch: The closure that would help most; None if the matcher cannot tell.
     """
 
     matches: tuple[Match, ...]
     margin: float
     accepted: bool
     reasons: tuple[str, ...] = field(default=())
+    p_absent: float = math.nan
+    next_touch: Closure | None = None
 
     @property
     def best(self) -> Match:
@@ -104,10 +133,11 @@ def rank(matches: Sequence[Match], gates: Gates | None = None) -> Ranking:
     if not matches:
         raise ParamError("matches", len(matches), "at least one")
     order = tuple(sorted(matches, key=lambda m: (m.loss, m.index)))
+    order, p_absent = _with_probabilities(order)
     best = order[0]
     reasons: list[str] = []
     if not math.isfinite(best.loss):
-        return Ranking(order, 0.0, False, ("no evidence: no closure on any candidate was felt by a pad",))
+        return Ranking(order, 0.0, False, ("no evidence: no closure on any candidate was felt by a pad",), p_absent)
     margin = (order[1].loss - best.loss) if len(order) > 1 else math.inf
     if margin < gates.margin:
         reasons.append(
@@ -119,4 +149,13 @@ def rank(matches: Sequence[Match], gates: Gates | None = None) -> Ranking:
         reasons.append(
             f"evidence {best.evidence:.2f} of candidate {best.index} is below {gates.evidence:g} two-sided layers"
         )
-    return Ranking(order, margin, not reasons, tuple(reasons))
+    return Ranking(order, margin, not reasons, tuple(reasons), p_absent)
+
+
+def _with_probabilities(order: tuple[Match, ...]) -> tuple[tuple[Match, ...], float]:
+    """Soft minimum of the losses, with one more rival of `ABSENT_LOSS`; uncalibrated. Unfelt ones count as that."""
+    losses = [m.loss if math.isfinite(m.loss) else ABSENT_LOSS for m in order] + [ABSENT_LOSS]
+    weights = [math.exp(-(x - min(losses)) / LOSS_TEMPERATURE) for x in losses]
+    total = sum(weights)
+    shared = tuple(replace(m, probability=w / total) for m, w in zip(order, weights[:-1], strict=True))
+    return shared, weights[-1] / total

@@ -1,0 +1,38 @@
+"""The matchers by name: each ranks the TouchSets of all candidates against one target. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Protocol
+
+from glotouch_bt.recognition.decision import Ranking, rank
+from glotouch_bt.recognition.loss import match
+from glotouch_bt.recognition.model import TargetModel
+from glotouch_bt.recognition.params import LossParams
+from glotouch_bt.touch.values import TouchSet
+
+DEFAULT_MATCHER = "likelihood"
+
+
+class Matcher(Protocol):
+    """What ranks candidates. Deterministic."""
+
+    def __call__(self, model: TargetModel, touchsets: Sequence[TouchSet]) -> Ranking:
+        """Rank; the probabilities and `p_absent` sum to 1.
+
+        Raises:
+            ParamError: No TouchSet at all, or two of the same candidate.
+        """
+        ...
+
+
+def _likelihood(model: TargetModel, touchsets: Sequence[TouchSet]) -> Ranking:
+    return rank([match(model, t, LossParams()) for t in touchsets])
+
+
+def _paper(model: TargetModel, touchsets: Sequence[TouchSet]) -> Ranking:
+    return rank([match(model, t, LossParams.paper("depth", "mode")) for t in touchsets])
+
+
+MATCHERS: Mapping[str, Matcher] = MappingProxyType({"likelihood": _likelihood, "paper": _paper})
