@@ -1,7 +1,8 @@
-"""Objects that are not shipped, made by formula: `python tests/shapes.py DIR --set easy|hard|all`.
+"""Objects that are not shipped, made by formula: `python tests/shapes.py DIR --set easy|duplicates|hard|all`.
 
-Two sets of watertight solids of 4-11 cm in metres, upright, by which tests and benches try that nothing leans on the
-shipped five. `easy` is five everyday shapes; `hard` has what a loader, a cutter, a prober or a gripper may stumble on:
+Sets of watertight solids of 4-11 cm in metres, upright, by which tests and benches try that nothing leans on the
+shipped five. `easy` is five everyday shapes; `duplicates` is five of which two differ by a waist of 2.5 mm only, for
+recognition; `hard` has what a loader, a cutter, a prober or a gripper may stumble on:
 thin, flat, tall, overhanging, star-shaped, finely tessellated, off its file's origin, wider than the jaws open.
 Deterministic; every mesh is built face by face from numpy alone.
 """
@@ -183,8 +184,55 @@ def wide() -> trimesh.Trimesh:
     return block(92.0, 90.0, 45.0)
 
 
+def _jar(waist_mm: float) -> trimesh.Trimesh:
+    """A jar of 56 mm whose wall draws in by `waist_mm` half way up; foot, height and neck do not depend on it."""
+    z = np.linspace(0.0, 66.0, 23)
+    wall = 28.0 - waist_mm * np.sin(np.pi * z / 66.0) ** 2
+    return lathe([*zip(wall, z, strict=True), (20.0, 74.0), (20.0, 82.0)])
+
+
+def jar() -> trimesh.Trimesh:
+    """A jar with a straight wall."""
+    return _jar(0.0)
+
+
+def jar_waisted() -> trimesh.Trimesh:
+    """The same jar with a slight waist: its near-duplicate."""
+    return _jar(2.5)
+
+
+def house() -> trimesh.Trimesh:
+    """A block with a steep roof."""
+    x, y = 0.5 * np.array([[1, -1, -1, 1], [1, 1, -1, -1]]) * [[70.0], [44.0]]
+    rings = [np.column_stack([x, y * k, np.full(4, z)]) for k, z in ((1.0, 0.0), (1.0, 36.0), (0.15, 64.0))]
+    return loft(np.stack(rings) * MM)
+
+
+def cross() -> trimesh.Trimesh:
+    """An upright prism over a plus sign."""
+    a, b = 33.0, 12.0
+    quarter = np.array([(a, -b), (a, b), (b, b)])
+    turns = [np.array([[c, s], [-s, c]]) for c, s in ((1, 0), (0, 1), (-1, 0), (0, -1))]
+    return prism(np.concatenate([quarter @ t for t in turns]), 52.0)
+
+
+def twist() -> trimesh.Trimesh:
+    """A square column that turns by 50 degrees on its way up."""
+    corners = 21.0 * np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)], dtype=np.float64)
+    at = np.linspace(0.0, 1.0, 8, endpoint=False)[:, None]
+    outline = np.concatenate(
+        [(1 - at) * p + at * q for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+    )
+    rings = []
+    for k in np.linspace(0.0, 1.0, 41):
+        c, s = np.cos(np.deg2rad(50.0) * k), np.sin(np.deg2rad(50.0) * k)
+        rings.append(np.column_stack([outline @ np.array([[c, s], [-s, c]]), np.full(len(outline), 92.0 * k)]))
+    return loft(np.stack(rings) * MM)
+
+
 SETS: Mapping[str, tuple[Callable[[], trimesh.Trimesh], ...]] = {
     "easy": (cup, bottle, l_block, hexagon, cone),
+    "duplicates": (jar, jar_waisted, house, cross, twist),
     "hard": (plate, wedge, mushroom, star, disc, egg, tower, blob, offcentre, faraway, wide),
 }
 SHAPES: Mapping[str, Callable[[], trimesh.Trimesh]] = {f.__name__: f for made in SETS.values() for f in made}
