@@ -20,6 +20,8 @@ COARSE_BIAS_M, FINE_BIAS_M = 1e-3, 1e-4
 """Steps of the aperture bias for all hypotheses, and for the best of them."""
 REFINED = 24
 """Hypotheses whose bias is refined."""
+TIE = 1e-3
+"""Preference, at the edge of the grid, for the centre: where the loss is flat the object is where its contour was."""
 
 
 @dataclass(frozen=True)
@@ -63,11 +65,14 @@ def fit_widths(model: TargetModel, seen: Observation, p: PaperParams) -> WidthFi
     residuals = [residual_units(s, predicted_widths(tables, s.along_m, s.height_m, grid), p) for s in readings]
     bias = bias_grid(p.bias_limit_m, COARSE_BIAS_M)
     sums = [sequence_sums(r, s.weight, bias, p) for r, s in zip(residuals, readings, strict=True)]
+    tie = np.float32(TIE) * grid.off_centre
     strength = p.scale_prior * (1 + p.scale_anisotropy * model.anisotropy)
     prior = np.asarray(strength * np.abs(np.log(grid.scale_of_each)), dtype=np.float32)
     cross = cross_sums(readings, residuals, p) if p.w_cross > 0 else None
-    coupled = _least(joined(sums, cross), readings, residuals, prior, grid, p)
-    independent = tuple(_least(u, [s], [r], prior, grid, p) for u, s, r in zip(sums, readings, residuals, strict=True))
+    coupled = _least(joined(sums, cross), readings, residuals, prior, tie, grid, p)
+    independent = tuple(
+        _least(u, [s], [r], prior, tie, grid, p) for u, s, r in zip(sums, readings, residuals, strict=True)
+    )
     separate = float(np.median([f.loss for f in independent]))
     share = {"mixed": seen.p_coupled, "coupled": 1.0, "independent": 0.0}[p.branch]
     loss = separate if share == 0 else coupled.loss if share == 1 else share * coupled.loss + (1 - share) * separate
@@ -81,16 +86,16 @@ def bias_grid(limit_m: float, step_m: float) -> Array:
 
 
 def _least(
-    sums: Sums, readings: Sequence[SequenceReading], residuals: Sequence[Array32], prior: Array32, grid: Hypotheses,
-    p: PaperParams,
+    sums: Sums, readings: Sequence[SequenceReading], residuals: Sequence[Array32], prior: Array32, tie: Array32,
+    grid: Hypotheses,     p: PaperParams,
 ) -> BranchFit:  # fmt: skip
     """Least G + prior: over the coarse biases for all hypotheses, over the fine ones for the best."""
-    coarse = sums.loss(bias_grid(p.bias_limit_m, COARSE_BIAS_M), p).min(axis=0) + prior
+    coarse = sums.loss(bias_grid(p.bias_limit_m, COARSE_BIAS_M), p).min(axis=0) + prior + tie
     n = min(REFINED, coarse.size)
     chosen = np.sort(np.argpartition(coarse, n - 1)[:n])
     bias = bias_grid(p.bias_limit_m, FINE_BIAS_M)
     refined = _taken(sums, readings, residuals, chosen, bias, p).loss(bias, p) + prior[chosen]
-    b, i = np.unravel_index(int(np.argmin(refined)), refined.shape)
+    b, i = np.unravel_index(int(np.argmin(refined + tie[chosen])), refined.shape)
     s, yaw, d, z = (int(x) for x in np.unravel_index(int(chosen[i]), grid.shape))
     return BranchFit(
         float(refined[b, i]), yaw, float(grid.scale[s]), float(grid.shift_m[d]), float(grid.z0_m[z]), float(bias[b])

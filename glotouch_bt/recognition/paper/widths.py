@@ -98,6 +98,13 @@ class Hypotheses:
         """(N,) scale of every hypothesis."""
         return np.repeat(self.scale, int(np.prod(self.shape[1:]))).astype(np.float32)
 
+    @property
+    def off_centre(self) -> Array32:
+        """(N,) (delta / largest)^2 + (z_0 / largest)^2, from 0 to 2."""
+        d, z = (np.square(v / max(float(np.abs(v).max()), 1e-9)) for v in (self.shift_m, self.z0_m))
+        one = (d[:, None] + z[None, :]).reshape(-1).astype(np.float32)
+        return np.tile(one, len(self.scale) * self.yaws)
+
 
 def span(limit: float, n: int) -> Array:
     """n values evenly over +-limit; zero if n is 1."""
