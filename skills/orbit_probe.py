@@ -90,6 +90,7 @@ class OrbitProbe(Skill):
             candidate=admitted.candidates[admitted.index],
             displaced_m=float(np.linalg.norm(traced.displaced_K_m)),
             ended=traced.ended,
+            moves=traced.moves,
         )
         self.candidates = admitted.candidates
         self.found, self.complete = len(admitted.candidates), admitted.belief.complete

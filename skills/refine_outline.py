@@ -58,4 +58,4 @@ class RefineOutline(Skill):
             before, contour=contour, contacts=traced.contacts, quality=contour_quality(tips, contour)
         )
         moved = float(np.linalg.norm(traced.displaced_K_m))
-        self.event("candidate", candidate=self.refined, moved_m=moved, ended=traced.ended)
+        self.event("candidate", candidate=self.refined, moved_m=moved, ended=traced.ended, moves=traced.moves)

@@ -9,7 +9,8 @@ from glotouch_bt.search.policies import POLICIES, search_policy
 from glotouch_bt.search.policy import SearchPolicy, Stretch
 from glotouch_bt.search.routes import Routes, segment_is_free
 from glotouch_bt.search.seeking import Sought, seek
-from glotouch_bt.search.trace_state import Trace, TraceParams
+from glotouch_bt.search.trace_params import TraceParams
+from glotouch_bt.search.trace_state import Trace
 from glotouch_bt.search.tracing import trace, trace_more
 
 __all__ = [

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from glotouch_bt.robot import Array
 from glotouch_bt.search.moves import Felt
-from glotouch_bt.touch import Contact, Contour
+from glotouch_bt.search.trace_params import TraceParams
+from glotouch_bt.touch import Contact, Contour, split_moved
 from glotouch_bt.touch.belief import OutlineBelief, believe_outline
 
 BEARINGS = 72
 """Directions a next probe is chosen from."""
+TOUCH_SD_M = 0.0005
+"""How well a contact says along its normal where an outline of known shape is."""
 NEAR_CONTACT_M = 0.004
 """A place this near to a contact is no evidence of free space."""
 
@@ -28,57 +32,18 @@ def unit(v: Array) -> Array:
     return scaled
 
 
-@dataclass(frozen=True, kw_only=True)
-class TraceParams:
-    """How an outline is traced. Lengths in metres.
+def _polar(outline: OutlineBelief, bearings: Array, distance: Array) -> Array:
+    """(n, 2) K, so far from the outline's middle."""
+    return np.asarray(outline.centre_K_m + distance[:, None] * np.column_stack([np.cos(bearings), np.sin(bearings)]))
 
-    Attributes:
-        clearance_m: Ball to predicted outline while going round.
-        margin_sds: So many standard deviations of the prediction are added to the clearance.
-        widest_margin_m: No more than this is added.
-        centre_sd_m: Enough is known when the centre's standard deviation is below this ...
-        radial_sd_m: ... and the outline's nowhere above this.
-        least_contacts, most_contacts: Bounds whatever the covariance says.
-        step_m: Longest way round before the ball probes again.
-        doubt_m: With a deviation above this on the way round, the ball goes along the surface instead ...
-        along_m, along_reach_m: ... so far, and then looks for it so far deeper than it was.
-        back: How much a bearing counts that lies behind, against the way round so far.
-        way_m: Travel that every probe costs beside the way to it (in and out).
-        reach_sds: A probe goes so many standard deviations past the prediction.
-        facing: Cosine between the force on the ball and the direction from the object's middle below which the contact
-            is with something else.
-        same_m: A contact so near to an earlier one says nothing new.
-        own_m: A contact within this (and twice the deviation) of the prediction is the object's own; farther out the
-            evidence for one object or two decides.
-        other: Odds, before it is looked at, that a contact on the way round belongs to another object.
-        unmodelled_m: What no contact is near is not known better than this, whatever the families say that have been
-            thought of ...
-        near_m, far_m: ... fully so from the second of these distances on, not at all within the first.
-        misses: So many probes may meet nothing, or be refused, one after another.
-    """
 
-    clearance_m: float = 0.005
-    margin_sds: float = 0.7
-    widest_margin_m: float = 0.010
-    centre_sd_m: float = 0.0010
-    radial_sd_m: float = 0.0035
-    least_contacts: int = 4
-    most_contacts: int = 14
-    step_m: float = 0.045
-    doubt_m: float = 0.008
-    along_m: float = 0.026
-    along_reach_m: float = 0.014
-    back: float = 0.4
-    way_m: float = 0.03
-    reach_sds: float = 2.5
-    facing: float = -0.4
-    same_m: float = 0.003
-    own_m: float = 0.010
-    other: float = 0.02
-    unmodelled_m: float = 0.006
-    near_m: float = 0.024
-    far_m: float = 0.042
-    misses: int = 5
+def _moved_along(contacts: Sequence[Contact]) -> tuple[Contact, ...]:
+    push = np.array([c.pushed_K_m for c in contacts])
+    later = np.cumsum(push[::-1], axis=0)[::-1]
+    return tuple(
+        replace(c, tip_K_m=c.tip_K_m + np.array([*s, 0.0]), point_K_m=c.point_K_m + s)
+        for c, s in zip(contacts, later, strict=True)
+    )
 
 
 @dataclass(frozen=True)
@@ -93,6 +58,7 @@ class Trace:
         strays: Contacts that belong to something else.
         ended: Why no more probes were made.
         missing: It was not met where it had been traced.
+        moves: So many times it moved without being felt to, and was traced anew.
     """
 
     contacts: tuple[Contact, ...]
@@ -102,6 +68,7 @@ class Trace:
     strays: tuple[Contact, ...] = ()
     ended: str = ""
     missing: bool = False
+    moves: int = 0
 
     @property
     def contour(self) -> Contour | None:
@@ -123,6 +90,12 @@ class TraceState:
         strays: Contacts with something else.
         blocked: Bearings that were tried in vain, rad.
         side: The way round so far: +1 counter-clockwise, 0 not chosen yet.
+        moves: So many times the object moved unfelt.
+        moved_K_m: (2,) how far in all.
+        fresh: Index of the first of `paths` since the last of them.
+        odd: Index of the first contact that was odd; -1: none was.
+        told: (2, 2) 1/m^2 what contacts made now say of such a move.
+        known: How many of `raw` were made before, with who knows what in between.
     """
 
     tip: Array
@@ -134,6 +107,12 @@ class TraceState:
     strays: list[Contact] = field(default_factory=list)
     blocked: list[float] = field(default_factory=list)
     side: float = 0.0
+    moves: int = 0
+    moved_K_m: Array = field(default_factory=lambda: np.zeros(2))
+    fresh: int = 0
+    odd: int = -1
+    known: int = 0
+    told: Array = field(default_factory=lambda: np.zeros((2, 2)))
 
     @classmethod
     def begin(
@@ -145,12 +124,7 @@ class TraceState:
 
     def present(self) -> tuple[Contact, ...]:
         """The contacts moved to where the object stands now: each by all pushes from its own on."""
-        push = np.array([c.pushed_K_m for c in self.raw])
-        later = np.cumsum(push[::-1], axis=0)[::-1]
-        return tuple(
-            replace(c, tip_K_m=c.tip_K_m + np.array([*s, 0.0]), point_K_m=c.point_K_m + s)
-            for c, s in zip(self.raw, later, strict=True)
-        )
+        return _moved_along(self.raw)
 
     def outline(self, more: tuple[Contact, ...] = (), *, alone: bool = False) -> OutlineBelief:
         """What the contacts say, with some more, or those alone."""
@@ -169,12 +143,44 @@ class TraceState:
 
     def ring(self, outline: OutlineBelief, bearings: Array, p: TraceParams) -> tuple[Array, Array]:
         """Distance from the outline's middle at which the reference point would touch, (n,) m, and its deviation."""
+        distance, at, sd = self._shape(outline, bearings, p)
+        if self.known:
+            sd = np.sqrt(sd**2 + self._shift_variance(outline, bearings, at, p))
+        return distance + (0.0 if self.round else self.radius), sd
+
+    def _shape(self, outline: OutlineBelief, bearings: Array, p: TraceParams) -> tuple[Array, Array, Array]:
+        """As `ring` for an object that never moved unfelt, and where that is: (n,), (n, 2) K, (n,)."""
         distance, sd = outline.predict(bearings)
-        at = outline.centre_K_m + distance[:, None] * np.column_stack([np.cos(bearings), np.sin(bearings)])
+        at = _polar(outline, bearings, distance)
         known = np.array([self.place(c) for c in self.present()])
         apart = np.linalg.norm(at[:, None] - known[None], axis=2).min(axis=1)
         share = np.clip((apart - p.near_m) / (p.far_m - p.near_m), 0.0, 1.0)
-        return distance + (0.0 if self.round else self.radius), np.hypot(sd, share * p.unmodelled_m)
+        return distance, at, np.hypot(sd, share * p.unmodelled_m)
+
+    def _shift_variance(self, outline: OutlineBelief, bearings: Array, at_K_m: Array, p: TraceParams) -> Array:
+        """(n,) m^2 that an unfelt move adds to the outline's deviation along its normal."""
+        step = np.deg2rad(2.0)
+        ahead = _polar(outline, bearings + step, outline.predict(bearings + step)[0])
+        along = ahead - at_K_m
+        normal = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
+        return np.asarray(np.einsum("ni,ij,nj->n", normal, self.shift_covariance(p), normal))
+
+    def shift_covariance(self, p: TraceParams) -> Array:
+        """(2, 2) m^2 of how far the object may have moved unfelt before the contacts made now; zeros if all are."""
+        if not self.known:
+            return np.zeros((2, 2))
+        return np.asarray(np.linalg.inv(np.eye(2) / p.unfelt_m**2 + self.told))
+
+    def add(self, contact: Contact, outline: OutlineBelief, p: TraceParams) -> None:
+        """A contact with the object, of which `outline` was known."""
+        if self.known:
+            off = self.place(contact) - outline.centre_K_m
+            _, _, sd = self._shape(outline, np.array([np.arctan2(off[1], off[0])]), p)
+            normal = unit(2.0 * contact.reaction_K[:2] - contact.approach_K[:2])
+            self.told = self.told + np.outer(normal, normal) / (TOUCH_SD_M**2 + float(sd[0]) ** 2)
+        if self.odd < 0 and self.surprising(outline, contact, p):
+            self.odd = len(self.raw)
+        self.raw.append(contact)
 
     def is_new(self, contact: Contact, p: TraceParams) -> bool:
         """Whether a contact is not where there was one before."""
@@ -198,12 +204,40 @@ class TraceState:
         two = self.outline((contact,), alone=True).log_evidence
         return bool(one > two + np.log(p.other))
 
+    def surprising(self, outline: OutlineBelief, contact: Contact, p: TraceParams) -> bool:
+        """Whether a contact lies where the outline was thought not to be."""
+        off = self.place(contact) - outline.centre_K_m
+        distance, sd = outline.predict(np.array([np.arctan2(off[1], off[0])]))
+        gap = abs(float(np.hypot(off[0], off[1])) - float(distance[0]))
+        return gap > p.surprise_m + p.surprise_sds * float(sd[0])
+
+    def begin_anew(self, p: TraceParams) -> bool:
+        """If no one pose explains the contacts, keep the latest that one does; whether it was so.
+
+        What the ball passed before is no evidence about the object where it stands now.
+        """
+        if self.odd < 0 or self.moves >= p.moves:
+            return False
+        radius = self.radius if self.round else 0.0
+        felt = [replace(c, tip_K_m=np.array([*self.place(c), c.tip_K_m[2]])) for c in self.raw]
+        stray, _ = split_moved(felt, radius, likely=self.known)
+        if not stray:
+            return False
+        del self.raw[: len(stray)]
+        self.odd, self.known = -1, 0
+        self.blocked.clear()
+        self.fresh = len(self.paths)
+        self.moves += 1
+        stood = self.outline(_moved_along(stray), alone=True)
+        self.moved_K_m = self.moved_K_m + self.outline().centre_K_m - stood.centre_K_m
+        return True
+
     def free(self) -> Array:
         """(n, 2) places the ball has been, but for those so near to a contact that a push or the ball's own scatter
         could have put the object there."""
-        if not self.paths:
+        if not self.paths[self.fresh :]:
             return np.zeros((0, 2))
-        path = np.concatenate(self.paths)
+        path = np.concatenate(self.paths[self.fresh :])
         touched = np.array([c.tip_K_m[:2] for c in (*self.raw, *self.present())])
         far = np.linalg.norm(path[:, None] - touched[None], axis=2).min(axis=1) > NEAR_CONTACT_M
         return np.asarray(path[far])
@@ -213,10 +247,11 @@ class TraceState:
         return Trace(
             self.present(),
             outline,
-            np.sum([c.pushed_K_m for c in self.raw], axis=0),
+            self.moved_K_m + np.sum([c.pushed_K_m for c in self.raw], axis=0),
             np.concatenate(self.paths) if self.paths else np.zeros((0, 2)),
             tuple(self.strays),
             ended,
+            moves=self.moves,
         )
 
     def felt(self, felt: Felt) -> None:

@@ -8,7 +8,8 @@ import numpy as np
 
 from glotouch_bt.robot import Array
 from glotouch_bt.search.moves import Move, Plan
-from glotouch_bt.search.trace_state import BEARINGS, Trace, TraceParams, TraceState, all_bearings, unit
+from glotouch_bt.search.trace_params import TraceParams
+from glotouch_bt.search.trace_state import BEARINGS, Trace, TraceState, all_bearings, unit
 from glotouch_bt.touch import Contact
 from glotouch_bt.touch.belief import OutlineBelief
 from glotouch_bt.touch.primitives import wrapped
@@ -60,9 +61,8 @@ def trace_more(
     p = params or TraceParams()
     still = [replace(c, pushed_K_m=np.zeros(2)) for c in known]  # they are where the object stands now
     s = TraceState.begin(still, tip_K_m, tip_radius_m, round_tip, half_extent_m)
+    s.known = len(still)
     outline = s.outline()
-    if _enough(outline, s, p):
-        return s.trace(outline, "the outline is known")
     bearings = all_bearings()
     distance, sd = s.ring(outline, bearings, p)
     ring = distance + p.clearance_m + np.minimum(2.0 * sd, p.widest_margin_m)
@@ -76,7 +76,7 @@ def trace_more(
         felt = yield Move("probe", outline.centre_K_m + INSIDE_M * (places[i] - outline.centre_K_m) / ring[i])
         s.felt(felt)
         if felt.contact is not None and s.belongs(outline, felt.contact, p):
-            s.raw.append(felt.contact)
+            s.add(felt.contact, outline, p)
             yield from _retreat(s, p)
             return (yield from _until_known(s, p))
     return replace(s.trace(outline, "it was not met again"), missing=True)
@@ -95,7 +95,10 @@ def _apart(worth: Array, n: int) -> list[int]:
 
 
 def _until_known(s: TraceState, p: TraceParams) -> Plan[Trace]:
-    """Probe on until enough is known, from beside the object."""
+    """Probe on until enough is known, from beside the object.
+
+    Once a contact was odd, each one asks whether the object moved without being felt to: three are needed to tell.
+    """
     outline, missed, ended = s.outline(), 0, ""
     while not ended:
         ended = _enough(outline, s, p)
@@ -116,8 +119,10 @@ def _until_known(s: TraceState, p: TraceParams) -> Plan[Trace]:
             else:
                 missed += 1
                 s.blocked.append(bearing)
-            s.raw.append(found)
+            s.add(found, outline, p)
             yield from _retreat(s, p)
+            if s.begin_anew(p):
+                missed = 0
         else:
             missed += 1
             s.strays.append(found)
@@ -143,10 +148,11 @@ def _enough(outline: OutlineBelief, s: TraceState, p: TraceParams) -> str:
     n = len(s.raw)
     if n >= p.most_contacts:
         return f"{n} contacts"
-    if n < p.least_contacts:
+    if n < p.least_contacts or (s.known and s.odd >= 0 and n < s.odd + p.settling):
         return ""
     _, sd = s.ring(outline, all_bearings(), p)
-    if np.max(outline.centre_sd_m) <= p.centre_sd_m and float(np.max(sd)) <= p.radial_sd_m:
+    centre_sd = np.sqrt(outline.centre_sd_m**2 + np.diag(s.shift_covariance(p)))
+    if np.max(centre_sd) <= p.centre_sd_m and float(np.max(sd)) <= p.radial_sd_m:
         return "the outline is known"
     return ""
 

@@ -14,6 +14,8 @@ from glotouch_bt.touch.values import Contact
 
 MOVED_PRIOR = 0.005
 """Probability, before looking, that an object moved between two given contacts by more than it was seen pushed."""
+LIKELY_PRIOR = 0.05
+"""... and between two between which much may have happened."""
 FEWEST = 3
 """Contacts a pose needs to be told from another."""
 
@@ -33,16 +35,23 @@ def believe_contacts(
     )
 
 
-def split_moved(contacts: Sequence[Contact], tip_radius_m: float) -> tuple[tuple[Contact, ...], tuple[Contact, ...]]:
+def split_moved(
+    contacts: Sequence[Contact], tip_radius_m: float, *, likely: int = 0
+) -> tuple[tuple[Contact, ...], tuple[Contact, ...]]:
     """(stray, consistent): the latest contacts that one pose explains, and those from before the object moved.
 
     A change point by evidence: one outline explains all contacts, those before the move shifted by a common, unknown
     amount, clearly better than without a shift. With fewer than FEWEST + 1 contacts nothing is split off.
+
+    Args:
+        contacts: In order of time.
+        tip_radius_m: Radius of the ball.
+        likely: Before this one, if not the first, there was time for something to happen to the object.
     """
     contacts = tuple(contacts)
     scores = [believe_contacts(contacts, tip_radius_m).log_evidence]
     for first in range(1, len(contacts) - FEWEST + 1):
         moved = believe_contacts(contacts, tip_radius_m, strays=first)
-        scores.append(moved.log_evidence + math.log(MOVED_PRIOR))
+        scores.append(moved.log_evidence + math.log(LIKELY_PRIOR if first == likely else MOVED_PRIOR))
     best = int(np.argmax(scores))
     return contacts[:best], contacts[best:]
