@@ -20,6 +20,8 @@ AMPLITUDES: tuple[float, ...] = (0.3, 1.0, 2.0)
 """Deviations a circle is given (a rectangle: the first two); scales of the spread over random objects."""
 LOOSENESS = ((1.0, 0.3), (2.2, 0.03))
 """A plain circle or rectangle leaves the contacts' scatter, or so many times as much; each with its prior."""
+WAVY_CHANCE = 1 / 15
+"""Prior of each amplitude."""
 MODES, MODE_LOSS = 3, 12.0
 """So many optima of the rectangle are kept, if their loss is within so much of the best one's."""
 FREE_BINS = 18
@@ -94,24 +96,18 @@ def present_tips(tip_K_m: Array, pushed_K_m: Array) -> Array:
 
 def _hypotheses(touches: Touches) -> tuple[tuple[Hypothesis, ...], Array]:
     """Explanations, weightiest first, and their weights."""
-    found: list[Hypothesis] = []
-    prior: list[float] = []
     rounds, _ = fit(circle, touches.rooted)
     boxes, losses = fit(rounded, touches.rooted)
-    for looseness, chance in LOOSENESS:
-        found.append(explain(circle, rounds[0], 0.0, touches, looseness))
-        prior.append(chance)
-    middle = explain(circle, rounds[0], AMPLITUDES[1], touches).corrected
-    for amplitude in AMPLITUDES:
-        found.append(explain(circle, middle, amplitude, touches))
-        prior.append(1 / 15)
-    for i, params in enumerate(_distinct(boxes[losses < losses[0] + MODE_LOSS])):
-        for looseness, chance in LOOSENESS if i == 0 else LOOSENESS[:1]:
-            found.append(explain(rounded, params, 0.0, touches, looseness))
-            prior.append(chance)
-        for amplitude in AMPLITUDES[:2] if i == 0 else ():
-            found.append(explain(rounded, params, amplitude, touches))
-            prior.append(1 / 15)
+    distinct = _distinct(boxes[losses < losses[0] + MODE_LOSS])
+    loose, loose_chances = [scale for scale, _ in LOOSENESS], [chance for _, chance in LOOSENESS]
+    found = explain(circle, rounds[[0] * len(loose)], [0.0] * len(loose), touches, loose)
+    middle = explain(circle, rounds[:1], AMPLITUDES[1:2], touches)[0].corrected
+    found += explain(circle, middle[None].repeat(len(AMPLITUDES), axis=0), AMPLITUDES, touches)
+    plain, more = np.array(distinct[:1] * len(loose) + distinct[1:]), len(distinct) - 1
+    found += explain(rounded, plain, [0.0] * len(plain), touches, loose + loose[:1] * more)
+    found += explain(rounded, np.array(distinct[:1] * 2), AMPLITUDES[:2], touches)
+    prior = [*loose_chances, *[WAVY_CHANCE] * len(AMPLITUDES), *loose_chances, *loose_chances[:1] * more]
+    prior += [WAVY_CHANCE] * 2
     score = TEMPER * np.array([h.log_evidence for h in found]) + np.log(prior)
     weights = np.exp(score - score.max())
     weights /= weights.sum()

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial import ConvexHull, QhullError
 
 from glotouch_bt.robot import Array, ParamError
+
+Indices = npt.NDArray[np.int64]
 
 
 def convex_hull(points_m: Array) -> Array:
@@ -18,6 +21,33 @@ def convex_hull(points_m: Array) -> Array:
         return np.asarray(points_m[ConvexHull(points_m).vertices], dtype=np.float64)
     except (QhullError, ValueError) as error:
         raise ParamError("points_m", np.shape(points_m), "at least three points that span an area") from error
+
+
+def star_hull(points_m: Array) -> Indices:
+    """(m,) indices of the convex hull's corners, counter-clockwise, of a closed polygon (n, 2) whose points follow one
+    another counter-clockwise round the origin, inside it.
+
+    A corner that is not to the right of its neighbours' chord goes, and so may, then, the one before it (Graham, IPL 1,
+    1972): a few operations a point, since the order is known.
+
+    Raises:
+        ParamError: The points span no area.
+    """
+    x, y = points_m.T.tolist()
+    n = len(x)
+    first = int(np.argmax(points_m[:, 0])) if n else 0  # a corner of the hull for certain
+    kept: list[int] = []
+    for i in [*range(first, n), *range(first + 1)]:
+        xi, yi = x[i], y[i]
+        while len(kept) > 1:
+            a, b = kept[-2], kept[-1]
+            if (x[b] - x[a]) * (yi - y[a]) - (y[b] - y[a]) * (xi - x[a]) > 0.0:
+                break
+            kept.pop()
+        kept.append(i)
+    if len(kept) < 4:
+        raise ParamError("points_m", np.shape(points_m), "at least three points that span an area")
+    return np.array(kept[:-1])
 
 
 def area_and_centroid(polygon_m: Array) -> tuple[float, Array]:
@@ -68,7 +98,8 @@ def shrunk_convex(hull_m: Array, by_m: float) -> Array:
     offset = np.sum(normal * (hull_m[keep] - middle), axis=1) - by_m
     if np.min(offset) <= 1e-6:
         return middle[None, :]
-    dual = convex_hull(normal / offset[:, None])
+    dual = normal / offset[:, None]
+    dual = dual[star_hull(dual)]
     following = np.roll(dual, -1, axis=0)
     cross = dual[:, 0] * following[:, 1] - dual[:, 1] * following[:, 0]
     step = following - dual

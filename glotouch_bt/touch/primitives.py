@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -58,14 +59,19 @@ class Touches:
     contact_sd_m: float = CONTACT_SD_M
     strays: int = 0
 
-    @property
+    @cached_property
     def rooted(self) -> Touches:
         """Those made since the object moved."""
         s = self.strays
         tips, normal, sd = self.tips_m[s:], self.normal_rad[s:], self.normal_sd_rad[s:]
         return Touches(tips, normal, sd, self.approach[s:], self.free_m, self.radius_m, self.contact_sd_m)
 
-    @property
+    @cached_property
+    def points_m(self) -> Array:
+        """(k + m, 2) the contacts, then the free places."""
+        return np.concatenate([self.tips_m, self.free_m])
+
+    @cached_property
     def likely_middle_m(self) -> Array:
         """(2,) the middle of what was touched: half a typical object behind each contact."""
         known = np.isfinite(self.normal_sd_rad)[:, None]
@@ -78,7 +84,7 @@ class Touches:
 @dataclass(frozen=True)
 class Geometry:
     """Shapes (s) seen from points (k): signed distance (s, k), bearing of the nearest outward normal (s, k), and the
-    derivatives (s, k, p) of both by the shapes' parameters."""
+    derivatives (s, k, p) of both by the shapes' parameters. The first two of `by_params` are the normal, negated."""
 
     distance_m: Array
     by_params: Array
@@ -87,91 +93,86 @@ class Geometry:
 
 
 Shape = Callable[[Array, Array], Geometry]
+"""Parameters (s, p) and points, (k, 2) common to all or (s, k, 2), to what is seen."""
 
 
 def circle(params: Array, points_m: Array) -> Geometry:
-    """Circles (s, 3) = x, y, radius seen from points (k, 2)."""
-    d = points_m[None] - params[:, None, :2]
-    norm = np.maximum(np.linalg.norm(d, axis=2), 1e-9)
-    unit = d / norm[..., None]
-    by = np.concatenate([-unit, -np.ones((*norm.shape, 1))], axis=2)
-    turn = np.stack([unit[..., 1] / norm, -unit[..., 0] / norm, np.zeros_like(norm)], axis=2)
-    return Geometry(norm - params[:, 2:3], by, np.arctan2(d[..., 1], d[..., 0]), turn)
+    """Circles (s, 3) = x, y, radius seen from points."""
+    dx, dy = points_m[..., 0] - params[:, :1], points_m[..., 1] - params[:, 1:2]
+    norm = np.maximum(np.sqrt(dx * dx + dy * dy), 1e-9)
+    by, turn = np.zeros((2, *norm.shape, 3))
+    ux, uy = dx / norm, dy / norm
+    by[..., 0], by[..., 1], by[..., 2] = -ux, -uy, -1.0
+    turn[..., 0], turn[..., 1] = uy / norm, -ux / norm
+    return Geometry(norm - params[:, 2:3], by, np.arctan2(dy, dx), turn)
 
 
 def rectangle(params: Array, points_m: Array) -> Geometry:
-    """Rectangles (s, 5) = x, y, yaw, half sides along and across the yaw, seen from points (k, 2)."""
-    c, s = np.cos(params[:, 2, None]), np.sin(params[:, 2, None])
-    d = points_m[None] - params[:, None, :2]
-    x, y = c * d[..., 0] + s * d[..., 1], c * d[..., 1] - s * d[..., 0]
-    sign_x, sign_y = np.where(x < 0, -1.0, 1.0), np.where(y < 0, -1.0, 1.0)
-    over_x, over_y = np.abs(x) - params[:, 3, None], np.abs(y) - params[:, 4, None]
+    """Rectangles (s, 5) = x, y, yaw, half sides along and across the yaw, seen from points."""
+    g = rounded(np.concatenate([params, np.zeros((len(params), 1))], axis=1), points_m)
+    return Geometry(g.distance_m, g.by_params[..., :5], g.normal_rad, g.normal_by_params[..., :5])
+
+
+def rounded(params: Array, points_m: Array) -> Geometry:
+    """Rectangles with rounded corners (s, 6) = as `rectangle`, and the corners' radius; seen from points.
+
+    What real things have for corners: on a chamfer or a nose a ball is not held against a sharp corner, which would
+    fix the end of a box that nothing has touched. The distance is the one from the rectangle smaller by the radius all
+    round, less the radius: along a face the radius cancels, on a corner's bisector it moves the outline by
+    sqrt(2) - 1 of itself.
+    """
+    c, s = np.cos(params[:, 2:3]), np.sin(params[:, 2:3])
+    dx, dy = points_m[..., 0] - params[:, :1], points_m[..., 1] - params[:, 1:2]
+    x, y = c * dx + s * dy, c * dy - s * dx
+    over_x, over_y = np.abs(x) - (params[:, 3:4] - params[:, 5:]), np.abs(y) - (params[:, 4:5] - params[:, 5:])
     out_x, out_y = np.maximum(over_x, 0.0), np.maximum(over_y, 0.0)
-    norm = np.hypot(out_x, out_y)
+    norm = np.sqrt(out_x * out_x + out_y * out_y)
     outside = norm > 1e-12
     size = np.maximum(norm, 1e-12)
     nearer_x = over_x >= over_y
     grad_x = np.where(outside, out_x / size, nearer_x)
     grad_y = np.where(outside, out_y / size, ~nearer_x)
-    gx, gy = sign_x * grad_x, sign_y * grad_y
-    distance = np.where(outside, norm, np.maximum(over_x, over_y))
-    by = np.stack([-(c * gx - s * gy), -(s * gx + c * gy), gx * y - gy * x, -grad_x, -grad_y], axis=2)
+    gx, gy = np.copysign(grad_x, x), np.copysign(grad_y, y)
+    by, turn = np.zeros((2, *norm.shape, 6))
+    by[..., 0], by[..., 1], by[..., 2] = s * gy - c * gx, -(s * gx + c * gy), gx * y - gy * x
+    by[..., 3], by[..., 4], by[..., 5] = -grad_x, -grad_y, grad_x + grad_y - 1.0
     # The normal turns with the yaw; beside a corner also with the place: by d(atan2(v_y, v_x)) of v from the corner.
-    corner = (out_x > 0) & (out_y > 0)
-    tx = np.where(corner, -gy / size, 0.0)
-    ty = np.where(corner, gx / size, 0.0)
-    turn = np.stack([-(c * tx - s * ty), -(s * tx + c * ty), 1.0 + tx * y - ty * x, -sign_x * tx, -sign_y * ty], axis=2)
-    return Geometry(distance, by, params[:, 2, None] + np.arctan2(gy, gx), turn)
-
-
-def rounded(params: Array, points_m: Array) -> Geometry:
-    """Rectangles with rounded corners (s, 6) = as `rectangle`, and the corners' radius; seen from points (k, 2).
-
-    What real things have for corners: on a chamfer or a nose a ball is not held against a sharp corner, which would
-    fix the end of a box that nothing has touched.
-    """
-    inner = params[:, :5].copy()
-    inner[:, 3:] -= params[:, 5:]
-    g = rectangle(inner, points_m)
-    # Along a face the radius cancels; on a corner's bisector it moves the outline by sqrt(2) - 1 of itself.
-    by_radius = -g.by_params[..., 3] - g.by_params[..., 4] - 1.0
-    turn = -g.normal_by_params[..., 3] - g.normal_by_params[..., 4]
-    return Geometry(
-        g.distance_m - params[:, 5:],
-        np.concatenate([g.by_params, by_radius[..., None]], axis=2),
-        g.normal_rad,
-        np.concatenate([g.normal_by_params, turn[..., None]], axis=2),
-    )
+    beside = ((out_x > 0) & (out_y > 0)) / size
+    tx, ty = -gy * beside, gx * beside
+    turn_x, turn_y = -np.copysign(1.0, x) * tx, -np.copysign(1.0, y) * ty
+    turn[..., 0], turn[..., 1], turn[..., 2] = s * ty - c * tx, -(s * tx + c * ty), 1.0 + tx * y - ty * x
+    turn[..., 3], turn[..., 4], turn[..., 5] = turn_x, turn_y, -turn_x - turn_y
+    distance = np.where(outside, norm, np.maximum(over_x, over_y)) - params[:, 5:]
+    return Geometry(distance, by, params[:, 2:3] + np.arctan2(gy, gx), turn)
 
 
 def ray_m(params: Array, grown_m: float, origin_m: Array, unit: Array) -> Array:
-    """(n,) distance along unit vectors (n, 2) from a place inside to a primitive (p,) grown by `grown_m` all round.
+    """(s, n) distance along unit vectors (n, 2) from places inside, (2,) or (s, 2), to primitives (s, p) grown by
+    `grown_m` all round.
 
     From a place outside, where a ray may miss it, to where the ray passes nearest.
     """
-    if len(params) == 3:
-        return _far_root(unit, origin_m - params[:2], params[2] + grown_m)
-    c, s = np.cos(params[2]), np.sin(params[2])
-    turn = np.array([[c, -s], [s, c]])
-    start, u = (origin_m - params[:2]) @ turn, unit @ turn
-    radius = params[5] if len(params) == 6 else 0.0
-    inner, outer = params[3:5] - radius, params[3:5] + grown_m
-    steep = np.where(np.abs(u) > 1e-9, u, np.where(u < 0, -1e-9, 1e-9))
-    exits = (np.where(u < 0, -1.0, 1.0) * outer - start) / steep
-    side = np.argmin(exits, axis=1)
-    t = np.min(exits, axis=1)
-    place = start + t[:, None] * u
-    other = np.take_along_axis(place, 1 - side[:, None], axis=1)[:, 0]
-    rounded_off = np.abs(other) > inner[1 - side]
-    corner = np.where(place < 0, -1.0, 1.0) * inner
-    return np.asarray(np.where(rounded_off, _far_root(u, start - corner, radius + grown_m), t))
+    off = origin_m - params[:, :2]
+    if params.shape[1] == 3:
+        return _far_root(unit[:, 0], unit[:, 1], off[:, :1], off[:, 1:], params[:, 2:] + grown_m)
+    c, s = np.cos(params[:, 2:3]), np.sin(params[:, 2:3])
+    x, y = c * off[:, :1] + s * off[:, 1:], c * off[:, 1:] - s * off[:, :1]
+    ux, uy = c * unit[:, 0] + s * unit[:, 1], c * unit[:, 1] - s * unit[:, 0]
+    radius = params[:, 5:] if params.shape[1] == 6 else np.zeros((len(params), 1))
+    exit_x = (np.copysign(params[:, 3:4] + grown_m, ux) - x) / np.copysign(np.maximum(np.abs(ux), 1e-9), ux)
+    exit_y = (np.copysign(params[:, 4:5] + grown_m, uy) - y) / np.copysign(np.maximum(np.abs(uy), 1e-9), uy)
+    t = np.minimum(exit_x, exit_y)
+    at_x, at_y = x + t * ux, y + t * uy
+    half_x, half_y = params[:, 3:4] - radius, params[:, 4:5] - radius
+    rounded_off = np.where(exit_x <= exit_y, np.abs(at_y) > half_y, np.abs(at_x) > half_x)
+    to_x, to_y = x - np.copysign(half_x, at_x), y - np.copysign(half_y, at_y)
+    return np.asarray(np.where(rounded_off, _far_root(ux, uy, to_x, to_y, radius + grown_m), t))
 
 
-def _far_root(unit: Array, offset: Array, radius: float) -> Array:
-    """(n,) where rays from `offset`, (2,) or (n, 2) from a circle's centre, leave the circle."""
-    along = np.sum(unit * offset, axis=1)
-    square = along**2 - np.sum(offset * offset, axis=-1) + radius**2
-    return np.asarray(-along + np.sqrt(np.maximum(square, 0.0)))
+def _far_root(ux: Array, uy: Array, x: Array, y: Array, radius: Array) -> Array:
+    """Where rays along (ux, uy) from (x, y), seen from a circle's centre, leave the circle."""
+    along, across = ux * x + uy * y, ux * y - uy * x
+    return np.asarray(np.sqrt(np.maximum(radius**2 - across * across, 0.0)) - along)
 
 
 def prior(shape: Shape, touches: Touches) -> tuple[Array, Array]:
@@ -188,7 +189,7 @@ def prior(shape: Shape, touches: Touches) -> tuple[Array, Array]:
 
 def wrapped(angle_rad: Array) -> Array:
     """Angles in (-pi, pi]."""
-    return np.asarray(np.pi - np.mod(np.pi - angle_rad, 2 * np.pi))
+    return np.asarray(angle_rad + 2 * np.pi * np.floor((np.pi - angle_rad) / (2 * np.pi)))
 
 
 def fit(shape: Shape, touches: Touches, *, steps: int = 14, gain: float = 1e-2) -> tuple[Array, Array]:
@@ -201,28 +202,30 @@ def fit(shape: Shape, touches: Touches, *, steps: int = 14, gain: float = 1e-2) 
         params = np.concatenate([params, np.full((len(params), 1), CORNER_M)], axis=1)
     params = clipped(params)
     mean, sd = prior(shape, touches)
+    weight = 1.0 / sd**2
     n, first = params.shape[1], 2 if shape is circle else 3
-    points = np.concatenate([touches.tips_m, touches.free_m])
+    longest = np.array([0.02, 0.02, 0.3][:first])
+    identity = np.eye(n)
     damping = np.full(len(params), 1e-2)
-    loss, gradient, hessian = _normal_equations(shape, params, points, touches, mean, sd)
+    loss, gradient, hessian = normal_equations(shape, params, touches, mean, weight)
     idle = 0
     for step in range(steps):
         if step == SIFT_STEP and len(params) > SIFTED:
             keep = np.argsort(loss, kind="stable")[:SIFTED]
             params, damping, loss, gradient, hessian = (v[keep] for v in (params, damping, loss, gradient, hessian))
-        damped = hessian + (damping[:, None] * np.einsum("sii->si", hessian) + 1e-9)[:, :, None] * np.eye(n)
-        move = -np.linalg.solve(damped, gradient[..., None])[..., 0]
-        move[:, :2] = np.clip(move[:, :2], -0.02, 0.02)
-        move[:, 2:first] = np.clip(move[:, 2:first], -0.3, 0.3)
-        trial = clipped(params + move)
-        trial_loss, trial_gradient, trial_hessian = _normal_equations(shape, trial, points, touches, mean, sd)
+        damped = hessian * (1.0 + damping[:, None, None] * identity) + 1e-9 * identity
+        move = np.linalg.solve(damped, gradient[..., None])[..., 0]
+        move[:, :first] = np.minimum(np.maximum(move[:, :first], -longest), longest)
+        trial = clipped(params - move)
+        trial_loss, trial_gradient, trial_hessian = normal_equations(shape, trial, touches, mean, weight)
         better = trial_loss < loss
-        gained = float(np.max(np.where(better, loss - trial_loss, 0.0)))
-        params = np.where(better[:, None], trial, params)
-        gradient = np.where(better[:, None], trial_gradient, gradient)
-        hessian = np.where(better[:, None, None], trial_hessian, hessian)
-        loss = np.where(better, trial_loss, loss)
-        damping = np.where(better, 0.3 * damping, 5.0 * damping)
+        gained = float(np.max((loss - trial_loss) * better))
+        if better.all():
+            params, loss, gradient, hessian = trial, trial_loss, trial_gradient, trial_hessian
+        else:
+            params[better], loss[better] = trial[better], trial_loss[better]
+            gradient[better], hessian[better] = trial_gradient[better], trial_hessian[better]
+        damping = damping * np.where(better, 0.3, 5.0)
         idle = idle + 1 if gained < gain else 0
         if idle == 2:
             break
@@ -230,37 +233,38 @@ def fit(shape: Shape, touches: Touches, *, steps: int = 14, gain: float = 1e-2) 
     return params[order], loss[order]
 
 
-def _normal_equations(
-    shape: Shape, params: Array, points: Array, touches: Touches, mean: Array, sd: Array
+def normal_equations(
+    shape: Shape, params: Array, touches: Touches, mean: Array, weight: Array
 ) -> tuple[Array, Array, Array]:
-    """Loss (s,), gradient (s, p) and Gauss-Newton matrix (s, p, p)."""
+    """Loss (s,), gradient (s, p) and Gauss-Newton matrix (s, p, p) of parameters whose prior has this mean (p,) and
+    inverse variance (p,)."""
     k = len(touches.tips_m)
-    g = shape(params, points)
-    gap = (g.distance_m - touches.radius_m) / SCALE_M
-    gap[:, k:] = np.minimum(gap[:, k:], 0.0) * (SCALE_M / FREE_SD_M)
-    by = g.by_params / SCALE_M
-    by[:, k:] *= (gap[:, k:] < 0.0)[..., None] * (SCALE_M / FREE_SD_M)
+    g = shape(params, touches.points_m)
     known = 1.0 / touches.normal_sd_rad
-    turn = wrapped(g.normal_rad[:, :k] - touches.normal_rad) * known
-    z = np.concatenate([gap, turn], axis=1)
-    j = np.concatenate([by, g.normal_by_params[:, :k] * known[:, None]], axis=1)
+    gap = g.distance_m - touches.radius_m
+    gap[:, k:] = np.minimum(gap[:, k:], 0.0)
+    scale = np.full(len(touches.points_m), 1.0 / SCALE_M)
+    scale[k:] = 1.0 / FREE_SD_M
+    z = np.concatenate([gap * scale, wrapped(g.normal_rad[:, :k] - touches.normal_rad) * known], axis=1)
     root = np.sqrt(1.0 + z * z)
-    off = (params - mean) / sd
-    loss = np.sum(2 * (root - 1.0), axis=1) + 0.5 * np.sum(off**2, axis=1)
+    rows = np.concatenate([g.by_params * scale[:, None], g.normal_by_params[:, :k] * known[:, None]], axis=1)
+    rows[:, k : len(scale)] *= (gap[:, k:] < 0.0)[..., None]
+    off = params - mean
+    loss = 2.0 * (root.sum(axis=1) - root.shape[1]) + 0.5 * (off * off) @ weight
     # A contact on a face that looks along its approach would have been made from inside.
-    normal = np.stack([np.cos(g.normal_rad[:, :k]), np.sin(g.normal_rad[:, :k])], axis=2)
-    loss += 10.0 * np.sum(np.einsum("ski,ki->sk", normal, touches.approach) > 0.3, axis=1)
-    weighted = j / root[..., None]
-    gradient = np.einsum("skn,sk->sn", weighted, z) + off / sd
-    return loss, gradient, np.swapaxes(weighted, 1, 2) @ j + np.diag(1.0 / sd**2)
+    into = -(g.by_params[:, :k, :2] * touches.approach).sum(axis=2)
+    loss += 10.0 * (into > 0.3).sum(axis=1)
+    weighted = np.swapaxes(rows / root[..., None], 1, 2)
+    gradient = (weighted @ z[..., None])[..., 0] + off * weight
+    return loss, gradient, weighted @ rows + np.diag(weight)
 
 
 def clipped(params: Array) -> Array:
     """Parameters (s, p) with sizes and corners within the physical limits; in place."""
     sizes = params[:, 2:3] if params.shape[1] == 3 else params[:, 3:5]
-    np.clip(sizes, 0.5 * SMALLEST_M, 0.5 * LARGEST_M, out=sizes)
+    sizes[:] = np.minimum(np.maximum(sizes, 0.5 * SMALLEST_M), 0.5 * LARGEST_M)
     if params.shape[1] == 6:
-        np.clip(params[:, 5], 0.0, 0.8 * sizes.min(axis=1), out=params[:, 5])
+        params[:, 5] = np.minimum(np.maximum(params[:, 5], 0.0), 0.8 * np.minimum(params[:, 3], params[:, 4]))
     return params
 
 

@@ -167,7 +167,7 @@ def test_evidence_of_a_linear_problem_is_the_gaussian_density():
     nothing = np.zeros((7, 2))
     touches = Touches(tips, np.zeros(7), np.full(7, np.inf), nothing, nothing[:0], R)
     p = np.array([0.0, 0.0, 0.030])
-    h = explain(circle, p, 0.0, touches)
+    h = explain(circle, p[None], [0.0], touches)[0]
     jacobian = circle(p[None], tips).by_params[0]
     sd = np.array([0.025, 0.025, 0.014])
     mean = circle(p[None], tips).distance_m[0] - R + jacobian @ (np.array([*tips.mean(0), 0.030]) - p)

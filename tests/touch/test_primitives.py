@@ -39,7 +39,7 @@ def test_rays_end_where_the_ball_touches(shape):
         bearing = np.r_[rng.uniform(-np.pi, np.pi, 50), p[2] + np.pi * np.array([-1, -0.5, 0, 0.5, 1])]
         u = np.c_[np.cos(bearing), np.sin(bearing)]
         origin = p[:2] + rng.uniform(-0.006, 0.006, 2)
-        tips = origin + ray_m(p, R, origin, u)[:, None] * u
+        tips = origin + ray_m(p[None], R, origin, u)[0, :, None] * u
         np.testing.assert_allclose(shape(p[None], tips).distance_m[0], R, atol=1e-9)
 
 
