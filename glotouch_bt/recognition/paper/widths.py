@@ -19,6 +19,7 @@ from glotouch_bt.recognition.raster import mirrored
 from glotouch_bt.robot import Array
 
 Index = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
 _CACHE_SIZE = 32
 _cache: dict[tuple[str, PadSpec, tuple[float, ...]], tuple[WidthTable, ...]] = {}
 
@@ -30,7 +31,8 @@ class WidthTable:
     Attributes:
         scale: s.
         l_m, z_m: (nl,), (nz,) coordinates of the SCALED model: along the window from the footprint's middle; height.
-        width_m: (yaws, nl, nz); NaN where one pad's window is empty.
+        width_m: (yaws, nl, nz); where a pad's window is empty, the largest of the neighbours, for interpolation.
+        supported: (yaws, nl, nz) no window is empty.
         middle_m: (yaws, nl, nz) closing-direction coordinate halfway between the two supports.
     """
 
@@ -38,6 +40,7 @@ class WidthTable:
     l_m: Array
     z_m: Array
     width_m: Array32
+    supported: Mask
     middle_m: Array32
 
 
@@ -59,10 +62,13 @@ def _table(model: TargetModel, scale: float) -> WidthTable:
     reach = reach[:, edge_l:-edge_l:STRIDE, edge_z:-edge_z:STRIDE]
     reach = np.where(np.isfinite(reach), reach, np.nan).astype(np.float32) * np.float32(scale)
     other = mirrored(reach)
-    width, middle = np.ascontiguousarray(reach + other), np.float32(0.5) * (reach - other)
-    for a in (width, middle):
+    width, middle = reach + other, np.float32(0.5) * (reach - other)
+    supported = np.isfinite(width)
+    near = ndimage.maximum_filter(np.where(supported, width, np.float32(0)), size=(1, 3, 3), mode="constant")
+    width = np.where(supported, width, near)
+    for a in (width, supported, middle):
         a.setflags(write=False)
-    return WidthTable(scale, model.l_m * scale, model.z_m * scale, width, middle)
+    return WidthTable(scale, model.l_m * scale, model.z_m * scale, width, supported, middle)
 
 
 def _odd(x: float) -> int:
@@ -114,6 +120,8 @@ def span(limit: float, n: int) -> Array:
 def predicted_widths(tables: tuple[WidthTable, ...], along_m: float, height_m: Array, grid: Hypotheses) -> Array32:
     """(H, N) widths W(a + delta, z + z_0; s, theta) of one sequence at every hypothesis; NaN without support.
 
+    Widths are interpolated; whether there is support is what the nearest table cell says.
+
     Args:
         tables: One a scale of `grid`.
         along_m: a_k.
@@ -125,17 +133,18 @@ def predicted_widths(tables: tuple[WidthTable, ...], along_m: float, height_m: A
     out = np.zeros((layers, *grid.shape), dtype=np.float32)
     heights = (height_m[:, None] + grid.z0_m[None, :]).reshape(-1)
     for n, t in enumerate(tables):
-        i, f = _positions(t.l_m, along_m + grid.shift_m)
-        j, g = _positions(t.z_m, heights)
+        i, f, nearest_l = _positions(t.l_m, along_m + grid.shift_m)
+        j, g, nearest_z = _positions(t.z_m, heights)
         columns = t.width_m[:, i] * (1 - f)[:, None] + t.width_m[:, i + 1] * f[:, None]  # (yaws, nd, table heights)
         w = columns[:, :, j] * (1 - g) + columns[:, :, j + 1] * g
+        w[~t.supported[:, nearest_l][:, :, nearest_z]] = np.nan
         out[:, n] = w.reshape(yaws, nd, layers, nz).transpose(2, 0, 1, 3)
     return out.reshape(layers, -1)
 
 
-def _positions(axis: Array, x: Array) -> tuple[Index, Array32]:
-    """Cell and fraction for linear interpolation; the fraction is NaN outside the axis."""
+def _positions(axis: Array, x: Array) -> tuple[Index, Array32, Index]:
+    """Cell and fraction for linear interpolation, and nearest cell; the fraction is NaN outside the axis."""
     t = (x - axis[0]) / (axis[1] - axis[0])
     i = np.clip(np.floor(t).astype(np.int64), 0, len(axis) - 2)
-    f = np.where((t >= 0) & (t <= len(axis) - 1), t - i, np.nan)
-    return i, f.astype(np.float32)
+    f = np.where((t >= -0.5) & (t <= len(axis) - 0.5), np.clip(t - i, 0, 1), np.nan)
+    return i, f.astype(np.float32), np.clip(np.rint(t).astype(np.int64), 0, len(axis) - 1)
