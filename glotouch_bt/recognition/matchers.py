@@ -9,6 +9,7 @@ from typing import Protocol
 from glotouch_bt.recognition.decision import Ranking, rank
 from glotouch_bt.recognition.loss import match
 from glotouch_bt.recognition.model import TargetModel
+from glotouch_bt.recognition.paper import paper_matcher
 from glotouch_bt.recognition.params import LossParams
 from glotouch_bt.touch.values import TouchSet
 
@@ -31,8 +32,4 @@ def _likelihood(model: TargetModel, touchsets: Sequence[TouchSet]) -> Ranking:
     return rank([match(model, t, LossParams()) for t in touchsets])
 
 
-def _paper(model: TargetModel, touchsets: Sequence[TouchSet]) -> Ranking:
-    return rank([match(model, t, LossParams.paper("depth", "mode")) for t in touchsets])
-
-
-MATCHERS: Mapping[str, Matcher] = MappingProxyType({"likelihood": _likelihood, "paper": _paper})
+MATCHERS: Mapping[str, Matcher] = MappingProxyType({"likelihood": _likelihood, "paper": paper_matcher()})
