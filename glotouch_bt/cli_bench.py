@@ -195,6 +195,57 @@ def search(
 
 @bench.command()
 @guarded
+def match(
+    phases: Annotated[int, typer.Option(min=1, help="layouts; each gives a decision per object")] = 24,
+    seed: Seed = 400,
+    conditions: Conditions = "nominal",
+    objects: Objects = None,
+    strangers: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="folder of STL files that are not in the box, as targets")
+    ] = None,
+    dataset: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="recorded TouchSets, instead of acquiring (their own conditions)")
+    ] = None,
+    method: Annotated[list[str] | None, typer.Option(help="only these matchers (default: all)")] = None,
+    backend: Annotated[str, typer.Option(help="a registered simulation backend")] = "mujoco",
+    workers: Workers = 2,
+    out: Out = None,
+    json_: Json = False,
+) -> None:
+    """Which touched object is the target: the matchers and the paper's ablation on TouchSets of the real skills."""
+    from glotouch_bt import console_bench
+    from glotouch_bt.study.match.bench import Campaign, run_campaign
+    from glotouch_bt.study.match.methods import chosen
+
+    _check(conditions, backend)
+    campaign = Campaign(
+        seeds=tuple(range(seed, seed + phases)),
+        conditions=conditions,
+        objects=objects,
+        strangers=strangers,
+        dataset=dataset,
+        methods=chosen(method or ()),
+        backend=backend,
+        out=_folder(out, "match"),
+    )
+
+    def show(row: Mapping[str, Any], done: int, total: int) -> None:
+        right = ", ".join(f"{name} {n}" for name, n in row["right"].items())
+        sys.stderr.write(
+            f"[{done}/{total}] seed {row['seed']}: {row['ended']}, {row['touched']} of {row['objects']} touched; "
+            f"right: {right or 'none'}\n"
+        )
+
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        summary = run_campaign(campaign, pool, show)
+    if json_:
+        sys.stdout.write(json.dumps(summary, indent=2) + "\n")
+    else:
+        console_bench.print_match(summary, campaign.out)
+
+
+@bench.command()
+@guarded
 def contact(
     trials: Trials = 20,
     seed: Seed = 100,

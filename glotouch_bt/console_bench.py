@@ -149,3 +149,74 @@ def print_contact(summary: dict[str, Any], folder: Path) -> None:
     if summary["not_traced"]:
         print_table("not traced", ("trial and cause",), [(c,) for c in summary["not_traced"]])
     Console().print(f"{folder / 'summary.json'}", markup=False, highlight=False, soft_wrap=True)
+
+
+def print_match(summary: dict[str, Any], folder: Path) -> None:
+    """The tables of a matching campaign: Top-1 beside the paper's, what is accepted, losses, calibration, closures."""
+
+    def rate(r: dict[str, Any]) -> str:
+        return f"{100 * r['rate']:.1f} [{100 * r['lo']:.0f}, {100 * r['hi']:.0f}]" if r["n"] else "-"
+
+    def both(r: dict[str, Any]) -> str:
+        b = r["by_layout"]
+        return f"{rate(r)} ({100 * b['lo']:.0f}, {100 * b['hi']:.0f})" if r["n"] else "-"
+
+    def value(x: float | None, digits: int = 3) -> str:
+        return "-" if x is None else f"{x:.{digits}f}"
+
+    found, paper = summary["methods"], summary["paper"]
+    top1 = [
+        (n, both(f["row_top1"]), f"{100 * paper[n]['row_top1']:.1f}" if n in paper else "", both(f["col_top1"]))
+        for n, f in found.items()
+    ]
+    title = f"{summary['layouts']} layouts, {summary['conditions']}: Top-1 % [Wilson 95 %] (95 % over layouts)"
+    print_table(title, ("", "row", "paper's row", "column"), top1)
+    print_table(
+        "accepted, % [Wilson 95 %]",
+        ("", "present, right", "present, wrong", "absent", "stranger"),
+        [
+            (n, *(rate(f[k]) for k in ("right_and_accepted", "wrong_and_accepted", "absent_lifted", "stranger_lifted")))
+            for n, f in found.items()
+        ],
+    )
+    apart = [
+        (n, value(f["margin"]["mean"], 2), value(f["ece"]["value"]),
+         *(value(f[against].get(by, {}).get("value")) for against in ("auroc", "auroc_absent")
+           for by in ("probability", "loss")))
+        for n, f in found.items()
+    ]  # fmt: skip
+    against = f"strangers {', '.join(summary['strangers'])}" if summary["strangers"] else "absent targets"
+    print_table(
+        f"margin, calibration, AUROC (by p, by loss) against {against}, and against absent targets",
+        ("", "margin", "ECE", "AUROC p", "loss", "absent p", "loss"),
+        apart,
+    )
+    timing = summary["timing"]
+    cost = [
+        (n, *(value(f[k][q]["value"], 1) for k in ("position_error_mm", "yaw_error_deg") for q in ("median", "p95")),
+         value(timing.get("pair_ms", {}).get(n), 1), value(timing.get("pair_cpu_ms", {}).get(n), 1))
+        for n, f in found.items()
+    ]  # fmt: skip
+    head = ("", "mm median", "95 %", "deg median", "95 %", "ms a pair", "of processor")
+    print_table("fitted pose of the right candidate, cost", head, cost)
+    names = summary["loss_matrix"]["objects"]
+    matrix = summary["loss_matrix"][summary["head"]]
+    losses = [(n, *(value(v, 2) for v in line)) for n, line in zip(names, matrix, strict=True)]
+    print_table(f"mean loss of {summary['head']}: target STL down, object touched across", ("", *names), losses)
+    if summary["closures_to_confidence"]:
+        counts = [
+            (order, f"{c['closures']['mean']:.1f} [{c['closures']['lo']:.1f}, {c['closures']['hi']:.1f}]",
+             value(c["median"], 0), value(c["share_of_recorded"]["mean"], 2), rate(c["right"]),
+             rate(c["confident_and_wrong"]))
+            for order, c in summary["closures_to_confidence"].items()
+        ]  # fmt: skip
+        head = ("order", "closures", "median", "share", "right %", "sure and wrong %")
+        print_table("closures in the whole box until accepted with P > .95", head, counts)
+    Console().print(
+        f"a new STL takes {value(timing.get('new_stl_s'), 2)} s ({value(timing.get('new_stl_cpu_s'), 2)} s of "
+        f"processor); {summary['touched']} objects touched, {summary['nameless']} candidates of none\n"
+        f"{folder / 'summary.json'}",
+        markup=False,
+        highlight=False,
+        soft_wrap=True,
+    )
