@@ -1,0 +1,240 @@
+"""Touch where it tells most, until it is known which candidate is the target: one closure a call."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from glotouch_bt.motion import Motion
+from glotouch_bt.recognition import Gates, PadSpec, Ranking, TargetModel
+from glotouch_bt.recognition.gain import Belief, believe, expected_gain
+from glotouch_bt.robot import HOLD, MotionRefused, ParamError
+from glotouch_bt.touch import Candidate, Layer, TouchSequence, TouchSet
+from skills.allowance import keeping_clear_of
+from skills.base import Context, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from skills.hand import CLEARANCE_M, hand_pose_B, require_clear
+from skills.match import load_target
+from skills.squeeze_motion import ClosureParams, Squeezing, pads_height_m
+from skills.touch_options import Option, Standing, best_rates, options
+
+MOST_IN_VAIN = 4
+"""Closures without a plateau, after which a candidate is left alone: it is not where it was traced."""
+
+
+class TouchNextParams(ClosureParams):
+    """Parameters of `touch_next`."""
+
+    target: str = param("The object to find: an STL file, or the name of one in the world's object folder")
+    confidence: float = param("Probability that is enough", default=0.95, gt=0.5, lt=1.0)
+    least_gain_nats: float = param("Expected gain below which no closure is worth it", default=0.005, ge=0.0)
+
+
+class TouchNext(Skill):
+    """Make the closure, of all candidates, yaws and heights, that is expected to tell most in its time.
+
+    Repeat it until `decided`. SUCCESS: one closure was tried, or `decided` is now true: one candidate, or none of them,
+    is the target with the wanted confidence, or nothing more can be learned; the hand is then high again. `match` says
+    which.
+    FAILURE `no_candidates`: there is nothing to touch.
+    FAILURE `too_low`: the target is lower than the probe and the pads reach.
+    """
+
+    Params = TouchNextParams
+    params: TouchNextParams
+    candidates = In(tuple, "what may be touched", element=Candidate)
+    felt = In(tuple, "what was felt so far", key="touchsets", required=False)
+    touchsets = Out(tuple, "what was felt, one TouchSet per candidate", element=TouchSet)
+    decided = Out(bool, "no further closure is wanted")
+
+    def __init__(self, name: str, params: SkillParams, context: Context) -> None:
+        super().__init__(name, params, context)
+        self._model: TargetModel | None = None
+        self._down: Squeezing | None = None
+        self._refused: set[tuple[int, int, int, int]] = set()
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        candidates: tuple[Candidate, ...] = self.candidates
+        if not candidates:
+            raise SkillFailed("no_candidates", "there is no candidate to touch")
+        touchsets: tuple[TouchSet, ...] = self.felt or ()
+        if {t.candidate.index for t in touchsets} != {c.index for c in candidates}:
+            touchsets = tuple(TouchSet(c, ()) for c in candidates)
+            self._refused.clear()
+            self._down = None
+        down, self._down = self._down, None  # if this is broken off, nobody knows where the hand stands
+        self.touchsets, self.decided = touchsets, False
+        yield HOLD  # thinking takes longer than a control period; on hardware the arm holds meanwhile
+        belief = believe(self._target_model(), touchsets)
+        why = self._enough(belief.ranking)
+        chosen = None if why else self._choose(belief, down)
+        if chosen is None:
+            yield from self._end(belief, down, why or "no closure is expected to tell more")
+            return
+        try:
+            down, layer = yield from self._touch(candidates, chosen, down)
+        except MotionRefused as refusal:
+            self._refused.add(_key(chosen))
+            self.event("note", text=f"a closure on candidate {chosen.closure.candidate} was not made: {refusal}")
+            return
+        self._down = down
+        self.touchsets = touchsets = tuple(
+            _with_layer(t, down, layer) if t.candidate.index == chosen.closure.candidate else t for t in touchsets
+        )
+        self.event(
+            "closure",
+            number=sum(len(t.layers) for t in touchsets),
+            chosen=chosen.closure,
+            seconds=chosen.seconds,
+            stable=layer.stable,
+            probability={m.index: m.probability for m in belief.ranking.matches},
+            p_absent=belief.ranking.p_absent,
+        )
+
+    def _target_model(self) -> TargetModel:
+        """Built once.
+
+        Raises:
+            SkillFailed: `too_low`.
+        """
+        if self._model is None:
+            gripper = self.context.arm.description.gripper
+            mesh = load_target(self.params.target, self.context.world.objects.folder)
+            pads = PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
+            try:
+                self._model = TargetModel.from_mesh(mesh, pads)
+            except ParamError as e:
+                raise SkillFailed("too_low", f"{mesh.name} cannot be felt: {e}", advice="sweep lower") from e
+        return self._model
+
+    def _enough(self, ranking: Ranking) -> str:
+        """Why no further closure is wanted, or empty."""
+        best = max(ranking.matches, key=lambda m: m.probability)
+        if ranking.p_absent >= self.params.confidence:
+            return f"none of them is the target (probability {ranking.p_absent:.3f})"
+        if best.probability >= self.params.confidence and ranking.accepted:
+            return f"candidate {best.index} is the target (probability {best.probability:.3f})"
+        return ""
+
+    def _choose(self, belief: Belief, down: Squeezing | None) -> Option | None:
+        """The most telling closure for its time that can be made; None if none tells enough.
+
+        One candidate may be surely the target and yet have too little evidence to be taken: it is touched again.
+        """
+        p, arm = self.params, self.context.arm
+        pose_K_P = self.context.world.container.pose_B_K.inverse() @ arm.pose_B_P
+        standing = None
+        if down is not None:
+            standing = Standing(down.candidate.index, down.at, float(pose_K_P.position_m[2]))
+        hopeless = {t.candidate.index for t in belief.touchsets if _in_vain(t) >= MOST_IN_VAIN}
+        found = options(belief.touchsets, standing, pose_K_P.position_m, arm.description.gripper, p)
+        found = [o for o in found if _key(o) not in self._refused and o.closure.candidate not in hopeless]
+        if not found:
+            return None
+        closures = [c for o in found for c in (o.closure, *o.after)]
+        gains = np.split(expected_gain(belief, closures), np.cumsum([1 + len(o.after) for o in found])[:-1])
+        rates = best_rates(found, gains)
+        worth = np.array([g.max() for g in gains]) >= p.least_gain_nats
+        best = max(belief.ranking.matches, key=lambda m: m.probability)
+        if best.probability >= p.confidence and best.evidence < Gates().evidence:
+            worth = np.array([o.closure.candidate == best.index for o in found])
+            rates = np.array([1.0 / o.seconds for o in found])
+        for i in np.argsort(-rates, kind="stable").tolist():
+            if not worth[i]:
+                continue
+            option: Option = found[i]
+            if self._has_room(belief, option, down):
+                return replace(option, closure=replace(option.closure, gain_nats=float(gains[i][0])))
+            self._refused.add(_key(option))
+        return None
+
+    def _has_room(self, belief: Belief, option: Option, down: Squeezing | None) -> bool:
+        """The open hand fits beside the neighbours; where it stands already it does."""
+        if down is not None and option.at is down.at:
+            return True
+        arm = self.context.arm
+        z = option.closure.height_m
+        pose = hand_pose_B(
+            arm, self.context.world.container, np.array([*option.at.position_K_m, z]), option.at.yaw_K_rad
+        )
+        others = [t.candidate for t in belief.touchsets if t.candidate.index != option.closure.candidate]
+        with keeping_clear_of(arm, others):
+            try:
+                require_clear(arm, pose, option.at.opening_m, CLEARANCE_M)
+            except MotionRefused:
+                return False
+        return True
+
+    def _touch(
+        self, candidates: tuple[Candidate, ...], chosen: Option, down: Squeezing | None
+    ) -> Motion[tuple[Squeezing, Layer]]:
+        """Go there and close.
+
+        Raises:
+            MotionRefused: It could not be made; the hand is high.
+        """
+        index = chosen.closure.candidate
+        hand = down
+        if hand is None or hand.at is not chosen.at:
+            yield from self._rise(down)
+            (candidate,) = (c for c in candidates if c.index == index)
+            hand = Squeezing(self.context, candidate, chosen.at, self.params)
+        with keeping_clear_of(self.context.arm, [c for c in candidates if c.index != index]):
+            if hand is not down:
+                yield from hand.go_down(chosen.closure.height_m)
+            elif not (yield from hand.move_to(chosen.closure.height_m)):
+                yield from hand.rise()
+                raise MotionRefused("squeeze", "the open hand is caught under something")
+            try:
+                return hand, (yield from hand.close())
+            except MotionRefused:
+                yield from hand.rise()
+                raise
+
+    def _rise(self, down: Squeezing | None) -> Motion[None]:
+        """Straight up, if the hand is low (after a preemption nobody knows over what)."""
+        if down is not None:
+            yield from down.rise()
+            return
+        arm = self.context.arm
+        lift = self.params.headroom_m + arm.description.gripper.fingertip_below_P_m - pads_height_m(self.context)
+        if lift > 0.0:
+            yield from arm.shift([0.0, 0.0, lift], self.params.travel_speed_m_s, check=False, what="rise")
+
+    def _end(self, belief: Belief, down: Squeezing | None, why: str) -> Motion[None]:
+        yield from self._rise(down)
+        for touchset in belief.touchsets:
+            if touchset.sequences:
+                self.event("touchset", touchset=touchset, refusals=[])
+        self.event(
+            "decided",
+            why=why,
+            closures=sum(len(t.layers) for t in belief.touchsets),
+            stances=sum(len(t.sequences) for t in belief.touchsets),
+            candidates=sum(bool(t.layers) for t in belief.touchsets),
+            ranking=belief.ranking,
+        )
+        self.decided = True
+
+
+def _with_layer(touchset: TouchSet, hand: Squeezing, layer: Layer) -> TouchSet:
+    """With one more layer: in the sequence of the hand's stance, or in a new one."""
+    last = touchset.sequences[-1] if touchset.sequences else None
+    if last is not None and last.position_K_m is hand.at.position_K_m:
+        return replace(touchset, sequences=(*touchset.sequences[:-1], replace(last, layers=(*last.layers, layer))))
+    begun = TouchSequence(hand.at.position_K_m, hand.yaw_K_rad, (layer,))
+    return replace(touchset, sequences=(*touchset.sequences, begun))
+
+
+def _in_vain(touchset: TouchSet) -> int:
+    """Closures without a plateau, if there was never one with."""
+    return 0 if any(layer.stable for layer in touchset.layers) else len(touchset.layers)
+
+
+def _key(option: Option) -> tuple[int, int, int, int]:
+    """Candidate, yaw in degrees, height and place along the jaws' width in mm: for what was refused."""
+    at = option.at
+    along = float(at.position_K_m @ [np.cos(at.yaw_K_rad), np.sin(at.yaw_K_rad)])
+    c = option.closure
+    return c.candidate, round(np.rad2deg(at.yaw_K_rad)), round(1e3 * c.height_m), round(1e3 * along)
