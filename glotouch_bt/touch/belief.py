@@ -12,7 +12,15 @@ import numpy as np
 from glotouch_bt.robot import Array, ParamError
 from glotouch_bt.touch.deviation import Hypothesis, explain
 from glotouch_bt.touch.mixture import TEMPER, OutlineBelief
-from glotouch_bt.touch.primitives import APPROACH_SD_RAD, CONTACT_SD_M, NORMAL_SD_RAD, Touches, circle, fit, rounded
+from glotouch_bt.touch.primitives import (
+    APPROACH_SD_RAD,
+    CONTACT_SD_M,
+    NORMAL_SD_RAD,
+    Touches,
+    circle,
+    fit_both,
+    rounded,
+)
 
 __all__ = ["OutlineBelief", "believe_outline", "present_tips"]
 
@@ -96,12 +104,11 @@ def present_tips(tip_K_m: Array, pushed_K_m: Array) -> Array:
 
 def _hypotheses(touches: Touches) -> tuple[tuple[Hypothesis, ...], Array]:
     """Explanations, weightiest first, and their weights."""
-    rounds, _ = fit(circle, touches.rooted)
-    boxes, losses = fit(rounded, touches.rooted)
+    ring, boxes, losses = fit_both(touches.rooted)
     distinct = _distinct(boxes[losses < losses[0] + MODE_LOSS])
     loose, loose_chances = [scale for scale, _ in LOOSENESS], [chance for _, chance in LOOSENESS]
-    found = explain(circle, rounds[[0] * len(loose)], [0.0] * len(loose), touches, loose)
-    middle = explain(circle, rounds[:1], AMPLITUDES[1:2], touches)[0].corrected
+    found = explain(circle, ring[None].repeat(len(loose), axis=0), [0.0] * len(loose), touches, loose)
+    middle = explain(circle, ring[None], AMPLITUDES[1:2], touches)[0].corrected
     found += explain(circle, middle[None].repeat(len(AMPLITUDES), axis=0), AMPLITUDES, touches)
     plain, more = np.array(distinct[:1] * len(loose) + distinct[1:]), len(distinct) - 1
     found += explain(rounded, plain, [0.0] * len(plain), touches, loose + loose[:1] * more)

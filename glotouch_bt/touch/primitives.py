@@ -193,51 +193,93 @@ def wrapped(angle_rad: Array) -> Array:
 
 
 def fit(shape: Shape, touches: Touches, *, steps: int = 14, gain: float = 1e-2) -> tuple[Array, Array]:
-    """Local optima of the soft-L1 loss from many starts: parameters (s, p) and losses (s,), best first.
-
-    Levenberg-Marquardt by iterated reweighting, all starts at once; ends when two steps running gain less than `gain`.
-    """
+    """Local optima of the soft-L1 loss from many starts: parameters (s, p) and losses (s,), best first."""
     params = _circle_starts(touches) if shape is circle else _rectangle_starts(touches)
     if shape is rounded:
         params = np.concatenate([params, np.full((len(params), 1), CORNER_M)], axis=1)
-    params = clipped(params)
     mean, sd = prior(shape, touches)
-    weight = 1.0 / sd**2
-    n, first = params.shape[1], 2 if shape is circle else 3
-    longest = np.array([0.02, 0.02, 0.3][:first])
-    identity = np.eye(n)
+    params, loss = _descend(shape, clipped, clipped(params), touches, mean, sd**-2, 0, steps, gain)
+    order = np.argsort(loss, kind="stable")
+    return params[order], loss[order]
+
+
+def fit_both(touches: Touches, *, steps: int = 14, gain: float = 1e-2) -> tuple[Array, Array, Array]:
+    """The best circle (3,), and what `fit` gives for rounded rectangles, in one descent.
+
+    A circle is a rounded rectangle that is all corner: yaw 0, half sides and corner's radius equal, and kept so.
+    """
+    rounds, boxes = _circle_starts(touches), _rectangle_starts(touches)
+    n = len(rounds)
+    params = np.zeros((n + len(boxes), 6))
+    params[:n, :2], params[:n, 3:] = rounds[:, :2], rounds[:, 2:]
+    params[n:, :5], params[n:, 5] = boxes, CORNER_M
+    mean, sd = prior(rounded, touches)
+    weight = np.repeat(sd[None] ** -2, len(params), axis=0)
+    weight[:n, [2, 4, 5]] = 0.0
+
+    def tied(params: Array, points_m: Array) -> Geometry:
+        g = rounded(params, points_m)
+        g.by_params[:n, :, 2:] = (0.0, -1.0, 0.0, 0.0)
+        g.normal_by_params[:n, :, 2:] = 0.0
+        return g
+
+    def bound(params: Array) -> Array:
+        params = clipped(params)
+        params[:n, 4:] = params[:n, 3:4]
+        return params
+
+    params, loss = _descend(tied, bound, bound(params), touches, mean, weight, n, steps, gain)
+    order = n + np.argsort(loss[n:], kind="stable")
+    best = params[int(np.argmin(loss[:n]))]
+    return best[[0, 1, 3]], params[order], loss[order]
+
+
+def _descend(
+    shape: Shape,
+    bound: Callable[[Array], Array],
+    params: Array,
+    touches: Touches,
+    mean: Array,
+    weight: Array,
+    kept: int,
+    steps: int,
+    gain: float,
+) -> tuple[Array, Array]:
+    """Parameters (s, p) and losses (s,) of local optima; after some steps of the first `kept` starts and the best.
+
+    Levenberg-Marquardt by iterated reweighting, all starts at once; ends when two steps running gain less than `gain`.
+    """
+    identity = np.eye(params.shape[1])
+    longest = np.array([0.02, 0.02, 0.3] if params.shape[1] > 3 else [0.02, 0.02])
     damping = np.full(len(params), 1e-2)
     loss, gradient, hessian = normal_equations(shape, params, touches, mean, weight)
     idle = 0
     for step in range(steps):
-        if step == SIFT_STEP and len(params) > SIFTED:
-            keep = np.argsort(loss, kind="stable")[:SIFTED]
+        if step == SIFT_STEP and len(params) > kept + SIFTED:
+            keep = np.r_[:kept, kept + np.argsort(loss[kept:], kind="stable")[:SIFTED]]
             params, damping, loss, gradient, hessian = (v[keep] for v in (params, damping, loss, gradient, hessian))
+            weight = weight if weight.ndim == 1 else weight[keep]
         damped = hessian * (1.0 + damping[:, None, None] * identity) + 1e-9 * identity
         move = np.linalg.solve(damped, gradient[..., None])[..., 0]
-        move[:, :first] = np.minimum(np.maximum(move[:, :first], -longest), longest)
-        trial = clipped(params - move)
+        move[:, : len(longest)] = np.minimum(np.maximum(move[:, : len(longest)], -longest), longest)
+        trial = bound(params - move)
         trial_loss, trial_gradient, trial_hessian = normal_equations(shape, trial, touches, mean, weight)
         better = trial_loss < loss
         gained = float(np.max((loss - trial_loss) * better))
-        if better.all():
-            params, loss, gradient, hessian = trial, trial_loss, trial_gradient, trial_hessian
-        else:
-            params[better], loss[better] = trial[better], trial_loss[better]
-            gradient[better], hessian[better] = trial_gradient[better], trial_hessian[better]
+        params[better], loss[better] = trial[better], trial_loss[better]
+        gradient[better], hessian[better] = trial_gradient[better], trial_hessian[better]
         damping = damping * np.where(better, 0.3, 5.0)
         idle = idle + 1 if gained < gain else 0
         if idle == 2:
             break
-    order = np.argsort(loss, kind="stable")
-    return params[order], loss[order]
+    return params, loss
 
 
 def normal_equations(
     shape: Shape, params: Array, touches: Touches, mean: Array, weight: Array
 ) -> tuple[Array, Array, Array]:
     """Loss (s,), gradient (s, p) and Gauss-Newton matrix (s, p, p) of parameters whose prior has this mean (p,) and
-    inverse variance (p,)."""
+    inverse variance, (p,) or one each (s, p)."""
     k = len(touches.tips_m)
     g = shape(params, touches.points_m)
     known = 1.0 / touches.normal_sd_rad
@@ -250,13 +292,18 @@ def normal_equations(
     rows = np.concatenate([g.by_params * scale[:, None], g.normal_by_params[:, :k] * known[:, None]], axis=1)
     rows[:, k : len(scale)] *= (gap[:, k:] < 0.0)[..., None]
     off = params - mean
-    loss = 2.0 * (root.sum(axis=1) - root.shape[1]) + 0.5 * (off * off) @ weight
+    pull = off * weight
+    # Twice the data's part of the gradient's loss: it decides which of two optima is the better one, and which steps
+    # are taken; where they end is where the gradient vanishes.
+    loss = 2.0 * (root.sum(axis=1) - root.shape[1]) + 0.5 * (off * pull).sum(axis=1)
     # A contact on a face that looks along its approach would have been made from inside.
     into = -(g.by_params[:, :k, :2] * touches.approach).sum(axis=2)
     loss += 10.0 * (into > 0.3).sum(axis=1)
     weighted = np.swapaxes(rows / root[..., None], 1, 2)
-    gradient = (weighted @ z[..., None])[..., 0] + off * weight
-    return loss, gradient, weighted @ rows + np.diag(weight)
+    gradient = (weighted @ z[..., None])[..., 0] + pull
+    hessian = weighted @ rows
+    hessian[:, np.arange(params.shape[1]), np.arange(params.shape[1])] += weight
+    return loss, gradient, hessian
 
 
 def clipped(params: Array) -> Array:

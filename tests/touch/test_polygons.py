@@ -10,6 +10,7 @@ from glotouch_bt.touch.polygons import (
     minimum_rectangle,
     polygon_distance,
     shrunk_convex,
+    star_hull,
 )
 
 CORNERS = np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 2.0], [2.0, 2.0], [2.0, 5.0], [0.0, 5.0]])  # an L
@@ -69,3 +70,16 @@ def test_distance_of_an_l():
 def test_no_area_no_hull():
     with pytest.raises(ParamError):
         convex_hull(np.zeros((5, 2)))
+
+
+@given(st.integers(0, 10_000))
+def test_the_hull_of_a_star_is_the_hull_of_its_points(seed):
+    """Against Qhull, for random distances along evenly spaced rays."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(8, 80))
+    bearing = np.linspace(-np.pi, np.pi, n, endpoint=False)
+    star = rng.uniform(0.02, 0.05, n)[:, None] * np.c_[np.cos(bearing), np.sin(bearing)]
+    got, want = star[star_hull(star)], convex_hull(star)
+    assert len(got) == len(want)
+    first = int(np.argmin(np.linalg.norm(want - got[0], axis=1)))
+    np.testing.assert_array_equal(got, np.roll(want, -first, axis=0))
