@@ -21,6 +21,10 @@ from glotouch_bt.recognition.placement import unfelt_pose
 from glotouch_bt.robot import ParamError
 from glotouch_bt.touch.values import TouchSet
 
+PAPER_GATES = Gates(margin=0.1, loss=1.0, evidence=2.5)
+"""The paper names the three gates and gives no values. Its own loss matrix has right pairs up to 0.90 and its least
+mean margin is 0.15, so 1.0 and 0.1 are the round numbers beyond; evidence as everywhere in this project."""
+
 
 def paper_match(model: TargetModel, touchset: TouchSet, params: PaperParams | None = None) -> Match:
     """Loss of one pair; deterministic. A TouchSet that no pad felt has infinite loss and evidence 0."""
@@ -67,7 +71,7 @@ def mode_loss(p_coupled: float, anisotropy: float, p: PaperParams) -> float:
 
 
 def paper_rank(
-    model: TargetModel, touchsets: Sequence[TouchSet], params: PaperParams | None = None, gates: Gates | None = None
+    model: TargetModel, touchsets: Sequence[TouchSet], params: PaperParams | None = None, gates: Gates = PAPER_GATES
 ) -> Ranking:
     """Rank all candidates; accepted by margin, absolute fit and evidence alone.
 
@@ -90,7 +94,7 @@ def paper_rank(
 
 
 def paper_matcher(
-    params: PaperParams | None = None, gates: Gates | None = None
+    params: PaperParams | None = None, gates: Gates = PAPER_GATES
 ) -> Callable[[TargetModel, Sequence[TouchSet]], Ranking]:
     """A Matcher with these parameters."""
     p = params or PaperParams()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from glotouch_bt.recognition import TargetModel
-from glotouch_bt.recognition.paper import PaperParams, paper_match, paper_matcher, paper_rank
+from glotouch_bt.recognition.paper import TERMS, PaperParams, paper_match, paper_matcher, paper_rank
 from glotouch_bt.recognition.paper.branches import bias_grid, fit_widths
 from glotouch_bt.recognition.paper.observation import read_observation
 from glotouch_bt.recognition.paper.widths import Hypotheses, predicted_widths, width_tables
@@ -176,6 +176,25 @@ def test_terms_add_up_and_switch(models, nominal) -> None:
     assert paper_match(model, touchset, replace(FULL, depth_anisotropy=0.0)).terms["depth"] == pytest.approx(
         weights * full.terms["depth"]
     )
+
+
+@pytest.mark.parametrize("term", TERMS)
+def test_every_term_stands_alone(models, nominal, term: str) -> None:
+    """Alone it is finite and not negative, and what it gives is all there is."""
+    m = paper_match(models[2], nominal[0], FULL.only(term))
+    assert 0 <= m.loss < 10
+    assert set(m.terms) == {"width"} | ({term} & {"depth", "mode"})
+    if term in ("depth", "mode"):
+        assert m.terms["width"] == 0.0
+        assert m.terms[term] == pytest.approx(paper_match(models[2], nominal[0]).terms[term])
+
+
+def test_normals_of_a_closed_mesh_average_to_nothing(meshes) -> None:
+    """Why the global normal dispersion d_M cannot be meant: it is 1 for every solid."""
+    for mesh in meshes:
+        solid = mesh.as_trimesh()
+        mean = (solid.face_normals * solid.area_faces[:, None]).sum(axis=0) / solid.area
+        assert 1 - np.linalg.norm(mean) == pytest.approx(1.0, abs=1e-9)
 
 
 def test_more_weight_never_lowers_the_loss(models, nominal) -> None:
