@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -93,13 +93,18 @@ def paper_rank(
     return replace(ranking, matches=matches, p_absent=0.0)
 
 
-def paper_matcher(
-    params: PaperParams | None = None, gates: Gates = PAPER_GATES
-) -> Callable[[TargetModel, Sequence[TouchSet]], Ranking]:
+@dataclass(frozen=True)
+class PaperMatcher:
+    """A Matcher: `paper_rank` with these parameters and gates."""
+
+    params: PaperParams
+    gates: Gates
+
+    def __call__(self, model: TargetModel, touchsets: Sequence[TouchSet]) -> Ranking:
+        """See `paper_rank`."""
+        return paper_rank(model, touchsets, self.params, self.gates)
+
+
+def paper_matcher(params: PaperParams | None = None, gates: Gates = PAPER_GATES) -> PaperMatcher:
     """A Matcher with these parameters."""
-    p = params or PaperParams()
-
-    def matcher(model: TargetModel, touchsets: Sequence[TouchSet]) -> Ranking:
-        return paper_rank(model, touchsets, p, gates)
-
-    return matcher
+    return PaperMatcher(params or PaperParams(), gates)
