@@ -24,6 +24,7 @@ class LayerEvidence:
         width_m: Rigid width: aperture plus what sank into the gels.
         weight: 1 if both pads felt it, `LossParams.unilateral` if one.
         upper_only: One pad felt nothing, so the true width in the window is at most `width_m`.
+        yaw_rad: Of the hand in K.
         along_m: x_P coordinate of the hand's middle, from the contour's centre.
         height_m: Of the pads' mid-point.
         images: (left, right) features (35,), or None for a pad that felt nothing.
@@ -36,6 +37,7 @@ class LayerEvidence:
     width_m: float
     weight: float
     upper_only: bool
+    yaw_rad: float
     along_m: float
     height_m: float
     images: tuple[Array | None, Array | None]
@@ -96,6 +98,7 @@ def read_evidence(touchset: TouchSet, pad: PadSpec, params: LossParams) -> Evide
                     layer.aperture_m + sum(p.top_m for p in patches),
                     1.0 if felt == 2 else params.unilateral,
                     felt < 2,
+                    float(layer.yaw_rad),
                     float(x @ (np.asarray(layer.position_K_m) - centre)),
                     layer.height_m,
                     (left, right),

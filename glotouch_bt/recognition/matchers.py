@@ -6,11 +6,10 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Protocol
 
-from glotouch_bt.recognition.decision import Ranking, rank
-from glotouch_bt.recognition.loss import match
+from glotouch_bt.recognition.decision import Ranking
+from glotouch_bt.recognition.likelihood.belief import believe, ranked
 from glotouch_bt.recognition.model import TargetModel
 from glotouch_bt.recognition.paper import paper_matcher
-from glotouch_bt.recognition.params import LossParams
 from glotouch_bt.touch.values import TouchSet
 
 DEFAULT_MATCHER = "likelihood"
@@ -19,7 +18,7 @@ DEFAULT_MATCHER = "likelihood"
 class Matcher(Protocol):
     """What ranks candidates. Deterministic."""
 
-    def __call__(self, model: TargetModel, touchsets: Sequence[TouchSet]) -> Ranking:
+    def __call__(self, model: TargetModel, touchsets: Sequence[TouchSet], /) -> Ranking:
         """Rank; the probabilities and `p_absent` sum to 1.
 
         Raises:
@@ -29,7 +28,7 @@ class Matcher(Protocol):
 
 
 def _likelihood(model: TargetModel, touchsets: Sequence[TouchSet]) -> Ranking:
-    return rank([match(model, t, LossParams()) for t in touchsets])
+    return ranked(believe(model, touchsets))
 
 
 MATCHERS: Mapping[str, Matcher] = MappingProxyType({"likelihood": _likelihood, "paper": paper_matcher()})

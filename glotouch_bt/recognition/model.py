@@ -98,6 +98,11 @@ class TargetModel:
             self._lazy["images"] = image_feature(pooled_images(self.fine_m, STRIDE, self.pad)).astype(np.float32)
         return self._lazy["images"]
 
+    @cached_property
+    def image_norms(self) -> Array32:
+        """(72, nl, nz) squared norm of each image feature."""
+        return np.asarray(np.einsum("...i,...i->...", self.images, self.images))
+
     def width_at(self, l_m: float, z_m: float, phi_rad: float) -> float:
         """One support width by linear interpolation of the table; NaN outside it."""
         n = len(self.phi_rad)

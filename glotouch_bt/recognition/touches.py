@@ -25,23 +25,23 @@ def pooled_images(fine_m: Array32, stride: int, pad: PadSpec) -> Array32:
     out = []
     for side in fine_m:
         h = sliding_window_view(side, (FINE[1], FINE[0]))[::stride, ::stride]  # (nl, nz, 15, 21), z upwards
-        out.append(_pool_touch(h, pad))
+        out.append(touch_windows(h.reshape(-1, FINE[1], FINE[0]), pad).reshape(*h.shape[:2], -1))
     return np.stack(out)
 
 
-def _pool_touch(h: Array32, pad: PadSpec) -> Array32:
-    nl, nz = h.shape[:2]
-    top = h.max(axis=(2, 3), keepdims=True)
-    pooled = np.zeros((nl * nz, POOLED[0] * POOLED[1]), dtype=np.float32)
+def touch_windows(h: Array32, pad: PadSpec) -> Array32:
+    """Pooled images (n, 35) of surfaces under the whole window, heights (n, 15, 21): along x_P, upwards; -inf: none."""
+    top = h.max(axis=(1, 2), keepdims=True)
+    pooled = np.zeros((len(h), POOLED[0] * POOLED[1]), dtype=np.float32)
     some = np.isfinite(top).reshape(-1)
     if not some.any():
-        return pooled.reshape(nl, nz, -1)
-    rel = (h - np.where(np.isfinite(top), top, np.float32(0))).reshape(nl * nz, -1)[some]
+        return pooled
+    rel = (h - np.where(np.isfinite(top), top, np.float32(0))).reshape(len(h), -1)[some]
     s = _fast_shift(rel, pad)
     x = np.maximum(rel + s, np.float32(0)).reshape(-1, POOLED[1], FINE[1] // POOLED[1], POOLED[0], FINE[0] // POOLED[0])
     mean = x.sum(axis=(2, 4)) / np.float32(FINE[0] * FINE[1] / (POOLED[0] * POOLED[1]))  # (m, 5, 7), rows upwards
     pooled[some] = mean[:, :, ::-1].transpose(0, 2, 1).reshape(len(mean), -1)
-    return pooled.reshape(nl, nz, -1)
+    return pooled
 
 
 def _fast_shift(rel_m: Array32, pad: PadSpec) -> Array32:

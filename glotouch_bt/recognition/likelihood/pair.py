@@ -1,0 +1,147 @@
+"""One STL against one TouchSet: the marginal log ratio target : background, and the posterior of the pose."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from glotouch_bt.recognition.decision import Fit
+from glotouch_bt.recognition.evidence import Evidence, read_evidence
+from glotouch_bt.recognition.likelihood.background import log_generic_images, log_generic_widths
+from glotouch_bt.recognition.likelihood.params import LikelihoodParams
+from glotouch_bt.recognition.likelihood.scalars import (
+    contour_ratio,
+    height_ratio,
+    mode_ratio,
+    shift_prior,
+    yaw_prior,
+)
+from glotouch_bt.recognition.likelihood.volumes import Grid, Observed, image_ratios, log_sum, turned, width_ratios
+from glotouch_bt.recognition.model import TargetModel
+from glotouch_bt.recognition.pads import Array32, PadSpec
+from glotouch_bt.recognition.params import LossParams
+from glotouch_bt.recognition.placement import fitted_pose, unfelt_pose
+from glotouch_bt.robot import Array
+from glotouch_bt.touch.values import TouchSet
+
+UNFELT_LIMIT = 1.0
+"""Largest log ratio in favour of a candidate that no pad felt: its outline alone must not decide."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A TouchSet and what the background makes of it; the same for every STL.
+
+    Attributes:
+        touchset: What was felt.
+        evidence: The same, reduced.
+        sequences: Layers that count, with background densities, by sequence; sequences without any are left out.
+    """
+
+    touchset: TouchSet
+    evidence: Evidence
+    sequences: tuple[tuple[Observed, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Evidence of one pair.
+
+    Attributes:
+        index: The candidate's index.
+        log_ratio: log p(TouchSet | target) - log p(TouchSet | some other object), tempered and calibrated.
+        terms: What it is made of, nats before calibration: mode, height, contour; width and image at the best pose;
+            pose: what is gained or lost by not knowing the pose.
+        log_pose: (72, nz) posterior of (relative yaw of the first sequence, height offset); None if nothing was felt.
+        first_rad: Yaw of the first sequence's hand.
+        bias_m: Best aperture bias.
+        fit, pose_K_O, evidence: As in `Match`.
+    """
+
+    index: int
+    log_ratio: float
+    terms: dict[str, float]
+    log_pose: Array32 | None
+    first_rad: float
+    bias_m: float
+    fit: Fit | None
+    pose_K_O: tuple[float, float, float]
+    evidence: float
+
+
+def read_touchset(touchset: TouchSet, pad: PadSpec, p: LikelihoodParams) -> Reading:
+    """Reduce a TouchSet and weigh it under the background."""
+    e = read_evidence(touchset, pad, LossParams())
+    images = [i for layer in e.layers for i in layer.images if i is not None]
+    logs = iter(log_generic_images(np.array(images, dtype=np.float32), pad, p) if images else ())
+    widths = log_generic_widths(e.layers, touchset.candidate, p)
+    seen: dict[int, list[Observed]] = {}
+    for layer, width in zip(e.layers, widths, strict=True):
+        left, right = (0.0 if i is None else float(next(logs)) for i in layer.images)
+        seen.setdefault(layer.sequence, []).append(Observed(layer, float(width), (left, right)))
+    return Reading(touchset, e, tuple(tuple(v) for _, v in sorted(seen.items())))
+
+
+def compare(model: TargetModel, reading: Reading, p: LikelihoodParams) -> Pair:
+    """Marginalise over bias, yaw, height offset, and each sequence's shift and turn."""
+    touchset = reading.touchset
+    candidate = touchset.candidate
+    terms = {
+        "mode": mode_ratio(model, candidate),
+        "height": height_ratio(model, candidate, p),
+        "contour": contour_ratio(model, candidate, p),
+    }
+    if not reading.sequences:
+        ratio = p.offset + p.slope * min(sum(terms.values()), UNFELT_LIMIT)
+        return Pair(candidate.index, ratio, terms, None, 0.0, 0.0, None, unfelt_pose(touchset), 0.0)
+    grid = Grid.of(p)
+    first = reading.sequences[0][0].layer.yaw_rad
+    common = _log_normal(grid.bias_m, p.bias_sd_m)[:, None, None] + _log_normal(grid.z0_m, p.z0_sd_m)[None, None]
+    joint = (common + yaw_prior(model, candidate, first, p)[None, :, None]).astype(np.float32)
+    parts = []
+    for seen in reading.sequences:
+        turn = seen[0].layer.yaw_rad - first
+        widths = np.float32(p.temper_width) * width_ratios(model, seen, turn, grid, p)
+        images = np.float32(p.temper_image) * image_ratios(model, seen, turn, grid, p)
+        prior = shift_prior(model, candidate, turn, grid.shift_m, p).astype(np.float32)
+        volume = widths + (images + prior[:, :, None])[None]
+        parts.append((widths, images, volume))
+        joint = joint + turned(log_sum(volume, 2), p)
+    total = float(log_sum(joint.reshape(1, -1), 1)[0])
+    at = np.unravel_index(int(np.argmax(joint)), joint.shape)
+    b, i, z = (int(k) for k in at)
+    shifts = np.zeros(len(touchset.sequences))
+    terms["width"] = terms["image"] = 0.0
+    for seen, (widths, images, volume) in zip(reading.sequences, parts, strict=True):
+        d = int(volume[b, i, :, z].argmax())
+        shifts[seen[0].layer.sequence] = grid.shift_m[d]
+        terms["width"] += float(widths[b, i, d, z])
+        terms["image"] += float(images[i, d, z])
+    terms["pose"] = total - terms["width"] - terms["image"]
+    log_pose = log_sum(joint, 0)
+    yaw = _refined(log_sum(log_pose, 1), i)
+    fit, pose = fitted_pose(
+        model, touchset, reading.evidence, yaw, shifts, float(grid.z0_m[z]), 1.0, float(grid.bias_m[b])
+    )
+    ratio = p.offset + p.slope * sum(terms.values())
+    return Pair(
+        candidate.index, ratio, terms, np.asarray(log_pose - total, dtype=np.float32), first, float(grid.bias_m[b]),
+        fit, pose, reading.evidence.weight,
+    )  # fmt: skip
+
+
+def _log_normal(x: Array, sd: float) -> Array:
+    weight = np.exp(-0.5 * (x / sd) ** 2)
+    return np.asarray(np.log(weight / weight.sum()))
+
+
+def _refined(log_profile: Array32, i: int) -> float:
+    """Vertex of the parabola through the greatest value and its neighbours, in table steps."""
+    n = len(log_profile)
+    a, b, c = float(log_profile[i - 1]), float(log_profile[i]), float(log_profile[(i + 1) % n])
+    curve = a - 2 * b + c
+    if not math.isfinite(curve) or curve > -1e-6:
+        return float(i)
+    return i + float(np.clip(0.5 * (a - c) / curve, -0.5, 0.5))

@@ -1,0 +1,62 @@
+"""From the evidence of all candidates to probabilities and a decision.
+
+Given which candidate is the target, the others are some other objects; so the posterior odds of candidate i against
+"none of these" are its prior odds times its own ratio target : background, and all of them with "none" sum to 1.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from glotouch_bt.recognition.decision import Match, Ranking
+from glotouch_bt.recognition.likelihood.pair import Pair
+from glotouch_bt.recognition.likelihood.params import LikelihoodParams
+from glotouch_bt.robot import Array, ParamError
+
+
+def probabilities(log_ratios: Sequence[float], prior_absent: float) -> tuple[Array, float]:
+    """(n,) probability of each candidate, and of none; candidates share what the prior leaves equally.
+
+    Raises:
+        ParamError: No candidate.
+    """
+    n = len(log_ratios)
+    if n == 0:
+        raise ParamError("candidates", 0, "at least one")
+    logs = np.array([math.log((1 - prior_absent) / n) + x for x in log_ratios] + [math.log(prior_absent)])
+    weights = np.exp(logs - logs.max())
+    weights /= weights.sum()
+    return weights[:-1], float(weights[-1])
+
+
+def as_match(pair: Pair, probability: float) -> Match:
+    """Loss is -log P(target | this TouchSet alone, against one other object, even odds): 0 is certain."""
+    loss = float(np.logaddexp(0.0, -pair.log_ratio))
+    return Match(pair.index, loss, pair.terms, pair.fit, pair.pose_K_O, pair.evidence, probability)
+
+
+def decide(pairs: Sequence[Pair], p: LikelihoodParams) -> Ranking:
+    """Sort by evidence; accept the best if it is probable enough and was felt by both pads often enough."""
+    shares, p_absent = probabilities([x.log_ratio for x in pairs], p.prior_absent)
+    matches = [as_match(x, float(s)) for x, s in zip(pairs, shares, strict=True)]
+    order = tuple(sorted(matches, key=lambda m: (-m.probability, m.loss, m.index)))
+    best = order[0]
+    margin = order[1].loss - best.loss if len(order) > 1 else math.inf
+    if all(m.evidence == 0 for m in order):
+        reason = "no evidence: no closure on any candidate was felt by a pad"
+        return Ranking(order, 0.0, False, (reason,), p_absent)
+    reasons: list[str] = []
+    if best.probability < p.accept:
+        reasons.append(
+            f"candidate {best.index} is the target with probability {best.probability:.2f}, below {p.accept:g}"
+            + (f"; candidate {order[1].index} with {order[1].probability:.2f}" if len(order) > 1 else "")
+            + f"; none of them with {p_absent:.2f}"
+        )
+    if best.evidence < p.evidence:
+        reasons.append(
+            f"evidence {best.evidence:.2f} of candidate {best.index} is below {p.evidence:g} two-sided layers"
+        )
+    return Ranking(order, margin, not reasons, tuple(reasons), p_absent)

@@ -1,0 +1,166 @@
+"""Log ratios target : background of one sequence over the whole grid of nuisance poses.
+
+Axes: (bias, yaw, shift, height offset). Yaw i means that the hand of the FIRST sequence meets the mesh at phi_i; the
+others follow by the known motion of the hand.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from glotouch_bt.recognition.evidence import LayerEvidence
+from glotouch_bt.recognition.likelihood.background import log_kernel
+from glotouch_bt.recognition.likelihood.params import LikelihoodParams
+from glotouch_bt.recognition.model import TargetModel
+from glotouch_bt.recognition.pads import POOLED, Array32
+from glotouch_bt.robot import Array
+
+Index = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The nuisance values tried: bias (nb,), shift (nd,), z0 (nz,), metres."""
+
+    bias_m: Array
+    shift_m: Array
+    z0_m: Array
+
+    @classmethod
+    def of(cls, p: LikelihoodParams) -> Grid:
+        """Evenly over the limits."""
+
+        def span(limit: float, n: int) -> Array:
+            return np.linspace(-limit, limit, n) if n > 1 else np.zeros(1)
+
+        return cls(
+            span(p.bias_limit_m, p.bias_steps),
+            span(p.shift_limit_m, p.shift_steps),
+            span(p.z0_limit_m, p.z0_steps),
+        )
+
+
+@dataclass(frozen=True)
+class Observed:
+    """One layer and what the background makes of it: log densities of its width and of (left, right) images."""
+
+    layer: LayerEvidence
+    log_width: float
+    log_images: tuple[float, float]
+
+
+def width_ratios(
+    model: TargetModel, seen: Sequence[Observed], turn_rad: float, grid: Grid, p: LikelihoodParams
+) -> Array32:
+    """(nb, 72, nd, nz) sum over the layers of log p(width | pose) / p(width | background)."""
+    total = np.zeros((len(grid.bias_m), len(model.phi_rad), len(grid.shift_m), len(grid.z0_m)), dtype=np.float32)
+    sd = np.float32(p.width_sd_m)
+    bias = grid.bias_m.astype(np.float32)[:, None, None, None]
+    for o in seen:
+        e = o.layer
+        predicted = interpolated_width(model, e.along_m + grid.shift_m, e.height_m + grid.z0_m, turn_rad)
+        z = (np.float32(e.width_m) - bias - predicted[None]) / sd
+        if e.upper_only:  # the other finger touched outside its gel: the width is only bounded
+            z = np.minimum(z, np.float32(0))
+            scale = np.float32((1 - p.width_outlier) / p.width_range_m * math.exp(-o.log_width))
+        else:
+            scale = np.float32((1 - p.width_outlier) / (p.width_sd_m * math.sqrt(2 * math.pi)) * math.exp(-o.log_width))
+        good = np.exp(np.float32(-0.5) * np.minimum(z * z, np.float32(80)))
+        # A window beside the object (NaN) predicts no closure at all: as good as an outlier.
+        total += np.log(np.where(np.isnan(good), np.float32(0), good) * scale + np.float32(p.width_outlier))
+    return total
+
+
+def image_ratios(
+    model: TargetModel, seen: Sequence[Observed], turn_rad: float, grid: Grid, p: LikelihoodParams
+) -> Array32:
+    """(72, nd, nz) sum over the images of log p(image | pose) / p(image | background)."""
+    yaws = len(model.phi_rad)
+    total = np.zeros((yaws, len(grid.shift_m), len(grid.z0_m)), dtype=np.float32)
+    turn = round(turn_rad / (2 * np.pi) * yaws)
+    for o in seen:
+        e = o.layer
+        for side, image in enumerate(e.images):
+            if image is None:
+                continue
+            m = image.astype(np.float32)
+            at = e.along_m + grid.shift_m
+            roll = turn
+            if side == 1:  # the right pad sees the object from behind: its columns run the other way
+                m = np.ascontiguousarray(m.reshape(POOLED)[:, ::-1]).reshape(-1)
+                at, roll = -at, turn + yaws // 2
+            squared = _squared_distance(model, m, at, e.height_m + grid.z0_m)
+            ratio = np.exp(log_kernel(squared, p) - np.float32(o.log_images[side]))
+            ratio = np.log(ratio * np.float32(1 - p.image_outlier) + np.float32(p.image_outlier))
+            total += np.roll(ratio, -roll, axis=0)
+    return total
+
+
+def _squared_distance(model: TargetModel, feature: Array32, l_m: Array, z_m: Array) -> Array32:
+    """(72, nd, nz) mean squared distance of a feature (35,) to the table, interpolated between its cells."""
+    i, f = _positions(model.l_m, l_m)
+    j, g = _positions(model.z_m, z_m)
+    a, b = int(i.min()), int(i.max()) + 2
+    c, d = int(j.min()), int(j.max()) + 2
+    block = model.images[:, a:b, c:d]
+    dots = block.reshape(-1, feature.size) @ feature
+    squared = model.image_norms[:, a:b, c:d] - 2 * dots.reshape(block.shape[:3]) + feature @ feature
+    squared = np.maximum(squared, 0) / np.float32(feature.size)
+    i, j = i - a, j - c
+    along = squared[:, i] * (1 - f)[None, :, None] + squared[:, i + 1] * f[None, :, None]
+    return np.asarray(along[:, :, j] * (1 - g) + along[:, :, j + 1] * g, dtype=np.float32)
+
+
+def interpolated_width(model: TargetModel, l_m: Array, z_m: Array, turn_rad: float) -> Array32:
+    """(72, nl, nz) predicted widths at yaws phi + turn; NaN where a window is empty or outside the table."""
+    i, f = _positions(model.l_m, l_m)
+    j, g = _positions(model.z_m, z_m)
+    a, b = int(i.min()), int(i.max()) + 2
+    c, d = int(j.min()), int(j.max()) + 2
+    t = model.width_m[:, a:b, c:d]
+    i, j = i - a, j - c
+    along = t[:, i] * (1 - f)[None, :, None] + t[:, i + 1] * f[None, :, None]
+    out = along[:, :, j] * (1 - g) + along[:, :, j + 1] * g
+    out[:, (l_m < model.l_m[0]) | (l_m > model.l_m[-1])] = np.nan
+    out[:, :, (z_m < model.z_m[0] - 5e-3) | (z_m > model.z_m[-1])] = np.nan
+    roll = turn_rad / (2 * np.pi) * len(model.phi_rad)
+    whole = math.floor(roll + 1e-6)
+    part = np.float32(max(roll - whole, 0.0))
+    first = np.roll(out, -whole, axis=0)
+    if part < 1e-3:
+        return np.asarray(first, dtype=np.float32)
+    return np.asarray((1 - part) * first + part * np.roll(first, -1, axis=0), dtype=np.float32)
+
+
+def _positions(axis: Array, x: Array) -> tuple[Index, Array32]:
+    """Lower cell and fraction of each x; clamped to the axis."""
+    t = (x - axis[0]) / (axis[1] - axis[0])
+    i = np.clip(np.floor(t).astype(np.int64), 0, len(axis) - 2)
+    return i, np.clip(t - i, 0, 1).astype(np.float32)
+
+
+def log_sum(x: Array32, axis: int | tuple[int, ...]) -> Array32:
+    """log sum exp over axes, stable; -inf where all are."""
+    top = x.max(axis=axis, keepdims=True)
+    safe = np.where(np.isfinite(top), top, np.float32(0))
+    return np.asarray(np.log(np.exp(x - safe).sum(axis=axis)) + np.squeeze(safe, axis=axis), dtype=np.float32)
+
+
+def turned(x: Array32, p: LikelihoodParams) -> Array32:
+    """Mean over the object's own turning, in probability: a normal of `turn_sd_rad` over axis 1, and any yaw."""
+    n = x.shape[1]
+    step = 2 * math.pi / n
+    reach = max(1, math.ceil(2 * p.turn_sd_rad / step))
+    weight = np.exp(-0.5 * (np.arange(-reach, reach + 1) * step / p.turn_sd_rad) ** 2)
+    weight *= (1 - p.slip) / weight.sum()
+    top = x.max(axis=1, keepdims=True)
+    e = np.exp(x - top)
+    out = np.float32(p.slip) * e.mean(axis=1, keepdims=True) + sum(
+        np.float32(w) * np.roll(e, k, axis=1) for k, w in zip(range(-reach, reach + 1), weight, strict=True)
+    )
+    return np.asarray(np.log(out) + top, dtype=np.float32)
