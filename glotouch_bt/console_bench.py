@@ -197,8 +197,11 @@ def print_match(summary: dict[str, Any], folder: Path) -> None:
          value(timing.get("pair_ms", {}).get(n), 1), value(timing.get("pair_cpu_ms", {}).get(n), 1))
         for n, f in found.items()
     ]  # fmt: skip
-    head = ("", "mm median", "95 %", "deg median", "95 %", "ms a pair", "of processor")
-    print_table("fitted pose of the right candidate, cost", head, cost)
+    print_table(
+        "fitted pose of the right candidate, cost",
+        ("", "mm median", "95 %", "deg median", "95 %", "ms a pair", "of processor"),
+        cost,
+    )
     names = summary["loss_matrix"]["objects"]
     matrix = summary["loss_matrix"][summary["head"]]
     losses = [(n, *(value(v, 2) for v in line)) for n, line in zip(names, matrix, strict=True)]
@@ -210,8 +213,11 @@ def print_match(summary: dict[str, Any], folder: Path) -> None:
              rate(c["confident_and_wrong"]))
             for order, c in summary["closures_to_confidence"].items()
         ]  # fmt: skip
-        head = ("order", "closures", "median", "share", "right %", "sure and wrong %")
-        print_table("closures in the whole box until accepted with P > .95", head, counts)
+        print_table(
+            "closures in the whole box until accepted with P > .95",
+            ("order", "closures", "median", "share", "right %", "sure and wrong %"),
+            counts,
+        )
     Console().print(
         f"a new STL takes {value(timing.get('new_stl_s'), 2)} s ({value(timing.get('new_stl_cpu_s'), 2)} s of "
         f"processor); {summary['touched']} objects touched, {summary['nameless']} candidates of none\n"

@@ -20,7 +20,7 @@ from glotouch_bt.study.launch import RunRequest
 from glotouch_bt.study.match.acquire import acquire_layout
 from glotouch_bt.study.match.closures import CLOSURE_COLUMNS, closures_to_confidence
 from glotouch_bt.study.match.dataset import Layout, layout_files, read_layout
-from glotouch_bt.study.match.methods import DEFAULT, methods
+from glotouch_bt.study.match.methods import DEFAULT
 from glotouch_bt.study.match.plots import plot_all
 from glotouch_bt.study.match.summary import summarise
 from glotouch_bt.study.match.timing import time_matching
@@ -118,7 +118,7 @@ def layout_task(campaign: Campaign, seed: int, file: Path | None) -> dict[str, A
     if DEFAULT in campaign.methods and layout.touched:
         present = [n for n in layout.objects if layout.of(n)]
         models = models_of(layout, campaign.folder, present) if present else {}
-        closures = closures_to_confidence(layout, models, methods()[DEFAULT])
+        closures = closures_to_confidence(layout, models)
     layers = [layer for t in layout.touched for layer in t.touchset.layers]
     row: dict[str, Any] = {
         "seed": layout.seed, "conditions": layout.conditions, "ended": layout.ended, "objects": len(layout.objects),
@@ -194,7 +194,7 @@ def _progress(done: Mapping[str, Any]) -> dict[str, Any]:
     present = [t for t in done["trials"] if t["kind"] == "present"]
     names = dict.fromkeys(t["method"] for t in present)
     right = {n: sum(bool(t["right"]) for t in present if t["method"] == n) for n in names}
-    return done["layout"] | {"right": right}
+    return dict(done["layout"]) | {"right": right}
 
 
 def _finite(value: Any) -> Any:

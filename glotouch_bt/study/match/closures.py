@@ -6,16 +6,15 @@ felt when it was recorded, whatever is shown before it; a skill that chooses for
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from glotouch_bt.recognition import Closure, Ranking, TargetModel
-from glotouch_bt.recognition.gain import Belief, expected_gain
+from glotouch_bt.recognition.gain import Belief, believe, expected_gain
 from glotouch_bt.study.match.dataset import Layout
-from glotouch_bt.study.match.methods import Method
 from glotouch_bt.touch import TouchSet
 
 CONFIDENT = 0.95
@@ -33,8 +32,8 @@ class Shown:
     layer: int
 
 
-Choice = Callable[[Sequence[Shown], Sequence[TouchSet], TargetModel, Sequence[TouchSet], Ranking], int]
-"""(what is left, everything recorded, model, what was shown, its ranking) -> which of what is left comes next."""
+Choice = Callable[[Sequence[Shown], Sequence[TouchSet], Belief], int]
+"""(what is left, everything recorded, the belief after what was shown) -> which of what is left comes next."""
 
 
 def recorded_closures(touchsets: Sequence[TouchSet]) -> list[Shown]:
@@ -59,12 +58,12 @@ def partial(touchset: TouchSet, shown: Sequence[Shown]) -> TouchSet:
     return replace(touchset, sequences=tuple(sequences))
 
 
-def in_order(left: Sequence[Shown], *_: object) -> int:
+def in_order(left: Sequence[Shown], whole: Sequence[TouchSet], belief: Belief) -> int:
     """The fixed scheme: candidate after candidate, as recorded."""
     return 0
 
 
-def in_turn(left: Sequence[Shown], whole: Sequence[TouchSet], *_: object) -> int:
+def in_turn(left: Sequence[Shown], whole: Sequence[TouchSet], belief: Belief) -> int:
     """One closure of each candidate in turn."""
     total = [len(t.layers) for t in whole]
     remain = [sum(s.candidate == i for s in left) for i in range(len(whole))]
@@ -73,16 +72,9 @@ def in_turn(left: Sequence[Shown], whole: Sequence[TouchSet], *_: object) -> int
     return next(i for i, s in enumerate(left) if s.candidate == turn)
 
 
-def most_telling(
-    left: Sequence[Shown],
-    whole: Sequence[TouchSet],
-    model: TargetModel,
-    so_far: Sequence[TouchSet],
-    ranking: Ranking,
-) -> int:
+def most_telling(left: Sequence[Shown], whole: Sequence[TouchSet], belief: Belief) -> int:
     """The recorded closure with the greatest expected information gain."""
-    options = [closure_of(whole[s.candidate], s) for s in left]
-    return int(np.argmax(expected_gain(Belief(model, tuple(so_far), ranking), options)))
+    return int(np.argmax(expected_gain(belief, [closure_of(whole[s.candidate], s) for s in left])))
 
 
 def closure_of(touchset: TouchSet, shown: Shown) -> Closure:
@@ -94,7 +86,7 @@ def closure_of(touchset: TouchSet, shown: Shown) -> Closure:
 ORDERS: dict[str, Choice] = {"recorded": in_order, "in_turn": in_turn, "adaptive": most_telling}
 
 
-def closures_to_confidence(layout: Layout, models: dict[str, TargetModel], method: Method) -> list[dict[str, Any]]:
+def closures_to_confidence(layout: Layout, models: Mapping[str, TargetModel]) -> list[dict[str, Any]]:
     """One row an order and target: after how many closures the best is accepted with P > `CONFIDENT`, and if rightly.
 
     A target that is never sure has `confident` False and all its closures counted; `right` is then of the last ranking.
@@ -104,31 +96,30 @@ def closures_to_confidence(layout: Layout, models: dict[str, TargetModel], metho
     rows = []
     for target, model in models.items():
         for order, choose in ORDERS.items():
-            count, confident, ranking = _until_sure(whole, model, method, choose)
+            count, ranking = _until_sure(whole, model, choose)
             best = names[ranking.best.index]
             rows.append(
                 {"order": order, "seed": layout.seed, "target": target, "present": bool(layout.of(target)),
-                 "closures": count, "recorded": len(recorded_closures(whole)), "confident": confident,
+                 "closures": count, "recorded": len(recorded_closures(whole)), "confident": sure(ranking),
                  "right": best == target, "best_object": best, "p_best": ranking.best.probability}
             )  # fmt: skip
     return rows
 
 
-def _until_sure(
-    whole: Sequence[TouchSet], model: TargetModel, method: Method, choose: Choice
-) -> tuple[int, bool, Ranking]:
+def _until_sure(whole: Sequence[TouchSet], model: TargetModel, choose: Choice) -> tuple[int, Ranking]:
     left = recorded_closures(whole)
     so_far = [partial(t, ()) for t in whole]
     shown: list[Shown] = []
-    ranking = method(model, so_far)
-    while left and not _sure(ranking):
-        new = left.pop(choose(left, whole, model, so_far, ranking))
+    belief = believe(model, so_far)
+    while left and not sure(belief.ranking):
+        new = left.pop(choose(left, whole, belief))
         shown.append(new)
         i = new.candidate
         so_far[i] = partial(whole[i], [s for s in shown if s.candidate == i])
-        ranking = method(model, so_far)
-    return len(shown), _sure(ranking), ranking
+        belief = believe(model, so_far)
+    return len(shown), belief.ranking
 
 
-def _sure(ranking: Ranking) -> bool:
+def sure(ranking: Ranking) -> bool:
+    """Accepted, and with the wanted confidence."""
     return bool(ranking.accepted) and ranking.best.probability > CONFIDENT

@@ -95,7 +95,8 @@ def _reliability(axes: Axes, summary: Mapping[str, Any]) -> None:
     axes.set(xlabel="probability of the likeliest answer", ylabel="share right", xlim=(0, 1.02), ylim=(-0.02, 1.04))
     axes.set_title("targets present and absent alike", fontsize=9)
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=7, loc="upper left")
+    if axes.collections:
+        axes.legend(fontsize=7, loc="upper left")
 
 
 def _scores(axes: Axes, trials: Sequence[Row], summary: Mapping[str, Any]) -> None:
@@ -110,7 +111,8 @@ def _scores(axes: Axes, trials: Sequence[Row], summary: Mapping[str, Any]) -> No
     axes.set(xlabel="1 - p_absent", ylabel="share of decisions [%]", ylim=(0, 104))
     axes.set_title(f"{summary['head']}: is the target there?", fontsize=9)
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8)
+    if axes.patches:
+        axes.legend(fontsize=8)
 
 
 def _closures(axes: Axes, closures: Sequence[Row]) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from glotouch_bt.study.statistics import wilson
 
 BINS = 10
 RESAMPLES = 1000
-Statistic = Callable[[npt.NDArray[np.int64]], float]
 
 
 def reliability(confidence: npt.ArrayLike, right: npt.ArrayLike, bins: int = BINS) -> list[dict[str, float]]:
@@ -23,7 +23,7 @@ def reliability(confidence: npt.ArrayLike, right: npt.ArrayLike, bins: int = BIN
     A confidence on an edge counts with the bin below it, as in (lo, hi]; 0 with the first (Guo et al., ICML 2017).
     """
     p, hit = np.asarray(confidence, dtype=np.float64), np.asarray(right, dtype=np.float64)
-    at = np.clip(np.ceil(p * bins).astype(np.int64) - 1, 0, bins - 1)
+    at = bin_of(p, bins)
     out = []
     for b in range(bins):
         mine = at == b
@@ -33,6 +33,11 @@ def reliability(confidence: npt.ArrayLike, right: npt.ArrayLike, bins: int = BIN
                  "right": float(hit[mine].mean()), "n": float(mine.sum())}
             )  # fmt: skip
     return out
+
+
+def bin_of(confidence: Array, bins: int) -> npt.NDArray[np.int64]:
+    """The bin of each confidence."""
+    return np.clip(np.ceil(confidence * bins).astype(np.int64) - 1, 0, bins - 1)
 
 
 def calibration_error(confidence: npt.ArrayLike, right: npt.ArrayLike, bins: int = BINS) -> float:
@@ -47,14 +52,18 @@ def auroc(positive: npt.ArrayLike, negative: npt.ArrayLike) -> float:
 
     Scores may be infinite; NaN scores count as lowest.
     """
-    a, b = np.asarray(positive, dtype=np.float64).ravel(), np.asarray(negative, dtype=np.float64).ravel()
+    a, b = _scores(positive), _scores(negative)
     if not a.size or not b.size:
         return float("nan")
-    rank = rankdata(np.nan_to_num(np.concatenate([a, b]), nan=-np.inf, posinf=np.inf, neginf=-np.inf))
+    rank = rankdata(np.concatenate([a, b]))
     return float((rank[: a.size].sum() - a.size * (a.size + 1) / 2) / (a.size * b.size))
 
 
-def shared_rate(right: Sequence[bool], layout: Sequence[int]) -> dict[str, Any]:
+def _scores(values: npt.ArrayLike) -> Array:
+    return np.nan_to_num(np.asarray(values, dtype=np.float64), nan=-np.inf, posinf=np.inf, neginf=-np.inf)
+
+
+def shared_rate(right: Sequence[bool], layout: npt.ArrayLike) -> dict[str, Any]:
     """A rate of trials that come in layouts: Wilson as if all were independent, and what does not need that.
 
     Returns:
@@ -62,32 +71,73 @@ def shared_rate(right: Sequence[bool], layout: Sequence[int]) -> dict[str, Any]:
         trials agree, so read it with the next) and `whole_layouts` (Wilson of layouts with every trial right).
     """
     hit = np.asarray(right, dtype=np.float64)
-    groups = np.asarray(layout)
-    names = np.unique(groups)
+    draws = Draws.of(layout)
+    good, count = draws.sums(hit), draws.sums(np.ones(len(hit)))
     out: dict[str, Any] = dict(wilson(int(hit.sum()), len(hit)))
-    out["by_layout"] = by_layout(lambda pick: float(hit[pick].mean()), groups)
-    out["whole_layouts"] = wilson(sum(bool(hit[groups == g].all()) for g in names), len(names))
+    out["by_layout"] = draws.interval(draws.weight @ good, draws.weight @ count)
+    out["whole_layouts"] = wilson(int((good == count).sum()), len(count))
     return out
 
 
-def by_layout(
-    statistic: Statistic, layout: Sequence[int] | npt.NDArray[Any], resamples: int = RESAMPLES, seed: int = 0
+def shared_auroc(
+    positive: npt.ArrayLike, negative: npt.ArrayLike, layouts: tuple[npt.ArrayLike, npt.ArrayLike]
 ) -> dict[str, Any]:
-    """Percentile 95 % interval of a statistic of trials when whole layouts are drawn with replacement.
+    """`auroc` as `value`, with its interval over whole layouts; `layouts` are those of the positives and negatives.
 
-    Args:
-        statistic: Of trials given by their places; not called without any. NaN draws are left out.
-        layout: The layout of each trial.
-        resamples: Draws.
-        seed: Of the draws.
+    Pairs in order are counted between every two layouts once; a draw weighs the counts.
     """
-    groups = np.asarray(layout)
-    names = np.unique(groups)
-    if not len(names):
-        return {"lo": float("nan"), "hi": float("nan"), "layouts": 0}
-    places = [np.flatnonzero(groups == g) for g in names]
-    drawn = np.random.default_rng(seed).integers(0, len(names), (resamples, len(names)))
-    values: Array = np.array([statistic(np.concatenate([places[i] for i in row])) for row in drawn])
-    values = values[np.isfinite(values)]
-    lo, hi = np.percentile(values, [2.5, 97.5]) if values.size else (np.nan, np.nan)
-    return {"lo": float(lo), "hi": float(hi), "layouts": len(names)}
+    a, b = _scores(positive), _scores(negative)
+    of_a, of_b = (np.asarray(x) for x in layouts)
+    draws = Draws.of(np.concatenate([of_a, of_b]))
+    in_order = (a[:, None] > b[None]) + 0.5 * (a[:, None] == b[None])  # (a, b)
+    is_a = (of_a[None] == draws.names[:, None]).astype(np.float64)  # (layouts, a)
+    is_b = (of_b[None] == draws.names[:, None]).astype(np.float64)
+    won, pairs = is_a @ in_order @ is_b.T, is_a.sum(axis=1)[:, None] * is_b.sum(axis=1)[None]
+    over, under = (np.einsum("ri,ij,rj->r", draws.weight, m, draws.weight) for m in (won, pairs))
+    return {"value": auroc(a, b), **draws.interval(over, under)}
+
+
+def shared_calibration(confidence: npt.ArrayLike, right: npt.ArrayLike, layout: npt.ArrayLike) -> dict[str, Any]:
+    """`calibration_error` as `value`, with its interval over whole layouts, and the bins of `reliability`."""
+    p, hit = np.asarray(confidence, dtype=np.float64), np.asarray(right, dtype=np.float64)
+    draws = Draws.of(layout)
+    binned = (bin_of(p, BINS)[None] == np.arange(BINS)[:, None]) * (hit - p)[None]  # (bins, trials)
+    off = np.stack([draws.weight @ draws.sums(b) for b in binned]) if len(p) else np.zeros((BINS, 0))
+    count = draws.weight @ draws.sums(np.ones(len(p)))
+    value = {"value": calibration_error(p, hit), **draws.interval(np.abs(off).sum(axis=0), count)}
+    return value | {"n": len(p), "bins": reliability(p, hit)}
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """Whole layouts drawn with replacement: percentile bootstrap whose units are layouts (B. Efron, 1979). Seeded.
+
+    Attributes:
+        names: (l,) the layouts.
+        member: (l, n) 1 where a trial is of a layout.
+        weight: (draws, l) how often each was drawn.
+    """
+
+    names: npt.NDArray[Any]
+    member: Array
+    weight: Array
+
+    @classmethod
+    def of(cls, layout: npt.ArrayLike, resamples: int = RESAMPLES, seed: int = 0) -> Draws:
+        """`layout` is the layout of each trial (n,)."""
+        groups = np.asarray(layout)
+        names = np.unique(groups)
+        count = len(names)
+        share = np.full(count, 1 / max(count, 1))
+        weight = np.random.default_rng(seed).multinomial(count, share, resamples) if count else np.zeros((resamples, 0))
+        return cls(names, (groups[None] == names[:, None]).astype(np.float64), weight.astype(np.float64))
+
+    def sums(self, values: Array) -> Array:
+        """(l,) sum of the trials' values in each layout."""
+        return np.asarray(self.member @ values)
+
+    def interval(self, over: Array, under: Array) -> dict[str, Any]:
+        """95 % of over / under (draws,); draws of 0 / 0 are left out."""
+        use = under > 0
+        lo, hi = np.percentile(over[use] / under[use], [2.5, 97.5]) if use.any() else (np.nan, np.nan)
+        return {"lo": float(lo), "hi": float(hi), "layouts": len(self.names)}

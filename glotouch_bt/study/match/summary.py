@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from glotouch_bt.study.match.methods import DEFAULT, PAPER_TOP1
-from glotouch_bt.study.match.scores import auroc, by_layout, calibration_error, reliability, shared_rate
+from glotouch_bt.study.match.scores import shared_auroc, shared_calibration, shared_rate
 from glotouch_bt.study.search_summary import quantiles
 from glotouch_bt.study.statistics import bootstrap_mean
 
@@ -113,34 +112,18 @@ def _mean(values: Any) -> float:
 
 def separation(present: Sequence[Row], other: Sequence[Row]) -> dict[str, Any]:
     """AUROC of decisions whose target is there against those whose is not, by 1 - p_absent and by the best's loss."""
-    rows = [*present, *other]
-    layout = np.array([t["seed"] for t in rows])
-    is_there = np.arange(len(rows)) < len(present)
     out: dict[str, Any] = {"n_present": len(present), "n_not": len(other)}
-    for key, score in (
-        ("probability", np.array([1 - t["p_absent"] for t in rows])),
-        ("loss", np.array([-t["best_loss"] for t in rows])),
-    ):
-
-        def of(pick: npt.NDArray[np.int64], score: npt.NDArray[Any] = score) -> float:
-            return auroc(score[pick][is_there[pick]], score[pick][~is_there[pick]])
-
-        out[key] = {"value": of(np.arange(len(rows))), **by_layout(of, layout)} if rows else {"value": math.nan}
+    layouts = [t["seed"] for t in present], [t["seed"] for t in other]
+    there, gone = ([1 - t["p_absent"] for t in rows] for rows in (present, other))
+    fit, misfit = ([-t["best_loss"] for t in rows] for rows in (present, other))
+    out["probability"], out["loss"] = shared_auroc(there, gone, layouts), shared_auroc(fit, misfit, layouts)
     return out
 
 
 def calibration(trials: Sequence[Row]) -> dict[str, Any]:
     """ECE and reliability of the likeliest answer, a candidate or "none of them", over present and absent targets."""
-    confidence = np.array([max(t["p_best"], t["p_absent"]) for t in trials])
-    right = np.array([_answer_is_right(t) for t in trials])
-    layout = np.array([t["seed"] for t in trials])
-    interval = by_layout(lambda pick: calibration_error(confidence[pick], right[pick]), layout)
-    return {
-        "value": calibration_error(confidence, right),
-        **interval,
-        "n": len(trials),
-        "bins": reliability(confidence, right),
-    }
+    confidence = [max(t["p_best"], t["p_absent"]) for t in trials]
+    return shared_calibration(confidence, [_answer_is_right(t) for t in trials], [t["seed"] for t in trials])
 
 
 def _answer_is_right(trial: Row) -> bool:

@@ -7,7 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from glotouch_bt.study.match.scores import auroc, by_layout, calibration_error, reliability, shared_rate
+from glotouch_bt.study.match.scores import (
+    auroc,
+    calibration_error,
+    reliability,
+    shared_auroc,
+    shared_calibration,
+    shared_rate,
+)
 
 
 def test_calibration_error_worked_by_hand():
@@ -72,7 +79,7 @@ def test_trials_of_a_layout_are_not_independent():
 def test_independent_trials_need_no_layouts():
     """One trial a layout: the bootstrap is the ordinary one, about the normal interval of a rate."""
     right = np.arange(200) % 4 != 0
-    found = by_layout(lambda pick: float(right[pick].mean()), np.arange(200))
+    found = shared_rate(right, np.arange(200))["by_layout"]
     half = 1.96 * np.sqrt(0.75 * 0.25 / 200)
     assert (found["lo"], found["hi"]) == pytest.approx((0.75 - half, 0.75 + half), abs=0.015)
     assert found["layouts"] == 200
@@ -83,3 +90,30 @@ def test_no_trials():
     assert found["n"] == 0
     assert np.isnan(found["rate"])
     assert found["by_layout"]["layouts"] == 0
+
+
+def drawn_again(statistic, layout, resamples=400):
+    """The plain way to the same interval: layouts drawn, their trials gathered, the statistic taken anew."""
+    rng = np.random.default_rng(1)
+    names = np.unique(layout)
+    places = [np.flatnonzero(layout == n) for n in names]
+    drawn = (rng.integers(0, len(names), len(names)) for _ in range(resamples))
+    values = np.array([statistic(np.concatenate([places[i] for i in d])) for d in drawn])
+    return np.percentile(values[np.isfinite(values)], [2.5, 97.5])
+
+
+def test_intervals_are_those_of_the_plain_bootstrap():
+    rng = np.random.default_rng(5)
+    layout = np.repeat(np.arange(12), 5)
+    shift = rng.normal(size=12)[layout]
+    score, there = rng.normal(size=60) + 0.5 * shift, rng.random(60) < 0.5
+    score += there
+    found = shared_auroc(score[there], score[~there], (layout[there], layout[~there]))
+    plain = drawn_again(lambda k: auroc(score[k][there[k]], score[k][~there[k]]), layout)
+    assert found["value"] == auroc(score[there], score[~there])
+    assert (found["lo"], found["hi"]) == pytest.approx(tuple(plain), abs=0.03)
+    p, right = rng.random(60), there
+    found = shared_calibration(p, right, layout)
+    plain = drawn_again(lambda k: calibration_error(p[k], right[k]), layout)
+    assert found["value"] == calibration_error(p, right)
+    assert (found["lo"], found["hi"]) == pytest.approx(tuple(plain), abs=0.03)
