@@ -18,7 +18,7 @@ YIELD_N = 3.0
 """Force along y_P at which the hand gives way: an object that slides on the floor resists with less."""
 RELEASED_N = 1.0
 """Given way far enough; and a push from the other side of more than this means that both jaws touch."""
-GIVE_UP_N, WEDGED_N = 20.0, 8.0
+GIVE_UP_N, WEDGED_N = 20.0, 12.0
 """Force on the hand at which a closure ends. Source: two thirds of the robot's own limit; it rises by 0.1 N/ms. While
 the jaws close gently they cannot push with more than 6 N: what presses harder then is wedged between them or stands on
 a fingertip, and pressing would only lever it up."""

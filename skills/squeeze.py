@@ -9,7 +9,7 @@ from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.touch import Candidate, Layer, TouchSequence, TouchSet
 from skills.allowance import keeping_clear_of
 from skills.base import In, Out, Skill, SkillFailed, SkillRun
-from skills.squeeze_motion import ClosureParams, Squeezing, layer_heights
+from skills.squeeze_motion import LEAST_GAP_M, ClosureParams, Squeezing, disturbance, layer_heights
 from skills.squeeze_plan import Stance, plan_stances
 
 
@@ -69,17 +69,42 @@ class Squeeze(Skill):
         self.touchset = touchset
 
     def _sequence(self, candidate: Candidate, at: Stance, heights: Array) -> Motion[TouchSequence]:
-        """Open over the candidate, close at each height from below, rise."""
+        """Open over the candidate, close at each height from below, rise.
+
+        A height that gives no layer is tried once more a little beside it. What fails there too slopes or stands free,
+        and does so higher up: the sequence ends.
+        """
         hand = Squeezing(self.context, candidate, at, self.params)
         layers: list[Layer] = []
         yield from hand.go_down(float(heights[0]))
-        for height in heights:
-            if not (yield from hand.move_to(float(height))):
-                break  # caught under something that sticks out; the layers below are good
-            try:
-                layers.append((yield from hand.close()))
-            except MotionRefused as refusal:  # what slopes or stands free here does so higher up, too
-                self.event("note", text=f"a closure {height * 1e3:.0f} mm above the floor was given up: {refusal}")
+        for height, elsewhere in zip(heights.tolist(), _elsewhere(heights), strict=True):
+            tried = [(yield from self._layer(hand, height))]
+            if tried[0] is None or not tried[0].stable:
+                tried.append((yield from self._layer(hand, elsewhere)))
+            layers += [layer for layer in tried if layer is not None]
+            if tried[-1] is None:
                 break
         yield from hand.rise()
+        layers.sort(key=lambda layer: layer.height_m)
         return TouchSequence(np.asarray(at.position_K_m), hand.yaw_K_rad, tuple(layers))
+
+    def _layer(self, hand: Squeezing, height_m: float) -> Motion[Layer | None]:
+        """One closure; None if it could not be made."""
+        if not (yield from hand.move_to(height_m)):
+            return None  # caught under something that sticks out
+        try:
+            layer, yielding = yield from hand.close()
+        except MotionRefused as refusal:
+            self.event("note", text=f"a closure {height_m * 1e3:.0f} mm above the floor was given up: {refusal}")
+            return None
+        if (moved := disturbance(hand.candidate, layer, yielding)) is not None:
+            self.event("object_moved", **moved)
+        return layer
+
+
+def _elsewhere(heights: Array) -> list[float]:
+    """For each height another one to try: half way to the next, of the highest half way to the one before."""
+    if len(heights) == 1:
+        return [float(heights[0]) + LEAST_GAP_M]
+    gaps = np.diff(heights)
+    return [*(heights[:-1] + 0.5 * gaps).tolist(), float(heights[-1] - 0.5 * gaps[-1])]

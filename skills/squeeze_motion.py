@@ -6,7 +6,7 @@ import numpy as np
 
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose
-from glotouch_bt.touch import Candidate, Layer, make_layer
+from glotouch_bt.touch import Candidate, Layer, Yielding, make_layer, watch_yielding
 from skills.base import Context, SkillParams, param
 from skills.closing import close_gently, let_go
 from skills.hand import glide, hand_pose_B
@@ -102,19 +102,22 @@ class Squeezing:
         """Up or down beside the object, jaws open; False if the fingers met something."""
         return (yield from glide(self._context, self._pose(height_m), self._p.descent_speed_m_s))
 
-    def close(self) -> Motion[Layer]:
+    def close(self) -> Motion[tuple[Layer, Yielding]]:
         """One closure where the hand is; the jaws are open again afterwards.
 
         Raises:
             MotionRefused: The hand was pressed too hard; the jaws are open.
         """
         p, arm = self._p, self._context.arm
+        gripper = arm.description.gripper
         height = pads_height_m(self._context)
-        yield from close_gently(arm, p.closing_speed_m_s, p.force_N)
+        closing: list[Observation] = []
+        yield from close_gently(arm, p.closing_speed_m_s, p.force_N, tactile=True, seen_by=closing.append)
         command = Command(gripper=GripperTarget(0.0, p.closing_speed_m_s, p.force_N), tactile=True)
         blocks: list[Observation] = []
         for _ in range(round(p.settle_s / arm.period_s)):
             blocks.append((yield command))  # noqa: PERF401 (a comprehension cannot yield)
+        yielding = watch_yielding([*closing, *blocks], gripper.pad_window_m[0])
         measured = self._context.world.container.pose_B_K.inverse().apply(blocks[-1].pose_B_P.position_m)
         layer = make_layer(
             blocks,
@@ -122,10 +125,11 @@ class Squeezing:
             position_K_m=measured[:2],
             yaw_rad=self.yaw_K_rad,
             force_N=p.force_N,
-            pad_shape=arm.description.gripper.pad_shape,
+            pad_shape=gripper.pad_shape,
+            yielding=yielding,
         )
         yield from let_go(arm, self.at.opening_m)
-        return layer
+        return layer, yielding
 
     def rise(self) -> Motion[None]:
         """Straight up to travelling height."""
@@ -136,6 +140,21 @@ class Squeezing:
     def _pose(self, height_m: float) -> Pose:
         position = np.array([*self.at.position_K_m, height_m])
         return hand_pose_B(self._context.arm, self._context.world.container, position, self.yaw_K_rad)
+
+
+def disturbance(candidate: Candidate, layer: Layer, yielding: Yielding) -> dict[str, object] | None:
+    """Data of an `object_moved` event, or None: no closure drags, turns or topples an object silently."""
+    lost = yielding.felt and not layer.stable
+    if not (yielding.moved or lost):
+        return None
+    return {
+        "candidate": candidate.index,
+        "height_m": layer.height_m,
+        "slide_m": layer.slide_m,
+        "turn_rad": layer.turn_rad,
+        "gave_m": layer.gave_m,
+        "lost": layer.why_not if lost else "",
+    }
 
 
 def pads_height_m(context: Context) -> float:

@@ -50,13 +50,20 @@ def stance(candidate: Candidate, along_m: float, yaw_K_rad: float, side_gap_m: f
 
 
 def schemes(candidate: Candidate, gripper: Gripper) -> list[list[list[tuple[float, float]]]]:
-    """Ways to take three sequences, the preferred one first: for each sequence its (along, yaw) alternatives."""
+    """Ways to take three sequences, the preferred one first: for each sequence its (along, yaw) alternatives.
+
+    A free outline is turned about from the direction of its long side. If it is squeezed like a box, but not all of its
+    tracks have room, it may be turned about all the same.
+    """
     contour = candidate.contour
+    first = contour.yaw_rad if contour.family == "free" else 0.0
+    turned = [[[(0.0, float(first + base + turn))] for turn in TURNS_RAD] for base in BASES_RAD]
     if contour.kind == "round":
-        return [[[(0.0, float(base + turn))] for turn in TURNS_RAD] for base in BASES_RAD]
+        return turned
     reach = max(0.5 * contour.size_m[0] - 0.5 * gripper.pad_window_m[0], 0.0)
     track = min(0.25 * contour.size_m[0], reach)
-    return [[[(t, contour.yaw_rad + float(s)) for s in SLACK_RAD] for t in (-track, 0.0, track)]]
+    tracks = [[(t, contour.yaw_rad + float(s)) for s in SLACK_RAD] for t in (-track, 0.0, track)]
+    return [tracks, *turned] if contour.family == "free" else [tracks]
 
 
 def plan_stances(

@@ -15,7 +15,7 @@ from skills.allowance import keeping_clear_of
 from skills.base import Context, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.hand import CLEARANCE_M, hand_pose_B, require_clear
 from skills.match import load_target
-from skills.squeeze_motion import ClosureParams, Squeezing, pads_height_m
+from skills.squeeze_motion import ClosureParams, Squeezing, disturbance, pads_height_m
 from skills.touch_options import Option, Standing, best_rates, options
 
 MOST_IN_VAIN = 4
@@ -187,10 +187,13 @@ class TouchNext(Skill):
                 yield from hand.rise()
                 raise MotionRefused("squeeze", "the open hand is caught under something")
             try:
-                return hand, (yield from hand.close())
+                layer, yielding = yield from hand.close()
             except MotionRefused:
                 yield from hand.rise()
                 raise
+        if (moved := disturbance(hand.candidate, layer, yielding)) is not None:
+            self.event("object_moved", **moved)
+        return hand, layer
 
     def _rise(self, down: Squeezing | None) -> Motion[None]:
         """Straight up, if the hand is low (after a preemption nobody knows over what)."""

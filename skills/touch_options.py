@@ -63,9 +63,8 @@ def stances_over(candidate: Candidate, gripper: Gripper, side_gap_m: float) -> l
     contour = candidate.contour
     places = [(0.0, float(contour.yaw_rad + y)) for y in YAWS_RAD]
     if contour.kind == "box":
-        places += [
-            options[0] for scheme in schemes(candidate, gripper) for options in scheme if abs(options[0][0]) > SAME_M
-        ]
+        tracks, *_ = schemes(candidate, gripper)
+        places += [alternatives[0] for alternatives in tracks if abs(alternatives[0][0]) > SAME_M]
     found = (stance(candidate, along, yaw, side_gap_m, gripper.stroke_m) for along, yaw in places)
     return [s for s in found if s is not None]
 

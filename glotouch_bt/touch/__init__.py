@@ -32,6 +32,7 @@ from glotouch_bt.touch.values import (
     TouchSequence,
     TouchSet,
 )
+from glotouch_bt.touch.yielding import Yielding, watch_yielding
 
 __all__ = [
     "Baseline",
@@ -57,6 +58,7 @@ __all__ = [
     "TipFusion",
     "TouchSequence",
     "TouchSet",
+    "Yielding",
     "believe_contacts",
     "believe_outline",
     "consistent",
@@ -86,5 +88,6 @@ __all__ = [
     "signed_distance",
     "split_moved",
     "temporal_median",
+    "watch_yielding",
     "widest_gap",
 ]

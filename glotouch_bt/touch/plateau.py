@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ import numpy as np
 
 from glotouch_bt.robot import Array, Observation, ParamError, TactileFrame
 from glotouch_bt.touch.values import Layer
+from glotouch_bt.touch.yielding import Yielding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,6 +128,7 @@ def make_layer(
     force_N: float,
     pad_shape: tuple[int, int],
     params: PlateauParams | None = None,
+    yielding: Yielding | None = None,
 ) -> Layer:
     """One closure as a `Layer`: aperture and force on the plateau, median maps of the frames TAKEN during it.
 
@@ -137,6 +140,7 @@ def make_layer(
         force_N: Commanded jaw force.
         pad_shape: (rows, cols) of the maps.
         params: Plateau conditions.
+        yielding: What the closure did to the object, if it was watched.
 
     Raises:
         ParamError: No blocks, or maps of another shape.
@@ -155,4 +159,8 @@ def make_layer(
         right_m=right,
         force_N=plateau.force_N,
         stable=plateau.stable,
+        why_not=plateau.why_not,
+        slide_m=math.nan if yielding is None else yielding.slide_m,
+        turn_rad=math.nan if yielding is None else yielding.turn_rad,
+        gave_m=math.nan if yielding is None else yielding.gave_m,
     )

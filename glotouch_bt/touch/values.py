@@ -5,6 +5,7 @@ K: origin at the centre of the container's floor, z up. Planar quantities are (x
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -144,6 +145,10 @@ class Layer:
         left_m, right_m: (rows, cols) temporal median of the depth maps; layout as in `robot.TactileFrame`.
         force_N: Jaw force on the plateau.
         stable: The aperture reached a plateau and the arm stood still; only stable layers carry evidence.
+        why_not: What was missing, if it is not stable.
+        slide_m, turn_rad, gave_m: What the closure did to the object, as far as the robot can tell (`touch.yielding`):
+            displacement along the closing direction (+y_P), turn about +z_K, closing after both pads touched; NaN if
+            nobody watched.
     """
 
     height_m: float
@@ -154,6 +159,10 @@ class Layer:
     right_m: Array
     force_N: float
     stable: bool
+    why_not: str = ""
+    slide_m: float = math.nan
+    turn_rad: float = math.nan
+    gave_m: float = math.nan
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,6 @@ from py_trees.common import Status
 
 import skills.touch_next as module
 from glotouch_bt.recognition import Closure, Match, Ranking
-from glotouch_bt.recognition.gain import Belief
 from skills.touch_next import TouchNext
 
 WIDTH = 0.05
@@ -31,7 +31,7 @@ class Oracle:
     def __init__(self, right: int | None, enough: int, evidence: float = 9.0) -> None:
         self.right, self.enough, self.evidence = right, enough, evidence
 
-    def believe(self, model, touchsets) -> Belief:
+    def believe(self, model, touchsets) -> SimpleNamespace:
         felt = {t.candidate.index: sum(layer.stable for layer in t.layers) for t in touchsets}
         known = sum(felt.values()) >= self.enough if self.right is None else felt[self.right] >= self.enough
         n = len(felt)
@@ -39,9 +39,11 @@ class Oracle:
         matches = [Match(i, 1.0 - p[i], {}, None, (0, 0, 0), float(felt[i]), p[i]) for i in felt]
         matches.sort(key=lambda m: m.loss)
         accepted = known and self.right is not None
-        return Belief(model, tuple(touchsets), Ranking(tuple(matches), 1.0, accepted, (), 1.0 - sum(p.values())))
+        return SimpleNamespace(
+            touchsets=tuple(touchsets), ranking=Ranking(tuple(matches), 1.0, accepted, (), 1.0 - sum(p.values()))
+        )
 
-    def expected_gain(self, belief: Belief, closures) -> np.ndarray:
+    def expected_gain(self, belief, closures) -> np.ndarray:
         return np.array([0.5 if c.candidate == self.right or self.right is None else 0.1 for c in closures])
 
 
@@ -116,7 +118,7 @@ def test_sure_but_with_too_little_evidence_is_touched_again(make, monkeypatch) -
     def believe(model, touchsets):
         belief = plain(model, touchsets)
         best = belief.ranking.matches[0]
-        return replace(belief, ranking=replace(belief.ranking, accepted=best.evidence >= 3))
+        return SimpleNamespace(touchsets=belief.touchsets, ranking=replace(belief.ranking, accepted=best.evidence >= 3))
 
     def gain(belief, closures):
         felt = any(t.layers for t in belief.touchsets)
