@@ -16,6 +16,8 @@ LEAST_SIDE_GAP_M = 0.004
 TURNS_RAD = np.deg2rad([0.0, 60.0, -60.0])
 BASES_RAD = np.deg2rad([0.0, 15.0, -15.0, 30.0])
 """Base yaws tried for a round candidate; with the three turns they cover half a circle every 15 degrees."""
+LEEWAY_RAD = np.deg2rad([0.0, 8.0, -8.0])
+"""Turns away from each of its three yaws tried when there is no room."""
 SLACK_RAD = np.deg2rad([0.0, 6.0, -6.0])
 """Turns away from a box's long side tried when a track has no room."""
 
@@ -57,7 +59,9 @@ def schemes(candidate: Candidate, gripper: Gripper) -> list[list[list[tuple[floa
     """
     contour = candidate.contour
     first = contour.yaw_rad if contour.family == "free" else 0.0
-    turned = [[[(0.0, float(first + base + turn))] for turn in TURNS_RAD] for base in BASES_RAD]
+    turned = [
+        [[(0.0, float(first + base + turn + away)) for away in LEEWAY_RAD] for turn in TURNS_RAD] for base in BASES_RAD
+    ]
     if contour.kind == "round":
         return turned
     reach = max(0.5 * contour.size_m[0] - 0.5 * gripper.pad_window_m[0], 0.0)
