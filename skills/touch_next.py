@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from glotouch_bt.motion import Motion
-from glotouch_bt.recognition import Gates, PadSpec, Ranking, TargetModel
+from glotouch_bt.recognition import Gates, PadSpec, TargetModel
 from glotouch_bt.recognition.gain import Belief, believe, expected_gain
 from glotouch_bt.robot import HOLD, MotionRefused, ParamError
 from glotouch_bt.touch import Candidate, Layer, TouchSequence, TouchSet
@@ -67,7 +67,7 @@ class TouchNext(Skill):
         self.touchsets, self.decided = touchsets, False
         yield HOLD  # thinking takes longer than a control period; on hardware the arm holds meanwhile
         belief = believe(self._target_model(), touchsets)
-        why = self._enough(belief.ranking)
+        why = self._enough(belief)
         chosen = None if why else self._choose(belief, down)
         if chosen is None:
             yield from self._end(belief, down, why or "no closure is expected to tell more")
@@ -108,20 +108,22 @@ class TouchNext(Skill):
                 raise SkillFailed("too_low", f"{mesh.name} cannot be felt: {e}", advice="sweep lower") from e
         return self._model
 
-    def _enough(self, ranking: Ranking) -> str:
-        """Why no further closure is wanted, or empty."""
+    def _enough(self, belief: Belief) -> str:
+        """Why no further closure is wanted, or empty.
+
+        That none of them is the target is believed once each was felt: contours alone do not send the robot home.
+        """
+        ranking = belief.ranking
         best = max(ranking.matches, key=lambda m: m.probability)
-        if ranking.p_absent >= self.params.confidence:
-            return f"none of them is the target (probability {ranking.p_absent:.3f})"
         if best.probability >= self.params.confidence and ranking.accepted:
             return f"candidate {best.index} is the target (probability {best.probability:.3f})"
+        felt = all(any(layer.stable for layer in t.layers) for t in belief.touchsets)
+        if ranking.p_absent >= self.params.confidence and felt:
+            return f"none of them is the target (probability {ranking.p_absent:.3f})"
         return ""
 
     def _choose(self, belief: Belief, down: Squeezing | None) -> Option | None:
-        """The most telling closure for its time that can be made; None if none tells enough.
-
-        One candidate may be surely the target and yet have too little evidence to be taken: it is touched again.
-        """
+        """The most telling closure for its time that can be made; None if none tells enough."""
         p, arm = self.params, self.context.arm
         pose_K_P = self.context.world.container.pose_B_K.inverse() @ arm.pose_B_P
         standing = None
@@ -136,9 +138,9 @@ class TouchNext(Skill):
         gains = np.split(expected_gain(belief, closures), np.cumsum([1 + len(o.after) for o in found])[:-1])
         rates = best_rates(found, gains)
         worth = np.array([g.max() for g in gains]) >= p.least_gain_nats
-        best = max(belief.ranking.matches, key=lambda m: m.probability)
-        if best.probability >= p.confidence and best.evidence < Gates().evidence:
-            worth = np.array([o.closure.candidate == best.index for o in found])
+        wanted = self._wanted(belief)
+        if wanted:
+            worth = np.array([o.closure.candidate in wanted for o in found])
             rates = np.array([1.0 / o.seconds for o in found])
         for i in np.argsort(-rates, kind="stable").tolist():
             if not worth[i]:
@@ -148,6 +150,16 @@ class TouchNext(Skill):
                 return replace(option, closure=replace(option.closure, gain_nats=float(gains[i][0])))
             self._refused.add(_key(option))
         return None
+
+    def _wanted(self, belief: Belief) -> set[int]:
+        """Candidates to be touched whatever it tells, for a decision that is only short of evidence; mostly none."""
+        ranking, confidence = belief.ranking, self.params.confidence
+        best = max(ranking.matches, key=lambda m: m.probability)
+        if best.probability >= confidence and best.evidence < Gates().evidence:
+            return {best.index}
+        if ranking.p_absent >= confidence:
+            return {t.candidate.index for t in belief.touchsets if not any(layer.stable for layer in t.layers)}
+        return set()
 
     def _has_room(self, belief: Belief, option: Option, down: Squeezing | None) -> bool:
         """The open hand fits beside the neighbours; where it stands already it does."""

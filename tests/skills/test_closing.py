@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import Array, MotionRefused, Pose, World
 from glotouch_bt.robot.fake import FakeRobot
-from skills.closing import GIVE_UP_N, YIELD_N, close_gently
+from skills.closing import GENTLE_N, GIVE_UP_N, WEDGED_N, YIELD_N, close_gently
 
 STIFFNESS_N_M = 2500.0
 """Of a standing object pushed sideways by one jaw, as MuJoCo showed it (1.5 N in 0.6 mm)."""
@@ -55,10 +55,33 @@ def test_the_hand_comes_to_the_post(bench: Any, world: World, off_mm: float) -> 
     assert max(robot.felt_N) < 8.0, "without giving way 12 mm would be 30 N"
 
 
+class Stuck(Post):
+    """A post whose coupled jaw pushes with twice the jaw's force, as a real gripper's does, and that never moves."""
+
+    def _pushed(self, stamp: Array, position: Array, quat: Array) -> Array:
+        out = super()._pushed(stamp, position, quat)
+        most = 2 * self._target.force_N
+        out[:, 1] = np.clip(out[:, 1], -most, most)
+        return out
+
+
+@pytest.mark.parametrize("force_N", [2.0, 10.0, 30.0])
+def test_full_force_comes_only_when_the_jaws_rest(bench: Any, world: World, force_N: float) -> None:
+    """What one jaw meets alone feels at most 6 N, whatever the grasp's force is."""
+    robot = Stuck(0.010)
+    b = bench().on(world, robot)
+    seen: list[Any] = []
+    b.go(close_gently(b.arm, SPEED_M_S, force_N, seen_by=seen.append))
+    assert max(robot.felt_N) <= 2 * GENTLE_N + 1e-9
+    forces = [c.gripper.force_N for c in b.commands if c.gripper is not None]
+    assert forces == ([force_N] if force_N < GENTLE_N else [GENTLE_N, force_N])
+    assert len(seen) > 0.95 * len(b.commands), "all is shown but the braking of giving way"
+
+
 def test_what_presses_the_hand_away_ends_the_closure(bench: Any, world: World) -> None:
     robot = Post(0.002, up_N_m=40e3)
     b = bench().on(world, robot)
     with pytest.raises(MotionRefused, match="pressed"):
         b.go(close_gently(b.arm, SPEED_M_S, 10.0))
-    assert max(robot.felt_N) < 1.3 * GIVE_UP_N
+    assert max(robot.felt_N) < 1.3 * WEDGED_N < GIVE_UP_N, "it is known while the jaws are gentle"
     assert b.arm.aperture_m == pytest.approx(RIZON4_XENSE.gripper.stroke_m, abs=1e-3)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from py_trees.common import Status
 
+import skills.squeeze_motion as motion
 from skills.squeeze import Squeeze
 
 WIDTH = 0.05
@@ -98,3 +101,46 @@ def test_fingers_on_something_rise_again(make, things) -> None:
 def test_broken_off_anywhere(make, found, preempt_all_along) -> None:
     neighbour = found.round((0.0, -0.12), 0.02, index=1)
     preempt_all_along(lambda: make(known=(neighbour,), layers=2), 12, finish=False)
+
+
+class Slippery:
+    """`make_layer` that finds no plateau at some heights."""
+
+    def __init__(self, bad, plain) -> None:
+        self.bad, self.plain = bad, plain
+
+    def __call__(self, blocks, **words):
+        layer = self.plain(blocks, **words)
+        return replace(layer, stable=layer.stable and not self.bad(layer.height_m), why_not="slipped")
+
+
+def test_a_layer_that_fails_is_tried_once_beside(make, monkeypatch) -> None:
+    """Four heights, the second is bad: half way to the third it works; a bad place is never tried three times."""
+    plain = motion.make_layer
+    b, skill = make()
+    b.run(skill)
+    heights = [layer.height_m for layer in skill.touchset.sequences[0].layers]
+    bad = heights[1]
+    monkeypatch.setattr(motion, "make_layer", Slippery(lambda z: abs(z - bad) < 1e-3, plain))
+    b, skill = make()
+    b.run(skill)
+    layers = skill.touchset.sequences[0].layers
+    assert [layer.stable for layer in layers] == [True, False, True, *[True] * (len(heights) - 2)]
+    got = [layer.height_m for layer in layers]
+    assert got == sorted(got)
+    assert got[2] == pytest.approx(0.5 * (heights[1] + heights[2]), abs=1e-4)
+    assert layers[1].why_not == "slipped"
+    lost = [e for e in b.of_kind("object_moved") if e["lost"]]
+    assert [e["height_m"] for e in lost] == pytest.approx([bad] * 3)
+    monkeypatch.setattr(motion, "make_layer", Slippery(lambda z: z > bad - 1e-3, plain))
+    b, skill = make()
+    b.run(skill)
+    assert skill.status is Status.SUCCESS
+    assert all(sum(layer.stable for layer in s.layers) == 1 for s in skill.touchset.sequences)
+
+
+def test_what_stands_still_is_not_reported_as_moved(make) -> None:
+    b, skill = make()
+    b.run(skill)
+    assert not b.of_kind("object_moved")
+    assert all(abs(layer.slide_m) + abs(layer.turn_rad) + layer.gave_m < 1e-6 for layer in skill.touchset.layers)

@@ -95,9 +95,10 @@ def test_it_touches_where_it_tells_most_and_stops_when_it_knows(make) -> None:
 
 
 def test_none_of_them(make) -> None:
-    """The oracle is sure after two closures that the target is absent: that is a decision, too."""
-    b, skill = make(Oracle(right=None, enough=2))
+    """The oracle is sure after one closure that the target is absent: a decision, too, once both have been felt."""
+    b, skill = make(Oracle(right=None, enough=1))
     assert repeat(b, skill) == 3
+    assert [len(t.layers) for t in skill.touchsets] == [1, 1]
     assert "none of them" in b.of_kind("decided")[0]["why"]
 
 
