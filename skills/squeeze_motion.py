@@ -117,7 +117,11 @@ class Squeezing:
         blocks: list[Observation] = []
         for _ in range(round(p.settle_s / arm.period_s)):
             blocks.append((yield command))  # noqa: PERF401 (a comprehension cannot yield)
-        yielding = watch_yielding([*closing, *blocks], gripper.pad_window_m[0])
+        contour = self.candidate.contour
+        x_P = np.array([np.cos(self.yaw_K_rad), np.sin(self.yaw_K_rad)])
+        middle = float(x_P @ (contour.centre_K_m - self.at.position_K_m))
+        half_diagonal = 0.5 * float(np.hypot(*contour.size_m)) if contour.family != "circle" else contour.radius_m
+        yielding = watch_yielding([*closing, *blocks], gripper.pad_window_m[0], middle, half_diagonal)
         measured = self._context.world.container.pose_B_K.inverse().apply(blocks[-1].pose_B_P.position_m)
         layer = make_layer(
             blocks,

@@ -24,6 +24,8 @@ BOTH_N = 1.5
 BASELINE_PERIODS = 6
 LEAST_LEVER_M = 0.003
 """Closer than this the pads are opposite to each other: no lever."""
+FRICTION_RADIUS = 0.65
+"""c over half the diagonal of the outline: 0.54 for a 7 x 4 cm box of even pressure, 1 if it stands on its corners."""
 TURN_LIMIT_RAD = float(np.deg2rad(20.0))
 DEEP_TAXELS, LEAST_TAXELS = 8, 6
 SLIDE_M, TURN_RAD, GAVE_M = 0.0025, float(np.deg2rad(3.0)), 0.003
@@ -35,8 +37,8 @@ class Yielding:
     """What one closure did to its object.
 
     Attributes:
-        slide_m: Displacement along +y_P, of the side that was touched first; 0 if both were touched at once.
-        turn_rad: Turn about +z_B, at most `TURN_LIMIT_RAD` either way; 0 if the pads had no lever.
+        slide_m: Displacement along +y_P of the side that was touched first, at the pad; 0 if both were touched at once.
+        turn_rad: Turn about +z_B, at most `TURN_LIMIT_RAD` either way; 0 if nothing had a lever.
         gave_m: How far the jaws closed after both touched, the gels' own give taken off.
         felt: Something was pushed or pressed at all.
     """
@@ -52,12 +54,16 @@ class Yielding:
         return abs(self.slide_m) > SLIDE_M or abs(self.turn_rad) > TURN_RAD or self.gave_m > GAVE_M
 
 
-def watch_yielding(blocks: Sequence[Observation], pad_width_m: float) -> Yielding:
+def watch_yielding(
+    blocks: Sequence[Observation], pad_width_m: float, middle_x_m: float = 0.0, half_diagonal_m: float = 0.03
+) -> Yielding:
     """Judge a whole closure.
 
     Args:
         blocks: From open jaws to the plateau; depth maps from the first touch on, if there are any.
         pad_width_m: Of the gel window, along x_P.
+        middle_x_m: Where the object's middle was traced, along x_P from the pads.
+        half_diagonal_m: Of its outline.
     """
     if len(blocks) <= BASELINE_PERIODS:
         return Yielding(0.0, 0.0, 0.0, False)
@@ -85,6 +91,8 @@ def watch_yielding(blocks: Sequence[Observation], pad_width_m: float) -> Yieldin
     if len(both):
         gave = max(float(np.interp(stamp[both[0]], stamp, aperture) - aperture[-1] - last.sum()), 0.0)
     turn = _turn(frames, dents, np.array([np.interp(f.stamp_s, stamp, aperture) for f in frames]), pad_width_m)
+    turn -= slide * middle_x_m / ((FRICTION_RADIUS * half_diagonal_m) ** 2 + middle_x_m**2)
+    turn = min(max(turn, -TURN_LIMIT_RAD), TURN_LIMIT_RAD)
     return Yielding(slide, float(turn * rotation[2, 2]), gave, bool(len(pushed) or len(both)))
 
 
@@ -98,8 +106,7 @@ def _turn(frames: Sequence[TactileFrame], dents: Array, aperture: Array, width_m
     between = (aperture + dents.sum(axis=1))[seen]
     arm = 0.5 * (lever[seen][1:] + lever[seen][:-1])
     use = np.abs(arm) > LEAST_LEVER_M
-    turn = float(np.sum(-np.diff(between)[use] / arm[use]))
-    return min(max(turn, -TURN_LIMIT_RAD), TURN_LIMIT_RAD)
+    return float(np.sum(-np.diff(between)[use] / arm[use]))
 
 
 def _sides(frames: Sequence[TactileFrame]) -> tuple[list[Array], list[Array]]:

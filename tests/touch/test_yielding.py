@@ -118,3 +118,13 @@ def test_what_slips_out_under_both_jaws_is_seen_without_depth_maps() -> None:
     felt = watch_yielding(blocks, PAD_WIDTH)
     assert felt.gave_m == pytest.approx(0.008, abs=5e-4)
     assert felt.moved
+
+
+@pytest.mark.parametrize("middle", [-0.02, 0.015])
+def test_a_push_beside_the_middle_turns_it(middle: float) -> None:
+    """5 mm pushed at x from the middle: s x / (c^2 + x^2) about z_P, x = -middle, c = 0.65 x 40 mm; z_B is -z_P."""
+    still = watch_yielding(pushed(0.005, 0.04, 0), PAD_WIDTH, 0.0, 0.04)
+    felt = watch_yielding(pushed(0.005, 0.04, 0), PAD_WIDTH, middle, 0.04)
+    assert still.turn_rad == 0.0
+    assert felt.slide_m == still.slide_m < 0
+    assert felt.turn_rad == pytest.approx(felt.slide_m * middle / (0.026**2 + middle**2), rel=1e-9)
