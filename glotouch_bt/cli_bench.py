@@ -162,6 +162,7 @@ def search(
     backend: Annotated[str, typer.Option(help="a registered simulation backend")] = "mujoco",
     workers: Workers = 2,
     out: Out = None,
+    resume: Annotated[bool, typer.Option("--resume", help="keep the missions that are in --out already")] = False,
     json_: Json = False,
 ) -> None:
     """How soon every object is found, by policy: the mission, and its planar stand-in on the same and more layouts."""
@@ -177,6 +178,7 @@ def search(
         objects=objects,
         backend=backend,
         out=_folder(out, "search"),
+        resume=resume,
     )
 
     def show(row: Mapping[str, Any], done: int, total: int) -> None:
@@ -210,6 +212,7 @@ def match(
     backend: Annotated[str, typer.Option(help="a registered simulation backend")] = "mujoco",
     workers: Workers = 2,
     out: Out = None,
+    resume: Annotated[bool, typer.Option("--resume", help="keep the missions that are in --out already")] = False,
     json_: Json = False,
 ) -> None:
     """Which touched object is the target: the matchers and the paper's ablation on TouchSets of the real skills."""

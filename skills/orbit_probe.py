@@ -61,7 +61,7 @@ class OrbitProbe(Skill):
         p, belief, first = self.params, self.previous_map, self.contact
         known: tuple[Candidate, ...] = self.previous or ()
         self.candidates, self.found, self.complete = known, len(known), belief.complete
-        if bool(belief.inside_exclusion(first.tip_K_m[None, :2])[0]):
+        if belief.knows(first):
             self.map = belief.with_dropped(first.point_K_m)
             raise SkillFailed("known_object", "the contact lies on an object that is traced already")
         explorer = Explorer(self.context, self.tool, p.speeds(), self.event)

@@ -18,6 +18,10 @@ PATH_STEP_M = 0.002
 GRID_STEP_M = 0.005
 LIMB_M = 0.010
 """Most that contacts outside the fitted outline may widen its envelope: gaps between objects are 30 mm."""
+KNOWN_M = 0.005
+"""A contact this near to the envelope of a traced object is one with that object: the next stands farther off."""
+FACING = -0.4
+"""Cosine between the force on the ball and the direction from an object's middle below which it is not the object's."""
 Mask = npt.NDArray[np.bool_]
 
 
@@ -25,11 +29,13 @@ Mask = npt.NDArray[np.bool_]
 class Exclusion:
     """A traced object and how far the tip's centre keeps from its outline (tip radius and clearance).
 
-    Compared by identity: two exclusions are the same if they are one.
+    Compared by identity: two exclusions are the same if they are one. `traced=False`: a place to keep out of, no
+    object.
     """
 
     contour: Contour
     margin_m: float
+    traced: bool = True
 
     def clearance(self, points_K_m: Array) -> Array:
         """(n,) distance of points (n, 2) from the envelope; negative inside."""
@@ -113,7 +119,7 @@ class SearchMap:
             raise ParamError("radius_m", radius_m, "finite and positive")
         point = np.asarray(point_K_m, dtype=np.float64).ravel()[:2]
         disc = Contour("round", point, (2 * radius_m, 2 * radius_m), 0.0, 0.0, np.zeros(0))
-        return replace(self, exclusions=(*self.exclusions, Exclusion(disc, 0.0)))
+        return replace(self, exclusions=(*self.exclusions, Exclusion(disc, 0.0, traced=False)))
 
     def with_hints(self, contacts: tuple[Contact, ...]) -> SearchMap:
         """With these hints, and no others."""
@@ -130,6 +136,17 @@ class SearchMap:
     def inside_exclusion(self, points_K_m: Array) -> Mask:
         """(n,) True for points (n, 2) inside any traced object's envelope."""
         return np.asarray(self.clearance(points_K_m) < 0.0)
+
+    def knows(self, contact: Contact) -> bool:
+        """True if a contact belongs to a traced object: in its envelope or hardly outside, on a surface that does not
+        face the object's middle."""
+        tip = contact.tip_K_m[:2]
+        for e in self.exclusions:
+            out = tip - e.contour.centre_K_m
+            facing = float(contact.reaction_K[:2] @ out) < FACING * float(np.hypot(out[0], out[1]))
+            if e.traced and not facing and float(e.clearance(tip[None])[0]) < KNOWN_M:
+                return True
+        return False
 
     def inside_extent(self, points_K_m: Array) -> Mask:
         """(n,) True for points (n, 2) where the tip's centre may be."""

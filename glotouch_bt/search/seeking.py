@@ -22,8 +22,6 @@ OBSTACLE_M = 0.012
 """What was touched where nothing new can be is kept clear of by this much from the contact point."""
 HINT_BEFORE_M, HINT_PAST_M = 0.015, 0.006
 """A hint is approached from so far before the contact it was, and looked for so far past it."""
-KNOWN_M = 0.005
-"""A contact this near to the envelope of a traced object is one with that object: the next stands farther off."""
 TAKEN_M = 0.004
 """A place this near a dropped one is not tried for coming down."""
 BESIDE_M = (0.025, 0.040, 0.055, 0.070)
@@ -86,7 +84,7 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
                 lowered = felt.contact is None
             if felt.contact is None:
                 continue
-            if _known(belief, felt.contact):
+            if belief.knows(felt.contact):
                 belief = belief.with_dropped(felt.contact.tip_K_m)
                 belief = belief.with_obstacle(felt.contact.point_K_m, OBSTACLE_M)
                 if not stretch.raised:
@@ -103,17 +101,12 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
             break
 
 
-def _known(belief: SearchMap, contact: Contact) -> bool:
-    """True if a contact belongs to what is traced already: in an envelope, or hardly outside."""
-    return bool(belief.clearance(contact.tip_K_m[None, :2])[0] < KNOWN_M)
-
-
 def _follow(belief: SearchMap, hint: Contact, tip: Array) -> Plan[tuple[SearchMap, Contact | None, Array]]:
     """To where something was touched by the way, and touch it again. Map, contact or None, where the ball is."""
     against = hint.reaction_K[:2] / max(float(np.linalg.norm(hint.reaction_K[:2])), 1e-9)
     before = hint.tip_K_m[:2] + HINT_BEFORE_M * against
     past = hint.tip_K_m[:2] - HINT_PAST_M * against
-    if bool(belief.inside_exclusion(hint.point_K_m[None]).any()) or not bool(belief.inside_extent(before[None])[0]):
+    if belief.knows(hint) or not bool(belief.inside_extent(before[None])[0]):
         return belief, None, tip
     way = Routes(belief, tip).to(before)
     if way is None:
@@ -123,7 +116,7 @@ def _follow(belief: SearchMap, hint: Contact, tip: Array) -> Plan[tuple[SearchMa
         tip, belief = felt.tip_K_m, belief.with_path(felt.path_K_m)
         if felt.refused or felt.contact is not None:
             break
-    if felt.contact is None or _known(belief, felt.contact):
+    if felt.contact is None or belief.knows(felt.contact):
         return belief, None, tip
     return belief, felt.contact, tip
 

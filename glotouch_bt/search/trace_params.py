@@ -18,6 +18,7 @@ class TraceParams:
         least_contacts, most_contacts: Bounds whatever the covariance says.
         unfelt_m: Standard deviation of how far what was known before may have moved unfelt, each way; contacts made
             since say how far it did not.
+        largest_m: What is longer are two objects.
         step_m: Longest way round before the ball probes again.
         doubt_m: With a deviation above this on the way round, the ball goes along the surface instead ...
         along_m, along_reach_m: ... so far, and then looks for it so far deeper than it was.
@@ -48,6 +49,7 @@ class TraceParams:
     least_contacts: int = 4
     most_contacts: int = 14
     unfelt_m: float = 0.004
+    largest_m: float = 0.118
     step_m: float = 0.045
     doubt_m: float = 0.008
     along_m: float = 0.026

@@ -17,6 +17,8 @@ BEARINGS = 72
 """Directions a next probe is chosen from."""
 TOUCH_SD_M = 0.0005
 """How well a contact says along its normal where an outline of known shape is."""
+FEWEST_OF_ONE = 2
+"""Contacts with one of two objects that were taken for one."""
 NEAR_CONTACT_M = 0.004
 """A place this near to a contact is no evidence of free space."""
 
@@ -230,6 +232,35 @@ class TraceState:
         self.moves += 1
         stood = self.outline(_moved_along(stray), alone=True)
         self.moved_K_m = self.moved_K_m + self.outline().centre_K_m - stood.centre_K_m
+        return True
+
+    def keep_one(self, outline: OutlineBelief, p: TraceParams) -> bool:
+        """If what was traced is larger than any object, keep the contacts with one of two; whether it was so.
+
+        The two are told by the best cut across the long side; the others are strays. The larger part is kept.
+        """
+        size = outline.contour.size_m
+        if len(self.raw) < 2 * FEWEST_OF_ONE or max(size) <= p.largest_m:
+            return False
+        now = self.present()
+        places = np.array([self.place(c) for c in now])
+        axis = np.linalg.svd(places - places.mean(axis=0))[2][0]
+        order = np.argsort(places @ axis, kind="stable")
+        best, kept = -np.inf, order
+        for k in range(FEWEST_OF_ONE, len(order) - FEWEST_OF_ONE + 1):
+            parts = [self.outline(tuple(now[i] for i in part), alone=True) for part in (order[:k], order[k:])]
+            if sum(b.log_evidence for b in parts) > best:
+                best = sum(b.log_evidence for b in parts)
+                kept = (
+                    order[:k]
+                    if 2 * k > len(order) or (2 * k == len(order) and len(now) - 1 in order[:k])
+                    else order[k:]
+                )
+        keep = {int(i) for i in kept}
+        self.strays += [c for i, c in enumerate(now) if i not in keep]
+        self.raw = [c for i, c in enumerate(self.raw) if i in keep]
+        self.odd, self.known = -1, 0
+        self.blocked.clear()
         return True
 
     def free(self) -> Array:

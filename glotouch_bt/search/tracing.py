@@ -131,6 +131,8 @@ def _until_known(s: TraceState, p: TraceParams) -> Plan[Trace]:
         if missed > p.misses:
             ended = f"{missed} probes in a row told nothing"
         outline = s.outline()
+        if s.keep_one(outline, p):
+            outline, missed, ended = s.outline(), 0, ""
     return s.trace(outline, ended)
 
 

@@ -47,6 +47,7 @@ class Campaign:
         backend: Registered name of a simulation.
         out: Folder of the campaign; each mission's run folder goes below it.
         mission: Path or shipped name; it must take a parameter `policy`.
+        resume: Missions whose folders are complete are scored as they are instead of being run again.
         planar_budget_m: Planar explorations are broken off here; the mission goes on until it is done.
     """
 
@@ -59,6 +60,7 @@ class Campaign:
     out: Path
     mission: str = "survey"
     planar_budget_m: float = BUDGET_M
+    resume: bool = False
 
     def __post_init__(self) -> None:
         unknown = [p for p in self.policies if p not in POLICIES]
@@ -129,7 +131,7 @@ def _run(campaign: Campaign, executor: Executor, on_row: OnRow | None) -> list[d
     plane = tuple(dict.fromkeys(campaign.seeds + campaign.planar_seeds))
     budget = campaign.planar_budget_m
     futures: list[Future[Any]] = [
-        executor.submit(mission_trial, campaign.request(policy, seed), policy)
+        executor.submit(mission_trial, campaign.request(policy, seed), policy, campaign.resume)
         for seed in campaign.seeds
         for policy in campaign.policies
     ]

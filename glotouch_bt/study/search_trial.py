@@ -7,7 +7,8 @@ it travels after (touching the tops, putting the probe back) is not counted: not
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -34,21 +35,41 @@ EMPTY_ROW: dict[str, Any] = {
 }  # fmt: skip
 
 
-def mission_trial(request: RunRequest, policy: str) -> dict[str, Any]:
+def mission_trial(request: RunRequest, policy: str, resume: bool = False) -> dict[str, Any]:
     """Run the mission and score its record. Whatever goes wrong is a row: what was discovered until then counts.
+
+    Args:
+        request: What to run, and where its record goes.
+        policy: For the row.
+        resume: A record that is there already, of the same mission, seed and conditions, is scored instead.
 
     Raises:
         BadInput: The request itself is wrong.
     """
     row = EMPTY_ROW | {"simulator": request.backend, "policy": policy, "seed": request.seed}
     try:
-        done = launch(request)
+        done = _result_of(request) if resume else None
+        folder = request.out
+        if done is None or folder is None:
+            run = launch(request)
+            done, folder = run.result, run.folder
         sections = sections_of(request.mission, request.objects)
-        return row | {"ended": _ended(done.result)} | score_run(read_run(done.folder), sections)
+        return row | {"ended": _ended(done)} | score_run(read_run(folder), sections)
     except BadInput:
         raise
     except Exception as e:
         return row | {"ended": f"traceback {type(e).__name__}: {e}"}
+
+
+def _result_of(request: RunRequest) -> Mapping[str, Any] | None:
+    """The result of a run of this request that ended, or None."""
+    try:
+        result: Mapping[str, Any] = json.loads(((request.out or Path()) / "result.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    asked = {"mission": request.mission, "backend": request.backend, "seed": request.seed}
+    asked["conditions"] = request.conditions
+    return result if all(result.get(k) == v for k, v in asked.items()) else None
 
 
 def _ended(result: Any) -> str:

@@ -87,3 +87,18 @@ def test_hints_are_those_given_last():
     assert belief.with_path([[0.0, 0.0]]).hints == (one,)
     assert belief.with_hints((two, one)).hints == (two, one)
     assert belief.hints == (one,)
+
+
+def test_a_surface_that_faces_a_traced_object_is_not_that_objects():
+    disc = Contour("round", np.zeros(2), (0.06, 0.06), 0.0, 0.0, np.zeros(0))
+    known = SearchMap.blank((0.2, 0.15), expected=2).with_exclusion(disc, 0.01)
+
+    def contact(x, push):
+        tip = np.array([x, 0.0, 0.018])
+        return Contact(0.0, tip, np.array([-push, 0.0, 0.0]), np.array([push, 0.0, 0.0]), tip[:2], 1.0)
+
+    assert known.knows(contact(0.038, 1.0))
+    assert known.knows(contact(0.044, 1.0))
+    assert not known.knows(contact(0.050, 1.0))
+    assert not known.knows(contact(0.038, -1.0))
+    assert not known.with_obstacle((0.1, 0.0), 0.012).knows(contact(0.1, 1.0))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from glotouch_bt.search import Felt, Move, Trace, TraceParams, trace, trace_more
+from glotouch_bt.search.trace_state import TraceState
 from glotouch_bt.study.planar import ContactModel, PlanarWorld
 from glotouch_bt.study.planar.drive import drive
 from glotouch_bt.touch import Contact
@@ -119,3 +120,19 @@ def test_what_moved_unfelt_is_traced_anew(world_of: WorldOf) -> None:
             else:
                 missed += result.moves == 0
     assert missed <= 4
+
+
+def test_what_is_too_long_for_one_object_is_two(world_of: WorldOf) -> None:
+    """Contacts with two discs, the second taken for the first one's far end: those with one of them are kept."""
+    for gap in (0.020, 0.030):
+        apart = np.array([0.06 + gap, 0.0])
+        state = TraceState.begin([], np.zeros(2), TIP, True, None)
+        for middle, bearings in ((CENTRE, (1.0, 2.2, 3.1, 4.0, 5.1)), (CENTRE + apart, (-1.2, 0.0, 1.0))):
+            for a in bearings:
+                out = np.array([np.cos(a), np.sin(a), 0.0])
+                tip = np.array([*middle, 0.018]) + (0.03 + TIP) * out
+                state.raw.append(Contact(0.0, tip, -out, out, tip[:2] - TIP * out[:2], 1.0))
+        assert state.keep_one(state.outline(), TraceParams())
+        assert (len(state.raw), len(state.strays)) == (5, 3)
+        np.testing.assert_allclose(state.outline().centre_K_m, CENTRE, atol=1e-3)
+        assert not state.keep_one(state.outline(), TraceParams())
