@@ -9,7 +9,7 @@ import numpy as np
 from glotouch_bt.motion import Motion
 from glotouch_bt.recognition import Gates, PadSpec, TargetModel
 from glotouch_bt.recognition.gain import Belief, believe, expected_gain
-from glotouch_bt.robot import HOLD, MotionRefused, ParamError
+from glotouch_bt.robot import HOLD, Array, MotionRefused, ParamError
 from glotouch_bt.touch import Candidate, Layer, TouchSequence, TouchSet
 from skills.allowance import keeping_clear_of
 from skills.base import Context, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
@@ -52,6 +52,7 @@ class TouchNext(Skill):
         self._model: TargetModel | None = None
         self._down: Squeezing | None = None
         self._refused: set[tuple[int, int, int, int]] = set()
+        self._hopeless: frozenset[int] = frozenset()
 
     def run(self) -> SkillRun:
         """See the class."""
@@ -67,6 +68,7 @@ class TouchNext(Skill):
         self.touchsets, self.decided = touchsets, False
         yield HOLD  # thinking takes longer than a control period; on hardware the arm holds meanwhile
         belief = believe(self._target_model(), touchsets)
+        self._hopeless = frozenset(t.candidate.index for t in touchsets if _in_vain(t) >= MOST_IN_VAIN)
         why = self._enough(belief)
         chosen = None if why else self._choose(belief, down)
         if chosen is None:
@@ -111,14 +113,14 @@ class TouchNext(Skill):
     def _enough(self, belief: Belief) -> str:
         """Why no further closure is wanted, or empty.
 
-        That none of them is the target is believed once each was felt: contours alone do not send the robot home.
+        That none of them is the target is believed once each was felt, and the likeliest as often as would be needed to
+        take it: contours and single closures do not send the robot home.
         """
         ranking = belief.ranking
         best = max(ranking.matches, key=lambda m: m.probability)
         if best.probability >= self.params.confidence and ranking.accepted:
             return f"candidate {best.index} is the target (probability {best.probability:.3f})"
-        felt = all(any(layer.stable for layer in t.layers) for t in belief.touchsets)
-        if ranking.p_absent >= self.params.confidence and felt:
+        if ranking.p_absent >= self.params.confidence and not self._wanted(belief):
             return f"none of them is the target (probability {ranking.p_absent:.3f})"
         return ""
 
@@ -129,23 +131,35 @@ class TouchNext(Skill):
         standing = None
         if down is not None:
             standing = Standing(down.candidate.index, down.at, float(pose_K_P.position_m[2]))
-        hopeless = {t.candidate.index for t in belief.touchsets if _in_vain(t) >= MOST_IN_VAIN}
         found = options(belief.touchsets, standing, pose_K_P.position_m, arm.description.gripper, p)
-        found = [o for o in found if _key(o) not in self._refused and o.closure.candidate not in hopeless]
+        found = [o for o in found if _key(o) not in self._refused and o.closure.candidate not in self._hopeless]
         if not found:
             return None
         closures = [c for o in found for c in (o.closure, *o.after)]
         gains = np.split(expected_gain(belief, closures), np.cumsum([1 + len(o.after) for o in found])[:-1])
         rates = best_rates(found, gains)
         worth = np.array([g.max() for g in gains]) >= p.least_gain_nats
-        wanted = self._wanted(belief)
-        if wanted:
-            worth = np.array([o.closure.candidate in wanted for o in found])
-            rates = np.array([1.0 / o.seconds for o in found])
-        for i in np.argsort(-rates, kind="stable").tolist():
-            if not worth[i]:
-                continue
+        quick = np.array([1.0 / o.seconds for o in found])
+        for score in (
+            quick * [o.closure.candidate in self._wanted(belief) for o in found],
+            rates * worth,
+            quick * [o.closure.candidate in _short_of_evidence(belief) for o in found],
+        ):
+            option = self._first(belief, found, gains, score, down)
+            if option is not None:
+                return option
+        return None
+
+    def _first(
+        self, belief: Belief, found: list[Option], gains: list[Array], score: Array, down: Squeezing | None
+    ) -> Option | None:
+        """The option of the highest positive score that has room."""
+        for i in np.argsort(-score, kind="stable").tolist():
+            if score[i] <= 0.0:
+                break
             option: Option = found[i]
+            if _key(option) in self._refused:
+                continue
             if self._has_room(belief, option, down):
                 return replace(option, closure=replace(option.closure, gain_nats=float(gains[i][0])))
             self._refused.add(_key(option))
@@ -154,11 +168,11 @@ class TouchNext(Skill):
     def _wanted(self, belief: Belief) -> set[int]:
         """Candidates to be touched whatever it tells, for a decision that is only short of evidence; mostly none."""
         ranking, confidence = belief.ranking, self.params.confidence
-        best = max(ranking.matches, key=lambda m: m.probability)
-        if best.probability >= confidence and best.evidence < Gates().evidence:
-            return {best.index}
+        if max(m.probability for m in ranking.matches) >= confidence:
+            return _short_of_evidence(belief)
         if ranking.p_absent >= confidence:
-            return {t.candidate.index for t in belief.touchsets if not any(layer.stable for layer in t.layers)}
+            unfelt = {t.candidate.index for t in belief.touchsets if not any(layer.stable for layer in t.layers)}
+            return (unfelt or _short_of_evidence(belief)) - self._hopeless
         return set()
 
     def _has_room(self, belief: Belief, option: Option, down: Squeezing | None) -> bool:
@@ -240,6 +254,12 @@ def _with_layer(touchset: TouchSet, hand: Squeezing, layer: Layer) -> TouchSet:
         return replace(touchset, sequences=(*touchset.sequences[:-1], replace(last, layers=(*last.layers, layer))))
     begun = TouchSequence(hand.at.position_K_m, hand.yaw_K_rad, (layer,))
     return replace(touchset, sequences=(*touchset.sequences, begun))
+
+
+def _short_of_evidence(belief: Belief) -> set[int]:
+    """The likeliest candidate, if it was not felt by both pads as often as a decision needs."""
+    best = max(belief.ranking.matches, key=lambda m: m.probability)
+    return {best.index} if best.evidence < Gates().evidence else set()
 
 
 def _in_vain(touchset: TouchSet) -> int:
