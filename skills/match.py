@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from glotouch_bt.recognition import MATCHERS, Gates, PadSpec, Ranking, TargetModel
+from glotouch_bt.model_cache import target_model
+from glotouch_bt.recognition import MATCHERS, Gates, PadSpec, Ranking
 from glotouch_bt.robot import HOLD, BadInput, ParamError
 from glotouch_bt.robot.meshes import Mesh, load_folder, load_mesh
 from glotouch_bt.touch import TouchSet
@@ -46,7 +47,7 @@ class Match(Skill):
         gripper = self.context.arm.description.gripper
         mesh = self._target()
         try:
-            model = TargetModel.from_mesh(mesh, PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m))
+            model = target_model(mesh, PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m))
         except ParamError as e:
             raise SkillFailed("too_low", f"{mesh.name} cannot be felt: {e}", advice="sweep lower") from e
         gates = Gates()

@@ -95,13 +95,22 @@ class TargetModel:
     def images(self) -> Array32:
         """(72, nl, nz, 35) image features the LEFT pad shows at `pad.force_N`; built at first use (0.4 s)."""
         if "images" not in self._lazy:
-            self._lazy["images"] = image_feature(pooled_images(self.fine_m, STRIDE, self.pad)).astype(np.float32)
-        return self._lazy["images"]
+            features = image_feature(pooled_images(self.fine_m, STRIDE, self.pad))
+            self._lazy["images"] = np.ascontiguousarray(features.transpose(2, 1, 0, 3), dtype=np.float32)
+        return self._lazy["images"].transpose(2, 1, 0, 3)
 
-    @cached_property
+    @property
+    def images_by_height(self) -> Array32:
+        """The same as stored, (nz, nl, 72, 35): what lies under a few shifts at one height is one piece of memory."""
+        return self.images.transpose(2, 1, 0, 3)
+
+    @property
     def image_norms(self) -> Array32:
-        """(72, nl, nz) squared norm of each image feature."""
-        return np.asarray(np.einsum("...i,...i->...", self.images, self.images))
+        """(nz, nl, 72) squared norm of each image feature."""
+        if "image_norms" not in self._lazy:
+            table = self.images_by_height
+            self._lazy["image_norms"] = np.asarray(np.einsum("...i,...i->...", table, table))
+        return self._lazy["image_norms"]
 
     def width_at(self, l_m: float, z_m: float, phi_rad: float) -> float:
         """One support width by linear interpolation of the table; NaN outside it."""

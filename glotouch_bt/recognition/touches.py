@@ -22,7 +22,7 @@ def pooled_images(fine_m: Array32, stride: int, pad: PadSpec) -> Array32:
     Returns:
         (n, nl, nz, 35) metres. An empty window gives zeros.
     """
-    out = []
+    out: list[Array32] = []
     for side in fine_m:
         h = sliding_window_view(side, (FINE[1], FINE[0]))[::stride, ::stride]  # (nl, nz, 15, 21), z upwards
         out.append(touch_windows(h.reshape(-1, FINE[1], FINE[0]), pad).reshape(*h.shape[:2], -1))

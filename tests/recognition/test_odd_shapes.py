@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glotouch_bt.recognition import LossParams, TargetModel, match, rank
-from glotouch_bt.recognition.loss import height_loss
+from glotouch_bt.recognition import MATCHERS, TargetModel
+from glotouch_bt.recognition.likelihood.params import LikelihoodParams
+from glotouch_bt.recognition.likelihood.scalars import height_ratio
 from glotouch_bt.recognition.synthetic import IDEAL, acquire
 from glotouch_bt.robot.meshes import load_mesh
 
@@ -32,9 +33,12 @@ def meshes(tmp_path_factory: pytest.TempPathFactory):
 def test_a_top_that_was_not_felt_says_only_how_high_it_is_at_least(meshes) -> None:
     touched, _ = acquire(meshes["cup"], POSE, IDEAL, np.random.default_rng(0))
     low = replace(touched.candidate, height_m=0.018)
-    params = LossParams()
-    assert height_loss(TargetModel.from_mesh(meshes["cup"]), low, params) == 0.0
-    assert height_loss(TargetModel.from_mesh(meshes["plate"]), replace(low, height_m=0.030), params) > 0.0
+    params = LikelihoodParams()
+    cup = TargetModel.from_mesh(meshes["cup"])
+    assert height_ratio(cup, low, params) == 0.0
+    # A lower place may have been taken for the top; a higher one cannot.
+    lower, higher = (height_ratio(cup, replace(low, height_m=cup.height_m + d), params) for d in (-0.02, 0.02))
+    assert higher < lower < height_ratio(cup, replace(low, height_m=cup.height_m), params)
 
 
 def test_the_narrowest_way_through(meshes) -> None:
@@ -49,6 +53,6 @@ def test_every_shape_knows_itself_among_all(meshes) -> None:
     touched = [acquire(meshes[n], POSE, IDEAL, np.random.default_rng(i), i)[0] for i, n in enumerate(names)]
     for i, name in enumerate(names):
         model = TargetModel.from_mesh(meshes[name])
-        ranking = rank([match(model, t, LossParams()) for t in touched])
+        ranking = MATCHERS["likelihood"](model, touched)
         assert ranking.best.index == i, (name, [(names[m.index], round(m.loss, 2)) for m in ranking.matches])
-        assert ranking.best.loss < 2.0
+        assert ranking.best.probability > 0.5

@@ -46,8 +46,11 @@ def generic_features(pad: PadSpec) -> Array32:
     a, b = np.cos(turn) * x + np.sin(turn) * z, -np.sin(turn) * x + np.cos(turn) * z
     aligned = some(0.6)  # upright things have their curvatures along and across
     a, b = np.where(aligned, x, a), np.where(aligned, z, b)
-    ka = np.where(some(0.3), 0.0, 1 / np.exp(draw(math.log(0.006), math.log(0.06))))
-    kb = np.where(some(0.6), 0.0, np.sign(draw(-0.3, 1)) / np.exp(draw(math.log(0.010), math.log(0.10))))
+    flat = rng.random((n, 1, 1)) < 0.25
+    ka = np.where(np.logical_or(flat, some(0.2)), 0.0, 1 / np.exp(draw(math.log(0.006), math.log(0.06))))
+    kb = np.where(
+        np.logical_or(flat, some(0.6)), 0.0, np.sign(draw(-0.3, 1)) / np.exp(draw(math.log(0.010), math.log(0.10)))
+    )
     h = -0.5 * ka * (a - draw(-4e-3, 4e-3)) ** 2 - 0.5 * kb * (b - draw(-8e-3, 8e-3)) ** 2
     h = h + np.where(some(0.4), draw(-0.25, 0.25), 0) * z + np.where(some(0.4), draw(-0.15, 0.15), 0) * x
     steps = some(0.25) * (z > draw(-10e-3, 10e-3)) * draw(-4e-3, 4e-3)
@@ -62,18 +65,60 @@ def generic_features(pad: PadSpec) -> Array32:
     return out
 
 
+def image_kernel(squared: Array32, p: LikelihoodParams) -> Array32:
+    """An image's unnormalised density at mean squared feature distance `squared` from a prediction."""
+    near = 1 + squared * np.float32(1 / p.image_scale**2)
+    if p.image_order == 3.0:  # several times faster than a power
+        return np.asarray(1 / (near * near * near))
+    return np.asarray(near ** np.float32(-p.image_order))
+
+
 def log_kernel(squared: Floats, p: LikelihoodParams) -> Array32:
-    """Log of an image's unnormalised density at mean squared feature distance `squared` from a prediction."""
-    good = (1 + squared * np.float32(1 / p.image_scale**2)) ** np.float32(-p.image_order)
-    return np.asarray(np.log(good + np.float32(1e-12)))
+    """Log of `image_kernel`."""
+    return np.asarray(np.log(image_kernel(squared.astype(np.float32), p) + np.float32(1e-12)))
 
 
-def log_generic_images(images: Array32, pad: PadSpec, p: LikelihoodParams) -> Array:
-    """(n,) log density, in the units of `log_kernel`, of image features (n, 35) under the background."""
-    library = generic_features(pad)
-    squared = (images**2).sum(axis=1)[:, None] - 2 * images @ library.T + (library**2).sum(axis=1)[None]
-    mean = np.exp(log_kernel(np.maximum(squared, 0) / np.float32(images.shape[1]), p)).mean(axis=1)
-    return np.asarray(np.log(mean + 1e-12), dtype=np.float64)
+def log_generic_images(layers: tuple[LayerEvidence, ...], pad: PadSpec, p: LikelihoodParams) -> Array:
+    """(n, 2) log density, in the units of `log_kernel`, of the (left, right) images of each layer; 0 without image.
+
+    Any surface of the library, or one like those already felt beside it: below on the same pad, at the same place in
+    the sequence before, on the other pad. So a wall that goes on tells no more than its first image.
+    """
+    known: dict[tuple[int, int, int], Array32] = {
+        (e.sequence, e.index, side): image.astype(np.float32)
+        for e in layers
+        for side, image in enumerate(e.images)
+        if image is not None
+    }
+    out = np.zeros((len(layers), 2))
+    if not known:
+        return out
+    place = {key: i for i, key in enumerate(known)}
+    images = np.array(list(known.values()))
+    size = np.float32(images.shape[1])
+    squared = _squared(images, generic_features(pad)) / size
+    anything = image_kernel(squared, p).mean(axis=1)
+    alike = image_kernel(_squared(images, images) / size, p)
+    for i, e in enumerate(layers):
+        for side in (0, 1):
+            at = place.get((e.sequence, e.index, side))
+            if at is None:
+                continue
+            beside = [(e.sequence, e.index - 1, side), (e.sequence - 1, e.index, side)]
+            if side == 1:
+                beside.append((e.sequence, e.index, 0))
+            guesses = [float(alike[at, place[k]]) for k in beside if k in place]
+            density = float(anything[at])
+            if guesses:
+                density = (1 - p.image_alike) * density + p.image_alike * sum(guesses) / len(guesses)
+            out[i, side] = math.log(density + 1e-12)
+    return out
+
+
+def _squared(a: Array32, b: Array32) -> Array32:
+    """(len(a), len(b)) squared distance of features."""
+    d = (a**2).sum(axis=1)[:, None] - 2 * a @ b.T + (b**2).sum(axis=1)[None]
+    return np.asarray(np.maximum(d, 0))
 
 
 def log_generic_widths(layers: tuple[LayerEvidence, ...], candidate: Candidate, p: LikelihoodParams) -> Array:

@@ -18,14 +18,24 @@ from glotouch_bt.recognition.likelihood.scalars import (
     shift_prior,
     yaw_prior,
 )
-from glotouch_bt.recognition.likelihood.volumes import Grid, Observed, image_ratios, log_sum, turned, width_ratios
+from glotouch_bt.recognition.likelihood.volumes import (
+    Grid,
+    Observed,
+    image_ratios,
+    log_sum,
+    slid,
+    slide_matrix,
+    turned,
+    width_ratios,
+)
 from glotouch_bt.recognition.model import TargetModel
 from glotouch_bt.recognition.pads import Array32, PadSpec
-from glotouch_bt.recognition.params import LossParams
 from glotouch_bt.recognition.placement import fitted_pose, unfelt_pose
 from glotouch_bt.robot import Array
 from glotouch_bt.touch.values import TouchSet
 
+PARALLEL_RAD = math.radians(10.0)
+"""Sequences whose hands differ by less (or by half a turn) are tracks along one axis."""
 UNFELT_LIMIT = 1.0
 """Largest log ratio in favour of a candidate that no pad felt: its outline alone must not decide."""
 
@@ -73,14 +83,12 @@ class Pair:
 
 def read_touchset(touchset: TouchSet, pad: PadSpec, p: LikelihoodParams) -> Reading:
     """Reduce a TouchSet and weigh it under the background."""
-    e = read_evidence(touchset, pad, LossParams())
-    images = [i for layer in e.layers for i in layer.images if i is not None]
-    logs = iter(log_generic_images(np.array(images, dtype=np.float32), pad, p) if images else ())
+    e = read_evidence(touchset, pad)
+    images = log_generic_images(e.layers, pad, p)
     widths = log_generic_widths(e.layers, touchset.candidate, p)
     seen: dict[int, list[Observed]] = {}
-    for layer, width in zip(e.layers, widths, strict=True):
-        left, right = (0.0 if i is None else float(next(logs)) for i in layer.images)
-        seen.setdefault(layer.sequence, []).append(Observed(layer, float(width), (left, right)))
+    for layer, width, image in zip(e.layers, widths, images, strict=True):
+        seen.setdefault(layer.sequence, []).append(Observed(layer, float(width), (float(image[0]), float(image[1]))))
     return Reading(touchset, e, tuple(tuple(v) for _, v in sorted(seen.items())))
 
 
@@ -98,29 +106,39 @@ def compare(model: TargetModel, reading: Reading, p: LikelihoodParams) -> Pair:
         return Pair(candidate.index, ratio, terms, None, 0.0, 0.0, None, unfelt_pose(touchset), 0.0)
     grid = Grid.of(p)
     first = reading.sequences[0][0].layer.yaw_rad
-    common = _log_normal(grid.bias_m, p.bias_sd_m)[:, None, None] + _log_normal(grid.z0_m, p.z0_sd_m)[None, None]
-    joint = (common + yaw_prior(model, candidate, first, p)[None, :, None]).astype(np.float32)
+    turns = np.array([seen[0].layer.yaw_rad - first for seen in reading.sequences])
+    parallel = bool(np.abs((turns + np.pi / 2) % np.pi - np.pi / 2).max() < PARALLEL_RAD)
+    common = _log_normal(grid.bias_m, p.bias_sd_m)[:, None, None, None] + _log_normal(grid.z0_m, p.z0_sd_m)
+    joint = (common + yaw_prior(model, candidate, first, p)[None, :, None, None]).astype(np.float32)
+    if parallel:  # tracks share one shift along x_P, but for what each slides
+        joint = joint + shift_prior(model, candidate, 0.0, grid.shift_m, p)[None, :, :, None].astype(np.float32)
+    slide = slide_matrix(grid, p)
     parts = []
-    for seen in reading.sequences:
-        turn = seen[0].layer.yaw_rad - first
+    for seen, turn in zip(reading.sequences, turns, strict=True):
+        flip = bool(np.cos(turn) < 0)
         widths = np.float32(p.temper_width) * width_ratios(model, seen, turn, grid, p)
         images = np.float32(p.temper_image) * image_ratios(model, seen, turn, grid, p)
-        prior = shift_prior(model, candidate, turn, grid.shift_m, p).astype(np.float32)
-        volume = widths + (images + prior[:, :, None])[None]
-        parts.append((widths, images, volume))
-        joint = joint + turned(log_sum(volume, 2), p)
+        volume = widths + images[None]
+        if parallel:
+            volume = volume[:, :, ::-1] if flip else volume
+            joint = joint + turned(slid(volume, slide), p)
+        else:
+            volume = volume + shift_prior(model, candidate, turn, grid.shift_m, p)[None, :, :, None].astype(np.float32)
+            joint = joint + turned(log_sum(volume, 2), p)[:, :, None]
+        parts.append((widths, images, volume, flip))
     total = float(log_sum(joint.reshape(1, -1), 1)[0])
-    at = np.unravel_index(int(np.argmax(joint)), joint.shape)
-    b, i, z = (int(k) for k in at)
+    b, i, c, z = (int(k) for k in np.unravel_index(int(np.argmax(joint)), joint.shape))
     shifts = np.zeros(len(touchset.sequences))
     terms["width"] = terms["image"] = 0.0
-    for seen, (widths, images, volume) in zip(reading.sequences, parts, strict=True):
-        d = int(volume[b, i, :, z].argmax())
+    for seen, (widths, images, volume, flip) in zip(reading.sequences, parts, strict=True):
+        along = volume[b, i, :, z] + (np.log(slide[:, c]) if parallel else 0)
+        d = int(np.argmax(along))
+        d = len(grid.shift_m) - 1 - d if parallel and flip else d
         shifts[seen[0].layer.sequence] = grid.shift_m[d]
         terms["width"] += float(widths[b, i, d, z])
         terms["image"] += float(images[i, d, z])
     terms["pose"] = total - terms["width"] - terms["image"]
-    log_pose = log_sum(joint, 0)
+    log_pose = log_sum(joint, (0, 2))
     yaw = _refined(log_sum(log_pose, 1), i)
     fit, pose = fitted_pose(
         model, touchset, reading.evidence, yaw, shifts, float(grid.z0_m[z]), 1.0, float(grid.bias_m[b])

@@ -17,13 +17,16 @@ class LikelihoodParams:
         width_outlier: Probability that a width has nothing to do with the prediction.
         width_range_m: Such a width is uniform over this.
         bias_sd_m, bias_limit_m, bias_steps: Aperture bias, one a TouchSet.
-        shift_sd_m, shift_limit_m, shift_steps: Object's middle along x_P about the contour's, one a sequence.
+        shift_sd_m, shift_limit_m, shift_steps: Object's middle along x_P about the contour's; one for all
+            parallel tracks, else one a sequence.
+        slide_sd_m: Spread of the object's own sliding along x_P between parallel tracks.
         z0_sd_m, z0_limit_m, z0_steps: Floor's datum, one a TouchSet.
         turn_sd_rad: Spread of the object's own turning between sequences.
         slip: Probability that it turned to any yaw at all.
         image_scale: Feature distance (sqrt(mm), RMS over 35 blocks) at which an image is half as good.
         image_order: Half the effective number of independent blocks of an image.
         image_outlier: Probability that an image shows something not in the STL's table.
+        image_alike: Probability, under the background, that an image is like one felt beside it.
         height_sd_m: Spread of the top found.
         height_lower: Probability that a lower place than the top was taken for it.
         contour_sd_m: Spread of a fitted contour's side besides the traces' own.
@@ -37,22 +40,24 @@ class LikelihoodParams:
     """
 
     width_sd_m: float = 0.8e-3
-    width_outlier: float = 0.1
+    width_outlier: float = 0.04
     width_range_m: float = 0.060
     bias_sd_m: float = 0.5e-3
-    bias_limit_m: float = 1.2e-3
-    bias_steps: int = 5
+    bias_limit_m: float = 0.8e-3
+    bias_steps: int = 3
     shift_sd_m: float = 3e-3
-    shift_limit_m: float = 9e-3
-    shift_steps: int = 9
+    shift_limit_m: float = 7.5e-3
+    shift_steps: int = 7
+    slide_sd_m: float = 1.5e-3
     z0_sd_m: float = 1.5e-3
-    z0_limit_m: float = 4e-3
-    z0_steps: int = 5
+    z0_limit_m: float = 2.5e-3
+    z0_steps: int = 3
     turn_sd_rad: float = math.radians(4.0)
     slip: float = 0.02
     image_scale: float = 0.12
     image_order: float = 3.0
     image_outlier: float = 0.05
+    image_alike: float = 0.6
     height_sd_m: float = 1e-3
     height_lower: float = 0.15
     contour_sd_m: float = 1.5e-3
@@ -60,8 +65,8 @@ class LikelihoodParams:
     yaw_sd_rad: float = math.radians(6.0)
     temper_width: float = 0.5
     temper_image: float = 0.5
-    slope: float = 1.0
-    offset: float = -7.0
+    slope: float = 0.77
+    offset: float = -0.55
     prior_absent: float = 0.2
     accept: float = 0.9
     evidence: float = 2.5
@@ -75,6 +80,14 @@ class LikelihoodParams:
                 raise ParamError(f"likelihood.{f.name}", v, "positive")
             if f.name.endswith("_steps") and v % 2 == 0:
                 raise ParamError(f"likelihood.{f.name}", v, "odd, so that zero is tried")
-        for name in ("width_outlier", "slip", "image_outlier", "height_lower", "contour_outlier", "prior_absent"):
+        for name in (
+            "width_outlier",
+            "slip",
+            "image_outlier",
+            "image_alike",
+            "height_lower",
+            "contour_outlier",
+            "prior_absent",
+        ):
             if not 0 < getattr(self, name) < 1:
                 raise ParamError(f"likelihood.{name}", getattr(self, name), "between 0 and 1")

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from glotouch_bt.recognition.evidence import LayerEvidence
-from glotouch_bt.recognition.likelihood.background import log_kernel
+from glotouch_bt.recognition.likelihood.background import image_kernel
 from glotouch_bt.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.recognition.model import TargetModel
 from glotouch_bt.recognition.pads import POOLED, Array32
@@ -81,10 +81,11 @@ def image_ratios(
 ) -> Array32:
     """(72, nd, nz) sum over the images of log p(image | pose) / p(image | background)."""
     yaws = len(model.phi_rad)
-    total = np.zeros((yaws, len(grid.shift_m), len(grid.z0_m)), dtype=np.float32)
+    total = np.zeros((len(grid.z0_m), len(grid.shift_m), yaws), dtype=np.float32)
     turn = round(turn_rad / (2 * np.pi) * yaws)
     for o in seen:
         e = o.layer
+        z_m = e.height_m + grid.z0_m
         for side, image in enumerate(e.images):
             if image is None:
                 continue
@@ -94,26 +95,30 @@ def image_ratios(
             if side == 1:  # the right pad sees the object from behind: its columns run the other way
                 m = np.ascontiguousarray(m.reshape(POOLED)[:, ::-1]).reshape(-1)
                 at, roll = -at, turn + yaws // 2
-            squared = _squared_distance(model, m, at, e.height_m + grid.z0_m)
-            ratio = np.exp(log_kernel(squared, p) - np.float32(o.log_images[side]))
-            ratio = np.log(ratio * np.float32(1 - p.image_outlier) + np.float32(p.image_outlier))
-            total += np.roll(ratio, -roll, axis=0)
-    return total
+            squared = _squared_distance(model, m, at, z_m)
+            # ((1 + d2) ** -order / background) (1 - outlier) + outlier, as one power
+            good = np.float32((1 - p.image_outlier) * math.exp(-o.log_images[side]))
+            ratio = np.log(image_kernel(squared, p) * good + np.float32(p.image_outlier))
+            roll %= yaws
+            total[:, :, : yaws - roll] += ratio[:, :, roll:]
+            total[:, :, yaws - roll :] += ratio[:, :, :roll]
+    return np.ascontiguousarray(total.transpose(2, 1, 0))
 
 
 def _squared_distance(model: TargetModel, feature: Array32, l_m: Array, z_m: Array) -> Array32:
-    """(72, nd, nz) mean squared distance of a feature (35,) to the table, interpolated between its cells."""
+    """(nz, nd, 72) mean squared distance of a feature (35,) to the table, interpolated between its cells."""
     i, f = _positions(model.l_m, l_m)
     j, g = _positions(model.z_m, z_m)
     a, b = int(i.min()), int(i.max()) + 2
     c, d = int(j.min()), int(j.max()) + 2
-    block = model.images[:, a:b, c:d]
-    dots = block.reshape(-1, feature.size) @ feature
-    squared = model.image_norms[:, a:b, c:d] - 2 * dots.reshape(block.shape[:3]) + feature @ feature
-    squared = np.maximum(squared, 0) / np.float32(feature.size)
-    i, j = i - a, j - c
-    along = squared[:, i] * (1 - f)[None, :, None] + squared[:, i + 1] * f[None, :, None]
-    return np.asarray(along[:, :, j] * (1 - g) + along[:, :, j + 1] * g, dtype=np.float32)
+    squared = model.image_norms[c:d, a:b] - 2 * (model.images_by_height[c:d, a:b] @ feature) + feature @ feature
+    squared = np.maximum(squared, 0) * np.float32(1 / feature.size)
+    f, g = f[None, :, None], g[:, None, None]
+    along = squared[:, i - a]
+    along += f * (squared[:, i - a + 1] - along)
+    out = along[j - c]
+    out += g * (along[j - c + 1] - out)
+    return np.asarray(out)
 
 
 def interpolated_width(model: TargetModel, l_m: Array, z_m: Array, turn_rad: float) -> Array32:
@@ -131,17 +136,19 @@ def interpolated_width(model: TargetModel, l_m: Array, z_m: Array, turn_rad: flo
     roll = turn_rad / (2 * np.pi) * len(model.phi_rad)
     whole = math.floor(roll + 1e-6)
     part = np.float32(max(roll - whole, 0.0))
-    first = np.roll(out, -whole, axis=0)
+    whole %= len(out)
+    first = np.concatenate([out[whole:], out[:whole]]) if whole else out
     if part < 1e-3:
         return np.asarray(first, dtype=np.float32)
-    return np.asarray((1 - part) * first + part * np.roll(first, -1, axis=0), dtype=np.float32)
+    return np.asarray((1 - part) * first + part * np.concatenate([first[1:], first[:1]]), dtype=np.float32)
 
 
 def _positions(axis: Array, x: Array) -> tuple[Index, Array32]:
     """Lower cell and fraction of each x; clamped to the axis."""
-    t = (x - axis[0]) / (axis[1] - axis[0])
-    i = np.clip(np.floor(t).astype(np.int64), 0, len(axis) - 2)
-    return i, np.clip(t - i, 0, 1).astype(np.float32)
+    last = len(axis) - 1
+    t = np.minimum(np.maximum((x - axis[0]) * (last / (axis[-1] - axis[0])), 0.0), last - 1e-9)
+    i = t.astype(np.int64)  # towards 0, and t is not negative
+    return i, (t - i).astype(np.float32)
 
 
 def log_sum(x: Array32, axis: int | tuple[int, ...]) -> Array32:
@@ -160,7 +167,23 @@ def turned(x: Array32, p: LikelihoodParams) -> Array32:
     weight *= (1 - p.slip) / weight.sum()
     top = x.max(axis=1, keepdims=True)
     e = np.exp(x - top)
-    out = np.float32(p.slip) * e.mean(axis=1, keepdims=True) + sum(
-        np.float32(w) * np.roll(e, k, axis=1) for k, w in zip(range(-reach, reach + 1), weight, strict=True)
-    )
+    wrapped = np.concatenate([e[:, -reach:], e, e[:, :reach]], axis=1)
+    out = np.float32(p.slip) * e.mean(axis=1, keepdims=True)
+    for k, w in enumerate(weight):
+        out = out + np.float32(w) * wrapped[:, k : k + n]
     return np.asarray(np.log(out) + top, dtype=np.float32)
+
+
+def slide_matrix(grid: Grid, p: LikelihoodParams) -> Array32:
+    """(nd, nd) probability of shift i in one sequence, given shift j of the object as a whole."""
+    off = (grid.shift_m[:, None] - grid.shift_m[None, :]) / p.slide_sd_m
+    weight = np.exp(-0.5 * off**2)
+    weight /= weight.sum(axis=0, keepdims=True)
+    return np.asarray((1 - p.slip) * weight + p.slip / len(weight), dtype=np.float32)
+
+
+def slid(x: Array32, slide: Array32) -> Array32:
+    """Mean over the object's own sliding, in probability, over axis 2 of (nb, 72, nd, nz)."""
+    top = x.max(axis=2, keepdims=True)
+    mixed = np.einsum("byiz,ij->byjz", np.exp(x - top), slide)
+    return np.asarray(np.log(mixed) + top, dtype=np.float32)
