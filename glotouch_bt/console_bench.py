@@ -220,8 +220,8 @@ def print_match(summary: dict[str, Any], folder: Path) -> None:
         )
     Console().print(
         f"a new STL takes {value(timing.get('new_stl_s'), 2)} s ({value(timing.get('new_stl_cpu_s'), 2)} s of "
-        f"processor); {summary['touched']} objects touched, {summary['nameless']} candidates of none\n"
-        f"{folder / 'summary.json'}",
+        f"processor); {summary['touched']} of {summary['objects']} objects touched, {summary['nameless']} false "
+        f"candidates\n{folder / 'summary.json'}",
         markup=False,
         highlight=False,
         soft_wrap=True,

@@ -173,6 +173,7 @@ def run_campaign(campaign: Campaign, executor: Executor, on_row: OnRow | None = 
             "seeds": [x["seed"] for x in layouts],
             "layouts": len(layouts),
             "ended": {e: sum(x["ended"] == e for x in layouts) for e in sorted({x["ended"] for x in layouts})},
+            "objects": sum(x["objects"] for x in layouts),
             "touched": sum(x["touched"] for x in layouts),
             "nameless": sum(x["nameless"] for x in layouts),
             "recorded": campaign.dataset is not None,
