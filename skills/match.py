@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Literal
 
@@ -22,9 +23,9 @@ class MatchParams(SkillParams):
 
 
 class Match(Skill):
-    """Rank all TouchSets by their matching loss against the target's STL and plan the grasp of the best.
+    """Rank all TouchSets against the target's STL and plan the grasp of the best.
 
-    SUCCESS: the best candidate passes margin, fit and evidence; `plan` says how to grasp it.
+    SUCCESS: the best candidate is surely enough the target and was felt enough; `plan` says how to grasp it.
     FAILURE `not_recognised`: it does not; `ranking` is written all the same.
     FAILURE `too_wide`: the same, and the jaws do not open wide enough for the target.
     FAILURE `too_low`: the target is lower than the probe and the pads reach.
@@ -50,10 +51,10 @@ class Match(Skill):
             model = target_model(mesh, PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m))
         except ParamError as e:
             raise SkillFailed("too_low", f"{mesh.name} cannot be felt: {e}", advice="sweep lower") from e
-        gates = Gates()
         ranking = MATCHERS[self.params.matcher](model, touchsets)
         self.ranking = ranking
-        self.event("ranking", target=mesh.name, ranking=ranking, gates=gates)
+        gates = Gates() if self.params.matcher == "paper" else None  # the likelihood decides on probability
+        self.event("ranking", target=mesh.name, ranking=ranking, gates=gates, matcher=self.params.matcher)
         if not ranking.accepted:
             felt = {t.candidate.index for t in touchsets}
             missed = [str(c.index) for c in self.known or () if c.index not in felt]
@@ -69,7 +70,7 @@ class Match(Skill):
             raise SkillFailed(
                 "not_recognised",
                 f"no candidate is surely {mesh.name}: {why}",
-                advice="touch more, or lower the gates",
+                advice=_advice(ranking),
                 margin=ranking.margin,
             )
         best = next(t for t in touchsets if t.candidate.index == ranking.best.index)
@@ -78,6 +79,15 @@ class Match(Skill):
 
     def _target(self) -> Mesh:
         return load_target(self.params.target, self.context.world.objects.folder)
+
+
+def _advice(ranking: Ranking) -> str:
+    """What would help most."""
+    c = ranking.next_touch
+    if c is None:
+        return "touch more"
+    yaw = math.degrees(math.remainder(c.yaw_K_rad, math.pi))
+    return f"touch candidate {c.candidate} {c.height_m * 1e3:.0f} mm above the floor, hand turned to {yaw:.0f} degrees"
 
 
 def load_target(target: str, folder: Path) -> Mesh:

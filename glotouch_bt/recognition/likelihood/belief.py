@@ -12,7 +12,7 @@ from glotouch_bt.recognition.decision import Closure, Ranking
 from glotouch_bt.recognition.likelihood.gain import Prediction, expected_gains, predict
 from glotouch_bt.recognition.likelihood.pair import Pair, Reading, compare, read_touchset
 from glotouch_bt.recognition.likelihood.params import LikelihoodParams
-from glotouch_bt.recognition.likelihood.posterior import decide
+from glotouch_bt.recognition.likelihood.posterior import decide, probabilities
 from glotouch_bt.recognition.model import TargetModel
 from glotouch_bt.robot import Array, ParamError
 from glotouch_bt.touch.values import TouchSet
@@ -95,6 +95,24 @@ def expected_gain(belief: Belief, closures: Sequence[Closure]) -> Array:
             raise ParamError("closure.candidate", c.candidate, f"one of {sorted(known)}")
     shares = {m.index: m.probability for m in belief.ranking.matches}
     return expected_gains(belief.model, belief.predictions(), shares, belief.ranking.p_absent, closures, belief.params)
+
+
+def identify(
+    models: Sequence[TargetModel], touchset: TouchSet, params: LikelihoodParams | None = None
+) -> tuple[Array, float]:
+    """(n,) probability that the touched object is each of `models`, and that it is none of them; they sum to 1.
+
+    Raises:
+        ParamError: No model, models for different pads, or an outline that is not finite.
+    """
+    p = params or LikelihoodParams()
+    check((touchset,))
+    if not models:
+        raise ParamError("models", 0, "at least one")
+    if any(m.pad != models[0].pad for m in models):
+        raise ParamError("models", "of several pads", "of one pad")
+    reading = read_touchset(touchset, models[0].pad, p)
+    return probabilities([compare(m, reading, p).log_ratio for m in models], p.prior_absent)
 
 
 def ranked(belief: Belief) -> Ranking:

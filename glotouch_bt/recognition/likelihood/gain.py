@@ -14,19 +14,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from glotouch_bt.recognition.decision import Closure
-from glotouch_bt.recognition.likelihood.background import WIDTH_SCALE_M, generic_features, log_kernel
+from glotouch_bt.recognition.likelihood.background import FIRST_SCALE_M, WIDTH_SCALE_M, generic_features, image_kernel
 from glotouch_bt.recognition.likelihood.pair import Pair, Reading
 from glotouch_bt.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.recognition.likelihood.scalars import yaw_prior
 from glotouch_bt.recognition.model import TargetModel
-from glotouch_bt.recognition.pads import Array32
+from glotouch_bt.recognition.pads import POOLED, Array32
 from glotouch_bt.recognition.raster import hand_axes
 from glotouch_bt.robot import Array
 from glotouch_bt.touch.values import Candidate
 
 POSES, OTHERS, SURFACES = 10, 16, 96
 """Poses of the target, other objects, and background surfaces the sums run over."""
-FIRST_SCALE_M = 4e-3
 NEAR_M, NEAR_RAD = 0.008, math.radians(20.0)
 """A closure this near to one already made (height and track; yaw) repeats it."""
 
@@ -91,69 +90,94 @@ def expected_gains(
     library = generic_features(model.pad)
     library = library[:: max(1, len(library) // SURFACES)]
     others = library[:: max(1, len(library) // OTHERS)][:OTHERS]
-    quantile = np.tan(np.pi * (((np.arange(len(others)) * 7 % len(others)) + 0.5) / len(others) - 0.5))  # of a Cauchy
-    spread = 1 - p.image_outlier
-    log_other = np.log(np.exp(log_kernel(_squared(others, library), p)).mean(axis=-1))
-    out = []
-    for c in closures:
-        q = predictions[c.candidate]
-        width, left, right, novelty = _at(model, q, c)
-        guess, scale = _guess(q, c)
-        felt = np.isfinite(width)
-        w = np.where(felt, width, 1.0)
+    generic_other = image_kernel(_squared(others, library), p).mean(axis=-1)
+    n_other = len(others)
+    quantile = np.tan(np.pi * (((np.arange(n_other) * 7 % n_other) + 0.5) / n_other - 0.5))  # of a Cauchy
+    out = np.zeros(len(closures))
+    for candidate in sorted({c.candidate for c in closures}):
+        q = predictions[candidate]
+        where = [i for i, c in enumerate(closures) if c.candidate == candidate]
+        mine = [closures[i] for i in where]
+        width, sides, novelty = _at(model, q, mine)
         # Ratios where the target is there (one a pose) and where some other object is (one a surface and quantile).
-        seen = np.concatenate([w, guess + scale * quantile])
-        generic = scale / math.pi / (scale**2 + (seen - guess) ** 2)
-        sd = math.hypot(p.width_sd_m, p.bias_sd_m)
-        near = np.exp(-0.5 * ((seen[:, None] - w[None]) / sd) ** 2) * felt / (sd * math.sqrt(2 * math.pi))
-        ratio = p.temper_width * np.log((1 - p.width_outlier) * (near @ q.weight) / generic + p.width_outlier)
-        images = np.zeros(len(seen))
-        for side in (left, right):
-            own = np.exp(log_kernel(_squared(side, side), p)) @ q.weight
-            own_ratio = own / np.exp(log_kernel(_squared(side, library), p)).mean(axis=-1)
-            other_ratio = (np.exp(log_kernel(_squared(others, side), p)) @ q.weight) / np.exp(log_other)
-            images += p.temper_image * np.log(spread * np.concatenate([own_ratio, other_ratio]) + p.image_outlier)
-        log_ratio = p.slope * novelty * (ratio + images)
-        out.append(_gain(log_ratio[: len(w)], q.weight, log_ratio[len(w) :], shares[c.candidate], entropy))
-    return np.array(out)
+        ratio = _width_ratios(width, np.array([_guess(q, c) for c in mine]), quantile, q.weight, p)
+        for side in sides:
+            ratio += _image_ratios(side, library, others, generic_other, q.weight, p)
+        ratio *= p.slope * novelty[:, None]
+        s = width.shape[1]
+        out[where] = _gains(ratio[:, :s], q.weight, ratio[:, s:], shares[candidate], entropy)
+    return out
 
 
-def _gain(there: Array, weight: Array, not_there: Array, share: float, entropy: float) -> float:
-    """Entropy before minus its mean after one observation that concerns one candidate's odds only."""
+def _width_ratios(width: Array, guess: Array, quantile: Array, weight: Array, p: LikelihoodParams) -> Array:
+    """(n, s + o) tempered log ratios of widths: predicted ones (n, s), then those of other objects."""
+    middle, scale = guess[:, :1], guess[:, 1:]
+    felt = np.isfinite(width)
+    w = np.where(felt, width, 1.0)
+    seen = np.concatenate([w, middle + scale * quantile], axis=1)
+    generic = scale / math.pi / (scale**2 + (seen - middle) ** 2)
+    sd = math.hypot(p.width_sd_m, p.bias_sd_m)
+    near = np.exp(-0.5 * ((seen[:, :, None] - w[:, None, :]) / sd) ** 2) * felt[:, None, :]
+    target = (near @ weight) / (sd * math.sqrt(2 * math.pi))
+    log_ratio = np.log((1 - p.width_outlier) * target / generic + p.width_outlier)
+    return np.asarray(p.temper_width * log_ratio, dtype=np.float64)
+
+
+def _image_ratios(
+    side: Array32, library: Array32, others: Array32, generic_other: Array32, weight: Array, p: LikelihoodParams
+) -> Array:
+    """(n, s + o) tempered log ratios of one pad's images: predicted ones (n, s, 35), then those of other objects."""
+    n, s, size = side.shape
+    flat = side.reshape(-1, size)
+    norm = (side**2).sum(axis=2)
+    inner = np.maximum(norm[:, :, None] + norm[:, None, :] - 2 * side @ side.transpose(0, 2, 1), 0) / np.float32(size)
+    own = image_kernel(inner, p) @ weight / image_kernel(_squared(flat, library), p).mean(axis=-1).reshape(n, s)
+    other = (image_kernel(_squared(others, flat), p).reshape(len(others), n, s) @ weight).T / generic_other
+    ratio = np.concatenate([own, other], axis=1)
+    return np.asarray(p.temper_image * np.log((1 - p.image_outlier) * ratio + p.image_outlier), dtype=np.float64)
+
+
+def _gains(there: Array, weight: Array, not_there: Array, share: float, entropy: float) -> Array:
+    """(n,) entropy before minus its mean after one observation that concerns one candidate's odds only."""
     if share <= 0 or share >= 1:
-        return 0.0
-    own = -(share * math.log(share) + (1 - share) * math.log(1 - share))
+        return np.zeros(len(there))
+    own = -(share * math.log(share) + (1 - share) * math.log1p(-share))
     among = (entropy - own) / (1 - share)  # entropy of the others, given that it is not this one
+    odds = math.log(share) - math.log1p(-share)
 
     def after(log_ratio: Array) -> Array:
-        x = np.clip(log_ratio + math.log(share / (1 - share)), -60, 60)
-        s = 1 / (1 + np.exp(-x))
+        s = 1 / (1 + np.exp(-np.clip(log_ratio + odds, -60, 60)))
         h = -(s * np.log(np.maximum(s, 1e-300)) + (1 - s) * np.log(np.maximum(1 - s, 1e-300)))
         return np.asarray(h + (1 - s) * among)
 
-    mean = share * float(weight @ after(there)) + (1 - share) * float(after(not_there).mean())
-    return max(0.0, entropy - mean)
+    mean = share * (after(there) @ weight) + (1 - share) * after(not_there).mean(axis=1)
+    return np.asarray(np.maximum(entropy - mean, 0.0))
 
 
-def _at(model: TargetModel, q: Prediction, c: Closure) -> tuple[Array, Array32, Array32, float]:
-    """Predicted widths (s,), left and right features (s, 35), and how new the closure is (0..1)."""
+def _at(model: TargetModel, q: Prediction, closures: Sequence[Closure]) -> tuple[Array, tuple[Array32, Array32], Array]:
+    """Predicted widths (n, s), (left, right) features (n, s, 35), and how new each closure is (n,), 0..1."""
     n = len(model.phi_rad)
-    turn = (c.yaw_K_rad - q.first_rad) / (2 * np.pi) * n
-    i = np.rint(q.yaw_index + turn).astype(np.int64) % n
+    yaw = np.array([c.yaw_K_rad for c in closures])
+    height = np.array([c.height_m for c in closures])
+    place = np.array([c.position_K_m for c in closures], dtype=np.float64).reshape(-1, 2)
+    turn = (yaw - q.first_rad) / (2 * np.pi) * n
+    i = np.rint(q.yaw_index[None, :] + turn[:, None]).astype(np.int64) % n
     x, _ = hand_axes(model.phi_rad[i])
     centre = model.outline.of(q.candidate.contour.kind).centre_m
-    x_K, _ = hand_axes(np.asarray(c.yaw_K_rad))
-    along = float(x_K @ (np.asarray(c.position_K_m) - q.candidate.contour.centre_K_m)) + x @ centre
+    x_K, _ = hand_axes(yaw)
+    along = ((place - q.candidate.contour.centre_K_m) * x_K).sum(axis=1)[:, None] + x @ centre
     j = _nearest(model.l_m, along)
-    k = _nearest(model.z_m, c.height_m + q.z0_m)
-    right = model.images[(i + n // 2) % n, _nearest(model.l_m, -along), k]
-    right = right.reshape(-1, 7, 5)[:, :, ::-1].reshape(len(i), -1)
-    novelty = 1.0
+    k = _nearest(model.z_m, height[:, None] + q.z0_m[None, :])
+    table = model.images_by_height
+    left = table[k, j, i]
+    right = table[k, _nearest(model.l_m, -along), (i + n // 2) % n]
+    right = np.ascontiguousarray(right.reshape(*i.shape, *POOLED)[..., ::-1]).reshape(left.shape)
+    novelty = np.ones(len(closures))
     if len(q.felt):
-        d2 = ((q.felt[:, :2] - c.position_K_m) ** 2).sum(axis=1) + (q.felt[:, 2] - c.height_m) ** 2
-        turned = (q.felt[:, 3] - c.yaw_K_rad + np.pi / 2) % np.pi - np.pi / 2
-        novelty = 1 - float(np.exp(-0.5 * d2 / NEAR_M**2 - 0.5 * (turned / NEAR_RAD) ** 2).max())
-    return model.width_m[i, j, k].astype(np.float64), model.images[i, j, k], right, novelty
+        d2 = ((q.felt[None, :, :2] - place[:, None]) ** 2).sum(axis=2) + (q.felt[None, :, 2] - height[:, None]) ** 2
+        turned = (q.felt[None, :, 3] - yaw[:, None] + np.pi / 2) % np.pi - np.pi / 2
+        novelty -= np.exp(-0.5 * d2 / NEAR_M**2 - 0.5 * (turned / NEAR_RAD) ** 2).max(axis=1)
+    return model.width_m[i, j, k].astype(np.float64), (left, right), novelty
 
 
 def _guess(q: Prediction, c: Closure) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +34,8 @@ from glotouch_bt.recognition.pads import Array32, PadSpec
 from glotouch_bt.recognition.placement import fitted_pose, unfelt_pose
 from glotouch_bt.robot import Array
 from glotouch_bt.touch.values import TouchSet
+
+_read: deque[tuple[TouchSet, PadSpec, LikelihoodParams, Reading]] = deque(maxlen=32)
 
 PARALLEL_RAD = math.radians(10.0)
 """Sequences whose hands differ by less (or by half a turn) are tracks along one axis."""
@@ -82,7 +85,16 @@ class Pair:
 
 
 def read_touchset(touchset: TouchSet, pad: PadSpec, p: LikelihoodParams) -> Reading:
-    """Reduce a TouchSet and weigh it under the background."""
+    """Reduce a TouchSet and weigh it under the background; the last ones read are remembered (by identity)."""
+    for known, spec, q, reading in _read:
+        if known is touchset and spec == pad and q == p:
+            return reading
+    reading = _read_touchset(touchset, pad, p)
+    _read.appendleft((touchset, pad, p, reading))
+    return reading
+
+
+def _read_touchset(touchset: TouchSet, pad: PadSpec, p: LikelihoodParams) -> Reading:
     e = read_evidence(touchset, pad)
     images = log_generic_images(e.layers, pad, p)
     widths = log_generic_widths(e.layers, touchset.candidate, p)
