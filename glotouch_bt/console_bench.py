@@ -218,11 +218,9 @@ def print_match(summary: dict[str, Any], folder: Path) -> None:
             ("order", "closures", "median", "share", "right %", "sure and wrong %"),
             counts,
         )
-    Console().print(
-        f"a new STL takes {value(timing.get('new_stl_s'), 2)} s ({value(timing.get('new_stl_cpu_s'), 2)} s of "
-        f"processor); {summary['touched']} of {summary['objects']} objects touched, {summary['nameless']} false "
-        f"candidates\n{folder / 'summary.json'}",
-        markup=False,
-        highlight=False,
-        soft_wrap=True,
+    cost_of_stl = (
+        f"a new STL takes {value(timing.get('new_stl_s'), 2)} s ({value(timing.get('new_stl_cpu_s'), 2)} s of processor), "
+        f"one kept on disk {value(timing.get('load_stl_ms'), 0)} ms"
     )
+    felt = f"{summary['touched']} of {summary['objects']} objects touched, {summary['nameless']} false candidates"
+    Console().print(f"{cost_of_stl}\n{felt}\n{folder / 'summary.json'}", markup=False, highlight=False, soft_wrap=True)

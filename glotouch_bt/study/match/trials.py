@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from glotouch_bt.model_cache import target_model
 from glotouch_bt.recognition import Match, PadSpec, Ranking, TargetModel
 from glotouch_bt.robot import Array, BadInput
 from glotouch_bt.robot.meshes import Mesh, load_folder
@@ -63,7 +64,7 @@ def models_of(layout: Layout, folder: Path, names: Sequence[str] = ()) -> dict[s
     missing = [n for n in names or layout.objects if n not in meshes]
     if missing:
         raise BadInput(f"{folder}: has no {', '.join(missing)} (it has {', '.join(meshes)})")
-    return {n: TargetModel.from_mesh(meshes[n], pad_of(layout)) for n in names or layout.objects}
+    return {n: target_model(meshes[n], pad_of(layout)) for n in names or layout.objects}
 
 
 def pad_of(layout: Layout) -> PadSpec:
