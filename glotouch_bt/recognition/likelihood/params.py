@@ -66,7 +66,7 @@ class LikelihoodParams:
     temper_width: float = 0.5
     temper_image: float = 0.5
     slope: float = 0.77
-    offset: float = -0.55
+    offset: float = -0.5
     prior_absent: float = 0.2
     accept: float = 0.9
     evidence: float = 2.5
