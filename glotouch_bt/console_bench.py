@@ -219,7 +219,7 @@ def print_match(summary: dict[str, Any], folder: Path) -> None:
             counts,
         )
     cost_of_stl = (
-        f"a new STL takes {value(timing.get('new_stl_s'), 2)} s ({value(timing.get('new_stl_cpu_s'), 2)} s of processor), "
+        f"a new STL takes {value(timing.get('new_stl_s'), 2)} s ({value(timing.get('new_stl_cpu_s'), 2)} s cpu), "
         f"one kept on disk {value(timing.get('load_stl_ms'), 0)} ms"
     )
     felt = f"{summary['touched']} of {summary['objects']} objects touched, {summary['nameless']} false candidates"
