@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from glotouch_bt.search import Move, Plan, SearchMap, admit, trace
+from glotouch_bt.search import Move, Plan, SearchMap, admit, part_of, trace
 from glotouch_bt.touch import Candidate, Contact
 from skills.base import In, Out, Skill, SkillFailed, SkillRun, param
 from skills.exploring import Explorer
@@ -25,7 +25,7 @@ class OrbitProbeParams(TracingParams):
     radial_sd_m: float = param(
         "... and the outline's, in every direction, below this", unit="m", default=0.02, gt=0.0, le=0.03
     )
-    least_contacts: int = param("Fewest contacts, whatever the covariance says", default=5, ge=3, le=60)
+    least_contacts: int = param("Fewest contacts, whatever the covariance says", default=4, ge=3, le=60)
     most_contacts: int = param("Most contacts", default=9, ge=3, le=60)
     exclusion_m: float = param("Margin round a traced object that the search keeps out of", unit="m", default=0.010,
                                ge=0.0, le=0.05)  # fmt: skip
@@ -67,6 +67,7 @@ class OrbitProbe(Skill):
         explorer = Explorer(self.context, self.tool, p.speeds(), self.event)
         if float(np.linalg.norm(explorer.tip_K_m - first.tip_K_m[:2])) > NEAR_M:
             yield from explorer.run(_back_to(first, p.clearance_m))
+        old = part_of(known, first, self.tool.tip_radius_m if self.tool.round else 0.0)
         plan = trace(
             first,
             explorer.tip_K_m,
@@ -74,9 +75,10 @@ class OrbitProbe(Skill):
             p.rule(),
             round_tip=self.tool.round,
             half_extent_m=belief.half_extent_m,
+            known=() if old is None else old.contacts,
         )
         traced = yield from explorer.run(plan)
-        admitted = admit(belief, known, first, traced, p.height_m, p.exclusion_m)
+        admitted = admit(belief, known, first, traced, p.height_m, p.exclusion_m, part_of=old)
         self.map = admitted.belief
         if admitted.index is None:
             raise SkillFailed(

@@ -7,14 +7,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from glotouch_bt.robot import Array
-from glotouch_bt.search.map import SearchMap
+from glotouch_bt.search.map import FACING, SearchMap
+from glotouch_bt.search.trace_params import TraceParams
 from glotouch_bt.search.trace_state import Trace
 from glotouch_bt.touch import Candidate, Contact, believe_outline, contour_quality, envelope, signed_distance
+from glotouch_bt.touch.belief import OutlineBelief
 
 LEAST_CONTACTS = 3
 """An outline fitted to fewer is a guess."""
 SAME_M = 0.010
 """Contacts this near to the room a known object takes are its own: objects stand farther apart."""
+PART_M = 0.030
+"""A contact farther than this from the room a candidate takes is not looked at as a part of it."""
 LARGEST_M = 0.125
 """Nothing that is looked for is longer; two things that touch are not made one beyond it."""
 
@@ -35,7 +39,14 @@ class Admitted:
 
 
 def admit(
-    belief: SearchMap, known: tuple[Candidate, ...], first: Contact, traced: Trace, height_m: float, exclusion_m: float
+    belief: SearchMap,
+    known: tuple[Candidate, ...],
+    first: Contact,
+    traced: Trace,
+    height_m: float,
+    exclusion_m: float,
+    *,
+    part_of: Candidate | None = None,
 ) -> Admitted:
     """Add a trace to the map and to the candidates.
 
@@ -49,11 +60,18 @@ def admit(
         traced: What it gave.
         height_m: Of the sensing plane: the object is at least so high.
         exclusion_m: Margin round it that the search keeps out of.
+        part_of: The candidate whose contacts the trace was begun with.
     """
     belief = belief.with_path(traced.path_K_m).with_hints((*belief.hints, *traced.strays))
     if traced.outline is None or len(traced.contacts) < LEAST_CONTACTS:
         return Admitted(belief.with_dropped(first.point_K_m), known, None)
     radius = traced.outline.touches.radius_m
+    if part_of is not None and traced.continued:
+        points = np.array([c.tip_K_m[:2] for c in traced.contacts])
+        quality = contour_quality(points, traced.outline.contour)
+        better = replace(part_of, contour=traced.outline.contour, contacts=traced.contacts, quality=quality)
+        belief = belief.with_exclusion(envelope(better), exclusion_m, new=False)
+        return Admitted(belief, tuple(better if c.index == better.index else c for c in known), better.index)
     for old in known:
         more = _merged(old, traced, radius, height_m)
         if more is not None:
@@ -65,6 +83,30 @@ def admit(
     return Admitted(belief.with_exclusion(envelope(candidate), exclusion_m), (*known, candidate), candidate.index)
 
 
+def part_of(known: tuple[Candidate, ...], first: Contact, radius_m: float) -> Candidate | None:
+    """The candidate near a new contact that together with it is better explained as one object than as two."""
+    for old in sorted(known, key=lambda c: float(signed_distance(envelope(c), first.point_K_m[None])[0])):
+        if float(signed_distance(envelope(old), first.point_K_m[None])[0]) > PART_M:
+            return None
+        off = first.tip_K_m[:2] - old.contour.centre_K_m
+        if float(first.reaction_K[:2] @ off) < FACING * float(np.hypot(off[0], off[1])):
+            continue
+        one = _outline((*old.contacts, first), radius_m)
+        two = _outline(old.contacts, radius_m).log_evidence + _outline((first,), radius_m).log_evidence
+        if one.log_evidence > two and max(one.contour.size_m) <= TraceParams().largest_m:
+            return old
+    return None
+
+
+def _outline(contacts: tuple[Contact, ...], radius_m: float) -> OutlineBelief:
+    return believe_outline(
+        _places(contacts, radius_m),
+        radius_m,
+        approach_K=np.array([c.approach_K[:2] for c in contacts]),
+        reaction_K=np.array([c.reaction_K[:2] for c in contacts]),
+    )
+
+
 def _merged(old: Candidate, traced: Trace, radius_m: float, height_m: float) -> Candidate | None:
     """The candidate that both are, or None if they are two."""
     points = np.array([c.point_K_m for c in traced.contacts])
@@ -73,12 +115,7 @@ def _merged(old: Candidate, traced: Trace, radius_m: float, height_m: float) -> 
     shift = np.array([*traced.displaced_K_m, 0.0])
     before = (replace(c, tip_K_m=c.tip_K_m + shift, point_K_m=c.point_K_m + shift[:2]) for c in old.contacts)
     contacts = (*before, *traced.contacts)
-    contour = believe_outline(
-        _places(contacts, radius_m),
-        radius_m,
-        approach_K=np.array([c.approach_K[:2] for c in contacts]),
-        reaction_K=np.array([c.reaction_K[:2] for c in contacts]),
-    ).contour
+    contour = _outline(contacts, radius_m).contour
     if max(contour.size_m) > LARGEST_M:
         return None
     quality = contour_quality(np.array([c.tip_K_m[:2] for c in contacts]), contour)

@@ -43,7 +43,7 @@ class TraceParams:
 
     clearance_m: float = 0.005
     margin_sds: float = 0.7
-    widest_margin_m: float = 0.010
+    widest_margin_m: float = 0.005
     centre_sd_m: float = 0.0010
     radial_sd_m: float = 0.0035
     least_contacts: int = 4
@@ -51,7 +51,7 @@ class TraceParams:
     unfelt_m: float = 0.004
     largest_m: float = 0.118
     step_m: float = 0.045
-    doubt_m: float = 0.008
+    doubt_m: float = 0.012
     along_m: float = 0.026
     along_reach_m: float = 0.014
     back: float = 0.4

@@ -61,6 +61,7 @@ class Trace:
         ended: Why no more probes were made.
         missing: It was not met where it had been traced.
         moves: So many times it moved without being felt to, and was traced anew.
+        continued: It is the object whose contacts were given at the beginning.
     """
 
     contacts: tuple[Contact, ...]
@@ -71,6 +72,7 @@ class Trace:
     ended: str = ""
     missing: bool = False
     moves: int = 0
+    continued: bool = False
 
     @property
     def contour(self) -> Contour | None:
@@ -97,6 +99,7 @@ class TraceState:
         fresh: Index of the first of `paths` since the last of them.
         odd: Index of the first contact that was odd; -1: none was.
         told: (2, 2) 1/m^2 what contacts made now say of such a move.
+        given: How many of `raw` were there at the beginning.
         known: How many of `raw` were made before, with who knows what in between.
     """
 
@@ -113,6 +116,7 @@ class TraceState:
     moved_K_m: Array = field(default_factory=lambda: np.zeros(2))
     fresh: int = 0
     odd: int = -1
+    given: int = 0
     known: int = 0
     told: Array = field(default_factory=lambda: np.zeros((2, 2)))
 
@@ -226,6 +230,7 @@ class TraceState:
         if not stray:
             return False
         del self.raw[: len(stray)]
+        self.given = max(self.given - len(stray), 0)
         self.odd, self.known = -1, 0
         self.blocked.clear()
         self.fresh = len(self.paths)
@@ -259,6 +264,7 @@ class TraceState:
         keep = {int(i) for i in kept}
         self.strays += [c for i, c in enumerate(now) if i not in keep]
         self.raw = [c for i, c in enumerate(self.raw) if i in keep]
+        self.given = sum(i < self.given for i in keep)
         self.odd, self.known = -1, 0
         self.blocked.clear()
         return True
@@ -283,6 +289,7 @@ class TraceState:
             tuple(self.strays),
             ended,
             moves=self.moves,
+            continued=self.given > 0 or self.moves > 0,
         )
 
     def felt(self, felt: Felt) -> None:

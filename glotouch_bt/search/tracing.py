@@ -14,6 +14,8 @@ from glotouch_bt.touch import Contact
 from glotouch_bt.touch.belief import OutlineBelief
 from glotouch_bt.touch.primitives import wrapped
 
+LEAST_MORE = 3
+"""Contacts made of an object that was thought to be known."""
 INSIDE_M = 0.004
 """A probe that came this near to the object's supposed middle has passed through: nothing is there."""
 
@@ -26,6 +28,7 @@ def trace(
     *,
     round_tip: bool = True,
     half_extent_m: Array | None = None,
+    known: tuple[Contact, ...] = (),
 ) -> Plan[Trace]:
     """Trace the outline of what was touched. The ball ends beside it, at sensing height.
 
@@ -36,9 +39,11 @@ def trace(
         params: See `TraceParams`.
         round_tip: The section is a disc: outlines are fitted to its centres. Else to the contacts' points.
         half_extent_m: (2,) the ball's centre keeps within |x|, |y| of it in K; None: no walls near.
+        known: Contacts with the same object made before, where it stands now.
     """
     p = params or TraceParams()
-    s = TraceState.begin([first], tip_K_m, tip_radius_m, round_tip, half_extent_m)
+    s = TraceState.begin([*_still(known), first], tip_K_m, tip_radius_m, round_tip, half_extent_m)
+    s.given = len(known)
     yield from _retreat(s, p)
     return (yield from _until_known(s, p))
 
@@ -59,9 +64,8 @@ def trace_more(
         tip_K_m, tip_radius_m, params, round_tip, half_extent_m: As for `trace`; the ball may be raised.
     """
     p = params or TraceParams()
-    still = [replace(c, pushed_K_m=np.zeros(2)) for c in known]  # they are where the object stands now
-    s = TraceState.begin(still, tip_K_m, tip_radius_m, round_tip, half_extent_m)
-    s.known = len(still)
+    s = TraceState.begin(_still(known), tip_K_m, tip_radius_m, round_tip, half_extent_m)
+    s.known = s.given = len(known)
     outline = s.outline()
     bearings = all_bearings()
     distance, sd = s.ring(outline, bearings, p)
@@ -80,6 +84,11 @@ def trace_more(
             yield from _retreat(s, p)
             return (yield from _until_known(s, p))
     return replace(s.trace(outline, "it was not met again"), missing=True)
+
+
+def _still(contacts: tuple[Contact, ...]) -> list[Contact]:
+    """They are where the object stands now: the pushes they made are in their places."""
+    return [replace(c, pushed_K_m=np.zeros(2)) for c in contacts]
 
 
 def _apart(worth: Array, n: int) -> list[int]:
@@ -148,7 +157,7 @@ def _retreat(s: TraceState, p: TraceParams) -> Plan[None]:
 
 def _enough(outline: OutlineBelief, s: TraceState, p: TraceParams) -> str:
     n = len(s.raw)
-    if n >= p.most_contacts:
+    if n >= p.most_contacts and (s.known or n >= s.given + LEAST_MORE):
         return f"{n} contacts"
     if n < p.least_contacts or (s.known and s.odd >= 0 and n < s.odd + p.settling):
         return ""

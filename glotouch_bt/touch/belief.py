@@ -6,6 +6,7 @@ Circle, rectangle (every distinct optimum), and either with smooth deviations (f
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -34,6 +35,10 @@ MODES, MODE_LOSS = 3, 12.0
 """So many optima of the rectangle are kept, if their loss is within so much of the best one's."""
 FREE_BINS = 18
 """Of free places, the nearest to the middle in each of so many sectors forbids the others too."""
+SIDE_COSINE = 0.7
+"""A side was touched if a contact's normal is so near to its own."""
+OPEN_M = 0.030
+"""A side that was not may stand farther out by up to this."""
 DULL_WEIGHT = 1e-3
 """Hypotheses of less weight are dropped."""
 LARGEST_FREE_M = 0.08
@@ -113,6 +118,7 @@ def _hypotheses(touches: Touches) -> tuple[tuple[Hypothesis, ...], Array]:
     plain, more = np.array(distinct[:1] * len(loose) + distinct[1:]), len(distinct) - 1
     found += explain(rounded, plain, [0.0] * len(plain), touches, loose + loose[:1] * more)
     found += explain(rounded, np.array(distinct[:1] * 2), AMPLITUDES[:2], touches)
+    found = [h if h.shape is circle else _open_sided(h, touches.rooted) for h in found]
     prior = [*loose_chances, *[WAVY_CHANCE] * len(AMPLITUDES), *loose_chances, *loose_chances[:1] * more]
     prior += [WAVY_CHANCE] * 2
     score = TEMPER * np.array([h.log_evidence for h in found]) + np.log(prior)
@@ -121,6 +127,32 @@ def _hypotheses(touches: Touches) -> tuple[tuple[Hypothesis, ...], Array]:
     order = [int(i) for i in np.argsort(-weights, kind="stable") if weights[i] > DULL_WEIGHT]
     kept = weights[order]
     return tuple(found[i] for i in order), kept / kept.sum()
+
+
+def _open_sided(h: Hypothesis, touches: Touches) -> Hypothesis:
+    """A rectangle whose untouched sides may stand farther out.
+
+    The fit puts such a side as far in as the contacts beside it permit: it is held from one side only, which no normal
+    distribution about the optimum says. The ball's way beyond it is a bound.
+    """
+    x, y, yaw, *half = h.corrected[:5]
+    covariance = h.covariance.copy()
+    known = np.isfinite(touches.normal_sd_rad)
+    outward = np.column_stack([np.cos(touches.normal_rad[known]), np.sin(touches.normal_rad[known])])
+    for side in range(4):
+        angle = yaw + 0.5 * math.pi * side
+        normal, along = np.array([math.cos(angle), math.sin(angle)]), np.array([-math.sin(angle), math.cos(angle)])
+        if np.any(outward @ normal > SIDE_COSINE):
+            continue
+        reach = half[side % 2]
+        off = touches.free_m - (x, y)
+        beside = np.abs(off @ along) < half[1 - side % 2] + touches.radius_m
+        beyond = off[beside] @ normal - reach - touches.radius_m
+        room = float(np.min(beyond[beyond > 0.0], initial=OPEN_M))
+        step = np.zeros(len(covariance))
+        step[:2], step[3 + side % 2] = 0.5 * normal, 0.5
+        covariance += (0.5 * room) ** 2 * np.outer(step, step)
+    return replace(h, covariance=covariance)
 
 
 def _distinct(boxes: Array) -> list[Array]:

@@ -40,7 +40,7 @@ def make(bench, things, tool):
 
 
 def test_the_outline_is_the_posts(make) -> None:
-    b, skill = make()
+    b, skill = make(centre_sd_m=0.001)
     b.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message
     (candidate,) = skill.candidates
@@ -56,6 +56,14 @@ def test_the_outline_is_the_posts(make) -> None:
     assert (candidate.index, skill.found, skill.complete) == (0, 1, True)
     assert skill.map.inside_exclusion(np.array([POST]))[0]
     assert b.robot.peak_force_N < 6.0
+
+
+def test_by_itself_it_is_as_coarse_as_it_is_said_to_be(make) -> None:
+    b, skill = make()
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    (candidate,) = skill.candidates
+    assert np.linalg.norm(candidate.contour.centre_K_m - POST) < 2 * OrbitProbe.Params().centre_sd_m
 
 
 def test_what_is_touched_by_the_way_becomes_a_hint(make, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,7 +123,7 @@ def test_an_impossible_way_round_is_a_failure_not_a_crash(make) -> None:
 
 def test_from_the_objects_other_side_the_ball_goes_back_over_it(make, tool) -> None:
     """As after a trace that was broken off: straight back would be through the object."""
-    b, skill = make()
+    b, skill = make(centre_sd_m=0.001)
     b.go(Prober(b.context, tool, GuardParams()).hop(np.array([POST[0], POST[1] - RADIUS - 0.02, 0.0]), 0.13, 0.1))
     b.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message

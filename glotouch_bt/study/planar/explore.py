@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from glotouch_bt.search import SearchMap, SearchPolicy, TraceParams, admit, seek, trace
+from glotouch_bt.search import SearchMap, SearchPolicy, TraceParams, admit, part_of, seek, trace
 from glotouch_bt.search.moves import Felt, Move
 from glotouch_bt.study.planar.drive import drive
 from glotouch_bt.study.planar.world import PlanarWorld
@@ -101,9 +101,12 @@ def explore(
             if sought.contact is None:
                 ended = "exhausted"
                 break
-            plan = trace(sought.contact, world.tip_K_m, world.tip_radius_m, tracing, half_extent_m=belief.half_extent_m)
-            traced = drive(plan, limited)
-            admitted = admit(belief, candidates, sought.contact, traced, orbit.height_m, orbit.exclusion_m)
+            first, radius = sought.contact, world.tip_radius_m
+            old = part_of(candidates, first, radius)
+            known = () if old is None else old.contacts
+            half = belief.half_extent_m
+            traced = drive(trace(first, world.tip_K_m, radius, tracing, half_extent_m=half, known=known), limited)
+            admitted = admit(belief, candidates, first, traced, orbit.height_m, orbit.exclusion_m, part_of=old)
             belief, candidates = admitted.belief, admitted.candidates
             if admitted.index is None:
                 untraced += 1
