@@ -209,3 +209,25 @@ def test_bad_contacts_are_refused(bad):
         believe_outline(bad, R)
     with pytest.raises(ParamError, match="approach_K"):
         believe_outline(np.zeros((2, 2)), R, approach_K=np.zeros((3, 2)))
+
+
+def test_a_side_that_nobody_touched_may_stand_farther_out():
+    """A 104 x 44 mm box touched on three sides at one end: its length, and its middle along it, are not known."""
+    tips = np.array([[-0.03, 0.028], [0.02, 0.028], [-0.058, 0.005], [-0.04, -0.028], [0.015, -0.028]])
+    out = np.array([[0.0, 1.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [0.0, -1.0]])
+    three = believe_outline(tips, 0.006, approach_K=-out, reaction_K=out)
+    assert three.centre_sd_m[0] > 0.005
+    assert three.centre_sd_m[1] < 0.002
+    assert three.predict(np.array([0.0]))[1][0] > 0.010
+    four = believe_outline(
+        np.vstack([tips, [0.058, 0.0]]),
+        0.006,
+        approach_K=np.vstack([-out, [-1.0, 0.0]]),
+        reaction_K=np.vstack([out, [1.0, 0.0]]),
+    )
+    assert four.centre_sd_m.max() < 0.002
+    # the ball passed close by the far end: it stands no farther out than that
+    near = believe_outline(
+        tips, 0.006, approach_K=-out, reaction_K=out, free_K_m=np.array([[0.040, 0.0], [0.04, 0.01]])
+    )
+    assert near.centre_sd_m[0] < three.centre_sd_m[0]

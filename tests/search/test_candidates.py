@@ -1,0 +1,50 @@
+import numpy as np
+import pytest
+
+from glotouch_bt.search import SearchMap, Trace, admit, part_of
+from glotouch_bt.search.candidates import _outline
+from glotouch_bt.touch import Candidate, Contact
+
+R = 0.006
+
+
+def contact(x, y, nx, ny):
+    """A ball's contact with a surface through (x, y) whose outward normal is (nx, ny)."""
+    out = np.array([nx, ny, 0.0])
+    tip = np.array([x, y, 0.018]) + R * out
+    return Contact(0.0, tip, -out, out, tip[:2] - R * out[:2], 1.0)
+
+
+def half_a_box():
+    """One end of a box of 90 mm x 44 mm from x = -50 mm to 40 mm."""
+    return (
+        contact(-0.03, 0.022, 0, 1), contact(0.01, 0.022, 0, 1), contact(-0.05, 0.0, -1, 0), contact(-0.03, -0.022, 0, -1),
+        contact(0.01, -0.022, 0, -1),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def candidate():
+    contacts = half_a_box()
+    return Candidate(0, _outline(contacts, R).contour, 0.018, 0.5, contacts)
+
+
+def test_the_far_end_of_a_box_is_a_part_of_it(candidate):
+    assert part_of((candidate,), contact(0.04, 0.0, 1, 0), R) is candidate
+
+
+def test_what_stands_beside_it_is_not(candidate):
+    assert part_of((candidate,), contact(0.0, 0.060, 0, -1), R) is None  # it faces the box
+    assert part_of((candidate,), contact(0.15, 0.0, 1, 0), R) is None  # too far
+    assert part_of((), contact(0.04, 0.0, 1, 0), R) is None
+
+
+def test_more_of_a_candidate_replaces_it_and_counts_nothing(candidate):
+    belief = SearchMap.blank((0.2, 0.15), expected=2).with_exclusion(candidate.contour, 0.01)
+    last = contact(0.04, 0.0, 1, 0)
+    contacts = (*candidate.contacts, last)
+    traced = Trace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)), continued=True)
+    admitted = admit(belief, (candidate,), last, traced, 0.018, 0.01, part_of=candidate)
+    assert (admitted.index, len(admitted.candidates), admitted.belief.found) == (0, 1, 1)
+    np.testing.assert_allclose(admitted.candidates[0].contour.centre_K_m, [-0.005, 0.0], atol=1e-3)
+    np.testing.assert_allclose(sorted(admitted.candidates[0].contour.size_m), [0.044, 0.090], atol=2e-3)
