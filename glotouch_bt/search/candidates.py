@@ -19,6 +19,9 @@ SAME_M = 0.010
 """Contacts this near to the room a known object takes are its own: objects stand farther apart."""
 PART_M = 0.030
 """A contact farther than this from the room a candidate takes is not looked at as a part of it."""
+OTHER = 0.02
+"""Odds, before it is looked at, that a contact so near to a candidate is with something else; where that stands is not
+in its evidence."""
 LARGEST_M = 0.125
 """Nothing that is looked for is longer; two things that touch are not made one beyond it."""
 
@@ -93,7 +96,7 @@ def part_of(known: tuple[Candidate, ...], first: Contact, radius_m: float) -> Ca
             continue
         one = _outline((*old.contacts, first), radius_m)
         two = _outline(old.contacts, radius_m).log_evidence + _outline((first,), radius_m).log_evidence
-        if one.log_evidence > two and max(one.contour.size_m) <= TraceParams().largest_m:
+        if one.log_evidence > two + np.log(OTHER) and max(one.contour.size_m) <= TraceParams().largest_m:
             return old
     return None
 

@@ -18,9 +18,12 @@ def contact(x, y, nx, ny):
 def half_a_box():
     """One end of a box of 90 mm x 44 mm from x = -50 mm to 40 mm."""
     return (
-        contact(-0.03, 0.022, 0, 1), contact(0.01, 0.022, 0, 1), contact(-0.05, 0.0, -1, 0), contact(-0.03, -0.022, 0, -1),
+        contact(-0.03, 0.022, 0, 1),
+        contact(0.01, 0.022, 0, 1),
+        contact(-0.05, 0.0, -1, 0),
+        contact(-0.03, -0.022, 0, -1),
         contact(0.01, -0.022, 0, -1),
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture
