@@ -212,7 +212,6 @@ def match(
     backend: Annotated[str, typer.Option(help="a registered simulation backend")] = "mujoco",
     workers: Workers = 2,
     out: Out = None,
-    resume: Annotated[bool, typer.Option("--resume", help="keep the missions that are in --out already")] = False,
     json_: Json = False,
 ) -> None:
     """Which touched object is the target: the matchers and the paper's ablation on TouchSets of the real skills."""
