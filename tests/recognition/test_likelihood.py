@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
 
 from glotouch_bt.recognition import MATCHERS, TargetModel
 from glotouch_bt.recognition.evidence import read_evidence
@@ -234,9 +236,41 @@ def test_bad_input_is_refused(meshes) -> None:
 
 
 def test_probabilities_against_bayes() -> None:
-    """Two candidates with ratios 8 and 2, none with prior 0.2: 0.4 x 8, 0.4 x 2 and 0.2, over their sum."""
-    shares, absent = probabilities([np.log(8), np.log(2)], 0.2)
-    np.testing.assert_allclose([*shares, absent], np.array([3.2, 0.8, 0.2]) / 4.2)
+    """Ratios 8 and 2 after 4 and 0 layers, prior 0.2 of none, of which half has a look-alike missed by exp(-n / 2).
+
+    Target: 0.4 x 8, 0.4 x 2. None: 0.2 (0.5 + 0.5 / 2 (8 exp(-2) + 2)).
+    """
+    p = LikelihoodParams(prior_absent=0.2, look_alike=0.5, look_alike_rate=0.5)
+    shares, absent = probabilities([np.log(8), np.log(2)], [4.0, 0.0], p)
+    expected = np.array([3.2, 0.8, 0.2 * (0.5 + 0.25 * (8 * np.exp(-2) + 2))])
+    np.testing.assert_allclose([*shares, absent], expected / expected.sum())
+
+
+@given(
+    st.lists(st.tuples(st.floats(-60, 60), st.floats(0, 20)), min_size=1, max_size=6),
+    st.floats(0.05, 0.95),
+    st.floats(0, 1),
+)
+def test_few_layers_never_prove_much(candidates, share: float, rate: float) -> None:
+    """However well they fit: the odds of one candidate against none are at most those against its look-alike."""
+    p = LikelihoodParams(look_alike=share, look_alike_rate=rate)
+    ratios, layers = zip(*candidates, strict=True)
+    shares, absent = probabilities(ratios, layers, p)
+    assert shares.sum() + absent == pytest.approx(1.0)
+    bound = (1 - p.prior_absent) / (p.prior_absent * share) * np.exp(rate * np.array(layers))
+    assert (shares <= absent * bound * (1 + 1e-9)).all()
+
+
+def test_a_candidate_nobody_felt_keeps_the_weight_of_its_outline(meshes) -> None:
+    """Two look-alikes, one felt a little and fitting worse by its touch: the other is not yet ruled out."""
+    felt, _ = touched(meshes[0], NOMINAL, 41, 0)
+    twin = replace(felt, candidate=replace(felt.candidate, index=1), sequences=())
+    one = replace(felt, sequences=(replace(felt.sequences[0], layers=felt.sequences[0].layers[:1]),))
+    ranking = believe(TargetModel.from_mesh(meshes[0]), [one, twin]).ranking
+    shares = {m.index: m.probability for m in ranking.matches}
+    assert shares[1] > 0.1
+    nothing = believe(TargetModel.from_mesh(meshes[0]), [replace(one, sequences=()), twin]).ranking
+    assert nothing.matches[0].probability == pytest.approx(nothing.matches[1].probability)
 
 
 def test_belief_before_any_touch_is_not_sure(meshes) -> None:

@@ -112,7 +112,8 @@ def identify(
     if any(m.pad != models[0].pad for m in models):
         raise ParamError("models", "of several pads", "of one pad")
     reading = read_touchset(touchset, models[0].pad, p)
-    return probabilities([compare(m, reading, p).log_ratio for m in models], p.prior_absent)
+    ratios = [compare(m, reading, p).log_ratio for m in models]
+    return probabilities(ratios, [reading.evidence.weight] * len(models), p)
 
 
 def ranked(belief: Belief) -> Ranking:

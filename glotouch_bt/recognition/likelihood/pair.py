@@ -39,8 +39,6 @@ _read: deque[tuple[TouchSet, PadSpec, LikelihoodParams, Reading]] = deque(maxlen
 
 PARALLEL_RAD = math.radians(10.0)
 """Sequences whose hands differ by less (or by half a turn) are tracks along one axis."""
-UNFELT_LIMIT = 1.0
-"""Largest log ratio in favour of a candidate that no pad felt: its outline alone must not decide."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +112,7 @@ def compare(model: TargetModel, reading: Reading, p: LikelihoodParams) -> Pair:
         "contour": contour_ratio(model, candidate, p),
     }
     if not reading.sequences:
-        ratio = p.offset + p.slope * min(sum(terms.values()), UNFELT_LIMIT)
+        ratio = p.offset + p.slope * sum(terms.values())
         return Pair(candidate.index, ratio, terms, None, 0.0, 0.0, None, unfelt_pose(touchset), 0.0)
     grid = Grid.of(p)
     first = reading.sequences[0][0].layer.yaw_rad

@@ -35,6 +35,8 @@ class LikelihoodParams:
         temper_width, temper_image: Powers that make correlated observations count as fewer.
         slope, offset: Calibration: log odds against the background = offset + slope * summed log ratios.
         prior_absent: Probability, before touching, that the target is none of the candidates.
+        look_alike: Probability, if it is none of them, that one of them is made much like it.
+        look_alike_rate: Rate, a two-sided layer, at which a closure meets what such a one differs in.
         accept: Least probability of the best to act on.
         evidence: Least number of layers both pads felt on the best.
     """
@@ -65,9 +67,11 @@ class LikelihoodParams:
     yaw_sd_rad: float = math.radians(6.0)
     temper_width: float = 0.5
     temper_image: float = 0.5
-    slope: float = 0.77
-    offset: float = -0.5
+    slope: float = 0.95
+    offset: float = -3.4
     prior_absent: float = 0.2
+    look_alike: float = 0.5
+    look_alike_rate: float = 0.25
     accept: float = 0.9
     evidence: float = 2.5
 
@@ -88,6 +92,7 @@ class LikelihoodParams:
             "height_lower",
             "contour_outlier",
             "prior_absent",
+            "look_alike",
         ):
             if not 0 < getattr(self, name) < 1:
                 raise ParamError(f"likelihood.{name}", getattr(self, name), "between 0 and 1")
