@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from glotouch_bt.model_cache import target_model
 from glotouch_bt.motion import Motion
 from glotouch_bt.recognition import Gates, PadSpec, TargetModel
 from glotouch_bt.recognition.gain import Belief, believe, expected_gain
@@ -95,7 +96,7 @@ class TouchNext(Skill):
         )
 
     def _target_model(self) -> TargetModel:
-        """Built once.
+        """Kept on disk and in memory.
 
         Raises:
             SkillFailed: `too_low`.
@@ -105,7 +106,7 @@ class TouchNext(Skill):
             mesh = load_target(self.params.target, self.context.world.objects.folder)
             pads = PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
             try:
-                self._model = TargetModel.from_mesh(mesh, pads)
+                self._model = target_model(mesh, pads)
             except ParamError as e:
                 raise SkillFailed("too_low", f"{mesh.name} cannot be felt: {e}", advice="sweep lower") from e
         return self._model

@@ -1,4 +1,4 @@
-"""The decision: every candidate's loss against the target, what it is made of, and the gates."""
+"""The decision: every candidate's loss or probability, what it is made of, and the gates or reasons."""
 
 from __future__ import annotations
 
@@ -20,17 +20,65 @@ def ranking_section(record: RunRecord) -> str:
     data = events[-1].data
     ranking = data["ranking"] if isinstance(data.get("ranking"), dict) else data
     matches = [m for m in ranking.get("matches") or [] if isinstance(m, dict)]
-    matches.sort(key=lambda m: (_loss(m), str(m.get("index"))))
+    names = sorted({n for m in matches for n in (m.get("terms") or {})})
+    accepted = bool(ranking.get("accepted"))
     target = data.get("target") or record.result.get("target") or "the target"
+    if not (data.get("gates") or ranking.get("gates")) and matches and all(_share(m) is not None for m in matches):
+        return _by_probability(ranking, matches, names, esc(target))
+    matches.sort(key=lambda m: (_loss(m), str(m.get("index"))))
     lead = (
         f"How badly each candidate fits {esc(target)}: the loss, least first. The best is taken only if it leads "
         "clearly (margin), fits well (loss) and was felt enough (evidence)."
     )
-    names = sorted({n for m in matches for n in (m.get("terms") or {})})
-    body = (
-        _gates(ranking, data, matches) + _bars(matches, names) + _table(matches, names, bool(ranking.get("accepted")))
-    )
+    body = _gates(ranking, data, matches) + _bars(matches, names) + _table(matches, names, accepted)
     return section("Recognition", lead, body)
+
+
+def _by_probability(ranking: dict[str, Any], matches: list[dict[str, Any]], names: list[str], target: str) -> str:
+    """Of a matcher that decides on probability: shares of the candidates and of none, as they are in the record."""
+    accepted = bool(ranking.get("accepted"))
+    matches = sorted(matches, key=lambda m: -(_share(m) or 0.0))
+    lead = (
+        f"How probable it is that each candidate, or none of them, is {target}, after all that was felt. The best is "
+        "taken only if it is probable enough and was felt enough. The terms say what speaks for it (positive) or for "
+        "some other object, in nats."
+    )
+    shares = [(f"candidate {esc(m.get('index', '?'))}", _share(m) or 0.0) for m in matches]
+    absent = ranking.get("p_absent")
+    if isinstance(absent, int | float):
+        shares.append(("none of them", float(absent)))
+    body = _verdict(ranking) + _share_bars(shares) + _table(matches, names, accepted, "probability", "Evidence")
+    return section("Recognition", lead, body)
+
+
+def _share(match: dict[str, Any]) -> float | None:
+    value = match.get("probability")
+    return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
+
+
+def _share_bars(shares: list[tuple[str, float]]) -> str:
+    """One bar a hypothesis, from 0 to 1."""
+    width, left, right, row, top = 1060.0, 110.0, 980.0, 30.0, 14.0
+    bottom = top + row * len(shares)
+    x = Scale(0.0, 1.0, left, right)
+    out = [x_axis(x, top - 6, bottom, "probability", about=8)]
+    for i, (name, share) in enumerate(shares):
+        y = top + row * i
+        out.append(label(left - 12, y + 16, name, "ink e" + (" b" if i == 0 else "")))
+        out.append(
+            f'<rect x="{left:.1f}" y="{y + 3:.1f}" width="{x.at(share) - left:.1f}" height="18" fill="var(--t0)" '
+            f'stroke="var(--card)"><title>{name}: {share:.4f}</title></rect>'
+        )
+        out.append(label(x.at(share) + 8, y + 16, number(share, 3), "ink b"))
+    return f'<div style="margin-top:18px">{picture(width, bottom + 38, "".join(out), "probabilities")}</div>'
+
+
+def _verdict(ranking: dict[str, Any]) -> str:
+    """Accepted or not, and why not."""
+    accepted = bool(ranking.get("accepted"))
+    chip = '<span class="chip good">accepted</span>' if accepted else '<span class="chip bad">not accepted</span>'
+    reasons = "".join(f"<li>{esc(r)}</li>" for r in ranking.get("reasons") or [])
+    return f"<p>{chip}</p>" + (f"<ul>{reasons}</ul>" if reasons else "")
 
 
 def _loss(match: dict[str, Any]) -> float:
@@ -102,7 +150,13 @@ def _adds_up(match: dict[str, Any]) -> bool:
     return bool(terms) and min(terms) >= 0 and abs(sum(terms) - _loss(match)) <= 0.01 * max(_loss(match), 1e-9)
 
 
-def _table(matches: list[dict[str, Any]], names: list[str], accepted: bool) -> str:
+def _table(
+    matches: list[dict[str, Any]],
+    names: list[str],
+    accepted: bool,
+    score: str = "loss",
+    title: str = "Losses and their terms",
+) -> str:
     rows = []
     for i, m in enumerate(matches):
         pose = m.get("pose_K_O")
@@ -117,12 +171,10 @@ def _table(matches: list[dict[str, Any]], names: list[str], accepted: bool) -> s
         rows.append(
             [
                 index,
-                number(m.get("loss"), 3),
+                number(m.get(score), 3),
                 *(number(terms.get(n), 3) for n in names),
                 number(m.get("evidence"), 2),
                 placed,
             ]
         )
-    return "<h3>Losses and their terms</h3>" + table(
-        ["candidate", "loss", *map(esc, names), "evidence", "pose x, y, yaw"], rows
-    )
+    return f"<h3>{title}</h3>" + table(["candidate", score, *map(esc, names), "evidence", "pose x, y, yaw"], rows)

@@ -102,6 +102,23 @@ def test_a_cut_record_without_a_result_still_gives_a_report(whole: SimpleNamespa
     assert "the record was cut short" in text
 
 
+def test_a_matcher_of_probabilities_is_drawn_with_them(tmp_path: Path) -> None:
+    """Without gates and with probabilities: candidates by probability, and none of them beside; no bar of losses."""
+    matches = [
+        {"index": i, "loss": 0.001, "probability": p, "terms": {"width": 1.5, "image": -0.5}, "evidence": 4.0,
+         "pose_K_O": [0.0, 0.0, 0.0]}
+        for i, p in ((0, 0.125), (3, 0.625))
+    ]  # fmt: skip
+    ranking = {"matches": matches, "margin": 0.1, "accepted": False, "reasons": ["too few <touches>"], "p_absent": 0.25}
+    with Recorder(tmp_path / "run.mcap", {"container": {"interior_m": [0.4, 0.3, 0.1]}, "pose_B_K": 4}) as record:
+        record.event("ranking", 1.0, {"target": "a & b", "ranking": ranking, "gates": None, "matcher": "likelihood"})
+    text = " ".join(parsed(write_report(tmp_path).read_text()).text)
+    places = [text.index(w) for w in ("candidate 3", "candidate 0", "none of them")]
+    assert all(words in text for words in ("a & b", "too few <touches>", "0.625", "0.125", "0.25"))
+    assert places[0] < places[1]
+    assert "margin to the second" not in text
+
+
 def test_events_of_odd_shapes_are_no_error(tmp_path: Path) -> None:
     odd: list[object] = [
         None,

@@ -133,7 +133,8 @@ def _patch(depth_m: Array, pad: PadSpec) -> Patch:
 
 
 def _readable(layer: Layer) -> bool:
-    return layer.stable and math.isfinite(layer.aperture_m) and layer.aperture_m > 0 and math.isfinite(layer.height_m)
+    numbers = (layer.aperture_m, layer.height_m, layer.yaw_rad)
+    return layer.stable and all(map(math.isfinite, numbers)) and layer.aperture_m > 0
 
 
 def _read_sequence(
