@@ -163,6 +163,10 @@ def search(
     workers: Workers = 2,
     out: Out = None,
     resume: Annotated[bool, typer.Option("--resume", help="keep the missions that are in --out already")] = False,
+    recorded: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="DIR", help="score the runs recorded below, too; they are not run again"),
+    ] = None,
     json_: Json = False,
 ) -> None:
     """How soon every object is found, by policy: the mission, and its planar stand-in on the same and more layouts."""
@@ -179,6 +183,7 @@ def search(
         backend=backend,
         out=_folder(out, "search"),
         resume=resume,
+        recorded=tuple(recorded or ()),
     )
 
     def show(row: Mapping[str, Any], done: int, total: int) -> None:

@@ -18,7 +18,14 @@ from glotouch_bt.study.planar.explore import BUDGET_M
 from glotouch_bt.study.search_plots import plot_discovered, plot_layout
 from glotouch_bt.study.search_scoring import discovered_at
 from glotouch_bt.study.search_summary import COMPLETE_AT_M, MEAN_AT_M, summarise
-from glotouch_bt.study.search_trial import mission_trial, planar_trials, scene, sections_of
+from glotouch_bt.study.search_trial import (
+    mission_trial,
+    planar_trials,
+    recorded_folders,
+    recorded_trial,
+    scene,
+    sections_of,
+)
 
 CHUNK = 25
 """Planar layouts a task."""
@@ -48,6 +55,7 @@ class Campaign:
         out: Folder of the campaign; each mission's run folder goes below it.
         mission: Path or shipped name; it must take a parameter `policy`.
         resume: Missions whose folders are complete are scored as they are instead of being run again.
+        recorded: Folders below which recorded runs are scored beside those that are run now.
         planar_budget_m: Planar explorations are broken off here; the mission goes on until it is done.
     """
 
@@ -61,13 +69,14 @@ class Campaign:
     mission: str = "survey"
     planar_budget_m: float = BUDGET_M
     resume: bool = False
+    recorded: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
         unknown = [p for p in self.policies if p not in POLICIES]
         if unknown or not self.policies:
             raise BadInput(f"--policies {','.join(unknown)}: must be among {', '.join(POLICIES)}")
-        if not self.seeds and not self.planar_seeds:
-            raise BadInput("nothing to try: give --trials or --planar")
+        if not self.seeds and not self.planar_seeds and not self.recorded:
+            raise BadInput("nothing to try: give --trials, --planar or --recorded")
 
     def folder(self, policy: str, seed: int) -> Path:
         """The run folder of a trial."""
@@ -105,13 +114,13 @@ def run_campaign(campaign: Campaign, executor: Executor, on_row: OnRow | None = 
     objects = campaign.object_count
     campaign.out.mkdir(parents=True, exist_ok=True)
     rows = _run(campaign, executor, on_row)
-    order = {p: i for i, p in enumerate(campaign.policies)}
-    rows.sort(key=lambda r: (r["simulator"], order[r["policy"]], r["seed"]))
+    order = {p: i for i, p in enumerate((*campaign.policies, *sorted(POLICIES)))}
+    rows.sort(key=lambda r: (r["simulator"], order.get(r["policy"], len(order)), r["seed"]))
     _write_csv(campaign, rows, objects)
     figures: dict[str, Any] = _finite(summarise(rows, campaign.policies, objects))
     summary = figures | {
         "conditions": campaign.conditions,
-        "seeds": list(campaign.seeds),
+        "seeds": sorted({r["seed"] for r in rows if r["simulator"] != "planar"}),
         "planar_seeds": _span(campaign.planar_seeds),
         "objects": objects,
         "mission": campaign.mission,
@@ -128,6 +137,7 @@ def run_campaign(campaign: Campaign, executor: Executor, on_row: OnRow | None = 
 
 def _run(campaign: Campaign, executor: Executor, on_row: OnRow | None) -> list[dict[str, Any]]:
     """Missions first, seeds outermost, so that a broken-off campaign has all policies on the same layouts."""
+    runs = [f for top in campaign.recorded for f in recorded_folders(top, Path(campaign.conditions).stem)]
     plane = tuple(dict.fromkeys(campaign.seeds + campaign.planar_seeds))
     budget = campaign.planar_budget_m
     futures: list[Future[Any]] = [
@@ -136,11 +146,15 @@ def _run(campaign: Campaign, executor: Executor, on_row: OnRow | None) -> list[d
         for policy in campaign.policies
     ]
     futures += [
+        executor.submit(recorded_trial, folder, campaign.mission, campaign.objects, campaign.policies[0])
+        for folder in runs
+    ]
+    futures += [
         executor.submit(planar_trials, campaign.mission, campaign.objects, policy, plane[k : k + CHUNK], budget)
         for k in range(0, len(plane), CHUNK)
         for policy in campaign.policies
     ]
-    total = len(campaign.policies) * (len(campaign.seeds) + len(plane))
+    total = len(campaign.policies) * (len(campaign.seeds) + len(plane)) + len(runs)
     rows: list[dict[str, Any]] = []
     try:
         for future in as_completed(futures):
@@ -175,7 +189,9 @@ def _write_csv(campaign: Campaign, rows: Sequence[Mapping[str, Any]], objects: i
             line: dict[str, Any] = {f"discovered_{d:g}_m": discovered_at(r, d) for d in MEAN_AT_M}
             line |= {f"complete_{d:g}_m": int(discovered_at(r, d) >= objects) for d in COMPLETE_AT_M}
             line["discovered_at_m"] = " ".join(f"{t:.4f}" for t in r["discovered_m"])
-            line["folder"] = "" if r["simulator"] == "planar" else campaign.folder(r["policy"], r["seed"]).name
+            line["folder"] = (
+                "" if r["simulator"] == "planar" else r.get("folder") or campaign.folder(r["policy"], r["seed"]).name
+            )
             table.writerow(dict(r) | line)
     with (campaign.out / "candidates.csv").open("w", newline="") as f:
         table = csv.DictWriter(f, CANDIDATE_COLUMNS, extrasaction="ignore")

@@ -61,6 +61,41 @@ def mission_trial(request: RunRequest, policy: str, resume: bool = False) -> dic
         return row | {"ended": f"traceback {type(e).__name__}: {e}"}
 
 
+def recorded_folders(top: Path, conditions: str) -> list[Path]:
+    """Folders of ended, simulated runs below `top` under these conditions, by name; what is no such run is passed over.
+
+    Raises:
+        BadInput: There is none.
+    """
+    out = []
+    for file in sorted(top.rglob("result.json")):
+        try:
+            result = json.loads(file.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue
+        whole = all((file.parent / name).is_file() for name in ("run.mcap", "truth.json"))
+        if whole and isinstance(result, dict) and result.get("conditions") == conditions:
+            out.append(file.parent)
+    if not out:
+        raise BadInput(f"{top}: no recorded run under {conditions!r} conditions with its truth is below this folder")
+    return out
+
+
+def recorded_trial(folder: Path, mission: str, objects: Path | None, policy: str) -> dict[str, Any]:
+    """The row of a run that was recorded before, by any mission that explores.
+
+    Args:
+        folder: Of the run.
+        mission, objects: Whose meshes the sections are cut from.
+        policy: If the run does not say its own.
+    """
+    record = read_run(folder)
+    policy = str((record.run.get("parameters") or {}).get("policy", policy))
+    row = EMPTY_ROW | {"simulator": record.run["backend"], "policy": policy, "seed": int(record.run["seed"])}
+    row["folder"] = str(folder)
+    return row | {"ended": _ended(record.result)} | score_run(record, sections_of(mission, objects))
+
+
 def _result_of(request: RunRequest) -> Mapping[str, Any] | None:
     """The result of a run of this request that ended, or None."""
     try:

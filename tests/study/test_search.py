@@ -13,10 +13,11 @@ import pytest
 
 from glotouch_bt.report.run_record import Event, RunRecord, Tick
 from glotouch_bt.robot import BadInput
+from glotouch_bt.study.launch import RunRequest
 from glotouch_bt.study.search import Campaign, run_campaign
 from glotouch_bt.study.search_scoring import Found, TrueLayout, discovered_at, score
 from glotouch_bt.study.search_summary import correlation, quantiles, summarise
-from glotouch_bt.study.search_trial import Way
+from glotouch_bt.study.search_trial import Way, _result_of, recorded_folders
 
 
 def thing(name="thing", size=(0.08, 0.04), centre=(0.01, 0.0), yaw=0.0, top=0.07):
@@ -164,3 +165,32 @@ def test_a_campaign_in_the_plane_writes_all_there_is(tmp_path):
     assert len(candidates) == sum(len(t["discovered_at_m"].split()) for t in trials)
     assert discovered_at({"discovered_m": travels}, 3.0) == int(trials[0]["discovered_3_m"])
     assert (campaign.out / "discovered.png").stat().st_size > 10_000
+
+
+def test_recorded_runs_are_those_that_ended_under_the_conditions_with_their_truth(tmp_path):
+    def run(name, result, *files):
+        (tmp_path / name).mkdir(parents=True)
+        (tmp_path / name / "result.json").write_text(result)
+        for f in files:
+            (tmp_path / name / f).touch()
+
+    run("runs/a", '{"conditions": "nominal"}', "run.mcap", "truth.json")
+    run("b", '{"conditions": "nominal"}', "run.mcap", "truth.json")
+    run("c", '{"conditions": "harsh"}', "run.mcap", "truth.json")
+    run("no_truth", '{"conditions": "nominal"}', "run.mcap")
+    run("broken", "{", "run.mcap", "truth.json")
+    assert recorded_folders(tmp_path, "nominal") == [tmp_path / "b", tmp_path / "runs/a"]
+    assert recorded_folders(tmp_path, "harsh") == [tmp_path / "c"]
+    with pytest.raises(BadInput, match="no recorded run"):
+        recorded_folders(tmp_path, "ideal")
+
+
+def test_a_run_is_resumed_only_if_it_is_the_one_that_was_asked_for(tmp_path):
+    asked = RunRequest(mission="survey", backend="mujoco", seed=3, conditions="nominal", out=tmp_path)
+    assert _result_of(asked) is None
+    result = {"mission": "survey", "backend": "mujoco", "seed": 3, "conditions": "nominal", "status": "success"}
+    (tmp_path / "result.json").write_text(json.dumps(result))
+    assert _result_of(asked) == result
+    for key, other in (("mission", "retrieve"), ("seed", 4), ("conditions", "harsh")):
+        (tmp_path / "result.json").write_text(json.dumps(result | {key: other}))
+        assert _result_of(asked) is None
