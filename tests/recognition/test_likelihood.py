@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from glotouch_bt.recognition import MATCHERS, TargetModel
 from glotouch_bt.recognition.evidence import read_evidence
 from glotouch_bt.recognition.gain import believe
-from glotouch_bt.recognition.likelihood.pair import compare, read_touchset
+from glotouch_bt.recognition.likelihood.pair import compare, read_touchset, watched_turns
 from glotouch_bt.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.recognition.likelihood.posterior import probabilities
 from glotouch_bt.recognition.synthetic import HARSH, IDEAL, NOMINAL, acquire
@@ -233,6 +233,20 @@ def test_bad_input_is_refused(meshes) -> None:
         LikelihoodParams(bias_steps=4)
     with pytest.raises(ParamError):
         LikelihoodParams(width_sd_m=0.0)
+
+
+def test_an_object_seen_to_turn_may_lie_at_another_yaw(meshes) -> None:
+    """Sequences after a turn of 25 deg that was seen speak less against the target than if nobody had seen it."""
+    touchset, _ = touched(meshes[2], NOMINAL, 43)
+    turn = np.deg2rad(25.0)
+    first, *later = touchset.sequences
+    # The object turned by -25 deg between the first sequence and the next: the hand as good as by +25.
+    later = [replace(s, layers=tuple(replace(l, yaw_rad=l.yaw_rad - turn) for l in s.layers)) for s in later]
+    unseen = replace(touchset, sequences=(first, *later))
+    one, *rest = later[0].layers
+    seen = replace(later[0], layers=(replace(one, turn_rad=-turn), *rest))
+    assert ratio(meshes[2], replace(unseen, sequences=(first, seen, *later[1:]))) > ratio(meshes[2], unseen) + 0.5
+    assert watched_turns(replace(unseen, sequences=(first, seen, *later[1:]))) == pytest.approx([0, turn, turn])
 
 
 def test_probabilities_against_bayes() -> None:

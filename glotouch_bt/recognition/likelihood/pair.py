@@ -123,18 +123,20 @@ def compare(model: TargetModel, reading: Reading, p: LikelihoodParams) -> Pair:
     if parallel:  # tracks share one shift along x_P, but for what each slides
         joint = joint + shift_prior(model, candidate, 0.0, grid.shift_m, p)[None, :, :, None].astype(np.float32)
     slide = slide_matrix(grid, p)
+    moved = watched_turns(touchset)
     parts = []
     for seen, turn in zip(reading.sequences, turns, strict=True):
         flip = bool(np.cos(turn) < 0)
+        sd = math.hypot(p.turn_sd_rad, moved[seen[0].layer.sequence])
         widths = np.float32(p.temper_width) * width_ratios(model, seen, turn, grid, p)
         images = np.float32(p.temper_image) * image_ratios(model, seen, turn, grid, p)
         volume = widths + images[None]
         if parallel:
             volume = volume[:, :, ::-1] if flip else volume
-            joint = joint + turned(slid(volume, slide), p)
+            joint = joint + turned(slid(volume, slide), p, sd)
         else:
             volume = volume + shift_prior(model, candidate, turn, grid.shift_m, p)[None, :, :, None].astype(np.float32)
-            joint = joint + turned(log_sum(volume, 2), p)[:, :, None]
+            joint = joint + turned(log_sum(volume, 2), p, sd)[:, :, None]
         parts.append((widths, images, volume, flip))
     total = float(log_sum(joint.reshape(1, -1), 1)[0])
     b, i, c, z = (int(k) for k in np.unravel_index(int(np.argmax(joint)), joint.shape))
@@ -158,6 +160,19 @@ def compare(model: TargetModel, reading: Reading, p: LikelihoodParams) -> Pair:
         candidate.index, ratio, terms, np.asarray(log_pose - total, dtype=np.float32), first, float(grid.bias_m[b]),
         fit, pose, reading.evidence.weight,
     )  # fmt: skip
+
+
+def watched_turns(touchset: TouchSet) -> list[float]:
+    """How far the object was seen to turn, rad in all, from its first closure to the end of each sequence.
+
+    The turn of the very first closure is over before that closure feels anything; what nobody watched counts as none.
+    """
+    total, out = 0.0, []
+    for k, sequence in enumerate(touchset.sequences):
+        for layer in sequence.layers[1 if k == 0 else 0 :]:
+            total += abs(layer.turn_rad) if math.isfinite(layer.turn_rad) else 0.0
+        out.append(total)
+    return out
 
 
 def _log_normal(x: Array, sd: float) -> Array:

@@ -158,12 +158,12 @@ def log_sum(x: Array32, axis: int | tuple[int, ...]) -> Array32:
     return np.asarray(np.log(np.exp(x - safe).sum(axis=axis)) + np.squeeze(safe, axis=axis), dtype=np.float32)
 
 
-def turned(x: Array32, p: LikelihoodParams) -> Array32:
-    """Mean over the object's own turning, in probability: a normal of `turn_sd_rad` over axis 1, and any yaw."""
+def turned(x: Array32, p: LikelihoodParams, sd_rad: float) -> Array32:
+    """Mean over the object's own turning, in probability: a normal of `sd_rad` over axis 1, and any yaw."""
     n = x.shape[1]
     step = 2 * math.pi / n
-    reach = max(1, math.ceil(2 * p.turn_sd_rad / step))
-    weight = np.exp(-0.5 * (np.arange(-reach, reach + 1) * step / p.turn_sd_rad) ** 2)
+    reach = min(max(1, math.ceil(2 * sd_rad / step)), n // 2)
+    weight = np.exp(-0.5 * (np.arange(-reach, reach + 1) * step / sd_rad) ** 2)
     weight *= (1 - p.slip) / weight.sum()
     top = x.max(axis=1, keepdims=True)
     e = np.exp(x - top)
