@@ -210,12 +210,12 @@ def print_match(summary: dict[str, Any], folder: Path) -> None:
         counts = [
             (order, f"{c['closures']['mean']:.1f} [{c['closures']['lo']:.1f}, {c['closures']['hi']:.1f}]",
              value(c["median"], 0), value(c["share_of_recorded"]["mean"], 2), rate(c["right"]),
-             rate(c["confident_and_wrong"]))
+             rate(c["confident_and_wrong"]), rate(c["absent_taken"]))
             for order, c in summary["closures_to_confidence"].items()
         ]  # fmt: skip
         print_table(
             "closures in the whole box until accepted with P > .95",
-            ("order", "closures", "median", "share", "right %", "sure and wrong %"),
+            ("order", "closures", "median", "share", "right %", "sure and wrong %", "target absent, taken %"),
             counts,
         )
     cost_of_stl = (

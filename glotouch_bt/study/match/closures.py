@@ -87,22 +87,27 @@ ORDERS: dict[str, Choice] = {"recorded": in_order, "in_turn": in_turn, "adaptive
 
 
 def closures_to_confidence(layout: Layout, models: Mapping[str, TargetModel]) -> list[dict[str, Any]]:
-    """One row an order and target: after how many closures the best is accepted with P > `CONFIDENT`, and if rightly.
+    """A row an order and target: after how many closures the best is accepted with P > `CONFIDENT`, and if rightly.
 
     A target that is never sure has `confident` False and all its closures counted; `right` is then of the last ranking.
+    Each is replayed once more with the target's own TouchSets taken away (`present` False): whatever is taken is wrong.
     """
-    whole = [t.touchset for t in layout.touched]
-    names = {t.touchset.candidate.index: t.name for t in layout.touched}
     rows = []
     for target, model in models.items():
-        for order, choose in ORDERS.items():
-            count, ranking = _until_sure(whole, model, choose)
-            best = names[ranking.best.index]
-            rows.append(
-                {"order": order, "seed": layout.seed, "target": target, "present": bool(layout.of(target)),
-                 "closures": count, "recorded": len(recorded_closures(whole)), "confident": sure(ranking),
-                 "right": best == target, "best_object": best, "p_best": ranking.best.probability}
-            )  # fmt: skip
+        others = [t for t in layout.touched if t.name != target]
+        for touched, present in ((layout.touched, bool(layout.of(target))), (others, False)):
+            whole = [t.touchset for t in touched]
+            names = {t.touchset.candidate.index: t.name for t in touched}
+            if not whole or (not present and len(others) == len(layout.touched)):
+                continue
+            for order, choose in ORDERS.items():
+                count, ranking = _until_sure(whole, model, choose)
+                best = names[ranking.best.index]
+                rows.append(
+                    {"order": order, "seed": layout.seed, "target": target, "present": present,
+                     "closures": count, "recorded": len(recorded_closures(whole)), "confident": sure(ranking),
+                     "right": best == target, "best_object": best, "p_best": ranking.best.probability}
+                )  # fmt: skip
     return rows
 
 

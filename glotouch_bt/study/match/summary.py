@@ -39,6 +39,7 @@ def summarise(
         "absent_lifted": per[head]["absent_lifted"],
         "closures_to_confidence": {
             order: confidence([c for c in closures if c["order"] == order and c["present"]])
+            | {"absent_taken": taken([c for c in closures if c["order"] == order and not c["present"]])}
             for order in dict.fromkeys(c["order"] for c in closures)
         },
     }
@@ -129,6 +130,11 @@ def calibration(trials: Sequence[Row]) -> dict[str, Any]:
 def _answer_is_right(trial: Row) -> bool:
     says_absent = trial["p_absent"] >= trial["p_best"]
     return bool(trial["right"] and not says_absent if trial["kind"] == "present" else says_absent)
+
+
+def taken(rows: Sequence[Row]) -> dict[str, Any]:
+    """How often something was taken for a target that was not there."""
+    return _share(rows, [r["confident"] for r in rows])
 
 
 def confidence(rows: Sequence[Row]) -> dict[str, Any]:

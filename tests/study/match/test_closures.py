@@ -67,6 +67,9 @@ def test_how_many_until_sure(made_up, monkeypatch):
     )
     believing(monkeypatch, surely_after(2))
     rows = closures_to_confidence(a_layout(layers=(2, 1)), made_up)
+    gone = [r for r in rows if not r["present"]]
+    rows = [r for r in rows if r["present"]]
+    assert [(r["recorded"], r["confident"], r["right"]) for r in gone] == [(6, True, False)] * 9, "two objects are left"
     by = {(r["order"], r["target"]): r for r in rows}
     assert [by["recorded", n]["closures"] for n in ("small", "middle", "large")] == [2, 5, 8]
     assert [by["in_turn", n]["closures"] for n in ("small", "middle", "large")] == [4, 5, 6]
@@ -78,4 +81,5 @@ def test_never_sure_counts_every_closure(made_up, monkeypatch):
     monkeypatch.setattr(closures, "expected_gain", lambda belief, options: np.zeros(len(options)))
     believing(monkeypatch, surely_after(math.inf))
     rows = closures_to_confidence(a_layout(layers=(1,)), {"small": made_up["small"]})
-    assert {(r["closures"], r["confident"], r["right"]) for r in rows} == {(3, False, True)}
+    told = {(r["present"], r["closures"], r["confident"], r["right"]) for r in rows}
+    assert told == {(True, 3, False, True), (False, 2, False, False)}
