@@ -45,7 +45,7 @@ def command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[CliRunn
 BAD = [
     (["search", "--policies", "expected_fnd"], "must be among expected_find, nearest_frontier, random_descent"),
     (["search", "--policies", " , "], "must be among"),
-    (["search", "--trials", "0"], "give --trials or --planar"),
+    (["search", "--trials", "0"], "give --trials, --planar or --recorded"),
     (["search", "--trials", "-1"], "--trials"),
     (["search", "--objects", "gone"], "is not a folder with .stl files in it"),
     (["search", "--conditions", "nominl"], "did you mean 'nominal'"),
