@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from glotouch_bt.model_cache import target_model
-from glotouch_bt.recognition import MATCHERS, Gates, PadSpec, Ranking
+from glotouch_bt.recognition import MATCHERS, PadSpec, Ranking
 from glotouch_bt.robot import HOLD, BadInput, ParamError
 from glotouch_bt.robot.meshes import Mesh, load_folder, load_mesh
 from glotouch_bt.touch import TouchSet
@@ -53,8 +53,7 @@ class Match(Skill):
             raise SkillFailed("too_low", f"{mesh.name} cannot be felt: {e}", advice="sweep lower") from e
         ranking = MATCHERS[self.params.matcher](model, touchsets)
         self.ranking = ranking
-        gates = Gates() if self.params.matcher == "paper" else None  # the likelihood decides on probability
-        self.event("ranking", target=mesh.name, ranking=ranking, gates=gates, matcher=self.params.matcher)
+        self.event("ranking", target=mesh.name, ranking=ranking, gates=ranking.gates, matcher=self.params.matcher)
         if not ranking.accepted:
             felt = {t.candidate.index for t in touchsets}
             missed = [str(c.index) for c in self.known or () if c.index not in felt]

@@ -8,7 +8,7 @@ import numpy as np
 
 from glotouch_bt.model_cache import target_model
 from glotouch_bt.motion import Motion
-from glotouch_bt.recognition import Gates, PadSpec, TargetModel
+from glotouch_bt.recognition import PadSpec, TargetModel
 from glotouch_bt.recognition.gain import Belief, believe, expected_gain
 from glotouch_bt.robot import HOLD, Array, MotionRefused, ParamError
 from glotouch_bt.touch import Candidate, Layer, TouchSequence, TouchSet
@@ -260,7 +260,7 @@ def _with_layer(touchset: TouchSet, hand: Squeezing, layer: Layer) -> TouchSet:
 def _short_of_evidence(belief: Belief) -> set[int]:
     """The likeliest candidate, if it was not felt by both pads as often as a decision needs."""
     best = max(belief.ranking.matches, key=lambda m: m.probability)
-    return {best.index} if best.evidence < Gates().evidence else set()
+    return {best.index} if best.evidence < belief.params.evidence else set()
 
 
 def _in_vain(touchset: TouchSet) -> int:

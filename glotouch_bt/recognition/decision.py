@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from glotouch_bt.robot import Array, ParamError
-
-ABSENT_LOSS, LOSS_TEMPERATURE = 2.0, 0.2
-"""What a loss is worth as a probability, for matchers that have no better: the loss of "none of these" (the gate), and
-the loss that makes a factor e."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +36,8 @@ class Match:
 
     Attributes:
         index: The candidate's index.
-        loss: Total matching loss; infinite if nothing was felt.
-        terms: What it is the sum of: width, image, depth, mode, height, contour.
+        loss: The matcher's loss, comparable within a ranking; infinite if it needs touches and there were none.
+        terms: What speaks for or against it, by the matcher's own names.
         fit: The fitted pose; None if nothing was felt.
         pose_K_O: (x, y, yaw) of the mesh's frame O in K, m and rad; the contour's centre and yaw if nothing was felt.
         evidence: Layers both pads felt; all one-sided layers together add at most 1.
@@ -108,6 +104,7 @@ class Ranking:
         reasons: What failed, in words; empty if accepted.
         p_absent: Probability that none of them is the target; the matches' probabilities and this sum to 1.
         next_touch: The closure that would help most; None if the matcher cannot tell.
+        gates: What it was decided by; None if by probability.
     """
 
     matches: tuple[Match, ...]
@@ -116,6 +113,7 @@ class Ranking:
     reasons: tuple[str, ...] = field(default=())
     p_absent: float = math.nan
     next_touch: Closure | None = None
+    gates: Gates | None = None
 
     @property
     def best(self) -> Match:
@@ -124,7 +122,7 @@ class Ranking:
 
 
 def rank(matches: Sequence[Match], gates: Gates | None = None) -> Ranking:
-    """Sort by loss and apply the gates (paper IV-C: margin, absolute fit, evidence).
+    """Sort by loss and apply the gates (paper IV-C: margin, absolute fit, evidence). Says nothing of probabilities.
 
     Raises:
         ParamError: No match at all.
@@ -133,11 +131,10 @@ def rank(matches: Sequence[Match], gates: Gates | None = None) -> Ranking:
     if not matches:
         raise ParamError("matches", len(matches), "at least one")
     order = tuple(sorted(matches, key=lambda m: (m.loss, m.index)))
-    order, p_absent = _with_probabilities(order)
     best = order[0]
     reasons: list[str] = []
     if not math.isfinite(best.loss):
-        return Ranking(order, 0.0, False, ("no evidence: no closure on any candidate was felt by a pad",), p_absent)
+        return Ranking(order, 0.0, False, ("no evidence: no closure on any candidate was felt by a pad",), gates=gates)
     margin = (order[1].loss - best.loss) if len(order) > 1 else math.inf
     if margin < gates.margin:
         reasons.append(
@@ -149,13 +146,4 @@ def rank(matches: Sequence[Match], gates: Gates | None = None) -> Ranking:
         reasons.append(
             f"evidence {best.evidence:.2f} of candidate {best.index} is below {gates.evidence:g} two-sided layers"
         )
-    return Ranking(order, margin, not reasons, tuple(reasons), p_absent)
-
-
-def _with_probabilities(order: tuple[Match, ...]) -> tuple[tuple[Match, ...], float]:
-    """Soft minimum of the losses, with one more rival of `ABSENT_LOSS`; uncalibrated. Unfelt ones count as that."""
-    losses = [m.loss if math.isfinite(m.loss) else ABSENT_LOSS for m in order] + [ABSENT_LOSS]
-    weights = [math.exp(-(x - min(losses)) / LOSS_TEMPERATURE) for x in losses]
-    total = sum(weights)
-    shared = tuple(replace(m, probability=w / total) for m, w in zip(order, weights[:-1], strict=True))
-    return shared, weights[-1] / total
+    return Ranking(order, margin, not reasons, tuple(reasons), gates=gates)

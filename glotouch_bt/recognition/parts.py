@@ -15,7 +15,6 @@ from glotouch_bt.robot import ParamError
 
 VERSION = 1
 """Of what the tables hold; counts up whenever a table's meaning or its computation changes."""
-ARRAYS = ("reach_m", "fine_m", "images", "image_norms")
 _NUMBERS = ("height_m", "rho", "rho_sd", "normal_dispersion", "anisotropy")
 
 

@@ -13,6 +13,7 @@ from py_trees.common import Status
 
 import skills.touch_next as module
 from glotouch_bt.recognition import Closure, Match, Ranking
+from glotouch_bt.recognition.likelihood.params import LikelihoodParams
 from skills.touch_next import TouchNext
 
 WIDTH = 0.05
@@ -40,7 +41,9 @@ class Oracle:
         matches.sort(key=lambda m: m.loss)
         accepted = known and self.right is not None
         return SimpleNamespace(
-            touchsets=tuple(touchsets), ranking=Ranking(tuple(matches), 1.0, accepted, (), 1.0 - sum(p.values()))
+            params=LikelihoodParams(),
+            touchsets=tuple(touchsets),
+            ranking=Ranking(tuple(matches), 1.0, accepted, (), 1.0 - sum(p.values())),
         )
 
     def expected_gain(self, belief, closures) -> np.ndarray:
@@ -119,7 +122,8 @@ def test_sure_but_with_too_little_evidence_is_touched_again(make, monkeypatch) -
     def believe(model, touchsets):
         belief = plain(model, touchsets)
         best = belief.ranking.matches[0]
-        return SimpleNamespace(touchsets=belief.touchsets, ranking=replace(belief.ranking, accepted=best.evidence >= 3))
+        ranking = replace(belief.ranking, accepted=best.evidence >= 3)
+        return SimpleNamespace(touchsets=belief.touchsets, ranking=ranking, params=belief.params)
 
     def gain(belief, closures):
         felt = any(t.layers for t in belief.touchsets)

@@ -95,10 +95,9 @@ def log_generic_images(layers: tuple[LayerEvidence, ...], pad: PadSpec, p: Likel
         return out
     place = {key: i for i, key in enumerate(known)}
     images = np.array(list(known.values()))
-    size = np.float32(images.shape[1])
-    squared = _squared(images, generic_features(pad)) / size
+    squared = mean_squared(images, generic_features(pad))
     anything = image_kernel(squared, p).mean(axis=1)
-    alike = image_kernel(_squared(images, images) / size, p)
+    alike = image_kernel(mean_squared(images, images), p)
     for i, e in enumerate(layers):
         for side in (0, 1):
             at = place.get((e.sequence, e.index, side))
@@ -115,10 +114,10 @@ def log_generic_images(layers: tuple[LayerEvidence, ...], pad: PadSpec, p: Likel
     return out
 
 
-def _squared(a: Array32, b: Array32) -> Array32:
-    """(len(a), len(b)) squared distance of features."""
+def mean_squared(a: Array32, b: Array32) -> Array32:
+    """(len(a), len(b)) mean squared distance of features (.., 35)."""
     d = (a**2).sum(axis=1)[:, None] - 2 * a @ b.T + (b**2).sum(axis=1)[None]
-    return np.asarray(np.maximum(d, 0))
+    return np.asarray(np.maximum(d, 0) * np.float32(1 / a.shape[1]))
 
 
 def log_generic_widths(layers: tuple[LayerEvidence, ...], candidate: Candidate, p: LikelihoodParams) -> Array:

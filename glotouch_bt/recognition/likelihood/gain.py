@@ -14,7 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from glotouch_bt.recognition.decision import Closure
-from glotouch_bt.recognition.likelihood.background import FIRST_SCALE_M, WIDTH_SCALE_M, generic_features, image_kernel
+from glotouch_bt.recognition.likelihood.background import (
+    FIRST_SCALE_M,
+    WIDTH_SCALE_M,
+    generic_features,
+    image_kernel,
+    mean_squared,
+)
 from glotouch_bt.recognition.likelihood.pair import Pair, Reading
 from glotouch_bt.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.recognition.likelihood.scalars import yaw_prior
@@ -90,7 +96,7 @@ def expected_gains(
     library = generic_features(model.pad)
     library = library[:: max(1, len(library) // SURFACES)]
     others = library[:: max(1, len(library) // OTHERS)][:OTHERS]
-    generic_other = image_kernel(_squared(others, library), p).mean(axis=-1)
+    generic_other = image_kernel(mean_squared(others, library), p).mean(axis=-1)
     n_other = len(others)
     quantile = np.tan(np.pi * (((np.arange(n_other) * 7 % n_other) + 0.5) / n_other - 0.5))  # of a Cauchy
     out = np.zeros(len(closures))
@@ -131,8 +137,8 @@ def _image_ratios(
     flat = side.reshape(-1, size)
     norm = (side**2).sum(axis=2)
     inner = np.maximum(norm[:, :, None] + norm[:, None, :] - 2 * side @ side.transpose(0, 2, 1), 0) / np.float32(size)
-    own = image_kernel(inner, p) @ weight / image_kernel(_squared(flat, library), p).mean(axis=-1).reshape(n, s)
-    other = (image_kernel(_squared(others, flat), p).reshape(len(others), n, s) @ weight).T / generic_other
+    own = image_kernel(inner, p) @ weight / image_kernel(mean_squared(flat, library), p).mean(axis=-1).reshape(n, s)
+    other = (image_kernel(mean_squared(others, flat), p).reshape(len(others), n, s) @ weight).T / generic_other
     ratio = np.concatenate([own, other], axis=1)
     return np.asarray(p.temper_image * np.log((1 - p.image_outlier) * ratio + p.image_outlier), dtype=np.float64)
 
@@ -189,12 +195,6 @@ def _guess(q: Prediction, c: Closure) -> tuple[float, float]:
             return float(q.widths_m[at]), WIDTH_SCALE_M
     low, high = q.candidate.span_m(c.yaw_K_rad + 0.5 * math.pi)
     return high - low, FIRST_SCALE_M
-
-
-def _squared(a: Array32, b: Array32) -> Array32:
-    """(len(a), len(b)) mean squared distance of features."""
-    d = (a**2).sum(axis=1)[:, None] - 2 * a @ b.T + (b**2).sum(axis=1)[None]
-    return np.asarray(np.maximum(d, 0) / a.shape[1])
 
 
 def _nearest(axis: Array, x: Array) -> Array:
