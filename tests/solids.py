@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import trimesh
+from scipy.spatial import ConvexHull
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -28,7 +29,7 @@ COLUMNS = 96
 ANGLES = np.linspace(0.0, 2 * np.pi, COLUMNS, endpoint=False)
 
 
-def polar(rows: list[tuple[float, Array | float]]) -> trimesh.Trimesh:
+def polar(rows: Sequence[tuple[float, Array | float]]) -> trimesh.Trimesh:
     """A solid through rings of (height, radius over `ANGLES`), bottom first."""
     r = np.stack([np.broadcast_to(radius, COLUMNS) for _, radius in rows])
     z = np.broadcast_to(np.array([height for height, _ in rows])[:, None], r.shape)
@@ -36,7 +37,7 @@ def polar(rows: list[tuple[float, Array | float]]) -> trimesh.Trimesh:
 
 
 def reach(corners: Array) -> Array:
-    """(COLUMNS,) radius of a polygon (n, 2) seen whole from the origin, anticlockwise; its corners are met if aligned."""
+    """(COLUMNS,) radius of a polygon (n, 2), anticlockwise and seen whole from the origin."""
     a, b = corners, np.roll(corners, -1, axis=0)
     d = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)[:, None]  # (COLUMNS, 1, 2)
     side = b - a
@@ -90,7 +91,7 @@ def angled(rng: Draw) -> trimesh.Trimesh:
     c = float(rng.choice([0.0, rng.uniform(0.012, 0.025)]))
     x, y = 0.5 * w, 0.5 * v
     corners = [(-x - c, -y), (x + a, -y), (x + a, y), (x, y), (x, y + b), (-x, y + b), (-x, y), (-x - c, y)]
-    flat = np.array(corners if c else corners[:5] + [(-x, y + b)])
+    flat = np.array(corners if c else [*corners[:5], (-x, y + b)])
     fine = np.concatenate([p + np.linspace(0, 1, 12, endpoint=False)[:, None] * (q - p)
                            for p, q in zip(flat, np.roll(flat, -1, axis=0), strict=True)])  # fmt: skip
     return loft(np.stack([np.column_stack([fine, np.full(len(fine), z)]) for z in (0.0, rng.uniform(0.04, 0.09))]))
@@ -102,8 +103,8 @@ def ball(rng: Draw) -> trimesh.Trimesh:
     thick, r = rng.uniform(0.010, 0.025), rng.uniform(0.019, 0.030)
     below = rng.uniform(0.75, 0.95)
     t = np.linspace(-np.arcsin(below), 0.5 * np.pi - 0.03, 30)
-    rows: list[tuple[float, Array | float]] = [(0.0, plate), (thick, plate)]
-    return polar(rows + [(float(thick + r * (below + np.sin(s))), float(r * np.cos(s))) for s in t])
+    rows = [(float(thick + r * (below + np.sin(s))), float(r * np.cos(s))) for s in t]
+    return polar([(0.0, plate), (thick, plate), *rows])
 
 
 def stacked(rng: Draw) -> trimesh.Trimesh:
@@ -120,6 +121,23 @@ def stacked(rng: Draw) -> trimesh.Trimesh:
 KINDS: tuple[Callable[[Draw], trimesh.Trimesh], ...] = (
     polytope, chamfered, turned, angled, ball, stacked, lobes.solid,
 )  # fmt: skip
+
+
+def usable(mesh: trimesh.Trimesh) -> bool:
+    """It stands (centre of mass 4 mm inside its foot), the jaws span it, and it measures 4 to 11 cm."""
+    v = np.asarray(mesh.vertices)
+    foot = ConvexHull(v[v[:, 2] < v[:, 2].min() + 1e-4, :2]).equations
+    a = np.linspace(0.0, np.pi, 36)
+    narrow = np.ptp(v[:, :2] @ np.stack([np.cos(a), np.sin(a)]), axis=0).min()
+    stands = (foot[:, :2] @ mesh.center_mass[:2] + foot[:, 2]).max() < -0.004
+    return bool(stands and narrow < 0.068 and 0.04 < mesh.extents.max() < 0.11)
+
+
+def drawn(kind: Callable[[Draw], trimesh.Trimesh], rng: Draw) -> trimesh.Trimesh:
+    """The first usable one of a kind."""
+    while not usable(mesh := kind(rng)):
+        pass
+    return mesh
 
 
 def twin(mesh: trimesh.Trimesh, rng: Draw) -> trimesh.Trimesh:
@@ -155,7 +173,7 @@ def main() -> int:
         for file in sorted(options.of.glob("*.stl")):
             twin(trimesh.load_mesh(file), rng).export(options.folder / f"{file.stem}_twin.stl")
         return 0
-    made = {f"{KINDS[k].__name__}_{options.seed}": KINDS[k](rng) for k in rng.permutation(len(KINDS))[:5]}
+    made = {f"{KINDS[k].__name__}_{options.seed}": drawn(KINDS[k], rng) for k in rng.permutation(len(KINDS))[:5]}
     if options.twins:
         names = list(made)
         for old, model in zip(names[3:], names[:2], strict=True):
