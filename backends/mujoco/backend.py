@@ -12,7 +12,7 @@ from backends.mujoco.model import Handles, compile_world
 from backends.mujoco.referee import MujocoReferee
 from backends.mujoco.robot import MujocoRobot
 from backends.mujoco.safety import check_sane, silence_mujoco
-from backends.mujoco.truth import draw_truth
+from backends.mujoco.truth import Truth, draw_truth
 from backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import (
     Backend,
@@ -72,6 +72,28 @@ def _settle(model: mujoco.MjModel, data: mujoco.MjData, handles: Handles, descri
     check_sane(data.warning.number, data.sensordata, data.time)
 
 
+def build_world(
+    description: RobotDescription, world: World, conditions: Conditions, seed: int, options: Mapping[str, object]
+) -> tuple[Truth, mujoco.MjModel, mujoco.MjData, Handles]:
+    """Draw, compile and settle the world of a trial; of the options only `layout` and `fixed` are looked at.
+
+    Raises:
+        BadInput: The world cannot be built.
+        BackendError: MuJoCo failed; cause chained.
+    """
+    layout = _read_layout(options["layout"]) if "layout" in options else None
+    fixed = _read_switch("fixed", options.get("fixed", False))
+    silence_mujoco()
+    truth = replace(draw_truth(world, conditions, seed, layout), fixed=fixed)
+    model, handles = compile_world(description, world, truth)
+    data = mujoco.MjData(model)
+    try:
+        _settle(model, data, handles, description)
+    except mujoco.FatalError as e:
+        raise BackendError(f"MuJoCo failed while the world {world.name!r} settled: {e}") from e
+    return truth, model, data, handles
+
+
 class MujocoBackend(Backend):
     """A Rizon 4 with a tactile gripper, a probe in its stand and free objects in a box, in MuJoCo.
 
@@ -96,17 +118,8 @@ class MujocoBackend(Backend):
         for option in options:
             if option not in OPTIONS:
                 raise UnknownName("option of backend mujoco", option, OPTIONS)
-        layout = _read_layout(options["layout"]) if "layout" in options else None
         traced = _read_switch("trace", options.get("trace", False))
-        fixed = _read_switch("fixed", options.get("fixed", False))
-        silence_mujoco()
-        truth = replace(draw_truth(world, conditions, seed, layout), fixed=fixed)
-        model, handles = compile_world(self._description, world, truth)
-        data = mujoco.MjData(model)
-        try:
-            _settle(model, data, handles, self._description)
-        except mujoco.FatalError as e:
-            raise BackendError(f"MuJoCo failed while the world {world.name!r} settled: {e}") from e
+        truth, model, data, handles = build_world(self._description, world, conditions, seed, options)
         return MujocoRobot(
             self._description, self._limits, world, truth, model, data, handles, conditions, seed, traced
         )

@@ -2,22 +2,39 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
+import mujoco
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from backends.mujoco.robot import MujocoRobot
+from backends.mujoco.model import Handles
 from backends.mujoco.tactile import body_pose
-from glotouch_bt.robot import Array, Pose
+from backends.mujoco.trace import Trace
+from backends.mujoco.truth import Truth
+from glotouch_bt.robot import Array, Pose, World
 from glotouch_bt.robot.referee import BareSteps, TrueObject
 
 STOWED_M = 0.005  # the handle's centre this near its place in the stand
 STOWED_TILT = 0.996  # cosine of 5 degrees
 
 
+class Simulated(Protocol):
+    """What a simulated robot lets its referee look at."""
+
+    world: World
+    truth: Truth
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    handles: Handles
+    peak_force_N: float
+    trace: Trace | None
+
+
 class MujocoReferee:
     """See `robot.referee.Referee`."""
 
-    def __init__(self, robot: MujocoRobot) -> None:
+    def __init__(self, robot: Simulated) -> None:
         self._robot = robot
 
     def objects(self) -> list[TrueObject]:

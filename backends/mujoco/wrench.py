@@ -42,9 +42,14 @@ class WristSensor:
 
     reported(t) = true(t - latency) + white noise + random walk - weight model - tare. Before the first tare the report
     contains the hand's weight; from then on only its change with orientation, as the controller believes it.
+
+    Args:
+        description, conditions, seed: The robot, and what its sensor suffers from.
+        steps: Samples in a block of `measure`; the noise of a sample is the same for any.
     """
 
-    def __init__(self, description: RobotDescription, conditions: Conditions, seed: int) -> None:
+    def __init__(self, description: RobotDescription, conditions: Conditions, seed: int, steps: int = STEPS) -> None:
+        self._steps = steps
         self._rng = stream(seed, "wrench")
         draw = stream(seed, "payload")
         self._mass_factor = 1.0 + conditions.payload_mass_error * float(draw.standard_normal())
@@ -56,14 +61,14 @@ class WristSensor:
         self._bias = np.zeros(6)
         self._up_at_tare: Array | None = None
         self._late = round(conditions.wrench_latency_s / STEP_S)
-        self._line = np.zeros((self._late + STEPS, 6))
+        self._line = np.zeros((self._late + steps, 6))
         self._sd = np.array([conditions.force_noise_sd_N] * 3 + [conditions.torque_noise_sd_Nm] * 3)
         self._walk_sd = conditions.force_drift_N_per_sqrt_min * float(np.sqrt(STEP_S / 60.0))
         self._walk = np.zeros(3)
         self._noisy = bool(self._sd.any() or self._walk_sd > 0)
-        self._noise = np.zeros((BLOCKS, STEPS, 6))
+        self._noise = np.zeros((BLOCKS, steps, 6))
         self._block = BLOCKS
-        self._measured = np.zeros((STEPS, 6))
+        self._measured = np.zeros((steps, 6))
         self._renew()
 
     def _renew(self) -> None:
@@ -105,11 +110,11 @@ class WristSensor:
         """
         late = self._late
         if late:
-            self._line[:late] = self._line[STEPS : STEPS + late]
+            self._line[:late] = self._line[self._steps : self._steps + late]
         self._line[late:] = true
         matrix, constant = self._offset
         out = self._measured
-        np.subtract(self._line[:STEPS], matrix @ up + constant, out=out)
+        np.subtract(self._line[: self._steps], matrix @ up + constant, out=out)
         if self._noisy:
             if self._block == BLOCKS:
                 self._draw()
@@ -123,11 +128,11 @@ class WristSensor:
         return self._bias
 
     def _draw(self) -> None:
-        n = BLOCKS * STEPS
+        n = BLOCKS * self._steps
         noise = self._rng.standard_normal((n, 9))
         walk = self._walk + np.cumsum(self._walk_sd * noise[:, 6:], axis=0)
         self._walk = walk[-1]
         noise[:, :6] *= self._sd
         noise[:, :3] += walk
-        self._noise[:] = noise[:, :6].reshape(BLOCKS, STEPS, 6)
+        self._noise[:] = noise[:, :6].reshape(BLOCKS, self._steps, 6)
         self._block = 0
