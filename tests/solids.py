@@ -2,7 +2,7 @@
 
 Kinds: convex polytope, chamfered prism, turned profile, L or T extrusion, ball on a plate, stacked slabs, lobed figure;
 a folder has five different ones, drawn from the seed. With `--twins` the last two are twins of the first two: the same
-solid but for a waist, a taper, a stretch or a twist that moves its wall by 2.5 to 5 mm. `--of FOLDER` writes a twin of
+solid but for a waist, taper, stretch or belt that moves its wall by 2.5 to 5 mm at most. `--of FOLDER` writes a twin of
 every STL of a folder instead: targets that are not in the box, but something like them is. Watertight, 4-11 cm.
 """
 
@@ -141,21 +141,17 @@ def drawn(kind: Callable[[Draw], trimesh.Trimesh], rng: Draw) -> trimesh.Trimesh
 
 
 def twin(mesh: trimesh.Trimesh, rng: Draw) -> trimesh.Trimesh:
-    """The same but for a smooth change that moves the wall by 2.5 to 5 mm where it is largest."""
+    """The same but for a smooth change: a point as far out as any would move by 2.5 to 5 mm where it is largest."""
     out = mesh.subdivide_to_size(0.008)
     v = np.array(out.vertices)
     v[:, :2] -= 0.5 * (v[:, :2].min(axis=0) + v[:, :2].max(axis=0))
     t = (v[:, 2] - v[:, 2].min()) / np.ptp(v[:, 2])
     far = float(np.linalg.norm(v[:, :2], axis=1).max())
     share = rng.uniform(0.0025, 0.005) / far * rng.choice([-1.0, 1.0])
-    kind = rng.integers(4)
-    if kind == 3:  # a twist moves corners along the wall: more of it for as much to feel
-        c, s = np.cos(4 * share * (t - 0.3)), np.sin(4 * share * (t - 0.3))
-        v[:, :2] = np.stack([c * v[:, 0] - s * v[:, 1], s * v[:, 0] + c * v[:, 1]], axis=1)
-    else:
-        along = (np.sin(np.pi * t) ** 2, t, np.ones_like(t))[kind]
-        v[:, 0] *= 1 + share * along
-        v[:, 1] *= 1 + share * along * (kind != 2)
+    kind, at = int(rng.integers(4)), rng.uniform(0.3, 0.8)
+    along = (np.sin(np.pi * t) ** 2, t, np.ones_like(t), np.exp(-0.5 * ((t - at) / 0.15) ** 2))[kind]
+    v[:, 0] *= 1 + share * along
+    v[:, 1] *= 1 + share * along * (kind != 2)
     return trimesh.Trimesh(v, out.faces, process=False)
 
 
