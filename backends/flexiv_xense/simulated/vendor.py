@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
-from backends.flexiv_xense.driver.clock import SteppedClock
-from backends.flexiv_xense.simulated import flexivrdk
+from backends.flexiv_xense.driver.clock import Clock, SteppedClock
+from backends.flexiv_xense.simulated import flexivrdk, xensegripper, xensesdk
 from backends.flexiv_xense.simulated.control_box import ControlBox
 from backends.flexiv_xense.simulated.world import SimulatedWorld
+from backends.flexiv_xense.simulated.xensegripper import GripperLink
+from backends.flexiv_xense.simulated.xensesdk import PadLink
+from backends.mujoco.referee import MujocoReferee
 
-ROBOT_SN = "Rizon4-000001"
+ROBOT_SN = "Rizon4-SIMULATED"
+GRIPPER_ADDRESS = "simulated"  # as a network address and as a serial port
+PAD_SNS = ("left", "right")
 
 
 @dataclass(frozen=True)
@@ -21,27 +27,62 @@ class SimulatedVendor:
     Attributes:
         flexivrdk, xensesdk, xensegripper: Namespaces with the vendors' names.
         clock: Sleeping on it advances the world.
-        world: The world.
-        box: The arm's control box.
+        world, box, gripper, pads: What is behind them.
     """
 
     flexivrdk: Any
     xensesdk: Any
     xensegripper: Any
-    clock: SteppedClock
+    clock: Clock
     world: SimulatedWorld
     box: ControlBox
+    gripper: GripperLink
+    pads: tuple[PadLink, PadLink]
+
+    def referee(self, question: bytes) -> bytes:
+        """Answer for the world's referee: a pickled (method, arguments) in, the pickled result out."""
+        method, arguments = pickle.loads(question)
+        return pickle.dumps(getattr(MujocoReferee(self.world), method)(*arguments))
+
+
+def bound(cls: type[Any], **values: object) -> Any:
+    """A subclass of a stand-in that knows one world, under the vendor's name."""
+    return type(cls.__name__, (cls,), {"__doc__": cls.__doc__, **values})
+
+
+def modules(box: ControlBox, gripper: GripperLink, pads: tuple[PadLink, PadLink]) -> tuple[Any, Any, Any]:
+    """`flexivrdk`, `xensesdk` and `xensegripper` over these devices."""
+    arm = {name: getattr(flexivrdk, name) for name in flexivrdk.__all__}
+    arm["Robot"] = bound(flexivrdk.Robot, _boxes={box.serial: box})
+    links = {GRIPPER_ADDRESS: gripper}
+    tcp = bound(xensegripper.XenseTCPGripper, _links=links)
+    serial = bound(xensegripper.XenseSerialGripper, _links=links)
+    either = bound(xensegripper.XenseGripper, _tcp=tcp, _serial=serial)
+    inner = SimpleNamespace(XenseGripper=either, XenseTCPGripper=tcp, XenseSerialGripper=serial)
+    sensor = bound(xensesdk.Sensor, _links=dict(zip(PAD_SNS, pads, strict=True)))
+    return (
+        SimpleNamespace(**arm),
+        SimpleNamespace(Sensor=sensor),
+        SimpleNamespace(XenseGripper=either, xense_gripper=inner),
+    )
 
 
 def open_vendor(world_blob: bytes) -> SimulatedVendor:
     """The vendors' modules over a world of its own in this process.
 
     Args:
-        world_blob: Pickle of (World, Conditions, seed, options).
+        world_blob: Pickle of {"world", "conditions", "seed", "options"}.
+
+    Raises:
+        GlotouchError: The world cannot be built.
     """
     world = SimulatedWorld.unpickle(world_blob)
-    clock = SteppedClock(world.advance)
+    return assemble(world, SteppedClock(world.advance))
+
+
+def assemble(world: SimulatedWorld, clock: Clock) -> SimulatedVendor:
+    """The vendors' modules over a world that moves with a clock."""
     box = ControlBox(ROBOT_SN, world.arm, clock)
-    names = {name: getattr(flexivrdk, name) for name in flexivrdk.__all__}
-    names["Robot"] = type("Robot", (flexivrdk.Robot,), {"_boxes": {ROBOT_SN: box}, "__doc__": flexivrdk.Robot.__doc__})
-    return SimulatedVendor(SimpleNamespace(**names), None, None, clock, world, box)
+    gripper = GripperLink(world.hand, clock)
+    pads = PadLink(world.hand, clock, right=False, camera=0), PadLink(world.hand, clock, right=True, camera=1)
+    return SimulatedVendor(*modules(box, gripper, pads), clock, world, box, gripper, pads)

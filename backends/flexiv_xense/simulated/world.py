@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from backends.flexiv_xense.simulated.arm import Arm
+from backends.flexiv_xense.simulated.hand import Hand
 from backends.mujoco.backend import build_world
 from backends.mujoco.model import STEP_S, STEPS
 from backends.mujoco.robot import HELD_DISTANCE_M
@@ -42,10 +43,12 @@ class SimulatedWorld:
         self.trace: Trace | None = None
         self.peak_force_N = 0.0
         self.arm = Arm(description, conditions, seed, self.model, self.data, self.handles)
+        self.hand = Hand(description, conditions, seed, world, self.truth, self.model, self.data, self.handles)
         self.steps = 0
         h = self.handles
         self._ctrl = np.array(self.data.ctrl)
-        self._arm_ctrl = self._ctrl[h.arm_ctrl]
+        self._arm_ctrl, self._jaw_ctrl = self._ctrl[h.arm_ctrl], self._ctrl[h.jaw_ctrl]
+        self._jaw_rows = np.zeros((STEPS, 2))
         self._external = np.zeros((STEPS, 4, 6))  # torque, force
         self._external_now = self.data.cfrc_ext[h.held_bodies]
         self._samples = np.zeros((STEPS, self.model.nsensordata))
@@ -53,9 +56,9 @@ class SimulatedWorld:
 
     @classmethod
     def unpickle(cls, blob: bytes) -> SimulatedWorld:
-        """From a pickle of (World, Conditions, seed, options)."""
-        world, conditions, seed, options = pickle.loads(blob)
-        return cls(world, conditions, seed, options)
+        """From a pickle of {"world", "conditions", "seed", "options"}, written by our own client."""
+        given = pickle.loads(blob)
+        return cls(given["world"], given["conditions"], given["seed"], given["options"])
 
     @property
     def now_s(self) -> float:
@@ -79,7 +82,9 @@ class SimulatedWorld:
         i = self.steps % STEPS
         if i == 0:
             self.arm.carry()
+            self._jaw_rows = self.hand.begin()
         self.arm.control(self._arm_ctrl)
+        self._jaw_ctrl[:] = self._jaw_rows[i]
         self.data.ctrl[:] = self._ctrl
         mujoco.mj_step(self.model, self.data)
         self.steps += 1
@@ -94,6 +99,7 @@ class SimulatedWorld:
         """What the MuJoCo backend does once a control period."""
         check_sane(self.data.warning.number, self._samples, self.data.time)
         self._note_peak()
+        self.hand.end(self.now_s, self._samples[-1])
 
     def _note_peak(self) -> None:
         """Largest true contact force so far, on the hand and on the probe while it is in the hand."""
