@@ -1,0 +1,39 @@
+"""`python -m glotouch_driver --address ipc://PATH`: waits for one client, serves it, stops the arm, ends."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from pathlib import Path
+
+from .endpoint import DriverSocket
+from .serve import Log, serve
+
+
+def main(argv: list[str] | None = None) -> int:
+    """The process. 0: ended as asked; 1: a device did not come up; 2: bad arguments; 4: nobody came."""
+    parser = argparse.ArgumentParser(prog="glotouch-driver", description=__doc__)
+    parser.add_argument("--address", required=True, help="ipc://PATH, or tcp://HOST:PORT with --keys")
+    parser.add_argument("--keys", type=Path, help="folder with driver.key_secret and clients/*.key (CURVE)")
+    parser.add_argument("--log", type=Path, help="append one JSON line per event here")
+    parser.add_argument("--stay", action="store_true", help="wait for the next client when one has gone")
+    options = parser.parse_args(argv)
+    stopped: list[int] = []
+    signal.signal(signal.SIGTERM, lambda number, _: stopped.append(number))
+    signal.signal(signal.SIGINT, lambda number, _: stopped.append(number))
+    log = Log(options.log)
+    while True:
+        try:
+            socket = DriverSocket(options.address, options.keys)
+        except (ValueError, OSError) as e:
+            sys.stderr.write(f"glotouch-driver: {e}\n")
+            return 2
+        with socket:
+            code = serve(socket, log, lambda: bool(stopped), forever=options.stay)
+        if not options.stay or stopped:
+            return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,93 @@
+"""Every setpoint is looked at before it is sent: the vendor's interface takes NaN without a word."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from .faults import CommandRefused
+from .messages import ArmLimits, Setpoint
+
+SLACK = 1.02
+"""Of velocities implied by two setpoints, for rounding."""
+SPEED_SLACK = 1.1
+START_M = 5e-3
+"""The first setpoint may be this far from where the arm stands (servo error)."""
+UNIT = 1e-3
+"""A quaternion's length may differ from 1 by this."""
+
+
+class SetpointCheck:
+    """Remembers the last setpoint, because speeds are checked between two.
+
+    Args:
+        limits: Of the arm.
+        period_s: Time between setpoints.
+    """
+
+    def __init__(self, limits: ArmLimits, period_s: float) -> None:
+        self._limits, self._period = limits, period_s
+        self._q: Sequence[float] = ()
+        self._position: Sequence[float] = ()
+        self._fresh = True
+
+    def stands_at(self, q: Sequence[float], pose: Sequence[float]) -> None:
+        """The arm is at rest at joints (7,) and TCP pose (7,), not at a setpoint of ours."""
+        self._q, self._position, self._fresh = tuple(q), tuple(pose[:3]), True
+
+    def look(self, s: Setpoint) -> None:
+        """Take the setpoint as the new last one, if it is sane.
+
+        Raises:
+            CommandRefused: Which value breaks which limit.
+        """
+        limits = self._limits
+        for name, values, n in (("q", s.q, 7), ("dq", s.dq, 7), ("pose", s.pose, 7), ("twist", s.twist, 6)):
+            if len(values) != n or not all(map(math.isfinite, values)):
+                raise CommandRefused(f"setpoint.{name}", list(values), f"{n} finite numbers")
+        norm = math.sqrt(sum(v * v for v in s.pose[3:]))
+        if abs(norm - 1.0) > UNIT:
+            raise CommandRefused("setpoint.pose", list(s.pose[3:]), "a unit quaternion (w x y z)")
+        reach = START_M if self._fresh else 0.0
+        for i in range(7):
+            q, dq, top = s.q[i], s.dq[i], limits.dq_max[i]
+            low, high = limits.q_min[i] - 1e-9, limits.q_max[i] + 1e-9
+            if not low <= q <= high:
+                raise CommandRefused(f"setpoint.q[joint{i + 1}]", q, f"within {low:.4f} .. {high:.4f} rad")
+            if abs(dq) > top:
+                raise CommandRefused(f"setpoint.dq[joint{i + 1}]", dq, f"within {-top:.4f} .. {top:.4f} rad/s")
+            step = (q - self._q[i]) / self._period
+            # Right after a stop the null space has let the joints go where the arm's own controller wanted them.
+            if abs(step) > SLACK * top and not self._fresh:
+                raise CommandRefused(f"setpoint.(q - last q)/period[joint{i + 1}]", step, f"within {top:.4f} rad/s")
+        moved = math.dist(s.pose[:3], self._position)
+        allowed = SPEED_SLACK * limits.speed_m_s * self._period + reach
+        if moved > allowed:
+            raise CommandRefused("setpoint.pose", f"{moved * 1e3:.2f} mm from the last", f"<= {allowed * 1e3:.2f} mm")
+        speed = math.sqrt(sum(v * v for v in s.twist[:3]))
+        if speed > SPEED_SLACK * limits.speed_m_s:
+            raise CommandRefused("setpoint.twist", f"{speed:.3f} m/s", f"<= {limits.speed_m_s:g} m/s")
+        self._q, self._position, self._fresh = s.q, s.pose[:3], False
+
+
+def braked(setpoint: Setpoint, acceleration_m_s2: float) -> tuple[float, ...]:
+    """The pose (7,) at which P comes to rest when it is slowed evenly from a setpoint's twist.
+
+    Linear: v^2 / 2a along v. The turn is slowed in the same time (never less than 0.02 s for a turn on the spot).
+    """
+    v, w = setpoint.twist[:3], setpoint.twist[3:]
+    x, y, z, qw, qx, qy, qz = setpoint.pose
+    speed = math.sqrt(sum(a * a for a in v))
+    half = 0.5 * max(speed / acceleration_m_s2, 0.02 if any(w) else 0.0)
+    ax, ay, az = (
+        0.5 * half * a for a in w
+    )  # half the angle along the axis: a quaternion's vector part, to first order
+    bw = math.sqrt(max(0.0, 1.0 - ax * ax - ay * ay - az * az))
+    turned = (
+        bw * qw - ax * qx - ay * qy - az * qz,
+        bw * qx + ax * qw + ay * qz - az * qy,
+        bw * qy - ax * qz + ay * qw + az * qx,
+        bw * qz + ax * qy - ay * qx + az * qw,
+    )
+    half_linear = 0.5 * speed / acceleration_m_s2
+    return (x + half_linear * v[0], y + half_linear * v[1], z + half_linear * v[2], *turned)

@@ -1,0 +1,102 @@
+"""The driver's end of the socket: one client at a time, others are told so.
+
+A Unix socket in a directory only its owner can enter, unless a network address is asked for; that needs keys (CURVE),
+and only clients whose public keys lie in the keys' folder are let in.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+
+import msgspec
+import zmq
+import zmq.auth
+from zmq.auth.thread import ThreadAuthenticator
+
+from .messages import Answer, Beat, Failed, Request, decode_request, encode
+
+LINGER_MS = 200
+HEART = b"+"
+"""A client's heartbeats come from a thread, hence a socket, of their own: its name with this at its end."""
+
+
+class DriverSocket:
+    """See the module's text.
+
+    Args:
+        address: ipc://PATH or tcp://HOST:PORT.
+        keys: Folder with driver.key_secret and, in clients/, the clients' public keys; needed for tcp, and only there.
+
+    Raises:
+        ValueError: tcp without keys, or an address of another kind.
+    """
+
+    def __init__(self, address: str, keys: Path | None = None) -> None:
+        if not address.startswith(("ipc://", "tcp://")):
+            raise ValueError(f"address {address!r}: must begin with ipc:// or tcp://")
+        if address.startswith("tcp://") and keys is None:
+            raise ValueError(f"address {address!r}: a network port is opened only with --keys")
+        self._context = zmq.Context()
+        self._guard: ThreadAuthenticator | None = None
+        self._socket = self._context.socket(zmq.ROUTER)
+        self._socket.setsockopt(zmq.LINGER, LINGER_MS)
+        if keys is not None:
+            self._guard = ThreadAuthenticator(self._context)
+            self._guard.start()
+            self._guard.configure_curve(domain="*", location=str(keys / "clients"))
+            public, secret = zmq.auth.load_certificate(keys / "driver.key_secret")
+            if secret is None:
+                raise ValueError(f"{keys}/driver.key_secret has no secret key")
+            self._socket.curve_publickey, self._socket.curve_secretkey = public, secret
+            self._socket.curve_server = True
+        self._socket.bind(address)
+        self._client: bytes | None = None
+
+    def receive(self, timeout_s: float) -> Request | None:
+        """The client's next request, waited for at most `timeout_s`; None if none came."""
+        if not self._socket.poll(max(0, round(timeout_s * 1e3))):
+            return None
+        frames: list[bytes] = self._socket.recv_multipart()
+        sender, body = frames[0], frames[-1]
+        if self._client is None:
+            self._client = sender.removesuffix(HEART)
+        try:
+            request: Request = decode_request(body)
+        except msgspec.MsgspecError as e:
+            self._answer(sender, Failed(number=0, kind="link", message=f"a request could not be read: {e}"))
+            return None
+        if sender == self._client + HEART:
+            return request if isinstance(request, Beat) else None
+        if sender != self._client:
+            number = getattr(request, "number", 0)
+            self._answer(sender, Failed(number=number, kind="connect", message="the driver has another client"))
+            return None
+        return request
+
+    def send(self, answer: Answer) -> None:
+        """To the client; dropped if it is gone."""
+        if self._client is not None:
+            self._answer(self._client, answer)
+
+    def _answer(self, to: bytes, answer: Answer) -> None:
+        try:
+            self._socket.send_multipart((to, encode(answer)), zmq.NOBLOCK)
+        except zmq.Again:
+            return
+
+    def close(self) -> None:
+        """Idempotent."""
+        if self._guard is not None:
+            self._guard.stop()
+            self._guard = None
+        self._socket.close()
+        self._context.term()
+
+    def __enter__(self) -> DriverSocket:
+        return self
+
+    def __exit__(
+        self, exc_type: type[BaseException] | None, exc: BaseException | None, tb: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,83 @@
+"""From the vendors' frames, signs and units to ours. This is the only place where that is done.
+
+Ours (robot.observation): B arm base, E flange = wrist sensor S, P pads' mid-point; a wrench is what the hand FEELS from
+its surroundings, force N then torque Nm, written in S about S's origin.
+
+Flexiv: "world" is the arm's base B; the TCP is P, because the tool we register says so; the external wrench is what is
+applied ON the TCP, written in the TCP frame about the TCP's origin. It has our sign already: a tool pressed on a
+table feels +z of the world. Quaternions are w x y z in both.
+
+Xense: millimetres, mm/s, N; depth maps in millimetres, positive when the gel is indented.
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+MM = 1e-3
+
+
+def rotation(quat: npt.ArrayLike) -> Array:
+    """(3, 3) of a unit quaternion w x y z."""
+    w, x, y, z = (float(v) for v in np.asarray(quat, dtype=np.float64))
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def wrench_map(pose_E_P: npt.ArrayLike) -> Array:
+    """(6, 6) that takes a wrench on the TCP, in P about P, to the same wrench in S about S.
+
+    With R the rotation and p the origin of P in S: f_S = R f_P, t_S = R t_P + p x f_S (moving a wrench's reference
+    point; Lynch and Park, Modern Robotics, 3.4).
+
+    Args:
+        pose_E_P: (7,) x y z qw qx qy qz.
+    """
+    pose = np.asarray(pose_E_P, dtype=np.float64)
+    r = rotation(pose[3:])
+    x, y, z = pose[:3].tolist()
+    lever = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    out = np.zeros((6, 6))
+    out[:3, :3] = out[3:, 3:] = r
+    out[3:, :3] = lever @ r
+    return out
+
+
+def payload_on_tool(
+    mass_kg: float, com_E_m: npt.ArrayLike, payload_kg: float, com_P_m: npt.ArrayLike, pose_E_P: npt.ArrayLike
+) -> tuple[float, list[float]]:
+    """Mass and centre of mass (3,) in E of tool and payload together; the payload's is given in P."""
+    pose = np.asarray(pose_E_P, dtype=np.float64)
+    com = rotation(pose[3:]) @ np.asarray(com_P_m, dtype=np.float64) + pose[:3]
+    mass = mass_kg + payload_kg
+    both = mass_kg * np.asarray(com_E_m, dtype=np.float64) + payload_kg * com
+    return mass, cast("list[float]", (both / mass).tolist() if mass > 0.0 else [0.0, 0.0, 0.0])
+
+
+def depth_map_m(depth_mm: npt.ArrayLike, shape: tuple[int, int], mirrored: bool) -> Array:
+    """A sensor's depth map in metres, at (rows, columns), each the mean of the pixels in it that delivered something.
+
+    Args:
+        depth_mm: (h, w), rows from the flange to the fingertip.
+        shape: Not larger than (h, w).
+        mirrored: Its columns run along -x_P.
+    """
+    image = np.asarray(depth_mm, dtype=np.float64)
+    if mirrored:
+        image = image[:, ::-1]
+    rows = np.linspace(0, image.shape[0], shape[0] + 1).astype(int)[:-1]
+    columns = np.linspace(0, image.shape[1], shape[1] + 1).astype(int)[:-1]
+    good = np.isfinite(image)
+    total = np.add.reduceat(np.add.reduceat(np.where(good, image, 0.0), rows, axis=0), columns, axis=1)
+    count = np.add.reduceat(np.add.reduceat(good.astype(np.float64), rows, axis=0), columns, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(MM * total / count, dtype=np.float64)

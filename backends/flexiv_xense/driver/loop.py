@@ -1,0 +1,193 @@
+"""The driver's two loops: in lock-step with the client (simulated devices), or paced by the clock (real ones).
+
+Paced: the arm is read every millisecond and a block is answered on a fixed grid of control periods. What comes late is
+never made up: the arm is held meanwhile.
+
+    no command for HOLD_AFTER_S         the arm is told to come to rest on its way
+    nothing from the client for LOST_S  Stop(), IDLE, devices released, the process ends
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import nullcontext, suppress
+
+from .endpoint import DriverSocket
+from .faults import CommandRefused, DeviceFault
+from .messages import (
+    Accepted,
+    Beat,
+    Cycle,
+    Failed,
+    HoldRequest,
+    PayloadRequest,
+    Quit,
+    RefereeAnswer,
+    RefereeRequest,
+    Refused,
+    Request,
+    TareRequest,
+)
+from .session import Session
+
+SAMPLE_S = 0.001
+HOLD_AFTER_S = 0.03
+LOST_S = 0.5
+BEAT_S = 0.05
+LOCKSTEP_LOST_S = 10.0
+BEHIND_S = 0.02
+"""When the loop is later than this, it gives up catching up: samples are missing, and their stamps say so."""
+
+Log = Callable[..., None]
+
+
+class _Loop:
+    """What both loops answer alike."""
+
+    def __init__(self, session: Session, socket: DriverSocket, log: Log, stopping: Callable[[], bool]) -> None:
+        self._session, self._socket, self._log, self._stopping = session, socket, log, stopping
+
+    def _refuse(self, number: int, error: CommandRefused) -> None:
+        self._socket.send(Refused(number=number, name=error.name, value=repr(error.value), rule=error.rule))
+
+    def _fail(self, number: int, error: DeviceFault) -> None:
+        session = self._session
+        if session.failed is None:
+            session.failed = error
+            self._log("fault", kind=error.kind, message=error.message)
+            with suppress(DeviceFault):  # it may be the one that failed
+                session.hold()
+        cause = "" if error.__cause__ is None else f"{type(error.__cause__).__name__}: {error.__cause__}"
+        self._socket.send(
+            Failed(
+                number=number,
+                kind=error.kind,
+                message=error.message,
+                cause=cause,
+                events=error.events,
+                age_s=error.age_s,
+                limit_s=error.limit_s,
+            )
+        )
+
+    def _answer(self, request: Request) -> bool:
+        """Everything but cycles; False ends the loop."""
+        session = self._session
+        if isinstance(request, (TareRequest, PayloadRequest)):
+            session.start(request)
+            self._socket.send(Accepted(number=request.number))
+        elif isinstance(request, HoldRequest):
+            try:
+                session.hold()
+            except DeviceFault as e:
+                self._fail(request.number, e)
+            else:
+                self._socket.send(Accepted(number=request.number))
+        elif isinstance(request, RefereeRequest):
+            ask = getattr(session.devices.vendor, "referee", None)
+            if ask is None:
+                fault = DeviceFault("vendor", "there is no referee: the devices are real")
+                self._socket.send(Failed(number=request.number, kind=fault.kind, message=fault.message))
+            else:
+                self._socket.send(RefereeAnswer(number=request.number, answer=ask(request.question)))
+        elif isinstance(request, Quit):
+            self._log("quit", peak_force_N=session.peak_force_N)
+            return False
+        return True
+
+
+class Lockstep(_Loop):
+    """Time passes only in a cycle, exactly one period."""
+
+    def run(self, period_s: float) -> None:
+        """Until the client quits or is gone."""
+        session, socket = self._session, self._socket
+        clock, steps = session.clock, round(period_s / SAMPLE_S)
+        conducting = getattr(clock, "conducting", nullcontext)
+        begin, cycles = clock.now_s(), 0
+        heard = time.monotonic()
+        with conducting():
+            socket.send(session.block(0, tactile=False))
+            while not self._stopping():
+                request = socket.receive(1.0)
+                now = time.monotonic()
+                if request is None:
+                    if now - heard > LOCKSTEP_LOST_S:
+                        self._log("client lost", peak_force_N=session.peak_force_N)
+                        return
+                    continue
+                heard = now
+                if not isinstance(request, Cycle):
+                    if not self._answer(request):
+                        return
+                    continue
+                try:
+                    session.command(request)
+                    for k in range(1, steps + 1):
+                        clock.sleep_until(begin + cycles * period_s + k * SAMPLE_S)
+                        session.sample()
+                    cycles += 1
+                    session.poll()
+                    block = session.block(request.number, tactile=request.tactile)
+                except CommandRefused as e:
+                    self._refuse(request.number, e)
+                except DeviceFault as e:
+                    self._fail(request.number, e)
+                else:
+                    socket.send(block)
+                    if session.failed is not None:
+                        self._log("fault", kind=session.failed.kind, message=session.failed.message)
+
+
+class Paced(_Loop):
+    """The clock runs on by itself."""
+
+    def run(self, period_s: float) -> None:
+        """Until the client quits or is gone."""
+        session, socket, clock = self._session, self._socket, self._session.clock
+        steps = round(period_s / SAMPLE_S)
+        socket.send(session.block(0, tactile=False))
+        waiting: Cycle | None = None
+        begin = due = clock.now_s()
+        heard = commanded = beaten = begin
+        late = tick = 0
+        while not self._stopping():
+            due += SAMPLE_S
+            now = clock.now_s()
+            if now - due > BEHIND_S:
+                due = now
+            clock.sleep_until(due)
+            now, tick = clock.now_s(), tick + 1
+            try:
+                session.sample()
+                while (request := socket.receive(0.0)) is not None:
+                    heard = now
+                    if isinstance(request, Cycle):
+                        waiting, commanded = request, now
+                        session.command(request)
+                    elif not self._answer(request):
+                        return
+                if session.moving and now - commanded > HOLD_AFTER_S:
+                    self._log("no command", silent_s=now - commanded)
+                    session.hold()
+                if tick % steps == 0:
+                    session.poll()
+                    if waiting is None:
+                        late += 1
+                    elif session.ready:
+                        socket.send(session.block(waiting.number, tactile=waiting.tactile, late=late))
+                        waiting, late = None, 0
+            except CommandRefused as e:
+                self._refuse(0 if waiting is None else waiting.number, e)
+                waiting = None
+            except DeviceFault as e:
+                if session.failed is None or waiting is not None:
+                    self._fail(0 if waiting is None else waiting.number, e)
+                waiting = None
+            if now - beaten > BEAT_S:
+                beaten = now
+                socket.send(Beat())
+            if now - heard > LOST_S:
+                self._log("client lost", silent_s=now - heard, speed_m_s=session.speed_m_s)
+                return
