@@ -15,9 +15,9 @@ from backends.flexiv_xense.simulated.xensegripper import GripperLink
 from backends.flexiv_xense.simulated.xensesdk import PadLink
 from backends.mujoco.referee import MujocoReferee
 
-ROBOT_SN = "Rizon4-SIMULATED"
-GRIPPER_ADDRESS = "simulated"  # as a network address and as a serial port
-PAD_SNS = ("left", "right")
+ROBOT_SN = "Rizon4-000001"
+GRIPPER_ADDRESS = "000000000001"  # as a network address and as a serial port
+PAD_SNS = ("OG000001", "OG000002")  # left, right
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def open_vendor(world_blob: bytes) -> SimulatedVendor:
     """The vendors' modules over a world of its own in this process.
 
     Args:
-        world_blob: Pickle of {"world", "conditions", "seed", "options"}.
+        world_blob: Pickle of (World, Conditions, seed, options).
 
     Raises:
         GlotouchError: The world cannot be built.

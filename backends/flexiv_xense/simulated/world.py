@@ -56,9 +56,9 @@ class SimulatedWorld:
 
     @classmethod
     def unpickle(cls, blob: bytes) -> SimulatedWorld:
-        """From a pickle of {"world", "conditions", "seed", "options"}, written by our own client."""
-        given = pickle.loads(blob)
-        return cls(given["world"], given["conditions"], given["seed"], given["options"])
+        """From a pickle of (World, Conditions, seed, options), written by our own client."""
+        world, conditions, seed, options = pickle.loads(blob)
+        return cls(world, conditions, seed, options)
 
     @property
     def now_s(self) -> float:
