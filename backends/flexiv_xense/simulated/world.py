@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 from collections.abc import Mapping
 
@@ -100,6 +101,11 @@ class SimulatedWorld:
         check_sane(self.data.warning.number, self._samples, self.data.time)
         self._note_peak()
         self.hand.end(self.now_s, self._samples[-1])
+
+    def contact_force_N(self) -> float:
+        """True contact force in the last step, on the hand and on the probe while it is in the hand."""
+        force = (self._counted @ np.asarray(self._external_now))[3:]
+        return math.sqrt(float(force @ force))
 
     def _note_peak(self) -> None:
         """Largest true contact force so far, on the hand and on the probe while it is in the hand."""
