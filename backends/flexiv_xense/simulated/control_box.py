@@ -189,7 +189,9 @@ class ControlBox:
 
 
 def _flange() -> ToolParams:
-    return ToolParams(tcp_location=[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    params = ToolParams()
+    params.tcp_location = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    return params
 
 
 def load_of(params: ToolParams) -> Load:

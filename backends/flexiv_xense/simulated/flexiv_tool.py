@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from backends.flexiv_xense.simulated.checks import numbers
 from backends.flexiv_xense.simulated.control_box import REQUEST_S, SWITCH_S, load_of
 from backends.flexiv_xense.simulated.flexiv_types import Mode, ToolParams
 from backends.flexiv_xense.simulated.flexivrdk_robot import Robot
@@ -34,7 +33,7 @@ class Tool:
     def params(self, name: str | None = None) -> ToolParams:
         """A tool's parameters, of the current one by default."""
         self._box.wait(REQUEST_S)
-        return _copy(self._box.tools[self._known(self._box.tool if name is None else name)])
+        return self._box.tools[self._known(self._box.tool if name is None else name)]._copy()
 
     def Add(self, name: str, params: ToolParams) -> None:
         """A new tool."""
@@ -43,7 +42,7 @@ class Tool:
             raise ValueError(f"[flexiv::rdk] tool {name} exists already")
         self._box.need_mode(Mode.IDLE)
         self._box.wait(REQUEST_S)
-        self._box.tools[name] = _copy(params)
+        self._box.tools[name] = params._copy()
 
     def Update(self, name: str, params: ToolParams) -> None:
         """Other parameters, at once."""
@@ -51,7 +50,7 @@ class Tool:
         self._known(name)
         self._box.need_mode(Mode.IDLE)
         self._box.wait(REQUEST_S)
-        self._box.tools[name] = _copy(params)
+        self._box.tools[name] = params._copy()
         if name == self._box.tool:
             self._box.use_tool(name)
 
@@ -82,13 +81,7 @@ class Tool:
     def _check(params: ToolParams) -> None:
         if not isinstance(params, ToolParams):
             raise TypeError(f"incompatible function arguments: params = {params!r}")
-        numbers("CoM", params.CoM, 3), numbers("inertia", params.inertia, 6)
-        numbers("tcp_location", params.tcp_location, 7)
         try:
             load_of(params)
         except Exception as e:
             raise ValueError(f"[flexiv::rdk] invalid tool parameters: {e}") from e
-
-
-def _copy(p: ToolParams) -> ToolParams:
-    return ToolParams(float(p.mass), [*p.CoM], [*p.inertia], [*p.tcp_location])

@@ -5,6 +5,7 @@ Vendor classes hand out copies: a list taken from one can be changed without cha
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import Enum
@@ -12,6 +13,7 @@ from enum import Enum
 import numpy as np
 
 from backends.flexiv_xense.simulated.arm import Load, Sample
+from backends.flexiv_xense.simulated.checks import numbers
 from backends.mujoco.model import STEP_S, SensorMap
 from glotouch_bt.robot import Array, Pose
 
@@ -72,7 +74,7 @@ class RobotEvent_Level(_Numbered):
     CRITICAL = 4
 
 
-@dataclass
+@dataclass(slots=True)
 class RobotEvent:
     """One line of the event log."""
 
@@ -87,7 +89,7 @@ class RobotEvent:
     Level = RobotEvent_Level
 
 
-@dataclass
+@dataclass(slots=True)
 class RobotInfo:
     """General information."""
 
@@ -107,14 +109,44 @@ class RobotInfo:
     has_FT_sensor: bool = False
 
 
-@dataclass
+def _numbers(name: str, length: int) -> property:
+    """A field of so many numbers: handed out as a copy, refused (TypeError) if it is anything else."""
+
+    def get(self: ToolParams) -> list[float]:
+        return [*self._values[name]]
+
+    def put(self: ToolParams, value: Sequence[float]) -> None:
+        self._values[name] = numbers(name, value, length).tolist()
+
+    return property(get, put)
+
+
 class ToolParams:
     """What is bolted to the flange: kg, m and kg m2; `tcp_location` is x y z qw qx qy qz in the flange frame."""
 
-    mass: float = 0.0
-    CoM: list[float] = field(default_factory=lambda: [0.0] * 3)
-    inertia: list[float] = field(default_factory=lambda: [0.0] * 6)
-    tcp_location: list[float] = field(default_factory=lambda: [0.0] * 7)
+    __slots__ = ("_mass", "_values")
+    CoM = _numbers("CoM", 3)
+    inertia = _numbers("inertia", 6)
+    tcp_location = _numbers("tcp_location", 7)
+
+    def __init__(self) -> None:
+        self._mass = 0.0
+        self._values = {"CoM": [0.0] * 3, "inertia": [0.0] * 6, "tcp_location": [0.0] * 7}
+
+    @property
+    def mass(self) -> float:
+        """Mass, kg."""
+        return self._mass
+
+    @mass.setter
+    def mass(self, value: float) -> None:
+        self._mass = float(numbers("mass", [value])[0])
+
+    def _copy(self) -> ToolParams:
+        """The same values again (not the vendor's: its functions copy by themselves)."""
+        other = ToolParams()
+        other._mass, other._values = self._mass, {k: [*v] for k, v in self._values.items()}
+        return other
 
 
 def seven(pose: Pose) -> list[float]:

@@ -69,6 +69,13 @@ class Sensor:
         Force6DTuned = 22
         CaptureTimeStamp = 23
         Raw = 1000
+        Mesh3DNorm = 101
+        Flow = 103
+        ImgFloat = 104
+        ImgMarkerFree = 105
+        ImgMarkerEnhance = 106
+        ImgObjEnhance = 107
+        CoarseDepth = 109
 
     _links: ClassVar[dict[str, PadLink]] = {}
 
