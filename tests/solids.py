@@ -126,7 +126,10 @@ KINDS: tuple[Callable[[Draw], trimesh.Trimesh], ...] = (
 def usable(mesh: trimesh.Trimesh) -> bool:
     """It stands (centre of mass 4 mm inside its foot), the jaws span it, and it measures 4 to 11 cm."""
     v = np.asarray(mesh.vertices)
-    foot = ConvexHull(v[v[:, 2] < v[:, 2].min() + 1e-4, :2]).equations
+    low = v[v[:, 2] < v[:, 2].min() + 1e-4, :2]
+    if np.linalg.matrix_rank(low - low[0], tol=1e-4) < 2:
+        return False
+    foot = ConvexHull(low).equations
     a = np.linspace(0.0, np.pi, 36)
     narrow = np.ptp(v[:, :2] @ np.stack([np.cos(a), np.sin(a)]), axis=0).min()
     stands = (foot[:, :2] @ mesh.center_mass[:2] + foot[:, 2]).max() < -0.004
