@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 
-from glotouch_bt.search import trace_more
-from glotouch_bt.touch import Candidate, contour_quality
+from glotouch_bt.search import refined, trace_more
+from glotouch_bt.touch import Candidate
 from skills.base import In, Out, Skill, SkillFailed, SkillRun, param
 from skills.exploring import Explorer
 from skills.held_tool import HeldTool
@@ -44,7 +42,8 @@ class RefineOutline(Skill):
             before.contacts, explorer.tip_K_m, tool.tip_radius_m, p.rule(), round_tip=tool.round, half_extent_m=half
         )
         traced = yield from explorer.run(plan)
-        if traced.outline is None or len(traced.contacts) == len(before.contacts):
+        better = refined(before, traced)
+        if better is None:
             if traced.missing:
                 raise SkillFailed(
                     "not_met",
@@ -52,10 +51,6 @@ class RefineOutline(Skill):
                     advice="it was pushed away, or is gone",
                 )
             return
-        contour = traced.outline.contour
-        tips = np.array([c.tip_K_m[:2] for c in traced.contacts])
-        self.refined = dataclasses.replace(
-            before, contour=contour, contacts=traced.contacts, quality=contour_quality(tips, contour)
-        )
+        self.refined = better
         moved = float(np.linalg.norm(traced.displaced_K_m))
         self.event("candidate", candidate=self.refined, moved_m=moved, ended=traced.ended, moves=traced.moves)

@@ -10,7 +10,7 @@ from skills.exploring import ExploringSpeeds
 class TracingParams(SkillParams):
     """Base of the parameters of `orbit_probe` and `refine_outline`."""
 
-    clearance_m: float = param("Ball to outline while going round", unit="m", default=0.005, ge=0.003, le=0.03)
+    clearance_m: float = param("Ball to outline while going round", unit="m", default=0.003, ge=0.002, le=0.03)
     centre_sd_m: float = param(
         "Enough is known when the centre's standard deviation is below this", unit="m", default=0.0010, gt=0.0, le=0.02
     )

@@ -145,7 +145,8 @@ class _Builder:
         items, item = spec.reads["items"].key, spec.writes["item"].key
         collect = {w.key: spec.writes[p].key for p, w in spec.reads.items() if p != "items"}
         keys = Keys(spec.name, self._namespace, (items, item, *collect, *collect.values()))
-        return ForEach(spec.name, children[0], keys, items, item, collect, settings.on_failure == "continue")
+        go_on = settings.on_failure == "continue"
+        return ForEach(spec.name, children[0], keys, items, item, collect, go_on, settings.least_first)
 
     def _condition(self, spec: NodeSpec, children: list[Behaviour]) -> Behaviour:
         assert isinstance(spec.settings, ConditionSettings)

@@ -141,27 +141,40 @@ class ForEach(Decorator):
 
     SUCCESS: every item succeeded (`on_failure: stop`), or at least one did (`continue`), or there is no item.
     FAILURE: the items are not written; an item failed (`stop`); no item succeeded (`continue`).
-    The gathered tuples hold one value per item that succeeded, in order, and are written in each case.
+    The gathered tuples hold one value per item that succeeded, in the items' order, and are written in each case.
+    With `least_first` the items are taken in rising order of that field of theirs.
     """
 
     def __init__(
-        self, name: str, child: Behaviour, keys: Keys, items: str, item: str, collect: Mapping[str, str], go_on: bool
+        self,
+        name: str,
+        child: Behaviour,
+        keys: Keys,
+        items: str,
+        item: str,
+        collect: Mapping[str, str],
+        go_on: bool,
+        least_first: str | None = None,
     ) -> None:
         super().__init__(name, child)
         self._keys, self._items_key, self._item_key = keys, items, item
-        self._collect, self._go_on = dict(collect), go_on
+        self._collect, self._go_on, self._least_first = dict(collect), go_on, least_first
         self._items: tuple[Any, ...] = ()
+        self._order: list[int] = []
         self._next = 0
         self._succeeded = 0
-        self._gathered: dict[str, list[Any]] = {}
+        self._gathered: dict[str, dict[int, Any]] = {}
 
     def initialise(self) -> None:
         """Take the items as they are now."""
         self.feedback_message = ""
         self._next = self._succeeded = 0
-        self._gathered = {source: [] for source in self._collect}
+        self._gathered = {source: {} for source in self._collect}
         items = self._keys.get(self._items_key)
         self._items = tuple(items) if items is not None else ()
+        self._order = list(range(len(self._items)))
+        if self._least_first is not None:
+            self._order.sort(key=lambda i: getattr(self._items[i], str(self._least_first)))
         if items is None:
             self.feedback_message = f"{self._items_key!r} has not been written"
         for target in self._collect.values():
@@ -175,7 +188,7 @@ class ForEach(Decorator):
             if self.decorated.status is not Status.RUNNING:
                 for source in self._collect:
                     self._keys.unset(source)
-                self._keys.set(self._item_key, self._items[self._next])
+                self._keys.set(self._item_key, self._items[self._order[self._next]])
             yield from self.decorated.tick()
         new_status = self.update()
         if new_status is not Status.RUNNING:
@@ -210,8 +223,9 @@ class ForEach(Decorator):
         if any(v is None for v in row.values()):
             return
         for source, value in row.items():
-            self._gathered[source].append(value)
-            self._keys.set(self._collect[source], tuple(self._gathered[source]))
+            gathered = self._gathered[source]
+            gathered[self._order[self._next]] = value
+            self._keys.set(self._collect[source], tuple(gathered[i] for i in sorted(gathered)))
 
 
 class Passage(Decorator):

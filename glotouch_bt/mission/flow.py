@@ -9,6 +9,7 @@ they can fail.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -77,6 +78,12 @@ def write(state: State, writes: Iterable[tuple[str, Writer]], *, always: bool) -
 def check_flow(root: NodeSpec, findings: Findings) -> None:
     """Report every read of an unwritten key, every type mismatch and every child that can never be reached."""
     _Flow(root, findings).run(root, {}, report=True)
+
+
+def _fields(kind: type) -> list[str]:
+    """What values of a type can be asked for: their public attributes."""
+    declared = [f.name for f in dataclasses.fields(kind)] if dataclasses.is_dataclass(kind) else []
+    return [*declared, *(n for n in dir(kind) if not n.startswith("_") and n not in declared)]
 
 
 class _Flow:
@@ -181,6 +188,11 @@ class _Flow:
             self._read(node, items.key, items.place, tuple, state, "items", must=False)
         elements = {w.element for w in known.writers} if known else {object}
         element = elements.pop() if len(elements) == 1 else object
+        if report and settings.least_first is not None and element is not object:
+            fields = _fields(element)
+            if settings.least_first not in fields:
+                what = f"field of {element.__name__}:"
+                self._findings.unknown(node.place, "unknown_field", what, settings.least_first, fields)
         given = [(item.key, Writer(node.name, item.place, element))]
 
         def again(success: State | None, failure: State | None) -> State | None:

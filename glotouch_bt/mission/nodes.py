@@ -65,6 +65,7 @@ class ForEachSettings(Settings):
     item: str = Field(description="key each item is written to")
     collect: dict[str, str] = Field(default_factory=dict, description="child's key: key of the tuple it is gathered in")
     on_failure: Literal["continue", "stop"] = Field(default="stop", description="what a failing item does")
+    least_first: str | None = Field(default=None, description="field of the items: those with the least of it first")
 
 
 class SubtreeSettings(Settings):

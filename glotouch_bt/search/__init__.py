@@ -1,6 +1,6 @@
 """Where to probe next. Pure: a map in, moves out."""
 
-from glotouch_bt.search.candidates import Admitted, admit, part_of
+from glotouch_bt.search.candidates import Admitted, admit, part_of, refined
 from glotouch_bt.search.expectation import ExpectationParams, ExpectedFind
 from glotouch_bt.search.frontier import PAPER_PASSES, NearestFrontier
 from glotouch_bt.search.map import Exclusion, SearchMap
@@ -36,6 +36,7 @@ __all__ = [
     "seek",
     "admit",
     "part_of",
+    "refined",
     "segment_is_free",
     "trace",
     "trace_more",

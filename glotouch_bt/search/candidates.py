@@ -10,18 +10,32 @@ from glotouch_bt.robot import Array
 from glotouch_bt.search.map import FACING, SearchMap
 from glotouch_bt.search.trace_params import TraceParams
 from glotouch_bt.search.trace_state import Trace
-from glotouch_bt.touch import Candidate, Contact, believe_outline, contour_quality, envelope, signed_distance
+from glotouch_bt.touch import (
+    Candidate,
+    Contact,
+    believe_outline,
+    contour_quality,
+    envelope,
+    signed_distance,
+    split_moved,
+)
 from glotouch_bt.touch.belief import OutlineBelief
+from glotouch_bt.touch.polygons import convex_hull, polygon_distance
 
 LEAST_CONTACTS = 3
 """An outline fitted to fewer is a guess."""
 SAME_M = 0.010
 """Contacts this near to the room a known object takes are its own: objects stand farther apart."""
+BETWEEN_M = 0.018
+"""Contacts this near to the hull of a known object's contacts are its own, whatever outline those gave: objects
+stand 30 mm apart, and are pushed a few."""
 PART_M = 0.030
 """A contact farther than this from the room a candidate takes is not looked at as a part of it."""
 OTHER = 0.02
 """Odds, before it is looked at, that a contact so near to a candidate is with something else; where that stands is not
 in its evidence."""
+FLAT_M = 1e-4
+"""Contacts no wider apart than this across their line have no hull."""
 LARGEST_M = 0.125
 """Nothing that is looked for is longer; two things that touch are not made one beyond it."""
 
@@ -86,6 +100,15 @@ def admit(
     return Admitted(belief.with_exclusion(envelope(candidate), exclusion_m), (*known, candidate), candidate.index)
 
 
+def refined(before: Candidate, traced: Trace) -> Candidate | None:
+    """The candidate with what tracing it on gave; None if that was nothing."""
+    if traced.outline is None or len(traced.contacts) == len(before.contacts):
+        return None
+    contour = traced.outline.contour
+    quality = contour_quality(np.array([c.tip_K_m[:2] for c in traced.contacts]), contour)
+    return replace(before, contour=contour, contacts=traced.contacts, quality=quality)
+
+
 def part_of(known: tuple[Candidate, ...], first: Contact, radius_m: float) -> Candidate | None:
     """The candidate near a new contact that together with it is better explained as one object than as two."""
     for old in sorted(known, key=lambda c: float(signed_distance(envelope(c), first.point_K_m[None])[0])):
@@ -113,16 +136,29 @@ def _outline(contacts: tuple[Contact, ...], radius_m: float) -> OutlineBelief:
 def _merged(old: Candidate, traced: Trace, radius_m: float, height_m: float) -> Candidate | None:
     """The candidate that both are, or None if they are two."""
     points = np.array([c.point_K_m for c in traced.contacts])
-    if float(signed_distance(envelope(old), points).min()) > SAME_M:
+    if float(signed_distance(envelope(old), points).min()) > SAME_M and _apart_m(old.contacts, points) > BETWEEN_M:
         return None
     shift = np.array([*traced.displaced_K_m, 0.0])
     before = (replace(c, tip_K_m=c.tip_K_m + shift, point_K_m=c.point_K_m + shift[:2]) for c in old.contacts)
-    contacts = (*before, *traced.contacts)
+    everything = tuple(replace(c, pushed_K_m=np.zeros(2)) for c in (*before, *traced.contacts))
+    contacts = split_moved(everything, radius_m, likely=len(old.contacts))[1]
     contour = _outline(contacts, radius_m).contour
     if max(contour.size_m) > LARGEST_M:
-        return None
+        middle = points.mean(axis=0)[None]
+        if float(signed_distance(envelope(old), middle)[0]) > 0.0:
+            return None
+        # Nothing else can be where it stands: it is what was traced last, and what was felt before was not all its own.
+        contacts, contour = traced.contacts, _outline(traced.contacts, radius_m).contour
     quality = contour_quality(np.array([c.tip_K_m[:2] for c in contacts]), contour)
     return Candidate(old.index, contour, max(old.height_m, height_m), quality, contacts)
+
+
+def _apart_m(contacts: tuple[Contact, ...], points: Array) -> float:
+    """Distance of points (n, 2) from the hull of the contacts' points; not positive if one is within it."""
+    hull = np.array([c.point_K_m for c in contacts])
+    if np.linalg.svd(hull - hull.mean(axis=0))[1][1] > FLAT_M:
+        return float(polygon_distance(convex_hull(hull), points).min())
+    return float(np.linalg.norm(points[:, None] - hull[None], axis=2).min())
 
 
 def _places(contacts: tuple[Contact, ...], radius_m: float) -> Array:

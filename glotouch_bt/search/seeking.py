@@ -57,7 +57,7 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
         tip_K_m: (2,) where the ball is.
         lowered: It is at sensing height.
     """
-    tip, hops = np.asarray(tip_K_m, dtype=np.float64)[:2], 0
+    tip, hops, cornered = np.asarray(tip_K_m, dtype=np.float64)[:2], 0, False
     while lowered and belief.hints:
         hint, belief = belief.hints[0], belief.with_hints(belief.hints[1:])
         belief, contact, tip = yield from _follow(belief, hint, tip)
@@ -66,15 +66,16 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
             return Sought(belief.with_path(felt.path_K_m), contact, True)
     while True:
         stretch = policy.next_stretch(belief, tip)
-        if stretch is not None and not lowered and not stretch.raised:
+        if stretch is not None and (cornered or not lowered) and not stretch.raised:
             stretch = None
         if stretch is None:
             spot = _way_in(policy, belief, tip, lowered=lowered) if hops < MAX_HOPS else None
             if spot is None:
                 return Sought(belief, None, lowered)
             hops += 1
-            stretch = Stretch(spot[None, :], raised=True)
+            stretch, cornered = Stretch(spot[None, :], raised=True), False
         for waypoint in stretch.waypoints_K_m:
+            beside = bool(belief.inside_exclusion(tip[None])[0])
             felt = yield Move("hop" if stretch.raised else "sweep", waypoint)
             tip, belief = felt.tip_K_m, belief.with_path(felt.path_K_m)
             if felt.refused:
@@ -88,6 +89,7 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
                 belief = belief.with_dropped(felt.contact.tip_K_m)
                 belief = belief.with_obstacle(felt.contact.point_K_m, OBSTACLE_M)
                 if not stretch.raised:
+                    cornered = beside  # no sweep leads out from between its limbs
                     tip = (yield Move("retreat", tip - RETREAT_M * felt.contact.approach_K[:2])).tip_K_m
                 break
             place = felt.contact.tip_K_m

@@ -41,9 +41,9 @@ class TraceParams:
         moves: An object is begun anew so many times.
     """
 
-    clearance_m: float = 0.005
+    clearance_m: float = 0.003
     margin_sds: float = 0.7
-    widest_margin_m: float = 0.005
+    widest_margin_m: float = 0.002
     centre_sd_m: float = 0.0010
     radial_sd_m: float = 0.0035
     least_contacts: int = 4

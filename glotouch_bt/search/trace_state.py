@@ -12,6 +12,7 @@ from glotouch_bt.search.moves import Felt
 from glotouch_bt.search.trace_params import TraceParams
 from glotouch_bt.touch import Contact, Contour, split_moved
 from glotouch_bt.touch.belief import OutlineBelief, believe_outline
+from glotouch_bt.touch.primitives import wrapped
 
 BEARINGS = 72
 """Directions a next probe is chosen from."""
@@ -19,6 +20,8 @@ TOUCH_SD_M = 0.0005
 """How well a contact says along its normal where an outline of known shape is."""
 FEWEST_OF_ONE = 2
 """Contacts with one of two objects that were taken for one."""
+LIMB_M = 0.006
+"""What was touched is kept clear of so far to each side of the contact."""
 NEAR_CONTACT_M = 0.004
 """A place this near to a contact is no evidence of free space."""
 
@@ -153,6 +156,24 @@ class TraceState:
         if self.known:
             sd = np.sqrt(sd**2 + self._shift_variance(outline, bearings, at, p))
         return distance + (0.0 if self.round else self.radius), sd
+
+    def passing(
+        self, outline: OutlineBelief, bearings: Array, p: TraceParams, clearance: float = 1.0, margin: float = 1.0
+    ) -> Array:
+        """(n,) distance from the outline's middle at which the ball goes past: clear of what is predicted, and of what
+        was touched there, which may stick out of every family of outlines.
+
+        Args:
+            outline, bearings, p: Of what, (n,) rad, with which clearances.
+            clearance, margin: Parts of the clearance and of the margin that are kept.
+        """
+        distance, sd = self.ring(outline, bearings, p)
+        out = distance + margin * np.minimum(p.margin_sds * sd, p.widest_margin_m)
+        off = np.array([self.place(c) for c in self.present()]) - outline.centre_K_m
+        far = np.hypot(off[:, 0], off[:, 1]) + (0.0 if self.round else self.radius)
+        aside = np.abs(wrapped(bearings[:, None] - np.arctan2(off[:, 1], off[:, 0])[None, :])) * far
+        limbs = np.where(aside < LIMB_M, far, 0.0).max(axis=1)
+        return np.asarray(np.maximum(out, limbs) + clearance * p.clearance_m)
 
     def _shape(self, outline: OutlineBelief, bearings: Array, p: TraceParams) -> tuple[Array, Array, Array]:
         """As `ring` for an object that never moved unfelt, and where that is: (n,), (n, 2) K, (n,)."""

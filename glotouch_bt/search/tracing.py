@@ -16,6 +16,8 @@ from glotouch_bt.touch.primitives import wrapped
 
 LEAST_MORE = 3
 """Contacts made of an object that was thought to be known."""
+BESIDE_RAD = np.deg2rad(10.0)
+"""The ball is not sent nearer than this to the bearing of something else beside the object."""
 INSIDE_M = 0.004
 """A probe that came this near to the object's supposed middle has passed through: nothing is there."""
 
@@ -182,7 +184,7 @@ def _choose(outline: OutlineBelief, s: TraceState, p: TraceParams) -> tuple[floa
         way = np.zeros(BEARINGS)
         way[order] = np.cumsum((distance + p.clearance_m)[order] * step)
         gain = sd / (way + p.way_m)
-        gain[(way > p.step_m) | (turn > np.pi)] = 0.0
+        gain[(way > p.step_m) | (turn > np.pi) | (turn > _barred(outline, s, p, here, side))] = 0.0
         if side == -s.side:
             gain *= p.back
         if s.blocked:
@@ -192,6 +194,15 @@ def _choose(outline: OutlineBelief, s: TraceState, p: TraceParams) -> tuple[floa
         if gain[i] > 0 and (best is None or gain[i] > best[0]):
             best = (float(gain[i]), float(bearings[i]), side)
     return (None, 1.0) if best is None else (best[1], best[2])
+
+
+def _barred(outline: OutlineBelief, s: TraceState, p: TraceParams, here: float, side: float) -> float:
+    """How far, rad, the way round is free of what is not the object: strays beside it stand in the way."""
+    off = np.array([c.tip_K_m[:2] for c in s.strays]).reshape(-1, 2) - outline.centre_K_m
+    at = np.arctan2(off[:, 1], off[:, 0])
+    beside = np.hypot(off[:, 0], off[:, 1]) < s.passing(outline, at, p) + s.radius
+    turns = wrapped(side * (at[beside] - here)) % (2 * np.pi)
+    return float(np.min(turns - BESIDE_RAD, initial=2 * np.pi))
 
 
 def _probe_at(
@@ -250,8 +261,7 @@ def _angles(outline: OutlineBelief, s: TraceState, bearing: float, side: float) 
 def _way_round(outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: float, side: float) -> Array:
     """(k, 2) waypoints outside the predicted outline, from where the ball is to `bearing`, pulled tight."""
     angles = _angles(outline, s, bearing, side)
-    distance, sd = s.ring(outline, angles, p)
-    ring = distance + p.clearance_m + np.minimum(p.margin_sds * sd, p.widest_margin_m)
+    ring = s.passing(outline, angles, p)
     points = outline.centre_K_m + ring[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
     points = np.clip(points, -s.half, s.half)
     return _tight(s, points, outline, p)
@@ -274,6 +284,5 @@ def _tight(s: TraceState, points: Array, outline: OutlineBelief, p: TraceParams)
 def _clear(s: TraceState, a: Array, b: Array, outline: OutlineBelief, p: TraceParams) -> bool:
     t = np.linspace(0.0, 1.0, 12)[1:-1, None]
     d = (1 - t) * a + t * b - outline.centre_K_m
-    distance, sd = s.ring(outline, np.arctan2(d[:, 1], d[:, 0]), p)
-    least = distance + 0.7 * p.clearance_m + 0.5 * np.minimum(p.margin_sds * sd, p.widest_margin_m)
+    least = s.passing(outline, np.arctan2(d[:, 1], d[:, 0]), p, 0.7, 0.5)
     return bool(np.all(np.hypot(d[:, 0], d[:, 1]) >= least))

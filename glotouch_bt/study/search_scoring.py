@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -98,17 +98,25 @@ def errors(found: Found, i: int, layout: TrueLayout) -> dict[str, Any]:
 def score(found: Sequence[Found], layout: TrueLayout, measured: Sequence[Found] | None = None) -> dict[str, Any]:
     """`discovered_m` (travel at each object's discovery), `false_candidates`, and `candidates` (errors of each).
 
+    An object counts as discovered when its candidate was traced; if that was too far off, when it was refined.
+
     Args:
-        found: As they were when discovered: this says whose they are.
+        found: As they were when traced: this says whose they are.
         layout: The truth.
         measured: As they were at the end, in the same order; the errors are theirs. None: the same.
     """
-    whose = assign(found, layout)
-    real = [(f, i) for f, i in zip(measured or found, whose, strict=True) if i is not None]
+    final = measured if measured is not None else found
+    whose = assign([*found, *final], layout)
+    first, later = whose[: len(found)], whose[len(found) :]
+    real = [
+        (replace(end, travel_m=(f if i is not None else end).travel_m), i if i is not None else j)
+        for f, end, i, j in zip(found, final, first, later, strict=True)
+    ]
+    mine = [(f, i) for f, i in real if i is not None]
     return {
-        "discovered_m": sorted(f.travel_m for f, _ in real),
-        "false_candidates": len(found) - len(real),
-        "candidates": [errors(f, i, layout) for f, i in real],
+        "discovered_m": sorted(f.travel_m for f, _ in mine),
+        "false_candidates": len(found) - len(mine),
+        "candidates": [errors(f, i, layout) for f, i in mine],
     }
 
 

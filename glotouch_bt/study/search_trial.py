@@ -26,7 +26,8 @@ from glotouch_bt.study.planar import FeltSection, felt_section, planar_world
 from glotouch_bt.study.planar.explore import explore
 from glotouch_bt.study.search_scoring import Found, TrueLayout, score
 
-SWEEP_NODE, TRACE_NODE, PICKUP_NODE = "guarded_sweep", "orbit_probe", "tool_pickup"
+SWEEP_NODE, TRACE_NODE, REFINE_NODE, PICKUP_NODE = "guarded_sweep", "orbit_probe", "refine_outline", "tool_pickup"
+TOP_NODE = "touch_top"
 STILL_M = 0.0003
 """The tip must have moved so far for its travel to grow: a standing arm sways by less."""
 EMPTY_ROW: dict[str, Any] = {
@@ -147,16 +148,17 @@ def score_run(record: RunRecord, sections: dict[str, FeltSection]) -> dict[str, 
     layout = true_layout(record.truth, pose_B_K, sections)
     way = Way.of(record)
     heights = {e.data["candidate"]: float(e.data["height_m"]) for e in record.of_kind("top")}
-    # An object traced in parts counts from its last part on; what only measures its height comes later still.
+    # An object traced in parts counts from its last part on; only if that was too far off, from its refinement on.
     last: dict[int, tuple[float, Any]] = {}
-    final: dict[int, Any] = {}
+    final: dict[int, tuple[float, Any]] = {}
     for e in record.of_kind("candidate"):
         index = int(e.data["candidate"]["index"])
-        final[index] = e.data["candidate"]
+        if index not in final or e.data["node"] != TOP_NODE:
+            final[index] = (e.stamp_s, e.data["candidate"])
         if "displaced_m" in e.data:
             last[index] = (e.stamp_s, e.data["candidate"])
     found = [_found(way.travel_m(stamp), c, heights.get(i)) for i, (stamp, c) in sorted(last.items())]
-    measured = [_found(f.travel_m, final[i], heights.get(i)) for f, i in zip(found, sorted(last), strict=True)]
+    measured = [_found(way.travel_m(final[i][0]), final[i][1], heights.get(i)) for i in sorted(last)]
     row = score(found, layout, measured)
     row["contacts"] = sum(len(c["contacts"]) for _, c in last.values())
     row["contact_gap_mm"] = _gaps(record, layout)
@@ -206,7 +208,7 @@ class Way:
 
     Attributes:
         stamp_s, length_m: (n,) the travel since the probe was picked up at each control cycle.
-        begin_s, end_s: Of the exploration.
+        begin_s, end_s: Of the exploration, until all is found.
         start_K_m: Where the tip was at its beginning.
     """
 
@@ -220,12 +222,13 @@ class Way:
     def of(cls, record: RunRecord) -> Way:
         """Read it from a record; empty if nothing was explored."""
         ticks = [t for t in record.ticks if t.node.rsplit("/", 1)[-1] in (SWEEP_NODE, TRACE_NODE)]
+        later = [t for t in record.ticks if t.node.rsplit("/", 1)[-1] == REFINE_NODE]
         held = [e.stamp_s for e in record.of_kind("tool") if e.data.get("held")]
         pose_B_K = record.pose_B_K
         if not ticks or not held or pose_B_K is None or "position_B_P" not in record.samples:
             return cls(np.zeros(1), np.zeros(1), np.inf, np.inf, [])
         stamps = record.samples["stamp_s"]
-        use = np.nonzero((stamps >= held[0]) & (stamps <= ticks[-1].stamp_s))[0][::10]
+        use = np.nonzero((stamps >= held[0]) & (stamps <= max(t.stamp_s for t in (*ticks[-1:], *later[-1:]))))[0][::10]
         # the hand keeps pointing down with one yaw, so the tip moves in the plane as the pads' mid-point does
         p = pose_B_K.inverse().apply(record.samples["position_B_P"][use])[:, :2]
         length = _travelled(p)
@@ -234,10 +237,10 @@ class Way:
         return cls(stamps[use], length, begin, ticks[-1].stamp_s, at.tolist())
 
     def travel_m(self, stamp_s: float) -> float:
-        """Travel of the exploration up to a time."""
+        """Travel from the beginning of the exploration to a time, refining included."""
         if not np.isfinite(self.begin_s):
             return 0.0
-        return float(np.interp(min(stamp_s, self.end_s), self.stamp_s, self.length_m)) - self.before_m
+        return float(np.interp(stamp_s, self.stamp_s, self.length_m)) - self.before_m
 
     @property
     def total_m(self) -> float:
@@ -273,8 +276,10 @@ def planar_trials(
         row = EMPTY_ROW | {"simulator": "planar", "policy": policy, "seed": seed}
         explored = explore(planar, search_policy(policy), len(meshes), budget_m=budget_m)
         layout = TrueLayout(planar.sections, planar.start_poses, planar.poses)
-        contours = [(f.travel_m, f.candidate.contour) for f in explored.found]
-        found = [Found(t, c.centre_K_m, c.kind, c.yaw_rad) for t, c in contours]
+        found, measured = (
+            [Found(t.travel_m, c.centre_K_m, c.kind, c.yaw_rad) for t in traced for c in [t.candidate.contour]]
+            for traced in (explored.found, explored.measured)
+        )
         row |= {"ended": explored.ended, "travel_m": explored.travel_m, "contacts": explored.contacts}
-        rows.append(row | score(found, layout))
+        rows.append(row | score(found, layout, measured))
     return rows

@@ -49,6 +49,7 @@ MISTAKES: list[tuple[str, str, list[tuple[int, int, str, str]]]] = [
     ("not a key", HEAD + "tree:\n  find: {out: {found: /n}}\n", [(4, 23, "wrong_key", "'/n'")]),
     ("for_each over a number", HEAD + "tree:\n  - find\n  - for_each: {items: found, item: item, do: act}\n", [(5, 23, "port_type", "as tuple")]),
     ("collects what nobody writes", HEAD + "tree:\n  - find\n  - for_each: {items: items, item: item, collect: {mrk: marks}, do: act}\n", [(5, 52, "port_unset", "mrk")]),
+    ("for_each by an unknown field", HEAD + "tree:\n  - find\n  - for_each: {items: items, item: item, least_first: sise, do: act}\n", [(5, 5, "unknown_field", "of Item")]),
     ("until of a number", HEAD + "tree:\n  repeat: {until: found, do: find}\n", [(4, 19, "port_type", "as bool")]),
     ("repeat without an end", HEAD + "tree:\n  repeat: {do: find}\n", [(4, 3, "wrong_value", "either times or until")]),
     ("two comparisons", HEAD + "tree:\n  - find\n  - condition: {port: found, at_least: 1, at_most: 2}\n", [(5, 5, "wrong_value", "exactly one")]),

@@ -7,6 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from glotouch_bt.mission.decorators import ForEach
 
 TABLE = [
     ("one skill", "  act: {script: RRS}", "RRS"),
@@ -142,3 +146,37 @@ def test_a_subtree_s_keys_are_its_own(built: Callable[[str], Any], robot: Any, t
     assert made.root.status.value == "SUCCESS"
     assert (made.value("found"), made.value("ours"), made.value("a_b@5_5/found")) == (3, True, 5)
     made.forget()
+
+
+def test_for_each_takes_the_least_first_and_gathers_in_order() -> None:
+    """Whatever order the items are taken in, what is gathered keeps theirs."""
+    keys, taken = _Keys({"items": tuple(complex(r, i) for i, r in enumerate((0.7, 0.2, 0.5)))}), []
+
+    class Child(Behaviour):
+        def update(self) -> Status:
+            item = keys.get("item")
+            taken.append(item.imag)
+            keys.set("mark", item.imag)
+            return Status.FAILURE if item.real == 0.2 else Status.SUCCESS
+
+    made = ForEach("each", Child("child"), keys, "items", "item", {"mark": "marks"}, True, "real")
+    while made.status not in (Status.SUCCESS, Status.FAILURE):
+        made.tick_once()
+    assert taken == [1, 2, 0]
+    assert (made.status, keys.get("marks")) == (Status.SUCCESS, (0, 2))
+
+
+class _Keys:
+    """A blackboard of one's own."""
+
+    def __init__(self, values: dict[str, Any]) -> None:
+        self.values = values
+
+    def get(self, key: str) -> Any:
+        return self.values.get(key)
+
+    def set(self, key: str, value: Any) -> None:
+        self.values[key] = value
+
+    def unset(self, key: str) -> None:
+        self.values.pop(key, None)

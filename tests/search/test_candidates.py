@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -6,6 +8,8 @@ from glotouch_bt.search.candidates import _outline
 from glotouch_bt.touch import Candidate, Contact
 
 R = 0.006
+LIMB = ((0.0, 0.022, 0, 1), (0.0, -0.022, 0, -1), (0.012, 0.0, 1, 0))
+"""Contacts round something narrow: x, y and outward normal."""
 
 
 def contact(x, y, nx, ny):
@@ -51,3 +55,15 @@ def test_more_of_a_candidate_replaces_it_and_counts_nothing(candidate):
     assert (admitted.index, len(admitted.candidates), admitted.belief.found) == (0, 1, 1)
     np.testing.assert_allclose(admitted.candidates[0].contour.centre_K_m, [-0.005, 0.0], atol=1e-3)
     np.testing.assert_allclose(sorted(admitted.candidates[0].contour.size_m), [0.044, 0.090], atol=2e-3)
+
+
+def test_what_stands_too_near_for_another_object_is_the_same(candidate):
+    """16 mm off the contacts, where no other object can stand (30 mm); 26 mm off one can."""
+    two = {}
+    for gap in (0.016, 0.026):
+        contacts = tuple(contact(0.01 + gap + dx, y, nx, ny) for dx, y, nx, ny in LIMB)
+        traced = Trace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)))
+        belief = SearchMap.blank((0.2, 0.15), expected=2).with_exclusion(candidate.contour, 0.01)
+        near = dataclasses.replace(candidate, contour=_outline(candidate.contacts[:3], R).contour)
+        two[gap] = len(admit(belief, (near,), contacts[0], traced, 0.018, 0.01).candidates)
+    assert two == {0.016: 1, 0.026: 2}

@@ -95,6 +95,21 @@ def test_a_traced_object_touched_again_is_no_find() -> None:
     assert sought.belief.found == known.found
 
 
+def test_no_sweep_out_of_a_corner_is_tried_again() -> None:
+    """Between the limbs of a traced object every sweep meets it: the ball is lifted out."""
+    start = np.array([0.02, 0.0])
+    known = blank().with_path(np.array([[-0.1, 0.0], [-0.06, 0.0]])).with_exclusion(DISC, 0.01)
+
+    def answer(move: Move, tip: Array) -> Felt:
+        if move.kind == "sweep" and np.linalg.norm(tip) < 0.03:
+            return Felt(tip, np.array([tip]), touch(tip, move.goal_K_m - tip))
+        return free(move, tip)
+
+    sought, moves = run(seek(known, Towards(*[(0.12, 0.0)] * 4), start, lowered=True), start, answer)
+    assert [m.kind for m in moves][:3] == ["sweep", "retreat", "hop"]
+    assert sought.lowered
+
+
 def test_what_is_refused_is_given_up() -> None:
     start = np.array([0.0, 0.0])
 

@@ -44,6 +44,15 @@ def test_a_candidate_is_of_the_nearest_object_not_counted_before():
     assert [c["centre_error_mm"] for c in row["candidates"]] == pytest.approx([2.0, 0.0], abs=1e-9)
 
 
+def test_a_wrong_outline_counts_when_it_is_refined():
+    truth = layout((0.0, 0.0, 0.0), (0.1, 0.0, np.pi / 2))
+    first = [at(0.045, 0.0, 1.0), at(0.1, 0.020, 2.0)]
+    row = score(first, truth, [at(0.011, 0.0, 2.6), at(0.1, 0.010, 3.0)])
+    assert row["discovered_m"] == [2.0, 2.6]
+    assert row["false_candidates"] == 0
+    assert score(first, truth)["discovered_m"] == [2.0]
+
+
 @pytest.mark.parametrize(("off_mm", "found"), [(24.9, 1), (25.1, 0)])
 def test_discovered_means_within_25_mm(off_mm, found):
     row = score([at(0.01, 1e-3 * off_mm)], layout((0, 0, 0)))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from glotouch_bt.search import SearchMap, SearchPolicy, TraceParams, admit, part_of, seek, trace
+from glotouch_bt.search import SearchMap, SearchPolicy, TraceParams, admit, part_of, refined, seek, trace, trace_more
 from glotouch_bt.search.moves import Felt, Move
 from glotouch_bt.study.planar.drive import drive
 from glotouch_bt.study.planar.world import PlanarWorld
 from glotouch_bt.touch import Candidate
 from skills.guarded_sweep import GuardedSweepParams
 from skills.orbit_probe import OrbitProbeParams
+from skills.refine_outline import RefineOutlineParams
 
 BUDGET_M = 8.0
 MOST_MOVES = 5000
@@ -30,8 +31,9 @@ class Explored:
     """How an exploration went.
 
     Attributes:
-        found: Candidates in order.
-        travel_m: Planar length of all the ball's ways.
+        found: Candidates in order, as they were traced first.
+        measured: The same as far as they were refined, in order; where that was broken off, as they were.
+        travel_m: Planar length of all the ball's ways until all was found, or the search ended.
         ended: "complete", "exhausted" or "budget".
         belief: The map at the end.
         contacts: How many contacts the candidates have.
@@ -39,6 +41,7 @@ class Explored:
     """
 
     found: tuple[Traced, ...]
+    measured: tuple[Traced, ...]
     travel_m: float
     ended: str
     belief: SearchMap
@@ -77,8 +80,9 @@ def explore(
     tracing: TraceParams | None = None,
     sweep: GuardedSweepParams | None = None,
     orbit: OrbitProbeParams | None = None,
+    refine: RefineOutlineParams | None = None,
 ) -> Explored:
-    """What the mission's exploration does, with geometry for an arm.
+    """What the mission's exploration does, with geometry for an arm: find all, then refine each.
 
     Args:
         world: The layout; its travel meter must be at 0.
@@ -86,7 +90,7 @@ def explore(
         expected: How many objects are looked for.
         budget_m: Travel after which it is broken off.
         tracing: How outlines are traced (default: as the skill's parameters say).
-        sweep, orbit: Parameters of the skills; their defaults by default.
+        sweep, orbit, refine: Parameters of the skills; their defaults by default.
     """
     sweep, orbit = sweep or GuardedSweepParams(), orbit or OrbitProbeParams()
     tracing = tracing or orbit.rule()
@@ -114,4 +118,24 @@ def explore(
             found[admitted.index] = Traced(world.travel_m, candidates[admitted.index])
     except _OutOfBudget:
         ended = "budget"
-    return Explored(tuple(found[i] for i in sorted(found)), world.travel_m, ended, belief, untraced)
+    travel_m, coarse = world.travel_m, [found[i] for i in sorted(found)]
+    measured = _refine(coarse, world, limited, (refine or RefineOutlineParams()).rule(), belief)
+    return Explored(tuple(coarse), tuple(measured), travel_m, ended, belief, untraced)
+
+
+def _refine(
+    found: list[Traced], world: PlanarWorld, limited: _Budget, tracing: TraceParams, belief: SearchMap
+) -> list[Traced]:
+    """All candidates as they are after tracing on, the least known first, while the travel lasts."""
+    out = list(found)
+    for i, traced in sorted(enumerate(found), key=lambda item: item[1].candidate.quality):
+        more = trace_more(
+            traced.candidate.contacts, world.tip_K_m, world.tip_radius_m, tracing, half_extent_m=belief.half_extent_m
+        )
+        try:
+            better = refined(traced.candidate, drive(more, limited))
+        except _OutOfBudget:
+            break
+        if better is not None:
+            out[i] = Traced(world.travel_m, better)
+    return out
