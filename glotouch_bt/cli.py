@@ -16,6 +16,7 @@ from typing import Annotated, Any
 import typer
 
 from glotouch_bt.cli_bench import bench
+from glotouch_bt.cli_doctor import link, read_settings
 from glotouch_bt.guarded import guarded, set_debug, showing_tracebacks
 
 app = typer.Typer(
@@ -26,6 +27,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+bench.command("link")(link)
 app.add_typer(bench)
 
 
@@ -54,20 +56,6 @@ def _options(debug: Annotated[bool, typer.Option("--debug", help="show the trace
         set_debug()
 
 
-def _settings(given: list[str] | None) -> dict[str, str]:
-    from glotouch_bt.robot import BadInput
-
-    settings: dict[str, str] = {}
-    for item in given or []:
-        name, equals, value = item.partition("=")
-        if not equals or not name.strip():
-            raise BadInput(f"--set {item}: must be NAME=VALUE")
-        if name.strip() in settings:
-            raise BadInput(f"--set {name.strip()}: given twice")
-        settings[name.strip()] = value
-    return settings
-
-
 def _print_json(data: object) -> None:
     sys.stdout.write(json.dumps(data, indent=2, allow_nan=False, default=str) + "\n")
 
@@ -88,7 +76,7 @@ def run(
     from glotouch_bt import console
     from glotouch_bt.study.launch import RunRequest, launch
 
-    request = RunRequest(mission, backend, seed, _settings(set_), objects, conditions, out)
+    request = RunRequest(mission, backend, seed, read_settings(set_), objects, conditions, out)
     with console.RunProgress(quiet=json_) as progress:
         done = launch(request, on_start=progress.start, on_progress=progress.update)
     if json_:
@@ -119,7 +107,7 @@ def check(
     from glotouch_bt.mission.load import load_mission, split_settings
     from glotouch_bt.robot import BadInput
 
-    settings = _settings(set_)
+    settings = read_settings(set_)
     reports: list[dict[str, object]] = []
     for given in missions:
         findings: list[object] = []
@@ -199,7 +187,7 @@ def tree(
     from glotouch_bt.mission.load import load_mission
     from glotouch_bt.robot import BadInput
 
-    loaded = load_mission(mission, _settings(set_), objects=objects)
+    loaded = load_mission(mission, read_settings(set_), objects=objects)
     drawn = as_svg(loaded) if format_ is TreeFormat.svg else as_text(loaded)
     if out is None:
         sys.stdout.write(drawn)

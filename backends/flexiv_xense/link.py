@@ -46,7 +46,7 @@ def failure(answer: Failed) -> BackendError:
     if answer.kind == "stale":
         error: BackendError = StaleReading(answer.message, answer.age_s, answer.limit_s)
     else:
-        text = answer.message if not answer.cause else f"{answer.message} (from {answer.cause})"
+        text = answer.message if answer.cause in answer.message else f"{answer.message} (from {answer.cause})"
         error = DeviceError(text)
     for e in answer.events:
         error.add_note(f"arm event {e.level} {e.id}: {e.description} {e.advice}".rstrip())

@@ -102,16 +102,11 @@ def read_options(given: Mapping[str, object]) -> Options:
             extra[name] = value
         else:
             raise UnknownName("option of backend flexiv_xense", name, (*NAMES, *SIMULATED_OPTIONS))
-    options = Options(**known, simulated=extra)
-    if options.devices == "simulated":
-        return _simulated(options)
-    return _real(options, known)
-
-
-def _simulated(options: Options) -> Options:
-    if options.driver:
+    if known.get("devices") != "simulated":
+        return _real(Options(**known, simulated=extra), known)
+    if "driver" in known:
         raise BadInput("option driver: simulated devices run in a driver of our own; leave it away")
-    return replace(options, **{name: value for name, value in SIMULATED.items() if not getattr(options, name)})
+    return Options(**(SIMULATED | known), simulated=extra)
 
 
 def _real(options: Options, known: Mapping[str, object]) -> Options:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -58,7 +59,15 @@ class SlowTicket:
 
 
 class FlexivXenseRobot(Robot):
-    """See `Robot`. Made by `FlexivXenseBackend.open`."""
+    """See `Robot`. Made by `FlexivXenseBackend.open`.
+
+    Attributes:
+        link, process: To the driver, and the driver if it is ours.
+        info: What the devices say about themselves.
+        late_periods: Control periods so far that passed without a command of ours.
+        latency_s: Of the last cycle: from the call to the arm having the setpoint, and from the newest sample's reading
+            to the observation; without the wait for the period's end between them. One machine only.
+    """
 
     def __init__(
         self,
@@ -73,6 +82,7 @@ class FlexivXenseRobot(Robot):
         self.description, self.limits, self.period_s = description, limits, period_s
         self.link, self.process, self.info = link, process, info
         self.late_periods = 0
+        self.latency_s = 0.0
         self._chain = Chain(description)
         self._tickets: dict[int, SlowTicket] = {}
         self._failed: BackendError | None = None
@@ -92,13 +102,14 @@ class FlexivXenseRobot(Robot):
         setpoint = None if command.motion is None else self._setpoint(command.motion)
         g = command.gripper
         jaws = None if g is None else Jaws(float(g.aperture_m), float(g.speed_m_s), float(g.force_N))
-        number = self.link.number()
+        number, began = self.link.number(), time.monotonic()
         try:
             block = self.link.ask(Cycle(number=number, setpoint=setpoint, jaws=jaws, tactile=command.tactile), Block)
         except BackendError as e:
             self._failed = e
             self._end_tickets(str(e))
             raise
+        self.latency_s = (block.sent_s - began) + (time.monotonic() - block.read_s)
         self._observation = self._take(block)
         if block.stop is not None:
             raise SafetyStop(*block.stop)

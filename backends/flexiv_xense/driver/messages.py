@@ -240,6 +240,8 @@ class Block(msgspec.Struct, frozen=True, kw_only=True, tag=True):
         samples: float64 bytes (n, COLUMNS).
         late: Control periods that passed without a command since the last block.
         stop: (quantity, value, limit, stamp s) if the hard limit has tripped.
+        sent_s, read_s: `time.monotonic` when the command had been handed to the arm, and when the newest sample was
+            read: for measuring latencies on one machine.
     """
 
     number: int
@@ -250,6 +252,8 @@ class Block(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     done: tuple[Done, ...] = ()
     late: int = 0
     stop: tuple[str, float, float, float] | None = None
+    sent_s: float = 0.0
+    read_s: float = 0.0
 
 
 class Accepted(msgspec.Struct, frozen=True, kw_only=True, tag=True):

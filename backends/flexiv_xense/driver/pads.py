@@ -7,6 +7,7 @@ wanted.
 from __future__ import annotations
 
 import math
+import time
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,9 @@ from .frames import Array, depth_map_m
 from .messages import HandLimits, Maps
 
 LEFT, RIGHT = 0, 1
-SAME_CLOCK_S = 60.0
-"""Sensor stamps this near our clock are on our clock; others are shifted by the smallest lateness seen."""
+SAME_CLOCK_S = 1.0
+"""Which clock a sensor stamps with is not documented. Stamps this near our clock, or this machine's calendar time, are
+on it; others are shifted by the smallest lateness seen."""
 PAIR_S = 0.04
 """Two maps belong together if their stamps differ by less: one frame of the slower rate in use."""
 MISSING_S = 1.0
@@ -115,12 +117,19 @@ class Pads:
             if taken == self._last[side]:
                 return
             self._last[side] = taken
-            now = self._clock.now_s()
-            if abs(now - taken) > SAME_CLOCK_S:
-                self._lateness[side] = min(self._lateness[side], now - taken)
-                taken += self._lateness[side]
+            taken = self._on_our_clock(side, taken)
             self._maps[side] = depth_map_m(depth, self._shape, self._mirrored[side])
             self._stamps[side] = taken
+
+    def _on_our_clock(self, side: int, stamp_s: float) -> float:
+        now = self._clock.now_s()
+        if abs(now - stamp_s) < SAME_CLOCK_S:
+            return stamp_s
+        calendar = time.time()  # noqa: TID251  the sensor's clock is compared with, no time is measured
+        if abs(calendar - stamp_s) < SAME_CLOCK_S:
+            return now - (calendar - stamp_s)
+        self._lateness[side] = min(self._lateness[side], now - stamp_s)
+        return stamp_s + self._lateness[side]
 
     def _pair(self) -> None:
         left, right = self._maps

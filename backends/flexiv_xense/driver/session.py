@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections import deque
 from collections.abc import Sequence
 
@@ -66,6 +67,7 @@ class Session:
         self._busy = False
         self._jaws = NO_JAWS
         self._moves = request.move
+        self._sent_s = self._read_s = time.monotonic()
         self.failed: DeviceFault | None = None
         self.stop: tuple[str, float, float, float] | None = None
         self.peak_force_N = 0.0
@@ -111,6 +113,7 @@ class Session:
             self._arm.send(cycle.setpoint)
         else:
             self.hold()
+        self._sent_s = time.monotonic()
 
     def _look(self, cycle: Cycle) -> None:
         if not self._moves and (cycle.setpoint is not None or cycle.jaws is not None):
@@ -185,7 +188,7 @@ class Session:
             DeviceFault: It cannot be read, or repeats an old reading.
         """
         state = self._arm.state()
-        now = self.clock.now_s()
+        now, self._read_s = self.clock.now_s(), time.monotonic()
         if state.stamp == self._device_stamp:
             age = now - self._fresh_s
             if age > self._limits.max_age_s:
@@ -261,4 +264,6 @@ class Session:
             done=done,
             late=late,
             stop=self.stop,
+            sent_s=self._sent_s,
+            read_s=self._read_s,
         )

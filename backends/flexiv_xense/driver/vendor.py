@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, cast
@@ -51,7 +52,8 @@ def _module(name: str, needed: bool) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError as e:
-        raise DeviceFault("connect", f"the vendor's package {name!r} cannot be imported here: {e}") from e
+        why = f"the vendor's package {name!r} cannot be imported by {sys.executable} ({e}); --set python=INTERPRETER"
+        raise DeviceFault("connect", f"{why} names one that has it") from e
 
 
 def load_vendor(kind: str, world: str = "", *, gripper: bool = True, pads: bool = True) -> Vendor:

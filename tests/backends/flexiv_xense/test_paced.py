@@ -1,0 +1,126 @@
+"""The driver on the wall's clock: what it does when its client, or a device, goes silent. Nothing here is timed."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from backends.flexiv_xense.driver.messages import Cycle, Setpoint
+from backends.rizon4 import RIZON4_XENSE
+from glotouch_bt.robot import HOLD, BackendError, Command, JointSetpoint, Tare
+from glotouch_bt.robot.fake import forward
+from tests.backends.flexiv_xense.conftest import Open
+from tests.backends.flexiv_xense.scripted import ScriptedVendor
+
+HOME = np.array(RIZON4_XENSE.home_q)
+PATIENCE_S = 20.0
+
+
+def eventually(reached: Callable[[], bool]) -> bool:
+    until = time.monotonic() + PATIENCE_S
+    while not reached():
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.005)
+    return True
+
+
+def a_moving_setpoint() -> Command:
+    dq = np.zeros(7)
+    dq[0] = 0.1
+    q = HOME + 0.005 * dq
+    return Command(JointSetpoint(q, dq, np.zeros(7), forward(RIZON4_XENSE, q)))
+
+
+def events(tmp_path: Path) -> list[str]:
+    return [json.loads(line)["event"] for line in (tmp_path / "log.jsonl").read_text().splitlines()]
+
+
+def test_blocks_follow_each_other_and_nothing_is_made_up(open_robot: Open) -> None:
+    robot = open_robot(ScriptedVendor(stepped=False), pace="real")
+    stamps = list(robot.observe().stamp_s)
+    for _ in range(20):
+        stamps.extend(robot.cycle(HOLD).stamp_s)
+    assert np.all(np.diff(stamps) > 0.0)
+    assert stamps[-1] - stamps[0] > 0.15
+
+
+def test_a_client_that_sends_no_setpoint_is_held_for(open_robot: Open) -> None:
+    vendor = ScriptedVendor(stepped=False)
+    robot = open_robot(vendor, pace="real")
+    robot.cycle(a_moving_setpoint())
+    assert eventually(lambda: vendor.sent[-1][1] == [0.0] * 6)
+    time.sleep(0.6)  # its heart still beats
+    assert robot.cycle(HOLD).stamp_s.size > 100
+    assert robot.late_periods > 10
+
+
+def test_a_client_that_is_gone_ends_the_session(open_robot: Open, tmp_path: Path) -> None:
+    vendor = ScriptedVendor(stepped=False)
+    robot = open_robot(vendor, pace="real")
+    robot.cycle(a_moving_setpoint())
+    vendor.calls.clear()
+    robot.link._stop.set()  # its heart stops
+    assert eventually(lambda: "Stop" in vendor.calls)
+    assert eventually(lambda: vendor.gripper.released)
+    assert eventually(lambda: "released" in events(tmp_path))
+    assert "client lost" in events(tmp_path)
+    assert vendor.sensors
+    assert all(s.released for s in vendor.sensors)
+
+
+def test_a_driver_that_is_silent_is_an_error(open_robot: Open) -> None:
+    vendor = ScriptedVendor(stepped=False)
+    robot = open_robot(vendor, pace="real")
+    vendor.clock.sleep_until = lambda stamp_s: time.sleep(2.0)
+    with pytest.raises(BackendError, match="nothing heard"):
+        robot.cycle(HOLD)
+        robot.cycle(HOLD)
+
+
+def test_a_tare_runs_beside_the_loop(open_robot: Open) -> None:
+    robot = open_robot(ScriptedVendor(stepped=False), pace="real")
+    ticket = robot.start(Tare(0.1))
+    for _ in range(500):
+        robot.cycle(HOLD)
+        if ticket.done:
+            break
+    assert ticket.done
+    assert ticket.error is None
+
+
+def test_a_second_client_is_told_so(open_robot: Open) -> None:
+    from backends.flexiv_xense.driver.messages import Block
+    from backends.flexiv_xense.link import Link
+
+    robot = open_robot(ScriptedVendor(stepped=False), pace="real")
+    other = Link(robot.link._address, lambda: None, paced=False)
+    try:
+        with pytest.raises(BackendError, match="another client"):
+            other.ask(Cycle(number=1), Block, limit_s=PATIENCE_S)
+    finally:
+        other.close()
+    robot.cycle(HOLD)
+
+
+def test_rubbish_is_refused_and_does_not_end_the_driver(open_robot: Open) -> None:
+    robot = open_robot(ScriptedVendor(stepped=False), pace="real")
+    robot.link._socket.send(b"\xc1 rubbish")
+    with pytest.raises(BackendError, match="could not be read"):
+        robot.cycle(HOLD)
+    assert robot.process is None
+
+
+def test_a_setpoint_of_another_length_is_refused(open_robot: Open) -> None:
+    robot = open_robot(ScriptedVendor(), pace="lockstep")
+    bad = Setpoint((0.0,) * 6, (0.0,) * 7, (0.0,) * 7, (0.0,) * 6)
+    from backends.flexiv_xense.driver.messages import Block
+    from glotouch_bt.robot import ParamError
+
+    with pytest.raises(ParamError, match="7 finite numbers"):
+        robot.link.ask(Cycle(number=robot.link.number(), setpoint=bad), Block)
