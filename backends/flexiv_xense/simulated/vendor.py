@@ -10,10 +10,10 @@ from typing import Any
 from backends.flexiv_xense.driver.clock import Clock, SteppedClock
 from backends.flexiv_xense.simulated import flexivrdk, xensegripper, xensesdk
 from backends.flexiv_xense.simulated.control_box import ControlBox
+from backends.flexiv_xense.simulated.disturbances import Disturber
 from backends.flexiv_xense.simulated.world import SimulatedWorld
 from backends.flexiv_xense.simulated.xensegripper import GripperLink
 from backends.flexiv_xense.simulated.xensesdk import PadLink
-from backends.mujoco.referee import MujocoReferee
 
 ROBOT_SN = "Rizon4-000001"
 GRIPPER_ADDRESS = "000000000001"  # as a network address and as a serial port
@@ -40,9 +40,10 @@ class SimulatedVendor:
     pads: tuple[PadLink, PadLink]
 
     def referee(self, question: bytes) -> bytes:
-        """Answer for the world's referee: a pickled (method, arguments) in, the pickled result out."""
+        """Ask the world's referee (or disturber): a pickled (method, arguments) in, the pickled result out."""
         method, arguments = pickle.loads(question)
-        return pickle.dumps(getattr(MujocoReferee(self.world), method)(*arguments))
+        referee = Disturber(self.world, self.box, self.gripper, self.pads)
+        return pickle.dumps(getattr(referee, method)(*arguments))
 
 
 def bound(cls: type[Any], **values: object) -> Any:
