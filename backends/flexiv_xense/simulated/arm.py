@@ -7,6 +7,7 @@ kept by giving way at the tool (`_give_way`), and that an arm whose client is go
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import mujoco
@@ -62,6 +63,21 @@ class Load:
     com_E_m: Array
     pose_E_T: Pose
 
+    @cached_property
+    def at_T(self) -> Array:
+        """(6, 6) moves a wrench from S to the tool centre point, axes kept: the torque becomes m - r x f."""
+        x, y, z = self.pose_E_T.position_m
+        move = np.eye(6)
+        move[3:, :3] = -np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        return move
+
+    @cached_property
+    def in_T(self) -> Array:
+        """(6, 6) moves a wrench from S to the tool centre point and writes it in the tool's axes."""
+        turn = np.zeros((6, 6))
+        turn[:3, :3] = turn[3:, 3:] = self.pose_E_T.rotation.T
+        return np.asarray(turn @ self.at_T)
+
 
 FLANGE = Load(0.0, np.zeros(3), Pose(np.zeros(3)))
 
@@ -98,8 +114,9 @@ class Arm:
         self._taring: list[Array] | None = None
         self.load = FLANGE
         self._carry: Array | None = None
-        self.max_wrench: Array | None = None
-        self._aside = np.zeros(description.dof)
+        self._max_wrench: Array | None = None
+        self._least = (np.inf, np.inf)
+        self._aside, self._yielding = np.zeros(description.dof), False
         self.reference_q = self.trajectory.q
         self._lost_steps: int | None = None
         first = np.array(data.sensordata)
@@ -161,6 +178,14 @@ class Arm:
         now.go(q, dq + (null / time_s if twist_B.any() else 0.0), time_s)
         return True
 
+    def limit_wrench(self, most: Array | None) -> None:
+        """Bound the contact wrench's components (6,), N and Nm, from now on; None does not."""
+        self._max_wrench = most
+        if most is None:
+            self._aside[:], self._yielding = 0.0, False
+        else:
+            self._least = float(most[:3].min()) ** 2, float(most[3:].min()) ** 2
+
     def brake(self) -> None:
         """Stop where braking leads."""
         self.trajectory.brake(STOP_RAD_S2)
@@ -200,7 +225,7 @@ class Arm:
             ctrl += self._product[self._h.arm_dof] * self._per_kp
         if self._carry is not None:
             ctrl += self._carry
-        if np.count_nonzero(self._aside):
+        if self._yielding:
             ctrl += self._aside
 
     def sense(self, step: int, row: Array) -> None:
@@ -215,8 +240,8 @@ class Arm:
         last = self.sample.filtered_S
         filtered = last + (STEP_S / FILTER_S) * (wrench - last)
         self.sample = Sample(step, row, wrench, filtered, measured)
-        if self.max_wrench is not None:
-            self._give_way(wrench, quat_to_matrix(row[s.quat]))
+        if self._max_wrench is not None:
+            self._give_way(self.load.at_T @ wrench, row[s.quat])
 
     def carry(self) -> None:
         """Renew the motors' share of the load that is not the hand's own; called every control period."""
@@ -234,26 +259,29 @@ class Arm:
         j = self._jacobian[:, h.arm_dof]
         self._carry = GRAVITY_M_S2 * (extra * j[2] + arm[1] * j[3] - arm[0] * j[4]) * self._per_kp
 
-    def _give_way(self, wrench_S: Array, rotation_B_S: Array) -> None:
-        """Move the servo's target aside while a component of the contact wrench (in B, at T) is beyond its maximum."""
-        assert self.max_wrench is not None
-        lever = self.load.pose_E_T.position_m
-        force, torque = wrench_S[:3], wrench_S[3:] - np.cross(lever, wrench_S[:3])
-        wrench_B = np.concatenate([rotation_B_S @ force, rotation_B_S @ torque])
-        excess = wrench_B - np.clip(wrench_B, -self.max_wrench, self.max_wrench)
+    def _give_way(self, wrench_S: Array, quat_B_S: Array) -> None:
+        """Move the servo's target aside while a component of the contact wrench (at T, in B) is beyond its maximum."""
+        most = self._max_wrench
+        assert most is not None
+        f, m = wrench_S[:3], wrench_S[3:]
+        if not self._yielding and f @ f < self._least[0] and m @ m < self._least[1]:
+            return  # in no axes can a component be beyond its maximum
+        rotation_B_S = quat_to_matrix(quat_B_S)
+        wrench_B = np.concatenate([rotation_B_S @ f, rotation_B_S @ m])
+        excess = wrench_B - np.clip(wrench_B, -most, most)
         if not excess.any():
-            if self._aside.any():
-                self._aside *= 1.0 - STEP_S / COME_BACK_S
-                if float(np.abs(self._aside).max()) < 1e-7:
-                    self._aside[:] = 0.0
+            self._aside *= 1.0 - STEP_S / COME_BACK_S
+            if float(np.abs(self._aside).max()) < 1e-7:
+                self._aside[:], self._yielding = 0.0, False
             return
+        self._yielding = True
         h, d = self._h, self._data
         mujoco.mj_jac(
             self._model,
             d,
             self._jacobian[:3],
             self._jacobian[3:],
-            d.site_xpos[h.sensor_site] + rotation_B_S @ lever,
+            d.site_xpos[h.sensor_site] + rotation_B_S @ self.load.pose_E_T.position_m,
             h.hand_bodies.start,
         )
         self._aside += inverse(self._jacobian[:, h.arm_dof]) @ (excess / NOMINAL_STIFFNESS) * (STEP_S / GIVE_WAY_S)

@@ -98,7 +98,7 @@ class ControlBox:
     def halt(self) -> None:
         """Brake at once, in whatever mode."""
         self.arm.brake()
-        self.arm.max_wrench = None
+        self.arm.limit_wrench(None)
         self.mode = Mode.IDLE
         self.primitive_started_s = None
 
@@ -157,7 +157,7 @@ class ControlBox:
             self.fail(NOT_ZEROED, "the force sensor has not been zeroed since this client connected")
             raise RuntimeError(f"[flexiv::rdk] failed to switch to {mode.name}")
         self.mode = mode
-        self.arm.max_wrench = None
+        self.arm.limit_wrench(None)
         self.arm.reference_q = self.arm.trajectory.q.copy()
 
     def use_tool(self, name: str) -> None:

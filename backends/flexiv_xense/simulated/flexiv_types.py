@@ -10,8 +10,6 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from enum import Enum
 
-import numpy as np
-
 from backends.flexiv_xense.simulated.arm import Load, Sample
 from backends.flexiv_xense.simulated.checks import numbers
 from backends.mujoco.model import STEP_S, SensorMap
@@ -175,19 +173,14 @@ class Reading:
             return [*row[self.sensors.position].tolist(), *row[self.sensors.quat].tolist()]
         return seven(self.flange() @ self.load.pose_E_T)
 
-    def at_tool(self, wrench_S: Array, turn: Array) -> list[float]:
-        """A wrench moved to the tool centre point and turned by a matrix."""
-        force = wrench_S[:3]
-        torque = wrench_S[3:] - np.cross(self.load.pose_E_T.position_m, force)
-        return [*(turn @ force).tolist(), *(turn @ torque).tolist()]
-
     def in_tool(self, wrench_S: Array) -> list[float]:
         """A wrench at the tool centre point, in the tool's axes."""
-        return self.at_tool(wrench_S, self.load.pose_E_T.rotation.T)
+        return _list(self.load.in_T @ wrench_S)
 
     def in_world(self, wrench_S: Array) -> list[float]:
         """A wrench at the tool centre point, in B's axes."""
-        return self.at_tool(wrench_S, self.flange().rotation)
+        at_T, turn = self.load.at_T @ wrench_S, self.flange().rotation
+        return [*_list(turn @ at_T[:3]), *_list(turn @ at_T[3:])]
 
 
 def _same(a: Pose, b: Pose) -> bool:

@@ -178,7 +178,7 @@ class Robot:
         box.need_link()
         box.stand_still()
         box.finish_primitive()
-        box.arm.max_wrench = None
+        box.arm.limit_wrench(None)
         box.mode = Mode.IDLE
 
     def SwitchMode(self, mode: Mode) -> None:
@@ -308,7 +308,7 @@ class Robot:
         most = within("max_wrench", numbers("max_wrench", max_wrench, 6), 0.0, np.inf)
         self._box.need_mode(CARTESIAN)
         self._box.wait(REQUEST_S)
-        self._box.arm.max_wrench = None if bool(np.isinf(most).all()) else most
+        self._box.arm.limit_wrench(None) if bool(np.isinf(most).all()) else most
 
     def SetNullSpacePosture(self, ref_positions: Numbers) -> None:
         """Pull the redundant freedom to a posture, until the mode is entered again."""
