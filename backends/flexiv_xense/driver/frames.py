@@ -71,13 +71,16 @@ def depth_map_m(depth_mm: npt.ArrayLike, shape: tuple[int, int], mirrored: bool)
         shape: Not larger than (h, w).
         mirrored: Its columns run along -x_P.
     """
-    image = np.asarray(depth_mm, dtype=np.float64)
+    image = np.asarray(depth_mm)
     if mirrored:
         image = image[:, ::-1]
-    rows = np.linspace(0, image.shape[0], shape[0] + 1).astype(int)[:-1]
-    columns = np.linspace(0, image.shape[1], shape[1] + 1).astype(int)[:-1]
-    good = np.isfinite(image)
-    total = np.add.reduceat(np.add.reduceat(np.where(good, image, 0.0), rows, axis=0), columns, axis=1)
-    count = np.add.reduceat(np.add.reduceat(good.astype(np.float64), rows, axis=0), columns, axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(MM * total / count, dtype=np.float64)
+    (h, w), (m, n) = image.shape, shape
+    if h % m or w % n:  # cut what does not fill a last cell, less than one cell of pixels
+        image = image[: h - h % m, : w - w % n]
+    cells = image.reshape(m, h // m, n, w // n)
+    mean: Array = cells.mean(axis=(1, 3), dtype=np.float64)
+    for i, j in np.argwhere(~np.isfinite(mean)):
+        cell = cells[i, :, j]
+        good = np.isfinite(cell)
+        mean[i, j] = cell[good].mean(dtype=np.float64) if good.any() else np.nan
+    return MM * mean

@@ -36,6 +36,7 @@ HOLD_AFTER_S = 0.03
 LOST_S = 0.5
 BEAT_S = 0.05
 LOCKSTEP_LOST_S = 10.0
+STILL_M_S = 1e-3
 BEHIND_S = 0.02
 """When the loop is later than this, it gives up catching up: samples are missing, and their stamps say so."""
 
@@ -140,6 +141,29 @@ class Lockstep(_Loop):
                         self._log("fault", kind=session.failed.kind, message=session.failed.message)
 
 
+class _Silence:
+    """What is done, and written down, when no command has come for a while."""
+
+    def __init__(self, session: Session, log: Log) -> None:
+        self._session, self._log = session, log
+        self._silent = self._still = False
+
+    def look(self, silent_s: float) -> None:
+        """Once a sample."""
+        session = self._session
+        if silent_s <= HOLD_AFTER_S:
+            self._silent = False
+            return
+        if not self._silent:
+            self._silent, self._still = True, False
+            session.recent_peak_N = 0.0
+            self._log("no command", silent_s=silent_s, speed_m_s=session.speed_m_s)
+            session.hold()
+        if not self._still and session.speed_m_s < STILL_M_S:
+            self._still = True
+            self._log("standstill", silent_s=silent_s, peak_force_N=session.recent_peak_N)
+
+
 class Paced(_Loop):
     """The clock runs on by itself."""
 
@@ -152,6 +176,7 @@ class Paced(_Loop):
         begin = due = clock.now_s()
         heard = commanded = beaten = begin
         late = tick = 0
+        silence = _Silence(session, self._log)
         while not self._stopping():
             due += SAMPLE_S
             now = clock.now_s()
@@ -168,9 +193,7 @@ class Paced(_Loop):
                         session.command(request)
                     elif not self._answer(request):
                         return
-                if session.moving and now - commanded > HOLD_AFTER_S:
-                    self._log("no command", silent_s=now - commanded)
-                    session.hold()
+                silence.look(now - commanded)
                 if tick % steps == 0:
                     session.poll()
                     if waiting is None:

@@ -31,6 +31,7 @@ IN_A_ROW = 5
 """So many samples in a row beyond the hard limit stop the arm (5 ms); one alone may be noise."""
 KEPT = 60_000
 """Samples kept while nobody asks (60 s)."""
+SPEED_SAMPLES = 20
 NO_JAWS = JawState(0.0, math.nan, 0.0, False)
 
 
@@ -45,7 +46,7 @@ class Session:
         failed: What broke the session, if anything did; every later command raises it again.
         stop: (quantity, value, limit, stamp) once the hard limit has tripped.
         peak_force_N: Largest sensed force so far.
-        speed_m_s: Of P, over the last sample.
+        recent_peak_N: The same since somebody last set it to zero.
     """
 
     def __init__(self, devices: Connected, request: Open) -> None:
@@ -70,8 +71,8 @@ class Session:
         self._sent_s = self._read_s = time.monotonic()
         self.failed: DeviceFault | None = None
         self.stop: tuple[str, float, float, float] | None = None
-        self.peak_force_N = 0.0
-        self.speed_m_s = 0.0
+        self.peak_force_N = self.recent_peak_N = 0.0
+        self._track: deque[tuple[float, list[float]]] = deque(maxlen=SPEED_SAMPLES)
         self.sample()
         self._stand()
         self.poll()
@@ -85,6 +86,12 @@ class Session:
     def moving(self) -> bool:
         """The last setpoint had a speed and no hold has followed it."""
         return self._last is not None and self._rest is None and any(self._last.twist)
+
+    @property
+    def speed_m_s(self) -> float:
+        """Of P, over the last `SPEED_SAMPLES`."""
+        (begin, first), (end, last) = self._track[0], self._track[-1]
+        return math.dist(first, last) / (end - begin) if end > begin else 0.0
 
     # -- commands ----------------------------------------------------------------------------------------------------
 
@@ -200,8 +207,7 @@ class Session:
         row = [*state.q, *state.dq, *state.pose, *wrench]
         if not math.isfinite(math.fsum(row)):
             raise DeviceFault("vendor", "the arm reports numbers that are not finite")
-        if self._newest is not None and now > self._fresh_s:
-            self.speed_m_s = math.dist(row[14:17], self._newest[14:17]) / (now - self._fresh_s)
+        self._track.append((now, row[14:17]))
         self._fresh_s, self._newest = now, row
         self._stamps.append(now - self._zero_s)
         self._rows.append(row)
@@ -211,6 +217,7 @@ class Session:
         """The hard limit below the client: stop where the arm is, and stay stopped."""
         force, torque = math.hypot(*wrench[:3]), math.hypot(*wrench[3:])
         self.peak_force_N = max(self.peak_force_N, force)
+        self.recent_peak_N = max(self.recent_peak_N, force)
         limits = self._limits
         if force <= limits.force_N and torque <= limits.torque_Nm:
             self._over = 0
