@@ -50,6 +50,9 @@ class Rig:
         self.seen: list[Observation] = [robot.observe()]
         self.q: Array = np.array(self.last.q[-1])
         self.dq: Array = np.zeros_like(self.q)
+        k = self.kinematics
+        inside = (self.q > k.lower - 0.05) & (self.q < k.upper + 0.05)
+        assert inside.all(), f"q = {self.q.round(3).tolist()} is outside the joints' ranges; is it in rad?"
 
     @property
     def last(self) -> Observation:
