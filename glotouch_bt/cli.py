@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import typer
 
 from glotouch_bt.cli_bench import bench
-from glotouch_bt.cli_doctor import link, read_settings
+from glotouch_bt.cli_doctor import doctor, link, read_settings
 from glotouch_bt.guarded import guarded, set_debug, showing_tracebacks
 
 app = typer.Typer(
@@ -28,6 +28,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 bench.command("link")(link)
+app.command("doctor")(doctor)
 app.add_typer(bench)
 
 

@@ -56,3 +56,46 @@ def link(
             row = "  ".join(f"{k} {v:.3f}" for k, v in summary[name].items())
             sys.stdout.write(f"{name:12s} {row}\n")
     sys.stdout.write(f"{summary['cycles']} cycles, {summary['late_periods']} periods without a command in time\n")
+
+
+@guarded
+def doctor(
+    backend: Backend = "flexiv_xense",
+    set_: Sets = None,
+    mission: Annotated[str, typer.Option(help="the mission whose container is registered")] = "retrieve",
+    conditions: Annotated[str, typer.Option(help="disturbances, for simulated robots")] = "nominal",
+    yes: Annotated[bool, typer.Option("--yes", help="agree to every step (simulated robots only)")] = False,
+    json_: Json = False,
+) -> int:
+    """Look at a robot before it is trusted: versions, rates, noise, jaws, pads, walls; asks before it moves."""
+    from glotouch_bt.mission.load import load_mission
+    from glotouch_bt.mission.worlds import load_conditions
+    from glotouch_bt.robot import BadInput, load_backend
+    from glotouch_bt.study.doctor import Finding, nearly_empty, visit
+
+    options = read_settings(set_)
+    chosen = load_backend(backend)
+    real = getattr(chosen, "is_real", lambda _: False)(options)
+    if yes and real:
+        raise BadInput("--yes is for simulated robots; a real one is looked at step by step")
+    if not yes and not sys.stdin.isatty():
+        raise BadInput("nobody can be asked here (no terminal); --yes agrees to everything on simulated robots")
+    world, findings = load_mission(mission, {}).world, list[Finding]()
+    if not real:
+        world = nearly_empty(world)
+
+    def ask(question: str) -> bool:
+        return yes or typer.confirm(question, err=True)
+
+    def tell(finding: Finding) -> None:
+        mark = {True: "ok", False: "LOOK", None: "--"}[finding.good]
+        sys.stdout.write(f"{mark:4s} {finding.step:6s} {finding.what:12s} {finding.text}\n")
+        sys.stdout.flush()
+
+    for finding in visit(chosen, world, load_conditions(conditions), options, ask, sure=not yes):
+        findings.append(finding)
+        if not json_:
+            tell(finding)
+    if json_:
+        sys.stdout.write(json.dumps([f.as_dict() for f in findings], indent=2) + "\n")
+    return 0 if all(f.good is not False for f in findings) else 1

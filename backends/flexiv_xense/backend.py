@@ -92,6 +92,14 @@ class FlexivXenseBackend(Backend):
         """See `Backend`; options in `Options`. Conditions and seed are for simulated devices."""
         return self.connect(world, conditions, seed, read_options(options))
 
+    def look(self, world: World, conditions: Conditions, options: Mapping[str, object]) -> Robot:
+        """Connect without enabling, switching or commanding anything: for `glotouch doctor`."""
+        return self.connect(world, conditions, 0, read_options(options), move=False)
+
+    def is_real(self, options: Mapping[str, object]) -> bool:
+        """True if these options mean a real arm."""
+        return read_options(options).devices == "real"
+
     def connect(
         self,
         world: World,
