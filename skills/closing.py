@@ -1,8 +1,14 @@
-"""Closing the jaws on something that is not in their middle: the hand gives way to it and never presses hard."""
+"""Closing the jaws on something that is not in their middle, and letting it go: the hand gives way, never presses hard.
+
+A jaw's own push never reaches the robot's hard limit. A fingertip does that stands on a part of the object, a foot or a
+step, while the jaws tilt the object or drag it along: it turns between fingertip and floor like a sprag, and the force
+upwards grows with every tenth of a millimetre. So the jaw force rises by a ramp that what the hand feels can end, and
+the jaws open as weakly as they close: what they drag stalls them, and the hand goes the way it is pushed.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -14,20 +20,32 @@ GENTLE_N = 3.0
 """Jaw force until both jaws rest. Coupled jaws of which only one touches push with twice their force: 6 N slide the
 heaviest object of CONDITIONS (3.1 N of friction) and harm none, where 20 N (squeeze) or 60 N (grasp) would tilt and
 wedge what cannot slide."""
+RAMP_N_S = 100.0
+"""Rise of the jaw force after that, one newton a control period. At once, 10 N of jaw force were 20 N on the hand
+within a period where a fingertip stood on a foot."""
 YIELD_N = 3.0
 """Force along y_P at which the hand gives way: an object that slides on the floor resists with less."""
 RELEASED_N = 1.0
 """Given way far enough; and a push from the other side of more than this means that both jaws touch."""
-GIVE_UP_N, WEDGED_N = 20.0, 12.0
-"""Force on the hand at which a closure ends. Source: two thirds of the robot's own limit; it rises by 0.1 N/ms. While
-the jaws close gently they cannot push with more than 6 N: what presses harder then is wedged between them or stands on
-a fingertip, and pressing would only lever it up."""
+WEDGED_N, STOOD_N, STOOD_SHARE, GIVE_UP_N = 12.0, 10.0, 0.6, 20.0
+"""Force on the hand at which a closure ends: the first while gentle jaws close, which cannot push with more than 6 N;
+the second, or this share of a larger jaw force, while resting jaws press (on slopes as on walls 97 of 100 stay below
+4 N at 10 N of jaw force); never more than the last, two thirds of the robot's own limit. What presses harder is wedged
+or stands on a fingertip, and pressing would only lever it up."""
 PACE = 0.75
 """Speed of giving way against the closing speed; half of it would only keep the jaw that touches where it is."""
 LEAST_STEP_M = 0.0005
 TIMEOUT_S = 4.0
-LETTING_GO_M_S, LET_GO_M, LETTING_GO_S, OPENING_M_S = 0.04, 0.003, 0.3, 0.2
-"""Opening begins slowly until the jaws are so much farther apart, or so long: what is held askew springs back."""
+LETTING_GO_M_S, LETTING_GO_N, LET_GO_M, LETTING_GO_S, OPENING_M_S, OPENING_N = 0.02, 2.0, 0.003, 0.5, 0.2, 10.0
+"""Opening begins slowly and weakly, until the jaws are so much farther apart, or so long: what is held askew springs
+back, and what a fingertip stands on is dragged along with twice this force at most."""
+LOOSE_N, CAUGHT_N, FREED_N = 0.5, 4.0, 1.0
+"""Jaws that hold with less than the first should not be felt: more than the second on the hand, and it is caught; less
+than the third, and it is free again."""
+FREEING_M, FREEING_M_S, LEAST_TIP_M = 0.006, 0.02, 0.002
+"""How far the hand goes the way it is pushed, how fast, and how near to the floor a fingertip may come."""
+
+Watcher = Callable[[Observation], None]
 
 
 def _no_one(seen: Observation) -> None:
@@ -35,12 +53,7 @@ def _no_one(seen: Observation) -> None:
 
 
 def close_gently(
-    arm: Arm,
-    speed_m_s: float,
-    force_N: float,
-    *,
-    tactile: bool = False,
-    seen_by: Callable[[Observation], None] = _no_one,
+    arm: Arm, speed_m_s: float, force_N: float, *, tactile: bool = False, seen_by: Watcher = _no_one
 ) -> Motion[GripperState]:
     """Close with little force until the jaws rest, then press; while only one jaw touches, the hand moves its way.
 
@@ -60,74 +73,129 @@ def close_gently(
         The last report of the jaws.
 
     Raises:
-        MotionRefused: The hand was pressed with more than `WEDGED_N` while closing, `GIVE_UP_N` while pressing; the
-            jaws have opened again.
+        MotionRefused: The hand was pressed with more than `WEDGED_N` while closing, `STOOD_N` or `STOOD_SHARE` of the
+            jaw force while pressing; the jaws have opened again.
     """
-    opening = arm.aperture_m
-    start_B = arm.pose_B_P.position_m
-    state: GripperState | None = None
-    for force, give_up in ((GENTLE_N, WEDGED_N), (force_N, GIVE_UP_N)):
-        if force <= force_N:
-            state = yield from _close(arm, speed_m_s, force, give_up, opening, start_B, tactile, seen_by)
-    assert state is not None
+    closing = _Closing(arm, speed_m_s, tactile, seen_by)
+    state = yield from closing.until_rest([min(GENTLE_N, force_N)])
+    if force_N > GENTLE_N:
+        steps = int(np.ceil((force_N - GENTLE_N) / (RAMP_N_S * arm.period_s) - 1e-9))
+        state = yield from closing.until_rest(np.linspace(GENTLE_N, force_N, steps + 1)[1:].tolist())
     return state
 
 
-def _close(
-    arm: Arm,
-    speed_m_s: float,
-    force_N: float,
-    give_up_N: float,
-    opening_m: float,
-    start_B: Array,
-    tactile: bool,
-    seen_by: Callable[[Observation], None],
-) -> Motion[GripperState]:
-    """One stage: until the jaws rest under `force_N`."""
-    yield from arm.jaws(
-        0.0, speed_m_s=speed_m_s, force_N=force_N, timeout_s=arm.period_s, tactile=tactile, on_observation=seen_by
-    )
-    watch = JawWatch(arm.period_s)
-    for _ in range(round(TIMEOUT_S / arm.period_s)):
-        (seen,) = yield from arm.hold(arm.period_s, tactile=tactile)
-        seen_by(seen)
-        force = _force_P(seen)
-        if not np.linalg.norm(force) <= give_up_N:
-            yield from let_go(arm, opening_m)
-            raise MotionRefused(
-                "closing", f"the hand was pressed with {np.linalg.norm(force):.0f} N while the jaws closed"
+class _Closing:
+    """One closure: what its stages share."""
+
+    def __init__(self, arm: Arm, speed_m_s: float, tactile: bool, seen_by: Watcher) -> None:
+        self._arm, self._speed_m_s, self._tactile, self._seen_by = arm, speed_m_s, tactile, seen_by
+        self._opening_m, self._start_B = arm.aperture_m, arm.pose_B_P.position_m
+
+    def until_rest(self, forces_N: Sequence[float]) -> Motion[GripperState]:
+        """Close under each force for one period, then under the last one until the jaws rest."""
+        arm = self._arm
+        watch = JawWatch(arm.period_s)
+        for k in range(round(TIMEOUT_S / arm.period_s)):
+            force_N = forces_N[min(k, len(forces_N) - 1)]
+            seen = yield from self._one_period(force_N if k < len(forces_N) else None)
+            pressed = float(np.linalg.norm(_force_P(seen)))
+            if not pressed <= _most_N(force_N):
+                yield from let_go(arm, self._opening_m)
+                raise MotionRefused("closing", f"the hand was pressed with {pressed:.0f} N while the jaws closed")
+            if k >= len(forces_N) and watch.still(seen.now_s, seen.gripper):
+                break
+            yield from self._give_way(seen)
+        return watch.state()
+
+    def _one_period(self, force_N: float | None) -> Motion[Observation]:
+        """Hold the arm one period, with a new limit of the jaw force if one is given."""
+        arm, blocks = self._arm, list[Observation]()
+        if force_N is None:
+            blocks = yield from arm.hold(arm.period_s, tactile=self._tactile)
+        else:
+            yield from arm.jaws(
+                0.0,
+                speed_m_s=self._speed_m_s,
+                force_N=force_N,
+                timeout_s=arm.period_s,
+                tactile=self._tactile,
+                on_observation=blocks.append,
             )
-        if watch.still(seen.now_s, seen.gripper):
-            break
-        if seen.gripper.moving and abs(force[1]) > max(YIELD_N, seen.gripper.force_N):
-            side = float(np.sign(force[1]))
-            y_B = np.asarray(arm.pose_B_P.rotation[:, 1])
-            given = side * float((arm.pose_B_P.position_m - start_B) @ y_B)
-            room = 0.5 * (opening_m - arm.aperture_m) - given
-            if room > LEAST_STEP_M:
-                yield from arm.shift(
-                    side * room * y_B,
-                    PACE * speed_m_s,
-                    guard=_until_released(side, seen_by),
-                    check=False,
-                    tactile=tactile,
-                    what="give way",
-                )
-    return watch.state()
+        self._seen_by(blocks[-1])
+        return blocks[-1]
+
+    def _give_way(self, seen: Observation) -> Motion[None]:
+        """Follow a jaw that pushes alone, if one does."""
+        arm, force = self._arm, float(_force_P(seen)[1])
+        if not (seen.gripper.moving and abs(force) > max(YIELD_N, seen.gripper.force_N)):
+            return
+        side = float(np.sign(force))
+        y_B = np.asarray(arm.pose_B_P.rotation[:, 1])
+        given = side * float((arm.pose_B_P.position_m - self._start_B) @ y_B)
+        room = 0.5 * (self._opening_m - arm.aperture_m) - given
+        if room > LEAST_STEP_M:
+            yield from arm.shift(
+                side * room * y_B,
+                PACE * self._speed_m_s,
+                guard=_until_released(side, self._seen_by),
+                check=False,
+                tactile=self._tactile,
+                what="give way",
+            )
+
+
+def _most_N(jaw_N: float) -> float:
+    """Force on the hand at which a closure under this jaw force ends."""
+    return WEDGED_N if jaw_N <= GENTLE_N else min(max(STOOD_N, STOOD_SHARE * jaw_N), GIVE_UP_N)
 
 
 def let_go(arm: Arm, opening_m: float) -> Motion[None]:
-    """Open the jaws to `opening_m`, slowly until they are off what they held."""
-    held = arm.aperture_m
-    yield from arm.jaws(opening_m, speed_m_s=LETTING_GO_M_S, timeout_s=arm.period_s)
+    """Open the jaws to `opening_m`, slowly and weakly until they are off what they held.
+
+    If the hand is still pressed once the jaws hold nothing, a fingertip stands on something or is caught under it: the
+    hand goes the way it is pushed until it is free.
+    """
+    held, given = arm.aperture_m, 0.0
+    force_N = LETTING_GO_N
+    yield from _turn_jaws(arm, opening_m, LETTING_GO_N)
     for _ in range(round(LETTING_GO_S / arm.period_s)):
         if arm.aperture_m > held + LET_GO_M:
+            force_N = OPENING_N
             break
-        yield from arm.hold(arm.period_s)
-    yield from arm.jaws(opening_m, speed_m_s=OPENING_M_S)
+        (seen,) = yield from arm.hold(arm.period_s)
+        force = _force_P(seen)
+        if seen.gripper.force_N < LOOSE_N and np.linalg.norm(force) > CAUGHT_N and given < FREEING_M - LEAST_STEP_M:
+            yield from _turn_jaws(arm, arm.aperture_m, LETTING_GO_N)
+            given += yield from _free(arm, force, FREEING_M - given)
+            yield from _turn_jaws(arm, opening_m, LETTING_GO_N)
+    yield from arm.jaws(opening_m, speed_m_s=OPENING_M_S, force_N=force_N)
 
 
-def _until_released(side: float, seen_by: Callable[[Observation], None]) -> Callable[[Observation], str | None]:
+def _turn_jaws(arm: Arm, aperture_m: float, force_N: float) -> Motion[None]:
+    """Send the jaws elsewhere, slowly; one period."""
+    yield from arm.jaws(aperture_m, speed_m_s=LETTING_GO_M_S, force_N=force_N, timeout_s=arm.period_s)
+
+
+def _free(arm: Arm, force_P_N: Array, most_m: float) -> Motion[float]:
+    """Go the way the hand is pushed (3,) until it is free, `most_m` at most; how far it went, at least a step."""
+    container, tip_m = arm.world.container, arm.description.gripper.fingertip_below_P_m
+    way_B = arm.pose_B_P.rotation @ (force_P_N / np.linalg.norm(force_P_N))
+    down = -float(container.pose_B_K.rotation[:, 2] @ way_B)
+    room = float(container.pose_B_K.inverse().apply(arm.pose_B_P.position_m)[2]) - tip_m - LEAST_TIP_M
+    length = most_m if down <= 0.0 else min(most_m, max(room, 0.0) / down)
+    if length < LEAST_STEP_M:
+        return most_m
+    moved = yield from arm.shift(
+        length * way_B,
+        FREEING_M_S,
+        guard=lambda seen: "free" if np.linalg.norm(_force_P(seen)) < FREED_N else None,
+        check=False,
+        what="free the hand",
+    )
+    return max(moved.travelled_m, LEAST_STEP_M)
+
+
+def _until_released(side: float, seen_by: Watcher) -> Callable[[Observation], str | None]:
     def guard(seen: Observation) -> str | None:
         seen_by(seen)
         force = _force_P(seen)

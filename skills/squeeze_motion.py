@@ -45,15 +45,19 @@ def body_bottom_m(gripper: Gripper) -> float:
     return max(b.centre_m[2] + b.half_m[2] for b in gripper.body)
 
 
+def lowest_pads_m(height_m: float, gripper: Gripper) -> float:
+    """Least height of the pads' mid-point over an object of a height: fingertips over the floor, body over its top."""
+    body_above_P = gripper.pose_E_P.position_m[2] - body_bottom_m(gripper)
+    return float(max(gripper.fingertip_below_P_m, height_m - body_above_P) + HAND_CLEARANCE_M)
+
+
 def layer_heights(candidate: Candidate, gripper: Gripper, p: ClosureParams) -> Array:
     """Pad-centre heights above the floor, lowest first.
 
     A low object is squeezed up to where only the lower half of the pads still feels it: one layer a sequence would
     leave no spare.
     """
-    lowest = gripper.fingertip_below_P_m + HAND_CLEARANCE_M
-    body_limit = candidate.height_m + HAND_CLEARANCE_M - (gripper.pose_E_P.position_m[2] - body_bottom_m(gripper))
-    lowest = max(lowest, body_limit)
+    lowest = lowest_pads_m(candidate.height_m, gripper)
     highest = max(candidate.height_m - p.top_overlap_m, min(lowest + p.layer_gap_m, candidate.height_m), lowest)
     least = 1 if highest - lowest < LEAST_GAP_M else min(2, p.layers)
     count = int(np.clip(np.floor((highest - lowest) / p.layer_gap_m) + 1, least, p.layers))
@@ -110,7 +114,6 @@ class Squeezing:
         """
         p, arm = self._p, self._context.arm
         gripper = arm.description.gripper
-        height = pads_height_m(self._context)
         closing: list[Observation] = []
         yield from close_gently(arm, p.closing_speed_m_s, p.force_N, tactile=True, seen_by=closing.append)
         command = Command(gripper=GripperTarget(0.0, p.closing_speed_m_s, p.force_N), tactile=True)
@@ -125,7 +128,7 @@ class Squeezing:
         measured = self._context.world.container.pose_B_K.inverse().apply(blocks[-1].pose_B_P.position_m)
         layer = make_layer(
             blocks,
-            height_m=height,
+            height_m=float(measured[2]),
             position_K_m=measured[:2],
             yaw_rad=self.yaw_K_rad,
             force_N=p.force_N,

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import Array, MotionRefused, Pose, World
 from glotouch_bt.robot.fake import FakeRobot
-from skills.closing import GENTLE_N, GIVE_UP_N, WEDGED_N, YIELD_N, close_gently
+from skills.closing import GENTLE_N, GIVE_UP_N, RAMP_N_S, WEDGED_N, YIELD_N, close_gently, let_go
 
 STIFFNESS_N_M = 2500.0
 """Of a standing object pushed sideways by one jaw, as MuJoCo showed it (1.5 N in 0.6 mm)."""
@@ -73,8 +73,11 @@ def test_full_force_comes_only_when_the_jaws_rest(bench: Any, world: World, forc
     seen: list[Any] = []
     b.go(close_gently(b.arm, SPEED_M_S, force_N, seen_by=seen.append))
     assert max(robot.felt_N) <= 2 * GENTLE_N + 1e-9
-    forces = [c.gripper.force_N for c in b.commands if c.gripper is not None]
-    assert forces == ([force_N] if force_N < GENTLE_N else [GENTLE_N, force_N])
+    forces = np.array([c.gripper.force_N for c in b.commands if c.gripper is not None])
+    assert forces[0] == min(force_N, GENTLE_N)
+    assert forces[-1] == pytest.approx(force_N)
+    assert np.all(np.diff(forces) > 0.0)
+    assert np.all(np.diff(forces) <= RAMP_N_S * b.arm.period_s + 1e-9), "a ramp: what wedges is felt before it presses"
     assert len(seen) > 0.95 * len(b.commands), "all is shown but the braking of giving way"
 
 
@@ -85,3 +88,44 @@ def test_what_presses_the_hand_away_ends_the_closure(bench: Any, world: World) -
         b.go(close_gently(b.arm, SPEED_M_S, 10.0))
     assert max(robot.felt_N) < 1.3 * WEDGED_N < GIVE_UP_N, "it is known while the jaws are gentle"
     assert b.arm.aperture_m == pytest.approx(RIZON4_XENSE.gripper.stroke_m, abs=1e-3)
+
+
+class Sprag(FakeRobot):
+    """A fingertip stands on a foot: `held_N` up at rest, more the farther the opening jaws drag the foot along.
+
+    The foot turns up by `LIFT` per metre of jaw travel against a fingertip of `STIFF_N_M`; going up frees it.
+    """
+
+    LIFT, STIFF_N_M = 1.5, 7000.0
+
+    def __init__(self, held_N: float) -> None:
+        self.held_m, self.grip_m, self.low_B_z = held_N / self.STIFF_N_M, 0.0, 0.0
+        self.felt_N: list[float] = []
+        super().__init__(RIZON4_XENSE, wrench=self._pushed, grip_width_m=WIDTH_M)
+
+    def start_here(self) -> None:
+        """The jaws hold; the hand is where the foot is met."""
+        self.grip_m, self.low_B_z = self._aperture, float(self.observe().position_B_P[-1][2])
+
+    def _pushed(self, stamp: Array, position: Array, quat: Array) -> Array:
+        out = np.zeros((len(position), 6))
+        if self.grip_m:
+            dragged = min(max(self._aperture - self.grip_m, 0.0), 0.003)
+            deep = self.held_m + self.LIFT * dragged - (position[:, 2] - self.low_B_z)
+            out[:, 2] = -self.STIFF_N_M * np.maximum(deep, 0.0)
+            self.felt_N += list(np.abs(out[:, 2]))
+        return out
+
+
+@pytest.mark.parametrize("held_N", [0.0, 3.0, 9.0])
+def test_a_foot_under_a_fingertip_frees_the_hand_when_it_lets_go(bench: Any, world: World, held_N: float) -> None:
+    """Opening regardless would press with 7000 N/m x 1.5 x 3 mm = 31 N more before the jaws are off."""
+    robot = Sprag(held_N)
+    b = bench().on(world, robot)
+    b.go(b.arm.jaws(0.0))
+    robot.start_here()
+    z = float(b.arm.pose_B_P.position_m[2])
+    b.go(let_go(b.arm, 0.07))
+    assert b.arm.aperture_m == pytest.approx(0.07, abs=1e-3)
+    assert max(robot.felt_N) < held_N + 10.0
+    assert float(b.arm.pose_B_P.position_m[2]) > z, "the way it was pushed"

@@ -32,8 +32,9 @@ def test_the_jaws_close_at_the_place(make) -> None:
     np.testing.assert_allclose(b.arm.pose_B_P.position_m, [0.61, 0.04, -0.17], atol=1e-5)
     assert abs(np.sin(b.arm.pose_B_P.yaw_rad - 0.3)) < 1e-6
     targets = [c.gripper for c in b.commands if c.gripper is not None]
-    assert [round(t.aperture_m, 6) for t in targets] == [0.07, 0.0, 0.0]
-    assert [t.force_N for t in targets[1:]] == [3.0, 30.0]
+    assert {round(t.aperture_m, 6) for t in targets[1:]} == {0.0}
+    assert round(targets[0].aperture_m, 6) == 0.07
+    assert (targets[1].force_N, targets[-1].force_N) == (3.0, 30.0)
 
 
 def test_nothing_between_the_jaws_is_no_grasp(make) -> None:
