@@ -1,7 +1,8 @@
 """The simulated arm with its control box: what the vendor's firmware does between the calls of its API.
 
-ASSUMED, because it is not documented: the latencies and decelerations in this file, that a wrench below its maximum is
-kept by giving way at the tool (`_give_way`), and that an arm whose client is gone brakes after LINK_LOST_S.
+ASSUMED, because it is not documented: the latencies and decelerations in this file, that the contact wrench is kept
+below its maximum by bounding what the motors exert at the tool (`_pressing`; an impact's first milliseconds are not
+bounded by it), and that an arm whose client is gone brakes after LINK_LOST_S.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from backends.flexiv_xense.simulated.kinematics import Kinematics, inverse
+from backends.flexiv_xense.simulated.kinematics import Kinematics, inverse, rotation_between
 from backends.flexiv_xense.simulated.trajectory import Trajectory, cubic_extremes, shortest
 from backends.mujoco.arm_model import DAMPING_PER_STIFFNESS_S, JOINT_DAMPING, STIFFNESS_NM_RAD
 from backends.mujoco.model import STEP_S, Handles
@@ -27,8 +28,9 @@ STOP_RAD_S2 = 2.0 / BRAKE_REACH_M  # 2 m/s2 at the hand
 LINK_LOST_S = 0.1
 FILTER_S = 0.010  # time constant of the filtered wrench
 OFFSET_SD = np.array([1.0, 1.0, 1.0, 0.05, 0.05, 0.05])  # reading of a sensor that has not been zeroed, N and Nm
-GIVE_WAY_S = 0.010  # time constant of giving way, and
-COME_BACK_S = 0.3  # of coming back
+PARTED = 0.25  # share of the maximum contact wrench below which, for
+PARTED_STEPS = 100  # so long, the motors' wrench is not bounded any more
+STILL_RAD_S = 1e-3
 NOMINAL_STIFFNESS = np.array([10000.0, 10000.0, 10000.0, 1500.0, 1500.0, 1500.0])  # N/m and Nm/rad
 
 
@@ -115,8 +117,8 @@ class Arm:
         self.load = FLANGE
         self._carry: Array | None = None
         self._max_wrench: Array | None = None
-        self._least = (np.inf, np.inf)
-        self._aside, self._yielding = np.zeros(description.dof), False
+        self._per_most = (0.0, 0.0)
+        self._bounding = 0
         self.reference_q = self.trajectory.q
         self._lost_steps: int | None = None
         first = np.array(data.sensordata)
@@ -178,13 +180,17 @@ class Arm:
         now.go(q, dq + (null / time_s if twist_B.any() else 0.0), time_s)
         return True
 
+    @property
+    def stopped(self) -> bool:
+        """It stands, and was not told to go on."""
+        return self.trajectory.at_rest and float(np.abs(self.sample.row[self.sensors.dq]).max()) < STILL_RAD_S
+
     def limit_wrench(self, most: Array | None) -> None:
         """Bound the contact wrench's components (6,), N and Nm, from now on; None does not."""
         self._max_wrench = most
-        if most is None:
-            self._aside[:], self._yielding = 0.0, False
-        else:
-            self._least = float(most[:3].min()) ** 2, float(most[3:].min()) ** 2
+        self._bounding = 0
+        if most is not None:
+            self._per_most = max(float(most[:3].min()), 1e-6) ** -2, max(float(most[3:].min()), 1e-6) ** -2
 
     def brake(self) -> None:
         """Stop where braking leads."""
@@ -217,16 +223,17 @@ class Arm:
             if self._lost_steps == 0:
                 self.brake()
         q, dq, ddq = self.trajectory.advance()
-        np.multiply(self._lead, dq, out=ctrl)
-        ctrl += q
-        if np.count_nonzero(ddq):
-            self._vector[self._h.arm_dof] = ddq
-            mujoco.mj_mulM(self._model, self._data, self._product, self._vector)
-            ctrl += self._product[self._h.arm_dof] * self._per_kp
+        if self._bounding and self._max_wrench is not None:
+            ctrl[:] = self._pressing(q, self._max_wrench)
+        else:
+            ctrl[:] = q
+            ctrl += self._lead * dq
+            if np.count_nonzero(ddq):
+                self._vector[self._h.arm_dof] = ddq
+                mujoco.mj_mulM(self._model, self._data, self._product, self._vector)
+                ctrl += self._product[self._h.arm_dof] * self._per_kp
         if self._carry is not None:
             ctrl += self._carry
-        if self._yielding:
-            ctrl += self._aside
 
     def sense(self, step: int, row: Array) -> None:
         """Take the sensor row of the step just done; `row` is kept."""
@@ -241,7 +248,13 @@ class Arm:
         filtered = last + (STEP_S / FILTER_S) * (wrench - last)
         self.sample = Sample(step, row, wrench, filtered, measured)
         if self._max_wrench is not None:
-            self._give_way(self.load.at_T @ wrench, row[s.quat])
+            at_T = self.load.at_T @ wrench
+            f, m = at_T[:3], at_T[3:]
+            share = max(float(f @ f) * self._per_most[0], float(m @ m) * self._per_most[1])
+            if share > 1.0:
+                self._bounding = PARTED_STEPS
+            elif self._bounding and share < PARTED**2:
+                self._bounding -= 1
 
     def carry(self) -> None:
         """Renew the motors' share of the load that is not the hand's own; called every control period."""
@@ -259,29 +272,17 @@ class Arm:
         j = self._jacobian[:, h.arm_dof]
         self._carry = GRAVITY_M_S2 * (extra * j[2] + arm[1] * j[3] - arm[0] * j[4]) * self._per_kp
 
-    def _give_way(self, wrench_S: Array, quat_B_S: Array) -> None:
-        """Move the servo's target aside while a component of the contact wrench (at T, in B) is beyond its maximum."""
-        most = self._max_wrench
-        assert most is not None
-        f, m = wrench_S[:3], wrench_S[3:]
-        if not self._yielding and f @ f < self._least[0] and m @ m < self._least[1]:
-            return  # in no axes can a component be beyond its maximum
-        rotation_B_S = quat_to_matrix(quat_B_S)
-        wrench_B = np.concatenate([rotation_B_S @ f, rotation_B_S @ m])
-        excess = wrench_B - np.clip(wrench_B, -most, most)
-        if not excess.any():
-            self._aside *= 1.0 - STEP_S / COME_BACK_S
-            if float(np.abs(self._aside).max()) < 1e-7:
-                self._aside[:], self._yielding = 0.0, False
-            return
-        self._yielding = True
-        h, d = self._h, self._data
-        mujoco.mj_jac(
-            self._model,
-            d,
-            self._jacobian[:3],
-            self._jacobian[3:],
-            d.site_xpos[h.sensor_site] + rotation_B_S @ self.load.pose_E_T.position_m,
-            h.hand_bodies.start,
-        )
-        self._aside += inverse(self._jacobian[:, h.arm_dof]) @ (excess / NOMINAL_STIFFNESS) * (STEP_S / GIVE_WAY_S)
+    def _pressing(self, q: Array, most: Array) -> Array:
+        """Servo commands (dof,) towards the setpoint `q` (dof,) with at most the contact wrench `most` (in B, at P).
+
+        A spring of the nominal stiffness pulls P to where the setpoint puts it, each component of its wrench bounded;
+        the damper works against standstill, and what the redundant freedom is told stays.
+        """
+        row, k = self.sample.row, self.kinematics
+        goal, turned, _ = k.at(q)
+        j = k.at(row[self.sensors.q])[2]
+        away = rotation_between(turned, quat_to_matrix(row[self.sensors.quat]))
+        spring = NOMINAL_STIFFNESS * np.concatenate([goal - row[self.sensors.position], away])
+        stretch = (q - row[self.sensors.q]) / self._per_kp
+        redundant = stretch - j.T @ (inverse(j).T @ stretch)
+        return np.asarray(row[self.sensors.q] + (j.T @ np.clip(spring, -most, most) + redundant) * self._per_kp)

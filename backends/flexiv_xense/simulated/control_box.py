@@ -139,10 +139,9 @@ class ControlBox:
 
     def stand_still(self) -> None:
         """Brake if moving, and wait for it."""
-        trajectory = self.arm.trajectory
-        if not trajectory.at_rest:
+        if not self.arm.trajectory.at_rest:
             self.arm.brake()
-        self.wait_until(lambda: trajectory.at_rest)
+        self.wait_until(lambda: self.arm.stopped)
 
     def switch(self, mode: Mode) -> None:
         """Stop, change the mode, wait for it."""

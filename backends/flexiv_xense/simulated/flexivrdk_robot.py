@@ -95,7 +95,7 @@ class Robot:
 
     def stopped(self) -> bool:
         """Whether it stands."""
-        return self._box.arm.trajectory.at_rest and float(np.abs(self.states().dq).max()) < 1e-3
+        return self._box.arm.stopped
 
     def reduced(self) -> bool:
         """Whether a safety input has reduced it."""
@@ -308,7 +308,7 @@ class Robot:
         most = within("max_wrench", numbers("max_wrench", max_wrench, 6), 0.0, np.inf)
         self._box.need_mode(CARTESIAN)
         self._box.wait(REQUEST_S)
-        self._box.arm.limit_wrench(None) if bool(np.isinf(most).all()) else most
+        self._box.arm.limit_wrench(None if bool(np.isinf(most).all()) else most)
 
     def SetNullSpacePosture(self, ref_positions: Numbers) -> None:
         """Pull the redundant freedom to a posture, until the mode is entered again."""
