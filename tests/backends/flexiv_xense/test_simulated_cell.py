@@ -1,0 +1,104 @@
+"""The cell: a world that outlives its clients. kill -9 of a client that moves the arm: how the arm comes to rest."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from backends.flexiv_xense.simulated import PAD_SNS, ROBOT_SN, DistantVendor, open_vendor_at
+from backends.flexiv_xense.simulated.arm import LINK_LOST_S, STOP_RAD_S2
+from glotouch_bt.robot import Conditions
+from tests.testing.conformance_world import OPTIONS, WORLD
+
+pytestmark = pytest.mark.slow
+SPEED_M_S = 0.10
+REACH_M = 0.65  # of P from the first axis, which does most of this motion
+ROOT = Path(__file__).parents[3]
+
+
+def wait(seconds: float) -> None:
+    threading.Event().wait(seconds)
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Iterator[Path]:
+    """A running cell's folder: `socket` and `log`."""
+    (tmp_path / "world").write_bytes(pickle.dumps((WORLD, Conditions(), 0, OPTIONS)))
+    module = "backends.flexiv_xense.simulated.cell"
+    command = [sys.executable, "-m", module, tmp_path / "world", tmp_path / "socket", tmp_path / "log"]
+    process = subprocess.Popen(command, cwd=ROOT)
+    yield tmp_path
+    process.terminate()
+    assert process.wait(20.0) == 0
+
+
+def events(folder: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in (folder / "log").read_text().splitlines()]
+
+
+def until(found: Callable[[], Any], limit_s: float = 60.0) -> Any:
+    for _ in range(round(limit_s / 0.05)):
+        value = found()
+        if value:
+            return value
+        wait(0.05)
+    raise AssertionError(f"nothing within {limit_s} s")
+
+
+def test_a_killed_clients_arm_stands_still(cell: Path) -> None:
+    """Within LINK_LOST_S and the time of braking; the way is bounded by both."""
+    command = [sys.executable, "-m", "tests.backends.flexiv_xense.cell_client", cell / "socket", str(SPEED_M_S)]
+    for round_number in range(3):
+        client = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+        assert client.stdout is not None
+        assert client.stdout.readline().strip() == "moving"
+        wait(0.3 + 0.13 * round_number)
+        client.kill()
+        client.wait()
+        client.stdout.close()
+        still = until(lambda n=round_number: [e for e in events(cell) if e["event"] == "standstill"][n:])[0]
+        lost = [e for e in events(cell) if e["event"] == "client lost"][round_number]
+        braking_s = SPEED_M_S / REACH_M / STOP_RAD_S2
+        assert lost["speed_m_s"] < 1.2 * SPEED_M_S
+        assert still["after_s"] < LINK_LOST_S + braking_s + 0.2, "0.2 s: the servo's lag, down to 1 mm/s"
+        assert still["travel_m"] < SPEED_M_S * (LINK_LOST_S + 0.5 * braking_s) + 0.003
+        assert still["peak_force_N"] == 0.0, "in free space"
+
+
+def test_calls_pass_with_their_values_and_errors(cell: Path) -> None:
+    vendor: DistantVendor = open_vendor_at(str(cell / "socket"))
+    rdk = vendor.flexivrdk
+    with pytest.raises(ValueError, match="serial"):
+        rdk.Robot("Rizon4")
+    robot = rdk.Robot(ROBOT_SN)
+    assert robot.mode() is rdk.Mode.IDLE
+    first = robot.states()
+    wait(0.1)
+    assert robot.states().timestamp > first.timestamp, "it lives by itself"
+    with pytest.raises(RuntimeError, match="operational"):
+        robot.SwitchMode(rdk.Mode.NRT_JOINT_POSITION)
+    tool, params = rdk.Tool(robot), rdk.ToolParams()
+    params.mass, params.tcp_location = 0.5, [0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0]
+    tool.Add("hand", params)
+    assert tool.params("hand").mass == 0.5
+    gripper = vendor.xensegripper.XenseGripper.create("000000000001")
+    until(gripper.get_gripper_status)
+    gripper.set_position(20.0, 100.0, 10.0)
+    until(lambda: abs(gripper.get_gripper_status()["position"] - 20.0) < 0.1)
+    kinds = vendor.xensesdk.Sensor.OutputType
+    pad = vendor.xensesdk.Sensor.create(PAD_SNS[1])
+    depth = until(lambda: (pad.selectSensorInfo(kinds.Depth) is not None) and [pad.selectSensorInfo(kinds.Depth)])[0]
+    assert np.asarray(depth).shape == (700, 400)
+    peak = pickle.loads(vendor.referee(pickle.dumps(("peak_force_N", ()))))
+    assert peak >= 0.0
+    pickle.loads(vendor.referee(pickle.dumps(("disturb", ("fault",)))))
+    assert robot.fault()
