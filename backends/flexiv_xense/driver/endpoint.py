@@ -6,6 +6,7 @@ and only clients whose public keys lie in the keys' folder are let in.
 
 from __future__ import annotations
 
+import select
 from pathlib import Path
 from types import TracebackType
 
@@ -51,6 +52,7 @@ class DriverSocket:
             self._socket.curve_publickey, self._socket.curve_secretkey = public, secret
             self._socket.curve_server = True
         self._socket.bind(address)
+        self._wakes = int(self._socket.getsockopt(zmq.FD))
         self._client: bytes | None = None
 
     def receive(self, timeout_s: float) -> Request | None:
@@ -73,6 +75,11 @@ class DriverSocket:
             self._answer(sender, Failed(number=number, kind="connect", message="the driver has another client"))
             return None
         return request
+
+    def wait(self, timeout_s: float) -> bool:
+        """Until something may have come, at most `timeout_s`, exactly. All must have been received before."""
+        ready, _, _ = select.select([self._wakes], [], [], timeout_s)
+        return bool(ready)
 
     def send(self, answer: Answer) -> None:
         """To the client; dropped if it is gone."""

@@ -182,17 +182,22 @@ class Paced(_Loop):
             now = clock.now_s()
             if now - due > BEHIND_S:
                 due = now
-            clock.sleep_until(due)
-            now, tick = clock.now_s(), tick + 1
+            tick += 1
             try:
+                while True:
+                    while (request := socket.receive(0.0)) is not None:
+                        heard = clock.now_s()
+                        if isinstance(request, Cycle):
+                            waiting, commanded = request, heard
+                            session.command(request)
+                        elif not self._answer(request):
+                            return
+                    left = due - clock.now_s()
+                    if left <= 0.0:
+                        break
+                    socket.wait(left)
                 session.sample()
-                while (request := socket.receive(0.0)) is not None:
-                    heard = now
-                    if isinstance(request, Cycle):
-                        waiting, commanded = request, now
-                        session.command(request)
-                    elif not self._answer(request):
-                        return
+                now = clock.now_s()
                 silence.look(now - commanded)
                 if tick % steps == 0:
                     session.poll()

@@ -77,7 +77,7 @@ def test_a_client_that_is_gone_ends_the_session(open_robot: Open, tmp_path: Path
 def test_a_driver_that_is_silent_is_an_error(open_robot: Open) -> None:
     vendor = ScriptedVendor(stepped=False)
     robot = open_robot(vendor, pace="real")
-    vendor.clock.sleep_until = lambda stamp_s: time.sleep(2.0)
+    vendor.stamp = lambda: time.sleep(2.0)  # type: ignore[assignment,method-assign]
     with pytest.raises(BackendError, match="nothing heard"):
         robot.cycle(HOLD)
         robot.cycle(HOLD)
