@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
-from glotouch_bt.search import Move, Plan, SearchMap, admit, part_of, trace
+from glotouch_bt.search import Move, Plan, SearchMap, admit, of_another, part_of, trace
 from glotouch_bt.touch import Candidate, Contact
 from skills.base import In, Out, Skill, SkillFailed, SkillRun, param
 from skills.exploring import Explorer
@@ -20,10 +22,10 @@ class OrbitProbeParams(TracingParams):
     """Parameters of `orbit_probe`: a coarse outline, so that the next object is found soon."""
 
     centre_sd_m: float = param(
-        "Enough is known when the centre's standard deviation is below this", unit="m", default=0.005, gt=0.0, le=0.02
+        "Enough is known when the centre's standard deviation is below this", unit="m", default=0.006, gt=0.0, le=0.02
     )
     radial_sd_m: float = param(
-        "... and the outline's, in every direction, below this", unit="m", default=0.02, gt=0.0, le=0.03
+        "... and the outline's, in every direction, below this", unit="m", default=0.0225, gt=0.0, le=0.03
     )
     least_contacts: int = param("Fewest contacts, whatever the covariance says", default=4, ge=3, le=60)
     most_contacts: int = param("Most contacts", default=9, ge=3, le=60)
@@ -76,6 +78,7 @@ class OrbitProbe(Skill):
             round_tip=self.tool.round,
             half_extent_m=belief.half_extent_m,
             known=() if old is None else old.contacts,
+            elsewhere=partial(of_another, known) if old is None else None,
         )
         traced = yield from explorer.run(plan)
         admitted = admit(belief, known, first, traced, p.height_m, p.exclusion_m, part_of=old)

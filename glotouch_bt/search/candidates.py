@@ -36,6 +36,8 @@ OTHER = 0.02
 in its evidence."""
 FLAT_M = 1e-4
 """Contacts no wider apart than this across their line have no hull."""
+SURE, ON_M = 0.5, 0.004
+"""A candidate of this quality was touched from all sides: what is met this near to its outline is its own."""
 LARGEST_M = 0.125
 """Nothing that is looked for is longer; two things that touch are not made one beyond it."""
 
@@ -110,18 +112,27 @@ def refined(before: Candidate, traced: Trace) -> Candidate | None:
 
 
 def part_of(known: tuple[Candidate, ...], first: Contact, radius_m: float) -> Candidate | None:
-    """The candidate near a new contact that together with it is better explained as one object than as two."""
+    """The candidate a new contact is with: no other can be so near, or one object explains both better than two."""
     for old in sorted(known, key=lambda c: float(signed_distance(envelope(c), first.point_K_m[None])[0])):
         if float(signed_distance(envelope(old), first.point_K_m[None])[0]) > PART_M:
             return None
         off = first.tip_K_m[:2] - old.contour.centre_K_m
         if float(first.reaction_K[:2] @ off) < FACING * float(np.hypot(off[0], off[1])):
             continue
+        if _apart_m(old.contacts, first.point_K_m[None]) < BETWEEN_M:
+            return old
         one = _outline((*old.contacts, first), radius_m)
         two = _outline(old.contacts, radius_m).log_evidence + _outline((first,), radius_m).log_evidence
         if one.log_evidence > two + np.log(OTHER) and max(one.contour.size_m) <= TraceParams().largest_m:
             return old
     return None
+
+
+def of_another(known: tuple[Candidate, ...], contact: Contact) -> bool:
+    """Whether a contact made while something new is traced is with a candidate that is known from all sides."""
+    return any(
+        c.quality >= SURE and float(signed_distance(envelope(c), contact.point_K_m[None])[0]) < ON_M for c in known
+    )
 
 
 def _outline(contacts: tuple[Contact, ...], radius_m: float) -> OutlineBelief:

@@ -39,6 +39,7 @@ class TraceParams:
             has the object moved without being felt to? ...
         settling: ... So many contacts, the odd one included, are made before enough is known of what was known before.
         moves: An object is begun anew so many times.
+        farthest_m: Farther than this no object moves unfelt.
     """
 
     clearance_m: float = 0.003
@@ -69,3 +70,4 @@ class TraceParams:
     surprise_m: float = 0.0015
     settling: int = 3
     moves: int = 2
+    farthest_m: float = 0.015

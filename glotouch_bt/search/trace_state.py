@@ -250,14 +250,18 @@ class TraceState:
         stray, _ = split_moved(felt, radius, likely=self.known)
         if not stray:
             return False
+        stood = self.outline(_moved_along(stray), alone=True).centre_K_m
+        stands = self.outline(_moved_along(self.raw[len(stray) :]), alone=True).centre_K_m
+        if float(np.linalg.norm(stands - stood)) > p.farthest_m:
+            self.odd = -1  # it would have been felt: the outline is odder than thought
+            return False
         del self.raw[: len(stray)]
         self.given = max(self.given - len(stray), 0)
         self.odd, self.known = -1, 0
         self.blocked.clear()
         self.fresh = len(self.paths)
         self.moves += 1
-        stood = self.outline(_moved_along(stray), alone=True)
-        self.moved_K_m = self.moved_K_m + self.outline().centre_K_m - stood.centre_K_m
+        self.moved_K_m = self.moved_K_m + self.outline().centre_K_m - stood
         return True
 
     def keep_one(self, outline: OutlineBelief, p: TraceParams) -> bool:

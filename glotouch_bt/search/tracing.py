@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -31,6 +32,7 @@ def trace(
     round_tip: bool = True,
     half_extent_m: Array | None = None,
     known: tuple[Contact, ...] = (),
+    elsewhere: Callable[[Contact], bool] | None = None,
 ) -> Plan[Trace]:
     """Trace the outline of what was touched. The ball ends beside it, at sensing height.
 
@@ -42,12 +44,13 @@ def trace(
         round_tip: The section is a disc: outlines are fitted to its centres. Else to the contacts' points.
         half_extent_m: (2,) the ball's centre keeps within |x|, |y| of it in K; None: no walls near.
         known: Contacts with the same object made before, where it stands now.
+        elsewhere: Whether a contact is with another object that is known already; None: none is.
     """
     p = params or TraceParams()
     s = TraceState.begin([*_still(known), first], tip_K_m, tip_radius_m, round_tip, half_extent_m)
     s.given = len(known)
     yield from _retreat(s, p)
-    return (yield from _until_known(s, p))
+    return (yield from _until_known(s, p, elsewhere))
 
 
 def trace_more(
@@ -105,7 +108,7 @@ def _apart(worth: Array, n: int) -> list[int]:
     return chosen
 
 
-def _until_known(s: TraceState, p: TraceParams) -> Plan[Trace]:
+def _until_known(s: TraceState, p: TraceParams, elsewhere: Callable[[Contact], bool] | None = None) -> Plan[Trace]:
     """Probe on until enough is known, from beside the object.
 
     Once a contact was odd, each one asks whether the object moved without being felt to: three are needed to tell.
@@ -124,7 +127,7 @@ def _until_known(s: TraceState, p: TraceParams) -> Plan[Trace]:
         if found is None:
             missed += 1
             s.blocked.append(bearing)
-        elif s.belongs(outline, found, p):
+        elif not (elsewhere is not None and elsewhere(found)) and s.belongs(outline, found, p):
             if s.is_new(found, p):
                 missed = 0
             else:

@@ -3,8 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
-from glotouch_bt.search import SearchMap, SearchPolicy, TraceParams, admit, part_of, refined, seek, trace, trace_more
+from glotouch_bt.search import (
+    SearchMap,
+    SearchPolicy,
+    TraceParams,
+    admit,
+    of_another,
+    part_of,
+    refined,
+    seek,
+    trace,
+    trace_more,
+)
 from glotouch_bt.search.moves import Felt, Move
 from glotouch_bt.study.planar.drive import drive
 from glotouch_bt.study.planar.world import PlanarWorld
@@ -108,8 +120,10 @@ def explore(
             first, radius = sought.contact, world.tip_radius_m
             old = part_of(candidates, first, radius)
             known = () if old is None else old.contacts
+            elsewhere = partial(of_another, candidates) if old is None else None
             half = belief.half_extent_m
-            traced = drive(trace(first, world.tip_K_m, radius, tracing, half_extent_m=half, known=known), limited)
+            plan = trace(first, world.tip_K_m, radius, tracing, half_extent_m=half, known=known, elsewhere=elsewhere)
+            traced = drive(plan, limited)
             admitted = admit(belief, candidates, first, traced, orbit.height_m, orbit.exclusion_m, part_of=old)
             belief, candidates = admitted.belief, admitted.candidates
             if admitted.index is None:
