@@ -110,13 +110,13 @@ class RobotInfo:
 def _numbers(name: str, length: int) -> property:
     """A field of so many numbers: handed out as a copy, refused (TypeError) if it is anything else."""
 
-    def get(self: ToolParams) -> list[float]:
+    def _get(self: ToolParams) -> list[float]:
         return [*self._values[name]]
 
-    def put(self: ToolParams, value: Sequence[float]) -> None:
+    def _put(self: ToolParams, value: Sequence[float]) -> None:
         self._values[name] = numbers(name, value, length).tolist()
 
-    return property(get, put)
+    return property(_get, _put)
 
 
 class ToolParams:
