@@ -138,6 +138,7 @@ class ToolParams:
 
     @mass.setter
     def mass(self, value: float) -> None:
+        """TypeError if it is no number."""
         self._mass = float(numbers("mass", [value])[0])
 
     def _copy(self) -> ToolParams:
