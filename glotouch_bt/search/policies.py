@@ -12,23 +12,28 @@ from glotouch_bt.search.expectation import ExpectedFind
 from glotouch_bt.search.frontier import PAPER_PASSES, NearestFrontier
 from glotouch_bt.search.policy import SearchPolicy
 
-POLICIES: MappingProxyType[str, Callable[[], SearchPolicy]] = MappingProxyType(
+POLICIES: MappingProxyType[str, Callable[[int], SearchPolicy]] = MappingProxyType(
     {
-        "expected_find": ExpectedFind,
-        "nearest_frontier": lambda: NearestFrontier(passes=PAPER_PASSES, turn_m=0.0),
+        "expected_find": lambda seed: ExpectedFind(),
+        "nearest_frontier": lambda seed: NearestFrontier(passes=PAPER_PASSES, turn_m=0.0),
         "random_descent": RandomDescent,
     }
 )
-"""expected_find: ours (the default). nearest_frontier, random_descent: the paper's, as baselines."""
+"""expected_find: ours (the default). nearest_frontier, random_descent: the paper's, as baselines. Each is made with a
+seed."""
 
 
 @lru_cache(maxsize=8)
-def search_policy(name: str) -> SearchPolicy:
+def search_policy(name: str, seed: int = 0) -> SearchPolicy:
     """The policy of that name; stateless, so one does for all.
+
+    Args:
+        name: See `POLICIES`.
+        seed: Of what it draws, if it draws anything.
 
     Raises:
         UnknownName: There is none of that name.
     """
     if name not in POLICIES:
         raise UnknownName("search policy", name, tuple(POLICIES))
-    return POLICIES[name]()
+    return POLICIES[name](seed)

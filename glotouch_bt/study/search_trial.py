@@ -23,7 +23,7 @@ from glotouch_bt.robot.meshes import Mesh, load_folder
 from glotouch_bt.search import search_policy
 from glotouch_bt.study.launch import RunRequest, launch
 from glotouch_bt.study.planar import FeltSection, felt_section, planar_world
-from glotouch_bt.study.planar.explore import explore
+from glotouch_bt.study.planar.explore import Traced, explore, refine_all
 from glotouch_bt.study.search_scoring import Found, TrueLayout, score
 
 SWEEP_NODE, TRACE_NODE, REFINE_NODE, PICKUP_NODE = "guarded_sweep", "orbit_probe", "refine_outline", "tool_pickup"
@@ -274,12 +274,17 @@ def planar_trials(
     for seed in seeds:
         planar = planar_world(world, meshes, seed)
         row = EMPTY_ROW | {"simulator": "planar", "policy": policy, "seed": seed}
-        explored = explore(planar, search_policy(policy), len(meshes), budget_m=budget_m)
+        explored = explore(planar, search_policy(policy, seed), len(meshes), budget_m=budget_m)
         layout = TrueLayout(planar.sections, planar.start_poses, planar.poses)
-        found, measured = (
-            [Found(t.travel_m, c.centre_K_m, c.kind, c.yaw_rad) for t in traced for c in [t.candidate.contour]]
-            for traced in (explored.found, explored.measured)
-        )
+        found = _planar(explored.found)
         row |= {"ended": explored.ended, "travel_m": explored.travel_m, "contacts": explored.contacts}
-        rows.append(row | score(found, layout, measured))
+        scored = score(found, layout)
+        if len(scored["discovered_m"]) < len(meshes):  # else nothing more is discovered by refining
+            measured = _planar(refine_all(planar, explored, budget_m=budget_m))
+            scored = score(found, TrueLayout(planar.sections, planar.start_poses, planar.poses), measured)
+        rows.append(row | scored)
     return rows
+
+
+def _planar(traced: Sequence[Traced]) -> list[Found]:
+    return [Found(t.travel_m, c.centre_K_m, c.kind, c.yaw_rad) for t in traced for c in [t.candidate.contour]]

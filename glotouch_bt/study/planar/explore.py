@@ -43,9 +43,8 @@ class Explored:
     """How an exploration went.
 
     Attributes:
-        found: Candidates in order, as they were traced first.
-        measured: The same as far as they were refined, in order; where that was broken off, as they were.
-        travel_m: Planar length of all the ball's ways until all was found, or the search ended.
+        found: Candidates in order.
+        travel_m: Planar length of all the ball's ways.
         ended: "complete", "exhausted" or "budget".
         belief: The map at the end.
         contacts: How many contacts the candidates have.
@@ -53,7 +52,6 @@ class Explored:
     """
 
     found: tuple[Traced, ...]
-    measured: tuple[Traced, ...]
     travel_m: float
     ended: str
     belief: SearchMap
@@ -92,9 +90,8 @@ def explore(
     tracing: TraceParams | None = None,
     sweep: GuardedSweepParams | None = None,
     orbit: OrbitProbeParams | None = None,
-    refine: RefineOutlineParams | None = None,
 ) -> Explored:
-    """What the mission's exploration does, with geometry for an arm: find all, then refine each.
+    """What the mission's exploration does, with geometry for an arm.
 
     Args:
         world: The layout; its travel meter must be at 0.
@@ -102,7 +99,7 @@ def explore(
         expected: How many objects are looked for.
         budget_m: Travel after which it is broken off.
         tracing: How outlines are traced (default: as the skill's parameters say).
-        sweep, orbit, refine: Parameters of the skills; their defaults by default.
+        sweep, orbit: Parameters of the skills; their defaults by default.
     """
     sweep, orbit = sweep or GuardedSweepParams(), orbit or OrbitProbeParams()
     tracing = tracing or orbit.rule()
@@ -132,24 +129,31 @@ def explore(
             found[admitted.index] = Traced(world.travel_m, candidates[admitted.index])
     except _OutOfBudget:
         ended = "budget"
-    travel_m, coarse = world.travel_m, [found[i] for i in sorted(found)]
-    measured = _refine(coarse, world, limited, (refine or RefineOutlineParams()).rule(), belief)
-    return Explored(tuple(coarse), tuple(measured), travel_m, ended, belief, untraced)
+    return Explored(tuple(found[i] for i in sorted(found)), world.travel_m, ended, belief, untraced)
 
 
-def _refine(
-    found: list[Traced], world: PlanarWorld, limited: _Budget, tracing: TraceParams, belief: SearchMap
-) -> list[Traced]:
-    """All candidates as they are after tracing on, the least known first, while the travel lasts."""
-    out = list(found)
-    for i, traced in sorted(enumerate(found), key=lambda item: item[1].candidate.quality):
-        more = trace_more(
-            traced.candidate.contacts, world.tip_K_m, world.tip_radius_m, tracing, half_extent_m=belief.half_extent_m
-        )
+def refine_all(
+    world: PlanarWorld, explored: Explored, *, budget_m: float = BUDGET_M, refine: RefineOutlineParams | None = None
+) -> tuple[Traced, ...]:
+    """Go on where an exploration ended: all its candidates as they are after tracing on, in their order.
+
+    The least known comes first, while the travel lasts; those it does not last for stay as they were.
+
+    Args:
+        world: As the exploration left it.
+        explored: How it ended.
+        budget_m: Travel, the exploration's included, after which it is broken off.
+        refine: Parameters of the skill.
+    """
+    tracing, half = (refine or RefineOutlineParams()).rule(), explored.belief.half_extent_m
+    out, limited = list(explored.found), _Budget(world, budget_m)
+    for i, traced in sorted(enumerate(explored.found), key=lambda item: item[1].candidate.quality):
+        known = traced.candidate.contacts
+        more = trace_more(known, world.tip_K_m, world.tip_radius_m, tracing, half_extent_m=half)
         try:
             better = refined(traced.candidate, drive(more, limited))
         except _OutOfBudget:
             break
         if better is not None:
             out[i] = Traced(world.travel_m, better)
-    return out
+    return tuple(out)

@@ -10,7 +10,7 @@ from glotouch_bt.robot.meshes import load_folder
 from glotouch_bt.robot.placement import draw_layout
 from glotouch_bt.search import search_policy
 from glotouch_bt.study.planar import ContactModel, planar_world
-from glotouch_bt.study.planar.explore import explore
+from glotouch_bt.study.planar.explore import explore, refine_all
 
 from .conftest import WorldOf, cylinder
 
@@ -25,8 +25,10 @@ def test_two_cylinders_are_found_where_they_are(world_of: WorldOf, policy: str) 
     found = np.array([t.candidate.contour.centre_K_m for t in explored.found])
     gap = np.linalg.norm(found[:, None] - world.centres_K_m()[None], axis=2)
     assert gap.min(axis=0).max() < 0.003
-    assert explored.travel_m < explored.measured[-1].travel_m <= world.travel_m
-    measured = np.array([t.candidate.contour.centre_K_m for t in explored.measured])
+    assert explored.travel_m == world.travel_m
+    refined = refine_all(world, explored)
+    assert explored.travel_m < refined[-1].travel_m <= world.travel_m
+    measured = np.array([t.candidate.contour.centre_K_m for t in refined])
     assert np.linalg.norm(measured[:, None] - world.centres_K_m()[None], axis=2).min(axis=0).max() < 0.002
     assert [t.travel_m for t in explored.found] == sorted(t.travel_m for t in explored.found)
 
