@@ -120,7 +120,14 @@ class SteppedClock:
     def sleep_until(self, stamp_s: float) -> None:
         """See `Clock`."""
         me = threading.get_ident()
-        if self._conductor is None or me == self._conductor:
+        if me in self._workers:
+            with self._turn:
+                self._order += 1
+                heapq.heappush(self._sleepers, (stamp_s, self._order, me))
+                self._running = None
+                self._turn.notify_all()
+                self._turn.wait_for(lambda: self._running == me)
+        elif self._conductor is None or me == self._conductor:
             while self._sleepers and self._sleepers[0][0] <= stamp_s:
                 self._move_to(self._sleepers[0][0])
                 _, _, worker = heapq.heappop(self._sleepers)
@@ -129,13 +136,6 @@ class SteppedClock:
                     self._turn.notify_all()
                 self._wait_for_my_turn()
             self._move_to(stamp_s)
-        elif me in self._workers:
-            with self._turn:
-                self._order += 1
-                heapq.heappush(self._sleepers, (stamp_s, self._order, me))
-                self._running = None
-                self._turn.notify_all()
-                self._turn.wait_for(lambda: self._running == me)
         else:
             with self._turn:
                 self._turn.wait_for(lambda: self._now >= stamp_s - 1e-9)

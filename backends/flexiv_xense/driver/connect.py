@@ -82,7 +82,7 @@ def connect(request: Open, progress: Callable[[str], None]) -> Connected:
     try:
         if d.gripper:
             progress(f"connecting to the gripper {d.gripper}")
-            connected.gripper = Gripper(open_gripper(vendor.xensegripper, d.gripper), clock, request.hand)
+            connected.gripper = Gripper(open_gripper(vendor.xensegripper, d.gripper), clock, request.hand, d.link_loss)
             connected.gripper.wait_for_status()
         if d.pads:
             progress("opening the tactile sensors")

@@ -41,9 +41,12 @@ class Gripper:
         device: From `open_gripper`.
         clock: Time.
         limits: Range of the hand.
+        link_loss: What this model does when its link is lost: "holds" or "opens". Nobody can ask it then, so a person
+            is told.
     """
 
-    def __init__(self, device: Any, clock: Clock, limits: HandLimits) -> None:
+    def __init__(self, device: Any, clock: Clock, limits: HandLimits, link_loss: str = "holds") -> None:
+        self._then = "keeps its grip" if link_loss == "holds" else "LETS GO of what it holds"
         self._device, self._clock, self._limits = device, clock, limits
         self._target: Jaws | None = None
         self._told_s = -math.inf
@@ -105,7 +108,7 @@ class Gripper:
         with vendor_call("reading the gripper", "link"):
             status = self._device.get_gripper_status()
         if status is None:
-            raise DeviceFault("link", "the gripper has no status any more")
+            raise DeviceFault("link", f"the gripper has no status any more; without its link this model {self._then}")
         self._take(status)
         now, target = self.state.stamp_s, self._target
         if target is None or self._answered or now - self._told_s < ANSWER_S:
@@ -118,7 +121,8 @@ class Gripper:
         raise DeviceFault(
             "stale",
             f"the gripper was told to go to {target.aperture_m / MM:.1f} mm and still reports "
-            f"{self.state.aperture_m / MM:.1f} mm; its link is lost or it is blocked",
+            f"{self.state.aperture_m / MM:.1f} mm; it is blocked, or its link is lost: then this model "
+            f"{self._then}",
             age_s=now - self._changed_s,
             limit_s=ANSWER_S,
         )

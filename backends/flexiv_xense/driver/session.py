@@ -232,8 +232,9 @@ class Session:
             limits.force_N if beyond else limits.torque_Nm,
             now - self._zero_s,
         )
+        self._rest = tuple(pose)  # every later hold is here, not where the setpoints led
         if self._moves:
-            self._arm.hold_at(tuple(pose))
+            self._arm.hold_at(self._rest)
 
     def poll(self) -> None:
         """Once a period: the arm's flags, the gripper.

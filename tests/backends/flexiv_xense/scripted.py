@@ -222,6 +222,9 @@ class ScriptedGripper:
         self.released = True
 
 
+IMAGE_MM = 1e-3 * np.arange(700)[:, None] + 1e-6 * np.arange(400)
+
+
 class ScriptedSensor:
     """30 frames a second; row and column of a pixel are in its value."""
 
@@ -236,8 +239,7 @@ class ScriptedSensor:
         if self.silent:
             return None, None
         stamp = np.floor(self._vendor.clock.now_s() * 30.0) / 30.0
-        rows, columns = np.mgrid[0:700, 0:400]
-        return 1e-3 * rows + 1e-6 * columns, stamp
+        return IMAGE_MM, stamp
 
     def release(self) -> None:
         self.released = True

@@ -182,6 +182,38 @@ def test_the_hard_limit_stops_the_arm_below_the_client(open_robot: Open) -> None
     assert len(vendor.sent) == n
 
 
+def test_after_a_hard_stop_a_hold_is_where_the_arm_stopped(open_robot: Open) -> None:
+    vendor = ScriptedVendor()
+    robot = open_robot(vendor)
+    dq = np.zeros(7)
+    dq[0] = 0.2
+    robot.cycle(Command(setpoint(HOME + 0.001 * dq, dq)))
+    stopped = list(vendor.pose)
+    vendor.wrench = [0.0, 0.0, -31.0, 0.0, 0.0, 0.0]
+    with pytest.raises(SafetyStop):
+        robot.cycle(HOLD)
+    robot.hold()
+    assert vendor.sent[-1] == (vendor.pose, [0.0] * 6)
+    assert np.linalg.norm(np.subtract(vendor.pose[:3], stopped[:3])) < 0.02
+
+
+def test_without_feed_forward_every_setpoint_is_one_to_rest_at(open_robot: Open) -> None:
+    vendor = ScriptedVendor()
+    robot = open_robot(vendor, feed_forward="false")
+    dq = np.zeros(7)
+    dq[0] = 0.2
+    robot.cycle(Command(setpoint(HOME + 0.001 * dq, dq)))
+    assert vendor.sent[-1][1] == [0.0] * 6
+
+
+def test_a_gripper_that_lets_go_when_its_link_is_lost_is_said_to(open_robot: Open) -> None:
+    vendor = ScriptedVendor()
+    robot = open_robot(vendor, link_loss="opens")
+    vendor.gripper.get_gripper_status = lambda: None  # type: ignore[assignment,method-assign,return-value]
+    with pytest.raises(BackendError, match="LETS GO"):
+        robot.cycle(HOLD)
+
+
 def test_one_sample_beyond_the_limit_is_noise(open_robot: Open) -> None:
     vendor = ScriptedVendor()
     advance = vendor._advance
