@@ -49,22 +49,19 @@ class Trial:
     travel: float  # total when it ended
     sweep: float  # without the orbits
     exhausted: bool
-    calls_s: list
     belief: SearchMap
 
 
-def run(policy, layout, start, *, limit_m=8.0, wall_gap=0.012, orbit=True, clock=None):
+def run(policy, layout, start, *, limit_m=8.0, wall_gap=0.012, orbit=True):
     objects = [c for c, _ in layout]
     belief = SearchMap.blank(0.5 * INTERIOR - wall_gap, expected=len(objects))
     tip = np.array(start, dtype=float)
-    known, touched_at, calls = set(), [], []
+    known, touched_at = set(), []
     travel = sweep = 0.0
     while travel < limit_m and len(known) < len(objects):
-        t0 = clock() if clock else 0.0
         way = policy.next_path(belief, tip)
-        calls.append((clock() if clock else 0.0) - t0)
         if way is None:
-            return Trial(touched_at, travel, sweep, True, calls, belief)
+            return Trial(touched_at, travel, sweep, True, belief)
         hit = None
         for goal in way:
             n = max(int(np.linalg.norm(goal - tip) / 0.001), 1)
@@ -99,7 +96,7 @@ def run(policy, layout, start, *, limit_m=8.0, wall_gap=0.012, orbit=True, clock
             for p in ring[ok]:
                 belief = belief.with_path(p[None])
         belief = belief.with_exclusion(c, 0.010)
-    return Trial(touched_at, travel, sweep, False, calls, belief)
+    return Trial(touched_at, travel, sweep, False, belief)
 
 
 def summary(trials, budgets=(1.0, 3.0, 5.0), n=5):

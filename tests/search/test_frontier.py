@@ -1,5 +1,4 @@
 import itertools
-import time
 
 import numpy as np
 import pytest
@@ -98,12 +97,6 @@ def test_deterministic():
     belief = SearchMap.blank(HALF, 5).with_path([CORNER, [0.0, 0.0]])
     a, b = (NearestFrontier(seed=3).next_path(belief, np.zeros(2)) for _ in range(2))
     np.testing.assert_array_equal(a, b)
-
-
-def test_quick_enough(planar):
-    """The goal is 5 ms a call; medians, since other work shares the machine."""
-    trial = planar.run(NearestFrontier(), layouts(planar, 1)[0], CORNER, clock=time.perf_counter)
-    assert np.median(trial.calls_s) < 0.005
 
 
 contour = st.builds(
