@@ -1,0 +1,94 @@
+"""The backend as missions open it: options, a driver process with simulated devices, its end."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from backends.flexiv_xense import FlexivXenseBackend
+from backends.flexiv_xense.options import read_options
+from backends.flexiv_xense.robot import FlexivXenseRobot
+from glotouch_bt.mission.load import load_mission
+from glotouch_bt.robot import HOLD, BackendError, BadInput, Conditions, Observation, load_backend
+from glotouch_bt.study.doctor import nearly_empty
+
+
+@pytest.fixture
+def robot() -> Iterator[FlexivXenseRobot]:
+    world = nearly_empty(load_mission("retrieve", {}).world)
+    with FlexivXenseBackend().open(world, Conditions(), 5, {"devices": "simulated"}) as opened:
+        assert isinstance(opened, FlexivXenseRobot)
+        yield opened
+
+
+def test_it_is_registered() -> None:
+    assert load_backend("flexiv_xense").name == "flexiv_xense"
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({}, "need their addresses"),
+        ({"devices": "toy"}, "one of real, simulated"),
+        ({"devices": "simulated", "robto": "x"}, "did you mean 'robot'"),
+        ({"robot": "Rizon4-1", "pace": "real"}, "only simulated devices"),
+        ({"robot": "Rizon4-1", "layout": {}}, "only simulated devices"),
+        ({"robot": "Rizon4-1", "left_pad": "OG1"}, "both or none"),
+        ({"robot": "Rizon4-1", "driver": "tcp://x:1"}, "needs keys"),
+        ({"robot": "Rizon4-1", "keys": "/no/such/folder"}, "is no folder"),
+        ({"devices": "simulated", "driver": "tcp://x:1"}, "driver of our own"),
+        ({"devices": "simulated", "feed_forward": "maybe"}, "true or false"),
+    ],
+)
+def test_wrong_options_say_what_is_right(options: dict[str, object], text: str) -> None:
+    with pytest.raises(BadInput, match=text):
+        read_options(options)
+
+
+def test_the_simulated_devices_are_the_default_addresses_of_their_kind() -> None:
+    from backends.flexiv_xense.simulated import GRIPPER_ADDRESS, PAD_SNS, ROBOT_SN
+
+    o = read_options({"devices": "simulated"})
+    assert (o.robot, o.gripper, (o.left_pad, o.right_pad)) == (ROBOT_SN, GRIPPER_ADDRESS, PAD_SNS)
+
+
+def test_a_run_is_the_same_every_time_and_leaves_nothing(robot: FlexivXenseRobot) -> None:
+    world = nearly_empty(load_mission("retrieve", {}).world)
+    backend = FlexivXenseBackend()
+    first = [robot.cycle(HOLD) for _ in range(20)]
+    referee = backend.referee(robot)
+    assert referee is not None
+    assert len(referee.objects()) == 1
+    assert referee.probe_in_holder()
+    with backend.open(world, Conditions(), 5, {"devices": "simulated"}) as again:
+        second = [again.cycle(HOLD) for _ in range(20)]
+        assert isinstance(again, FlexivXenseRobot)
+        assert again.process is not None
+        folder: Path = again.process.folder
+        assert folder.stat().st_mode & 0o077 == 0
+    assert not folder.exists()
+    for a, b in zip(first, second, strict=True):
+        assert same(a, b)
+
+
+def same(a: Observation, b: Observation) -> bool:
+    arrays = ("stamp_s", "q", "dq", "position_B_P", "quat_B_P", "wrench_S")
+    return all(np.array_equal(getattr(a, n), getattr(b, n)) for n in arrays) and a.gripper == b.gripper
+
+
+def test_a_killed_driver_is_an_error_and_closing_still_works(robot: FlexivXenseRobot) -> None:
+    robot.cycle(HOLD)
+    assert robot.process is not None
+    os.kill(robot.process.pid, signal.SIGKILL)
+    with pytest.raises(BackendError, match="the driver has ended"):
+        robot.cycle(HOLD)
+    with pytest.raises(BackendError, match="the driver has ended"):
+        robot.cycle(HOLD)
+    robot.hold()
+    robot.close()
+    assert robot.process._process is None
