@@ -12,7 +12,7 @@ import pytest
 
 from backends.flexiv_xense.driver.messages import Cycle, Setpoint
 from backends.rizon4 import RIZON4_XENSE
-from glotouch_bt.robot import HOLD, BackendError, Command, JointSetpoint, Tare
+from glotouch_bt.robot import HOLD, BackendError, Command, JointSetpoint, Robot, Tare
 from glotouch_bt.robot.fake import forward
 from tests.backends.flexiv_xense.conftest import Open
 from tests.backends.flexiv_xense.scripted import ScriptedVendor
@@ -28,6 +28,11 @@ def eventually(reached: Callable[[], bool]) -> bool:
             return False
         time.sleep(0.005)
     return True
+
+
+def cycle_twice(robot: Robot) -> None:
+    robot.cycle(HOLD)
+    robot.cycle(HOLD)
 
 
 def a_moving_setpoint() -> Command:
@@ -79,8 +84,7 @@ def test_a_driver_that_is_silent_is_an_error(open_robot: Open) -> None:
     robot = open_robot(vendor, pace="real")
     vendor.stamp = lambda: time.sleep(2.0)  # type: ignore[assignment,method-assign]
     with pytest.raises(BackendError, match="nothing heard"):
-        robot.cycle(HOLD)
-        robot.cycle(HOLD)
+        cycle_twice(robot)
 
 
 def test_a_tare_runs_beside_the_loop(open_robot: Open) -> None:
