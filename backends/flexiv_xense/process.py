@@ -63,7 +63,7 @@ class DriverProcess:
 
     def _spawn(self, command: list[str], output: str) -> subprocess.Popen[bytes]:
         try:
-            with (self.folder / output).open("wb") as out:
+            with self.driver_log.with_name(output).open("wb") as out:
                 return subprocess.Popen(
                     command, stdin=subprocess.DEVNULL, stdout=out, stderr=out, start_new_session=True
                 )
@@ -74,7 +74,7 @@ class DriverProcess:
         """Why the driver has ended, or None while it runs."""
         if self._process is None or self._process.poll() is None:
             return None
-        said = (self.folder / "driver.txt").read_text(errors="replace").strip().splitlines()
+        said = self.driver_log.with_name("driver.txt").read_text(errors="replace").strip().splitlines()
         why = f"exit code {self._process.returncode}"
         return why if not said else f"{why}: {said[-1]}"
 
