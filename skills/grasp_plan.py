@@ -1,4 +1,7 @@
-"""Where to take hold of a recognised object: at the best closure already felt on it."""
+"""Where to take hold of a recognised object: where its mesh, standing at the fitted pose, is held best.
+
+The closures already felt on it say how far that pose can be believed, and are what is left to do if it cannot.
+"""
 
 from __future__ import annotations
 
@@ -7,18 +10,28 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glotouch_bt.recognition import Match
-from glotouch_bt.robot import Array
+from glotouch_bt.recognition import Match, TargetModel
+from glotouch_bt.robot import Array, Gripper
 from glotouch_bt.robot.meshes import Mesh
-from glotouch_bt.touch import Candidate, Layer, TouchSet, patch_statistics
+from glotouch_bt.touch import Candidate, Layer, TouchSet, evidence_weight, patch_statistics
+from skills.grasp_holds import AREA_SCALE, LEVER_SCALE_M, Holds, holds_of
+from skills.squeeze_motion import lowest_pads_m
 
-AREA_SCALE = 0.15
-"""Contact area, as a fraction of the pad, that counts as half of a good hold."""
-LEVER_SCALE_M = 0.015
-"""Distance of the pads from the centre of mass that halves a hold's worth: the object would turn about the pads."""
 STALENESS = 0.7
-"""What a hold is worth after each later sequence: squeezing turns and shifts the object."""
+"""What a felt hold is worth after each later sequence: squeezing turns and shifts the object."""
 ALTERNATIVES = 5
+FITTED = 3
+"""So many of the grasps come from the fitted pose, if it can be believed."""
+APART_RAD, APART_M = math.radians(25.0), 0.012
+"""Two grasps from the fitted pose differ in yaw or place by at least one of these: what spoils one spares the other."""
+LEAST_WORTH = 0.02
+BELIEVED_M = 0.002
+"""The pose is believed if the mesh standing there is as wide as was felt: three quarters of the closures within this of
+one offset. Source: 2.5 times the width's spread in recognition."""
+LEAST_OFFSET_M, GREATEST_OFFSET_M = -0.004, 0.0015
+"""The offset, of what was felt against the mesh: both gels give, and the jaws' zero is off (CONDITIONS)."""
+LEAST_LAYERS = 3
+FORCE_N = 30.0
 
 
 @dataclass(frozen=True)
@@ -29,9 +42,10 @@ class GraspPlan:
         candidate: Index of the candidate.
         position_K_m: (3,) pads' mid-point in K (z above the floor).
         yaw_rad: Direction of x_P in K.
-        aperture_m: Opening felt there; the jaws must stop near it.
+        aperture_m: Opening felt or expected there; the jaws must stop near it.
         opening_m: Opening to go in with.
         alternatives: Other grasps of the same object, the better ones first.
+        source: `fitted` to the mesh, or where it was `felt`.
     """
 
     candidate: int
@@ -40,17 +54,92 @@ class GraspPlan:
     aperture_m: float
     opening_m: float
     alternatives: tuple[GraspPlan, ...] = ()
+    source: str = "felt"
 
 
-def plan_grasp(touchset: TouchSet, match: Match, mesh: Mesh, side_gap_m: float = 0.010) -> GraspPlan:
-    """Rank the stable layers: large two-sided contact, near the centre of mass, felt late; the best, and the next ones.
+def plan_grasp(
+    touchset: TouchSet, match: Match, mesh: Mesh, model: TargetModel, gripper: Gripper, side_gap_m: float = 0.010
+) -> GraspPlan:
+    """The best grasp and the next ones.
 
-    The centre of mass comes from the STL placed at the fitted pose; every layer was reached once, so it can be again.
+    Args:
+        touchset: What was felt of the object.
+        match: Its fit to the target.
+        mesh: The target.
+        model: The target's tables.
+        gripper: The hand.
+        side_gap_m: Open jaw to the object, each side.
     """
-    com = mesh.as_trimesh().center_mass
-    x, y, yaw = match.pose_K_O
-    c, s = np.cos(yaw), np.sin(yaw)
-    com_K = np.array([x + c * com[0] - s * com[1], y + s * com[0] + c * com[1], com[2]])
+    com = np.asarray(mesh.as_trimesh().center_mass)
+    fitted: list[GraspPlan] = []
+    if match.fit is not None and misfit_m(touchset, match, model) <= BELIEVED_M:
+        holds = holds_of(model, com, gripper, lowest_pads_m(model.height_m, gripper), FORCE_N)
+        fitted = _fitted(touchset.candidate.index, match, model, holds, side_gap_m)
+    felt = _felt(touchset, _placed(com, match), side_gap_m)
+    plans = [*fitted, *felt][: 1 + ALTERNATIVES]
+    return replace(plans[0], alternatives=tuple(plans[1:]))
+
+
+def misfit_m(touchset: TouchSet, match: Match, model: TargetModel) -> float:
+    """How far the widths felt are from those of the mesh at the fitted pose; infinite if few were or all are off."""
+    theta = match.pose_K_O[2]
+    middle = _placed(np.array([*model.centre_m, 0.0]), match)[:2]
+    off = []
+    for layer in touchset.layers:
+        if evidence_weight(layer) < 1.0:
+            continue
+        along = float(np.array([np.cos(layer.yaw_rad), np.sin(layer.yaw_rad)]) @ (layer.position_K_m - middle))
+        off.append(layer.aperture_m - model.width_at(along, layer.height_m, layer.yaw_rad - theta))
+    off = [d for d in off if math.isfinite(d)]
+    if len(off) < LEAST_LAYERS:
+        return math.inf
+    offset = float(np.median(off))
+    if not LEAST_OFFSET_M <= offset <= GREATEST_OFFSET_M:
+        return math.inf
+    return float(np.quantile(np.abs(np.array(off) - offset), 0.75))
+
+
+def _placed(point_O_m: Array, match: Match) -> Array:
+    """A point (3,) of the mesh in K."""
+    x, y, theta = match.pose_K_O
+    c, s = math.cos(theta), math.sin(theta)
+    return np.array([x + c * point_O_m[0] - s * point_O_m[1], y + s * point_O_m[0] + c * point_O_m[1], point_O_m[2]])
+
+
+def _fitted(index: int, match: Match, model: TargetModel, holds: Holds, side_gap_m: float) -> list[GraspPlan]:
+    """The best holds of the mesh, each a little apart from the others."""
+    middle = _placed(np.array([*model.centre_m, 0.0]), match)
+    chosen: list[GraspPlan] = []
+    for flat in np.argsort(-holds.worth, axis=None, kind="stable")[:2000].tolist():
+        i, j, k = np.unravel_index(flat, holds.worth.shape)
+        if holds.worth[i, j, k] < LEAST_WORTH or len(chosen) == FITTED:
+            break
+        yaw = match.pose_K_O[2] + float(holds.phi_rad[i])
+        c, s = math.cos(yaw), math.sin(yaw)
+        across = float(holds.middle_m[i, j, k])
+        place = middle + np.array([c * holds.l_m[j] + s * across, s * holds.l_m[j] - c * across, float(holds.z_m[k])])
+        if any(_near(place, yaw, other) for other in chosen):
+            continue
+        chosen.append(
+            GraspPlan(
+                candidate=index,
+                position_K_m=place,
+                yaw_rad=math.remainder(yaw, 2 * math.pi),
+                aperture_m=float(holds.width_m[i, j, k]),
+                opening_m=float(holds.opening_m[i, j, k]) + 2 * side_gap_m,
+                source="fitted",
+            )
+        )
+    return chosen
+
+
+def _near(place_K_m: Array, yaw_rad: float, other: GraspPlan) -> bool:
+    turned = abs(math.remainder(yaw_rad - other.yaw_rad, math.pi))
+    return turned < APART_RAD and float(np.linalg.norm(place_K_m - other.position_K_m)) < APART_M
+
+
+def _felt(touchset: TouchSet, com_K: Array, side_gap_m: float) -> list[GraspPlan]:
+    """The closures felt: large two-sided contact, near the centre of mass, felt late. Each was reached once."""
 
     def worth(layer: Layer, later: int) -> float:
         areas = [patch_statistics(d).area_fraction for d in (layer.left_m, layer.right_m)]
@@ -62,7 +151,7 @@ def plan_grasp(touchset: TouchSet, match: Match, mesh: Mesh, side_gap_m: float =
     count = len(touchset.sequences)
     rated = [(worth(layer, count - 1 - k), layer) for k, q in enumerate(touchset.sequences) for layer in q.layers]
     rated.sort(key=lambda r: -r[0])
-    plans = [
+    return [
         GraspPlan(
             candidate=touchset.candidate.index,
             position_K_m=np.array([*layer.position_K_m, layer.height_m]),
@@ -72,7 +161,6 @@ def plan_grasp(touchset: TouchSet, match: Match, mesh: Mesh, side_gap_m: float =
         )
         for _, layer in rated[: 1 + ALTERNATIVES]
     ]
-    return replace(plans[0], alternatives=tuple(plans[1:]))
 
 
 def _extent(candidate: Candidate, layer: Layer) -> float:

@@ -73,7 +73,7 @@ class Match(Skill):
                 margin=ranking.margin,
             )
         best = next(t for t in touchsets if t.candidate.index == ranking.best.index)
-        self.plan = plan_grasp(best, ranking.best, mesh)
+        self.plan = plan_grasp(best, ranking.best, mesh, model, gripper)
         self.event("plan", plan=self.plan)
 
     def _target(self) -> Mesh:
