@@ -81,3 +81,38 @@ def test_a_box_askew_is_turned_and_says_so(bench, found, folder) -> None:
     assert said[k] == pytest.approx(turned[k], rel=0.6)
     assert events
     assert peak < 20.0
+
+
+@pytest.fixture(scope="module")
+def slabs(tmp_path_factory: pytest.TempPathFactory):
+    path = tmp_path_factory.mktemp("slabs")
+    section = [(-0.0015, 0.0), (0.0015, 0.0), (0.006, 0.080), (-0.006, 0.080)]
+    slab = trimesh.convex.convex_hull([(x, y, z) for x in (-0.030, 0.030) for y, z in section])
+    slab.export(path / "slab.stl")
+    return path
+
+
+def test_a_slab_that_topples_is_reported_and_the_skill_ends(bench, found, slabs) -> None:
+    """A slab on a foot 3 mm wide tips wherever pads push it: their lower edge is 7 mm up, and 0.45 x 7 mm > 1.5 mm."""
+    world = load_world("container_five")
+    world = dataclasses.replace(world, objects=dataclasses.replace(world.objects, folder=slabs, names=("slab",)))
+    backend = MujocoBackend()
+    with backend.open(world, load_conditions("nominal"), 3, {"layout": {"slab": (0.0, 0.014, 0.0)}}) as robot:
+        referee = backend.referee(robot)
+        b = bench().on(world, robot)
+        ticket = robot.start(Tare())
+        while not ticket.done:
+            b.pass_time(HOLD)
+        candidate = found.box((0.0, 0.0), (0.060, 0.012), 0.0, 0.080)  # traced 14 mm from where it stands now
+        skill = b.make(Squeeze, inputs={"candidate": candidate, "known": (candidate,)}, layers=2, side_gap_m=0.030)
+        tilt = 0.0
+        while b.tick(skill) is Status.RUNNING:
+            tilt = max(tilt, float(np.arccos(np.clip(referee.objects()[0].pose_B_O.rotation[2, 2], -1.0, 1.0))))
+        moved = b.of_kind("object_moved")
+        assert tilt > np.deg2rad(10.0), "else this tests nothing"
+        assert moved
+        assert max(abs(m["slide_m"]) for m in moved) > 0.005
+        assert skill.status is not Status.RUNNING
+        assert b.arm.pose_B_P.position_m[2] > world.container.pose_B_K.position_m[2] + 0.12, "the hand is high again"
+        assert b.arm.aperture_m > 0.03
+        assert referee.peak_force_N() < 20.0
