@@ -4,7 +4,8 @@ Subclass `RobotConformance` in a test file, say how a robot is made, and pytest 
 be asked (a known wall, losing a device) is offered by overriding `wall` and `losses`; without that those tests are
 skipped by name. Nothing is needed but free space: 0.15 m round the home posture.
 
-The tests use one robot one after another; those that end one make their own.
+The tests use one robot one after another; those that end one make their own. So do not spread them over processes where
+there is only one device.
 """
 
 from __future__ import annotations

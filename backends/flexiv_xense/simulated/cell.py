@@ -5,12 +5,13 @@
 WORLD is a pickle of (World, Conditions, seed, options), SOCKET the Unix socket to listen at, LOG a file of one JSON
 line per event. As a real arm does, the simulated one goes on living when its client dies, and the log says what it did
 then: how fast the tool was, how long it took to stand still, how far it went, and the largest contact force meanwhile.
-It ends when it is told to (SIGTERM) or when nobody has been connected for ALONE_S.
+It ends when it is told to (SIGTERM), or ALONE_S after its last client once the process that started it is gone.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import signal
 import sys
 import threading
@@ -109,6 +110,7 @@ class Cell:
         self._made: dict[int, tuple[int, Any]] = {}
         self._links: dict[int, int] = {}  # client: open connections
         self._watch = Watch(world, self.write)
+        self._parent = os.getppid()
         self._last_client_s = time.monotonic()
         self.ended = False
 
@@ -141,7 +143,7 @@ class Cell:
                 self.turn.notify_all()
                 alone = not self._links
             now = time.monotonic()
-            if not alone:
+            if not alone or os.getppid() == self._parent:
                 self._last_client_s = now
             elif now - self._last_client_s > ALONE_S:
                 self.ended = True
@@ -196,7 +198,7 @@ class Cell:
                 del self._made[key]
             if robots:
                 self._watch.begin(client)
-                self.world.arm.lose_link()
+                self.vendor.box.leave()
 
     def _do(self, client: int, what: str, *arguments: Any) -> Any:
         if what == REFEREE:

@@ -23,7 +23,6 @@ from glotouch_bt.robot import Pose
 CONNECT_S, UNREACHABLE_S, REQUEST_S, BRAKES_S, SWITCH_S, PRIMITIVE_S = 0.5, 3.1, 0.005, 2.0, 0.05, 0.1
 CLEAR_MINOR_S, CLEAR_CRITICAL_S = 1.0, 10.0
 POLL_S = 0.001
-STREAMING = (Mode.NRT_JOINT_IMPEDANCE, Mode.NRT_JOINT_POSITION, Mode.NRT_CARTESIAN_MOTION_FORCE)
 UNLICENSED = (Mode.NRT_PLAN_EXECUTION, Mode.NRT_SUPER_PRIMITIVE)
 NOT_ZEROED = 301004  # reported from a Rizon 4s by users; its text here is ours
 
@@ -101,6 +100,12 @@ class ControlBox:
         self.arm.limit_wrench(None)
         self.mode = Mode.IDLE
         self.primitive_started_s = None
+
+    def leave(self) -> None:
+        """The client is gone: what it had begun ends, and the arm brakes once that has been noticed."""
+        self.mode = Mode.IDLE
+        self.primitive_started_s = None
+        self.arm.lose_link()
 
     # --- requests ---------------------------------------------------------------------------------------------------
 

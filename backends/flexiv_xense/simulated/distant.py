@@ -14,7 +14,7 @@ from backends.flexiv_xense.driver.clock import Clock, WallClock
 from backends.flexiv_xense.simulated import flexivrdk, xensegripper, xensesdk
 from backends.flexiv_xense.simulated.wire import CALL, NEW, REFEREE, Reference
 
-CONNECT_S = 30.0
+CONNECT_S = 120.0
 RETRY_S = 0.05
 
 
