@@ -21,6 +21,8 @@ from glotouch_bt.robot.meshes import Mesh
 YAWS = 72
 STRIDE = 2
 """Table cells are two raster cells apart: 2.3 mm along x_P, 2.7 mm in height."""
+UNEVEN_M = 2e-3
+"""Neighbouring widths that differ by more are told apart by the pose, not by noise."""
 _CACHE_SIZE = 64
 _cache: dict[tuple[str, PadSpec], TargetModel] = {}
 
@@ -79,6 +81,17 @@ class TargetModel:
     def width_m(self) -> Array32:
         """(72, nl, nz) support width W(l, z; phi), eq. (finite_window_width); NaN where a window is empty."""
         return self.reach_m + mirrored(self.reach_m)
+
+    @cached_property
+    def unevenness_m(self) -> Array32:
+        """(72, nl, nz) RMS change of `width_m` to the six cells beside, at most 2 mm."""
+        w, most = self.width_m, np.float32(UNEVEN_M**2)
+        total = np.zeros_like(w)
+        for axis, wraps in ((0, True), (1, False), (2, False)):
+            step = np.diff(w, axis=axis, append=w[:1] if wraps else np.take(w, [-1], axis=axis)) ** 2
+            step = np.fmin(step, most)  # beside an empty window, the most
+            total += step + np.roll(step, 1, axis=axis)
+        return np.asarray(np.sqrt(total / 6))
 
     @property
     def narrowest_m(self) -> float:

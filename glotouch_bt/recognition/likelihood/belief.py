@@ -12,7 +12,7 @@ from glotouch_bt.recognition.decision import Closure, Ranking
 from glotouch_bt.recognition.likelihood.gain import Prediction, expected_gains, predict
 from glotouch_bt.recognition.likelihood.pair import Pair, Reading, compare, read_touchset
 from glotouch_bt.recognition.likelihood.params import LikelihoodParams
-from glotouch_bt.recognition.likelihood.posterior import decide, probabilities
+from glotouch_bt.recognition.likelihood.posterior import against_others, decide, probabilities
 from glotouch_bt.recognition.model import TargetModel
 from glotouch_bt.robot import Array, ParamError
 from glotouch_bt.touch.values import TouchSet
@@ -53,8 +53,13 @@ class Belief:
         return {x.index: predict(self.model, r, x, self.params) for r, x in zip(self.readings, self.pairs, strict=True)}
 
 
-def believe(model: TargetModel, touchsets: Sequence[TouchSet], params: LikelihoodParams | None = None) -> Belief:
-    """The belief after `touchsets`, one a candidate.
+def believe(
+    model: TargetModel,
+    touchsets: Sequence[TouchSet],
+    params: LikelihoodParams | None = None,
+    before: Belief | None = None,
+) -> Belief:
+    """The belief after `touchsets`, one a candidate; of `before`, what is unchanged (by identity) is not reckoned anew.
 
     Raises:
         ParamError: None at all, two of one candidate, or a candidate whose outline is not finite.
@@ -62,7 +67,10 @@ def believe(model: TargetModel, touchsets: Sequence[TouchSet], params: Likelihoo
     p = params or LikelihoodParams()
     check(touchsets)
     readings = tuple(read_touchset(t, model.pad, p) for t in touchsets)
-    pairs = tuple(compare(model, r, p) for r in readings)
+    known: dict[int, Pair] = {}
+    if before is not None and before.model is model and before.params == p:
+        known = {id(t): x for t, x in zip(before.touchsets, before.pairs, strict=True)}
+    pairs = tuple(known.get(id(t)) or compare(model, r, p) for t, r in zip(touchsets, readings, strict=True))
     return Belief(model, tuple(touchsets), decide(pairs, p), readings, pairs, p)
 
 
@@ -112,8 +120,8 @@ def identify(
     if any(m.pad != models[0].pad for m in models):
         raise ParamError("models", "of several pads", "of one pad")
     reading = read_touchset(touchset, models[0].pad, p)
-    ratios = [compare(m, reading, p).log_ratio for m in models]
-    return probabilities(ratios, [reading.evidence.weight] * len(models), p)
+    pairs = [compare(m, reading, p) for m in models]
+    return probabilities([against_others(x.log_ratio, x.log_twin, p) for x in pairs], p)
 
 
 def ranked(belief: Belief) -> Ranking:

@@ -24,6 +24,7 @@ from glotouch_bt.recognition.likelihood.background import (
 from glotouch_bt.recognition.likelihood.pair import Pair, Reading
 from glotouch_bt.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.recognition.likelihood.scalars import yaw_prior
+from glotouch_bt.recognition.likelihood.volumes import T_PEAK, width_kernel
 from glotouch_bt.recognition.model import TargetModel
 from glotouch_bt.recognition.pads import POOLED, Array32
 from glotouch_bt.recognition.raster import hand_axes
@@ -122,9 +123,9 @@ def _width_ratios(width: Array, guess: Array, quantile: Array, weight: Array, p:
     w = np.where(felt, width, 1.0)
     seen = np.concatenate([w, middle + scale * quantile], axis=1)
     generic = scale / math.pi / (scale**2 + (seen - middle) ** 2)
-    sd = math.hypot(p.width_sd_m, p.bias_sd_m)
-    near = np.exp(-0.5 * ((seen[:, :, None] - w[:, None, :]) / sd) ** 2) * felt[:, None, :]
-    target = (near @ weight) / (sd * math.sqrt(2 * math.pi))
+    sd = math.sqrt(p.width_sd_m**2 + p.bias_sd_m**2 + (p.width_rough * p.bias_limit_m) ** 2)
+    near = width_kernel((seen[:, :, None] - w[:, None, :]) / sd) * felt[:, None, :]
+    target = (near @ weight) * (T_PEAK / sd)
     log_ratio = np.log((1 - p.width_outlier) * target / generic + p.width_outlier)
     return np.asarray(p.temper_width * log_ratio, dtype=np.float64)
 

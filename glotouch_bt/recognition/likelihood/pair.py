@@ -62,7 +62,8 @@ class Pair:
 
     Attributes:
         index: The candidate's index.
-        log_ratio: log p(TouchSet | target) - log p(TouchSet | some other object), tempered and calibrated.
+        log_ratio: log p(TouchSet | target) - log p(TouchSet | just any object), tempered and calibrated.
+        log_twin: log p(TouchSet | a twin) - log p(TouchSet | target), by the widths, calibrated.
         terms: What it is made of, nats before calibration: mode, height, contour; width and image at the best pose;
             pose: what is gained or lost by not knowing the pose.
         log_pose: (72, nz) posterior of (relative yaw of the first sequence, height offset); None if nothing was felt.
@@ -73,6 +74,7 @@ class Pair:
 
     index: int
     log_ratio: float
+    log_twin: float
     terms: dict[str, float]
     log_pose: Array32 | None
     first_rad: float
@@ -113,32 +115,35 @@ def compare(model: TargetModel, reading: Reading, p: LikelihoodParams) -> Pair:
     }
     if not reading.sequences:
         ratio = p.offset + p.slope * sum(terms.values())
-        return Pair(candidate.index, ratio, terms, None, 0.0, 0.0, None, unfelt_pose(touchset), 0.0)
+        return Pair(candidate.index, ratio, 0.0, terms, None, 0.0, 0.0, None, unfelt_pose(touchset), 0.0)
     grid = Grid.of(p)
     first = reading.sequences[0][0].layer.yaw_rad
     turns = np.array([seen[0].layer.yaw_rad - first for seen in reading.sequences])
     parallel = bool(np.abs((turns + np.pi / 2) % np.pi - np.pi / 2).max() < PARALLEL_RAD)
-    common = _log_normal(grid.bias_m, p.bias_sd_m)[:, None, None, None] + _log_normal(grid.z0_m, p.z0_sd_m)
-    joint = (common + yaw_prior(model, candidate, first, p)[None, :, None, None]).astype(np.float32)
+    common = yaw_prior(model, candidate, first, p)[None, :, None, None] + _log_normal(grid.z0_m, p.z0_sd_m)
     if parallel:  # tracks share one shift along x_P, but for what each slides
-        joint = joint + shift_prior(model, candidate, 0.0, grid.shift_m, p)[None, :, :, None].astype(np.float32)
+        common = common + shift_prior(model, candidate, 0.0, grid.shift_m, p)[None, :, :, None]
+    twin = common.astype(np.float32)
+    joint = (common + _log_normal(grid.bias_m, p.bias_sd_m)[:, None, None, None]).astype(np.float32)
     slide = slide_matrix(grid, p)
     moved = watched_turns(touchset)
     parts = []
     for seen, turn in zip(reading.sequences, turns, strict=True):
         flip = bool(np.cos(turn) < 0)
         sd = math.hypot(p.turn_sd_rad, moved[seen[0].layer.sequence])
-        widths = np.float32(p.temper_width) * width_ratios(model, seen, turn, grid, p)
+        widths, twins = (np.float32(p.temper_width) * w for w in width_ratios(model, seen, turn, grid, p))
         images = np.float32(p.temper_image) * image_ratios(model, seen, turn, grid, p)
-        volume = widths + images[None]
+        volume = np.concatenate([widths, twins]) + images[None]  # the twin's is one more bias
         if parallel:
             volume = volume[:, :, ::-1] if flip else volume
-            joint = joint + turned(slid(volume, slide), p, sd)
+            mean = turned(slid(volume, slide), p, sd)
         else:
             volume = volume + shift_prior(model, candidate, turn, grid.shift_m, p)[None, :, :, None].astype(np.float32)
-            joint = joint + turned(log_sum(volume, 2), p, sd)[:, :, None]
+            mean = turned(log_sum(volume, 2), p, sd)[:, :, None]
+        joint, twin = joint + mean[:-1], twin + mean[-1:]
         parts.append((widths, images, volume, flip))
     total = float(log_sum(joint.reshape(1, -1), 1)[0])
+    log_twin = p.twin_slope * (float(log_sum(twin.reshape(1, -1), 1)[0]) - total)
     b, i, c, z = (int(k) for k in np.unravel_index(int(np.argmax(joint)), joint.shape))
     shifts = np.zeros(len(touchset.sequences))
     terms["width"] = terms["image"] = 0.0
@@ -157,8 +162,8 @@ def compare(model: TargetModel, reading: Reading, p: LikelihoodParams) -> Pair:
     )
     ratio = p.offset + p.slope * sum(terms.values())
     return Pair(
-        candidate.index, ratio, terms, np.asarray(log_pose - total, dtype=np.float32), first, float(grid.bias_m[b]),
-        fit, pose, reading.evidence.weight,
+        candidate.index, ratio, log_twin, terms, np.asarray(log_pose - total, dtype=np.float32), first,
+        float(grid.bias_m[b]), fit, pose, reading.evidence.weight,
     )  # fmt: skip
 
 

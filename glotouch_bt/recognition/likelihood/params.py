@@ -13,7 +13,8 @@ class LikelihoodParams:
     """Nuisance, noise, tempering and prior.
 
     Attributes:
-        width_sd_m: Spread of a rigid width about the prediction at the right pose (gel, raster, tilt).
+        width_sd_m: Scale of a rigid width about the prediction at the right pose (Student's t).
+        width_rough: Share of the table's unevenness that is added to it: a pose lies between the cells.
         width_outlier: Probability that a width has nothing to do with the prediction.
         width_range_m: Such a width is uniform over this.
         bias_sd_m, bias_limit_m, bias_steps: Aperture bias, one a TouchSet.
@@ -35,17 +36,20 @@ class LikelihoodParams:
         temper_width, temper_image: Powers that make correlated observations count as fewer.
         slope, offset: Calibration: log odds against the background = offset + slope * summed log ratios.
         prior_absent: Probability, before touching, that the target is none of the candidates.
-        look_alike: Probability, if it is none of them, that one of them is made much like it.
-        look_alike_rate: Rate, a two-sided layer, at which a closure meets what such a one differs in.
+        twin: Probability that some other object is a twin: made much like the target.
+        twin_width: Probability that a closure meets a place where a twin differs.
+        twin_width_sd_m: By how much it then does.
+        twin_slope: Calibration: log odds of a twin against the target = twin_slope * log ratio of their widths.
         accept: Least probability of the best to act on.
         evidence: Least number of layers both pads felt on the best.
     """
 
-    width_sd_m: float = 0.8e-3
-    width_outlier: float = 0.04
+    width_sd_m: float = 0.3e-3
+    width_rough: float = 0.6
+    width_outlier: float = 0.01
     width_range_m: float = 0.060
-    bias_sd_m: float = 0.5e-3
-    bias_limit_m: float = 0.8e-3
+    bias_sd_m: float = 0.3e-3
+    bias_limit_m: float = 0.4e-3
     bias_steps: int = 3
     shift_sd_m: float = 3e-3
     shift_limit_m: float = 7.5e-3
@@ -66,14 +70,16 @@ class LikelihoodParams:
     contour_outlier: float = 0.1
     yaw_sd_rad: float = math.radians(6.0)
     temper_width: float = 0.5
-    temper_image: float = 0.5
+    temper_image: float = 0.35
     slope: float = 0.95
-    offset: float = -3.4
+    offset: float = -3.1
     prior_absent: float = 0.2
-    look_alike: float = 0.5
-    look_alike_rate: float = 0.25
-    accept: float = 0.9
-    evidence: float = 2.5
+    twin: float = 0.17
+    twin_width: float = 0.5
+    twin_width_sd_m: float = 3e-3
+    twin_slope: float = 2.8
+    accept: float = 0.8
+    evidence: float = 2.0
 
     def __post_init__(self) -> None:
         for f in fields(self):
@@ -92,7 +98,8 @@ class LikelihoodParams:
             "height_lower",
             "contour_outlier",
             "prior_absent",
-            "look_alike",
+            "twin",
+            "twin_width",
         ):
             if not 0 < getattr(self, name) < 1:
                 raise ParamError(f"likelihood.{name}", getattr(self, name), "between 0 and 1")

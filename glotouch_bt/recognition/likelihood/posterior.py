@@ -1,12 +1,10 @@
 """From the evidence of all candidates to probabilities and a decision.
 
-Given which candidate is the target, the others are some other objects; so the posterior odds of candidate i against
-"none of these" are its prior odds times its own ratio target : background, and all of them with "none" sum to 1.
-
-"None of these" is either that all are some other objects, or that one of them is made much like the target. Such a
-look-alike feels like the target until a closure meets a part in which they differ: n layers miss it with probability
-exp(-look_alike_rate n). So a few layers cannot prove much, however well they fit; which candidate it is that fits best
-is not blurred by that.
+Some other object is just any object or, with probability `twin`, a twin: one made much like the target. Given which
+candidate is the target, each other one is some other object; so the posterior odds of candidate i against "none of
+these" are its prior odds times its own ratio target : some other object, and all of them with "none" sum to 1. However
+much speaks for the target against just any object, that ratio is at most that against a twin: it grows only with
+closures that meet what a twin would differ in.
 """
 
 from __future__ import annotations
@@ -22,12 +20,16 @@ from glotouch_bt.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.robot import Array, ParamError
 
 
-def probabilities(log_ratios: Sequence[float], layers: Sequence[float], p: LikelihoodParams) -> tuple[Array, float]:
+def against_others(log_ratio: float, log_twin: float, p: LikelihoodParams) -> float:
+    """log p(TouchSet | target) - log p(TouchSet | some other object) from a `Pair`'s two ratios."""
+    return log_ratio - float(np.logaddexp(math.log1p(-p.twin), math.log(p.twin) + log_ratio + log_twin))
+
+
+def probabilities(log_ratios: Sequence[float], p: LikelihoodParams) -> tuple[Array, float]:
     """(n,) probability of each candidate, and of none; candidates share what the prior leaves equally.
 
     Args:
         log_ratios: (n,) target : some other object, nats.
-        layers: (n,) two-sided layers felt on each.
         p: Priors.
 
     Raises:
@@ -36,27 +38,24 @@ def probabilities(log_ratios: Sequence[float], layers: Sequence[float], p: Likel
     n = len(log_ratios)
     if n == 0:
         raise ParamError("candidates", 0, "at least one")
-    ratios = np.asarray(log_ratios, dtype=np.float64)
-    taken_for_it = ratios - p.look_alike_rate * np.asarray(layers, dtype=np.float64)
-    absent = math.log(p.prior_absent) + np.logaddexp(
-        math.log1p(-p.look_alike), math.log(p.look_alike / n) + np.logaddexp.reduce(taken_for_it)
-    )
-    logs = np.append(math.log((1 - p.prior_absent) / n) + ratios, absent)
+    shared = math.log((1 - p.prior_absent) / n) + np.asarray(log_ratios, dtype=np.float64)
+    logs = np.append(shared, math.log(p.prior_absent))
     weights = np.exp(logs - logs.max())
     weights /= weights.sum()
     return weights[:-1], float(weights[-1])
 
 
-def as_match(pair: Pair, probability: float) -> Match:
+def as_match(pair: Pair, probability: float, p: LikelihoodParams) -> Match:
     """Loss is -log P(target | this TouchSet alone, against one other object, even odds): 0 is certain."""
-    loss = float(np.logaddexp(0.0, -pair.log_ratio))
-    return Match(pair.index, loss, pair.terms, pair.fit, pair.pose_K_O, pair.evidence, probability)
+    loss = float(np.logaddexp(0.0, -against_others(pair.log_ratio, pair.log_twin, p)))
+    terms = pair.terms | {"twin": pair.log_twin}
+    return Match(pair.index, loss, terms, pair.fit, pair.pose_K_O, pair.evidence, probability)
 
 
 def decide(pairs: Sequence[Pair], p: LikelihoodParams) -> Ranking:
     """Sort by evidence; accept the best if it is probable enough and was felt by both pads often enough."""
-    shares, p_absent = probabilities([x.log_ratio for x in pairs], [x.evidence for x in pairs], p)
-    matches = [as_match(x, float(s)) for x, s in zip(pairs, shares, strict=True)]
+    shares, p_absent = probabilities([against_others(x.log_ratio, x.log_twin, p) for x in pairs], p)
+    matches = [as_match(x, float(s), p) for x, s in zip(pairs, shares, strict=True)]
     order = tuple(sorted(matches, key=lambda m: (-m.probability, m.loss, m.index)))
     best = order[0]
     margin = order[1].loss - best.loss if len(order) > 1 else math.inf

@@ -21,6 +21,9 @@ from glotouch_bt.recognition.pads import POOLED, Array32
 from glotouch_bt.robot import Array
 
 Index = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.floating]
+T_PEAK = 2 / (math.pi * math.sqrt(3))
+"""Density of Student's t with three degrees of freedom at 0."""
 
 
 @dataclass(frozen=True)
@@ -54,26 +57,47 @@ class Observed:
     log_images: tuple[float, float]
 
 
+def width_kernel(z: Floats) -> Floats:
+    """Student's t with three degrees of freedom, 1 at its peak: most widths are 0.3 mm off, a few 2 mm."""
+    return np.asarray((1 + z * z * np.float32(1 / 3)) ** -2)
+
+
 def width_ratios(
     model: TargetModel, seen: Sequence[Observed], turn_rad: float, grid: Grid, p: LikelihoodParams
-) -> Array32:
-    """(nb, 72, nd, nz) sum over the layers of log p(width | pose) / p(width | background)."""
-    total = np.zeros((len(grid.bias_m), len(model.phi_rad), len(grid.shift_m), len(grid.z0_m)), dtype=np.float32)
-    sd = np.float32(p.width_sd_m)
+) -> tuple[Array32, Array32]:
+    """(nb, 72, nd, nz) sum over layers of log p(width | pose) / p(width | background); and (1, 72, nd, nz) of a twin.
+
+    A twin is the target with its wall moved: a closure meets a place where it differs with probability `twin_width`.
+    """
+    shape = (len(model.phi_rad), len(grid.shift_m), len(grid.z0_m))
+    total, twin = np.zeros((len(grid.bias_m), *shape), dtype=np.float32), np.zeros((1, *shape), dtype=np.float32)
     bias = grid.bias_m.astype(np.float32)[:, None, None, None]
+    outlier, far_sd = np.float32(p.width_outlier), np.float32(p.twin_width_sd_m)
     for o in seen:
         e = o.layer
-        predicted = interpolated_width(model, e.along_m + grid.shift_m, e.height_m + grid.z0_m, turn_rad)
-        z = (np.float32(e.width_m) - bias - predicted[None]) / sd
+        at, z_m = e.along_m + grid.shift_m, e.height_m + grid.z0_m
+        off = np.float32(e.width_m) - interpolated_width(model, at, z_m, turn_rad)[None]
+        sd = np.float32(p.width_rough) * nearest_unevenness(model, at, z_m, turn_rad)[None]
+        sd = np.sqrt(sd * sd + np.float32(p.width_sd_m**2))
+        scale = (1 - p.width_outlier) * math.exp(-o.log_width)
         if e.upper_only:  # the other finger touched outside its gel: the width is only bounded
-            z = np.minimum(z, np.float32(0))
-            scale = np.float32((1 - p.width_outlier) / p.width_range_m * math.exp(-o.log_width))
+            far_peak = np.float32(scale / p.width_range_m)
+            peak = np.full((1, 1, 1, 1), far_peak)
+            biased = np.minimum(off - bias, np.float32(0))
+            off = np.minimum(off, np.float32(0))
         else:
-            scale = np.float32((1 - p.width_outlier) / (p.width_sd_m * math.sqrt(2 * math.pi)) * math.exp(-o.log_width))
-        good = np.exp(np.float32(-0.5) * np.minimum(z * z, np.float32(80)))
+            far_peak = np.float32(scale * T_PEAK / p.twin_width_sd_m)
+            peak = np.float32(scale * T_PEAK) / sd
+            biased = off - bias
         # A window beside the object (NaN) predicts no closure at all: as good as an outlier.
-        total += np.log(np.where(np.isnan(good), np.float32(0), good) * scale + np.float32(p.width_outlier))
-    return total
+        total += np.log(_or_none(width_kernel(biased / sd) * peak) + outlier)
+        near, far = width_kernel(off / sd) * peak, width_kernel(off / far_sd) * far_peak
+        twin += np.log(_or_none(near + np.float32(p.twin_width) * (far - near)) + outlier)
+    return total, twin
+
+
+def _or_none(density: Floats) -> Floats:
+    return np.where(np.isnan(density), np.float32(0), density)
 
 
 def image_ratios(
@@ -141,6 +165,16 @@ def interpolated_width(model: TargetModel, l_m: Array, z_m: Array, turn_rad: flo
     if part < 1e-3:
         return np.asarray(first, dtype=np.float32)
     return np.asarray((1 - part) * first + part * np.concatenate([first[1:], first[:1]]), dtype=np.float32)
+
+
+def nearest_unevenness(model: TargetModel, l_m: Array, z_m: Array, turn_rad: float) -> Array32:
+    """(72, nl, nz) unevenness of the nearest cells, at yaws phi + turn."""
+    i, j = (
+        np.clip(np.rint((x - axis[0]) / (axis[1] - axis[0])), 0, len(axis) - 1).astype(np.int64)
+        for axis, x in ((model.l_m, l_m), (model.z_m, z_m))
+    )
+    turn = round(turn_rad / (2 * np.pi) * len(model.phi_rad))
+    return np.roll(model.unevenness_m[:, i[:, None], j[None, :]], -turn, axis=0)
 
 
 def _positions(axis: Array, x: Array) -> tuple[Index, Array32]:

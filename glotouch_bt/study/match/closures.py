@@ -19,7 +19,8 @@ from glotouch_bt.touch import TouchSet
 
 CONFIDENT = 0.95
 CLOSURE_COLUMNS = (
-    "order", "seed", "target", "present", "closures", "recorded", "confident", "right", "best_object", "p_best",
+    "order", "seed", "target", "present", "closures", "recorded", "confident", "accepted", "right",
+    "best_object", "p_best",
 )  # fmt: skip
 
 
@@ -89,7 +90,8 @@ ORDERS: dict[str, Choice] = {"recorded": in_order, "in_turn": in_turn, "adaptive
 def closures_to_confidence(layout: Layout, models: Mapping[str, TargetModel]) -> list[dict[str, Any]]:
     """A row an order and target: after how many closures the best is accepted with P > `CONFIDENT`, and if rightly.
 
-    A target that is never sure has `confident` False and all its closures counted; `right` is then of the last ranking.
+    A target that is never sure has `confident` False and all its closures counted; `right` and `accepted` are then of
+    the last ranking.
     Each is replayed once more with the target's own TouchSets taken away (`present` False): whatever is taken is wrong.
     """
     rows = []
@@ -106,7 +108,8 @@ def closures_to_confidence(layout: Layout, models: Mapping[str, TargetModel]) ->
                 rows.append(
                     {"order": order, "seed": layout.seed, "target": target, "present": present,
                      "closures": count, "recorded": len(recorded_closures(whole)), "confident": sure(ranking),
-                     "right": best == target, "best_object": best, "p_best": ranking.best.probability}
+                     "accepted": bool(ranking.accepted), "right": best == target, "best_object": best,
+                     "p_best": ranking.best.probability}
                 )  # fmt: skip
     return rows
 
@@ -121,7 +124,7 @@ def _until_sure(whole: Sequence[TouchSet], model: TargetModel, choose: Choice) -
         shown.append(new)
         i = new.candidate
         so_far[i] = partial(whole[i], [s for s in shown if s.candidate == i])
-        belief = believe(model, so_far)
+        belief = believe(model, so_far, before=belief)
     return len(shown), belief.ranking
 
 
