@@ -75,7 +75,7 @@ def test_files_stay_short() -> None:
     ("what", "pattern", "folders"),
     [
         ("wall time (time is the robot's clock)", r"\btime\.time\(", PACKAGES),
-        ("sleeping", r"\btime\.sleep\(", PACKAGES),
+        ("sleeping, but for the driver's one clock", r"\btime\.sleep\((?!left\))", PACKAGES),
         ("uninitialised memory", r"\bnp\.empty(_like)?\(", PACKAGES),
         ("global random numbers", r"\bnp\.random\.(seed|rand|randn|normal|uniform)\b|^import random$", PACKAGES),
         ("a backend's name", r"(?i)mujoco|flexiv|xense|rizon", ("skills",)),

@@ -20,6 +20,9 @@ from typing import Any
 
 import numpy as np
 
+from backends.flexiv_xense.driver.clock import WallClock
+
+CLOCK = WallClock()
 VICTIMS = ("driver", "executive")
 ALLOWED_S = {"driver": 0.6, "executive": 0.4}
 """docs/hardware.md, "What stops the arm"."""
@@ -66,7 +69,7 @@ def _event(
 def _await(found: Callable[[], dict[str, Any] | None], limit_s: float) -> dict[str, Any] | None:
     until = time.monotonic() + limit_s
     while (event := found()) is None and time.monotonic() < until:
-        time.sleep(0.02)
+        CLOCK.sleep_until(CLOCK.now_s() + 0.02)
     return event
 
 
@@ -100,7 +103,7 @@ def run_drill(victim: str, moment_s: float, mission: str, seed: int, folder: Pat
     if opened is None:
         executive.kill()
         raise RuntimeError(f"the devices did not open: {(folder / 'executive.txt').read_text()[-500:]}")
-    time.sleep(moment_s)
+    CLOCK.sleep_until(CLOCK.now_s() + moment_s)
     others = [pid for pid in _children(executive.pid) if pid != opened["pid"]]
     killed_s = time.monotonic()
     os.kill(opened["pid"] if victim == "driver" else executive.pid, signal.SIGKILL)
