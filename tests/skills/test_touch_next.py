@@ -101,16 +101,16 @@ def test_none_of_them(make) -> None:
     """The oracle is sure after one closure that the target is absent: a decision, too, once both have been felt and the
     likeliest, here the first, as often as it takes to be taken."""
     b, skill = make(Oracle(right=None, enough=1))
-    assert repeat(b, skill) == 5
-    assert [len(t.layers) for t in skill.touchsets] == [3, 1]
+    assert repeat(b, skill) == 4
+    assert [len(t.layers) for t in skill.touchsets] == [2, 1]
     assert "none of them" in b.of_kind("decided")[0]["why"]
 
 
 def test_it_ends_when_nothing_can_help(make) -> None:
     """Gains below the least are not worth a closure; only the likeliest, here the first, gets its evidence."""
     b, skill = make(Oracle(right=1, enough=3), least_gain_nats=0.6)
-    assert repeat(b, skill) == 4
-    assert [len(t.layers) for t in skill.touchsets] == [3, 0]
+    assert repeat(b, skill) == 3
+    assert [len(t.layers) for t in skill.touchsets] == [2, 0]
     assert "no closure" in b.of_kind("decided")[0]["why"]
 
 
@@ -122,7 +122,7 @@ def test_sure_but_with_too_little_evidence_is_touched_again(make, monkeypatch) -
     def believe(model, touchsets):
         belief = plain(model, touchsets)
         best = belief.ranking.matches[0]
-        ranking = replace(belief.ranking, accepted=best.evidence >= 3)
+        ranking = replace(belief.ranking, accepted=best.evidence >= belief.params.evidence)
         return SimpleNamespace(touchsets=belief.touchsets, ranking=ranking, params=belief.params)
 
     def gain(belief, closures):
@@ -132,7 +132,7 @@ def test_sure_but_with_too_little_evidence_is_touched_again(make, monkeypatch) -
     oracle.believe, oracle.expected_gain = believe, gain
     b, skill = make(oracle)
     repeat(b, skill)
-    assert [len(t.layers) for t in skill.touchsets] == [0, 3]
+    assert [len(t.layers) for t in skill.touchsets] == [0, 2]
 
 
 def test_a_candidate_that_is_gone_is_left_alone(make) -> None:
