@@ -12,7 +12,7 @@ from glotouch_bt.recognition.decision import Closure, Ranking
 from glotouch_bt.recognition.likelihood.gain import Prediction, expected_gains, predict
 from glotouch_bt.recognition.likelihood.pair import Pair, Reading, compare, read_touchset
 from glotouch_bt.recognition.likelihood.params import LikelihoodParams
-from glotouch_bt.recognition.likelihood.posterior import against_others, decide, probabilities
+from glotouch_bt.recognition.likelihood.posterior import decide, probabilities, ratios
 from glotouch_bt.recognition.model import TargetModel
 from glotouch_bt.robot import Array, ParamError
 from glotouch_bt.touch.values import TouchSet
@@ -121,7 +121,7 @@ def identify(
         raise ParamError("models", "of several pads", "of one pad")
     reading = read_touchset(touchset, models[0].pad, p)
     pairs = [compare(m, reading, p) for m in models]
-    return probabilities([against_others(x.log_ratio, x.log_twin, p) for x in pairs], p)
+    return probabilities(ratios(pairs, p), p)
 
 
 def ranked(belief: Belief) -> Ranking:

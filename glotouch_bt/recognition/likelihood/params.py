@@ -40,6 +40,7 @@ class LikelihoodParams:
         twin_width: Probability that a closure meets a place where a twin differs.
         twin_width_sd_m: By how much it then does.
         twin_slope: Calibration: log odds of a twin against the target = twin_slope * log ratio of their widths.
+        twin_fit: Power of how much better than a candidate a twin would fit (layers are correlated).
         accept: Least probability of the best to act on.
         evidence: Least number of layers both pads felt on the best.
     """
@@ -78,6 +79,7 @@ class LikelihoodParams:
     twin_width: float = 0.5
     twin_width_sd_m: float = 3e-3
     twin_slope: float = 2.8
+    twin_fit: float = 0.5
     accept: float = 0.8
     evidence: float = 2.0
 

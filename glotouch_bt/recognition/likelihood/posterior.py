@@ -20,9 +20,30 @@ from glotouch_bt.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.robot import Array, ParamError
 
 
-def against_others(log_ratio: float, log_twin: float, p: LikelihoodParams) -> float:
-    """log p(TouchSet | target) - log p(TouchSet | some other object) from a `Pair`'s two ratios."""
-    return log_ratio - float(np.logaddexp(math.log1p(-p.twin), math.log(p.twin) + log_ratio + log_twin))
+def against_others(log_ratio: float, log_twin: float, p: LikelihoodParams, missed: float = 0.0) -> float:
+    """log p(TouchSet | target) - log p(TouchSet | some other object) from a `Pair`'s two ratios.
+
+    Args:
+        log_ratio, log_twin: Of the `Pair`, nats.
+        p: Priors.
+        missed: How much better a twin explains the TouchSet than the target does, where that is known, nats.
+    """
+    return log_ratio - float(np.logaddexp(math.log1p(-p.twin), math.log(p.twin) + log_ratio + log_twin + missed))
+
+
+def ratios(pairs: Sequence[Pair], p: LikelihoodParams) -> list[float]:
+    """Target : some other object of every candidate, nats.
+
+    A twin fits its own closures as well as the target fits its: per layer that both pads felt, about as well as the
+    best of the candidates fits the target. What a candidate falls short of that speaks for its being the twin. This
+    tells two candidates apart by their images when no width can, as for an object and its mirror image.
+    """
+    rates = [x.log_ratio / max(x.evidence, 1.0) for x in pairs]
+    level = max(rates, default=0.0)
+    return [
+        against_others(x.log_ratio, x.log_twin, p, p.twin_fit * max(level - rate, 0.0) * max(x.evidence, 1.0))
+        for x, rate in zip(pairs, rates, strict=True)
+    ]
 
 
 def probabilities(log_ratios: Sequence[float], p: LikelihoodParams) -> tuple[Array, float]:
@@ -54,7 +75,7 @@ def as_match(pair: Pair, probability: float, p: LikelihoodParams) -> Match:
 
 def decide(pairs: Sequence[Pair], p: LikelihoodParams) -> Ranking:
     """Sort by evidence; accept the best if it is probable enough and was felt by both pads often enough."""
-    shares, p_absent = probabilities([against_others(x.log_ratio, x.log_twin, p) for x in pairs], p)
+    shares, p_absent = probabilities(ratios(pairs, p), p)
     matches = [as_match(x, float(s), p) for x, s in zip(pairs, shares, strict=True)]
     order = tuple(sorted(matches, key=lambda m: (-m.probability, m.loss, m.index)))
     best = order[0]
