@@ -4,7 +4,8 @@ Some other object is just any object or, with probability `twin`, a twin: one ma
 candidate is the target, each other one is some other object; so the posterior odds of candidate i against "none of
 these" are its prior odds times its own ratio target : some other object, and all of them with "none" sum to 1. However
 much speaks for the target against just any object, that ratio is at most that against a twin: it grows only with
-closures that meet what a twin would differ in.
+closures that meet what a twin would differ in, and is less for a candidate that fits worse than the best of them does.
+As each object may be a twin, the best of many candidates is less sure than the best of few.
 """
 
 from __future__ import annotations
