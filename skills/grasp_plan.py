@@ -27,7 +27,7 @@ APART_RAD, APART_M = math.radians(25.0), 0.012
 LEAST_WORTH = 0.02
 BELIEVED_M = 0.002
 """The pose is believed if the mesh standing there is as wide as was felt: three quarters of the closures within this of
-one offset. Source: 2.5 times the width's spread in recognition."""
+one offset. Wider than the width's scatter in recognition, for the place of the closures is off too."""
 LEAST_OFFSET_M, GREATEST_OFFSET_M = -0.004, 0.0015
 """The offset, of what was felt against the mesh: both gels give, and the jaws' zero is off (CONDITIONS)."""
 LEAST_LAYERS = 3

@@ -1,6 +1,7 @@
 """The right object has the greatest probability; evidence that is missing is never made up."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from glotouch_bt.recognition.evidence import read_evidence
 from glotouch_bt.recognition.gain import believe
 from glotouch_bt.recognition.likelihood.pair import compare, read_touchset, watched_turns
 from glotouch_bt.recognition.likelihood.params import LikelihoodParams
-from glotouch_bt.recognition.likelihood.posterior import against_others, probabilities
+from glotouch_bt.recognition.likelihood.posterior import against_others, probabilities, ratios
 from glotouch_bt.recognition.synthetic import HARSH, IDEAL, NOMINAL, acquire
 from glotouch_bt.robot import ParamError
 from glotouch_bt.touch import TouchSequence, TouchSet
@@ -255,10 +256,24 @@ def test_probabilities_against_bayes() -> None:
     Target: 0.4 x 8 (the other one 0.75 + 0.25 x 2), 0.4 x 2 (0.75 + 0.25 x 4). None: 0.2 x 1.25 x 1.75.
     """
     p = LikelihoodParams(prior_absent=0.2, twin=0.25)
-    ratios = [against_others(np.log(8), np.log(4 / 8), p), against_others(np.log(2), 0.0, p)]
-    shares, absent = probabilities(ratios, p)
+    against = [against_others(np.log(8), np.log(4 / 8), p), against_others(np.log(2), 0.0, p)]
+    shares, absent = probabilities(against, p)
     expected = np.array([0.4 * 8 * 1.25, 0.4 * 2 * 1.75, 0.2 * 1.25 * 1.75])
     np.testing.assert_allclose([*shares, absent], expected / expected.sum())
+
+
+def test_what_fits_worse_than_a_twin_would_is_the_twin() -> None:
+    """Of two whose widths say the same, the one whose images fit better leads by `twin_fit` of what they tell; layers
+    count, not sums: 80 nats of four layers and 40 of two fit alike."""
+    p = LikelihoodParams()
+
+    def felt(log_ratio: float, layers: float) -> SimpleNamespace:
+        return SimpleNamespace(log_ratio=log_ratio, log_twin=-2.0, evidence=layers)
+
+    better, worse = ratios([felt(80.0, 4.0), felt(60.0, 4.0)], p)
+    assert better == pytest.approx(2.0 - np.log(p.twin))  # against a twin that fits as well
+    assert better - worse == pytest.approx(p.twin_fit * 20.0)
+    assert ratios([felt(80.0, 4.0), felt(40.0, 2.0)], p) == pytest.approx([better, better])
 
 
 @given(

@@ -67,17 +67,18 @@ def probabilities(log_ratios: Sequence[float], p: LikelihoodParams) -> tuple[Arr
     return weights[:-1], float(weights[-1])
 
 
-def as_match(pair: Pair, probability: float, p: LikelihoodParams) -> Match:
-    """Loss is -log P(target | this TouchSet alone, against one other object, even odds): 0 is certain."""
-    loss = float(np.logaddexp(0.0, -against_others(pair.log_ratio, pair.log_twin, p)))
+def as_match(pair: Pair, ratio: float, probability: float) -> Match:
+    """Loss is -log P(target) by the ratio target : some other object (nats) at even odds: 0 is certain."""
+    loss = float(np.logaddexp(0.0, -ratio))
     terms = pair.terms | {"twin": pair.log_twin}
     return Match(pair.index, loss, terms, pair.fit, pair.pose_K_O, pair.evidence, probability)
 
 
 def decide(pairs: Sequence[Pair], p: LikelihoodParams) -> Ranking:
     """Sort by evidence; accept the best if it is probable enough and was felt by both pads often enough."""
-    shares, p_absent = probabilities(ratios(pairs, p), p)
-    matches = [as_match(x, float(s), p) for x, s in zip(pairs, shares, strict=True)]
+    against = ratios(pairs, p)
+    shares, p_absent = probabilities(against, p)
+    matches = [as_match(x, r, float(s)) for x, r, s in zip(pairs, against, shares, strict=True)]
     order = tuple(sorted(matches, key=lambda m: (-m.probability, m.loss, m.index)))
     best = order[0]
     margin = order[1].loss - best.loss if len(order) > 1 else math.inf
