@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from glotouch_bt.robot import Array, Gripper, Pose, SetPayload, Tare
@@ -37,6 +39,16 @@ class BareHand(Skill):
 
     Params = BareHandParams
     params: BareHandParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
+    LEAVES: ClassVar = {"hand": "fingers"}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "probe_held": "the probe is in the jaws",
+        "request_failed": "the sensor could not be zeroed, or the payload not be set",
+        "motion_refused": "the hand cannot be turned there",
+    }
+
     tool = Out(HeldTool, "the fingers as a tool")
 
     def run(self) -> SkillRun:

@@ -24,9 +24,11 @@ brakes past its last setpoint, the next skill first waits for it to stand and ta
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar, cast, overload
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, Protocol, TypeVar, cast, overload
 
 import py_trees
 from py_trees.common import Status
@@ -40,6 +42,14 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 SkillRun = Generator[Command, Observation, None]
+
+NOTHING: Mapping[str, Any] = MappingProxyType({})
+UNCHANGED = "unchanged"
+"""In `AFTER_FAILURE`: the resource may be in the state in which the skill found it."""
+GENERAL_FAILURES: Mapping[str, str] = MappingProxyType(
+    {"not_at_rest": "the arm still moves after the skill before was broken off"}
+)
+"""Failures that the base class gives, so that any skill can."""
 
 REST_RAD_S, REST_PERIODS, LONGEST_BRAKING_PERIODS = 0.01, 5, 300
 """The arm stands once every joint was this slow for so many periods; it must within the last number of them."""
@@ -216,8 +226,35 @@ def come_to_rest(context: Context) -> SkillRun:
     )
 
 
+class UndeclaredFailure(UserWarning):
+    """A skill failed with a code that its `FAILURES` do not name."""
+
+
 class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: ignore[call-arg]
-    """Base class of every skill; see the module's text. Subclass names are not used: entry points name skills."""
+    """Base class of every skill; see the module's text. Subclass names are not used: entry points name skills.
+
+    What a skill promises about things that are no ports, for `glotouch check`; left out, it promises and asks nothing.
+    A resource is a name, `hand` above all, whose states are names too: a mission begins with the hand `empty`. A state
+    says what skills did on purpose. What was lost against their will is a fault: the next skill that needs it notices.
+
+    Attributes:
+        NEEDS: States of resources in which it may start.
+        LEAVES: Their states after SUCCESS; of those not named, what they were.
+        AFTER_FAILURE: What they may be after FAILURE (`UNCHANGED`: what they were); of those not named, what they were
+            or what they are after SUCCESS.
+        PUT_BACK_WITH: Of what it leaves, what should not outlast a mission unsaid, and the skill that puts it back.
+        USES: What it has for itself while it runs: no two skills that use the same may run at once.
+        FAILURES: Codes it may fail with, each in a few words (beside `GENERAL_FAILURES`).
+        PAUSE: What a pause does to it.
+    """
+
+    NEEDS: ClassVar[Mapping[str, frozenset[str]]] = NOTHING
+    LEAVES: ClassVar[Mapping[str, str]] = NOTHING
+    AFTER_FAILURE: ClassVar[Mapping[str, frozenset[str]]] = NOTHING
+    PUT_BACK_WITH: ClassVar[Mapping[str, str]] = NOTHING
+    USES: ClassVar[frozenset[str]] = frozenset()
+    FAILURES: ClassVar[Mapping[str, str]] = NOTHING
+    PAUSE: ClassVar[Literal["hold", "retreat", "finish"]] = "hold"
 
     Params: ClassVar[type[SkillParams]] = SkillParams
     INPUT_PORTS: ClassVar[dict[str, PortInformation]] = {}
@@ -288,7 +325,14 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
             return self._fail(Reason("motion_refused", str(e), advice="move the target or clear the way"))
         return Status.RUNNING
 
+    @classmethod
+    def failure_codes(cls) -> dict[str, str]:
+        """Every code it may fail with, each in a few words."""
+        return {**cls.FAILURES, **GENERAL_FAILURES}
+
     def _fail(self, reason: Reason) -> Status:
+        if self.FAILURES and reason.code not in self.failure_codes():
+            warnings.warn(f"{type(self).__name__} does not declare {reason.code!r}", UndeclaredFailure, stacklevel=2)
         self.reason = dataclasses.replace(reason, node=self.name)
         self.feedback_message = reason.message
         return Status.FAILURE

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import MotionRefused, Pose
 from glotouch_bt.touch import Candidate
 from skills.allowance import keeping_clear_of
-from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from skills.base import UNCHANGED, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.closing import close_gently
 from skills.grasp_plan import GraspPlan
 from skills.hand import CLEARANCE_M, glide, hand_pose_B, require_clear
@@ -36,6 +38,13 @@ class Grasp(Skill):
 
     Params = GraspParams
     params: GraspParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
+    LEAVES: ClassVar = {"hand": "object"}
+    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {"no_grasp": "no grasp of the plan could be made; the hand has risen, jaws open"}
+
     plan = In(GraspPlan, "where and how wide")
     known = In(tuple, "all candidates, to keep clear of", key="candidates", element=Candidate, required=False)
     grip_m = Out(float, "aperture of the closed jaws, m")

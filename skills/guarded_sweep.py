@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -40,6 +40,16 @@ class GuardedSweep(Skill):
 
     Params = GuardedSweepParams
     params: GuardedSweepParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "search_exhausted": "nothing is left to explore, or to reach",
+        "hard_contact": "the wrench passed a hard limit on the way",
+        "tool_lost": "the jaws are not as far apart as when they took the tool",
+        "motion_refused": "the way is not clear",
+    }
+
     tool = In(HeldTool, "the held probe")
     previous = In(SearchMap, "what has been explored so far", key="map", required=False)
     map = Out(SearchMap, "what has been explored now")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
@@ -26,6 +28,16 @@ class Lift(Skill):
 
     Params = LiftParams
     params: LiftParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"object"})}
+    # `lost` is a verdict by weight and aperture: something light may still be between the pads.
+    AFTER_FAILURE: ClassVar = {"hand": frozenset({"object", "empty"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "lost": "the jaws are empty at the top",
+        "motion_refused": "the arm cannot be raised so far",
+    }
+
     grip_m = In(float, "aperture of the closed jaws")
     weight_N = Out(float, "weight in the hand, N")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 from glotouch_bt.model_cache import target_model
 from glotouch_bt.recognition import MATCHERS, PadSpec, Ranking
@@ -34,6 +34,15 @@ class Match(Skill):
 
     Params = MatchParams
     params: MatchParams
+
+    USES: ClassVar = frozenset({"arm"})  # it holds the arm while it thinks
+    FAILURES: ClassVar = {
+        "not_recognised": "no candidate is surely the target",
+        "too_wide": "the same, and the jaws do not open wide enough for the target",
+        "too_low": "the target is lower than the probe and the pads reach",
+        "no_touch": "nothing was squeezed",
+    }
+
     touchsets = In(tuple, "one TouchSet per candidate squeezed", required=False)
     known = In(tuple, "all candidates, to say which were not squeezed", key="candidates", required=False)
     ranking = Out(Ranking, "all candidates, best first")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import ClassVar
 
 import numpy as np
 
@@ -49,6 +50,17 @@ class OrbitProbe(Skill):
 
     Params = OrbitProbeParams
     params: OrbitProbeParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "known_object": "the contact belongs to an object traced before",
+        "not_traced": "too few contacts were made to fit an outline",
+        "hard_contact": "the wrench passed a hard limit on the way",
+        "tool_lost": "the jaws are not as far apart as when they took the tool",
+        "motion_refused": "the way is not clear",
+    }
+
     tool = In(HeldTool, "the held probe")
     contact = In(Contact, "first contact with the object")
     previous_map = In(SearchMap, "the search map", key="map")

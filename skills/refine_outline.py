@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from glotouch_bt.search import refined, trace_more
@@ -28,6 +30,16 @@ class RefineOutline(Skill):
 
     Params = RefineOutlineParams
     params: RefineOutlineParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "not_met": "nothing was touched where it should stand",
+        "hard_contact": "the wrench passed a hard limit on the way",
+        "tool_lost": "the jaws are not as far apart as when they took the tool",
+        "motion_refused": "the way is not clear",
+    }
+
     tool = In(HeldTool, "the held probe")
     candidate = In(Candidate, "the object as traced so far")
     refined = Out(Candidate, "the object as traced now", key="candidate", always=True)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.touch import Candidate, Layer, TouchSequence, TouchSet
 from skills.allowance import keeping_clear_of
-from skills.base import In, Out, Skill, SkillFailed, SkillRun
+from skills.base import UNCHANGED, In, Out, Skill, SkillFailed, SkillRun
 from skills.squeeze_motion import LEAST_GAP_M, ClosureParams, Squeezing, disturbance, layer_heights
 from skills.squeeze_plan import Stance, plan_stances
 
@@ -30,6 +32,17 @@ class Squeeze(Skill):
 
     Params = SqueezeParams
     params: SqueezeParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
+    LEAVES: ClassVar = {"hand": "empty"}
+    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "nothing_felt": "no closure reached a plateau on anything",
+        "no_squeeze": "it does not fit between the open jaws, or its neighbours leave the fingers no room",
+        "motion_refused": "the hand cannot be brought over it",
+    }
+
     candidate = In(Candidate, "what to squeeze")
     known = In(tuple, "all candidates, to keep clear of", key="candidates", required=False)
     touchset = Out(TouchSet, "what was felt")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 
@@ -60,6 +61,16 @@ class ToolCalibrate(Skill):
 
     Params = ToolCalibrateParams
     params: ToolCalibrateParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"probe"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "no_wall": "the ball met nothing where a wall should be",
+        "slipped": "the touches agree with no one place of the ball in the hand",
+        "hard_contact": "the wrench passed a hard limit on the way",
+        "motion_refused": "the corner cannot be reached, or the hand not be turned there",
+    }
+
     before = In(HeldTool, "the probe in the jaws", key="tool")
     tool = Out(HeldTool, "the probe, measured")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Pose, SetPayload, Tare
 from glotouch_bt.touch import GuardParams
 from skills.allowance import may_touch
-from skills.base import Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from skills.base import UNCHANGED, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.corner import corner_place
 from skills.hand import easy_yaw
 from skills.held_tool import HeldTool
@@ -50,6 +51,21 @@ class ToolPickup(Skill):
 
     Params = ToolPickupParams
     params: ToolPickupParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers", "untared", "probe"})}
+    LEAVES: ClassVar = {"hand": "probe"}
+    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "empty", "probe"})}
+    PUT_BACK_WITH: ClassVar = {"hand": "tool_return"}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "no_probe": "the jaws closed on nothing, or on something of another width",
+        "probe_not_lifted": "the hand came up without the probe's weight",
+        "no_floor": "the ball met nothing where the container's floor should be",
+        "hard_contact": "the wrench passed a hard limit on the way to the floor",
+        "request_failed": "the sensor could not be zeroed, or the payload not be set",
+        "motion_refused": "the holder cannot be reached",
+    }
+
     tool = Out(HeldTool, "the probe in the jaws")
 
     def run(self) -> SkillRun:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 
 from glotouch_bt.robot import Pose, SetPayload, Tare
-from skills.base import In, Skill, SkillParams, SkillRun, param
+from skills.base import UNCHANGED, In, Skill, SkillParams, SkillRun, param
 from skills.held_tool import HeldTool
 from skills.requests import finish
 
@@ -34,6 +35,17 @@ class ToolReturn(Skill):
 
     Params = ToolReturnParams
     params: ToolReturnParams
+
+    # `untared`: let go of, but not yet zeroed without it; nothing but this skill or `tool_pickup` may follow.
+    NEEDS: ClassVar = {"hand": frozenset({"probe", "untared"})}
+    LEAVES: ClassVar = {"hand": "empty"}
+    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "untared"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "request_failed": "the sensor could not be zeroed, or the payload not be set",
+        "motion_refused": "the holder cannot be reached from here",
+    }
+
     tool = In(HeldTool, "the probe in the jaws")
 
     def run(self) -> SkillRun:

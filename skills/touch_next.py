@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from glotouch_bt.recognition.gain import Belief, believe, expected_gain
 from glotouch_bt.robot import HOLD, Array, MotionRefused, ParamError
 from glotouch_bt.touch import Candidate, Layer, TouchSequence, TouchSet
 from skills.allowance import keeping_clear_of
-from skills.base import Context, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from skills.base import UNCHANGED, Context, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.hand import CLEARANCE_M, hand_pose_B, require_clear
 from skills.match import load_target
 from skills.squeeze_motion import ClosureParams, Squeezing, disturbance, pads_height_m
@@ -43,6 +44,17 @@ class TouchNext(Skill):
 
     Params = TouchNextParams
     params: TouchNextParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
+    LEAVES: ClassVar = {"hand": "empty"}
+    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "no_candidates": "there is nothing to touch",
+        "too_low": "the target is lower than the probe and the pads reach",
+        "motion_refused": "the hand cannot rise",
+    }
+
     candidates = In(tuple, "what may be touched", element=Candidate)
     felt = In(tuple, "what was felt so far", key="touchsets", required=False)
     touchsets = Out(tuple, "what was felt, one TouchSet per candidate", element=TouchSet)

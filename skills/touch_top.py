@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -44,6 +45,15 @@ class TouchTop(Skill):
 
     Params = TouchTopParams
     params: TouchTopParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "no_top": "nothing was met above where its sides had been touched",
+        "hard_contact": "the wrench passed a hard limit on the way",
+        "motion_refused": "the ball cannot be brought above it",
+    }
+
     tool = In(HeldTool, "the held probe")
     candidate = In(Candidate, "the object, as traced")
     measured = Out(Candidate, "the same with its height", always=True)
