@@ -237,18 +237,20 @@ class Recorder:
 
     def _encode_tactile(self, observations: list[Observation]) -> None:
         """Every pair of depth maps packed, and at most ten pairs a second as images."""
-        frames = [o.tactile for o in observations if o.tactile is not None]
-        if not frames:
+        taken = [(o.tactile, o.now_s) for o in observations if o.tactile is not None]
+        if not taken:
             return
+        frames = [frame for frame, _ in taken]
         start_ns = _ns(frames[0].stamp_s)
         shape = (frames[0].left_m.shape[0], frames[0].left_m.shape[1])
         columns = (
             Column("stamp_s", (), 1e-7, 2),
+            Column("arrived_s", (), 1e-7, 2),
             Column("left_m", shape, 1e-6, 0),
             Column("right_m", shape, 1e-6, 0),
         )
-        stamps = np.array([f.stamp_s for f in frames]) - start_ns * 1e-9
-        values = (stamps, np.stack([f.left_m for f in frames]), np.stack([f.right_m for f in frames]))
+        stamps = np.array([(f.stamp_s, arrived_s) for f, arrived_s in taken]).T - start_ns * 1e-9
+        values = (*stamps, np.stack([f.left_m for f in frames]), np.stack([f.right_m for f in frames]))
         self._put(start_ns, "/packed/tactile", pack(start_ns, columns, values))
         for frame in frames:
             ns = _ns(frame.stamp_s)

@@ -13,6 +13,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from glotouch_bt.mission.build import BuiltTree, build_tree
+from glotouch_bt.mission.journaled import JournaledRequests
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.reasons import Failure, ReasonBook
 from glotouch_bt.mission.tally import Record, Tally
@@ -86,9 +87,11 @@ def run_mission(
     arm = make_arm(robot, mission.world)
     observation = robot.observe()
     arm.sync(observation)
+    tally.block(observation, HOLD)  # a replay begins where the robot did
     context = Context(
         world=mission.world, arm=arm, requests=robot, journal=tally, observation=observation, command=HOLD
     )
+    context.requests = JournaledRequests(robot, tally, lambda: context.observation.now_s)
     tree = build_tree(mission.tree, context, mission.name)
     loop = _Loop(tree, context, robot, tally, on_progress)
     outcome = Outcome("aborted", tally, start_s=observation.now_s)

@@ -68,7 +68,7 @@ class RunRecord:
         truth: truth.json as it is, or None.
         samples: Full-rate columns (N, ...): stamp_s, q, dq, position_B_P, quat_B_P, force_S_N, torque_S_Nm.
         cycles: Once a control cycle: stamp_s, samples, gripper_*, command_* (NaN where there was no command).
-        tactile: stamp_s (f,), left_m and right_m (f, rows, cols).
+        tactile: stamp_s and arrived_s (f,), left_m and right_m (f, rows, cols).
         events, ticks, ports: In the order of the record.
         complete: The record was closed properly.
     """
@@ -201,7 +201,7 @@ def _wanted(topic: str) -> bool:
 def _take(record: RunRecord, packed: dict[str, list[dict[str, Array]]], topic: str, log_ns: int, data: bytes) -> None:
     if topic in _PACKED:
         start_ns, columns = unpack(data)
-        for name in ("stamp_s", "gripper_stamp_s"):
+        for name in ("stamp_s", "gripper_stamp_s", "arrived_s"):
             if name in columns:
                 columns[name] = columns[name] + start_ns * 1e-9
         packed[_PACKED[topic]].append(columns)

@@ -129,7 +129,7 @@ def _run(
     folder.write_text("mission.yaml", _mission_yaml(request, mission))
     objects_at_start = referee.objects() if referee else []
     ready = time.perf_counter()
-    recorder = Recorder(folder.path / "run.mcap", _description(request, mission, conditions))
+    recorder = Recorder(folder.path / "run.mcap", _description(request, mission, conditions, robot))
     result: dict[str, Any] | None = None
     try:
         try:
@@ -168,8 +168,8 @@ def _mission_yaml(request: RunRequest, mission: Mission) -> str:
     return head + mission.resolved_yaml()
 
 
-def _description(request: RunRequest, mission: Mission, conditions: Conditions) -> dict[str, object]:
-    """What is known before the run; goes into the record."""
+def _description(request: RunRequest, mission: Mission, conditions: Conditions, robot: Robot) -> dict[str, object]:
+    """What is known before the run; goes into the record. With `robot` a replay needs no backend."""
     world = mission.world
     objects = dataclasses.replace(world.objects, folder=Path(shown(world.objects.folder)))
     return {
@@ -183,6 +183,7 @@ def _description(request: RunRequest, mission: Mission, conditions: Conditions) 
         "probe": world.probe,
         "holder": world.holder,
         "objects": objects,
+        "robot": {"description": robot.description, "limits": robot.limits, "period_s": robot.period_s},
         "versions": _versions(),
     }
 

@@ -1,0 +1,185 @@
+"""A robot that senses what another one sensed: the blocks of a record, one a cycle, whatever it is told.
+
+It compares what it is told with what the recorded robot was told. While both agree, the skills stand where they stood
+then and every fit and decision is made again from the same data. From the first command that differs on, the recorded
+data are answers to other commands; `parted` says where that was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from glotouch_bt.robot import (
+    Array,
+    BackendError,
+    Command,
+    GripperState,
+    Limits,
+    Observation,
+    Request,
+    Robot,
+    RobotDescription,
+    TactileFrame,
+    Ticket,
+)
+
+SAME_RAD, SAME_M, SAME_M_S, SAME_N = 1e-4, 1e-5, 1e-4, 1e-2
+"""Commands agree within this: a hundred times what the record's rounding moves them by, far below what is noticed."""
+
+
+class RecordEnded(BackendError):
+    """The replay asked for a cycle that the record does not have."""
+
+
+@dataclass(frozen=True)
+class Parting:
+    """The first command that was not the recorded one.
+
+    Attributes:
+        cycle: Its number; the first command is 1.
+        stamp_s: Robot clock at the end of that cycle.
+        what: What differed, with both values.
+    """
+
+    cycle: int
+    stamp_s: float
+    what: str
+
+
+class ReplayedRobot(Robot):
+    """See the module's text.
+
+    Args:
+        description, limits, period_s: Of the recorded robot.
+        samples, cycles, tactile: The record's columns (`report.RunRecord`); row 0 of `cycles` was sensed before the
+            first command.
+        done_s: Robot clock at which each slow request was seen to be done, by its number, and its error.
+    """
+
+    def __init__(
+        self,
+        description: RobotDescription,
+        limits: Limits,
+        period_s: float,
+        samples: Mapping[str, Array],
+        cycles: Mapping[str, Array],
+        tactile: Mapping[str, Array],
+        done_s: Mapping[int, tuple[float, str | None]],
+    ) -> None:
+        self.description, self.limits, self.period_s = description, limits, period_s
+        self._samples, self._cycles, self._tactile, self._done_s = samples, cycles, tactile, done_s
+        self._ends = np.cumsum(cycles["samples"]).astype(np.int64)
+        frames = tactile["arrived_s"] if len(tactile) else np.zeros(0)
+        self._frame_of = np.searchsorted(cycles["stamp_s"], frames - 0.5 * period_s)
+        wrench = np.concatenate([samples["force_S_N"], samples["torque_S_Nm"]], axis=1)
+        self._wrench = np.ascontiguousarray(wrench)
+        self._at = 0
+        self._requests = 0
+        self._observation = self._block(0)
+        self.parted: Parting | None = None
+
+    @property
+    def left(self) -> int:
+        """Recorded cycles not yet used."""
+        return len(self._ends) - 1 - self._at
+
+    def observe(self) -> Observation:
+        """The newest block."""
+        return self._observation
+
+    def cycle(self, command: Command) -> Observation:
+        """The next recorded block.
+
+        Raises:
+            RecordEnded: There is none.
+        """
+        if self._at + 1 >= len(self._ends):
+            raise RecordEnded(f"the record ends at t={self._observation.now_s:.3f} s; the replay would go on")
+        self._at += 1
+        if self.parted is None:
+            what = self._difference(command, self._at)
+            if what:
+                self.parted = Parting(self._at, float(self._cycles["stamp_s"][self._at]), what)
+        self._observation = self._block(self._at)
+        return self._observation
+
+    def start(self, request: Request) -> Ticket:
+        """A request that is done when the recorded one was."""
+        stamp_s, error = self._done_s.get(self._requests, (np.inf, None))
+        self._requests += 1
+        return _Ticket(self, stamp_s, error)
+
+    def hold(self) -> None:
+        """Nothing moves."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+    def _block(self, i: int) -> Observation:
+        rows = slice(int(self._ends[i - 1]) if i else 0, int(self._ends[i]))
+        s, c = self._samples, self._cycles
+        gripper = GripperState(
+            float(c["gripper_stamp_s"][i]),
+            float(c["gripper_aperture_m"][i]),
+            float(c["gripper_force_N"][i]),
+            bool(c["gripper_moving"][i]),
+        )
+        frame: TactileFrame | None = None
+        at = int(np.searchsorted(self._frame_of, i))
+        if at < len(self._frame_of) and self._frame_of[at] == i:
+            t = self._tactile
+            frame = TactileFrame(float(t["stamp_s"][at]), t["left_m"][at], t["right_m"][at])
+        return Observation(
+            s["stamp_s"][rows],
+            s["q"][rows],
+            s["dq"][rows],
+            s["position_B_P"][rows],
+            s["quat_B_P"][rows],
+            self._wrench[rows],
+            gripper,
+            frame,
+        )
+
+    def _difference(self, command: Command, i: int) -> str:
+        """What this command and the recorded one of cycle i differ in, in words; empty if in nothing."""
+        c = self._cycles
+        was = c["command_q"][i]
+        if (command.motion is None) != bool(np.isnan(was[0])):
+            return "one holds, the other moves: the record " + ("holds" if np.isnan(was[0]) else "moves")
+        if command.motion is not None:
+            worst = float(np.abs(command.motion.q - was).max())
+            if worst > SAME_RAD:
+                return f"a joint setpoint differs by {worst:.2g} rad"
+        target, asked = command.gripper, not np.isnan(c["command_aperture_m"][i])
+        if (target is not None) != asked:
+            return "the jaws are told something in one only: " + ("the record" if asked else "the replay")
+        if target is not None:
+            for name, is_, tolerance in (
+                ("aperture_m", target.aperture_m, SAME_M),
+                ("speed_m_s", target.speed_m_s, SAME_M_S),
+                ("force_N", target.force_N, SAME_N),
+            ):
+                then = float(c[f"command_{name}"][i])
+                if abs(is_ - then) > tolerance:
+                    return f"the jaws' {name} is {is_:.6g}, it was {then:.6g}"
+        if command.tactile != bool(c["command_tactile"][i]):
+            return "depth maps are asked for in one only"
+        return ""
+
+
+class _Ticket:
+    def __init__(self, robot: ReplayedRobot, done_s: float, error: str | None) -> None:
+        self._robot, self._done_s, self._error = robot, done_s, error
+
+    @property
+    def done(self) -> bool:
+        """At the recorded time (half a sample early: stamps are rounded)."""
+        return self._robot.observe().now_s >= self._done_s - 0.0005
+
+    @property
+    def error(self) -> str | None:
+        """The recorded error, once done."""
+        return self._error if self.done else None
