@@ -118,6 +118,9 @@ class _Builder:
     def _succeed(self, spec: NodeSpec, children: list[Behaviour]) -> Behaviour:
         return py_trees.decorators.FailureIsSuccess(spec.name, children[0])
 
+    def _fail(self, spec: NodeSpec, children: list[Behaviour]) -> Behaviour:
+        return py_trees.decorators.SuccessIsFailure(spec.name, children[0])
+
     def _subtree(self, spec: NodeSpec, children: list[Behaviour]) -> Behaviour:
         return Passage(spec.name, children[0])
 

@@ -18,6 +18,7 @@ _SIGNS = {
     "timeout": "⏱",
     "invert": "¬",
     "succeed": "✓",
+    "fail": "✗",
     "condition": "◇",
     "subtree": "▤",
     "skill": "■",

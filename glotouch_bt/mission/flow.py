@@ -157,6 +157,9 @@ class _Flow:
     def _succeed(self, node: NodeSpec, state: State, report: bool) -> After:
         return join(*self._only(node, state, report)), None
 
+    def _fail(self, node: NodeSpec, state: State, report: bool) -> After:
+        return None, join(*self._only(node, state, report))
+
     def _timeout(self, node: NodeSpec, state: State, report: bool) -> After:
         success, failure = self._only(node, state, report)
         return success, join(failure, write(state, self._all_writes(node), always=False))

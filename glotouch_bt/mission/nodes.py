@@ -103,6 +103,7 @@ KINDS: dict[str, Kind] = {
     "for_each": Kind(ForEachSettings, "one", "do the child for every item of a tuple"),
     "invert": Kind(Plain, "one", "success and failure exchanged"),
     "succeed": Kind(Plain, "one", "success whatever the child says"),
+    "fail": Kind(Plain, "one", "failure whatever the child says"),
     "condition": Kind(ConditionSettings, "none", "test a port"),
     "subtree": Kind(SubtreeSettings, "none", "a tree from another file"),
 }

@@ -30,6 +30,9 @@ TABLE = [
     ("invert", "  invert: {act: {script: RS}}", "RF"),
     ("invert a failure", "  invert: {do: {act: {script: F}}}", "S"),
     ("succeed", "  succeed: {act: {script: RF}}", "RS"),
+    ("fail", "  fail: {act: {script: RS}}", "RF"),
+    ("fail what fails", "  fail: {do: {act: {script: RF}}}", "RF"),
+    ("a safe ending fails on", "  selector: [act: {script: RF}, fail: {act: {script: RS}}]", "RRF"),
     ("timeout fails", "  timeout: {seconds: 30 ms, do: {act: {script: RRRRRR}}}", "RRRF"),
     ("timeout lets success through", "  timeout: {seconds: 0.05, do: {act: {script: RS}}}", "RS"),
     (
