@@ -1,0 +1,217 @@
+"""Run a mission with scripted leaves: the real tree on the real runner, a robot without physics, in milliseconds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal, cast
+
+from glotouch_bt.mission.load import Mission
+from glotouch_bt.mission.nodes import NodeSpec
+from glotouch_bt.mission.reasons import Failure
+from glotouch_bt.mission.runner import default_arm, run_mission
+from glotouch_bt.mission.tally import NullRecord
+from glotouch_bt.mission_testing import casting
+from glotouch_bt.mission_testing.casting import ScriptError
+from glotouch_bt.mission_testing.outcomes import Script
+from glotouch_bt.mission_testing.skipping import SkippingRobot, may_skip
+from glotouch_bt.mission_testing.stand_in import Call, Part, Stage, playing
+from glotouch_bt.robot import Command, GlotouchError, Observation, Robot, World
+from glotouch_bt.robot.fake import FakeRobot
+
+if TYPE_CHECKING:
+    from glotouch_bt.motion import Arm
+
+MOST_TICKS = 20_000
+
+
+class RunsAway(GlotouchError):
+    """A scripted mission that does not end."""
+
+
+class ScriptedRun:
+    """What came of a scripted mission.
+
+    Attributes:
+        mission: The mission's name.
+        status: success, failure or aborted (a leaf raised).
+        calls: Every call of a leaf, in order of start.
+        chain: Why it did not succeed, root cause last.
+        error: What was raised, if it was aborted.
+        ticks: Ticks done.
+        duration_s: Robot time it took.
+        keys: Last value of each key that was written.
+    """
+
+    def __init__(self, mission: str, leaves: Mapping[str, NodeSpec], heard: _Heard, stage: Stage, outcome: Any) -> None:
+        self.mission = mission
+        self.status: Literal["success", "failure", "aborted"] = outcome.status
+        self.calls: tuple[Call, ...] = tuple(stage.calls)
+        self.chain: tuple[Failure, ...] = tuple(outcome.chain)
+        self.error: BaseException | None = outcome.error
+        self.ticks: int = outcome.ticks
+        self.duration_s: float = round(outcome.end_s - outcome.start_s, 9)
+        self.keys: Mapping[str, Any] = heard.keys
+        self._leaves, self._statuses = leaves, heard.statuses
+
+    @property
+    def succeeded(self) -> bool:
+        """The mission succeeded."""
+        return self.status == "success"
+
+    @property
+    def code(self) -> str:
+        """Code of the root cause: a skill's failure code, `mission_timeout`, `fault` ...; empty without one."""
+        reason = self.chain[-1].reason if self.chain else None
+        return reason.code if reason else ""
+
+    @property
+    def order(self) -> list[str]:
+        """Names of the leaves, in order of start."""
+        return [c.node for c in self.calls]
+
+    def failed_with(self, code: str, node: str = "*") -> bool:
+        """The mission failed, and its root cause has this code (and is this leaf)."""
+        if self.status != "failure" or self.code != code:
+            return False
+        return node == "*" or self.chain[-1].node in {s.name for s in self._fitting(node).values()}
+
+    def calls_of(self, pattern: str) -> list[Call]:
+        """The calls of the leaves that a name or pattern fits.
+
+        Raises:
+            ScriptError: It fits no leaf of the mission.
+        """
+        fitting = self._fitting(pattern)
+        return [c for c in self.calls if c.path in fitting]
+
+    def ran(self, pattern: str) -> int:
+        """How often these leaves were called."""
+        return len(self.calls_of(pattern))
+
+    def never_ran(self, pattern: str) -> bool:
+        """None of these leaves was called."""
+        return not self.calls_of(pattern)
+
+    def endings(self, pattern: str) -> list[str]:
+        """How these leaves' calls ended: SUCCESS, a failure code, PREEMPTED, RAISED."""
+        return [c.code or c.ending for c in self.calls_of(pattern)]
+
+    def before(self, first: str, then: str) -> bool:
+        """Both were called, and every call of the first began before any of the second."""
+        order = [id(c) for c in self.calls]
+        one, two = ([order.index(id(c)) for c in self.calls_of(p)] for p in (first, then))
+        return bool(one) and bool(two) and max(one) < min(two)
+
+    def status_of(self, node: str) -> str:
+        """Last status of a node by name or path, composites and decorators too; INVALID if it was never reached.
+
+        Raises:
+            ScriptError: No such node.
+        """
+        found = [s for p, s in self._statuses.items() if node in (p, p.rsplit("/", 1)[-1])]
+        if not found:
+            raise ScriptError(f"no node of {self.mission!r} is called {node!r}")
+        return found[0]
+
+    def _fitting(self, pattern: str) -> dict[str, NodeSpec]:
+        found = {p: n for p, n in self._leaves.items() if casting.fits(pattern, p, n)}
+        if not found:
+            raise ScriptError(f"no leaf of {self.mission!r} is called {pattern!r} "
+                              f"(leaves: {', '.join(n.name for n in self._leaves.values())})")  # fmt: skip
+        return found
+
+    def __repr__(self) -> str:
+        steps = " ".join(c.node + {"SUCCESS": ""}.get(c.ending, f"[{c.code or c.ending}]") for c in self.calls)
+        why = "".join(f"\n  {f}" for f in self.chain)
+        return f"<{self.mission}: {self.status} after {self.duration_s:g} s: {steps}{why}>"
+
+
+@dataclass
+class _Heard(NullRecord):
+    """A record that keeps each node's last status and each key's last value."""
+
+    statuses: dict[str, str]
+    most_ticks: int = MOST_TICKS
+    keys: dict[str, Any] = field(default_factory=dict)
+    blocks: int = 0
+
+    def block(self, observation: Observation, command: Command) -> None:
+        self.blocks += 1
+        if self.blocks > self.most_ticks:
+            raise RunsAway(f"no end after {self.most_ticks} ticks ({observation.now_s:g} s on the robot's clock)")
+
+    def tick(self, stamp_s: float, changes: Sequence[tuple[str, object, object]]) -> None:
+        for path, _, new in changes:
+            # A composite forgets its children when it ends: INVALID says nothing of how they ended.
+            if getattr(new, "value", "") != "INVALID":
+                self.statuses[path] = str(getattr(new, "value", new))
+
+    def port(self, stamp_s: float, key: str, value: object) -> None:
+        self.keys[key] = value
+
+
+class StillArm:
+    """Stands in for the motion room where no leaf moves."""
+
+    def sync(self, observation: Observation) -> None:
+        """Nothing to take up."""
+
+
+def run_scripted(
+    mission: Mission,
+    script: Script | None = None,
+    *,
+    robot: Robot | None = None,
+    timeout_s: float | None = None,
+    make_arm: Callable[[Robot, World], Arm] | None = None,
+    most_ticks: int = MOST_TICKS,
+) -> ScriptedRun:
+    """Run a mission with its leaves scripted; what no pattern fits succeeds at once.
+
+    Args:
+        mission: A checked mission.
+        script: Outcomes by node name, skill name, path, or pattern of those.
+        robot: An open robot (default: a FakeRobot, whose clock skips the time in which leaves only wait).
+        timeout_s: Longest duration on the robot's clock (default: the mission's).
+        make_arm: Makes the motion generators (default: none at all; the real ones if a leaf is `real()`).
+        most_ticks: A mission that has not ended after so many is aborted with `RunsAway`.
+
+    Raises:
+        ScriptError: The script does not fit the mission.
+    """
+    parts = casting.cast(mission.tree, mission.name, script or {})
+    stage = Stage()
+    end_s = mission.timeout_s if timeout_s is None else timeout_s
+    if robot is None:
+        robot = _robot(mission.tree, end_s, stage, all(p is not None for p in parts.values()))
+    stage.begin_s = robot.observe().now_s
+    if make_arm is None:
+        moving = any(p is None for p in parts.values())
+        make_arm = default_arm if moving else lambda robot, world: cast("Arm", StillArm())
+    paths = casting.paths_of(mission.tree, mission.name)
+    heard = _Heard(dict.fromkeys(paths, "INVALID"), most_ticks)
+    tree = _played(mission.tree, mission.name, parts, stage)
+    outcome = run_mission(replace(mission, tree=tree), robot, heard, make_arm=make_arm, timeout_s=end_s)
+    if isinstance(outcome.error, ScriptError | KeyboardInterrupt):
+        raise outcome.error
+    leaves = {p: n for p, n in paths.items() if n.kind == "skill"}
+    return ScriptedRun(mission.name, leaves, heard, stage, outcome)
+
+
+def _robot(tree: NodeSpec, end_s: float, stage: Stage, still: bool) -> FakeRobot:
+    if not still or not may_skip(tree):
+        return FakeRobot()
+    robot = SkippingRobot(end_s)
+    stage.wake = robot.wake
+    return robot
+
+
+def _played(node: NodeSpec, above: str, parts: Mapping[str, Part | None], stage: Stage) -> NodeSpec:
+    path = f"{above}/{node.name}"
+    children = tuple(map(partial(_played, above=path, parts=parts, stage=stage), node.children))
+    part = parts.get(path)
+    if part is None or node.skill_type is None:
+        return replace(node, children=children)
+    return replace(node, children=children, skill_type=playing(node.skill_type, part, stage))

@@ -1,0 +1,67 @@
+"""What the tests of one pytest session share: missions loaded once, coverage, and the mutant that is being tried."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from glotouch_bt.mission.library import find_shipped
+from glotouch_bt.mission.load import Mission, load_mission
+from glotouch_bt.mission_testing.coverage import OutcomeCoverage
+from glotouch_bt.mission_testing.scripted import ScriptedRun
+
+
+class Session:
+    """See the module's text.
+
+    Args:
+        root: pytest's root; relative paths are looked for there too.
+
+    Attributes:
+        coverage: Endings exercised so far.
+        users: For each mission's file, the ids of the tests that loaded it.
+        change: While a mutant is tried: what is done to every loaded mission.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self.coverage = OutcomeCoverage()
+        self.users: dict[Path, dict[str, None]] = {}
+        self.change: Callable[[Mission], Mission] | None = None
+        self._root = root
+        self._loaded: dict[Any, Mission] = {}
+
+    def load(
+        self,
+        given: str | Path,
+        settings: Mapping[str, Any],
+        objects: Path | None,
+        skills: Mapping[str, Any] | None,
+        here: Path,
+        test: str,
+    ) -> Mission:
+        """A mission for a test, from memory if it was loaded before and its file has not changed."""
+        path = self.find(given, here)
+        stat = path.stat()
+        known = (path, stat.st_mtime_ns, stat.st_size, repr(sorted(settings.items())), objects, id(skills))
+        if known not in self._loaded:
+            self._loaded[known] = load_mission(path, settings, objects=objects, skills=skills)
+        mission = self._loaded[known]
+        self.users.setdefault(path, {})[test] = None
+        return mission if self.change is None else self.change(mission)
+
+    def find(self, given: str | Path, *folders: Path) -> Path:
+        """A mission's file: as given, in one of the folders, under the root, or shipped.
+
+        Raises:
+            BadInput: Nowhere.
+        """
+        for folder in (Path(), *folders, self._root):
+            if Path(given).suffix in (".yaml", ".yml") and (folder / given).is_file():
+                return (folder / given).resolve()
+        return find_shipped("", str(given), "mission").resolve()
+
+    def ran(self, mission: Mission, run: ScriptedRun) -> None:
+        """Count a run, unless its mission was changed on purpose."""
+        if self.change is None:
+            self.coverage.add(mission, run)

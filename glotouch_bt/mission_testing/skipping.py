@@ -1,0 +1,54 @@
+"""A FakeRobot whose clock skips what nobody looks at: while all that runs is a leaf that waits, time passes at once."""
+
+from __future__ import annotations
+
+from glotouch_bt.mission.nodes import NodeSpec
+from glotouch_bt.robot import Command, Observation
+from glotouch_bt.robot.fake import FakeRobot
+
+ONE_AT_A_TIME = frozenset(
+    (
+        "sequence",
+        "selector",
+        "retry",
+        "timeout",
+        "repeat",
+        "for_each",
+        "invert",
+        "succeed",
+        "condition",
+        "subtree",
+        "skill",
+    )
+)
+"""Nodes below which only one leaf runs at a time; where another kind stands, no time is skipped."""
+
+
+def may_skip(root: NodeSpec) -> bool:
+    """Nothing but a waiting leaf and the timeouts above it can change anything while that leaf waits."""
+    return all(node.kind in ONE_AT_A_TIME for node in root.walk())
+
+
+class SkippingRobot(FakeRobot):
+    """See the module's text. A mission's own longest time must be told, for it ends a wait as well.
+
+    Args:
+        end_s: Robot time at which the mission is over whatever happens.
+        period_s: Control period.
+    """
+
+    def __init__(self, end_s: float, period_s: float = 0.01) -> None:
+        super().__init__(period_s=period_s)
+        self._end_s = end_s
+        self._wake_s = 0.0
+
+    def wake(self, until_s: float) -> None:
+        """Until then nobody needs a tick; holds for the next cycle only."""
+        self._wake_s = min(until_s, self._end_s)
+
+    def cycle(self, command: Command) -> Observation:
+        """One control period that ends at, or just before, the time somebody asked to be woken."""
+        skipped = int((self._wake_s - self._newest.now_s) / self.period_s + 1e-6) - 1
+        self.cycles += max(skipped, 0)
+        self._wake_s = 0.0
+        return super().cycle(command)

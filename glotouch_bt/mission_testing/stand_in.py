@@ -1,0 +1,183 @@
+"""A leaf that plays its part: the ports, parameters and declarations of a skill, the outcomes of a script."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from py_trees.common import Status
+
+from glotouch_bt.mission_testing.outcomes import Decide, Outcome
+from glotouch_bt.mission_testing.standins import port_value
+from glotouch_bt.robot import HOLD
+from skills.base import Context, Skill, SkillFailed, SkillParams, SkillRun
+
+Ending = Literal["SUCCESS", "FAILURE", "PREEMPTED", "RAISED", "RUNNING"]
+
+
+@dataclass
+class Call:
+    """One call of a leaf.
+
+    Attributes:
+        node: Name of the node.
+        path: Path in the tree.
+        skill: Name of the skill.
+        number: How often the node had been called before.
+        start_s: Robot time since the start of the mission.
+        params: The skill's parameters.
+        inputs: Values of the input ports that are written.
+        outputs: Values of the output ports it wrote.
+        ending: How it ended.
+        code: Failure code, or empty.
+        end_s: Robot time at its end.
+    """
+
+    node: str
+    path: str
+    skill: str
+    number: int
+    start_s: float
+    params: SkillParams
+    inputs: Mapping[str, Any]
+    outputs: dict[str, Any] = field(default_factory=dict)
+    ending: Ending = "RUNNING"
+    code: str = ""
+    end_s: float = 0.0
+
+
+@dataclass
+class Stage:
+    """What all leaves of one run share.
+
+    Attributes:
+        calls: Every call, in order of start.
+        begin_s: Robot time at which the mission began.
+        wake: Told by each waiting leaf until when it only waits.
+        note: Told of every call that begins or ends.
+    """
+
+    calls: list[Call] = field(default_factory=list)
+    begin_s: float = 0.0
+    wake: Callable[[float], None] = lambda until_s: None
+    note: Callable[[], None] = lambda: None
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one node plays.
+
+    Attributes:
+        path: The node's path in the tree.
+        skill: Name of the skill.
+        row: Outcomes, call after call; the last one repeats.
+    """
+
+    path: str
+    skill: str
+    row: tuple[Outcome | Decide, ...]
+
+    def answer(self, call: Call) -> Outcome:
+        """The outcome of a call."""
+        found = self.row[min(call.number, len(self.row) - 1)]
+        return found if isinstance(found, Outcome) else found(call)
+
+
+class _Playing(Skill):
+    """Mixed into the skill's own class, so that whoever asks finds its ports and declarations; nothing of it runs."""
+
+    part: Part
+    stage: Stage
+
+    def __init__(self, name: str, params: SkillParams, context: Context) -> None:
+        Skill.__init__(self, name, params, context)
+
+    initialise = Skill.initialise
+    update = Skill.update
+    terminate = Skill.terminate
+
+    def run(self) -> SkillRun:
+        call = self._begin()
+        try:
+            outcome = self.part.answer(call)
+            yield from self._wait(outcome)
+            self._end(call, outcome)
+        except GeneratorExit:
+            call.ending = "PREEMPTED"
+            raise
+        except SkillFailed as e:
+            call.ending, call.code = "FAILURE", e.reason.code
+            raise
+        except BaseException:
+            call.ending = "RAISED"
+            raise
+        finally:
+            call.end_s = self._now_s()
+            self.stage.note()
+
+    def _begin(self) -> Call:
+        stage, path = self.stage, self.part.path
+        number = sum(c.path == path for c in stage.calls)
+        # A required input that nobody wrote raises here, as it does when a skill reads it.
+        given = {
+            p: self.get_input(p)
+            for p, info in self.INPUT_PORTS.items()
+            if info.required or self.blackboard_client.exists(p)
+        }
+        call = Call(self.name, path, self.part.skill, number, self._now_s(), self.params, given)
+        stage.calls.append(call)
+        stage.note()
+        return call
+
+    def _now_s(self) -> float:
+        return round(self.context.observation.now_s - self.stage.begin_s, 9)
+
+    def _wait(self, outcome: Outcome) -> SkillRun:
+        if outcome.kind == "hangs":
+            self._write(outcome.ports)
+        until = float("inf") if outcome.kind == "hangs" else self.context.observation.now_s + outcome.after_s
+        while self.context.observation.now_s < until - 1e-9:
+            self.stage.wake(min([until, *(d for d in map(_deadline_s, self._above()) if d is not None)]))
+            yield HOLD
+
+    def _above(self) -> list[Any]:
+        above, node = [], self.parent
+        while node is not None:
+            above.append(node)
+            node = node.parent
+        return above
+
+    def _end(self, call: Call, outcome: Outcome) -> None:
+        if outcome.kind == "raises":
+            assert outcome.error is not None
+            raise outcome.error
+        kind = type(self)
+        written = {
+            p: port_value(info.data_type, getattr(getattr(kind, p, None), "element", None))
+            for p, info in self.OUTPUT_PORTS.items()
+            if p not in outcome.ports and (outcome.kind == "ok" or getattr(getattr(kind, p, None), "always", False))
+        }
+        call.outputs = {**written, **outcome.ports}
+        self._write(call.outputs)
+        if outcome.kind == "fails":
+            code = outcome.code or next(iter(kind.FAILURES), "scripted")
+            raise SkillFailed(code, outcome.message or kind.failure_codes().get(code, "scripted"))
+        call.ending = "SUCCESS"
+
+    def _write(self, ports: Mapping[str, object]) -> None:
+        for port, value in ports.items():
+            self.write_port(port, value)
+
+
+def _deadline_s(node: Any) -> float | None:
+    running = node.status is Status.RUNNING
+    found: float | None = getattr(node, "deadline_s", None) if running else None
+    return found
+
+
+def playing(skill: type[Skill], part: Part, stage: Stage) -> type[Skill]:
+    """The class of a node that plays a part."""
+    return type(
+        f"Scripted{skill.__name__}", (_Playing, skill), {"part": part, "stage": stage, "__doc__": skill.__doc__}
+    )
