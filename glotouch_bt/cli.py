@@ -17,6 +17,7 @@ import typer
 
 from glotouch_bt.cli_bench import bench
 from glotouch_bt.cli_doctor import doctor, link, read_settings
+from glotouch_bt.cli_faults import faults
 from glotouch_bt.guarded import guarded, set_debug, showing_tracebacks
 
 app = typer.Typer(
@@ -29,6 +30,7 @@ app = typer.Typer(
 )
 bench.command("link")(link)
 app.command("doctor")(doctor)
+app.command("faults")(faults)
 app.add_typer(bench)
 
 
@@ -70,6 +72,7 @@ def run(
     set_: Sets = None,
     objects: Objects = None,
     conditions: Annotated[str, typer.Option(help="disturbances: ideal, nominal, harsh, or a file")] = "nominal",
+    faults: Annotated[str | None, typer.Option(metavar="FILE", help="a fault plan (see: glotouch faults)")] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="the run's folder (default: runs/...)")] = None,
     json_: Json = False,
 ) -> int:
@@ -77,7 +80,7 @@ def run(
     from glotouch_bt import console
     from glotouch_bt.study.launch import RunRequest, launch
 
-    request = RunRequest(mission, backend, seed, read_settings(set_), objects, conditions, out)
+    request = RunRequest(mission, backend, seed, read_settings(set_), objects, conditions, out, faults, may_kill=True)
     with console.RunProgress(quiet=json_) as progress:
         done = launch(request, on_start=progress.start, on_progress=progress.update)
     if json_:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
+from backends.mujoco.disturber import MujocoDisturber
 from backends.mujoco.model import Handles, compile_world
 from backends.mujoco.referee import MujocoReferee
 from backends.mujoco.robot import MujocoRobot
@@ -25,6 +26,7 @@ from glotouch_bt.robot import (
     UnknownName,
     World,
 )
+from glotouch_bt.robot.disturber import Disturber
 from glotouch_bt.robot.referee import Referee
 
 OPTIONS = ("fixed", "layout", "trace")
@@ -127,3 +129,7 @@ class MujocoBackend(Backend):
     def referee(self, robot: Robot) -> Referee | None:
         """See `Backend`."""
         return MujocoReferee(robot) if isinstance(robot, MujocoRobot) else None
+
+    def disturber(self, robot: Robot) -> Disturber | None:
+        """See `Backend`."""
+        return MujocoDisturber(robot) if isinstance(robot, MujocoRobot) else None

@@ -10,10 +10,15 @@ from typing import Self
 from glotouch_bt.robot.command import Command, Request, Ticket
 from glotouch_bt.robot.conditions import Conditions
 from glotouch_bt.robot.description import RobotDescription
+from glotouch_bt.robot.disturber import Disturber
+from glotouch_bt.robot.errors import BackendError
 from glotouch_bt.robot.limits import Limits
 from glotouch_bt.robot.observation import Observation
 from glotouch_bt.robot.referee import Referee
 from glotouch_bt.robot.world import World
+
+Snapshot = Mapping[str, object]
+"""Plain values, arrays, tuples, mappings, random generators and dataclasses, as `mission.values` can keep."""
 
 
 class Robot(ABC):
@@ -23,11 +28,13 @@ class Robot(ABC):
         description: Kinematics, inertia, limits, gripper.
         limits: The frozen limits the backend enforces below the skills.
         period_s: Control period; each `cycle` lets exactly this much time pass on the robot's clock.
+        paced: The robot's clock is the wall's: it goes on whether or not `cycle` is called.
     """
 
     description: RobotDescription
     limits: Limits
     period_s: float
+    paced: bool = False
 
     @abstractmethod
     def observe(self) -> Observation:
@@ -54,6 +61,27 @@ class Robot(ABC):
     @abstractmethod
     def close(self) -> None:
         """Hold, then release the device. Idempotent."""
+
+    def snapshot(self) -> Snapshot | None:
+        """The whole state of robot and world between two cycles, or None: it cannot be kept (any real device).
+
+        A wrapper keeps what it wraps inside its own snapshot, and is None if that is.
+
+        Raises:
+            BackendError: The device or simulator has failed; its state is worth nothing.
+        """
+        return None
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot, of this robot or of another one opened with the same world, conditions, seed, options.
+
+        The same commands then give the same observations, bit for bit. Tickets given before stay as they were.
+
+        Raises:
+            BadInput: It is of another backend, of another version, or of a robot that was opened otherwise.
+            BackendError: This robot keeps no snapshots.
+        """
+        raise BackendError(f"{type(self).__name__} cannot be put back into an earlier state")
 
     def __enter__(self) -> Self:
         return self
@@ -88,4 +116,8 @@ class Backend(ABC):
 
     def referee(self, robot: Robot) -> Referee | None:
         """The truth about `robot`'s world, for scoring after the fact; None on hardware."""
+        return None
+
+    def disturber(self, robot: Robot) -> Disturber | None:
+        """Hands inside `robot`'s world, for faults; None on hardware."""
         return None

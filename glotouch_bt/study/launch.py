@@ -14,14 +14,16 @@ from pathlib import Path
 from typing import Any
 
 from glotouch_bt import __version__
+from glotouch_bt.faults import FaultInjector, FaultPlan, read_plan
+from glotouch_bt.faults.listening import ListeningRecord
 from glotouch_bt.mission.library import shown
 from glotouch_bt.mission.load import Mission, load_mission, split_settings
 from glotouch_bt.mission.mcap_json import to_json
 from glotouch_bt.mission.record import Recorder
 from glotouch_bt.mission.runner import Outcome, run_mission
-from glotouch_bt.mission.tally import Tally
+from glotouch_bt.mission.tally import Record, Tally
 from glotouch_bt.mission.worlds import load_conditions
-from glotouch_bt.robot import BadInput, Conditions, Robot, load_backend
+from glotouch_bt.robot import Backend, BadInput, Conditions, Robot, load_backend
 from glotouch_bt.robot.referee import Referee, TrueObject
 from glotouch_bt.study.run_folder import RunFolder
 
@@ -41,6 +43,8 @@ class RunRequest:
         objects: Folder of STL files instead of the world's.
         conditions: Path or shipped name.
         out: The run's folder (default: runs/<time>-<mission>-s<seed>).
+        faults: A fault plan: a path, the name of a shipped one, or one that has been read.
+        may_kill: A fault may kill this process: it does nothing but this run.
     """
 
     mission: str
@@ -50,6 +54,8 @@ class RunRequest:
     objects: Path | None = None
     conditions: str = "nominal"
     out: Path | None = None
+    faults: str | Path | FaultPlan | None = None
+    may_kill: bool = False
 
 
 @dataclass(frozen=True)
@@ -95,6 +101,7 @@ def launch(
         raise BadInput(f"--seed {request.seed}: must be in 0 .. {LARGEST_SEED}")
     mission = load_mission(request.mission, request.settings, objects=request.objects)
     conditions = load_conditions(request.conditions)
+    plan = _fault_plan(request, mission)
     backend = load_backend(request.backend)
     options = split_settings(mission, request.settings)
     folder = RunFolder(request.out) if request.out else RunFolder.named(mission.name, request.seed)
@@ -106,6 +113,9 @@ def launch(
                 raise
             known = ", ".join(mission.parameters) or "none"
             raise BadInput(f"{e} (parameters of mission {mission.name!r}: {known})") from e
+        referee = backend.referee(robot)
+        if plan is not None:
+            robot = _faulted(robot, plan, request, backend)
     except BaseException:
         folder.abandon()
         raise
@@ -113,7 +123,23 @@ def launch(
         folder.clear()
         if on_start is not None:
             on_start(mission, folder.path)
-        return _run(request, mission, conditions, robot, backend.referee(robot), folder, began, on_progress)
+        return _run(request, mission, conditions, robot, referee, folder, began, on_progress)
+
+
+def _fault_plan(request: RunRequest, mission: Mission) -> FaultPlan | None:
+    if request.faults is None or isinstance(request.faults, FaultPlan):
+        return request.faults
+    return read_plan(request.faults, mission.tree, mission.name)
+
+
+def _faulted(robot: Robot, plan: FaultPlan, request: RunRequest, backend: Backend) -> Robot:
+    """The device with its faults; closed again if they cannot be had."""
+    try:
+        disturber = backend.disturber(robot)
+        return FaultInjector(robot, plan, request.seed, disturber=disturber, may_kill=request.may_kill)
+    except BaseException:
+        robot.close()
+        raise
 
 
 def _run(
@@ -130,10 +156,12 @@ def _run(
     objects_at_start = referee.objects() if referee else []
     ready = time.perf_counter()
     recorder = Recorder(folder.path / "run.mcap", _description(request, mission, conditions, robot))
+    injector = robot if isinstance(robot, FaultInjector) else None
+    record: Record = recorder if injector is None else ListeningRecord(recorder, injector)
     result: dict[str, Any] | None = None
     try:
         try:
-            outcome = run_mission(mission, robot, recorder, on_progress=on_progress)
+            outcome = run_mission(mission, robot, record, on_progress=on_progress)
         except BaseException:  # it raises only before the first tick
             recorder.close()
             folder.clear()
@@ -142,6 +170,8 @@ def _run(
         ended = time.perf_counter()
         result = _result(request, mission, outcome, referee)
         result |= {"wall_time_s": round(ended - ready, 3), "wall_open_s": round(ready - began, 3)}
+        if injector is not None:
+            result |= {"faults": injector.report(), "held_at_end": injector.held}
     finally:
         recorder.close(result)
     folder.write_json("result.json", result)

@@ -1,0 +1,258 @@
+"""The wrapper that makes a plan happen on any Robot. Next to the device: everything above sees what it lets through."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from glotouch_bt.faults.effect import Effect, Scene, samples_altered
+from glotouch_bt.faults.plan import FaultPlan, FaultSpec
+from glotouch_bt.faults.proof import Proof, Sighting
+from glotouch_bt.faults.trigger import Moment, holds, running_node
+from glotouch_bt.robot import BadInput, Command, GuardTripped, Observation, Request, Robot, Ticket
+from glotouch_bt.robot.disturber import Disturber
+from glotouch_bt.robot.streams import stream
+
+
+class _Fault:
+    """One fault of the plan and where it stands."""
+
+    def __init__(self, spec: FaultSpec, effect: Effect) -> None:
+        self.spec, self.effect = spec, effect
+        self.proof = Proof(spec, effect.acts)
+        self.active = False
+        self.spent = False
+        self._node: str | None = None
+        self._until_s: float | None = None
+        self._until_cycle: int | None = None
+        self._next_s = float("-inf")
+
+    def try_begin(self, moment: Moment) -> bool:
+        """Begin if its moment has come."""
+        when = self.spec.when
+        if moment.now_s < self._next_s or not holds(when, moment):
+            return False
+        self._node = running_node(when, moment)
+        if when.node is not None and self._node is None:
+            return False
+        lasting, now_s = self.spec.lasting, moment.now_s
+        self._until_s = None if lasting.duration_s is None else now_s + lasting.duration_s
+        self._until_cycle = None if lasting.cycles is None else moment.cycles + lasting.cycles
+        self._next_s = now_s + self.spec.repeat.every_s
+        self.effect.scene.sensed = moment.sensed
+        self.effect.begin()
+        self.active = True
+        self.proof.begun_s.append(now_s)
+        self.proof.nodes.extend([self._node] if self._node else [p for p in moment.running if _is_leaf(p, moment)])
+        if self.effect.acts.times:
+            self.proof.changed(now_s)
+        return True
+
+    def try_end(self, moment: Moment) -> bool:
+        """End if its time is over."""
+        over = (
+            (self._until_s is not None and moment.now_s >= self._until_s - 1e-9)
+            or (self._until_cycle is not None and moment.cycles >= self._until_cycle)
+            or (self.spec.lasting.until == "node" and self._node not in moment.running)
+        )
+        if over:
+            self.active = False
+            self.effect.end()
+            self.proof.ended_s.append(moment.now_s)
+            self.spent = len(self.proof.begun_s) >= self.spec.repeat.times
+        return over
+
+
+def _is_leaf(path: str, moment: Moment) -> bool:
+    return not any(other.startswith(path + "/") for other in moment.running)
+
+
+class FaultInjector(Robot):
+    """A Robot that does to another what a plan says; without a fault under way or to come it costs one comparison.
+
+    A fault begins and ends at the start of a control period (or of a slow request). Each draws from a random stream of
+    its own, so that one fault of a plan does not change another's draws, nor the device's.
+
+    Args:
+        robot: The device.
+        plan: What shall go wrong.
+        seed: Of the run; used where the plan has none.
+        disturber: Hands inside the simulated world, if the backend offers them.
+        may_kill: The process may be killed.
+
+    Raises:
+        BadInput: The plan asks for what cannot be done here.
+    """
+
+    def __init__(
+        self, robot: Robot, plan: FaultPlan, seed: int, *, disturber: Disturber | None = None, may_kill: bool = False
+    ) -> None:
+        self.description, self.limits, self.period_s = robot.description, robot.limits, robot.period_s
+        self.plan = plan
+        self._robot = robot
+        first = robot.observe()
+        self._moment = Moment(first.now_s, first)
+        self._handed_out: Observation | None = None
+        self.sightings: list[Sighting] = []
+        self.news: list[tuple[float, dict[str, object]]] = []
+        self.held = False
+        draws = seed if plan.seed is None else plan.seed
+        self._faults = []
+        for spec in plan.faults:
+            rng = stream(draws, f"fault {spec.name}")
+            scene = Scene(rng, robot.period_s, robot.description, disturber, first, may_kill)
+            try:
+                effect = spec.kind.effect(spec.params, scene)
+                effect.prepare()
+            except BadInput as e:
+                raise BadInput(f"{spec.place}: {spec.name}: {e}") from e
+            self._faults.append(_Fault(spec, effect))
+        self._waiting = list(self._faults)
+        self._active: list[_Fault] = []
+
+    # -- the seam ----------------------------------------------------------------------------------------------------
+
+    def observe(self) -> Observation:
+        """The newest block, as it was handed out."""
+        self._moment.calls += 1
+        return self._handed_out if self._handed_out is not None else self._robot.observe()
+
+    def cycle(self, command: Command) -> Observation:
+        """One control period of the device, through the faults that are under way."""
+        moment = self._moment
+        self.held = False
+        if self._waiting or self._active:
+            self._turn()
+        moment.calls += 1
+        try:
+            observation = self._faulted(command) if self._active else self._robot.cycle(command)
+        except Exception as e:
+            self._see_error(e)
+            raise
+        if not self._active:
+            moment.sensed = observation
+        moment.cycles += 1
+        self._handed_out = observation
+        return observation
+
+    def start(self, request: Request) -> Ticket:
+        """A slow request, unless a fault answers it."""
+        if self._waiting or self._active:
+            self._turn()
+        self._moment.calls += 1
+        for fault in self._active:
+            ticket = fault.effect.request(request)
+            if ticket is not None:
+                fault.proof.changed(self._moment.now_s)
+                return ticket
+        return self._robot.start(request)
+
+    def hold(self) -> None:
+        """Passed on."""
+        self.held = True
+        self._robot.hold()
+
+    def close(self) -> None:
+        """Passed on."""
+        self._robot.close()
+
+    # -- what the run tells it ---------------------------------------------------------------------------------------
+
+    def node_began(self, path: str, now_s: float) -> None:
+        """A node of the tree runs from now on."""
+        self._moment.running[path] = now_s
+        self._moment.visits[path] = self._moment.visits.get(path, 0) + 1
+
+    def node_ended(self, path: str) -> None:
+        """A node of the tree runs no more."""
+        self._moment.running.pop(path, None)
+
+    def saw(self, stamp_s: float, by: str, code: str, text: str) -> None:
+        """Something reacted: a skill failed, a guard tripped."""
+        self.sightings.append(Sighting(stamp_s, by, code, text))
+
+    # -- proof -------------------------------------------------------------------------------------------------------
+
+    def proofs(self) -> list[Proof]:
+        """One for each fault of the plan."""
+        return [f.proof for f in self._faults]
+
+    def report(self) -> list[dict[str, Any]]:
+        """What became of each fault, as result.json has it."""
+        return [f.proof.report(self.sightings) for f in self._faults]
+
+    # -- inside ------------------------------------------------------------------------------------------------------
+
+    def _turn(self) -> None:
+        """End what is over, begin what is due."""
+        moment = self._moment
+        ended = [f for f in self._active if f.try_end(moment)]
+        for fault in ended:
+            self._tell(fault, "ends")
+        if ended:
+            self._active = [f for f in self._active if f.active]
+            self._waiting.extend(f for f in ended if not f.spent)
+        begun = [f for f in self._waiting if f.try_begin(moment)]
+        for fault in begun:
+            self._tell(fault, "begins")
+        if begun:
+            self._waiting = [f for f in self._waiting if not f.active]
+            order = {id(f): i for i, f in enumerate(self._faults)}
+            self._active = sorted([*self._active, *begun], key=lambda f: order[id(f)])
+
+    def _tell(self, fault: _Fault, what: str) -> None:
+        data: dict[str, object] = {
+            "fault": fault.spec.kind.name,
+            "name": fault.spec.name,
+            "what": what,
+            "notes": fault.proof.acts.notes,
+        }
+        self.news.append((self._moment.now_s, data))
+
+    def _faulted(self, command: Command) -> Observation:
+        moment = self._moment
+        now_s = moment.now_s
+        cycle: Callable[[Command], Observation] = self._to_device
+        for fault in self._active:
+            effect, proof = fault.effect, fault.proof
+            effect.scene.sensed = moment.sensed
+            acts = effect.acts.times
+            try:
+                told = effect.command(command)
+            except Exception:
+                proof.refused += 1
+                proof.changed(now_s)
+                raise
+            if told is not command:
+                proof.commands += 1
+            if told is not command or effect.acts.times > acts:
+                proof.changed(now_s)
+            command = told
+            if effect.drives:
+                cycle = partial(self._driven, fault, cycle)
+        observation = cycle(command)
+        for fault in self._active:
+            reported = fault.effect.sense(observation)
+            altered = samples_altered(observation, reported)
+            if altered:
+                fault.proof.samples += altered
+                fault.proof.changed(moment.now_s)
+            observation = reported
+        return observation
+
+    def _to_device(self, command: Command) -> Observation:
+        self._moment.sensed = observation = self._robot.cycle(command)
+        return observation
+
+    def _driven(self, fault: _Fault, cycle: Callable[[Command], Observation], command: Command) -> Observation:
+        acts, now_s = fault.effect.acts.times, self._moment.now_s
+        try:
+            return fault.effect.drive(cycle, command)
+        finally:
+            if fault.effect.acts.times > acts:
+                fault.proof.changed(now_s)
+
+    def _see_error(self, error: Exception) -> None:
+        by = "supervision" if isinstance(error, GuardTripped) else "device"
+        self.saw(self._moment.now_s, by, type(error).__name__, str(error))

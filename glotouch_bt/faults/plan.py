@@ -1,0 +1,238 @@
+"""A fault plan: what shall go wrong and when, as a checked YAML file.
+
+faults: biased wrist
+seed: 7                     # of the faults' own draws; without it, the run's
+plan:
+  - fault: wrench_bias
+    with: {force_N: [0, 0, 3]}
+    when: {node: guarded_sweep, after_s: 0.5}
+    for: 2 s                # or: ever, node, {cycles: 20}
+    repeat: {times: 3, every_s: 10}
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import BaseModel
+
+from glotouch_bt.faults.catalogue import CATALOGUE, FaultKind
+from glotouch_bt.faults.effect import FaultParams
+from glotouch_bt.faults.trigger import Lasting, Repeat, When, matches
+from glotouch_bt.mission.fields import validate
+from glotouch_bt.mission.findings import Findings, MissionFaults
+from glotouch_bt.mission.library import find_shipped, shown
+from glotouch_bt.mission.nodes import NodeSpec
+from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, read_yaml
+
+PLAN_KEYS = ("faults", "description", "seed", "plan")
+FAULT_KEYS = ("fault", "name", "with", "when", "for", "repeat")
+MOST_FAULTS = 1000
+
+M = TypeVar("M", bound=BaseModel)
+
+
+@dataclass(frozen=True)
+class FaultSpec:
+    """One fault of a plan.
+
+    Attributes:
+        name: For reports; by default the kind's, numbered if it comes twice.
+        kind: What it is.
+        params: Its parameters.
+        when, lasting, repeat: Its moments.
+        place: Where it stands.
+    """
+
+    name: str
+    kind: FaultKind
+    params: FaultParams
+    when: When
+    lasting: Lasting
+    repeat: Repeat
+    place: Place
+
+    def requested(self) -> dict[str, object]:
+        """What was asked for, as plain data."""
+        return {
+            "with": self.params.model_dump(mode="json"),
+            "when": self.when.model_dump(mode="json", exclude_defaults=True),
+            "for": self.lasting.model_dump(mode="json", exclude_defaults=True),
+            "repeat": self.repeat.model_dump(mode="json", exclude_defaults=True),
+        }
+
+
+@dataclass(frozen=True)
+class FaultPlan:
+    """A plan that passed every check.
+
+    Attributes:
+        name: Its name.
+        faults: In the order of the file; where two change the same samples, the later one has the last word.
+        seed: Of the faults' draws; None: the run's.
+        description: For people.
+    """
+
+    name: str
+    faults: tuple[FaultSpec, ...]
+    seed: int | None = None
+    description: str = ""
+
+
+def read_plan(given: str | Path, tree: NodeSpec | None = None, root: str = "") -> FaultPlan:
+    """Read and check a plan.
+
+    Args:
+        given: A path, or the name of a shipped plan.
+        tree: The mission's tree; every `when: {node: ...}` must then fit one of its nodes.
+        root: The mission's name, first word of every path.
+
+    Raises:
+        MissionFaults: Everything that is wrong with it, each with its place. (A `BadInput`.)
+        BadInput: It cannot be read at all.
+    """
+    path = find_shipped("faults", str(given), "fault plan")
+    return check_plan(read_yaml(path, shown(path)), tree, root)
+
+
+def check_plan(source: Node, tree: NodeSpec | None = None, root: str = "") -> FaultPlan:
+    """Check a plan that has been read; errors as in `read_plan`."""
+    findings = Findings()
+    plan = _plan(source, findings)
+    if plan is not None and tree is not None:
+        _check_nodes(plan, source, tree, root, findings)
+    if plan is None or len(findings):
+        raise MissionFaults(findings.sorted())
+    return plan
+
+
+def _plan(source: Node, findings: Findings) -> FaultPlan | None:
+    if not isinstance(source, Map):
+        findings.add(source.place, "wrong_type", "a fault plan must be a mapping", valid=", ".join(PLAN_KEYS))
+        return None
+    for key, _ in source.entries:
+        if key.value not in PLAN_KEYS:
+            findings.unknown(key.place, "unknown_key", "key of a fault plan:", str(key.value), PLAN_KEYS)
+    name = _text(source, "faults", findings)
+    if name is None and "faults" not in source:
+        findings.add(source.place, "missing_key", "a fault plan needs 'faults', its name")
+    seed = source.get("seed")
+    number = seed.value if isinstance(seed, Scalar) else None
+    if seed is not None and not (isinstance(number, int) and not isinstance(number, bool) and 0 <= number < 2**32):
+        findings.add(seed.place, "wrong_value", "seed: must be a whole number in 0 .. 4294967295")
+    items = source.get("plan")
+    if not isinstance(items, Seq) or not items.items:
+        at = source.place if items is None else items.place
+        findings.add(
+            at, "missing_key" if items is None else "wrong_type", "a fault plan needs 'plan', a list of faults"
+        )
+        return None
+    if len(items.items) > MOST_FAULTS:
+        findings.add(items.place, "wrong_value", f"{len(items.items)} faults: at most {MOST_FAULTS} in a plan")
+        return None
+    taken: set[str] = set()
+    faults = [f for item in items.items if (f := _fault(item, taken, findings)) is not None]
+    text = _text(source, "description", findings) or ""
+    return FaultPlan(name or "", tuple(faults), number if isinstance(number, int) else None, text)
+
+
+def _text(source: Map, key: str, findings: Findings) -> str | None:
+    node = source.get(key)
+    if node is None:
+        return None
+    if isinstance(node, Scalar) and isinstance(node.value, str) and node.value.strip():
+        return node.value
+    findings.add(node.place, "wrong_type", f"{key}: must be text")
+    return None
+
+
+def _fault(source: Node, taken: set[str], findings: Findings) -> FaultSpec | None:
+    if not isinstance(source, Map):
+        findings.add(source.place, "wrong_type", "a fault must be a mapping", valid=", ".join(FAULT_KEYS))
+        return None
+    for key, _ in source.entries:
+        if key.value not in FAULT_KEYS:
+            findings.unknown(key.place, "unknown_key", "key of a fault:", str(key.value), FAULT_KEYS)
+    word = _text(source, "fault", findings)
+    if word is None:
+        if "fault" not in source:
+            findings.add(source.place, "missing_key", "a fault needs 'fault', one of the catalogue (glotouch faults)")
+        return None
+    if word not in CATALOGUE:
+        node = source.get("fault")
+        findings.unknown(node.place if node else source.place, "unknown_fault", "fault", word, CATALOGUE)
+        return None
+    kind = CATALOGUE[word]
+    params = _model(kind.effect.Params, source, "with", f"fault {word!r}", findings)
+    when = _model(When, source, "when", "'when'", findings)
+    lasting = _lasting(source, when, findings)
+    repeat = _model(Repeat, source, "repeat", "'repeat'", findings)
+    if params is None or when is None or lasting is None or repeat is None:
+        return None
+    base = _text(source, "name", findings) or word
+    name, n = base, 2
+    while name in taken:
+        name, n = f"{base} {n}", n + 1
+    taken.add(name)
+    return FaultSpec(name, kind, params, when, lasting, repeat, source.place)
+
+
+def _model(model: type[M], source: Map, key: str, what: str, findings: Findings) -> M | None:
+    node = source.get(key)
+    if node is None or (isinstance(node, Scalar) and node.value is None):
+        node = Map((), source.key_place(key))
+    if not isinstance(node, Map):
+        findings.add(node.place, "wrong_type", f"{key}: must be a mapping", valid=", ".join(model.model_fields))
+        return None
+    return validate(model, node, what, findings)
+
+
+def _lasting(source: Map, when: When | None, findings: Findings) -> Lasting | None:
+    """`for: 2 s`, `for: ever`, `for: node` or a mapping; by default until the node ends, or for ever."""
+    node = source.get("for")
+    has_node = when is not None and when.node is not None
+    if node is None:
+        return Lasting(until="node" if has_node else "ever")
+    words = "ever, node, a time such as 2 s, {duration_s: ...} or {cycles: ...}"
+    if isinstance(node, Map):
+        made = validate(Lasting, node, "'for'", findings)
+        if made is not None and len(node.entries) != 1:
+            findings.add(node.place, "wrong_value", "for: exactly one of its keys", valid=words)
+            return None
+    elif isinstance(node, Scalar) and node.value in ("ever", "node"):
+        made = Lasting(until="node" if node.value == "node" else "ever")
+    elif isinstance(node, Scalar) and isinstance(node.value, (int, float, str)) and not isinstance(node.value, bool):
+        key = Scalar("duration_s", node.place)
+        made = validate(Lasting, Map(((key, node),), node.place), "'for'", findings)
+    else:
+        findings.add(node.place, "wrong_type", "for: cannot be read", valid=words)
+        return None
+    if made is not None and made.until == "node" and when is not None and not has_node:
+        findings.add(node.place, "wrong_value", "for: node, but 'when' names no node", valid="add when: {node: ...}")
+        return None
+    return made
+
+
+def _check_nodes(plan: FaultPlan, source: Node, tree: NodeSpec, root: str, findings: Findings) -> None:
+    paths = dict(_paths(tree, root))
+    for fault in plan.faults:
+        pattern = fault.when.node
+        if pattern is None or any(matches(p, pattern) for p in paths):
+            continue
+        names = sorted({p.rsplit("/", 1)[-1] for p in paths})
+        findings.unknown(fault.place, "unknown_node", f"node of fault {fault.name!r}:", pattern, names)
+
+
+def _paths(tree: NodeSpec, above: str) -> list[tuple[str, NodeSpec]]:
+    found, stack = [], [(tree, above)]
+    while stack:
+        node, before = stack.pop()
+        path = f"{before}/{node.name}"
+        found.append((path, node))
+        stack.extend((c, path) for c in node.children)
+    return found
+
+
+__all__ = ["FaultPlan", "FaultSpec", "check_plan", "read_plan"]
