@@ -13,6 +13,7 @@ from backends.mujoco.probe import handle_mesh
 from backends.mujoco.requests import PAYLOAD_S, PendingPayload, PendingTare
 from backends.mujoco.safety import CHUNK, Guard, check_sane
 from backends.mujoco.servo import Servo
+from backends.mujoco.snapshot import Keeper
 from backends.mujoco.tactile import Tactile
 from backends.mujoco.trace import Trace
 from backends.mujoco.truth import Truth
@@ -33,6 +34,7 @@ from glotouch_bt.robot import (
     Ticket,
     World,
 )
+from glotouch_bt.robot.interface import Snapshot
 
 HELD_DISTANCE_M = 0.02  # the probe counts as held while its handle is this near the pads' mid-point
 
@@ -105,6 +107,7 @@ class MujocoRobot(Robot):
         self.peak_force_N = 0.0
 
         self.trace = Trace(model, data) if traced else None
+        self._keeper = Keeper(model, data)
 
         self._samples[:] = data.sensordata
         self._wrist.fill(-self._samples[0, s.force.start : s.torque.stop])
@@ -181,6 +184,18 @@ class MujocoRobot(Robot):
         """See `Robot`."""
         self.hold()
         self._closed = True
+
+    def snapshot(self) -> Snapshot:
+        """See `Robot`."""
+        if self._failed is not None:
+            raise self._failed
+        return self._keeper.take(self)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """See `Robot`. What `trace` remembers begins anew."""
+        self._keeper.put_back(self, snapshot)
+        if self.trace is not None:
+            self.trace = Trace(self.model, self.data)
 
     def _advance(self) -> None:
         """Ten steps, looking at the wrench after each chunk."""

@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from enum import Enum
 from functools import lru_cache
 from importlib.metadata import entry_points
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
@@ -144,7 +144,7 @@ class Encoder:
 
 def _array(value: np.ndarray[Any, Any], where: str) -> list[Any]:
     dtype = _dtype(value.dtype, where)
-    order = "F" if value.flags.f_contiguous and not value.flags.c_contiguous else "C"
+    order: Literal["C", "F"] = "F" if value.flags.f_contiguous and not value.flags.c_contiguous else "C"
     return [_ARRAY, dtype, list(value.shape), order, bool(value.flags.writeable), value.tobytes(order)]
 
 
