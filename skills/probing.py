@@ -181,3 +181,7 @@ class _Listener:
 
     def __call__(self, observation: Observation) -> HardTrip | Onset | None:
         return self._hard(observation) or self._soft(observation)
+
+    def standing(self, observation: Observation) -> HardTrip | Onset | None:
+        """While a paused motion stands."""
+        return self._hard(observation) or self._soft.standing(observation)

@@ -137,7 +137,9 @@ class FlexivXenseBackend(Backend):
                 process.end()
             raise
         description = _within(self._description, opened)
-        return FlexivXenseRobot(description, self._limits, PERIOD_S, link, process, opened.info, first)
+        robot = FlexivXenseRobot(description, self._limits, PERIOD_S, link, process, opened.info, first)
+        robot.paced = not options.lockstep
+        return robot
 
     def _request(self, options: Options, process: DriverProcess | None, number: int, move: bool) -> Open:
         hand = self._description.gripper

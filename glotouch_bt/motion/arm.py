@@ -4,13 +4,15 @@ Each motion is planned, and unless told otherwise checked, completely before its
 `Command` a control period and takes the `Observation` sensed in it. A guard that trips makes the very NEXT command
 the first of the deceleration. A generator may be closed at any yield; the arm's setpoint is then what was last
 yielded.
+
+A pause (`Feed`) stops a motion where it is along its path, softly; the guard goes on listening, and afterwards the
+motion goes on along the same path. A motion's caller never notices.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
-from typing import TypedDict, TypeVar, Unpack
+from collections.abc import Callable
+from typing import TypedDict, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -18,15 +20,15 @@ import numpy.typing as npt
 from glotouch_bt.motion.clearance import Scene
 from glotouch_bt.motion.jaws import JawWatch
 from glotouch_bt.motion.joints import plan_joints
-from glotouch_bt.motion.kinematics import Kinematics
 from glotouch_bt.motion.paths import Arc, Line, Path, Polyline
-from glotouch_bt.motion.plan import Plan, plan_piece
+from glotouch_bt.motion.plan import plan_piece
+from glotouch_bt.motion.timing import JointProfile
+from glotouch_bt.motion.travel import Guard, Motion, Mover, MoveResult
 from glotouch_bt.robot import (
     Array,
     Command,
     GripperState,
     GripperTarget,
-    JointSetpoint,
     Limits,
     MotionRefused,
     Observation,
@@ -35,33 +37,10 @@ from glotouch_bt.robot import (
     World,
 )
 
-T = TypeVar("T")
-Motion = Generator[Command, Observation, T]
-Guard = Callable[[Observation], object | None]
-
 # Null-space pull towards home in free motions, per metre travelled: half the way home in 0.35 m.
 POSTURE_GAIN_1_M = 2.0
 # A path may begin this far from where the arm is (servo error right after `sync`).
 _START_M, _START_RAD = 2e-3, 0.02
-
-
-@dataclass(frozen=True)
-class MoveResult:
-    """How a motion ended; the arm is at rest.
-
-    Attributes:
-        completed: The whole path was travelled.
-        stop: What the guard returned, or None.
-        travelled_m: Path length travelled, as commanded.
-        path_B_m: (m, 3) measured position of P in B, newest sample of each period.
-        pose_B_P: Measured pose of P in B at the end.
-    """
-
-    completed: bool
-    stop: object | None
-    travelled_m: float
-    path_B_m: Array
-    pose_B_P: Pose
 
 
 class MoveOptions(TypedDict, total=False):
@@ -76,7 +55,7 @@ class MoveOptions(TypedDict, total=False):
     what: str
 
 
-class Arm:
+class Arm(Mover):
     """The arm's motions. Holds the present setpoint, so one Arm drives one robot.
 
     Args:
@@ -90,40 +69,13 @@ class Arm:
         scene: What must not be hit; skills add what they find to it.
         along_m_s2: Commanded acceleration along the path at the end of the newest period of a motion along a path;
             what a guard needs to know the inertia it will feel.
+        feed: Whether motions go on or are paused; the runner writes it.
     """
 
     def __init__(self, description: RobotDescription, limits: Limits, world: World, period_s: float) -> None:
-        self.description, self.limits, self.world, self.period_s = description, limits, world, period_s
-        self.kinematics = Kinematics(description)
+        super().__init__(description, limits, period_s)
+        self.world = world
         self.scene = Scene(self.kinematics, world)
-        self._q: Array = self.kinematics.home.copy()
-        self._aperture_m = description.gripper.stroke_m
-        self.along_m_s2 = 0.0
-
-    # -- where it is -------------------------------------------------------------------------------------------------
-
-    @property
-    def q(self) -> Array:
-        """(dof,) present joint setpoint, rad."""
-        return self._q
-
-    @property
-    def pose_B_P(self) -> Pose:
-        """Pose of P in B at the present setpoint."""
-        return self.kinematics.fk(self._q)
-
-    @property
-    def aperture_m(self) -> float:
-        """Opening of the jaws as last seen; clearance is checked with it."""
-        return self._aperture_m
-
-    def sync(self, observation: Observation) -> None:
-        """Take the measured joint positions and aperture as the present setpoint: at the start, after a preemption."""
-        self._q = np.array(observation.q[-1])
-        self._see(observation)
-
-    def _see(self, observation: Observation) -> None:
-        self._aperture_m = min(max(observation.gripper.aperture_m, 0.0), self.description.gripper.stroke_m)
 
     # -- motions -----------------------------------------------------------------------------------------------------
 
@@ -150,10 +102,13 @@ class Arm:
         plan = plan_joints(self.kinematics, self._q, np.asarray(q, dtype=np.float64), speed, self.limits, self.period_s)
         if check:
             self._clear(plan.checks_q, "joint move")
-        for k in range(len(plan.profile.q)):
-            self._q = plan.profile.q[k]
-            pose = self.kinematics.fk(self._q)
-            self._see((yield Command(JointSetpoint(self._q, plan.profile.dq[k], plan.profile.ddq[k], pose))))
+        self._touched = None
+        running: JointProfile | None = plan.profile
+        while running is not None:
+            k = yield from self._turn(running, breakable=True)
+            if k is None:
+                return
+            running = yield from self._turn_on_later(running, k)
 
     def follow(
         self,
@@ -275,6 +230,20 @@ class Arm:
         Returns:
             The last reported state, its aperture the mean over the still window.
         """
+        with self.feed.finishing():
+            return (yield from self._jaws(aperture_m, speed_m_s, force_N, timeout_s, tactile, on_observation))
+
+    # -- inside ------------------------------------------------------------------------------------------------------
+
+    def _jaws(
+        self,
+        aperture_m: float,
+        speed_m_s: float,
+        force_N: float,
+        timeout_s: float,
+        tactile: bool,
+        on_observation: Callable[[Observation], None] | None,
+    ) -> Motion[GripperState]:
         hand = self.description.gripper
         target = GripperTarget(
             min(max(aperture_m, 0.0), hand.stroke_m), min(speed_m_s, hand.speed_m_s), min(force_N, hand.force_N)
@@ -290,40 +259,6 @@ class Arm:
             if watch.still(observation.now_s, observation.gripper):
                 break
         return watch.state()
-
-    # -- inside ------------------------------------------------------------------------------------------------------
-
-    def _travel(self, plans: Sequence[Plan], guard: Guard | None, tactile: bool) -> Motion[MoveResult]:
-        limits = self.limits
-        track: list[Array] = []
-        done_m, travelled = 0.0, 0.0
-        stopped: object | None = None
-        observation: Observation | None = None
-        for plan in plans:
-            running: Plan | None = plan
-            while running is not None:
-                now, running = running, None
-                for k in range(len(now)):
-                    self._q = now.q[k]
-                    self.along_m_s2 = float(now.progress.a[k])
-                    observation = yield Command(now.setpoint(k), None, tactile)
-                    self._see(observation)
-                    track.append(observation.position_B_P[-1])
-                    if guard is not None and stopped is None:
-                        stopped = guard(observation)
-                        if stopped is not None:
-                            running = now.halt(k, limits.stop_acceleration_m_s2, limits.stop_jerk_m_s3, self.period_s)
-                            travelled = float(now.progress.s[k])
-                            break
-                else:
-                    travelled = float(now.progress.s[-1])
-            done_m += travelled
-            if stopped is not None:
-                break
-        total = float(sum(p.piece.length_m for p in plans))
-        path = np.array(track).reshape(-1, 3)
-        pose = self.pose_B_P if observation is None else observation.pose_B_P
-        return MoveResult(done_m >= total - 1e-9, stopped, done_m, path, pose)
 
     def _within_limits(self, speed: float, acceleration: float, jerk: float, what: str) -> None:
         limits = self.limits

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glotouch_bt.motion.kinematics import Kinematics
-from glotouch_bt.motion.timing import JointProfile, joint_move
+from glotouch_bt.motion.timing import JointProfile, Pace, Progress, joint_move
 from glotouch_bt.robot import Array, Limits, MotionRefused
 
 # The description has no acceleration limits; a joint takes this long to its full speed and acceleration. Ours, gentle.
@@ -57,8 +57,8 @@ def plan_joints(
     largest = float(np.abs(end - start).max())
     checks = np.linspace(start, end, max(2, int(np.ceil(largest / np.radians(2.0))) + 1))
     if largest < 1e-9:
-        still = JointProfile(end[None].copy(), np.zeros((1, len(end))), np.zeros((1, len(end))))
-        return JointPlan(still, checks)
+        there = Progress(np.ones(1), np.zeros(1), np.zeros(1))
+        return JointPlan(JointProfile.along(start, end - start, there, Pace(1.0, 1.0, 1.0)), checks)
     velocity = speed * kinematics.velocity
     profile = _profile(start, end, velocity, 1.0, period_s)
     picks = np.unique(np.linspace(0, len(profile.q) - 1, _SAMPLES).astype(int))
@@ -66,8 +66,6 @@ def plan_joints(
     if fastest > limits.tcp_speed_m_s:
         # Stretching time by 1/r scales speed by r, acceleration by r^2 and jerk by r^3: the same track, slower.
         profile = _profile(start, end, velocity, 0.98 * limits.tcp_speed_m_s / fastest, period_s)
-    for array in (profile.q, profile.dq, profile.ddq):
-        array.setflags(write=False)
     return JointPlan(profile, checks)
 
 

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 
 from glotouch_bt.motion.kinematics import Kinematics, known_pose
 from glotouch_bt.motion.paths import Piece, quats_to_matrices
-from glotouch_bt.motion.timing import Progress, rest_to_rest, stop
+from glotouch_bt.motion.timing import Pace, Progress, between, brake, rest_to_rest, stop
 from glotouch_bt.robot import Array, JointSetpoint, MotionRefused
 
 KNOT_SPACING_M = 0.005
@@ -32,6 +32,7 @@ class Plan:
         progress: Path length, speed and acceleration per period.
         knots_q: (k, dof) solved postures along the path; what clearance is checked at.
         knots_s: (k,) where they are, m.
+        pace: The limits along the path.
         q, dq, ddq: (n, dof) setpoints.
         position_m, quat: (n, 3), (n, 4) poses of P in B.
     """
@@ -41,6 +42,7 @@ class Plan:
     knots_q: Array
     knots_s: Array
     spline: CubicSpline
+    pace: Pace
     q: Array
     dq: Array
     ddq: Array
@@ -62,13 +64,20 @@ class Plan:
         p = self.progress
         if p.v[k] == 0.0 and p.a[k] == 0.0:
             return None
-        return _along(
-            self.piece,
-            self.knots_s,
-            self.knots_q,
-            self.spline,
-            stop(p.s[k], p.v[k], p.a[k], acceleration, jerk, period_s),
-        )
+        return self._timed(stop(p.s[k], p.v[k], p.a[k], acceleration, jerk, period_s))
+
+    def brake(self, k: int, period_s: float) -> Plan | None:
+        """What to command after period `k` to come to rest on the path as softly as it is travelled; None at rest."""
+        progress = brake(self.progress, k, self.pace, period_s)
+        return None if progress is None else self._timed(progress)
+
+    def between(self, s0: float, s1: float, period_s: float, most_m_s: float = np.inf) -> Plan:
+        """From rest to rest along this path, m, forwards or backwards, at its own pace or at most `most_m_s`."""
+        pace = Pace(min(self.pace.speed, most_m_s), self.pace.acceleration, self.pace.jerk)
+        return self._timed(between(s0, s1, pace, period_s))
+
+    def _timed(self, progress: Progress) -> Plan:
+        return _along(self.piece, self.knots_s, self.knots_q, self.spline, self.pace, progress)
 
 
 def plan_piece(
@@ -113,7 +122,8 @@ def plan_piece(
         speed_m_s = min(speed_m_s, float(np.sqrt(acceleration_m_s2 / piece.bend_1_m)))
     progress = rest_to_rest(length, speed_m_s, acceleration_m_s2, jerk_m_s3, period_s)
     spline = CubicSpline(s, q, bc_type=((1, tangents[0]), (1, tangents[-1])))
-    plan = _along(piece, s, q, spline, progress)
+    pace = Pace(speed_m_s, acceleration_m_s2, jerk_m_s3)
+    plan = _along(piece, s, q, spline, pace, progress)
     share = np.abs(plan.dq) / kinematics.velocity
     k, i = divmod(int(np.argmax(share)), share.shape[1])
     if share[k, i] > 1.0:
@@ -156,11 +166,11 @@ def _knots(
     return s, q, slope
 
 
-def _along(piece: Piece, knots_s: Array, knots_q: Array, spline: CubicSpline, progress: Progress) -> Plan:
+def _along(piece: Piece, knots_s: Array, knots_q: Array, spline: CubicSpline, pace: Pace, progress: Progress) -> Plan:
     v, a = progress.v[:, None], progress.a[:, None]
     q, first, second = (np.asarray(spline(progress.s, order), dtype=np.float64) for order in range(3))
     position, quat = piece.sample(progress.s)
     dq, ddq = first * v, second * v * v + first * a
     for array in (q, dq, ddq, position, quat):
         array.setflags(write=False)
-    return Plan(piece, progress, knots_q, knots_s, spline, q, dq, ddq, position, quat)
+    return Plan(piece, progress, knots_q, knots_s, spline, pace, q, dq, ddq, position, quat)

@@ -29,6 +29,15 @@ class Progress:
     a: Array
 
 
+@dataclass(frozen=True)
+class Pace:
+    """The limits a way is travelled under: m/s, m/s2, m/s3 (of a joint move, shares of the way instead of metres)."""
+
+    speed: float
+    acceleration: float
+    jerk: float
+
+
 EASED = (1.0, 1.0 - 1e-6, 1.0 - 1e-4)
 """Parts of the acceleration tried. Where two sorts of profile meet (speed times jerk is exactly the acceleration
 squared, and the way just long enough) the library's root finding fails by rounding; a hair beside it does not."""
@@ -80,6 +89,26 @@ def stop(s: float, v: float, a: float, acceleration: float, jerk: float, period_
     return _sample(trajectory, period_s, trajectory.at_time(trajectory.duration)[0][0])
 
 
+def between(s0: float, s1: float, pace: Pace, period_s: float) -> Progress:
+    """Fastest travel from rest at `s0` to rest at `s1`, forwards or backwards along the way."""
+    way = rest_to_rest(abs(s1 - s0), pace.speed, pace.acceleration, pace.jerk, period_s)
+    sign = 1.0 if s1 >= s0 else -1.0
+    s = s0 + sign * way.s
+    s[-1] = s1
+    return Progress(s, sign * way.v, sign * way.a)
+
+
+def brake(progress: Progress, k: int, pace: Pace, period_s: float) -> Progress | None:
+    """From period `k` of a travel under `pace` to rest under the same limits; None if it is at rest there.
+
+    The rest of the travel ends at rest under these limits, so that the fastest halt ends before it does.
+    """
+    s, v, a = (float(x[k]) for x in (progress.s, progress.v, progress.a))
+    if v == 0.0 and a == 0.0:
+        return None
+    return stop(s, v, a, pace.acceleration, pace.jerk, period_s)
+
+
 def _sample(trajectory: ruckig.Trajectory, period_s: float, end: float) -> Progress:
     n = _periods(trajectory.duration, period_s)
     rows = np.array([trajectory.at_time(k * period_s) for k in range(1, n)]).reshape(-1, 3)
@@ -92,12 +121,30 @@ class JointProfile:
     """A joint move at the END of each control period; the last sample is at rest.
 
     Attributes:
+        start, way: (dof,) where it begins and what it travels, rad.
+        share: Share of the way, 0 to 1.
+        pace: Limits of the share.
         q, dq, ddq: (n, dof) rad, rad/s, rad/s2.
     """
 
+    start: Array
+    way: Array
+    share: Progress
+    pace: Pace
     q: Array
     dq: Array
     ddq: Array
+
+    @classmethod
+    def along(cls, start: Array, way: Array, share: Progress, pace: Pace) -> JointProfile:
+        """Setpoints of a progress along the way."""
+        q = start + share.s[:, None] * way
+        if share.s[-1] == 1.0:
+            q[-1] = start + way
+        out = cls(start, way, share, pace, q, share.v[:, None] * way, share.a[:, None] * way)
+        for array in (out.q, out.dq, out.ddq):
+            array.setflags(write=False)
+        return out
 
 
 def joint_move(
@@ -114,7 +161,4 @@ def joint_move(
     way = end - start
     size = np.maximum(np.abs(way), 1e-12)
     v, a, j = (float((limit / size).min()) for limit in (velocity, acceleration, jerk))
-    share = rest_to_rest(1.0, v, a, j, period_s)
-    q = start + share.s[:, None] * way
-    q[-1] = end
-    return JointProfile(q, share.v[:, None] * way, share.a[:, None] * way)
+    return JointProfile.along(start, way, rest_to_rest(1.0, v, a, j, period_s), Pace(v, a, j))

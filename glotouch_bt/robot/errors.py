@@ -9,6 +9,7 @@ GlotouchError
 +-- BackendError        the device or simulator failed; cause chained               (exit 3)
     +-- SafetyStop      a hard limit tripped below the skills; the arm is held
     +-- StaleReading    a sensor stopped delivering
+    +-- GuardTripped    supervision below the tree found something wrong; the arm is held
 """
 
 from __future__ import annotations
@@ -101,3 +102,19 @@ class StaleReading(BackendError):
     def __init__(self, what: str, age_s: float, max_age_s: float) -> None:
         super().__init__(f"{what} is {age_s:.3f} s old; at most {max_age_s:.3f} s is allowed")
         self.what, self.age_s, self.max_age_s = what, age_s, max_age_s
+
+
+class GuardTripped(BackendError):
+    """Supervision below the tree found something wrong and holds the arm.
+
+    Args:
+        guard: Which guard: one of `supervision_limits.GUARDS`.
+        what: What was wrong, one clause, units and the valid range in it.
+        value: What was found.
+        limit: What it passed.
+        stamp_s: Robot clock at the offending sample.
+    """
+
+    def __init__(self, guard: str, what: str, value: float, limit: float, stamp_s: float) -> None:
+        super().__init__(f"guard {guard!r} at t={stamp_s:.3f} s: {what}")
+        self.guard, self.what, self.value, self.limit, self.stamp_s = guard, what, value, limit, stamp_s

@@ -24,6 +24,9 @@ from glotouch_bt.touch.onset import onset_index
 
 HISTORY_BLOCKS = 10
 """Blocks kept for dating an onset: 100 ms at 100 Hz, of which the last third may belong to the contact."""
+DRIFT_S = 2.0
+"""While a paused motion stands, what changes over this time or slower is the sensor's drift (harsh CONDITIONS: 0.02 N in
+it), what changes faster is a push."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,7 @@ class ContactGuard:
         self.params = params
         self._inertial = inertial
         self._baseline = baseline
+        self._zero = baseline.median
         self._fusion = TipFusion.for_tip(tip_P_m, pose_E_P, baseline.sd)
         self._R_P_E = pose_E_P.rotation.T
         self._low_pass = LowPass(6, params.cutoff_Hz, params.rate_Hz)
@@ -98,7 +102,7 @@ class ContactGuard:
         """The onset once the soft rule has tripped (the same one ever after), else None."""
         if self._onset is not None:
             return self._onset
-        residual = observation.wrench_S - self._baseline.median
+        residual = observation.wrench_S - self._zero
         if self._inertial is not None:
             residual -= self._inertial(len(residual))
         smooth = self._low_pass(residual)
@@ -119,6 +123,14 @@ class ContactGuard:
         if len(tripped):
             self._onset = self._date(observation, int(tripped[0]), force[tripped[0]])
         return self._onset
+
+    def standing(self, observation: Observation) -> Onset | None:
+        """As a call, while the hand stands still in a pause: the zero follows the sensor's drift meanwhile."""
+        onset = self(observation)
+        if onset is None:
+            share = len(observation.stamp_s) / (DRIFT_S * self.params.rate_Hz)
+            self._zero = self._zero + share * self._history[-1][1].mean(axis=0)
+        return onset
 
     def _soft_rule(self, force_S: Array, moment_S: Array) -> npt.NDArray[np.int64] | None:
         """(n,) 1 where a sample fulfils the soft rule; None if surely none does, told as early as it is clear."""

@@ -1,0 +1,54 @@
+"""The feed: whether motions go on, stop where they are along their path, or are stopped already.
+
+One small value that the runner writes and the motions read, once a control period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Literal
+
+Style = Literal["hold", "retreat", "finish"]
+
+BACK_OFF_M = 0.004
+"""How far a `retreat` backs off: the probe bends and its pads give less than a millimetre at a touch."""
+BACK_OFF_M_S = 0.02
+"""Largest speed of backing off, and of coming back to the contact."""
+
+
+@dataclass
+class Feed:
+    """What a pause does to motions.
+
+    Attributes:
+        wanted: A pause is asked for.
+        style: What it does to the skill that runs: `hold`, `retreat` (a guarded motion also backs off), `finish` (the
+            present motion is made to its end).
+        standing: A motion stands in the middle of its path because of it.
+    """
+
+    wanted: bool = False
+    style: Style = "hold"
+    standing: bool = False
+    _finishing: int = 0
+
+    @property
+    def stops(self) -> bool:
+        """A motion under way must stop now."""
+        return self.wanted and self.style != "finish" and not self._finishing
+
+    @property
+    def waits(self) -> bool:
+        """A pause must wait for what is being finished."""
+        return bool(self._finishing)
+
+    @contextmanager
+    def finishing(self) -> Iterator[None]:
+        """What is done inside is not interrupted by a pause, whatever the skill's style: the pause comes after it."""
+        self._finishing += 1
+        try:
+            yield
+        finally:
+            self._finishing -= 1

@@ -1,0 +1,117 @@
+"""What supervision below the tree tolerates: frozen values, each with its source."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+from glotouch_bt.robot.errors import ParamError
+
+GUARDS = {
+    "not_finite": "a reading that is no number (single samples are dropped)",
+    "stamps": "samples that do not follow each other in time (single samples are dropped)",
+    "samples_missing": "fewer samples than a control period has, again and again",
+    "overrun": "control periods that passed without a command while the arm moved",
+    "joint_range": "a joint measured outside its range",
+    "joint_speed": "a joint measured faster than its limit",
+    "out_of_reach": "a pose that no arm of this size has, or a rotation that is none",
+    "wrench": "a sensed wrench beyond the hard limit, sample after sample",
+    "wrench_stuck": "a noisy wrench sensor that gives the same numbers over and over",
+    "following": "the arm is not where it was told to be",
+    "gripper_stale": "the gripper does not report any more",
+    "tactile_stale": "depth maps were asked for and do not come",
+    "tactile_dead": "depth maps with hardly a live taxel, or with infinities, again and again",
+    "command": "a setpoint or a jaw target that is not finite, out of range, or a jump",
+    "device": "the device or its driver failed",
+}
+"""Every guard by name, with what trips it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SupervisionLimits:
+    """Limits of the guards; the joints' own, the hard wrench and the speeds are the robot's (`Limits`, `Joint`).
+
+    Attributes:
+        joint_slack_rad: A joint may be measured so far beyond its range. Source: ours, 1 degree: a setpoint at the
+            stop and the servo's error.
+        speed_slack: Measured against allowed joint speed. Source: ours; differentiated encoders are noisy.
+        reach_m: No part of the hand is farther from the base. Source: twice the reach of the largest supported arm.
+        wrench_samples: Samples in a row beyond the hard wrench limit. Source: that of the simulated backend's own
+            guard, 5 ms: what is shorter is the sensor's noise or the ringing of a stop.
+        following_rad: Largest distance of a joint from its setpoint at rest. Source: ours, 3 degrees: ten times what a
+            force at the hard limit causes at the stiffness of the simulated arm.
+        lag_s: In motion, a joint may be late by this as well. Source: driver 30 ms (its hold) and servo, doubled.
+        command_slack: Commanded against allowed speeds. Source: ours, rounding and the end of a profile.
+        gripper_age_s, tactile_age_s: Oldest report, and longest wait for a depth map that was asked for. Source:
+            `Limits.max_age_s`, five times the slowest gripper of CONDITIONS, twice its slowest depth maps.
+        stuck_s: Bit-identical wrench samples for so long. Source: ours, a third of the shortest rest a probing skill
+            listens at (120 ms).
+        noisy_s: A sensor counts as noisy after so long without one repeated or (`noise_N`) unchanged force: only then
+            may it be called stuck. Noise-free simulations never get there. Source: ours.
+        noise_N: A change between two periods that is less is no noise. Source: ours, a fiftieth of the force sensors'
+            resolution.
+        live_taxels: Least share of a pad that gives numbers. Source: harsh CONDITIONS have 3 % dead; half of a pad
+            cannot be matched.
+        late_periods: The arm may wait for so many periods while it moves. Source: the driver holds after 30 ms.
+        tolerated: Findings of one transient kind within `window_s` that are only put on record.
+        window_s: See `tolerated`.
+    """
+
+    joint_slack_rad: float = 0.02
+    speed_slack: float = 1.2
+    reach_m: float = 3.0
+    wrench_samples: int = 5
+    following_rad: float = 0.05
+    lag_s: float = 0.1
+    command_slack: float = 1.1
+    gripper_age_s: float = 0.2
+    tactile_age_s: float = 0.2
+    stuck_s: float = 0.04
+    noisy_s: float = 5.0
+    noise_N: float = 1e-6
+    live_taxels: float = 0.5
+    late_periods: float = 3.0
+    tolerated: int = 5
+    window_s: float = 1.0
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if not (math.isfinite(value) and value > 0):
+                raise ParamError(f"supervision.{f.name}", value, "finite and positive")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a guard found.
+
+    Attributes:
+        guard: A key of `GUARDS`.
+        what: One clause, with units and what is valid.
+        value: What was found.
+        limit: What it passed.
+        stamp_s: Robot clock.
+        fatal: It ends the mission; else it is only put on record.
+    """
+
+    guard: str
+    what: str
+    value: float
+    limit: float
+    stamp_s: float
+    fatal: bool = True
+
+
+class Patience:
+    """Counts findings of one transient kind; patience ends when too many came within the window."""
+
+    def __init__(self, limits: SupervisionLimits) -> None:
+        self._most, self._window_s = limits.tolerated, limits.window_s
+        self._stamps: dict[str, list[float]] = {}
+
+    def ends(self, guard: str, stamp_s: float, count: int = 1) -> bool:
+        """Take `count` findings of a guard; True if there are too many of them now."""
+        recent = [s for s in self._stamps.get(guard, ()) if 0.0 <= stamp_s - s < self._window_s]
+        recent += [stamp_s] * count
+        self._stamps[guard] = recent
+        return len(recent) > self._most
