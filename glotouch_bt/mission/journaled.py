@@ -1,4 +1,4 @@
-"""Slow requests (tare, payload) with their beginning and end on the record: a replay cannot see a device finish them."""
+"""Slow requests (tare, payload) with their beginning and end on the record: a replay sees no device finish them."""
 
 from __future__ import annotations
 

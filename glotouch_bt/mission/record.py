@@ -22,6 +22,18 @@ from glotouch_bt.mission.mcap_json import dumps, to_json
 from glotouch_bt.mission.mcap_packing import Column, pack
 from glotouch_bt.mission.mcap_scene import container_scene, event_scene
 from glotouch_bt.mission.mcap_schemas import EVENT_PREFIX, schema_of
+from glotouch_bt.mission.resolution import (
+    APERTURE_M,
+    DEPTH_M,
+    FORCE_N,
+    JOINT_RAD,
+    JOINT_RAD_S,
+    POSITION_M,
+    QUATERNION,
+    SPEED_M_S,
+    STAMP_S,
+    TORQUE_NM,
+)
 from glotouch_bt.robot import BadInput, Command, GlotouchError, Observation
 
 RUN_ATTACHMENT = "run.json"
@@ -174,13 +186,13 @@ class Recorder:
         start_ns = _ns(stamp_s[0])
         dof = (q.shape[1],)
         columns = (
-            Column("stamp_s", (), 1e-7, 2),
-            Column("q", dof, 1e-7, 2),
-            Column("dq", dof, 1e-6, 1),
-            Column("position_B_P", (3,), 1e-7, 2),
-            Column("quat_B_P", (4,), 1e-8, 2),
-            Column("force_S_N", (3,), 1e-4, 0),
-            Column("torque_S_Nm", (3,), 1e-5, 0),
+            Column("stamp_s", (), STAMP_S, 2),
+            Column("q", dof, JOINT_RAD, 2),
+            Column("dq", dof, JOINT_RAD_S, 1),
+            Column("position_B_P", (3,), POSITION_M, 2),
+            Column("quat_B_P", (4,), QUATERNION, 2),
+            Column("force_S_N", (3,), FORCE_N, 0),
+            Column("torque_S_Nm", (3,), TORQUE_NM, 0),
         )
         values = (stamp_s - start_ns * 1e-9, q, dq, position, quat, wrench[:, :3], wrench[:, 3:])
         self._put(start_ns, "/packed/samples", pack(start_ns, columns, values))
@@ -214,17 +226,17 @@ class Recorder:
                 target[i] = (c.gripper.aperture_m, c.gripper.speed_m_s, c.gripper.force_N)
         start_ns = _ns(stamp_s[0])
         columns = (
-            Column("stamp_s", (), 1e-7, 2),
+            Column("stamp_s", (), STAMP_S, 2),
             Column("samples", (), 1.0, 1),
-            Column("gripper_stamp_s", (), 1e-7, 2),
-            Column("gripper_aperture_m", (), 1e-7, 1),
-            Column("gripper_force_N", (), 1e-4, 1),
+            Column("gripper_stamp_s", (), STAMP_S, 2),
+            Column("gripper_aperture_m", (), APERTURE_M, 1),
+            Column("gripper_force_N", (), FORCE_N, 1),
             Column("gripper_moving", (), 1.0, 1),
-            Column("command_q", (dof,), 1e-7, 2),
-            Column("command_dq", (dof,), 1e-6, 1),
-            Column("command_aperture_m", (), 1e-7, 1),
-            Column("command_speed_m_s", (), 1e-6, 1),
-            Column("command_force_N", (), 1e-4, 1),
+            Column("command_q", (dof,), JOINT_RAD, 2),
+            Column("command_dq", (dof,), JOINT_RAD_S, 1),
+            Column("command_aperture_m", (), APERTURE_M, 1),
+            Column("command_speed_m_s", (), SPEED_M_S, 1),
+            Column("command_force_N", (), FORCE_N, 1),
             Column("command_tactile", (), 1.0, 1),
         )
         zero = start_ns * 1e-9
@@ -244,10 +256,10 @@ class Recorder:
         start_ns = _ns(frames[0].stamp_s)
         shape = (frames[0].left_m.shape[0], frames[0].left_m.shape[1])
         columns = (
-            Column("stamp_s", (), 1e-7, 2),
-            Column("arrived_s", (), 1e-7, 2),
-            Column("left_m", shape, 1e-6, 0),
-            Column("right_m", shape, 1e-6, 0),
+            Column("stamp_s", (), STAMP_S, 2),
+            Column("arrived_s", (), STAMP_S, 2),
+            Column("left_m", shape, DEPTH_M, 0),
+            Column("right_m", shape, DEPTH_M, 0),
         )
         stamps = np.array([(f.stamp_s, arrived_s) for f, arrived_s in taken]).T - start_ns * 1e-9
         values = (*stamps, np.stack([f.left_m for f in frames]), np.stack([f.right_m for f in frames]))

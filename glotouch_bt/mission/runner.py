@@ -16,9 +16,10 @@ from glotouch_bt.mission.build import BuiltTree, build_tree
 from glotouch_bt.mission.journaled import JournaledRequests
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.reasons import Failure, ReasonBook
+from glotouch_bt.mission.resolution import Rounding
 from glotouch_bt.mission.tally import Record, Tally
 from glotouch_bt.robot import HOLD, BackendError, Robot, World
-from skills.base import Context, Reason
+from skills.base import Context, Reason, Skill
 
 if TYPE_CHECKING:
     from glotouch_bt.motion import Arm
@@ -86,6 +87,8 @@ def run_mission(
     tally = Tally(record)
     arm = make_arm(robot, mission.world)
     observation = robot.observe()
+    rounding = Rounding(observation.q.shape[1])
+    observation = rounding(observation)
     arm.sync(observation)
     tally.block(observation, HOLD)  # a replay begins where the robot did
     context = Context(
@@ -93,7 +96,7 @@ def run_mission(
     )
     context.requests = JournaledRequests(robot, tally, lambda: context.observation.now_s)
     tree = build_tree(mission.tree, context, mission.name)
-    loop = _Loop(tree, context, robot, tally, on_progress)
+    loop = _Loop(tree, context, robot, tally, rounding, on_progress)
     outcome = Outcome("aborted", tally, start_s=observation.now_s)
     try:
         with deferred_interrupt() as interrupted:
@@ -125,8 +128,10 @@ class _Loop:
         context: Context,
         robot: Robot,
         tally: Tally,
+        rounding: Rounding,
         on_progress: Callable[[float, Tally], None] | None,
     ) -> None:
+        self._rounding = rounding
         self._tree, self._context, self._robot, self._tally = tree, context, robot, tally
         self._on_progress = on_progress
         self._book = ReasonBook()
@@ -152,7 +157,7 @@ class _Loop:
             if root.status is not Status.RUNNING:
                 self._decide(outcome, root)
                 return
-            context.observation = observation = robot.cycle(context.command)
+            context.observation = observation = self._rounding(robot.cycle(context.command))
             tally.block(observation, context.command)
             if self._on_progress is not None and now_s >= next_progress_s:
                 next_progress_s = now_s + PROGRESS_EVERY_S
@@ -187,6 +192,8 @@ class _Loop:
             changed = True
             if node.status is Status.FAILURE:
                 self._book.note(node)
+                if isinstance(node, Skill):
+                    self._tally.event("failure", now_s, self._book.of(node).as_dict())
         if changed:
             self._record_changes(now_s)
 

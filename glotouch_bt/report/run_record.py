@@ -22,6 +22,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from glotouch_bt.mission.mcap_packing import join, unpack
 from glotouch_bt.mission.mcap_schemas import EVENT_PREFIX
 from glotouch_bt.mission.record import RESULT_ATTACHMENT, RUN_ATTACHMENT
+from glotouch_bt.mission.resolution import STAMP_S, to_step
 from glotouch_bt.robot import Array, BadInput, GlotouchError, Pose
 
 RECORD_NAME, RESULT_NAME, TRUTH_NAME = "run.mcap", "result.json", "truth.json"
@@ -203,7 +204,7 @@ def _take(record: RunRecord, packed: dict[str, list[dict[str, Array]]], topic: s
         start_ns, columns = unpack(data)
         for name in ("stamp_s", "gripper_stamp_s", "arrived_s"):
             if name in columns:
-                columns[name] = columns[name] + start_ns * 1e-9
+                columns[name] = to_step(columns[name] + start_ns * 1e-9, STAMP_S)
         packed[_PACKED[topic]].append(columns)
         return
     content = json.loads(data)

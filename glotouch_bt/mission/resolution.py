@@ -1,0 +1,60 @@
+"""To what the record rounds, and the same rounding for what skills are given: a replay then gets the very same numbers.
+
+Each step is far below the noise of its sensor (nominal: 0.05 N, 0.1 mm of aperture, micrometres of gel).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glotouch_bt.robot import Array, GripperState, Observation, TactileFrame
+
+STAMP_S, JOINT_RAD, JOINT_RAD_S, POSITION_M, QUATERNION = 1e-7, 1e-7, 1e-6, 1e-7, 1e-8
+FORCE_N, TORQUE_NM, APERTURE_M, SPEED_M_S, DEPTH_M = 1e-4, 1e-5, 1e-7, 1e-6, 1e-6
+
+
+def to_step(values: Array, step: float) -> Array:
+    """Nearest multiples of `step`, by the arithmetic of `mcap_packing` (so that packing them loses nothing)."""
+    rounded: Array = np.rint(values * (1.0 / step)) * step
+    return rounded
+
+
+class Rounding:
+    """Rounds the observations of one robot; the steps of a whole block are laid out once.
+
+    Args:
+        dof: Number of joints.
+    """
+
+    def __init__(self, dof: int) -> None:
+        widths = (1, dof, dof, 3, 4, 3, 3)
+        steps = (STAMP_S, JOINT_RAD, JOINT_RAD_S, POSITION_M, QUATERNION, FORCE_N, TORQUE_NM)
+        self._step = np.repeat(np.array(steps), widths)
+        self._inverse = np.repeat(np.array([1.0 / s for s in steps]), widths)
+        a = 1 + dof
+        self._dq, self._p, self._w, self._f = a, a + dof, a + dof + 3, a + dof + 7
+
+    def __call__(self, o: Observation) -> Observation:
+        """The observation as the record will hold it."""
+        parts = (o.stamp_s[:, None], o.q, o.dq, o.position_B_P, o.quat_B_P, o.wrench_S)
+        block = np.concatenate(parts, axis=1)  # a copy: rounded in place
+        block *= self._inverse
+        np.rint(block, out=block)
+        block *= self._step
+        g = o.gripper
+        gripper = GripperState(
+            _number(g.stamp_s, STAMP_S), _number(g.aperture_m, APERTURE_M), _number(g.force_N, FORCE_N), g.moving
+        )
+        frame = o.tactile
+        if frame is not None:
+            left, right = to_step(frame.left_m, DEPTH_M), to_step(frame.right_m, DEPTH_M)
+            frame = TactileFrame(_number(frame.stamp_s, STAMP_S), left, right)
+        dq, p, w, f = self._dq, self._p, self._w, self._f
+        return Observation(
+            block[:, 0], block[:, 1:dq], block[:, dq:p], block[:, p:w], block[:, w:f], block[:, f:], gripper, frame
+        )
+
+
+def _number(value: float, step: float) -> float:
+    scaled = value * (1.0 / step)
+    return round(scaled) * step if abs(scaled) < 2**53 else value  # NaN and infinities stay what they are
