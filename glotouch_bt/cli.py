@@ -17,7 +17,7 @@ import typer
 
 from glotouch_bt.cli_bench import bench
 from glotouch_bt.cli_doctor import doctor, link, read_settings
-from glotouch_bt.cli_faults import faults
+from glotouch_bt.cli_faults import bench_faults, faults
 from glotouch_bt.guarded import guarded, set_debug, showing_tracebacks
 
 app = typer.Typer(
@@ -29,6 +29,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 bench.command("link")(link)
+bench.command("faults")(bench_faults)
 app.command("doctor")(doctor)
 app.command("faults")(faults)
 app.add_typer(bench)

@@ -1,10 +1,14 @@
-"""`glotouch faults`: what can be made to go wrong, and how a plan asks for it."""
+"""`glotouch faults` and `glotouch bench faults`: what can be made to go wrong, and what comes of it."""
 
 from __future__ import annotations
 
 import json
 import sys
-from typing import Annotated
+from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
@@ -42,3 +46,78 @@ def faults(
     rows5 = [(p["name"], p["unit"] or "", str(p["default"]), p["valid"], p["description"]) for p in kind.parameters()]
     if rows5:
         console.print_table("parameters (with: {...})", ("name", "unit", "default", "valid", "what it is"), rows5)
+
+
+@guarded
+def bench_faults(
+    mission: Annotated[str, typer.Option(help="a mission with `target` and `expected_objects`")] = "retrieve",
+    set_: Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="a mission parameter")] = None,
+    fault: Annotated[list[str] | None, typer.Option(help="only these classes (default: all that are tried)")] = None,
+    skill: Annotated[list[str] | None, typer.Option(help="only in these skills (default: eight)")] = None,
+    trials: Annotated[int, typer.Option(min=1, help="seeds per cell")] = 3,
+    seed: Annotated[int, typer.Option(min=0, help="first seed")] = 0,
+    conditions: Annotated[str, typer.Option(help="disturbances: ideal, nominal, harsh, or a file")] = "nominal",
+    objects: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="folder of watertight STL files in metres")
+    ] = None,
+    few: Annotated[int, typer.Option(min=1, help="only the first so many objects are in the box: it is quicker")] = 2,
+    backend: Annotated[str, typer.Option(help="a registered simulation backend")] = "mujoco",
+    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="where trials and summary go")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="keep the trials that are in --out already")] = False,
+    keep: Annotated[bool, typer.Option("--keep", help="keep the records of trials that ended well, too")] = False,
+    exhaustive: Annotated[
+        bool, typer.Option("--exhaustive", help="instead: fail the n-th call of the seam, n = 0, 1, ... (see --stride)")
+    ] = False,
+    stride: Annotated[int, typer.Option(min=1, help="with --exhaustive: every so many calls")] = 1,
+    json_: Annotated[bool, typer.Option("--json", help="print summary.json on stdout, nothing else")] = False,
+) -> None:
+    """Break a mission on purpose: each class of fault in each skill, beside the unfaulted run of the same seed."""
+    from glotouch_bt import console_faults
+    from glotouch_bt.cli_bench import _check, _folder
+    from glotouch_bt.cli_doctor import read_settings
+    from glotouch_bt.mission.load import load_mission
+    from glotouch_bt.study.faults import Campaign, few_objects, run_campaign
+    from glotouch_bt.study.faults_cases import SKILLS, chosen_cases
+    from glotouch_bt.study.faults_exhaustive import Exhaustive, run_exhaustive
+
+    settings = read_settings(set_)
+    _check(conditions, backend)
+    world = load_mission(mission, settings, objects=objects).world
+    if exhaustive:
+        study = Exhaustive(mission, settings, backend, seed, stride, _folder(out, "faults-exhaustive"))
+        found = run_exhaustive(study, lambda n, name: print(f"{name}: call {n}", file=sys.stderr))
+        if json_:
+            sys.stdout.write(json.dumps(found, indent=2) + "\n")
+        else:
+            console_faults.print_exhaustive(found, study.out)
+        return
+    folder = _folder(out, "faults")
+    box, names = few_objects(world.objects, few, folder / "objects")
+    settings = {"target": names[0], "expected_objects": str(len(names))} | settings
+    load_mission(mission, settings, objects=box)
+    campaign = Campaign(
+        mission=mission,
+        settings=settings,
+        cases=chosen_cases(fault or ()),
+        skills=tuple(skill or SKILLS),
+        seeds=tuple(range(seed, seed + trials)),
+        conditions=conditions,
+        objects=box,
+        backend=backend,
+        out=folder,
+        resume=resume,
+        keep=keep,
+    )
+
+    def show(row: Mapping[str, Any], done: int, total: int) -> None:
+        what = f"{row['class']} in {row['skill']}" if row["skill"] else "unfaulted"
+        said = f"{row['verdict']} {row.get('cause') or ''}" if row["effective"] else "altered nothing"
+        sys.stderr.write(f"[{done}/{total}] seed {row['seed']} {what}: {said} ({row['wall_s']:.0f} s)\n")
+
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        summary = run_campaign(campaign, pool, show)
+    if json_:
+        sys.stdout.write(json.dumps(summary, indent=2) + "\n")
+    else:
+        console_faults.print_faults(summary, campaign.out)

@@ -128,20 +128,25 @@ class StaleData(Effect):
         return self._last
 
 
-class FrozenClockParams(FaultParams):
+class RobotFaultParams(FaultParams):
     """Parameters of `robot_fault`."""
 
     message: str = param("What the controller says", default="servo fault (injected)")
 
 
 class RobotFault(Effect):
-    """The robot's controller stops by itself: this cycle and all after it fail."""
+    """The robot's controller stops by itself: this call of the seam and all after it fail."""
 
-    Params = FrozenClockParams
-    params: FrozenClockParams
+    Params = RobotFaultParams
+    params: RobotFaultParams
     drives = True
 
     def drive(self, cycle: Cycle, command: Command) -> Observation:
+        """See `Effect`."""
+        self.refuse()
+        return cycle(command)
+
+    def refuse(self) -> None:
         """See `Effect`."""
         self.acts.times += 1
         raise BackendError(f"robot fault stop: {self.params.message}")

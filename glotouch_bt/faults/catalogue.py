@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +12,17 @@ from glotouch_bt.faults.effect import Effect
 from glotouch_bt.mission.fields import unit_of
 
 CHANNELS = ("wrench", "touch", "gripper", "arm", "world", "process")
+
+NAMED_BY: Mapping[str, str] = {
+    "wrench": r"wrench|wrist|force|torque|weigh|off_zero|hard_contact|\btare",
+    "touch": r"tactile|depth map|\bpads?\b|taxel|\bgel|\bframes?\b",
+    "gripper": r"jaw|gripper|aperture|\bgrip|clos(?:ed|ure)|tool_lost|slipped|\bheld\b|in the hand",
+    "arm": r"joint|setpoint|following|overrun|control period|stamps|samples|controller|robot fault|not_at_rest|stale",
+    "world": r"object|candidate|container|\bwall|\bfloor|moved|not_met|nothing was|in the way|recognis|\btouched",
+    "process": r"driver|cycle|overrun|control period|RuntimeError",
+}
+"""What counts as naming the cause, by channel: one of these words in a guard's finding, a skill's failure or the chain
+of reasons, after the fault began. Fixed before anything was measured."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +44,10 @@ class FaultKind:
     effect: type[Effect]
     seen_by: str
     recoverable: bool
+
+    def named_in(self, text: str) -> bool:
+        """True if a text names what was faulted."""
+        return re.search(NAMED_BY[self.channel], text, re.IGNORECASE) is not None
 
     def parameters(self) -> list[dict[str, Any]]:
         """Each parameter: name, unit, default, what is valid, description."""

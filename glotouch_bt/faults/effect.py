@@ -96,6 +96,12 @@ class Effect:
         """What is said to have been sensed instead."""
         return observation
 
+    def refuse(self) -> None:
+        """Raise, if every call of the seam fails while the fault lasts; a call that is no cycle asks this only."""
+
+    def tared(self) -> None:
+        """The device has just zeroed its wrist sensor."""
+
     def request(self, request: Request) -> Ticket | None:
         """Answer a slow request in the device's place; None lets it pass."""
         return None

@@ -10,8 +10,9 @@ from glotouch_bt.faults.effect import Effect, Scene, samples_altered
 from glotouch_bt.faults.plan import FaultPlan, FaultSpec
 from glotouch_bt.faults.proof import Proof, Sighting
 from glotouch_bt.faults.trigger import Moment, holds, running_node
-from glotouch_bt.robot import BadInput, Command, GuardTripped, Observation, Request, Robot, Ticket
+from glotouch_bt.robot import BadInput, Command, GuardTripped, Observation, Request, Robot, Tare, Ticket
 from glotouch_bt.robot.disturber import Disturber
+from glotouch_bt.robot.interface import Snapshot
 from glotouch_bt.robot.streams import stream
 
 
@@ -94,8 +95,11 @@ class FaultInjector(Robot):
         first = robot.observe()
         self._moment = Moment(first.now_s, first)
         self._handed_out: Observation | None = None
+        self._taring: Ticket | None = None
         self.sightings: list[Sighting] = []
+        self._began_after: list[tuple[float, str]] = []
         self.news: list[tuple[float, dict[str, object]]] = []
+        self.outcome = ""
         self.held = False
         draws = seed if plan.seed is None else plan.seed
         self._faults = []
@@ -115,7 +119,10 @@ class FaultInjector(Robot):
 
     def observe(self) -> Observation:
         """The newest block, as it was handed out."""
+        if self._waiting or self._active:
+            self._turn()
         self._moment.calls += 1
+        self._refuse()
         return self._handed_out if self._handed_out is not None else self._robot.observe()
 
     def cycle(self, command: Command) -> Observation:
@@ -141,12 +148,36 @@ class FaultInjector(Robot):
         if self._waiting or self._active:
             self._turn()
         self._moment.calls += 1
+        self._refuse()
         for fault in self._active:
             ticket = fault.effect.request(request)
             if ticket is not None:
                 fault.proof.changed(self._moment.now_s)
                 return ticket
-        return self._robot.start(request)
+        ticket = self._robot.start(request)
+        if isinstance(request, Tare):
+            self._taring = ticket
+        return ticket
+
+    @property
+    def paced(self) -> bool:  # type: ignore[override]
+        """See `Robot`."""
+        return self._robot.paced
+
+    @property
+    def inner(self) -> Robot:
+        """The device."""
+        return self._robot
+
+    def snapshot(self) -> Snapshot | None:
+        """The device's; where the faults stand is not kept."""
+        return self._robot.snapshot()
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """The device goes back; faults begin and end as if nothing had happened."""
+        self._robot.restore(snapshot)
+        self._moment.sensed = self._robot.observe()
+        self._handed_out = None
 
     def hold(self) -> None:
         """Passed on."""
@@ -161,6 +192,8 @@ class FaultInjector(Robot):
 
     def node_began(self, path: str, now_s: float) -> None:
         """A node of the tree runs from now on."""
+        if self.sightings:
+            self._began_after.append((now_s, path))
         self._moment.running[path] = now_s
         self._moment.visits[path] = self._moment.visits.get(path, 0) + 1
 
@@ -178,9 +211,15 @@ class FaultInjector(Robot):
         """One for each fault of the plan."""
         return [f.proof for f in self._faults]
 
+    def conclude(self, outcome: str, code: str, text: str, now_s: float) -> None:
+        """How the run ended; where nobody saw anything before, its end is when it was seen."""
+        self.outcome = outcome
+        if outcome != "success":
+            self.saw(now_s, "runner", code, text)
+
     def report(self) -> list[dict[str, Any]]:
         """What became of each fault, as result.json has it."""
-        return [f.proof.report(self.sightings) for f in self._faults]
+        return [f.proof.report(self.sightings, self._began_after, self.outcome) for f in self._faults]
 
     # -- inside ------------------------------------------------------------------------------------------------------
 
@@ -197,6 +236,8 @@ class FaultInjector(Robot):
         for fault in begun:
             self._tell(fault, "begins")
         if begun:
+            if self._taring is not None and self._taring.done:
+                self._taring = None
             self._waiting = [f for f in self._waiting if not f.active]
             order = {id(f): i for i, f in enumerate(self._faults)}
             self._active = sorted([*self._active, *begun], key=lambda f: order[id(f)])
@@ -232,6 +273,11 @@ class FaultInjector(Robot):
             if effect.drives:
                 cycle = partial(self._driven, fault, cycle)
         observation = cycle(command)
+        if self._taring is not None and self._taring.done:
+            self._taring = None
+            for fault in self._active:
+                fault.effect.scene.sensed = observation
+                fault.effect.tared()
         for fault in self._active:
             reported = fault.effect.sense(observation)
             altered = samples_altered(observation, reported)
@@ -240,6 +286,19 @@ class FaultInjector(Robot):
                 fault.proof.changed(moment.now_s)
             observation = reported
         return observation
+
+    def _refuse(self) -> None:
+        """Let the faults under way refuse a call that is no cycle."""
+        for fault in self._active:
+            acts = fault.effect.acts.times
+            try:
+                fault.effect.refuse()
+            except Exception as e:
+                self._see_error(e)
+                raise
+            finally:
+                if fault.effect.acts.times > acts:
+                    fault.proof.changed(self._moment.now_s)
 
     def _to_device(self, command: Command) -> Observation:
         self._moment.sensed = observation = self._robot.cycle(command)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from glotouch_bt.faults.injector import FaultInjector
 from glotouch_bt.mission.tally import Record
-from glotouch_bt.robot import Command, Observation
+from glotouch_bt.robot import Command, Observation, Robot
 
 FAILURE_EVENT, FAULT_EVENT = "failure", "fault"
 
@@ -52,3 +52,11 @@ class ListeningRecord:
     def port(self, stamp_s: float, key: str, value: object) -> None:
         """Passed on."""
         self._record.port(stamp_s, key, value)
+
+
+def injector_in(robot: Robot) -> FaultInjector | None:
+    """The fault injector in a chain of wrappers, or None."""
+    seen: object = robot
+    while seen is not None and not isinstance(seen, FaultInjector):
+        seen = getattr(seen, "inner", None)
+    return seen

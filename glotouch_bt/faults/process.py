@@ -17,6 +17,11 @@ class Unexpected(Effect):
 
     def drive(self, cycle: Cycle, command: Command) -> Observation:
         """See `Effect`."""
+        self.refuse()
+        return cycle(command)
+
+    def refuse(self) -> None:
+        """See `Effect`."""
         self.acts.times += 1
         raise RuntimeError("the driver broke (injected exception)")
 

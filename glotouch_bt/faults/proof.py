@@ -9,6 +9,7 @@ from glotouch_bt.faults.effect import Acts
 from glotouch_bt.faults.plan import FaultSpec
 
 KEPT = 50  # beginnings and sightings that are written out
+FIRST = 8  # nodes after the first sighting that are
 
 
 @dataclass(frozen=True)
@@ -69,8 +70,14 @@ class Proof:
             self.first_s = now_s
         self.last_s = now_s
 
-    def report(self, sightings: list[Sighting]) -> dict[str, Any]:
-        """As result.json has it; `sightings` are all of the run, in order of time."""
+    def report(self, sightings: list[Sighting], began: list[tuple[float, str]], outcome: str) -> dict[str, Any]:
+        """As result.json has it.
+
+        Args:
+            sightings: All of the run, in order of time.
+            began: (robot clock, path) of nodes that began after the first of them, in order of time.
+            outcome: How the run ended.
+        """
         first = self.first_s
         after = [] if first is None else [s for s in sightings if s.stamp_s >= first - 1e-9]
         seen = after[0] if after else None
@@ -95,4 +102,13 @@ class Proof:
             "seen": None if seen is None else seen.as_dict(),
             "latency_s": None if seen is None or first is None else round(seen.stamp_s - first, 6),
             "sightings": [s.as_dict() for s in after[:KEPT]],
+            "recovery": [] if seen is None else _leaves(began, seen.stamp_s)[:FIRST],
+            "outcome": outcome,
         }
+
+
+def _leaves(began: list[tuple[float, str]], since_s: float) -> list[str]:
+    """Names of the leaves that began after a moment: what was done about it."""
+    later = [path for stamp_s, path in began if stamp_s > since_s - 1e-9]
+    names = [p.rsplit("/", 1)[-1] for p, q in zip(later, [*later[1:], ""], strict=True) if not q.startswith(p + "/")]
+    return names

@@ -73,6 +73,30 @@ class Garbage(WrenchEffect):
         return out
 
 
+class AddedEffect(WrenchEffect):
+    """Something is added inside the sensor: a tare taken while the fault lasts takes it out again."""
+
+    def begin(self) -> None:
+        """See `Effect`."""
+        self._start_s = self.scene.sensed.now_s
+        self._tared = np.zeros(6)
+
+    def added(self, since_s: Array) -> Array:
+        """(n, 6) or (6,) what is added to samples so long after the beginning (n, 1)."""
+        raise NotImplementedError
+
+    def tared(self) -> None:
+        """See `Effect`."""
+        self._tared = np.array(np.broadcast_to(self.added(self._since(self.scene.sensed.stamp_s[-1:])), (1, 6))[0])
+
+    def alter(self, wrench_S: Array, stamp_s: Array) -> Array:
+        """See `WrenchEffect`."""
+        return np.asarray(wrench_S + (self.added(self._since(stamp_s)) - self._tared))
+
+    def _since(self, stamp_s: Array) -> Array:
+        return np.asarray(stamp_s - self._start_s)[:, None]
+
+
 class BiasParams(FaultParams):
     """Parameters of `wrench_bias`."""
 
@@ -80,19 +104,15 @@ class BiasParams(FaultParams):
     torque_Nm: Triple = param("Added torque (x, y, z) in S", unit="Nm", default=(0.0, 0.0, 0.0))
 
 
-class Bias(WrenchEffect):
-    """A constant is added."""
+class Bias(AddedEffect):
+    """A constant is added, until the next tare."""
 
     Params = BiasParams
     params: BiasParams
 
-    def __init__(self, params: Any, scene: Scene) -> None:
-        super().__init__(params, scene)
-        self._added = np.array([*params.force_N, *params.torque_Nm])
-
-    def alter(self, wrench_S: Array, stamp_s: Array) -> Array:
-        """See `WrenchEffect`."""
-        return np.asarray(wrench_S + self._added)
+    def added(self, since_s: Array) -> Array:
+        """See `AddedEffect`."""
+        return np.array([*self.params.force_N, *self.params.torque_Nm])
 
 
 class DriftParams(FaultParams):
@@ -101,20 +121,15 @@ class DriftParams(FaultParams):
     rate_N_s: Triple = param("Force per second (x, y, z) in S", unit="N/s", default=(0.2, 0.0, 0.2))
 
 
-class Drift(WrenchEffect):
-    """A ramp is added that begins at zero with the fault; it stands still where it was when the fault ends."""
+class Drift(AddedEffect):
+    """A ramp is added that begins at zero with the fault; a tare begins it anew."""
 
     Params = DriftParams
     params: DriftParams
 
-    def begin(self) -> None:
-        """See `Effect`."""
-        self._start_s = self.scene.sensed.now_s
-        self._rate = np.array([*self.params.rate_N_s, 0.0, 0.0, 0.0])
-
-    def alter(self, wrench_S: Array, stamp_s: Array) -> Array:
-        """See `WrenchEffect`."""
-        return np.asarray(wrench_S + (stamp_s - self._start_s)[:, None] * self._rate)
+    def added(self, since_s: Array) -> Array:
+        """See `AddedEffect`."""
+        return np.asarray(since_s * np.array([*self.params.rate_N_s, 0.0, 0.0, 0.0]))
 
 
 class ScaleParams(FaultParams):

@@ -15,7 +15,7 @@ from typing import Any
 
 from glotouch_bt import __version__
 from glotouch_bt.faults import FaultInjector, FaultPlan, read_plan
-from glotouch_bt.faults.listening import ListeningRecord
+from glotouch_bt.faults.listening import ListeningRecord, injector_in
 from glotouch_bt.mission.library import shown
 from glotouch_bt.mission.load import Mission, load_mission, split_settings
 from glotouch_bt.mission.mcap_json import to_json
@@ -45,6 +45,7 @@ class RunRequest:
         out: The run's folder (default: runs/<time>-<mission>-s<seed>).
         faults: A fault plan: a path, the name of a shipped one, or one that has been read.
         may_kill: A fault may kill this process: it does nothing but this run.
+        report: Make report.html.
     """
 
     mission: str
@@ -56,6 +57,7 @@ class RunRequest:
     out: Path | None = None
     faults: str | Path | FaultPlan | None = None
     may_kill: bool = False
+    report: bool = True
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,7 @@ def _run(
     objects_at_start = referee.objects() if referee else []
     ready = time.perf_counter()
     recorder = Recorder(folder.path / "run.mcap", _description(request, mission, conditions, robot))
-    injector = robot if isinstance(robot, FaultInjector) else None
+    injector = injector_in(robot)
     record: Record = recorder if injector is None else ListeningRecord(recorder, injector)
     result: dict[str, Any] | None = None
     try:
@@ -171,6 +173,8 @@ def _run(
         result = _result(request, mission, outcome, referee)
         result |= {"wall_time_s": round(ended - ready, 3), "wall_open_s": round(ready - began, 3)}
         if injector is not None:
+            root = outcome.chain[-1].as_dict() if outcome.chain else {"code": "", "message": ""}
+            injector.conclude(outcome.status, str(root["code"]), str(root["message"]), outcome.end_s)
             result |= {"faults": injector.report(), "held_at_end": injector.held}
     finally:
         recorder.close(result)
@@ -179,7 +183,7 @@ def _run(
         truth = {"start": _truth(objects_at_start), "end": _truth(referee.objects())}
         truth["tip_B_m"] = referee.tip_B_m().tolist()
         folder.write_json("truth.json", truth)
-    report, warning = _report(folder.path)
+    report, warning = _report(folder.path) if request.report else (None, "")
     return RunResult(folder.path, result, outcome, report, warning)
 
 

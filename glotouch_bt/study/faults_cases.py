@@ -1,0 +1,108 @@
+"""What `bench faults` tries: each class of fault with its parameters, how long it lasts, and where it can act."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from glotouch_bt.faults.catalogue import CATALOGUE
+from glotouch_bt.faults.plan import FaultPlan, FaultSpec
+from glotouch_bt.faults.trigger import Lasting, Repeat, When
+from glotouch_bt.mission.source import Place
+from glotouch_bt.robot import UnknownName
+
+SKILLS = ("tool_pickup", "guarded_sweep", "orbit_probe", "touch_top", "tool_return", "squeeze", "grasp", "lift")
+_PROBING = ("guarded_sweep", "orbit_probe", "touch_top")
+_JAWS = ("tool_pickup", "tool_return", "squeeze", "grasp")
+_AMONG_OBJECTS = ("guarded_sweep", "orbit_probe", "touch_top", "squeeze", "grasp")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One class of fault as it is tried.
+
+    Attributes:
+        fault: Name in the catalogue; also the case's.
+        given: Parameters beside their defaults.
+        lasting: How long it lasts.
+        skills: Where it can act at all.
+    """
+
+    fault: str
+    given: Mapping[str, Any] = field(default_factory=dict)
+    lasting: Lasting = field(default_factory=lambda: Lasting(duration_s=2.0))
+    skills: tuple[str, ...] = SKILLS
+
+    @property
+    def recoverable(self) -> bool:
+        """A mission can still reach its goal."""
+        return CATALOGUE[self.fault].recoverable
+
+    def plan(self, skill: str, after_s: float) -> FaultPlan:
+        """The plan of one trial: once, in the skill's first run, so long after it began."""
+        kind = CATALOGUE[self.fault]
+        spec = FaultSpec(
+            self.fault,
+            kind,
+            kind.effect.Params(**self.given),
+            When(node=f"{skill}*", after_s=after_s),
+            self.lasting,
+            Repeat(),
+            Place("bench faults"),
+        )
+        return FaultPlan(f"{self.fault} in {skill}", (spec,))
+
+
+def _s(seconds: float) -> Lasting:
+    return Lasting(duration_s=seconds)
+
+
+EVER = Lasting(until="ever")
+CASES: tuple[Case, ...] = (
+    Case("wrench_off"),
+    Case("wrench_stuck"),
+    Case("wrench_garbage", lasting=_s(0.2)),
+    Case("wrench_bias", lasting=EVER),
+    Case("wrench_drift", lasting=_s(10.0)),
+    Case("wrench_scale"),
+    Case("wrench_noise"),
+    Case("wrench_delay"),
+    Case("wrench_intermittent"),
+    Case("wrench_saturation"),
+    Case("wrench_sign_flip"),
+    Case("following_error", {"offset_rad": 0.03}),
+    Case("lost_cycle"),
+    Case("slow_cycle", {"share": 0.05}),
+    Case("stale_data", lasting=_s(0.3)),
+    Case("robot_fault"),
+    Case("exception"),
+    Case("stale_tare", lasting=EVER, skills=("tool_pickup", "tool_return")),
+    Case("touch_dead", lasting=EVER, skills=("squeeze",)),
+    Case("touch_frozen", lasting=EVER, skills=("squeeze",)),
+    Case("touch_dropped", lasting=_s(5.0), skills=("squeeze",)),
+    Case("touch_swapped", lasting=EVER, skills=("squeeze",)),
+    Case("gel_offset", lasting=EVER, skills=("squeeze",)),
+    Case("grip_stall", lasting=_s(4.0), skills=_JAWS),
+    Case("grip_short", lasting=Lasting(until="node"), skills=_JAWS),
+    Case("grip_slip", lasting=EVER, skills=("tool_pickup", "grasp")),
+    Case("grip_drop", lasting=_s(1.0), skills=(*_PROBING, "tool_return", "lift")),
+    Case("object_shoved", skills=_AMONG_OBJECTS),
+    Case("object_toppled", skills=_AMONG_OBJECTS),
+    Case("object_removed", skills=_AMONG_OBJECTS),
+    Case("container_offset", lasting=EVER, skills=_AMONG_OBJECTS),
+)
+
+
+def chosen_cases(names: Iterable[str]) -> tuple[Case, ...]:
+    """The cases of these names; all of them if there is no name.
+
+    Raises:
+        UnknownName: One is not tried by this bench.
+    """
+    known = {c.fault: c for c in CASES}
+    wanted = tuple(names)
+    for name in wanted:
+        if name not in known:
+            raise UnknownName("class of faults", name, known)
+    return tuple(known[n] for n in wanted) if wanted else CASES

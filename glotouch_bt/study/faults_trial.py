@@ -1,0 +1,156 @@
+"""One trial of `bench faults`, in a process of its own, and what became of it."""
+
+from __future__ import annotations
+
+import json
+import signal
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from glotouch_bt.faults.catalogue import CATALOGUE
+from glotouch_bt.report.run_record import read_run
+from glotouch_bt.robot import BadInput
+from glotouch_bt.study.launch import RunRequest, launch
+
+HUNG_S = 900.0
+"""Wall time after which a trial counts as hanging."""
+ROW = "row.json"
+VERDICTS = ("recovered", "safely ended", "wrong", "unsafe")
+
+
+class Hung(BaseException):
+    """The trial took longer than it may."""
+
+
+@contextmanager
+def hang_guard(seconds: float = HUNG_S) -> Iterator[None]:
+    """Raise `Hung` in the main thread after so long on the wall's clock."""
+
+    def ring(number: int, frame: FrameType | None) -> None:
+        raise Hung
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def verdict(result: Mapping[str, Any], hard_force_N: float) -> str:
+    """What became of a run: one of `VERDICTS`.
+
+    unsafe: it broke down, hung, pressed harder than the hard limit, or ended with an arm that nobody holds;
+    wrong: it lifted another object than the target, or calls a success what is none; recovered: the target hangs in the
+    hand; safely ended: anything else, with its reason.
+    """
+    if result["status"] in ("traceback", "hang"):
+        return "unsafe"
+    if float(result["peak_force_N"]) > hard_force_N:
+        return "unsafe"
+    wrong_object = result["retrieved"] is not None and not result["correct"]
+    success = result["status"] == "success"
+    if wrong_object or (success and not result["correct"]):
+        return "wrong"
+    if success:
+        return "recovered"
+    return "safely ended" if result["held_at_end"] and result["reasons"] else "unsafe"
+
+
+def durations(folder: Path) -> dict[str, float]:
+    """How long each skill's first run took, by the name of its node, from a run's record."""
+    began: dict[str, float] = {}
+    found: dict[str, float] = {}
+    for tick in read_run(folder).ticks:
+        name = tick.node.rsplit("/", 1)[-1]
+        if tick.new == "RUNNING":
+            began.setdefault(name, tick.stamp_s)
+        elif name in began and name not in found:
+            found[name] = tick.stamp_s - began[name]
+    return found
+
+
+def run_trial(
+    request: RunRequest, labels: Mapping[str, Any], hard_force_N: float, resume: bool, keep: bool
+) -> dict[str, Any]:
+    """One run as a row. Whatever goes wrong is a row, never an exception of the campaign.
+
+    Args:
+        request: What to run; it names a folder.
+        labels: What the row begins with: class, skill, seed, after_s.
+        hard_force_N: The hard limit the true peak force is held against.
+        resume: Take the row that is there already.
+        keep: Leave the record of a harmless trial on disk.
+    """
+    assert request.out is not None
+    kept = request.out / ROW
+    if resume and kept.is_file():
+        row: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8"))
+        return row
+    began = time.perf_counter()
+    row = dict(labels) | {"folder": request.out.name}
+    try:
+        with hang_guard():
+            done = launch(request)
+    except BadInput:
+        raise
+    except (Exception, Hung) as e:
+        status = "hang" if isinstance(e, Hung) else "traceback"
+        row |= {"status": status, "verdict": "unsafe", "cause": f"{type(e).__name__}: {e}", "effective": True}
+    else:
+        row |= _row(done.result, hard_force_N)
+        if labels["class"] == "none":
+            row["durations_s"] = durations(done.folder)
+    row["wall_s"] = round(time.perf_counter() - began, 2)
+    if not keep and row.get("verdict") in ("recovered", "safely ended"):
+        for name in ("run.mcap", "truth.json", "report.html", "mission.yaml", "checkpoint.sqlite"):
+            (request.out / name).unlink(missing_ok=True)
+    request.out.mkdir(parents=True, exist_ok=True)
+    part = request.out / (ROW + ".part")
+    part.write_text(json.dumps(row) + "\n", encoding="utf-8")
+    part.replace(kept)
+    return row
+
+
+def _row(result: Mapping[str, Any], hard_force_N: float) -> dict[str, Any]:
+    chain, reports = result["reason_chain"], result["faults"]
+    root = chain[-1] if chain else {"node": "", "code": ""}
+    row = {
+        "status": result["status"],
+        "verdict": verdict(result, hard_force_N),
+        "cause": f"{root['node'].rsplit('/', 1)[-1]}: {root['code']}" if chain else "",
+        "reasons": list(result["reasons"]),
+        "retrieved": result["retrieved"],
+        "correct": result["correct"],
+        "peak_force_N": result["peak_force_N"],
+        "sim_s": result["sim_time_s"],
+    }
+    if not reports:
+        return row | {"effective": True}
+    fault = reports[0]
+    seen = fault["seen"] or {}
+    words = [f"{s['code']} {s['text']}" for s in fault["sightings"]]
+    words += [f"{c['code']} {c['message']} {c['advice']}" for c in chain]
+    return row | {
+        "effective": fault["effective"],
+        "applied": fault["applied"],
+        "changes": fault["samples_altered"] + fault["commands_altered"] + fault["commands_refused"] + fault["acts"],
+        "moved_m": fault["moved_m"],
+        "seen_by": seen.get("by", ""),
+        "seen_code": seen.get("code", ""),
+        "latency_s": fault["latency_s"],
+        "recovery": fault["recovery"],
+        "named": CATALOGUE[fault["fault"]].named_in("\n".join(words)),
+    }
+
+
+def drawn_after_s(seed: int, fault: str, skill: str, lasts_s: float) -> float:
+    """When in a skill's run a fault begins: anywhere in its first 80 %, to the period."""
+    from glotouch_bt.robot.streams import stream
+
+    return round(float(stream(seed, f"moment {fault} {skill}").uniform(0.0, 0.8 * max(lasts_s, 0.0))), 2)
