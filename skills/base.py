@@ -47,7 +47,10 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 UNCHANGED = "unchanged"
 """In `AFTER_FAILURE`: the resource may be in the state in which the skill found it."""
 GENERAL_FAILURES: Mapping[str, str] = MappingProxyType(
-    {"not_at_rest": "the arm still moves after the skill before was broken off"}
+    {
+        "not_at_rest": "the arm still moves after the skill before was broken off",
+        "skill_timeout": "it took longer than its class allows",
+    }
 )
 """Failures that the base class gives, so that any skill can."""
 
@@ -193,6 +196,7 @@ class Context:
         observation: The newest observation; set by the runner before each tick.
         command: What the active skill wants next; reset to hold by the runner before each tick.
         preempted: A skill was broken off, and no other has made sure since that the arm stands.
+        paused_s: Robot time so far in which the mission was paused.
     """
 
     world: World
@@ -202,6 +206,12 @@ class Context:
     observation: Observation
     command: Command = HOLD
     preempted: bool = False
+    paused_s: float = 0.0
+
+    @property
+    def mission_s(self) -> float:
+        """The clock of timeouts: the robot's, which stands still while the mission is paused."""
+        return self.observation.now_s - self.paused_s
 
 
 def come_to_rest(context: Context) -> SkillRun:
@@ -245,7 +255,12 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
         PUT_BACK_WITH: Of what it leaves, what should not outlast a mission unsaid, and the skill that puts it back.
         USES: What it has for itself while it runs: no two skills that use the same may run at once.
         FAILURES: Codes it may fail with, each in a few words (beside `GENERAL_FAILURES`).
-        PAUSE: What a pause does to it.
+        PAUSE: What a pause does to it: `hold` (a motion stops where it is along its path, and its guard goes on
+            listening), `retreat` (the same, and a guarded motion also backs off a few millimetres the way it came),
+            `finish` (the present motion is made to its end). What stands under `arm.feed.finishing()`, as all that
+            moves the jaws, is finished in any case. A skill never notices: timeouts and durations do not run.
+        LONGEST_S: Longest duration of one run on the mission's clock: a skill that yields for ever ends with FAILURE
+            `skill_timeout`.
     """
 
     NEEDS: ClassVar[Mapping[str, frozenset[str]]] = NOTHING
@@ -255,6 +270,7 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
     USES: ClassVar[frozenset[str]] = frozenset()
     FAILURES: ClassVar[Mapping[str, str]] = NOTHING
     PAUSE: ClassVar[Literal["hold", "retreat", "finish"]] = "hold"
+    LONGEST_S: ClassVar[float] = 900.0
 
     Params: ClassVar[type[SkillParams]] = SkillParams
     INPUT_PORTS: ClassVar[dict[str, PortInformation]] = {}
@@ -297,11 +313,22 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
         """Record an event of this skill at the robot's present time."""
         self.context.journal.event(kind, self.context.observation.now_s, {"node": self.name, **data})
 
+    def remember(self) -> object:
+        """What this skill knows from one run to the next beyond its ports, for a checkpoint; None: nothing.
+
+        Plain values, arrays and dataclasses (`mission.values`). Override together with `recall`.
+        """
+        return None
+
+    def recall(self, remembered: Any) -> None:
+        """Take up what `remember` gave, in a new process."""
+
     def initialise(self) -> None:
         """Start the body; its first command comes with the first update."""
         self.reason = None
         self._run = self._body()
         self._started = False
+        self._begun_s = self.context.mission_s
 
     def _body(self) -> SkillRun:
         if self.context.preempted:
@@ -311,6 +338,8 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
     def update(self) -> Status:
         """Hand the newest observation to the body, take its next command."""
         assert self._run is not None
+        if self.context.mission_s - self._begun_s > self.LONGEST_S:
+            return self._too_long()
         try:
             if self._started:
                 self.context.command = self._run.send(self.context.observation)
@@ -324,6 +353,12 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
         except MotionRefused as e:
             return self._fail(Reason("motion_refused", str(e), advice="move the target or clear the way"))
         return Status.RUNNING
+
+    def _too_long(self) -> Status:
+        self.context.preempted = True  # it may be broken off in a motion
+        message = f"it took longer than {self.LONGEST_S:g} s, the longest a {type(self).__name__} may take"
+        evidence = {"limit_s": self.LONGEST_S, "since_s": self._begun_s}
+        return self._fail(Reason("skill_timeout", message, evidence, "it hangs, or its task is larger than foreseen"))
 
     @classmethod
     def failure_codes(cls) -> dict[str, str]:

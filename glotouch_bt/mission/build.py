@@ -127,7 +127,7 @@ class _Builder:
     def _timeout(self, spec: NodeSpec, children: list[Behaviour]) -> Behaviour:
         assert isinstance(spec.settings, TimeoutSettings)
         context = self._context
-        return ClockTimeout(spec.name, children[0], spec.settings.seconds, lambda: context.observation.now_s)
+        return ClockTimeout(spec.name, children[0], spec.settings.seconds, lambda: context.mission_s)
 
     def _repeat(self, spec: NodeSpec, children: list[Behaviour]) -> Behaviour:
         settings = spec.settings

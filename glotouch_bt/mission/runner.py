@@ -2,29 +2,37 @@
 
 from __future__ import annotations
 
-import signal
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from glotouch_bt.mission.aborting import why_aborted
 from glotouch_bt.mission.build import BuiltTree, build_tree
+from glotouch_bt.mission.checkpoint_tree import TreeAtWork
+from glotouch_bt.mission.control import Control, Preempted
+from glotouch_bt.mission.ending import end_high
 from glotouch_bt.mission.journaled import JournaledRequests
+from glotouch_bt.mission.keeping import Keeper, TakenUp, Work, take_up
 from glotouch_bt.mission.load import Mission
+from glotouch_bt.mission.pausing import PauseGate
 from glotouch_bt.mission.reasons import Failure, ReasonBook
 from glotouch_bt.mission.resolution import Rounding
 from glotouch_bt.mission.tally import Record, Tally
-from glotouch_bt.robot import HOLD, BackendError, Robot, World
+from glotouch_bt.mission.watchdog import STUCK_S, BrokenOff, SkillHung, Stuck, Watchdog, deferred_interrupt
+from glotouch_bt.robot import HOLD, Command, Observation, Robot, World
+from glotouch_bt.robot.supervision import Supervisor
+from glotouch_bt.robot.supervision_limits import Finding, SupervisionLimits
 from skills.base import Context, Reason, Skill
 
 if TYPE_CHECKING:
     from glotouch_bt.motion import Arm
 
 PROGRESS_EVERY_S = 0.5
+ROUNDING_S = 1e-6
+"""Stamps are rounded to less than this."""
 
 
 @dataclass
@@ -37,6 +45,9 @@ class Outcome:
         error: What was raised, if it was aborted.
         start_s, end_s: Robot clock at the first and the last tick.
         ticks: Ticks done.
+        paused_s: Robot time in which it was paused.
+        guards: How often each guard of the supervision found something.
+        ending: What was done after a stop was asked for, in words.
         found: Counts and decisions.
     """
 
@@ -47,11 +58,18 @@ class Outcome:
     start_s: float = 0.0
     end_s: float = 0.0
     ticks: int = 0
+    paused_s: float = 0.0
+    guards: dict[str, int] = field(default_factory=dict)
+    ending: str = ""
 
     @property
     def reasons(self) -> list[str]:
         """The chain in words."""
         return [str(f) for f in self.chain]
+
+    def abort(self, error: BaseException, node: str) -> None:
+        """It ended by what was raised at a node."""
+        self.status, self.error, self.chain = "aborted", error, [why_aborted(error, node)]
 
 
 def default_arm(robot: Robot, world: World) -> Arm:
@@ -69,47 +87,84 @@ def run_mission(
     make_arm: Callable[[Robot, World], Arm] = default_arm,
     on_progress: Callable[[float, Tally], None] | None = None,
     timeout_s: float | None = None,
+    control: Control | None = None,
+    supervision: SupervisionLimits | None = None,
+    stuck_s: float = STUCK_S,
+    on_lost: Callable[[Stuck, Outcome], None] | None = None,
+    keeper: Keeper | None = None,
+    taken_up: TakenUp | None = None,
 ) -> Outcome:
     """Tick a mission to its end.
 
-    Never raises for what happens while ticking: a safety stop, a failing backend, a fault in a skill and Ctrl-C all
-    give an `aborted` outcome whose `error` says what it was. The arm is held in every case. What goes wrong before the
-    first tick (an arm that cannot be planned for) does raise.
+    Never raises for what happens while ticking: a guard, a safety stop, a failing backend, a fault in a skill, one that
+    hangs, a stop from outside and Ctrl-C all give an `aborted` outcome whose `error` says what it was. The arm is held
+    in every case. What goes wrong before the first tick (an arm that cannot be planned for) does raise.
 
     Args:
         mission: A checked mission.
-        robot: An open robot.
+        robot: An open robot; it is supervised (`robot.supervision`) from the first cycle on.
         record: Where everything sensed, commanded, ticked and decided goes; not closed here.
         make_arm: Makes the motion generators.
         on_progress: Called about twice a second of robot time with (robot time since start, tally).
-        timeout_s: Longest duration on the robot's clock (default: the mission's).
+        timeout_s: Longest duration on the robot's clock, without pauses (default: the mission's).
+        control: Who may pause and stop it.
+        supervision: What the guards tolerate.
+        stuck_s: Longest wall time of one tick and its cycle.
+        on_lost: Called, from another thread, when a tick does not come back and cannot be broken off; it should write
+            what it can and end the process.
+        keeper: Writes a checkpoint whenever a skill has ended.
+        taken_up: A checkpoint to go on from; where it says so, the robot has been put back to it already.
     """
-    tally = Tally(record)
+    tally, device = Tally(record), robot
+    robot = supervisor = Supervisor(robot, supervision)
+    supervisor.on_finding = lambda finding: _note_finding(tally, finding)
     arm = make_arm(robot, mission.world)
     observation = robot.observe()
     rounding = Rounding(observation.q.shape[1])
     observation = rounding(observation)
     arm.sync(observation)
-    tally.block(observation, HOLD)  # a replay begins where the robot did
+    if taken_up is None or not taken_up.same_world:
+        tally.block(observation, HOLD)  # a replay begins where the robot did
     context = Context(
         world=mission.world, arm=arm, requests=robot, journal=tally, observation=observation, command=HOLD
     )
-    context.requests = JournaledRequests(robot, tally, lambda: context.observation.now_s)
+    context.requests = requests = JournaledRequests(robot, tally, lambda: context.observation.now_s)
     tree = build_tree(mission.tree, context, mission.name)
-    loop = _Loop(tree, context, robot, tally, rounding, on_progress)
     outcome = Outcome("aborted", tally, start_s=observation.now_s)
+    loop = _Loop(tree, context, robot, tally, rounding, on_progress, control or Control(), outcome)
+    loop.begin(device, requests, keeper, taken_up)
+
+    def lost(stuck: Stuck) -> None:
+        if on_lost is not None:
+            outcome.abort(stuck.error(), stuck.node)
+            on_lost(stuck, outcome)
+
+    watchdog = loop.watchdog = Watchdog(robot, lambda: tally.node or mission.name, stuck_s, lost)
     try:
-        with deferred_interrupt() as interrupted:
-            loop.run(outcome, mission.timeout_s if timeout_s is None else timeout_s, interrupted)
-    except (Exception, KeyboardInterrupt) as e:
-        _abort(outcome, e, loop.node_of(e))
+        with deferred_interrupt(watchdog) as interrupted, watchdog:
+            try:
+                loop.run(mission.timeout_s if timeout_s is None else timeout_s, interrupted)
+            except Preempted as e:
+                outcome.abort(e, loop.node_of(e))
+                loop.end(interrupted)
+    except (Exception, KeyboardInterrupt, SystemExit, BrokenOff) as e:
+        error = watchdog.stuck.error() if watchdog.stuck is not None else e
+        outcome.abort(error, error.node if isinstance(error, SkillHung) else loop.node_of(e))
+        if isinstance(error, SkillHung):
+            tally.event("stuck", context.observation.now_s, {"node": error.node, "stack": error.stack})
     finally:
         robot.hold()
-        outcome.end_s = context.observation.now_s
+        outcome.end_s, outcome.paused_s = context.observation.now_s, context.paused_s
+        outcome.guards = dict(supervisor.counts)
         _preempt(tree.root)
         tally.settle()
         tree.forget()
     return outcome
+
+
+def _note_finding(tally: Tally, finding: Finding) -> None:
+    data = {"guard": finding.guard, "what": finding.what, "value": finding.value, "limit": finding.limit}
+    tally.event("guard", finding.stamp_s, {**data, "node": tally.node, "fatal": finding.fatal})
 
 
 def _preempt(root: Behaviour) -> None:
@@ -117,7 +172,7 @@ def _preempt(root: Behaviour) -> None:
     if root.status is Status.RUNNING:
         try:
             root.stop(Status.INVALID)
-        except Exception as e:
+        except (Exception, BrokenOff) as e:
             root.feedback_message = f"could not be closed: {e}"
 
 
@@ -130,38 +185,101 @@ class _Loop:
         tally: Tally,
         rounding: Rounding,
         on_progress: Callable[[float, Tally], None] | None,
+        control: Control,
+        outcome: Outcome,
     ) -> None:
-        self._rounding = rounding
+        self._rounding, self._control, self._outcome = rounding, control, outcome
+        self._gate = PauseGate(control, context, self._cycle)
+        self._next_progress_s = outcome.start_s
+        self._interrupted: Callable[[], bool] = lambda: False
+        self.watchdog: Watchdog | None = None
         self._tree, self._context, self._robot, self._tally = tree, context, robot, tally
         self._on_progress = on_progress
         self._book = ReasonBook()
         self._nodes = list(tree.root.iterate())
         self._status: dict[object, Status] = {n.id: Status.INVALID for n in self._nodes}
         self._written: dict[str, object] = {}
+        self._keeper: Keeper | None = None
+        self._work: Work | None = None
+        self._resumed: TreeAtWork | None = None
 
-    def run(self, outcome: Outcome, timeout_s: float, interrupted: Callable[[], bool]) -> None:
-        """Tick until the root has decided; fills `outcome`."""
-        context, robot, tally, root = self._context, self._robot, self._tally, self._tree.root
-        start_s = outcome.start_s
-        next_progress_s = start_s
+    def begin(
+        self, device: Robot, requests: JournaledRequests, keeper: Keeper | None, taken_up: TakenUp | None
+    ) -> None:
+        """Take up a checkpoint, or write the first one.
+
+        Raises:
+            BadInput: The checkpoint is not of this mission.
+        """
+        if keeper is None and taken_up is None:
+            return
+        self._keeper, outcome = keeper, self._outcome
+        self._work = work = Work(
+            *(self._tree, self._context, device, self._tally, self._book, requests, self._status, self._written),
+            start_s=outcome.start_s,
+        )
+        if taken_up is not None:
+            self._resumed = take_up(work, taken_up)
+            outcome.start_s, outcome.ticks = work.start_s, work.ticks
+        elif keeper is not None:
+            keeper.keep(work, [])
+
+    def run(self, timeout_s: float, interrupted: Callable[[], bool]) -> None:
+        """Tick until the root has decided; fills the outcome.
+
+        Raises:
+            Preempted: A stop was asked for.
+        """
+        context, root, outcome, gate = self._context, self._tree.root, self._outcome, self._gate
+        self._interrupted = interrupted
         while True:
-            now_s = context.observation.now_s
-            if interrupted():
-                raise KeyboardInterrupt
-            if now_s - start_s >= timeout_s:
+            self._heed()
+            if context.mission_s - outcome.start_s >= timeout_s - ROUNDING_S:
                 self._time_out(outcome, timeout_s)
                 return
+            gate.look(outcome.ticks)
             context.command = HOLD
-            self._tick(now_s)
+            self._tick(context.observation.now_s)
             outcome.ticks += 1
             if root.status is not Status.RUNNING:
                 self._decide(outcome, root)
                 return
-            context.observation = observation = self._rounding(robot.cycle(context.command))
-            tally.block(observation, context.command)
-            if self._on_progress is not None and now_s >= next_progress_s:
-                next_progress_s = now_s + PROGRESS_EVERY_S
-                self._on_progress(now_s - start_s, tally)
+            gate.send(context.command, outcome.ticks)
+
+    def end(self, interrupted: Callable[[], bool]) -> None:
+        """After a stop: close what runs, bring the arm to rest, raise it if it is free."""
+        _preempt(self._tree.root)
+        self._gate.feed.wanted = False
+        ending = end_high(self._context)
+        try:
+            command = next(ending)
+            while not interrupted():
+                command = ending.send(self._cycle(command, heed=False))
+        except StopIteration as end:
+            self._outcome.ending = end.value
+            self._tally.event("ending", self._context.observation.now_s, {"done": end.value})
+
+    def _heed(self) -> None:
+        """Someone may have asked for an end."""
+        if self._interrupted():
+            raise KeyboardInterrupt
+        if self._control.stopped is not None:
+            raise Preempted(self._control.stopped)
+
+    def _cycle(self, command: Command, *, heed: bool = True) -> Observation:
+        """One control period."""
+        context, now_s = self._context, self._context.observation.now_s
+        observation = self._rounding(self._robot.cycle(command))
+        context.observation = observation
+        self._tally.block(observation, command)
+        if self.watchdog is not None:
+            self.watchdog.beat()
+        if self._on_progress is not None and now_s >= self._next_progress_s:
+            self._next_progress_s = now_s + PROGRESS_EVERY_S
+            self._on_progress(now_s - self._outcome.start_s, self._tally)
+        if heed:
+            self._heed()
+        return observation
 
     def running_node(self) -> str:
         """The running leaf, or the root."""
@@ -186,16 +304,32 @@ class _Loop:
         """Tick the tree once and write down what changed. Unchanged RUNNING nodes, nearly all, cost one comparison."""
         changed = False
         status = self._status
+        finished: list[Behaviour] = []
         for node in self._tree.root.tick():
             if node.status is Status.RUNNING and status[node.id] is Status.RUNNING:
                 continue
             changed = True
+            again = self._resumed is not None and self._resumed.replays(node)
             if node.status is Status.FAILURE:
                 self._book.note(node)
-                if isinstance(node, Skill):
+                if isinstance(node, Skill) and not again:
                     self._tally.event("failure", now_s, self._book.of(node).as_dict())
+            if node.status is not Status.RUNNING and self._keeper is not None:
+                finished.append(node)
+                if isinstance(node, Skill) and not again:
+                    self._keep(finished)
+        if self._resumed is not None:
+            self._resumed.done()
+            self._resumed = None
         if changed:
             self._record_changes(now_s)
+
+    def _keep(self, finished: list[Behaviour]) -> None:
+        """The last of `finished` is a skill that has just ended, and nothing has reacted to that yet."""
+        assert self._keeper is not None
+        assert self._work is not None
+        self._work.ticks = self._outcome.ticks
+        self._keeper.keep(self._work, finished)
 
     def _record_changes(self, now_s: float) -> None:
         changes: list[tuple[str, object, object]] = []
@@ -207,8 +341,12 @@ class _Loop:
             self._status[node.id] = new
             if new is Status.RUNNING and not node.children:
                 self._tally.node = self._tree.paths[node.id]
+                if isinstance(node, Skill):
+                    self._gate.begins(node.PAUSE)
         if changes:
             self._tally.tick(now_s, changes)
+            if self._keeper is not None:
+                self._keeper.began([path for path, _, new in changes if new is Status.RUNNING])
         for key in self._tree.keys:
             value = self._tree.value(key)
             if value is not None and value is not self._written.get(key):
@@ -226,38 +364,3 @@ class _Loop:
         reason = Reason("mission_timeout", f"the mission took longer than {timeout_s:g} s", node=node)
         text = f"was running when the mission's {timeout_s:g} s were over"
         outcome.status, outcome.chain = "failure", [Failure(node, text, reason)]
-
-
-def _abort(outcome: Outcome, error: BaseException, node: str) -> None:
-    outcome.status, outcome.error = "aborted", error
-    if isinstance(error, KeyboardInterrupt):
-        code, text = "interrupted", "stopped by the operator"
-    elif isinstance(error, BackendError):
-        code, text = _snake(type(error).__name__), str(error)
-    else:
-        code, text = "fault", f"{type(error).__name__}: {error}"
-    outcome.chain = [Failure(node, text, Reason(code, text, node=node))]
-
-
-def _snake(name: str) -> str:
-    return "".join(f"_{c.lower()}" if c.isupper() and i else c.lower() for i, c in enumerate(name))
-
-
-@contextmanager
-def deferred_interrupt() -> Iterator[Callable[[], bool]]:
-    """Ctrl-C sets a flag, so that it takes effect between two cycles; a second Ctrl-C raises at once."""
-    pressed: list[bool] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield lambda: False
-        return
-
-    def handler(number: int, frame: object) -> None:
-        if pressed:
-            raise KeyboardInterrupt
-        pressed.append(True)
-
-    before = signal.signal(signal.SIGINT, handler)
-    try:
-        yield lambda: bool(pressed)
-    finally:
-        signal.signal(signal.SIGINT, before)

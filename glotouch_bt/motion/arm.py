@@ -11,8 +11,8 @@ motion goes on along the same path. A motion's caller never notices.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypedDict, Unpack
+from collections.abc import Callable, Mapping
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -77,6 +77,17 @@ class Arm(Mover):
         self.world = world
         self.scene = Scene(self.kinematics, world)
 
+    def state(self) -> dict[str, Any]:
+        """What it remembers between two motions, its scene included; for `restore`."""
+        remembered = {"q": self._q.copy(), "aperture_m": self._aperture_m, "along_m_s2": self.along_m_s2}
+        return remembered | {"scene": self.scene.state()}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go back to a `state`; where the arm really is elsewhere, `sync` after it."""
+        self._q = np.array(state["q"])
+        self._aperture_m, self.along_m_s2, self._touched = state["aperture_m"], state["along_m_s2"], None
+        self.scene.restore(state["scene"])
+
     # -- motions -----------------------------------------------------------------------------------------------------
 
     def hold(self, duration_s: float, *, tactile: bool = False) -> Motion[list[Observation]]:
@@ -102,7 +113,6 @@ class Arm(Mover):
         plan = plan_joints(self.kinematics, self._q, np.asarray(q, dtype=np.float64), speed, self.limits, self.period_s)
         if check:
             self._clear(plan.checks_q, "joint move")
-        self._touched = None
         running: JointProfile | None = plan.profile
         while running is not None:
             k = yield from self._turn(running, breakable=True)

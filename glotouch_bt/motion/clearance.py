@@ -7,8 +7,9 @@ frame B inside, K for obstacles.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import fcl
 import numpy as np
@@ -83,6 +84,7 @@ class Scene:
         self._tool_parts = tool_parts(kinematics.description, world.probe)
         self._holding = False
         self._allowed: set[tuple[str, str]] = set()
+        self._added: dict[str, dict[str, Any]] = {}
         self._obstacles: dict[str, Obstacle] = {}
         for obstacle in world_obstacles(world):
             self._obstacles[obstacle.name] = obstacle
@@ -155,6 +157,14 @@ class Scene:
         else:
             shape = fcl.Box(*sizes)
         self._obstacles[name] = make_obstacle(name, pose, 0.5 * sizes, shape)
+        self._added[name] = {
+            "kind": kind,
+            "centre_K_m": centre,
+            "size_m": size_m,
+            "height_m": height_m,
+            "yaw_rad": yaw_rad,
+            "base_K_m": base_K_m,
+        }
 
     def remove_obstacle(self, name: str) -> None:
         """Forget an added obstacle and what was allowed to touch it.
@@ -165,13 +175,26 @@ class Scene:
         added = [n for n in self._obstacles if n not in OWN_OBSTACLES]
         if name not in added:
             raise UnknownName("obstacle", name, added)
-        del self._obstacles[name]
+        del self._obstacles[name], self._added[name]
         self._allowed = {pair for pair in self._allowed if pair[1] != name}
 
     def clear_obstacles(self) -> None:
         """Forget every added obstacle."""
         for name in [n for n in self._obstacles if n not in OWN_OBSTACLES]:
             self.remove_obstacle(name)
+
+    def state(self) -> dict[str, Any]:
+        """What is there beyond the world's own, what is held, what may be touched; for `restore`."""
+        added = tuple((name, dict(given)) for name, given in self._added.items())
+        return {"holding": self._holding, "added": added, "allowed": frozenset(self._allowed)}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go back to a `state`."""
+        self.clear_obstacles()
+        for name, given in state["added"]:
+            self.add_obstacle(name, **given)
+        self.hold_tool(bool(state["holding"]))
+        self._allowed = set(state["allowed"])
 
     def allow(self, part: str, obstacle: str) -> None:
         """Let a part, or a group of parts, touch an obstacle: intended contact.

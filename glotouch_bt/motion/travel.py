@@ -42,6 +42,17 @@ class MoveResult:
     pose_B_P: Pose
 
 
+@dataclass(frozen=True)
+class BackedOff:
+    """Where a hand backed off to: from `at_m` to `away_m` along a plan's path; what it was about to do, as it was."""
+
+    plan: Plan
+    at_m: float
+    away_m: float
+    q: Array
+    along_m_s2: float
+
+
 class _Trip:
     """What one guarded motion has sensed so far, and what its guard said.
 
@@ -131,7 +142,6 @@ class Mover:
         limits = self.limits
         trip = _Trip(guard)
         done_m, travelled = 0.0, 0.0
-        self._touched = None
         for plan in plans:
             running: Plan | None = plan
             while running is not None:
@@ -169,6 +179,8 @@ class Mover:
             self.along_m_s2 = float(plan.progress.a[k])
             observation = yield Command(plan.setpoint(k), None, tactile)
             self._see(observation)
+            if breakable:
+                self._touched = None
             trip.take(observation)
             if listening and trip.ask(observation):
                 return k
@@ -215,22 +227,22 @@ class Mover:
         yield from self._play(halt, trip, tactile)
         return float(halt.progress.s[-1])
 
-    def back_off(self) -> Motion[tuple[Plan, float] | None]:
+    def back_off(self) -> Motion[BackedOff | None]:
         """Off what the last guarded motion met, the way it came; what `come_back` takes, or None: nothing was met."""
         if self._touched is None:
             return None
         plan, at_m = self._touched
-        away_m = max(0.0, at_m - BACK_OFF_M)
-        if at_m - away_m < 1e-6:
+        out = BackedOff(plan, at_m, max(0.0, at_m - BACK_OFF_M), self._q, self.along_m_s2)
+        if at_m - out.away_m < 1e-6:
             return None
-        yield from self._play(plan.between(at_m, away_m, self.period_s, BACK_OFF_M_S), _Trip(None), False)
-        return plan, away_m
+        yield from self._play(plan.between(at_m, out.away_m, self.period_s, BACK_OFF_M_S), _Trip(None), False)
+        return out
 
-    def come_back(self, way: tuple[Plan, float]) -> Motion[None]:
+    def come_back(self, out: BackedOff) -> Motion[None]:
         """To where `back_off` began, as slowly."""
-        plan, away_m = way
-        assert self._touched is not None
-        yield from self._play(plan.between(away_m, self._touched[1], self.period_s, BACK_OFF_M_S), _Trip(None), False)
+        way = out.plan.between(out.away_m, out.at_m, self.period_s, BACK_OFF_M_S)
+        yield from self._play(way, _Trip(None), False)
+        self._q, self.along_m_s2 = out.q, out.along_m_s2
 
     def _turn(self, profile: JointProfile, *, breakable: bool = False) -> Motion[int | None]:
         """Command a joint profile; the period after which a pause broke it off, or None: it is done."""
@@ -238,6 +250,7 @@ class Mover:
             self._q = profile.q[k]
             pose = self.kinematics.fk(self._q)
             self._see((yield Command(JointSetpoint(self._q, profile.dq[k], profile.ddq[k], pose))))
+            self._touched = None
             if breakable and self.feed.stops and k < len(profile.q) - 1:
                 return k
         return None

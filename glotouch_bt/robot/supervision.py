@@ -9,11 +9,12 @@ late block) is taken out or let pass a declared number of times. Both go on reco
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 
 from glotouch_bt.robot.command import HOLD, Command, Request, Ticket
 from glotouch_bt.robot.errors import BackendError, GuardTripped, SafetyStop, StaleReading
-from glotouch_bt.robot.interface import Robot
+from glotouch_bt.robot.interface import Robot, Snapshot
 from glotouch_bt.robot.observation import Observation
 from glotouch_bt.robot.supervision_command import CommandWatch
 from glotouch_bt.robot.supervision_limits import Finding, SupervisionLimits
@@ -33,7 +34,6 @@ class Supervisor(Robot):
     Attributes:
         on_finding: Called with every finding (the first `RECORDED` of each guard); set by who keeps the record.
         counts: Findings by guard, all of them.
-        in_cycle: True while a cycle of the inner robot is under way.
     """
 
     def __init__(self, robot: Robot, rules: SupervisionLimits | None = None) -> None:
@@ -42,7 +42,7 @@ class Supervisor(Robot):
         self.rules = SupervisionLimits() if rules is None else rules
         self.on_finding: Callable[[Finding], None] = lambda _: None
         self.counts: dict[str, int] = {}
-        self.in_cycle = False
+        self._lock = threading.RLock()
         self._newest = first = robot.observe()
         self._commands = CommandWatch(self.description, self.limits, self.period_s, self.rules, first)
         self._sensed = SensedWatch(self.description, self.limits, self.period_s, self.rules, first)
@@ -75,14 +75,12 @@ class Supervisor(Robot):
         if (wrong := self._commands.look(command, self._newest)) is not None:
             raise self._trip(wrong)
         self._sensed.told(command)
-        self.in_cycle = True
         try:
-            observation = self._robot.cycle(command)
+            with self._lock:
+                observation = self._robot.cycle(command)
         except BackendError as e:
             self._lost(e)
             raise
-        finally:
-            self.in_cycle = False
         observation, found = self._sensed.look(observation)
         if found:
             self._report(found)
@@ -94,15 +92,25 @@ class Supervisor(Robot):
         return self._robot.start(request)
 
     def hold(self) -> None:
-        """See `Robot`."""
-        self._robot.hold()
+        """See `Robot`; also from another thread, between two cycles."""
+        if self._lock.acquire(timeout=self.period_s):  # who cycles will find out by itself
+            try:
+                self._robot.hold()
+            finally:
+                self._lock.release()
 
     def close(self) -> None:
         """See `Robot`."""
         self._robot.close()
 
-    def forget(self) -> None:
-        """The inner robot was set back to another time or place: the guards begin anew."""
+    def snapshot(self) -> Snapshot | None:
+        """That of what it watches: guards begin anew."""
+        return self._robot.snapshot()
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """See `Robot`."""
+        self._robot.restore(snapshot)
+        self._error = None
         self._newest = newest = self._robot.observe()
         self._commands.forget(newest)
         self._sensed.forget(newest)

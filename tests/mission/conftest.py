@@ -12,7 +12,8 @@ import pytest
 
 from glotouch_bt.mission.build import BuiltTree, build_tree
 from glotouch_bt.mission.load import Mission, load_mission
-from glotouch_bt.robot import HOLD, Array, GripperState, Observation
+from glotouch_bt.robot import HOLD, Array, GripperState, Limits, Observation
+from glotouch_bt.robot.fake import FAKE_ARM
 from skills.base import Context, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 
 
@@ -158,7 +159,7 @@ class ClockRobot:
         self.now_s = 0.0
         self.held = 0
         self.fail_at: tuple[float, BaseException] | None = None
-        self.description = self.limits = None
+        self.description, self.limits, self.paced = FAKE_ARM, Limits(), False
 
     def observe(self) -> Observation:
         stamps = self.now_s + 0.001 * np.arange(-9, 1)

@@ -108,7 +108,7 @@ def test_whatever_is_raised_the_arm_is_held(
     assert outcome.error is error
     assert outcome.chain[-1].as_dict()["code"] == code
     assert outcome.reasons[0].startswith("m/sequence/act: ")
-    assert robot.held == 1
+    assert robot.held >= 1
     assert log[-1] == "act!", "the running skill was closed"
 
 

@@ -1,0 +1,58 @@
+"""What an operator wants of a running mission: pause, resume, stop. From any thread, or from a signal handler."""
+
+from __future__ import annotations
+
+import threading
+
+from glotouch_bt.robot import GlotouchError
+
+
+class Preempted(GlotouchError):
+    """The mission was asked to stop; carries why, in a few words."""
+
+
+class Control:
+    """Hand one to `run_mission` and call it from elsewhere: a thread, a signal handler, a key.
+
+    Pausing is asked for; the skill that runs declares what it does to it (`Skill.PAUSE`), and the record says when the
+    arm stood. A stop ends the mission: the arm stops, rises if it is free, and is held.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()  # a signal handler may come in between
+        self._paused = False
+        self._stop: str | None = None
+
+    @property
+    def paused(self) -> bool:
+        """A pause is asked for."""
+        return self._paused
+
+    @property
+    def stopped(self) -> str | None:
+        """Why a stop was asked for, or None."""
+        return self._stop
+
+    def pause(self) -> None:
+        """Pause as soon as the running skill allows; nothing happens if it is asked for already."""
+        with self._lock:
+            self._paused = True
+
+    def resume(self) -> None:
+        """Go on where it was paused."""
+        with self._lock:
+            self._paused = False
+
+    def toggle(self) -> None:
+        """Pause, or go on."""
+        with self._lock:
+            self._paused = not self._paused
+
+    def stop(self, why: str = "asked to stop") -> None:
+        """End the mission safely; the first reason stands. A paused mission ends, too."""
+        with self._lock:
+            self._stop = self._stop or why
+
+    def wants_pause(self, ticks: int, now_s: float) -> bool:
+        """Asked by the runner once a period, with its ticks so far and the robot's clock; scripts override it."""
+        return self._paused
