@@ -134,10 +134,25 @@ def fake_robot() -> Iterator[Callable[..., FakeRobot]]:
         robot.close()
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Refuse what does not go together."""
+    if config.getoption("--glotouch-mutate") and config.getoption("numprocesses", None):
+        raise pytest.UsageError("--glotouch-mutate runs its tests in one process: leave out -n")
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtestloop(session: pytest.Session) -> Iterator[None]:
-    """After the tests: the mutants."""
+    """After the tests, if they pass: the mutants."""
     done = yield
+    missions = session.config.getoption("--glotouch-mutate")
+    if missions and not session.config.option.collectonly and not hasattr(session.config, "workerinput"):
+        if session.testsfailed:
+            session_of(session.config).mutation_lines.append("no mutant was tried, for a test fails without any")
+        else:
+            from glotouch_bt.mission_testing.rerun import mutate
+
+            for mission in missions:
+                mutate(session, session_of(session.config), mission)
     return done
 
 
@@ -148,9 +163,17 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     if output is not None:
         output["glotouch_coverage"] = session_of(config).coverage.plain() if KEY in config.stash else {}
         return
-    least = config.getoption("--glotouch-coverage-min")
-    if least is not None and session_of(config).coverage.percent < least and session.exitstatus == 0:
+    if session.exitstatus == 0 and any(_short(config)):
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def _short(config: pytest.Config) -> tuple[bool, bool]:
+    """Less than was asked: (outcomes exercised, mutants noticed)."""
+    outcomes, mutants = config.getoption("--glotouch-coverage-min"), config.getoption("--glotouch-mutate-min")
+    return (
+        outcomes is not None and session_of(config).coverage.percent < outcomes,
+        mutants is not None and any(s.percent < mutants for s in session_of(config).scores),
+    )
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -162,18 +185,36 @@ def pytest_testnodedown(node: Any, error: object) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    """Print the coverage of outcomes."""
+    """Print the coverage of outcomes, and what came of the mutants."""
     least = config.getoption("--glotouch-coverage-min")
-    if not config.getoption("--glotouch-coverage") and least is None:
-        return
+    if config.getoption("--glotouch-coverage") or least is not None:
+        _print_coverage(terminalreporter, config, least)
+    if config.getoption("--glotouch-mutate"):
+        _print_mutants(terminalreporter, config)
+
+
+def _print_coverage(reporter: Any, config: pytest.Config, least: float | None) -> None:
     coverage = session_of(config).coverage
-    terminalreporter.section("glotouch: outcomes of leaves")
+    reporter.section("glotouch: outcomes of leaves")
     for line in coverage.lines():
-        terminalreporter.line(line)
+        reporter.line(line)
     if not coverage.missions:
-        terminalreporter.line("no mission was run with scripted leaves (fixture `scripted`)")
-    done, total = coverage.exercised()
+        reporter.line("no mission was run with scripted leaves (fixture `scripted`)")
     if least is not None:
-        short = coverage.percent < least
+        done, total = coverage.exercised()
         words = f"{done} of {total} outcomes ({coverage.percent:.1f} %), at least {least:g} % asked"
-        terminalreporter.line(f"{'FAILED: ' if short else ''}{words}", red=short, green=not short)
+        _print_verdict(reporter, _short(config)[0], words)
+
+
+def _print_mutants(reporter: Any, config: pytest.Config) -> None:
+    session, least = session_of(config), config.getoption("--glotouch-mutate-min")
+    reporter.section("glotouch: mutants")
+    for line in session.mutation_lines:
+        reporter.line(line)
+    if least is not None and session.scores:
+        worst = min(s.percent for s in session.scores)
+        _print_verdict(reporter, _short(config)[1], f"{worst:.1f} % of the mutants noticed, at least {least:g} % asked")
+
+
+def _print_verdict(reporter: Any, short: bool, words: str) -> None:
+    reporter.line(f"{'FAILED: ' if short else ''}{words}", red=short, green=not short)

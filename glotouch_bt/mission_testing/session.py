@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from glotouch_bt.mission.library import find_shipped
 from glotouch_bt.mission.load import Mission, load_mission
 from glotouch_bt.mission_testing.coverage import OutcomeCoverage
 from glotouch_bt.mission_testing.scripted import ScriptedRun
+
+if TYPE_CHECKING:
+    from glotouch_bt.mission_testing.mutation import MutationScore
 
 
 class Session:
@@ -22,12 +25,16 @@ class Session:
         coverage: Endings exercised so far.
         users: For each mission's file, the ids of the tests that loaded it.
         change: While a mutant is tried: what is done to every loaded mission.
+        scores: What came of the mutants of each mission.
+        mutation_lines: The same for the terminal.
     """
 
     def __init__(self, root: Path) -> None:
         self.coverage = OutcomeCoverage()
         self.users: dict[Path, dict[str, None]] = {}
         self.change: Callable[[Mission], Mission] | None = None
+        self.scores: list[MutationScore] = []
+        self.mutation_lines: list[str] = []
         self._root = root
         self._loaded: dict[Any, Mission] = {}
 

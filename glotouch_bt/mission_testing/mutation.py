@@ -1,0 +1,145 @@
+"""Mutation testing of missions inside pytest: every slip is made in turn, and the tests that use the mission run again.
+
+A mutant is refused (by `glotouch check`, so that nobody could run it), noticed (a test fails), or survives. A survivor
+for which no random script shows a difference is held to be equivalent; the others are printed with such a script: the
+test that is missing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from glotouch_bt.mission.load import Mission
+from glotouch_bt.mission_testing.mutants import Mutant, findings_of, mutants_of
+from glotouch_bt.mission_testing.search import Difference, Search
+from glotouch_bt.mission_testing.session import Session
+
+Test = Callable[[], bool]
+"""Runs one test again; True if it passes."""
+
+
+@dataclass(frozen=True)
+class Survivor:
+    """A mutant no test noticed.
+
+    Attributes:
+        mutant: What was changed.
+        difference: A script that tells it from the mission; None: none was found.
+    """
+
+    mutant: Mutant
+    difference: Difference | None
+
+
+@dataclass
+class MutationScore:
+    """What came of all mutants of one mission.
+
+    Attributes:
+        mission: Its name.
+        refused: By the checker.
+        noticed: With the test that failed first.
+        survivors: Those a script tells from the mission.
+        equivalent: Those for which no difference was found.
+        scripts: How many random scripts were tried for each survivor.
+    """
+
+    mission: str
+    scripts: int
+    refused: list[Mutant] = field(default_factory=list)
+    noticed: list[tuple[Mutant, str]] = field(default_factory=list)
+    survivors: list[Survivor] = field(default_factory=list)
+    equivalent: list[Mutant] = field(default_factory=list)
+
+    @property
+    def tried(self) -> int:
+        """Mutants so far."""
+        return len(self.refused) + len(self.noticed) + len(self.survivors) + len(self.equivalent)
+
+    @property
+    def percent(self) -> float:
+        """Share of noticed mutants among those that can run and behave differently."""
+        counted = len(self.noticed) + len(self.survivors)
+        return 100.0 * len(self.noticed) / counted if counted else 100.0
+
+    @property
+    def strict_percent(self) -> float:
+        """The same with the equivalent ones counted as survivors."""
+        counted = len(self.noticed) + len(self.survivors) + len(self.equivalent)
+        return 100.0 * len(self.noticed) / counted if counted else 100.0
+
+    def lines(self) -> Iterator[str]:
+        """The report for a terminal."""
+        yield f"{self.mission}: {self.tried} mutants"
+        yield f"  refused by check  {len(self.refused):4d}"
+        yield f"  noticed by tests  {len(self.noticed):4d}"
+        yield f"  survive           {len(self.survivors):4d}"
+        yield f"  equivalent        {len(self.equivalent):4d}  (no difference in {self.scripts} random scripts)"
+        yield (
+            f"  score             {self.percent:.1f} % of those that run and differ"
+            f" ({self.strict_percent:.1f} % with the equivalent ones)"
+        )
+        for survivor in self.survivors:
+            yield ""
+            yield f"{survivor.mutant.place}: {survivor.mutant.what}: no test notices"
+            if survivor.difference is not None:
+                yield f"  a test that would: scripted(..., {survivor.difference.script})"
+                yield f"  they part {survivor.difference.where}"
+                yield f"    the mission  {survivor.difference.before}"
+                yield f"    the mutant   {survivor.difference.after}"
+        for mutant in self.equivalent:
+            yield f"{mutant.place}: {mutant.what}: equivalent"
+
+
+def try_mutants(
+    mission: Mission,
+    session: Session,
+    tests: Sequence[tuple[str, Test]],
+    *,
+    scripts: int = 300,
+    on_progress: Callable[[int, int, MutationScore], None] | None = None,
+) -> MutationScore:
+    """Run the tests against every mutant of a mission.
+
+    Args:
+        mission: The mission as it is.
+        session: Where the tests get their missions from; changed while a mutant is tried.
+        tests: The tests that use it, by name; all pass on the mission as it is.
+        scripts: Random scripts tried for each survivor.
+        on_progress: Called after each mutant with (tried, of how many, score so far).
+    """
+    score, search = MutationScore(mission.name, scripts), Search(mission, scripts)
+    order = dict.fromkeys((name for name, _ in tests), 0)
+    run = dict(tests)
+    mutants = list(mutants_of(mission.tree))
+    for mutant in mutants:
+        tree = mutant.apply(mission.tree)
+        if findings_of(tree):
+            score.refused.append(mutant)
+        elif (name := _noticed_by(mutant, mission.file, session, order, run)) is not None:
+            order[name] += 1
+            score.noticed.append((mutant, name))
+        elif (difference := search.difference(tree)) is not None:
+            score.survivors.append(Survivor(mutant, difference))
+        else:
+            score.equivalent.append(mutant)
+        if on_progress is not None:
+            on_progress(score.tried, len(mutants), score)
+    return score
+
+
+def _noticed_by(
+    mutant: Mutant, file: Path, session: Session, order: dict[str, int], run: dict[str, Test]
+) -> str | None:
+    """The first test that fails; those that noticed most so far go first."""
+
+    def change(loaded: Mission) -> Mission:
+        return replace(loaded, tree=mutant.apply(loaded.tree)) if loaded.file == file else loaded
+
+    session.change = change
+    try:
+        return next((name for name in sorted(order, key=lambda n: -order[n]) if not run[name]()), None)
+    finally:
+        session.change = None
