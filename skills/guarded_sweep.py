@@ -38,6 +38,7 @@ class GuardedSweep(Skill):
     FAILURE `tool_lost`: the jaws are not as far apart as when they took the tool.
     """
 
+    PAUSE = "retreat"
     Params = GuardedSweepParams
     params: GuardedSweepParams
 

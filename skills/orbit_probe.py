@@ -48,6 +48,7 @@ class OrbitProbe(Skill):
     FAILURE `tool_lost`: the jaws are not as far apart as when they took the tool.
     """
 
+    PAUSE = "retreat"
     Params = OrbitProbeParams
     params: OrbitProbeParams
 

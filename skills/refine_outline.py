@@ -28,6 +28,7 @@ class RefineOutline(Skill):
     FAILURE `hard_contact`, `tool_lost`: as for `orbit_probe`.
     """
 
+    PAUSE = "retreat"
     Params = RefineOutlineParams
     params: RefineOutlineParams
 

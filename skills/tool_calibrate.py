@@ -59,6 +59,7 @@ class ToolCalibrate(Skill):
     FAILURE `motion_refused`: the corner cannot be reached, or the hand not be turned there.
     """
 
+    PAUSE = "retreat"
     Params = ToolCalibrateParams
     params: ToolCalibrateParams
 

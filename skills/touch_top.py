@@ -43,6 +43,7 @@ class TouchTop(Skill):
     FAILURE `motion_refused`: the ball cannot be brought above it; `measured` as for `no_top`.
     """
 
+    PAUSE = "retreat"
     Params = TouchTopParams
     params: TouchTopParams
 

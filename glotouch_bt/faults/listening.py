@@ -20,7 +20,7 @@ class ListeningRecord:
         reactions: Kinds of events that mean that something was noticed, besides a skill's failure.
     """
 
-    def __init__(self, record: Record, injector: FaultInjector, reactions: tuple[str, ...] = ("supervision",)) -> None:
+    def __init__(self, record: Record, injector: FaultInjector, reactions: tuple[str, ...] = ("guard",)) -> None:
         self._record, self._injector, self._reactions = record, injector, reactions
 
     def block(self, observation: Observation, command: Command) -> None:

@@ -136,6 +136,7 @@ def run_mission(
 
     def lost(stuck: Stuck) -> None:
         if on_lost is not None:
+            outcome.end_s, outcome.paused_s = context.observation.now_s, context.paused_s
             outcome.abort(stuck.error(), stuck.node)
             on_lost(stuck, outcome)
 

@@ -6,6 +6,8 @@ Only here, and in the report, is the truth of a simulated world looked at, after
 from __future__ import annotations
 
 import dataclasses
+import os
+import sys
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -16,12 +18,14 @@ from typing import Any
 from glotouch_bt import __version__
 from glotouch_bt.faults import FaultInjector, FaultPlan, read_plan
 from glotouch_bt.faults.listening import ListeningRecord, injector_in
+from glotouch_bt.mission.control import Control
 from glotouch_bt.mission.library import shown
 from glotouch_bt.mission.load import Mission, load_mission, split_settings
 from glotouch_bt.mission.mcap_json import to_json
 from glotouch_bt.mission.record import Recorder
 from glotouch_bt.mission.runner import Outcome, run_mission
 from glotouch_bt.mission.tally import Record, Tally
+from glotouch_bt.mission.watchdog import Stuck
 from glotouch_bt.mission.worlds import load_conditions
 from glotouch_bt.robot import Backend, BadInput, Conditions, Robot, load_backend
 from glotouch_bt.robot.referee import Referee, TrueObject
@@ -91,8 +95,15 @@ def launch(
     *,
     on_start: Callable[[Mission, Path], None] | None = None,
     on_progress: Callable[[float, Tally], None] | None = None,
+    control: Control | None = None,
 ) -> RunResult:
     """Check everything, open the backend, run the mission, score it, write the run's folder.
+
+    Args:
+        request: What to run.
+        on_start: Called with the mission and its folder once the backend is open.
+        on_progress: As in `run_mission`.
+        control: Who may pause and stop it.
 
     Raises:
         BadInput: Something given is wrong; nothing moved and nothing is left on disk.
@@ -125,7 +136,7 @@ def launch(
         folder.clear()
         if on_start is not None:
             on_start(mission, folder.path)
-        return _run(request, mission, conditions, robot, referee, folder, began, on_progress)
+        return _run(request, mission, conditions, robot, referee, folder, began, on_progress, control)
 
 
 def _fault_plan(request: RunRequest, mission: Mission) -> FaultPlan | None:
@@ -153,6 +164,7 @@ def _run(
     folder: RunFolder,
     began: float,
     on_progress: Callable[[float, Tally], None] | None,
+    control: Control | None,
 ) -> RunResult:
     folder.write_text("mission.yaml", _mission_yaml(request, mission))
     objects_at_start = referee.objects() if referee else []
@@ -161,9 +173,20 @@ def _run(
     injector = injector_in(robot)
     record: Record = recorder if injector is None else ListeningRecord(recorder, injector)
     result: dict[str, Any] | None = None
+
+    def lost(stuck: Stuck, outcome: Outcome) -> None:
+        """The main thread is lost in a skill: write what is known, and end. It writes nothing itself any more."""
+        record.event("stuck", outcome.end_s, {"node": stuck.node, "stack": stuck.stack})
+        told = _result(request, mission, outcome, None) | {"wall_time_s": round(time.perf_counter() - ready, 3)}
+        recorder.close(told)
+        folder.write_json("result.json", told)
+        sys.stderr.write(f"glotouch: {outcome.reasons[-1]}\n{stuck.stack}")
+        sys.stderr.flush()
+        os._exit(3)
+
     try:
         try:
-            outcome = run_mission(mission, robot, record, on_progress=on_progress)
+            outcome = run_mission(mission, robot, record, on_progress=on_progress, control=control, on_lost=lost)
         except BaseException:  # it raises only before the first tick
             recorder.close()
             folder.clear()
@@ -248,6 +271,9 @@ def _result(request: RunRequest, mission: Mission, outcome: Outcome, referee: Re
         "candidates": found.candidates,
         "contacts": found.contacts,
         "sim_time_s": round(outcome.end_s - outcome.start_s, 6),
+        "paused_s": round(outcome.paused_s, 6),
+        "guards": dict(outcome.guards),
+        "ending": outcome.ending,
         "ticks": outcome.ticks,
         "probe_path_m": round(found.probe_path_m, 6),
         "peak_force_N": round(float(peak), 6),
