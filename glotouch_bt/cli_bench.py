@@ -67,18 +67,27 @@ def retrieve(
     conditions: Conditions = "nominal",
     objects: Objects = None,
     backend: Annotated[str, typer.Option(help="a registered backend")] = "mujoco",
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="a mission parameter or backend option")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="keep the trials that --out holds already")] = False,
     workers: Workers = 2,
     out: Out = None,
     json_: Json = False,
 ) -> None:
     """The whole mission for every target on every seed."""
     from glotouch_bt import console_bench
+    from glotouch_bt.cli_doctor import read_settings
     from glotouch_bt.mission.load import load_mission
+    from glotouch_bt.robot import BadInput
     from glotouch_bt.study.retrieve import Campaign, run_campaign, targets_of
 
     names = tuple(target) if target else targets_of(objects) if objects else ()
     # A mission's default target need not be among other objects: check it with one that is.
-    world = load_mission(mission, {"target": names[0]} if names else {}, objects=objects).world
+    settings = read_settings(set_)
+    if "target" in settings:
+        raise BadInput("--set target: the targets of a campaign are given by --target")
+    world = load_mission(mission, settings | ({"target": names[0]} if names else {}), objects=objects).world
     campaign = Campaign(
         mission=mission,
         targets=names or targets_of(world.objects.folder),
@@ -87,6 +96,8 @@ def retrieve(
         objects=objects,
         backend=backend,
         out=_folder(out, "retrieve"),
+        settings=settings,
+        resume=resume,
     )
 
     def show(row: dict[str, Any], done: int, total: int) -> None:

@@ -7,7 +7,7 @@ import json
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,8 @@ class Campaign:
         objects: Folder of STL files instead of the world's.
         backend: Registered name.
         out: Folder of the campaign; each trial's run folder goes below it.
+        settings: Further `--set` values, for every trial.
+        resume: Trials whose result is in `out` already are not run again.
     """
 
     mission: str
@@ -43,6 +45,8 @@ class Campaign:
     objects: Path | None
     backend: str
     out: Path
+    settings: Mapping[str, str] = field(default_factory=dict)
+    resume: bool = False
 
     def requests(self) -> list[tuple[str, RunRequest]]:
         """(target, request) of every trial, seeds outermost, so that a broken-off campaign covers all targets alike."""
@@ -53,7 +57,7 @@ class Campaign:
                     mission=self.mission,
                     backend=self.backend,
                     seed=seed,
-                    settings={"target": target},
+                    settings={**self.settings, "target": target},
                     objects=self.objects,
                     conditions=self.conditions,
                     out=self.out / f"{target}-s{seed}",
@@ -73,19 +77,25 @@ def targets_of(folder: Path) -> tuple[str, ...]:
     return tuple(m.name for m in load_folder(folder))
 
 
-def run_trial(target: str, request: RunRequest) -> dict[str, Any]:
+def run_trial(target: str, request: RunRequest, resume: bool = False) -> dict[str, Any]:
     """One trial in this process, as a row. Whatever goes wrong is a row, never an exception of the campaign."""
     row: dict[str, Any] = {"target": target, "seed": request.seed, "folder": request.out and request.out.name}
+    if resume and request.out is not None and (request.out / "result.json").is_file():
+        return row | _columns(json.loads((request.out / "result.json").read_text()))
     try:
         done = launch(request)
     except BadInput:
         raise
     except Exception as e:
         return row | {"status": "traceback", "exit_code": -1, "cause": f"traceback {type(e).__name__}: {e}"}
-    result = done.result
-    row |= {k: result.get(k) for k in COLUMNS if k in result}
-    row |= {"exit_code": done.exit_code, "candidates": len(result["candidates"]), "cause": cause(result)}
-    return row
+    return row | _columns(done.result) | {"exit_code": done.exit_code}
+
+
+def _columns(result: Mapping[str, Any]) -> dict[str, Any]:
+    """A result as a row."""
+    code = {"success": 0, "failure": 1}.get(str(result["status"]), 3)
+    found = {"candidates": len(result["candidates"]), "cause": cause(result), "exit_code": code}
+    return {k: result[k] for k in COLUMNS if k in result} | found
 
 
 def cause(result: Mapping[str, Any]) -> str:
@@ -113,7 +123,7 @@ def run_campaign(
     """
     requests = campaign.requests()
     campaign.out.mkdir(parents=True, exist_ok=True)
-    futures = [executor.submit(run_trial, target, request) for target, request in requests]
+    futures = [executor.submit(run_trial, target, request, campaign.resume) for target, request in requests]
     rows: list[dict[str, Any]] = []
     for future in as_completed(futures):
         rows.append(future.result())
@@ -130,6 +140,7 @@ def run_campaign(
         "targets": list(campaign.targets),
         "mission": campaign.mission,
         "backend": campaign.backend,
+        "settings": dict(campaign.settings),
     }
     (campaign.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
     return summary

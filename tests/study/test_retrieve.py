@@ -1,6 +1,7 @@
 import csv
 import json
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -60,3 +61,28 @@ def test_a_mission_that_says_success_with_an_empty_hand_is_no_success() -> None:
     row = {"status": "success", "retrieved": None, "correct": False, "target": "a", "cause": "nothing_in_gripper"}
     assert not retrieve.succeeded(row)
     assert retrieve.cause({"status": "success", "retrieved": None, "correct": False}) == "nothing_in_gripper"
+
+
+def test_a_resumed_campaign_keeps_what_was_run_and_passes_settings_on(
+    campaign: retrieve.Campaign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[RunRequest] = []
+
+    def launch(request: RunRequest) -> Any:
+        asked.append(request)
+        assert request.out is not None
+        request.out.mkdir(parents=True)
+        (request.out / "result.json").write_text(json.dumps(_result(request)))
+        return SimpleNamespace(result=_result(request), exit_code={2: 1, 3: 3}.get(request.seed, 0))
+
+    monkeypatch.setattr(retrieve, "launch", launch)
+    first = replace(campaign, seeds=(0, 1), settings={"devices": "simulated"})
+    with ThreadPoolExecutor(1) as pool:
+        retrieve.run_campaign(first, pool)
+        assert {r.settings["devices"] for r in asked} == {"simulated"}
+        before = len(asked)
+        again = replace(first, seeds=(0, 1, 3), resume=True)
+        summary = retrieve.run_campaign(again, pool)
+    assert len(asked) == before + 2, "only the new seed"
+    assert summary["success"]["n"] == 6
+    assert summary["safety_stops"]["rate"] == pytest.approx(2 / 6)
