@@ -31,7 +31,9 @@ class GraspParams(SkillParams):
 class Grasp(Skill):
     """Go down over the object with open jaws and close on it with limited force; try the plan's alternatives in turn.
 
-    SUCCESS: the jaws stopped on something; `grip_m` is their aperture.
+    Grasps of the plan that were made before (and did not last) come last.
+
+    SUCCESS: the jaws stopped on something; `grip_m` is their aperture, `made` the grasp.
     FAILURE `no_grasp`: no grasp of the plan could be made: no room, the fingers stood on something on the way down,
     or the jaws closed on nothing. The hand has risen again, jaws open.
     """
@@ -47,17 +49,23 @@ class Grasp(Skill):
 
     plan = In(GraspPlan, "where and how wide")
     known = In(tuple, "all candidates, to keep clear of", key="candidates", element=Candidate, required=False)
+    before = In(tuple, "grasps made before", key="tried", required=False)
     grip_m = Out(float, "aperture of the closed jaws, m")
+    made = Out(GraspPlan, "the grasp that was made")
+    tried = Out(tuple, "grasps made so far", element=GraspPlan)
 
     def run(self) -> SkillRun:
         """See the class."""
         plan = self.plan
         others = tuple(c for c in (self.known or ()) if c.index != plan.candidate)
+        made: tuple[GraspPlan, ...] = self.before or ()
+        options = sorted((plan, *plan.alternatives), key=lambda option: any(_same(option, m) for m in made))
         tried: list[str] = []
         with keeping_clear_of(self.context.arm, others):
-            for option in (plan, *plan.alternatives):
+            for option in options:
                 try:
                     self.grip_m = yield from self._attempt(option)
+                    self.made, self.tried = option, (*made, option)
                     return
                 except MotionRefused as refusal:
                     tried.append(str(refusal))
@@ -120,3 +128,9 @@ class Grasp(Skill):
             return opening
         require_clear(self.context.arm, goal, narrowest)
         return narrowest
+
+
+def _same(one: GraspPlan, other: GraspPlan) -> bool:
+    """Both take the same object at the same place."""
+    alike = (one.candidate, one.yaw_rad) == (other.candidate, other.yaw_rad)
+    return alike and bool((one.position_K_m == other.position_K_m).all())

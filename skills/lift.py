@@ -39,7 +39,7 @@ class Lift(Skill):
     }
 
     grip_m = In(float, "aperture of the closed jaws")
-    weight_N = Out(float, "weight in the hand, N")
+    weight_N = Out(float, "weight in the hand, N", key="weight")
 
     def run(self) -> SkillRun:
         """See the class."""

@@ -10,7 +10,6 @@ from glotouch_bt.model_cache import target_model
 from glotouch_bt.recognition import MATCHERS, PadSpec, Ranking
 from glotouch_bt.robot import HOLD, BadInput, ParamError
 from glotouch_bt.robot.meshes import Mesh, load_folder, load_mesh
-from glotouch_bt.touch import TouchSet
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.grasp_plan import GraspPlan, plan_grasp
 
@@ -45,12 +44,14 @@ class Match(Skill):
 
     touchsets = In(tuple, "one TouchSet per candidate squeezed", required=False)
     known = In(tuple, "all candidates, to say which were not squeezed", key="candidates", required=False)
+    rejected = In(tuple, "indices of candidates that were found not to be it", required=False)
     ranking = Out(Ranking, "all candidates, best first")
     plan = Out(GraspPlan, "how to grasp the best one")
 
     def run(self) -> SkillRun:
         """See the class."""
-        touchsets: tuple[TouchSet, ...] = self.touchsets or ()
+        rejected = self.rejected or ()
+        touchsets = tuple(t for t in self.touchsets or () if t.candidate.index not in rejected)
         if not touchsets:
             raise SkillFailed("no_touch", "no candidate was squeezed, so nothing can be recognised")
         yield HOLD  # matching takes longer than a control period; on hardware the arm holds meanwhile
@@ -64,7 +65,7 @@ class Match(Skill):
         self.ranking = ranking
         self.event("ranking", target=mesh.name, ranking=ranking, gates=ranking.gates, matcher=self.params.matcher)
         if not ranking.accepted:
-            felt = {t.candidate.index for t in touchsets}
+            felt = {t.candidate.index for t in touchsets} | set(rejected)
             missed = [str(c.index) for c in self.known or () if c.index not in felt]
             why = "; ".join(ranking.reasons) + (f"; not squeezed: candidate {', '.join(missed)}" if missed else "")
             if model.narrowest_m > gripper.stroke_m:

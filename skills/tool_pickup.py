@@ -9,18 +9,14 @@ import numpy as np
 
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Pose, SetPayload, Tare
-from glotouch_bt.touch import GuardParams
 from skills.allowance import may_touch
 from skills.base import UNCHANGED, Out, Skill, SkillFailed, SkillParams, SkillRun, param
-from skills.corner import corner_place
+from skills.floor import FLOOR_SEARCH_M, feel_floor
 from skills.hand import easy_yaw
 from skills.held_tool import HeldTool
-from skills.probing import Prober
 from skills.requests import finish
 from skills.weighing import weigh_N
 
-FLOOR_SEARCH_M = 0.005
-"""The floor is looked for this far below where the registration puts it."""
 HANDLE_TOLERANCE_M = 0.004
 """The jaws hold the handle if they are this near to its width: twice the largest bias of their report, and its give."""
 GRAVITY_M_S2 = 9.81
@@ -49,6 +45,7 @@ class ToolPickup(Skill):
     FAILURE `motion_refused`: the holder cannot be reached.
     """
 
+    PAUSE = "retreat"
     Params = ToolPickupParams
     params: ToolPickupParams
 
@@ -146,22 +143,12 @@ class ToolPickup(Skill):
             yield from self.context.arm.shift(np.array([0.0, 0.0, up]), self.params.speed_m_s, check=False)
 
     def _feel_floor(self, tool: HeldTool) -> Motion[HeldTool]:
-        """Lower the ball in the corner nearest to the holder; a touch far from the nominal floor is not the floor."""
-        world, p = self.context.world, self.params
-        corner = corner_place(world, p.corner_gap_m)
-        prober = Prober(self.context, tool, GuardParams())
-        high = world.container.interior_m[2] + 0.06
-        yield from prober.hop(np.array([*corner, 0.0]), max(high, float(prober.tip_K_m[2])), p.speed_m_s)
-        near = 0.02
-        yield from self.context.arm.line(tool.pose_B_P(world, np.array([*corner, near])), p.speed_m_s)
-        with may_touch(self.context.arm, "tool", "floor"):
-            probed = yield from prober.move(np.array([*corner, tool.tip_radius_m - FLOOR_SEARCH_M]), 0.01)
-            if probed.contact is None:
-                raise SkillFailed(
-                    "no_floor",
-                    f"the ball met no floor {FLOOR_SEARCH_M * 1e3:.0f} mm below where the registration puts it",
-                    advice="check the container's pose and that the probe is held by its handle",
-                )
-            floor_z = float(probed.contact.tip_K_m[2]) - tool.tip_radius_m
-            yield from prober.retreat(np.array([0.0, 0.0, 1.0]), 0.01, 0.05)
+        """Learn the floor's height in the corner nearest to the holder."""
+        floor_z = yield from feel_floor(self.context, tool, self.params.corner_gap_m, self.params.speed_m_s)
+        if floor_z is None:
+            raise SkillFailed(
+                "no_floor",
+                f"the ball met no floor {FLOOR_SEARCH_M * 1e3:.0f} mm below where the registration puts it",
+                advice="check the container's pose and that the probe is held by its handle",
+            )
         return dataclasses.replace(tool, floor_z_K_m=floor_z)

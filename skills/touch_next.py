@@ -57,6 +57,7 @@ class TouchNext(Skill):
 
     candidates = In(tuple, "what may be touched", element=Candidate)
     felt = In(tuple, "what was felt so far", key="touchsets", required=False)
+    rejected = In(tuple, "indices of candidates to be left alone", required=False)
     touchsets = Out(tuple, "what was felt, one TouchSet per candidate", element=TouchSet)
     decided = Out(bool, "no further closure is wanted")
 
@@ -70,11 +71,13 @@ class TouchNext(Skill):
     def run(self) -> SkillRun:
         """See the class."""
         candidates: tuple[Candidate, ...] = self.candidates
-        if not candidates:
+        wanted = [c for c in candidates if c.index not in (self.rejected or ())]
+        if not wanted:
             raise SkillFailed("no_candidates", "there is no candidate to touch")
         touchsets: tuple[TouchSet, ...] = self.felt or ()
-        if {t.candidate.index for t in touchsets} != {c.index for c in candidates}:
-            touchsets = tuple(TouchSet(c, ()) for c in candidates)
+        if {t.candidate.index for t in touchsets} != {c.index for c in wanted}:
+            felt = {t.candidate.index: t for t in touchsets}
+            touchsets = tuple(felt.get(c.index, TouchSet(c, ())) for c in wanted)
             self._refused.clear()
             self._down = None
         down, self._down = self._down, None  # if this is broken off, nobody knows where the hand stands
