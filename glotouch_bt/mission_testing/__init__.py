@@ -1,12 +1,38 @@
 """For those who write missions: run them with scripted leaves, see what was covered, and which test is missing.
 
-A pytest plugin (`plugin.py`) comes with it; docs/compose.md shows it at work.
+A pytest plugin (`plugin.py`) comes with it; docs/compose.md shows it at work. Nothing is imported before it is asked
+for: pytest loads the plugin in every session of an environment, whether it tests missions or not.
 """
 
-from glotouch_bt.mission_testing.casting import ScriptError
-from glotouch_bt.mission_testing.outcomes import fails, hangs, ok, raises, real
-from glotouch_bt.mission_testing.scripted import ScriptedRun, run_scripted
-from glotouch_bt.mission_testing.stand_in import Call
-from glotouch_bt.mission_testing.standins import stand_in
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from glotouch_bt.mission_testing.casting import ScriptError
+    from glotouch_bt.mission_testing.leaf import Call
+    from glotouch_bt.mission_testing.outcomes import fails, hangs, ok, raises, real
+    from glotouch_bt.mission_testing.scripted import ScriptedRun, run_scripted
+    from glotouch_bt.mission_testing.standins import stand_in
+
+_HOME = {
+    "Call": "leaf",
+    "ScriptError": "casting",
+    "ScriptedRun": "scripted",
+    "fails": "outcomes",
+    "hangs": "outcomes",
+    "ok": "outcomes",
+    "raises": "outcomes",
+    "real": "outcomes",
+    "run_scripted": "scripted",
+    "stand_in": "standins",
+}
 
 __all__ = ["Call", "ScriptError", "ScriptedRun", "fails", "hangs", "ok", "raises", "real", "run_scripted", "stand_in"]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

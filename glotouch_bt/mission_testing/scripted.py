@@ -14,9 +14,9 @@ from glotouch_bt.mission.runner import default_arm, run_mission
 from glotouch_bt.mission.tally import NullRecord
 from glotouch_bt.mission_testing import casting
 from glotouch_bt.mission_testing.casting import ScriptError
+from glotouch_bt.mission_testing.leaf import Call, Part, Stage, playing
 from glotouch_bt.mission_testing.outcomes import Script
 from glotouch_bt.mission_testing.skipping import SkippingRobot, may_skip
-from glotouch_bt.mission_testing.stand_in import Call, Part, Stage, playing
 from glotouch_bt.robot import Command, GlotouchError, Observation, Robot, World
 from glotouch_bt.robot.fake import FakeRobot
 
