@@ -13,6 +13,7 @@ from glotouch_bt.faults.trigger import Moment, holds, running_node
 from glotouch_bt.robot import BadInput, Command, GuardTripped, Observation, Request, Robot, Tare, Ticket
 from glotouch_bt.robot.disturber import Disturber
 from glotouch_bt.robot.interface import Snapshot
+from glotouch_bt.robot.interface import Snapshot
 from glotouch_bt.robot.streams import stream
 
 
@@ -187,6 +188,10 @@ class FaultInjector(Robot):
     def close(self) -> None:
         """Passed on."""
         self._robot.close()
+
+    def snapshot(self) -> Snapshot | None:
+        """Of the device; the faults are no part of it: a resumed run goes on without them."""
+        return self._robot.snapshot()
 
     # -- what the run tells it ---------------------------------------------------------------------------------------
 

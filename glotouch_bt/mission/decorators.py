@@ -97,6 +97,16 @@ class ClockTimeout(Decorator):
         self._seconds, self._clock = seconds, clock
         self._start_s = 0.0
 
+    @property
+    def progress(self) -> dict[str, Any]:
+        """How far it has come, for a checkpoint; here on the robot's clock."""
+        return {"clock_s": self._clock(), "start_s": self._start_s}
+
+    @progress.setter
+    def progress(self, kept: dict[str, Any]) -> None:
+        """As much time has passed; the clock may be another one now."""
+        self._start_s = kept["start_s"] + (self._clock() - kept["clock_s"])
+
     def initialise(self) -> None:
         """Start the clock."""
         self.feedback_message = ""
@@ -117,6 +127,15 @@ class RepeatUntil(Decorator):
         super().__init__(name, child)
         self._done, self._limit, self._words = done, limit, words
         self._passes = 0
+
+    @property
+    def progress(self) -> dict[str, Any]:
+        """How far it has come, for a checkpoint."""
+        return {"passes": self._passes}
+
+    @progress.setter
+    def progress(self, kept: dict[str, Any]) -> None:
+        self._passes = kept["passes"]
 
     def initialise(self) -> None:
         """Start counting passes."""
@@ -164,6 +183,29 @@ class ForEach(Decorator):
         self._next = 0
         self._succeeded = 0
         self._gathered: dict[str, dict[int, Any]] = {}
+
+    @property
+    def progress(self) -> dict[str, Any]:
+        """How far it has come, for a checkpoint: its items, their order, and what was gathered of them."""
+        return {
+            "items": self._items,
+            "order": list(self._order),
+            "next": self._next,
+            "succeeded": self._succeeded,
+            "gathered": {source: dict(row) for source, row in self._gathered.items()},
+        }
+
+    @progress.setter
+    def progress(self, kept: dict[str, Any]) -> None:
+        self._items, self._order = kept["items"], kept["order"]
+        self._next, self._succeeded, self._gathered = kept["next"], kept["succeeded"], kept["gathered"]
+
+    def enter(self) -> None:
+        """Begin, or go on with the present item, in the midst of the child: its item is put in place."""
+        if self.status is not Status.RUNNING:
+            self.initialise()
+        if self._next < len(self._items):
+            self._keys.set(self._item_key, self._items[self._order[self._next]])
 
     def initialise(self) -> None:
         """Take the items as they are now."""

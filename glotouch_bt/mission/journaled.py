@@ -27,15 +27,18 @@ class JournaledRequests:
         requests: The robot.
         events: Where the events go.
         now_s: The robot's clock.
+
+    Attributes:
+        count: Requests so far.
     """
 
     def __init__(self, requests: RobotRequests, events: Events, now_s: Callable[[], float]) -> None:
         self._requests, self._events, self._now_s = requests, events, now_s
-        self._count = 0
+        self.count = 0
 
     def start(self, request: Request) -> Ticket:
         """Begin a request; see `Robot.start`."""
-        number, self._count = self._count, self._count + 1
+        number, self.count = self.count, self.count + 1
         asked = {"number": number, "request": type(request).__name__, "values": to_json(request)}
         self._events.event(REQUEST, self._now_s(), asked)
         ticket = self._requests.start(request)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from py_trees.behaviour import Behaviour
@@ -64,6 +65,14 @@ class ReasonBook:
 
     def __init__(self) -> None:
         self._last: dict[object, Failure] = {}
+
+    def noted(self) -> dict[object, Failure]:
+        """The last failure of each node that has failed, by node id."""
+        return dict(self._last)
+
+    def take_up(self, noted: Mapping[object, Failure]) -> None:
+        """Begin with what another book has noted."""
+        self._last = dict(noted)
 
     def note(self, node: Behaviour) -> None:
         """Write down why a node has just failed."""

@@ -8,7 +8,7 @@ Times are the robot's clock (log time = publish time); no wall clock enters, so 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -107,6 +107,29 @@ class Recorder:
     def port(self, stamp_s: float, key: str, value: object) -> None:
         """Record a blackboard write; large arrays are summarised (their full values are in the events)."""
         self._message(stamp_s, "/tree/ports", {"key": key, "value": to_json(value, summarise=True)})
+
+    def flush(self) -> int:
+        """Write all that is pending; the length of the file so far, which a reader needs nothing beyond."""
+        self._flush()
+        self._file.flush()
+        return self._file.tell()
+
+    def state(self) -> dict[str, int]:
+        """What a record that goes on from here must know, to write what this one would have."""
+        return {"cycles": self._cycles, "next_image_ns": self._next_image_ns}
+
+    def go_on_from(self, chunks: Iterable[Sequence[tuple[int, str, bytes]]], state: Mapping[str, int]) -> None:
+        """Begin with what another record of the same run had written, instead of the scene.
+
+        Args:
+            chunks: Its chunks, each as (log time ns, topic, message).
+            state: Its `state` after them.
+        """
+        self._pending.clear()
+        for chunk in chunks:
+            self._pending.extend((ns, self._channel(topic), message) for ns, topic, message in chunk)
+            self._flush()
+        self._cycles, self._next_image_ns = state["cycles"], state["next_image_ns"]
 
     def close(self, result: Mapping[str, object] | None = None) -> None:
         """Write what is pending, the result (without its wall times) and the index; idempotent."""

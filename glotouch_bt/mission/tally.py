@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -45,6 +45,9 @@ class NullRecord:
 
     def port(self, stamp_s: float, key: str, value: object) -> None:
         """Nothing."""
+
+
+_NOT_COUNTED = ("_record", "_pending")
 
 
 class Tally:
@@ -93,6 +96,15 @@ class Tally:
             steps = np.diff(np.concatenate([start, track]), axis=0)
             self.probe_path_m += float(np.sqrt((steps * steps).sum(axis=1)).sum())
         self._last_P_m = track[-1]
+
+    def state(self) -> dict[str, Any]:
+        """All that was counted, for a checkpoint; settled."""
+        self.settle()
+        return {name: value for name, value in vars(self).items() if name not in _NOT_COUNTED}
+
+    def take_up(self, state: Mapping[str, Any]) -> None:
+        """Go on counting from a `state`."""
+        vars(self).update({name: value for name, value in state.items() if name in vars(self)})
 
     def tick(self, stamp_s: float, changes: Sequence[tuple[str, object, object]]) -> None:
         """Pass on."""

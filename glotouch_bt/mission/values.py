@@ -68,12 +68,31 @@ def decode(data: bytes) -> Any:
         raise BadInput(f"kept values cannot be read ({type(e).__name__}: {e})") from e
 
 
+def encode_parts(parts: Mapping[str, object]) -> tuple[bytes, dict[str, str]]:
+    """A mapping as bytes, less what cannot be kept; and of that, by name, why.
+
+    What one part shares with another stays one object.
+    """
+    encoder, kept, lacking = Encoder(), [], {}
+    encoder.reserve()
+    for name, value in parts.items():
+        try:
+            kept.append([name, encoder.plain(value, name)])
+        except CannotKeep as e:
+            lacking[name] = str(e)
+    return msgspec.msgpack.encode([_MAP, *kept]), lacking
+
+
 class Encoder:
     """One message: objects met again within it become references."""
 
     def __init__(self) -> None:
         self._seen: dict[int, int] = {}
         self._kept: list[object] = []  # keeps the objects alive, so that an id means one object
+
+    def reserve(self) -> None:
+        """Count an object that the caller writes itself, round those to come."""
+        self._kept.append(self)
 
     def plain(self, value: object, where: str = "value") -> Any:
         """`value` as what MessagePack holds.

@@ -1,0 +1,191 @@
+"""Taking checkpoints while a mission runs, and taking one up in a new run.
+
+All that a mission is between two skills: the tree, the ports, what skills remember, the arm's setpoint and scene, the
+counts and reasons so far, how much of the record was written, and in simulation the world.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from py_trees.behaviour import Behaviour
+from py_trees.blackboard import Blackboard
+from py_trees.common import Status
+
+from glotouch_bt.mission.build import BuiltTree
+from glotouch_bt.mission.checkpoint import CheckpointFile, Row
+from glotouch_bt.mission.checkpoint_tree import TreeAtWork, start_at, tree_state
+from glotouch_bt.mission.journaled import JournaledRequests
+from glotouch_bt.mission.reasons import ReasonBook
+from glotouch_bt.mission.tally import Tally
+from glotouch_bt.mission.values import CannotKeep, encode, encode_parts
+from glotouch_bt.robot import BadInput, Robot
+from skills.base import Context
+
+
+class Flushed(Protocol):
+    """The part of a record that a checkpoint needs."""
+
+    def flush(self) -> int:
+        """Write all that is pending; the length of the file."""
+        ...
+
+    def state(self) -> dict[str, Any]:
+        """What a record that goes on from here must know."""
+        ...
+
+
+@dataclass
+class Work:
+    """A mission at work: what the loop holds, as checkpoints see it. All of it is the loop's own.
+
+    Attributes:
+        status: Status of each node as last recorded, by node id.
+        written: Value of each key as last recorded.
+        start_s: Robot clock at the first tick of the first run.
+        ticks: Ticks done, over all runs.
+    """
+
+    tree: BuiltTree
+    context: Context
+    robot: Robot
+    tally: Tally
+    book: ReasonBook
+    requests: JournaledRequests
+    status: dict[object, Status]
+    written: dict[str, object] = field(default_factory=dict)
+    start_s: float = 0.0
+    ticks: int = 0
+
+
+@dataclass(frozen=True)
+class TakenUp:
+    """A checkpoint to go on from.
+
+    Attributes:
+        number: Which.
+        state: Its content.
+        same_world: The robot was put back to the state it had then; else it is where it is, and so is the world.
+        start: Path of the node to begin with, whatever came next at the checkpoint; empty: go on.
+    """
+
+    number: int
+    state: Mapping[str, Any]
+    same_world: bool
+    start: str = ""
+
+
+class Keeper:
+    """Writes a checkpoint whenever a skill has ended.
+
+    Args:
+        file: Where to.
+        record: Flushed before each checkpoint, so that it reaches as far.
+        number: Of the next checkpoint.
+
+    Attributes:
+        lacking: What could not be kept at the last checkpoint, and why.
+        seconds: Wall time spent; set by who measures it.
+    """
+
+    def __init__(self, file: CheckpointFile, record: Flushed | None = None, number: int = 0) -> None:
+        self._file, self._record, self._number = file, record, number
+        self._begun: dict[str, None] = {}
+        self.lacking: dict[str, str] = {}
+
+    def began(self, paths: Sequence[str]) -> None:
+        """These nodes run from now on."""
+        self._begun.update(dict.fromkeys(paths))
+
+    def keep(self, work: Work, finished: Sequence[Behaviour]) -> None:
+        """Write a checkpoint; the last of `finished` has just ended, none: before the first tick.
+
+        Raises:
+            GlotouchError: The disk refused.
+        """
+        state = self._encoded(work, finished)
+        snapshot = work.robot.snapshot()
+        world: bytes | None = None
+        if snapshot is not None:
+            try:
+                world = encode(snapshot)
+            except CannotKeep as e:
+                self.lacking["world"] = str(e)
+        size = None if self._record is None else self._record.flush()
+        node, status = ("", "") if not finished else (work.tree.paths[finished[-1].id], finished[-1].status.value)
+        row = Row(
+            self._number,
+            work.context.observation.now_s,
+            node,
+            status,
+            tuple(self._begun),
+            self.lacking,
+            size,
+            world is not None,
+        )
+        self._file.add(row, state, world)
+        self._begun.clear()
+        self._number += 1
+
+    def _encoded(self, work: Work, finished: Sequence[Behaviour]) -> bytes:
+        work.tally.settle()
+        paths, storage, space = work.tree.paths, Blackboard.storage, work.tree.namespace
+        values = {k: storage[f"{space}/{k}"] for k in work.tree.keys if f"{space}/{k}" in storage}
+        parts: dict[str, object] = {f"port {key}": value for key, value in values.items()}
+        parts |= {
+            "tree": tree_state(work.tree, finished),
+            "arm": work.context.arm.state(),
+            "preempted": work.context.preempted,
+            "paused_s": work.context.paused_s,
+            "tally": work.tally.state(),
+            "reasons": {paths[i]: failure for i, failure in work.book.noted().items()},
+            "status": {paths[i]: status.value for i, status in work.status.items()},
+            "recorded": tuple(k for k, v in values.items() if work.written.get(k) is v),
+            "ticks": work.ticks,
+            "requests": work.requests.count,
+            "elapsed": (work.start_s, work.context.observation.now_s),
+            "record": None if self._record is None else self._record.state(),
+        }
+        encoded, self.lacking = encode_parts(parts)
+        return encoded
+
+
+def take_up(work: Work, kept: TakenUp) -> TreeAtWork | None:
+    """Bring a mission that is about to begin to a checkpoint; returns what must be told when its first tick is over.
+
+    Raises:
+        BadInput: The checkpoint is of another tree, or lacks what the tree needs.
+    """
+    state, tree, context = kept.state, work.tree, work.context
+    for name in ("tree", "arm", "tally", "reasons", "status", "elapsed"):
+        if name not in state:
+            raise BadInput(f"checkpoint {kept.number} lacks the state of the {name}: it could not be kept")
+    for name, value in state.items():
+        if name.startswith("port "):
+            key = name.removeprefix("port ")
+            Blackboard.storage[f"{tree.namespace}/{key}"] = value
+            if key in state["recorded"]:
+                work.written[key] = value
+    context.arm.restore(state["arm"])
+    if not kept.same_world:
+        context.arm.sync(context.observation)
+    context.preempted, context.paused_s = state["preempted"], state["paused_s"]
+    start_s, then_s = state["elapsed"]
+    work.start_s = start_s + (context.observation.now_s - then_s)
+    work.ticks, work.requests.count = state["ticks"], state["requests"]
+    ids = {path: number for number, path in tree.paths.items()}
+    odd = [p for p in (*state["status"], *state["reasons"]) if p not in ids]
+    if odd:
+        raise BadInput(f"checkpoint {kept.number} is of another tree (it knows {odd[0]})")
+    work.book.take_up({ids[p]: failure for p, failure in state["reasons"].items()})
+    work.tally.take_up(state["tally"])
+    resumed: TreeAtWork | None = None
+    if kept.start:
+        start_at(tree, state["tree"], kept.start)
+    else:
+        resumed = TreeAtWork(tree, state["tree"])
+    for path, status in state["status"].items():
+        work.status[ids[path]] = Status(status)
+    return resumed

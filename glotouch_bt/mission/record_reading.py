@@ -1,0 +1,50 @@
+"""The chunks of a record as they were written, up to a length: what a resumed run's record begins with."""
+
+from __future__ import annotations
+
+import io
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+
+import zstandard
+from mcap.exceptions import McapError
+from mcap.records import Channel, Chunk, Message
+from mcap.stream_reader import StreamReader, breakup_chunk
+
+from glotouch_bt.robot import BadInput
+
+WrittenChunk = list[tuple[int, str, bytes]]
+
+
+def read_chunks(path: Path, length: int) -> Iterator[WrittenChunk]:
+    """Each chunk as (log time ns, topic, message), in the order written.
+
+    Args:
+        path: The record; it may have been cut off beyond `length`.
+        length: Bytes to read; the end of a chunk.
+
+    Raises:
+        BadInput: The record is shorter, or damaged within that length.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(length)
+    except OSError as e:
+        raise BadInput(f"{path}: cannot be read ({e.strerror})") from e
+    if len(head) < length:
+        raise BadInput(f"{path}: has {len(head)} bytes; the checkpoint was taken at {length}")
+    stream, topics = io.BytesIO(head), dict[int, str]()
+    try:
+        for item in StreamReader(stream, emit_chunks=True).records:
+            if isinstance(item, Chunk):
+                chunk: WrittenChunk = []
+                for inside in breakup_chunk(item):
+                    if isinstance(inside, Channel):
+                        topics[inside.id] = inside.topic
+                    elif isinstance(inside, Message):
+                        chunk.append((inside.log_time, topics[inside.channel_id], inside.data))
+                yield chunk
+    except (McapError, struct.error, zstandard.ZstdError, KeyError, ValueError) as e:
+        if stream.tell() < length:
+            raise BadInput(f"{path}: damaged at byte {stream.tell()} ({type(e).__name__})") from e
