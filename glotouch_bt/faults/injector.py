@@ -13,7 +13,6 @@ from glotouch_bt.faults.trigger import Moment, holds, running_node
 from glotouch_bt.robot import BadInput, Command, GuardTripped, Observation, Request, Robot, Tare, Ticket
 from glotouch_bt.robot.disturber import Disturber
 from glotouch_bt.robot.interface import Snapshot
-from glotouch_bt.robot.interface import Snapshot
 from glotouch_bt.robot.streams import stream
 
 
@@ -33,7 +32,7 @@ class _Fault:
     def try_begin(self, moment: Moment) -> bool:
         """Begin if its moment has come."""
         when = self.spec.when
-        if moment.now_s < self._next_s or not holds(when, moment):
+        if moment.now_s < self._next_s - 1e-9 or not holds(when, moment):
             return False
         self._node = running_node(when, moment)
         if when.node is not None and self._node is None:
@@ -188,10 +187,6 @@ class FaultInjector(Robot):
     def close(self) -> None:
         """Passed on."""
         self._robot.close()
-
-    def snapshot(self) -> Snapshot | None:
-        """Of the device; the faults are no part of it: a resumed run goes on without them."""
-        return self._robot.snapshot()
 
     # -- what the run tells it ---------------------------------------------------------------------------------------
 
