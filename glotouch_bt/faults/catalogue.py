@@ -35,7 +35,8 @@ class FaultKind:
         summary: What it does.
         effect: The class at work.
         seen_by: Who should notice it, for people.
-        recoverable: A mission can still reach its goal: the fault passes or can be worked round.
+        recoverable: A mission can still reach its goal: the fault passes or can be worked round. A device that gives
+            no numbers, old ones or ever the same is not trusted again before a person has looked: it is not.
     """
 
     name: str
@@ -89,9 +90,9 @@ class FaultKind:
 def _kinds() -> Mapping[str, FaultKind]:
     watch, guard, tree = "supervision", "the guarded move or the hard limit", "the skill that meets it"
     rows: tuple[tuple[str, str, str, type[Effect], str, bool], ...] = (
-        ("wrench_off", "wrench", "every component reads zero", wrench.Off, watch, True),
-        ("wrench_stuck", "wrench", "the last sample is repeated", wrench.Stuck, watch, True),
-        ("wrench_garbage", "wrench", "samples are NaN, infinite or huge", wrench.Garbage, watch, True),
+        ("wrench_off", "wrench", "every component reads zero", wrench.Off, watch, False),
+        ("wrench_stuck", "wrench", "the last sample is repeated", wrench.Stuck, watch, False),
+        ("wrench_garbage", "wrench", "samples are NaN, infinite or huge", wrench.Garbage, watch, False),
         ("wrench_bias", "wrench", "a constant is added", wrench.Bias, guard + "; a new tare", True),
         ("wrench_drift", "wrench", "a ramp is added", wrench.Drift, guard + "; a new tare", True),
         ("wrench_scale", "wrench", "every component is multiplied", wrench.Scale, tree + ", by a weight", True),
@@ -104,7 +105,7 @@ def _kinds() -> Mapping[str, FaultKind]:
         ("stale_tare", "wrench", "tares are acknowledged, not done", wrench.StaleTare, tree + ", by a weight", True),
         ("touch_dead", "touch", "taxels deliver nothing", touch.Dead, "squeeze: fewer valid taxels", True),
         ("touch_frozen", "touch", "one pair of maps comes again", touch.Frozen, watch + "; squeeze", True),
-        ("touch_dropped", "touch", "frames are lost", touch.Dropped, watch + "; squeeze", True),
+        ("touch_dropped", "touch", "frames are lost", touch.Dropped, watch + "; squeeze", False),
         ("touch_swapped", "touch", "left is given as right", touch.Swapped, "match", True),
         ("gel_offset", "touch", "untouched gel reads a depth", touch.Offset, "squeeze; match", True),
         ("grip_stall", "gripper", "the jaws stand still", gripper.Stall, tree, True),
@@ -124,7 +125,7 @@ def _kinds() -> Mapping[str, FaultKind]:
         ("ik_failure", "arm", "the device finds no joint solution", arm.IkFailure, tree, False),
         ("lost_cycle", "arm", "commands do not arrive", arm.LostCycle, watch, True),
         ("slow_cycle", "arm", "cycles overrun, their samples are lost", arm.SlowCycle, watch, True),
-        ("stale_data", "arm", "one old block is delivered again", arm.StaleData, watch, True),
+        ("stale_data", "arm", "one old block is delivered again", arm.StaleData, watch, False),
         ("robot_fault", "arm", "the controller stops by itself", arm.RobotFault, "the runner", False),
         ("object_shoved", "world", "an object is knocked and slides", world.Shove, tree, True),
         ("object_toppled", "world", "an object is laid on its side", world.Topple, tree, True),

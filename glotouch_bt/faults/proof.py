@@ -110,5 +110,4 @@ class Proof:
 def _leaves(began: list[tuple[float, str]], since_s: float) -> list[str]:
     """Names of the leaves that began after a moment: what was done about it."""
     later = [path for stamp_s, path in began if stamp_s > since_s - 1e-9]
-    names = [p.rsplit("/", 1)[-1] for p, q in zip(later, [*later[1:], ""], strict=True) if not q.startswith(p + "/")]
-    return names
+    return [p.rsplit("/", 1)[-1] for p in later if not any(q.startswith(p + "/") for q in later)]

@@ -28,7 +28,7 @@ class TouchEffect(Effect):
 class DeadParams(FaultParams):
     """Parameters of `touch_dead`."""
 
-    share: float = param("Share of the taxels that deliver nothing", default=0.5, gt=0.0, le=1.0)
+    share: float = param("Share of the taxels that deliver nothing", default=0.3, gt=0.0, le=1.0)
 
 
 class Dead(TouchEffect):

@@ -1,0 +1,145 @@
+"""What is wrong with a plan is said all at once, each with its place; nothing else ever happens."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from glotouch_bt.faults.catalogue import CATALOGUE, NAMED_BY
+from glotouch_bt.faults.plan import check_plan, read_plan
+from glotouch_bt.faults.trigger import Lasting, When
+from glotouch_bt.mission.findings import MissionFaults
+from glotouch_bt.mission.library import shipped
+from glotouch_bt.mission.load import load_mission
+from glotouch_bt.mission.source import parse_yaml
+from glotouch_bt.robot import BadInput
+
+BAD = """\
+faults: everything
+sed: 3
+plan:
+  - fault: wrench_bais
+  - fault: wrench_bias
+    with: {force_N: [0, 0], torqe_Nm: [0, 0, 0]}
+    when: {node: guarded_swep, time_s: 3 mm}
+    for: eternity
+  - fault: wrench_delay
+    with: {delay_s: 9}
+    for: node
+  - fault: wrench_off
+    for: {cycles: 3, until: ever}
+    repeat: {times: 0}
+  - 7
+"""
+
+
+def findings_of(text: str) -> list[tuple[int, int, str]]:
+    with pytest.raises(MissionFaults) as e:
+        check_plan(parse_yaml(text, "bad.yaml"))
+    return [(f.place.line, f.place.column, f.code) for f in e.value.findings]
+
+
+def test_all_faults_in_one_report_each_with_its_place() -> None:
+    found = findings_of(BAD)
+    assert [f[:1] + f[2:] for f in found] == [
+        (2, "unknown_key"),
+        (4, "unknown_fault"),
+        (6, "wrong_type"),
+        (6, "unknown_parameter"),
+        (7, "wrong_unit"),
+        (8, "wrong_type"),
+        (10, "wrong_range"),
+        (11, "wrong_value"),
+        (13, "wrong_value"),
+        (14, "wrong_range"),
+        (15, "wrong_type"),
+    ]
+    with pytest.raises(MissionFaults, match=r"bad\.yaml:4:12: unknown fault 'wrench_bais'; did you mean 'wrench_bias'"):
+        check_plan(parse_yaml(BAD, "bad.yaml"))
+
+
+def test_a_node_nobody_has() -> None:
+    mission = load_mission("calibrate")
+    text = "faults: f\nplan:\n  - {fault: wrench_off, when: {node: tool_pickupp}}"
+    with pytest.raises(MissionFaults, match="did you mean 'tool_pickup'"):
+        check_plan(parse_yaml(text, "p.yaml"), mission.tree, mission.name)
+    check_plan(parse_yaml(text.replace("pickupp", "pick*"), "p.yaml"), mission.tree, mission.name)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("for: 2 s", Lasting(duration_s=2.0)),
+        ("for: 250 ms", Lasting(duration_s=0.25)),
+        ("for: 3", Lasting(duration_s=3.0)),
+        ("for: ever", Lasting(until="ever")),
+        ("for: {cycles: 4}", Lasting(cycles=4)),
+        ("when: {node: x}", Lasting(until="node")),
+        ("name: x", Lasting(until="ever")),
+    ],
+)
+def test_how_long(text: str, expected: Lasting) -> None:
+    plan = check_plan(parse_yaml(f"faults: f\nplan:\n  - fault: wrench_off\n    {text}", "p.yaml"))
+    assert plan.faults[0].lasting == expected
+
+
+def test_defaults_and_units() -> None:
+    text = "faults: f\nseed: 4\nplan:\n  - {fault: wrench_off}\n  - {fault: wrench_off, when: {time_s: 1 min}}"
+    plan = check_plan(parse_yaml(text, "p.yaml"))
+    assert plan.seed == 4
+    assert [f.name for f in plan.faults] == ["wrench_off", "wrench_off 2"]
+    assert plan.faults[0].when == When()
+    assert plan.faults[1].when.time_s == 60.0
+
+
+@pytest.mark.parametrize("name", sorted(shipped("faults")))
+def test_shipped_plans_fit_the_flagship(name: str) -> None:
+    mission = load_mission("retrieve")
+    assert read_plan(name, mission.tree, mission.name).faults
+
+
+def test_the_catalogue_is_whole() -> None:
+    for name, kind in CATALOGUE.items():
+        assert kind.name == name
+        assert kind.channel in NAMED_BY
+        kind.effect.Params()
+        assert kind.as_dict()["parameters"] == kind.parameters()
+
+
+def test_a_file_that_is_none(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="no such fault plan"):
+        read_plan(tmp_path / "none.yaml")
+
+
+leaf = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-5, 10**20),
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.text(max_size=8),
+    st.sampled_from([*CATALOGUE, "ever", "node", "2 s", "retrieve", "!!python/object:os.system", "a*", "[", "3 mm"]),
+)
+WORDS = "faults plan fault with when for repeat seed name times every_s cycles force_N share kind duration_s until lost"
+keys = st.one_of(st.sampled_from([*WORDS.split(), *When.model_fields]), st.text(min_size=1, max_size=6))
+tree = st.recursive(
+    leaf, lambda t: st.one_of(st.lists(t, max_size=4), st.dictionaries(keys, t, max_size=5)), max_leaves=25
+)
+
+
+@settings(max_examples=400, deadline=None)
+@given(
+    st.one_of(
+        tree,
+        st.fixed_dictionaries(
+            {"faults": st.just("f"), "plan": st.lists(st.dictionaries(keys, tree, max_size=5), max_size=4)}
+        ),
+    )
+)
+def test_no_plan_gives_anything_but_a_plan_or_its_faults(document: object) -> None:
+    with suppress(BadInput):
+        check_plan(parse_yaml(yaml.safe_dump(document, allow_unicode=True), "p.yaml"))
