@@ -36,9 +36,11 @@ PACE = 0.75
 """Speed of giving way against the closing speed; half of it would only keep the jaw that touches where it is."""
 LEAST_STEP_M = 0.0005
 TIMEOUT_S = 4.0
-LETTING_GO_M_S, LETTING_GO_N, LET_GO_M, LETTING_GO_S, OPENING_M_S, OPENING_N = 0.02, 2.0, 0.003, 0.5, 0.2, 10.0
-"""Opening begins slowly and weakly, until the jaws are so much farther apart, or so long: what is held askew springs
-back, and what a fingertip stands on is dragged along with twice this force at most."""
+LETTING_GO_M_S, LETTING_GO_N, LET_GO_M, LETTING_GO_S = 0.02, 2.0, 0.003, 0.5
+"""Opening begins slowly and weakly, until the jaws are so much farther apart; jaws that do not move are given so long:
+what is held askew springs back, and what a fingertip stands on is dragged along with twice this force at most."""
+OPENING_M_S, OPENING_N, OPENING_S = 0.2, 10.0, 3.5
+"""Opening after that, and how long all of it may take."""
 LOOSE_N, CAUGHT_N, FREED_N = 0.5, 4.0, 1.0
 """Jaws that hold with less than the first should not be felt: more than the second on the hand, and it is caught; less
 than the third, and it is free again."""
@@ -77,10 +79,11 @@ def close_gently(
             jaw force while pressing; the jaws have opened again.
     """
     closing = _Closing(arm, speed_m_s, tactile, seen_by)
-    state = yield from closing.until_rest([min(GENTLE_N, force_N)])
-    if force_N > GENTLE_N:
-        steps = int(np.ceil((force_N - GENTLE_N) / (RAMP_N_S * arm.period_s) - 1e-9))
-        state = yield from closing.until_rest(np.linspace(GENTLE_N, force_N, steps + 1)[1:].tolist())
+    with arm.feed.finishing():  # a pause comes when the jaws rest: until then the hand must be able to give way
+        state = yield from closing.until_rest([min(GENTLE_N, force_N)])
+        if force_N > GENTLE_N:
+            steps = int(np.ceil((force_N - GENTLE_N) / (RAMP_N_S * arm.period_s) - 1e-9))
+            state = yield from closing.until_rest(np.linspace(GENTLE_N, force_N, steps + 1)[1:].tolist())
     return state
 
 
@@ -152,28 +155,42 @@ def _most_N(jaw_N: float) -> float:
 def let_go(arm: Arm, opening_m: float) -> Motion[None]:
     """Open the jaws to `opening_m`, slowly and weakly until they are off what they held.
 
-    If the hand is still pressed once the jaws hold nothing, a fingertip stands on something or is caught under it: the
-    hand goes the way it is pushed until it is free.
+    If the hand is pressed although the jaws hold nothing, a fingertip stands on something, or is caught under it or in
+    a hollow of its flank: the jaws stop, the hand goes the way it is pushed until it is free, and they begin anew.
+    What was held may drop onto a fingertip only after the jaws are off it, so this is watched until they are open. A
+    pause waits until then.
     """
-    held, given = arm.aperture_m, 0.0
-    force_N = LETTING_GO_N
-    yield from _turn_jaws(arm, opening_m, LETTING_GO_N)
-    for _ in range(round(LETTING_GO_S / arm.period_s)):
-        if arm.aperture_m > held + LET_GO_M:
-            force_N = OPENING_N
-            break
+    with arm.feed.finishing():
+        yield from _let_go(arm, opening_m)
+
+
+def _let_go(arm: Arm, opening_m: float) -> Motion[None]:
+    held, given, weak, since = arm.aperture_m, 0.0, True, 0
+    watch = JawWatch(arm.period_s)
+    yield from _turn_jaws(arm, opening_m, weak)
+    for k in range(round(OPENING_S / arm.period_s)):
         (seen,) = yield from arm.hold(arm.period_s)
         force = _force_P(seen)
-        if seen.gripper.force_N < LOOSE_N and np.linalg.norm(force) > CAUGHT_N and given < FREEING_M - LEAST_STEP_M:
-            yield from _turn_jaws(arm, arm.aperture_m, LETTING_GO_N)
+        pressed = np.linalg.norm(force) > CAUGHT_N
+        still = watch.still(seen.now_s, seen.gripper)
+        if pressed and not (weak and seen.gripper.force_N >= LOOSE_N) and given < FREEING_M - LEAST_STEP_M:
+            yield from _turn_jaws(arm, arm.aperture_m, True)
             given += yield from _free(arm, force, FREEING_M - given)
-            yield from _turn_jaws(arm, opening_m, LETTING_GO_N)
-    yield from arm.jaws(opening_m, speed_m_s=OPENING_M_S, force_N=force_N)
+            held, weak, since = arm.aperture_m, True, k
+        elif weak and not pressed and arm.aperture_m > held + LET_GO_M:
+            weak = False
+        elif still and not (weak and k < since + round(LETTING_GO_S / arm.period_s)):
+            break
+        else:
+            continue
+        watch = JawWatch(arm.period_s)
+        yield from _turn_jaws(arm, opening_m, weak)
 
 
-def _turn_jaws(arm: Arm, aperture_m: float, force_N: float) -> Motion[None]:
-    """Send the jaws elsewhere, slowly; one period."""
-    yield from arm.jaws(aperture_m, speed_m_s=LETTING_GO_M_S, force_N=force_N, timeout_s=arm.period_s)
+def _turn_jaws(arm: Arm, aperture_m: float, weak: bool) -> Motion[None]:
+    """Send the jaws elsewhere; one period."""
+    speed_m_s, force_N = (LETTING_GO_M_S, LETTING_GO_N) if weak else (OPENING_M_S, OPENING_N)
+    yield from arm.jaws(aperture_m, speed_m_s=speed_m_s, force_N=force_N, timeout_s=arm.period_s)
 
 
 def _free(arm: Arm, force_P_N: Array, most_m: float) -> Motion[float]:
