@@ -76,6 +76,13 @@ class Prober:
         """(3,) where the ball's centre is commanded to be."""
         return self._tool.tip_K_m(self._world, self._context.arm.pose_B_P)
 
+    @property
+    def resting_up_N(self) -> float | None:
+        """Force straight up on the wrist at the newest rest; None before the first."""
+        if self._rested is None:
+            return None
+        return float((self._context.arm.pose_B_P.rotation @ self._rested[1].median[:3])[2])
+
     def rest(self) -> Motion[Baseline]:
         """Hold still until wrench and twist have settled, at most `LONGEST_REST_S`; the wrench of "nothing touched".
 
@@ -86,7 +93,10 @@ class Prober:
         period_s = self._context.arm.period_s
         window: deque[Observation] = deque(maxlen=round(REST_S / period_s))
         for _ in range(round(LONGEST_REST_S / period_s)):
-            window.extend((yield from self._context.arm.hold(period_s)))
+            (seen,) = yield from self._context.arm.hold(period_s)
+            if window and seen.stamp_s[0] - window[-1].now_s > period_s:
+                window.clear()  # a pause: what was sensed before it is old
+            window.append(seen)
             if len(window) == window.maxlen and settled(list(window)):
                 break
         baseline = fit_baseline(np.concatenate([o.wrench_S for o in window]))

@@ -112,7 +112,11 @@ class ToolCalibrate(Skill):
         yield from self.context.arm.line(tool.pose_B_P(world, low), p.travel_speed_m_s)
 
     def _rise(self, tool: HeldTool, place: Array) -> Motion[tuple[float, float]]:
-        """Up to the touching height; the wrist sensor's latency and its standard deviation, s."""
+        """Up to the touching height; the wrist sensor's latency and its standard deviation, s. Pauses come later."""
+        with self.context.arm.feed.finishing():
+            return (yield from self._measured_rise(tool, place))
+
+    def _measured_rise(self, tool: HeldTool, place: Array) -> Motion[tuple[float, float]]:
         arm = self.context.arm
         blocks: list[Observation] = []
         blocks += yield from arm.hold(0.1)

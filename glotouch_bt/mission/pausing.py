@@ -47,7 +47,7 @@ class PauseGate:
             self.feed.wanted = wanted
             self._event(PAUSE if wanted else RESUMED, now_s)
             self._standing = False
-        if self.feed.standing:
+        elif wanted and self.feed.standing:
             self._stands("on the way")
 
     def begins(self, style: Style) -> None:
@@ -65,7 +65,7 @@ class PauseGate:
         """The arm stands where the last motion ended, and nothing is under way that must be finished first."""
         motion = self._last.motion
         at_rest = motion is None or not (np.count_nonzero(motion.dq) or np.count_nonzero(motion.ddq))
-        return at_rest and not self.feed.standing and not self.feed.waits
+        return at_rest and not self.feed.taken and not self.feed.waits
 
     def _wait(self, ticks: int) -> None:
         """Hold until the pause is over."""

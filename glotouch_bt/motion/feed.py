@@ -12,7 +12,7 @@ from typing import Literal
 
 Style = Literal["hold", "retreat", "finish"]
 
-BACK_OFF_M = 0.004
+BACK_OFF_M = 0.003
 """How far a `retreat` backs off: the probe bends and its pads give less than a millimetre at a touch."""
 BACK_OFF_M_S = 0.02
 """Largest speed of backing off, and of coming back to the contact."""
@@ -26,11 +26,13 @@ class Feed:
         wanted: A pause is asked for.
         style: What it does to the skill that runs: `hold`, `retreat` (a guarded motion also backs off), `finish` (the
             present motion is made to its end).
-        standing: A motion stands in the middle of its path because of it.
+        taken: A motion under way takes care of the pause: it brakes, backs off or stands.
+        standing: It stands.
     """
 
     wanted: bool = False
     style: Style = "hold"
+    taken: bool = False
     standing: bool = False
     _finishing: int = 0
 
@@ -43,6 +45,15 @@ class Feed:
     def waits(self) -> bool:
         """A pause must wait for what is being finished."""
         return bool(self._finishing)
+
+    @contextmanager
+    def taking(self) -> Iterator[None]:
+        """A motion takes care of the pause."""
+        self.taken = True
+        try:
+            yield
+        finally:
+            self.taken = self.standing = False
 
     @contextmanager
     def finishing(self) -> Iterator[None]:

@@ -142,7 +142,10 @@ class Mover:
         limits = self.limits
         trip = _Trip(guard)
         done_m, travelled = 0.0, 0.0
-        for plan in plans:
+        if guard is not None and self.feed.stops:  # its zero was taken just now, and must not grow old unheard
+            with self.feed.taking():
+                yield from self._wait(trip, tactile)
+        for plan in plans if not trip.over() else ():
             running: Plan | None = plan
             while running is not None:
                 now, running = running, None
@@ -193,31 +196,33 @@ class Mover:
 
         If the guard trips on the way it is a contact as ever, and the pause is left to the next motion.
         """
-        at_m = float(plan.progress.s[k])
-        slower = plan.brake(k, self.period_s)
-        legs: list[Plan] = []
-        if slower is not None:
-            at_m = min(float(slower.progress.s[-1]), plan.piece.length_m)
-            legs.append(slower)
-        if trip.guard is not None and self.feed.style == "retreat" and at_m > 1e-6:
-            legs.append(plan.between(at_m, max(0.0, at_m - BACK_OFF_M), self.period_s, BACK_OFF_M_S))
-        for leg in legs:
-            k = yield from self._play(leg, trip, tactile)
-            if trip.over():
-                return (yield from self._halt(leg, k, trip, tactile))
-            at_m = min(float(leg.progress.s[-1]), plan.piece.length_m)
+        with self.feed.taking():
+            at_m = float(plan.progress.s[k])
+            slower = plan.brake(k, self.period_s)
+            legs: list[Plan] = []
+            if slower is not None:
+                at_m = min(float(slower.progress.s[-1]), plan.piece.length_m)
+                legs.append(slower)
+            if trip.guard is not None and self.feed.style == "retreat" and at_m > 1e-6:
+                legs.append(plan.between(at_m, max(0.0, at_m - BACK_OFF_M), self.period_s, BACK_OFF_M_S))
+            for leg in legs:
+                k = yield from self._play(leg, trip, tactile)
+                if trip.over():
+                    return (yield from self._halt(leg, k, trip, tactile))
+                at_m = min(float(leg.progress.s[-1]), plan.piece.length_m)
+            yield from self._wait(trip, tactile)
+        return at_m
+
+    def _wait(self, trip: _Trip, tactile: bool) -> Motion[None]:
+        """Stand until the pause is over or the guard trips."""
         self.along_m_s2 = 0.0
         self.feed.standing = True
-        try:
-            while self.feed.stops:
-                observation = yield Command(tactile=tactile)
-                self._see(observation)
-                trip.take(observation)
-                if trip.ask(observation, standing=True):
-                    break
-        finally:
-            self.feed.standing = False
-        return at_m
+        while self.feed.stops:
+            observation = yield Command(tactile=tactile)
+            self._see(observation)
+            trip.take(observation)
+            if trip.ask(observation, standing=True):
+                return
 
     def _halt(self, plan: Plan, k: int, trip: _Trip, tactile: bool) -> Motion[float]:
         """The guard's own hard stop, after period `k`; where it ends, m."""
@@ -259,15 +264,11 @@ class Mover:
         """Stop a joint move after period `k`, wait until the pause is over; what is left of it."""
         at = float(profile.share.s[k])
         slower = brake(profile.share, k, profile.pace, self.period_s)
-        if slower is not None:
-            yield from self._turn(JointProfile.along(profile.start, profile.way, slower, profile.pace))
-            at = min(float(slower.s[-1]), 1.0)
-        self.feed.standing = True
-        try:
-            while self.feed.stops:
-                self._see((yield Command()))
-        finally:
-            self.feed.standing = False
+        with self.feed.taking():
+            if slower is not None:
+                yield from self._turn(JointProfile.along(profile.start, profile.way, slower, profile.pace))
+                at = min(float(slower.s[-1]), 1.0)
+            yield from self._wait(_Trip(None), False)
         if at >= 1.0 - 1e-9:
             return None
         left = between(at, 1.0, profile.pace, self.period_s)
