@@ -134,7 +134,10 @@ class Keeper:
         paths, storage, space = work.tree.paths, Blackboard.storage, work.tree.namespace
         values = {k: storage[f"{space}/{k}"] for k in work.tree.keys if f"{space}/{k}" in storage}
         parts: dict[str, object] = {f"port {key}": value for key, value in values.items()}
+        recorded = tuple(k for k, v in values.items() if work.written.get(k) is v)
+        parts |= {f"recorded {k}": v for k, v in work.written.items() if k not in recorded}
         parts |= {
+            "recorded": recorded,
             "tree": tree_state(work.tree, finished),
             "arm": work.context.arm.state(),
             "preempted": work.context.preempted,
@@ -142,7 +145,6 @@ class Keeper:
             "tally": work.tally.state(),
             "reasons": {paths[i]: failure for i, failure in work.book.noted().items()},
             "status": {paths[i]: status.value for i, status in work.status.items()},
-            "recorded": tuple(k for k, v in values.items() if work.written.get(k) is v),
             "ticks": work.ticks,
             "requests": work.requests.count,
             "elapsed": (work.start_s, work.context.observation.now_s),
@@ -163,11 +165,11 @@ def take_up(work: Work, kept: TakenUp) -> TreeAtWork | None:
         if name not in state:
             raise BadInput(f"checkpoint {kept.number} lacks the state of the {name}: it could not be kept")
     for name, value in state.items():
-        if name.startswith("port "):
-            key = name.removeprefix("port ")
+        what, _, key = name.partition(" ")
+        if what == "port":
             Blackboard.storage[f"{tree.namespace}/{key}"] = value
-            if key in state["recorded"]:
-                work.written[key] = value
+        if (what == "port" and key in state["recorded"]) or (what == "recorded" and key):
+            work.written[key] = value
     context.arm.restore(state["arm"])
     if not kept.same_world:
         context.arm.sync(context.observation)
