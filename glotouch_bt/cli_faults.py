@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Annotated, Any
@@ -77,6 +78,7 @@ def bench_faults(
     from glotouch_bt.cli_bench import _check, _folder
     from glotouch_bt.cli_doctor import read_settings
     from glotouch_bt.mission.load import load_mission
+    from glotouch_bt.robot import GlotouchError
     from glotouch_bt.study.faults import Campaign, few_objects, run_campaign
     from glotouch_bt.study.faults_cases import SKILLS, chosen_cases
     from glotouch_bt.study.faults_exhaustive import Exhaustive, run_exhaustive
@@ -115,8 +117,11 @@ def bench_faults(
         said = f"{row['verdict']} {row.get('cause') or ''}" if row["effective"] else "altered nothing"
         sys.stderr.write(f"[{done}/{total}] seed {row['seed']} {what}: {said} ({row['wall_s']:.0f} s)\n")
 
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        summary = run_campaign(campaign, pool, show)
+    try:
+        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+            summary = run_campaign(campaign, pool, show)
+    except BrokenProcessPool as e:
+        raise GlotouchError(f"a trial ended its process; go on with --resume --out {folder}") from e
     if json_:
         sys.stdout.write(json.dumps(summary, indent=2) + "\n")
     else:

@@ -190,6 +190,11 @@ class FaultInjector(Robot):
 
     # -- what the run tells it ---------------------------------------------------------------------------------------
 
+    @property
+    def now_s(self) -> float:
+        """The device's clock, whatever it is said to be."""
+        return self._moment.now_s
+
     def node_began(self, path: str, now_s: float) -> None:
         """A node of the tree runs from now on."""
         if self.sightings:

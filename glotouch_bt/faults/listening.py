@@ -45,8 +45,10 @@ class ListeningRecord:
         if kind == FAILURE_EVENT:
             self._injector.saw(stamp_s, str(data["node"]), str(data["code"]), str(data["message"]))
         elif kind in self._reactions:
+            # A guard dates what it found by the last sample it trusted: it knew of it now.
+            known_s = max(stamp_s, self._injector.now_s)
             words = str(data.get("what", data.get("text", "")))
-            self._injector.saw(stamp_s, kind, str(data.get("guard", data.get("code", ""))), words)
+            self._injector.saw(known_s, "supervision", str(data.get("guard", data.get("code", ""))), words)
         self._record.event(kind, stamp_s, data)
 
     def port(self, stamp_s: float, key: str, value: object) -> None:

@@ -18,7 +18,8 @@ from glotouch_bt.study.launch import RunRequest, launch
 
 HUNG_S = 900.0
 """Wall time after which a trial counts as hanging."""
-ROW = "row.json"
+ROW, STARTED = "row.json", "started"
+MOST_STARTS = 2
 VERDICTS = ("recovered", "safely ended", "wrong", "unsafe")
 
 
@@ -92,9 +93,12 @@ def run_trial(
     if resume and kept.is_file():
         row: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8"))
         return row
+    starts = _count_start(request.out / STARTED)
     began = time.perf_counter()
     row = dict(labels) | {"folder": request.out.name}
     try:
+        if starts > MOST_STARTS:
+            raise Hung(f"took its process down {MOST_STARTS} times")
         with hang_guard():
             done = launch(request)
     except BadInput:
@@ -115,6 +119,14 @@ def run_trial(
     part.write_text(json.dumps(row) + "\n", encoding="utf-8")
     part.replace(kept)
     return row
+
+
+def _count_start(marker: Path) -> int:
+    """How often this trial has been started, this time included: a mission that is lost ends its own process."""
+    marker.parent.mkdir(parents=True, exist_ok=True)
+    starts = 1 + (int(marker.read_text(encoding="utf-8")) if marker.is_file() else 0)
+    marker.write_text(str(starts), encoding="utf-8")
+    return starts
 
 
 def _row(result: Mapping[str, Any], hard_force_N: float) -> dict[str, Any]:
