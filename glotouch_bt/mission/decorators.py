@@ -107,6 +107,11 @@ class ClockTimeout(Decorator):
         """As much time has passed; the clock may be another one now."""
         self._start_s = kept["start_s"] + (self._clock() - kept["clock_s"])
 
+    @property
+    def deadline_s(self) -> float:
+        """When the child's time is up, on the robot's clock; of use while it runs."""
+        return self._start_s + self._seconds
+
     def initialise(self) -> None:
         """Start the clock."""
         self.feedback_message = ""

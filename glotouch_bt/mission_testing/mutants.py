@@ -1,7 +1,7 @@
 """Slips a person makes in a mission, made on purpose: every mutant of a tree, each with the place it changes.
 
-Mutants are made of the checked tree, so that they reach into subtrees' files too and keep their places. A node is found
-again by its number in the walk, for one file gives one shape whatever the mission's parameters are.
+Mutants are made of the checked tree, so that they reach into subtrees' files too and keep their places. What stands in
+one place of a file is changed wherever that file is used, as a slip there would.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from glotouch_bt.mission.source import Place
 
 Change = Callable[[NodeSpec], NodeSpec]
 Slip = tuple[str, Place, str, Change]
+Keys = Mapping[Any, list[str]]
 TURNS = ("invert", "succeed", "fail")
 """Nodes that change a result."""
 
@@ -41,23 +42,26 @@ class Mutant:
         operator: Its class: composite, drop, unwrap, wrap, order, bound, key, on_failure, constant, parameter.
         place: Where it was made.
         what: What was done, for a person.
-        number: Number of the changed node in the walk of the tree.
+        target: Place and kind of the changed node.
         change: The node to what it becomes.
     """
 
     operator: str
     place: Place
     what: str
-    number: int
+    target: tuple[Place, str]
     change: Change
 
-    def apply(self, root: NodeSpec) -> NodeSpec:
+    def apply(self, node: NodeSpec) -> NodeSpec:
         """The tree with this slip in it."""
-        return _replaced(root, self.number, self.change)
+        children = tuple(map(self.apply, node.children))
+        if any(new is not old for new, old in zip(children, node.children, strict=True)):
+            node = replace(node, children=children)
+        return self.change(node) if (node.place, node.kind) == self.target else node
 
 
 def findings_of(root: NodeSpec) -> list[Finding]:
-    """What `glotouch check` says of a tree."""
+    """The faults `glotouch check` finds in a tree."""
     findings = Findings()
     check_flow(root, findings)
     return findings.sorted()
@@ -65,12 +69,16 @@ def findings_of(root: NodeSpec) -> list[Finding]:
 
 def mutants_of(root: NodeSpec) -> Iterator[Mutant]:
     """Every mutant of a tree that differs from it and from those before."""
-    seen = {signature(root)}
+    seen, visited = {signature(root)}, set()
     parents = {id(child): node for node in root.walk() for child in node.children}
     keys = _keys_by_type(root)
-    for number, node in enumerate(root.walk()):
+    for node in root.walk():
+        target = (node.place, node.kind)
+        if target in visited:
+            continue
+        visited.add(target)
         for operator, place, what, change in _changes(node, parents.get(id(node)), keys):
-            mutant = Mutant(operator, place, what, number, change)
+            mutant = Mutant(operator, place, what, target, change)
             made = signature(mutant.apply(root))
             if made not in seen:
                 seen.add(made)
@@ -85,21 +93,7 @@ def signature(node: NodeSpec) -> tuple[Any, ...]:
     return node.kind, name, repr(node.settings), repr(node.params), wires, repr(dict(node.constants)), below
 
 
-def _replaced(node: NodeSpec, number: int, change: Change) -> NodeSpec:
-    """The node with the `number`-th one of its walk changed."""
-    if number == 0:
-        return change(node)
-    children, at = list(node.children), 1
-    for i, child in enumerate(children):
-        size = sum(1 for _ in child.walk())
-        if at <= number < at + size:
-            children[i] = _replaced(child, number - at, change)
-            break
-        at += size
-    return replace(node, children=tuple(children))
-
-
-def _changes(node: NodeSpec, parent: NodeSpec | None, keys: Mapping[Any, list[str]]) -> Iterator[Slip]:
+def _changes(node: NodeSpec, parent: NodeSpec | None, keys: Keys) -> Iterator[Slip]:
     many = KINDS[node.kind].children == "many" if node.kind in KINDS else False
     if many and len(node.children) > 1:
         yield from _composite(node)
@@ -212,23 +206,35 @@ def _comparisons(s: ConditionSettings) -> Iterator[tuple[str, dict[str, Any]]]:
         yield f"{name} becomes {other}", {name: None, other: value}
 
 
-def _rewired(node: NodeSpec, keys: Mapping[Any, list[str]]) -> Iterator[Slip]:
-    """Each wire the mission writes out, put to the next key of its type; a written one to a key nobody reads."""
-    for side in ("reads", "writes"):
-        for port, wire in getattr(node, side).items():
+def _rewired(node: NodeSpec, keys: Keys) -> Iterator[Slip]:
+    """Each wire the mission writes out, put to another key of its type, or to one that nobody else uses."""
+    for side, wires in (("reads", node.reads), ("writes", node.writes)):
+        for port, wire in wires.items():
             if wire.place == node.place or port in node.constants:
                 continue
-            kind = next((k for k, names in keys.items() if wire.key in names), None)
-            others = [k for k in keys.get(kind, []) if k != wire.key]
-            new = others[0] if others else f"{wire.key}_elsewhere"
-            words = f"{node.name!r}: {port} {wire.key!r} becomes {new!r}"
-            yield "key", wire.place, words, _with_wire(side, port, replace(wire, key=new))
+            words = f"{node.name!r}: {port} {_local(wire.key)!r} becomes {_local(_other(wire.key, keys))!r}"
+            yield "key", wire.place, words, _with_wire(side, port, keys)
 
 
-def _with_wire(side: str, port: str, wire: Wire) -> Change:
+def _with_wire(side: str, port: str, keys: Keys) -> Change:
+    def other(wire: Wire) -> Wire:
+        return replace(wire, key=_other(wire.key, keys))
+
     if side == "reads":
-        return lambda n: replace(n, reads={**n.reads, port: wire})
-    return lambda n: replace(n, writes={**n.writes, port: wire})
+        return lambda n: replace(n, reads={**n.reads, port: other(n.reads[port])})
+    return lambda n: replace(n, writes={**n.writes, port: other(n.writes[port])})
+
+
+def _other(key: str, keys: Keys) -> str:
+    """The first other key of the same type in the same file, else of the mission, else a new one."""
+    same_type = next((names for names in keys.values() if key in names), [])
+    others = [k for k in same_type if k != key]
+    beside = [k for k in others if k.rpartition("/")[0] == key.rpartition("/")[0]]
+    return next(iter([*beside, *others]), f"{key}_elsewhere")
+
+
+def _local(key: str) -> str:
+    return key.rpartition("/")[2]
 
 
 def _keys_by_type(root: NodeSpec) -> dict[Any, list[str]]:

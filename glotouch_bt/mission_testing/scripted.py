@@ -16,7 +16,7 @@ from glotouch_bt.mission_testing import casting
 from glotouch_bt.mission_testing.casting import ScriptError
 from glotouch_bt.mission_testing.leaf import Call, Part, Stage, playing
 from glotouch_bt.mission_testing.outcomes import Script
-from glotouch_bt.mission_testing.skipping import SkippingRobot, may_skip
+from glotouch_bt.mission_testing.skipping import PATIENT, SkippingRobot, may_skip
 from glotouch_bt.robot import Command, GlotouchError, Observation, Robot, World
 from glotouch_bt.robot.fake import FakeRobot
 
@@ -191,9 +191,12 @@ def run_scripted(
         moving = any(p is None for p in parts.values())
         make_arm = default_arm if moving else lambda robot, world: cast("Arm", StillArm())
     paths = casting.paths_of(mission.tree, mission.name)
+    supervision = PATIENT if isinstance(robot, SkippingRobot) else None
     heard = _Heard(dict.fromkeys(paths, "INVALID"), most_ticks)
     tree = _played(mission.tree, mission.name, parts, stage)
-    outcome = run_mission(replace(mission, tree=tree), robot, heard, make_arm=make_arm, timeout_s=end_s)
+    outcome = run_mission(
+        replace(mission, tree=tree), robot, heard, make_arm=make_arm, timeout_s=end_s, supervision=supervision
+    )
     if isinstance(outcome.error, ScriptError | KeyboardInterrupt):
         raise outcome.error
     leaves = {p: n for p, n in paths.items() if n.kind == "skill"}
