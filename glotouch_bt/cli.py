@@ -19,6 +19,7 @@ from glotouch_bt.cli_bench import bench
 from glotouch_bt.cli_doctor import doctor, link, read_settings
 from glotouch_bt.cli_faults import bench_faults, faults
 from glotouch_bt.cli_replay import replay
+from glotouch_bt.cli_resume import resume
 from glotouch_bt.guarded import guarded, set_debug, showing_tracebacks
 
 app = typer.Typer(
@@ -33,6 +34,7 @@ bench.command("link")(link)
 bench.command("faults")(bench_faults)
 app.command("doctor")(doctor)
 app.command("replay")(replay)
+app.command("resume")(resume)
 app.command("faults")(faults)
 app.add_typer(bench)
 

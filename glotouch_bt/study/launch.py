@@ -18,7 +18,10 @@ from typing import Any
 from glotouch_bt import __version__
 from glotouch_bt.faults import FaultInjector, FaultPlan, read_plan
 from glotouch_bt.faults.listening import ListeningRecord, injector_in
+from glotouch_bt.mission.checkpoint import FILE as CHECKPOINTS
+from glotouch_bt.mission.checkpoint import CheckpointFile
 from glotouch_bt.mission.control import Control
+from glotouch_bt.mission.keeping import Keeper, TakenUp
 from glotouch_bt.mission.library import shown
 from glotouch_bt.mission.load import Mission, load_mission, split_settings
 from glotouch_bt.mission.mcap_json import to_json
@@ -29,6 +32,7 @@ from glotouch_bt.mission.watchdog import Stuck
 from glotouch_bt.mission.worlds import load_conditions
 from glotouch_bt.robot import Backend, BadInput, Conditions, Robot, load_backend
 from glotouch_bt.robot.referee import Referee, TrueObject
+from glotouch_bt.study.going_on import GoingOn, describe_run
 from glotouch_bt.study.run_folder import RunFolder
 
 RECORDED_PACKAGES = ("mujoco", "numpy", "pin", "py_trees", "ruckig", "scipy", "trimesh")
@@ -63,6 +67,19 @@ class RunRequest:
     may_kill: bool = False
     report: bool = True
 
+    def as_json(self) -> dict[str, Any]:
+        """What is needed to open the same robot and mission again."""
+        plan = self.faults.name if isinstance(self.faults, FaultPlan) else self.faults
+        return {
+            "mission": _absolute(self.mission),
+            "backend": self.backend,
+            "seed": self.seed,
+            "settings": dict(self.settings),
+            "objects": None if self.objects is None else str(self.objects.resolve()),
+            "conditions": _absolute(self.conditions),
+            "faults": None if plan is None else str(plan),
+        }
+
 
 @dataclass(frozen=True)
 class RunResult:
@@ -96,6 +113,7 @@ def launch(
     on_start: Callable[[Mission, Path], None] | None = None,
     on_progress: Callable[[float, Tally], None] | None = None,
     control: Control | None = None,
+    going_on: GoingOn | None = None,
 ) -> RunResult:
     """Check everything, open the backend, run the mission, score it, write the run's folder.
 
@@ -104,6 +122,7 @@ def launch(
         on_start: Called with the mission and its folder once the backend is open.
         on_progress: As in `run_mission`.
         control: Who may pause and stop it.
+        going_on: A broken-off run to go on with, in its own folder (`study.resume`).
 
     Raises:
         BadInput: Something given is wrong; nothing moved and nothing is left on disk.
@@ -112,7 +131,10 @@ def launch(
     began = time.perf_counter()
     if not 0 <= request.seed <= LARGEST_SEED:
         raise BadInput(f"--seed {request.seed}: must be in 0 .. {LARGEST_SEED}")
-    mission = load_mission(request.mission, request.settings, objects=request.objects)
+    if going_on is not None:
+        mission = going_on.mission
+    else:
+        mission = load_mission(request.mission, request.settings, objects=request.objects)
     conditions = load_conditions(request.conditions)
     plan = _fault_plan(request, mission)
     backend = load_backend(request.backend)
@@ -127,16 +149,28 @@ def launch(
             known = ", ".join(mission.parameters) or "none"
             raise BadInput(f"{e} (parameters of mission {mission.name!r}: {known})") from e
         referee = backend.referee(robot)
+        world = None if going_on is None else going_on.file.world(going_on.row.number)
+        objects_at_start = referee.objects() if referee else []
+        if world is not None:
+            robot.restore(world)
         if plan is not None:
             robot = _faulted(robot, plan, request, backend)
     except BaseException:
         folder.abandon()
         raise
     with robot:
-        folder.clear()
+        if going_on is None:
+            folder.clear()
         if on_start is not None:
             on_start(mission, folder.path)
-        return _run(request, mission, conditions, robot, referee, folder, began, on_progress, control)
+        taken_up = None if going_on is None else going_on.taken_up(same_world=world is not None)
+        run = _Run(request, mission, conditions, robot, referee, folder, objects_at_start, began, going_on, taken_up)
+        return _run(run, on_progress, control)
+
+
+def _absolute(given: str) -> str:
+    """A file by its whole path, so that it is found from anywhere; a shipped name as it is."""
+    return str(Path(given).resolve()) if Path(given).suffix in (".yaml", ".yml") and Path(given).is_file() else given
 
 
 def _fault_plan(request: RunRequest, mission: Mission) -> FaultPlan | None:
@@ -155,21 +189,44 @@ def _faulted(robot: Robot, plan: FaultPlan, request: RunRequest, backend: Backen
         raise
 
 
-def _run(
-    request: RunRequest,
-    mission: Mission,
-    conditions: Conditions,
-    robot: Robot,
-    referee: Referee | None,
-    folder: RunFolder,
-    began: float,
-    on_progress: Callable[[float, Tally], None] | None,
-    control: Control | None,
-) -> RunResult:
-    folder.write_text("mission.yaml", _mission_yaml(request, mission))
-    objects_at_start = referee.objects() if referee else []
+@dataclass(frozen=True)
+class _Run:
+    """A run that is about to begin, or to go on."""
+
+    request: RunRequest
+    mission: Mission
+    conditions: Conditions
+    robot: Robot
+    referee: Referee | None
+    folder: RunFolder
+    objects_at_start: list[TrueObject]
+    began: float
+    going_on: GoingOn | None
+    taken_up: TakenUp | None
+
+
+def _record(run: _Run) -> tuple[Recorder, CheckpointFile, Keeper]:
+    """The record and the checkpoints: new ones, or those of the run that goes on."""
+    description = _description(run.request, run.mission, run.conditions, run.robot)
+    going_on, folder = run.going_on, run.folder
+    if going_on is None:
+        recorder = Recorder(folder.path / "run.mcap", description)
+        asked = run.request.as_json()
+        told = describe_run(asked, run.mission, run.conditions, installed_versions())
+        file = CheckpointFile.create(folder.path / CHECKPOINTS, told)
+        return recorder, file, Keeper(file, recorder)
+    part = folder.path / ".run.mcap.part"
+    recorder = Recorder(part, description)
+    going_on.begin(part, recorder)
+    return recorder, going_on.file, Keeper(going_on.file, recorder, going_on.row.number + 1)
+
+
+def _run(run: _Run, on_progress: Callable[[float, Tally], None] | None, control: Control | None) -> RunResult:
+    request, mission, robot, referee, folder = run.request, run.mission, run.robot, run.referee, run.folder
+    if run.going_on is None:
+        folder.write_text("mission.yaml", _mission_yaml(request, mission))
     ready = time.perf_counter()
-    recorder = Recorder(folder.path / "run.mcap", _description(request, mission, conditions, robot))
+    recorder, checkpoints, keeper = _record(run)
     injector = injector_in(robot)
     record: Record = recorder if injector is None else ListeningRecord(recorder, injector)
     result: dict[str, Any] | None = None
@@ -186,24 +243,38 @@ def _run(
 
     try:
         try:
-            outcome = run_mission(mission, robot, record, on_progress=on_progress, control=control, on_lost=lost)
+            outcome = run_mission(
+                mission,
+                robot,
+                record,
+                on_progress=on_progress,
+                control=control,
+                on_lost=lost,
+                keeper=keeper,
+                taken_up=run.taken_up,
+            )
         except BaseException:  # it raises only before the first tick
             recorder.close()
-            folder.clear()
-            folder.abandon()
+            if run.going_on is None:
+                folder.clear()
+                folder.abandon()
             raise
         ended = time.perf_counter()
         result = _result(request, mission, outcome, referee)
-        result |= {"wall_time_s": round(ended - ready, 3), "wall_open_s": round(ready - began, 3)}
+        result |= {"wall_time_s": round(ended - ready, 3), "wall_open_s": round(ready - run.began, 3)}
+        if run.going_on is not None:
+            result["resumed"] = [*run.going_on.before, run.going_on.told()]
         if injector is not None:
             root = outcome.chain[-1].as_dict() if outcome.chain else {"code": "", "message": ""}
             injector.conclude(outcome.status, str(root["code"]), str(root["message"]), outcome.end_s)
             result |= {"faults": injector.report(), "held_at_end": injector.held}
+        checkpoints.note("ended", outcome.status)
     finally:
         recorder.close(result)
+        checkpoints.close()
     folder.write_json("result.json", result)
     if referee is not None:
-        truth = {"start": _truth(objects_at_start), "end": _truth(referee.objects())}
+        truth = {"start": _truth(run.objects_at_start), "end": _truth(referee.objects())}
         truth["tip_B_m"] = referee.tip_B_m().tolist()
         folder.write_json("truth.json", truth)
     report, warning = _report(folder.path) if request.report else (None, "")
@@ -241,7 +312,7 @@ def _description(request: RunRequest, mission: Mission, conditions: Conditions, 
         "holder": world.holder,
         "objects": objects,
         "robot": {"description": robot.description, "limits": robot.limits, "period_s": robot.period_s},
-        "versions": _versions(),
+        "versions": installed_versions(),
     }
 
 
@@ -279,7 +350,7 @@ def _result(request: RunRequest, mission: Mission, outcome: Outcome, referee: Re
         "peak_force_N": round(float(peak), 6),
         "sensed_peak_force_N": round(found.peak_force_N, 6),
         "parameters": {k: _portable(k, v, mission) for k, v in mission.parameters.items()},
-        "versions": _versions(),
+        "versions": installed_versions(),
     }
 
 
@@ -304,7 +375,8 @@ def _truth(objects: list[TrueObject]) -> list[Any]:
     return [to_json(o) for o in objects]
 
 
-def _versions() -> dict[str, str]:
+def installed_versions() -> dict[str, str]:
+    """Of this package and of those whose version may change a result."""
     found = {"glotouch-bt": __version__}
     for package in RECORDED_PACKAGES:
         try:

@@ -12,6 +12,7 @@ from pathlib import Path
 from glotouch_bt.robot import BadInput, GlotouchError
 
 FILES = ("mission.yaml", "run.mcap", "result.json", "truth.json", "report.html", "checkpoint.sqlite")
+LEFT_BY_SQLITE = ("checkpoint.sqlite-wal", "checkpoint.sqlite-shm")
 
 
 class RunFolder:
@@ -47,8 +48,9 @@ class RunFolder:
 
     def clear(self) -> None:
         """Remove what an earlier run left under this run's names; call when this run is sure to begin."""
-        for name in FILES:
+        for name in (*FILES, *LEFT_BY_SQLITE):
             (self.path / name).unlink(missing_ok=True)
+        shutil.rmtree(self.path / "earlier", ignore_errors=True)
 
     def abandon(self) -> None:
         """The run did not begin: remove what was made for it."""
