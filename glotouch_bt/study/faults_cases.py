@@ -46,7 +46,7 @@ class Case:
             self.fault,
             kind,
             kind.effect.Params(**self.given),
-            When(node=f"{skill}*", after_s=after_s),
+            When(node=skill, after_s=after_s),
             self.lasting,
             Repeat(),
             Place("bench faults"),
