@@ -114,7 +114,10 @@ class In(_Port[T]):
 
 
 class Out(_Port[T]):
-    """An output port: written as an attribute. `always=True` promises that it is written even when the skill fails."""
+    """An output port: written as an attribute. `always=True` promises that it is written even when the skill fails.
+
+    `on_success`, `on_failure`: the value it then has, where the outcome says it all; `glotouch check` counts on it.
+    """
 
     def __init__(
         self,
@@ -124,9 +127,11 @@ class Out(_Port[T]):
         key: str | None = None,
         element: type | None = None,
         always: bool = False,
+        on_success: T | None = None,
+        on_failure: T | None = None,
     ) -> None:
         super().__init__(data_type, description, key=key, element=element)
-        self.always = always
+        self.always, self.on_success, self.on_failure = always, on_success, on_failure
 
     @overload
     def __get__(self, obj: None, owner: type) -> Out[T]: ...

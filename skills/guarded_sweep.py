@@ -55,7 +55,7 @@ class GuardedSweep(Skill):
     previous = In(SearchMap, "what has been explored so far", key="map", required=False)
     map = Out(SearchMap, "what has been explored now")
     contact = Out(Contact, "the contact that ended the sweep")
-    exhausted = Out(bool, "nothing is left to explore, or to reach", always=True)
+    exhausted = Out(bool, "nothing is left to explore, or to reach", always=True, on_success=False)
 
     def run(self) -> SkillRun:
         """See the class."""

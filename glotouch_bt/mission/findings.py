@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
+from typing import Literal
 
 from glotouch_bt.mission.source import Place
+from glotouch_bt.mission.why import WARNINGS, WHY
 from glotouch_bt.robot import BadInput
 
 
@@ -20,6 +22,8 @@ class Finding:
         what: What is wrong, for a person.
         valid: What would be right, or empty.
         hint: The nearest valid name, or empty.
+        path: Outcomes of leaves on the shortest run that shows it, the node it is about last; empty: no run is needed.
+        node: Name of the node it is about, or empty.
     """
 
     place: Place
@@ -27,15 +31,38 @@ class Finding:
     what: str
     valid: str = ""
     hint: str = ""
+    path: tuple[str, ...] = ()
+    node: str = ""
+
+    @property
+    def severity(self) -> Literal["error", "warning"]:
+        """A warning leaves the mission as it is: it may be meant so."""
+        return "warning" if self.code in WARNINGS else "error"
+
+    @property
+    def why(self) -> str:
+        """Why it matters, or empty."""
+        return WHY.get(self.code, "")
 
     def __str__(self) -> str:
         hint = f"; did you mean {self.hint!r}?" if self.hint else ""
         valid = f" (valid: {self.valid})" if self.valid else ""
-        return f"{self.place}: {self.what}{hint}{valid}"
+        path = f" [{' > '.join(self.path)}]" if len(self.path) > 1 else ""
+        return f"{self.place}: {self.what}{hint}{valid}{path}"
 
     def as_dict(self) -> dict[str, object]:
         """For --json."""
-        return {**asdict(self.place), "code": self.code, "what": self.what, "valid": self.valid, "hint": self.hint}
+        return {
+            **asdict(self.place),
+            "severity": self.severity,
+            "code": self.code,
+            "what": self.what,
+            "why": self.why,
+            "valid": self.valid,
+            "hint": self.hint,
+            "path": list(self.path),
+            "node": self.node,
+        }
 
 
 class Findings:
@@ -44,24 +71,50 @@ class Findings:
     def __init__(self) -> None:
         self._found: dict[Finding, None] = {}
 
-    def add(self, place: Place, code: str, what: str, *, valid: str = "") -> None:
+    def add(
+        self,
+        place: Place,
+        code: str,
+        what: str,
+        *,
+        valid: str = "",
+        hint: str = "",
+        path: tuple[str, ...] = (),
+        node: str = "",
+    ) -> None:
         """Note one fault."""
-        self._found[Finding(place, code, what, valid)] = None
+        self._found[Finding(place, code, what, valid, hint, path, node)] = None
+
+    @staticmethod
+    def nearest(name: str, valid: Iterable[str]) -> str:
+        """The valid name that is most like another, or empty."""
+        near = difflib.get_close_matches(name, sorted(valid), n=1)
+        return near[0] if near else ""
 
     def unknown(self, place: Place, code: str, kind: str, name: str, valid: Iterable[str]) -> str:
         """Note a name nobody knows; returns the nearest valid one or an empty string."""
         names = sorted(valid)
-        near = difflib.get_close_matches(name, names, n=1)
-        hint = near[0] if near else ""
+        hint = self.nearest(name, names)
         self._found[Finding(place, code, f"unknown {kind} {name!r}", ", ".join(names) or "none", hint)] = None
         return hint
 
     def sorted(self) -> list[Finding]:
-        """All faults by file, line and column."""
+        """All faults and warnings by file, line and column."""
         return sorted(self._found)
 
+    @property
+    def errors(self) -> list[Finding]:
+        """The faults, by place."""
+        return [f for f in self.sorted() if f.severity == "error"]
+
+    @property
+    def warnings(self) -> list[Finding]:
+        """What may be meant as it is, by place."""
+        return [f for f in self.sorted() if f.severity == "warning"]
+
     def __len__(self) -> int:
-        return len(self._found)
+        """How many faults."""
+        return sum(f.severity == "error" for f in self._found)
 
 
 class MissionFaults(BadInput):
@@ -69,8 +122,9 @@ class MissionFaults(BadInput):
 
     Attributes:
         findings: All faults, sorted by place.
+        warnings: What may be meant as it is.
     """
 
-    def __init__(self, findings: list[Finding]) -> None:
+    def __init__(self, findings: list[Finding], warnings: Sequence[Finding] = ()) -> None:
         super().__init__("\n".join(str(f) for f in findings))
-        self.findings = findings
+        self.findings, self.warnings = findings, list(warnings)

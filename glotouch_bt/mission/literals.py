@@ -14,22 +14,8 @@ import numpy as np
 
 from glotouch_bt.mission.findings import Findings
 from glotouch_bt.mission.source import Map, Node, Scalar, Seq
-from glotouch_bt.mission.units import convert, split_quantity, units_for
+from glotouch_bt.mission.units import convert, split_quantity, unit_of_name, units_for
 from glotouch_bt.robot import ParamError
-
-# Longest first: `_m_s` before `_s`.
-_SUFFIXES: tuple[tuple[str, str], ...] = (
-    ("_m_s2", "m/s2"),
-    ("_rad_s", "rad/s"),
-    ("_m_s", "m/s"),
-    ("_rad", "rad"),
-    ("_Nm", "Nm"),
-    ("_kg", "kg"),
-    ("_Hz", "Hz"),
-    ("_N", "N"),
-    ("_s", "s"),
-    ("_m", "m"),
-)
 
 
 class _Unusable(Exception):
@@ -123,7 +109,7 @@ def _number(node: Node, name: str, findings: Findings) -> float:
         value, unit = found
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return float(_wrong(node, name, "a number", findings))
-    expected = next((u for suffix, u in _SUFFIXES if name.endswith(suffix)), "")
+    expected = unit_of_name(name)
     if not unit:
         return float(value)
     try:

@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from glotouch_bt.mission.findings import Findings, MissionFaults
-from glotouch_bt.mission.flow import check_flow
+from glotouch_bt.mission.judge import check_flow
 from glotouch_bt.mission.library import SkillShelf, find_shipped, shipped_root, shown
 from glotouch_bt.mission.nodes import NodeSpec, number_names
 from glotouch_bt.mission.parameters import Parameter, Value, read_parameters, resolved, substitute
@@ -79,7 +79,7 @@ def load_mission(
     findings = Findings()
     mission = _read(path, dict(settings or {}), SkillShelf() if skills is None else skills, objects, findings)
     if mission is None or len(findings):
-        raise MissionFaults(findings.sorted())
+        raise MissionFaults(findings.errors, findings.warnings)
     return mission
 
 
@@ -130,8 +130,7 @@ def _read(
     scope = Scope(skills, findings, path, folder)
     tree = parse_tree(substitute(tree_node, parameters, findings), scope)
     number_names(tree)
-    if not any(f.code == "unusable_skill" for f in findings.sorted()):  # what it writes is not known
-        check_flow(tree, findings)
+    check_flow(tree, findings, {})
     if world is None or len(findings):
         return None
     values = {n: p.value for n, p in parameters.items() if p.value is not None}

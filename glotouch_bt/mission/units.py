@@ -36,6 +36,22 @@ UNITS: dict[str, tuple[str, float]] = {
     "%": ("", 1e-2),
 }
 
+# Longest first: `_m_s` before `_s`.
+_SUFFIXES: tuple[tuple[str, str], ...] = (
+    ("_m_s2", "m/s2"),
+    ("_rad_s", "rad/s"),
+    ("_m_s", "m/s"),
+    ("_rad", "rad"),
+    ("_deg", "deg"),
+    ("_mm", "mm"),
+    ("_Nm", "Nm"),
+    ("_kg", "kg"),
+    ("_Hz", "Hz"),
+    ("_N", "N"),
+    ("_s", "s"),
+    ("_m", "m"),
+)
+
 _QUANTITY = re.compile(r"([-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([A-Za-z%µ][A-Za-z0-9/%^]*)")
 
 
@@ -45,6 +61,11 @@ def split_quantity(text: str) -> tuple[float, str] | None:
     if not found or not math.isfinite(float(found[1])):
         return None
     return float(found[1]), found[2].replace("^", "")
+
+
+def unit_of_name(name: str) -> str:
+    """The unit a name carries as its suffix (`weight_N`), or empty."""
+    return next((unit for suffix, unit in _SUFFIXES if name.endswith(suffix)), "")
 
 
 def units_for(unit: str) -> list[str]:

@@ -1,0 +1,153 @@
+"""What a node asks of the configuration in which it looks at a key or a resource: which values are good enough."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from glotouch_bt.mission.decorators import holds
+from glotouch_bt.mission.nodes import ConditionSettings, NodeSpec, RepeatSettings
+from glotouch_bt.mission.source import Place
+from glotouch_bt.mission.units import UNITS, unit_of_name
+from glotouch_bt.mission.variables import UNSET, Kind, Variables
+
+
+@dataclass(frozen=True, eq=False)
+class Demand:
+    """One look at one variable.
+
+    Attributes:
+        node: Who looks.
+        port: Port, setting, or the resource's name.
+        key: Key or resource.
+        variable: Its variable.
+        place: Where the mission says so.
+        good: Values of the variable with which the node works.
+        unset: What it means that nobody has written the key: a mistake, a mistake if nobody can have, or nothing.
+        wanted: Type it must have, or the states a resource must be in.
+        unit: Unit the port's name carries, or empty.
+    """
+
+    node: NodeSpec
+    port: str
+    key: str
+    variable: int
+    place: Place
+    good: frozenset[int]
+    unset: Literal["never", "not always", "allowed"]
+    wanted: Any
+    unit: str = ""
+
+    @property
+    def of_resource(self) -> bool:
+        """It looks at a resource, not at a key."""
+        return isinstance(self.wanted, frozenset)
+
+    @property
+    def stops(self) -> bool:
+        """Without a good value the node cannot even run (a condition would only fail)."""
+        return self.unset == "never" or self.of_resource
+
+
+def fits(kind: Kind, wanted: Any, unit: str = "") -> bool:
+    """A value of a kind passes py_trees' run-time check of `wanted`, and is in a unit that measures the same.
+
+    Unknown types pass, and so do names without a unit.
+    """
+    if kind.unit and unit and kind.unit != unit:
+        return False
+    given = kind.data_type
+    if given is object or wanted is object:
+        return True
+    options = getattr(wanted, "__args__", None) if not isinstance(wanted, type) else (wanted,)
+    plain = [o for o in options or () if isinstance(o, type)]
+    if not plain:
+        return True
+    if given is bool and bool not in plain:
+        return False
+    return any(issubclass(given, o) for o in plain)
+
+
+Demands = Mapping[int, tuple[Demand, ...]]
+"""By node id."""
+
+
+def all_demands(tree: NodeSpec, variables: Variables) -> Demands:
+    """What every node of a tree asks."""
+    return {id(n): tuple(demands_of(n, variables)) for n in tree.walk()}
+
+
+def demands_of(node: NodeSpec, variables: Variables) -> Iterator[Demand]:
+    """Everything a node asks: keys in the order of its ports, then resources."""
+
+    def look(port: str, unset: Literal["never", "not always", "allowed"], wanted: Any, unit: str = "") -> Demand:
+        wire = node.reads[port]
+        good = {v for v in variables.written(wire.key) if fits(variables.kind(wire.key, v), wanted, unit)}
+        if unset != "never":
+            good.add(UNSET)
+        return Demand(node, port, wire.key, variables.keys[wire.key], wire.place, frozenset(good), unset, wanted, unit)
+
+    if node.skill_type is not None:
+        skill = node.skill_type
+        for port, wire in node.reads.items():
+            if port in node.constants:
+                continue
+            info = skill.INPUT_PORTS[port]
+            # An optional input may stay unwritten, unless the mission wired it on purpose.
+            optional: Literal["not always", "allowed"] = "allowed" if wire.place == node.place else "not always"
+            yield look(port, "never" if info.required else optional, info.data_type, unit_of_name(port))
+        for resource, states in skill.NEEDS.items():
+            good = frozenset(variables.state(resource, s) for s in states)
+            yield Demand(
+                node, resource, resource, variables.resources[resource], node.place, good, "allowed", frozenset(states)
+            )
+    elif node.kind == "condition" and "port" in node.reads:
+        if isinstance(node.settings, ConditionSettings):
+            yield look(
+                "port", "not always" if node.settings.is_set is None else "allowed", compared_type(node.settings)
+            )
+    elif node.kind == "repeat" and "until" in node.reads:
+        if isinstance(node.settings, RepeatSettings):
+            condition = until_condition(node.settings)
+            yield look("until", "not always" if condition.is_set is None else "allowed", compared_type(condition))
+    elif node.kind == "for_each":
+        for port in node.reads:
+            yield look(port, "not always", tuple if port == "items" else object)
+
+
+def until_condition(settings: RepeatSettings) -> ConditionSettings:
+    """What a repeat tests after each pass; a bare key must be true."""
+    if isinstance(settings.until, ConditionSettings):
+        return settings.until
+    return ConditionSettings(port=str(settings.until), equals=True)
+
+
+def verdicts(variables: Variables, demand: Demand, settings: ConditionSettings) -> tuple[set[int], set[int]]:
+    """Values of a demand's variable with which a comparison may hold, and with which it may fail."""
+    holding, failing = set(), set()
+    for value in {UNSET, *demand.good}:
+        said = None if value == UNSET else variables.kind(demand.key, value).value
+        free = value != UNSET and said is None and settings.is_set is None
+        # Whatever is written is not None: any other value does for `is_set`.
+        held = holds(settings, None if value == UNSET else True if said is None else said)
+        if free or held:
+            holding.add(value)
+        if free or not held:
+            failing.add(value)
+    return holding, failing
+
+
+def compared_type(settings: ConditionSettings) -> Any:
+    """The type a condition's port must have."""
+    if settings.at_least is not None or settings.at_most is not None:
+        return int | float
+    if settings.equals is None:
+        return object
+    number = isinstance(settings.equals, (int, float)) and not isinstance(settings.equals, bool)
+    return int | float if number else type(settings.equals)
+
+
+def same_quantity(unit: str, other: str) -> bool:
+    """Two units measure the same thing, so that only the factor is wrong."""
+    return unit in UNITS and other in UNITS and UNITS[unit][0] == UNITS[other][0]
