@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -15,11 +16,15 @@ from glotouch_bt.touch import Contact, GuardParams
 from skills.base import Context, SkillFailed
 from skills.held_tool import HeldTool
 from skills.probing import Prober
+from skills.rising import rise_clear
+from skills.weighing import GRAVITY_M_S2, weigh_N
 
 AT_HEIGHT_M = 0.004
 """The ball counts as lowered within this of the sensing height."""
 HELD_TOLERANCE_M = 0.004
 """The tool is still held if the jaws are this near to where they closed on it: as for taking it."""
+LIGHTER = 0.5
+"""A share of the probe's weight that is missing all at once: it is weighed in free air."""
 OFF_TOP_M = 0.006
 """The ball is raised so far off what it landed on."""
 
@@ -50,6 +55,9 @@ class Explorer:
     def __init__(self, context: Context, tool: HeldTool, speeds: ExploringSpeeds, journal: Callable[..., None]) -> None:
         self._prober = Prober(context, tool, GuardParams())
         self._arm, self._tool, self._speeds, self._journal = context.arm, tool, speeds, journal
+        probe = context.world.probe
+        self._weight_N = probe.mass_kg * GRAVITY_M_S2 if context.arm.scene.holding_tool else math.inf
+        self._up_N: float | None = None
 
     @property
     def lowered(self) -> bool:
@@ -81,6 +89,7 @@ class Explorer:
 
     def _make(self, move: Move) -> Motion[Felt]:
         self._require_tool()
+        yield from self._require_weight()
         try:
             if move.kind == "hop":
                 contact, path = yield from self._hop(move.goal_K_m)
@@ -107,6 +116,28 @@ class Explorer:
                 advice="the tool lies in the container or beside it; take it out by hand",
                 aperture_m=apart,
             )
+
+    def _require_weight(self) -> Motion[None]:
+        """The resting wrist must not become lighter at once by as much as the probe weighs, nor stay so in free air.
+
+        From one rest to the next, for a tare drifts farther than that in minutes.
+        """
+        before, self._up_N = self._up_N, self._prober.resting_up_N
+        if before is None or self._up_N is None or not self._up_N - before > LIGHTER * self._weight_N:
+            return
+        tip = self._prober.tip_K_m
+        yield from rise_clear(self._arm)
+        missing_N = -(yield from weigh_N(self._arm)) - before
+        if missing_N > LIGHTER * self._weight_N:
+            raise SkillFailed(
+                "tool_lost",
+                f"the hand is lighter by {missing_N:.2f} N than a moment ago, the probe weighs {self._weight_N:.2f} N",
+                advice="look with tool_check",
+                missing_N=missing_N,
+                weight_N=self._weight_N,
+            )
+        self._journal("note", text=f"the wrist became lighter on a contact; in free air {missing_N:.2f} N are missing")
+        yield from self._prober.move(tip, self._speeds.lower_m_s)
 
     def _go(self, move: Move) -> Motion[tuple[Contact | None, Array]]:
         s = self._speeds

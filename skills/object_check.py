@@ -11,9 +11,10 @@ from glotouch_bt.model_cache import target_model
 from glotouch_bt.recognition import PadSpec, TargetModel
 from glotouch_bt.robot import HOLD, ParamError
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from skills.grasp_holds import SHIFTS_M
 from skills.grasp_plan import GraspPlan
 from skills.match import load_target
-from skills.tool_pickup import GRAVITY_M_S2
+from skills.weighing import GRAVITY_M_S2
 
 HEIGHT_SLACK_M = 0.006
 """It may be held so much higher or lower on its body than planned: it was lifted at an edge, or stands on something."""
@@ -57,7 +58,7 @@ class ObjectCheck(Skill):
     made = In(GraspPlan, "how it was taken")
     grip_m = In(float, "aperture when the jaws had closed, m")
     weight_N = In(float, "weight in the hand, N", key="weight")
-    fits = Out(bool, "it can be the target", always=True)
+    fits = Out(bool, "it can be the target", always=True, on_success=True)
     impossible = Out(bool, "it cannot be the target, however it was taken", always=True)
 
     def run(self) -> SkillRun:
@@ -111,8 +112,12 @@ class ObjectCheck(Skill):
 
 
 def nearest_width_m(model: TargetModel, height_m: float, width_m: float) -> float:
-    """Of the model's widths about a height, at any yaw and place, the one nearest to `width_m`; infinite if none."""
-    near = np.abs(model.z_m - height_m) <= HEIGHT_SLACK_M
-    widths = model.width_m[:, :, near].astype(np.float64).ravel()
+    """Of the model's widths about a height, at any yaw, the one nearest to `width_m`; infinite if none.
+
+    Only where a grasp would be planned, not over the ends of the mesh, where anything is narrow.
+    """
+    level = np.abs(model.z_m - height_m) <= HEIGHT_SLACK_M
+    inner = np.abs(model.l_m) <= SHIFTS_M
+    widths = model.width_m[:, inner][:, :, level].astype(np.float64).ravel()
     widths = widths[np.isfinite(widths)]
     return float(widths[np.argmin(np.abs(widths - width_m))]) if len(widths) else math.inf

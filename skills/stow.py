@@ -24,8 +24,8 @@ class StowParams(SkillParams):
 class Stow(Skill):
     """Rise clear of the container, return a held probe to its holder, and hold. For endings, and for going on without.
 
-    It asks for no port, and may start with anything in the hand. If the probe was lost, the hand is empty from now on; an object in the
-    jaws is kept, for it must not fall from here.
+    It asks for no port, and may start with anything in the hand. If the probe was lost, the hand is empty from now on;
+    an object in the jaws is kept, for it must not fall from here.
 
     SUCCESS: the hand is high and empty, the wrist zeroed.
     FAILURE `object_held`: the hand is high; the jaws hold something that is not the probe, and keep it.

@@ -11,8 +11,7 @@ from skills.exploring import HELD_TOLERANCE_M
 from skills.floor import feel_floor
 from skills.held_tool import HeldTool
 from skills.rising import rise_clear
-from skills.tool_pickup import GRAVITY_M_S2
-from skills.weighing import weigh_N
+from skills.weighing import GRAVITY_M_S2, weigh_N
 
 
 class ToolCheckParams(SkillParams):

@@ -15,11 +15,10 @@ from skills.floor import FLOOR_SEARCH_M, feel_floor
 from skills.hand import easy_yaw
 from skills.held_tool import HeldTool
 from skills.requests import finish
-from skills.weighing import weigh_N
+from skills.weighing import GRAVITY_M_S2, weigh_N
 
 HANDLE_TOLERANCE_M = 0.004
 """The jaws hold the handle if they are this near to its width: twice the largest bias of their report, and its give."""
-GRAVITY_M_S2 = 9.81
 
 
 class ToolPickupParams(SkillParams):

@@ -6,6 +6,7 @@ import numpy as np
 
 from glotouch_bt.motion import Arm, Motion
 
+GRAVITY_M_S2 = 9.81
 STAND_S, WEIGH_S = 0.1, 0.25
 """The hand stands still before it weighs: the end of a stop is felt as a force, too."""
 
