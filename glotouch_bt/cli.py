@@ -18,8 +18,10 @@ import typer
 from glotouch_bt.cli_bench import bench
 from glotouch_bt.cli_doctor import doctor, link, read_settings
 from glotouch_bt.cli_faults import bench_faults, faults
+from glotouch_bt.cli_pause import bench_pause
 from glotouch_bt.cli_replay import replay
 from glotouch_bt.cli_resume import resume
+from glotouch_bt.cli_testing import bench_fuzz, mission_tests
 from glotouch_bt.guarded import guarded, set_debug, showing_tracebacks
 
 app = typer.Typer(
@@ -31,8 +33,11 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 bench.command("link")(link)
+bench.command("pause")(bench_pause)
 bench.command("faults")(bench_faults)
+bench.command("fuzz")(bench_fuzz)
 app.command("doctor")(doctor)
+app.command("test")(mission_tests)
 app.command("replay")(replay)
 app.command("resume")(resume)
 app.command("faults")(faults)
@@ -81,13 +86,15 @@ def run(
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="the run's folder (default: runs/...)")] = None,
     json_: Json = False,
 ) -> int:
-    """Run a mission and write its record, result and report."""
+    """Run a mission and write its record, result and report. `p` (or SIGUSR1) pauses it, SIGTERM ends it safely."""
     from glotouch_bt import console
+    from glotouch_bt.mission.control import Control
+    from glotouch_bt.operator import operated
     from glotouch_bt.study.launch import RunRequest, launch
 
     request = RunRequest(mission, backend, seed, read_settings(set_), objects, conditions, out, faults, may_kill=True)
-    with console.RunProgress(quiet=json_) as progress:
-        done = launch(request, on_start=progress.start, on_progress=progress.update)
+    with console.RunProgress(quiet=json_) as progress, operated(Control()) as control:
+        done = launch(request, on_start=progress.start, on_progress=progress.update, control=control)
     if json_:
         _print_json({**done.result, "folder": str(done.folder)})
     else:

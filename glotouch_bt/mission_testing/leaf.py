@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from py_trees.common import Status
-
 from glotouch_bt.mission_testing.outcomes import Decide, Outcome
 from glotouch_bt.mission_testing.standins import port_value
 from glotouch_bt.robot import HOLD
@@ -138,7 +136,7 @@ class _Playing(Skill):
             self._write(outcome.ports)
         until = float("inf") if outcome.kind == "hangs" else self.context.observation.now_s + outcome.after_s
         while self.context.observation.now_s < until - 1e-9:
-            self.stage.wake(min([until, *(d for d in map(_deadline_s, self._above()) if d is not None)]))
+            self.stage.wake(min([until, *(getattr(node, "deadline_s", until) for node in self._above())]))
             yield HOLD
 
     def _above(self) -> list[Any]:
@@ -168,12 +166,6 @@ class _Playing(Skill):
     def _write(self, ports: Mapping[str, object]) -> None:
         for port, value in ports.items():
             self.write_port(port, value)
-
-
-def _deadline_s(node: Any) -> float | None:
-    running = node.status is Status.RUNNING
-    found: float | None = getattr(node, "deadline_s", None) if running else None
-    return found
 
 
 def playing(skill: type[Skill], part: Part, stage: Stage) -> type[Skill]:

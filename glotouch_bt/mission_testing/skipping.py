@@ -7,7 +7,6 @@ from glotouch_bt.robot import Command, Observation
 from glotouch_bt.robot.fake import FakeRobot
 from glotouch_bt.robot.supervision_limits import SupervisionLimits
 
-
 PATIENT = SupervisionLimits(late_periods=1e12, tolerated=10**9)
 """A supervisor that lets skipped time pass."""
 
