@@ -59,7 +59,10 @@ class RunProgress:
             return
         node = tally.node.rsplit("/", 1)[-1]
         line = f"t = {robot_s:6.1f} s  {node:<14} contacts {tally.contacts:3d}  candidates {len(tally.candidates):2d}"
-        line += f"  last: {tally.last_event[1]}" if tally.last_event[1] else ""
+        if tally.last_event[1] in ("pause", "paused"):
+            line += "  PAUSED (p goes on)" if tally.last_event[1] == "paused" else "  pausing"
+        else:
+            line += f"  last: {tally.last_event[1]}" if tally.last_event[1] else ""
         now = time.perf_counter()
         if self._live is not None:
             if now - self._shown_s >= REFRESH_S:
