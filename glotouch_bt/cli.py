@@ -89,7 +89,7 @@ def run(
     """Run a mission and write its record, result and report. `p` (or SIGUSR1) pauses it, SIGTERM ends it safely."""
     from glotouch_bt import console
     from glotouch_bt.mission.control import Control
-    from glotouch_bt.operator import operated
+    from glotouch_bt.operated import operated
     from glotouch_bt.study.launch import RunRequest, launch
 
     request = RunRequest(mission, backend, seed, read_settings(set_), objects, conditions, out, faults, may_kill=True)
