@@ -10,18 +10,19 @@ from typing import Any
 
 import yaml
 
-from glotouch_bt.mission.findings import Findings, MissionFaults
+from glotouch_bt.mission.findings import Finding, Findings, MissionFaults
 from glotouch_bt.mission.judge import check_flow
 from glotouch_bt.mission.library import SkillShelf, find_shipped, shipped_root, shown
 from glotouch_bt.mission.nodes import NodeSpec, number_names
 from glotouch_bt.mission.parameters import Parameter, Value, read_parameters, resolved, substitute
-from glotouch_bt.mission.parse import Scope, parse_tree
-from glotouch_bt.mission.source import Map, Node, Scalar, plain, read_yaml
+from glotouch_bt.mission.parse import parse_tree
+from glotouch_bt.mission.scope import Reading, Scope
+from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, plain, read_yaml
 from glotouch_bt.mission.worlds import read_world
 from glotouch_bt.robot import BadInput, World
 from skills.base import Skill
 
-MISSION_KEYS = ("mission", "description", "world", "parameters", "tree", "timeout_s")
+MISSION_KEYS = ("mission", "description", "world", "parameters", "tree", "timeout_s", "leaves", "subtrees")
 LONGEST_S = 3600.0
 
 
@@ -38,7 +39,8 @@ class Mission:
         tree: The checked tree.
         timeout_s: Longest duration on the robot's clock.
         file: Where it came from.
-        document: The mission as plain data with the values in use, for the run's folder.
+        document: The mission as plain data with the values in use and its subtrees, for the run's folder.
+        warnings: What the check found that may be meant as it is.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Mission:
     timeout_s: float
     file: Path
     document: Mapping[str, Any]
+    warnings: tuple[Finding, ...] = ()
 
     def resolved_yaml(self) -> str:
         """The document as YAML text."""
@@ -127,16 +130,17 @@ def _read(
     if tree_node is None:
         findings.add(source.place, "missing_key", "a mission needs 'tree'")
         return None
-    scope = Scope(skills, findings, path, folder)
+    reading = Reading(carried=_carried(source, findings))
+    scope = Scope(skills, findings, path, folder, reading=reading)
     tree = parse_tree(substitute(tree_node, parameters, findings), scope)
     number_names(tree)
-    check_flow(tree, findings, {})
+    check_flow(tree, findings, _leaves(source, findings))
     if world is None or len(findings):
         return None
     values = {n: p.value for n, p in parameters.items() if p.value is not None}
-    document = _document(source, name, world_document, parameters)
+    document = _document(source, name, world_document, parameters, reading)
     stl = tuple(n for n, p in parameters.items() if p.declared.type == "stl")
-    return Mission(name, description, world, values, stl, tree, timeout_s, path, document)
+    return Mission(name, description, world, values, stl, tree, timeout_s, path, document, tuple(findings.warnings))
 
 
 def _text(source: Map, key: str, findings: Findings, *, required: bool) -> str:
@@ -199,9 +203,42 @@ def _find_world(given: str, mission: Path) -> Path | None:
     return None
 
 
-def _document(source: Map, name: str, world: object, parameters: Mapping[str, Parameter]) -> dict[str, Any]:
+def _carried(source: Map, findings: Findings) -> dict[str, Node]:
+    """Subtrees that stand in the mission itself, by name."""
+    node = source.get("subtrees")
+    if node is None:
+        return {}
+    if not isinstance(node, Map):
+        findings.add(node.place, "wrong_type", "subtrees: must be a mapping of name: {parameters, tree}")
+        return {}
+    return {str(k.value): v for k, v in node.entries}
+
+
+def _leaves(source: Map, findings: Findings) -> dict[str, tuple[frozenset[str], Place]]:
+    """The states in which the mission says it leaves resources when it succeeds."""
+    node = source.get("leaves")
+    found: dict[str, tuple[frozenset[str], Place]] = {}
+    if node is None:
+        return found
+    entries = node.entries if isinstance(node, Map) else ()
+    for key, value in entries:
+        names = [value] if isinstance(value, Scalar) else list(value.items) if isinstance(value, Seq) else []
+        states = {n.value for n in names if isinstance(n, Scalar) and isinstance(n.value, str)}
+        if len(states) == len(names) > 0:
+            found[str(key.value)] = (frozenset(states), key.place)
+            continue
+        findings.add(value.place, "wrong_type", f"leaves.{key.value}: must be a state, or a list of them")
+    if not entries:
+        findings.add(node.place, "wrong_type", "leaves: must be a mapping of resource: state", valid="{hand: empty}")
+    return found
+
+
+def _document(
+    source: Map, name: str, world: object, parameters: Mapping[str, Parameter], reading: Reading
+) -> dict[str, Any]:
+    """The mission with the values in use and every subtree it uses: it needs no other file but the world's."""
     document: dict[str, Any] = {"mission": name, "world": world}
-    for key in ("description", "timeout_s"):
+    for key in ("description", "timeout_s", "leaves"):
         node: Node | None = source.get(key)
         if node is not None:
             document[key] = plain(node)
@@ -209,7 +246,9 @@ def _document(source: Map, name: str, world: object, parameters: Mapping[str, Pa
     if section:
         document["parameters"] = section
     tree = source.get("tree")
-    document["tree"] = plain(tree) if tree is not None else None
+    document["tree"] = plain(tree, reading.renamed) if tree is not None else None
+    if reading.used:
+        document["subtrees"] = {n: plain(t, reading.renamed) for n, t in sorted(reading.used.items())}
     return document
 
 

@@ -4,53 +4,43 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 from glotouch_bt.mission.fields import validate
-from glotouch_bt.mission.findings import Findings
-from glotouch_bt.mission.library import shown
+from glotouch_bt.mission.library import shipped_root, shown
 from glotouch_bt.mission.literals import is_literal, read_literal
 from glotouch_bt.mission.nodes import KINDS, ConditionSettings, Kind, NodeSpec, RepeatSettings, SubtreeSettings, Wire
 from glotouch_bt.mission.parameters import Parameter, Value, read_parameters, substitute
+from glotouch_bt.mission.scope import Scope
 from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, read_yaml
 from glotouch_bt.robot import BadInput
 from skills.base import Skill
 
 KEY = re.compile(r"[a-z][a-z0-9_]*")
 DEEPEST_SUBTREE = 8
+MOST_NODES, DEEPEST_NODE = 3000, 100
 SUBTREE_KEYS = ("subtree", "description", "parameters", "tree")
-
-
-@dataclass(frozen=True)
-class Scope:
-    """What a tree is read in.
-
-    Attributes:
-        skills: Known skills.
-        findings: Where faults go.
-        file: The file being read; subtrees are found relative to it.
-        stl_folder: The world's objects, for stl parameters of subtrees.
-        prefix: Put before private keys ("" in the mission itself).
-        ports: Subtree key -> absolute key; None in the mission itself, where a key is its own name.
-        trail: Files being read, outermost first.
-    """
-
-    skills: Mapping[str, type[Skill]]
-    findings: Findings
-    file: Path
-    stl_folder: Path | None = None
-    prefix: str = ""
-    ports: Mapping[str, str] = field(default_factory=dict)
-    trail: tuple[Path, ...] = ()
-
-    def key(self, name: str) -> str:
-        """The absolute key of a name used in this tree."""
-        return self.ports.get(name, self.prefix + name)
 
 
 def parse_tree(node: Node, scope: Scope) -> NodeSpec:
     """Read one node and everything below it."""
+    reading = scope.reading
+    reading.nodes += 1
+    if reading.nodes > MOST_NODES or reading.depth >= DEEPEST_NODE:
+        if reading.nodes <= MOST_NODES + 1:
+            what = f"more than {MOST_NODES} nodes, or nested deeper than {DEEPEST_NODE}"
+            scope.findings.add(node.place, "too_large", f"the tree has {what} (subtrees included)")
+            reading.nodes = MOST_NODES + 1
+        return _lost(node)
+    reading.depth += 1
+    try:
+        return _node(node, scope)
+    finally:
+        reading.depth -= 1
+
+
+def _node(node: Node, scope: Scope) -> NodeSpec:
     if isinstance(node, Scalar) and isinstance(node.value, str) and not node.poisoned:
         return _named(node.value, node.place, Scalar(None, node.place), scope)
     if isinstance(node, Map) and len(node.entries) == 1:
@@ -266,7 +256,8 @@ def _literals(
         if port not in wires or not is_literal(value):
             left.append((key, value))
             continue
-        wires[port] = Wire(port, f"{scope.prefix}{port}@{place.line}_{place.column}", value.place)
+        scope.reading.constants += 1
+        wires[port] = Wire(port, f"{scope.prefix}{port}@{scope.reading.constants}", value.place)
         constants[port] = read_literal(value, skill.INPUT_PORTS[port].data_type, port, scope.findings)
     return replace(given, entries=tuple(left)), constants
 
@@ -301,17 +292,12 @@ def _subtree(place: Place, body: Node, scope: Scope) -> NodeSpec:
         return NodeSpec("unknown", _title(taken, "subtree", scope), place)
     file_node = rest.get("file")
     at = file_node.place if file_node else place
-    path = scope.file.parent / settings.file
-    trail = (*scope.trail, scope.file.resolve())
-    if path.resolve() in trail or len(trail) > DEEPEST_SUBTREE:
-        scope.findings.add(at, "subtree_loop", f"subtree {settings.file!r} contains itself or is nested too deep")
+    found = _find_subtree(settings.file, at, scope)
+    if found is None:
         return NodeSpec("unknown", _title(taken, "subtree", scope), place)
-    try:
-        source = read_yaml(path, shown(path))
-    except BadInput as e:
-        scope.findings.add(at, "unusable_subtree", f"subtree cannot be read: {e}")
-        return NodeSpec("unknown", _title(taken, "subtree", scope), place)
-    title = _title(taken, path.stem, scope)
+    path, identity, source = found
+    name = scope.reading.carry(path.stem, identity, source, at)
+    title = _title(taken, name, scope)
     inner, tree = _open_subtree(source, settings.parameters, rest, scope, at)
     if tree is None:
         return NodeSpec("unknown", title, place)
@@ -320,15 +306,39 @@ def _subtree(place: Place, body: Node, scope: Scope) -> NodeSpec:
         if isinstance(value, Scalar) and (wire := _keyed(str(key.value), str(value.value), value.place, scope)):
             ports[str(key.value)] = wire.key
     # py_trees splits keys at dots, so that none may stand in a key.
-    prefix = f"{scope.prefix}{re.sub('[^A-Za-z0-9]', '_', path.stem)}@{place.line}_{place.column}/"
-    child_scope = replace(scope, file=path, prefix=prefix, ports=ports, trail=trail)
+    scope.reading.subtrees += 1
+    prefix = f"{scope.prefix}{re.sub('[^A-Za-z0-9]', '_', name)}@{scope.reading.subtrees}/"
+    child_scope = replace(scope, file=path, prefix=prefix, ports=ports, trail=(*scope.trail, identity))
     child = parse_tree(substitute(tree, inner, scope.findings), child_scope)
     used = {w.key for n in child.walk() for w in (*n.reads.values(), *n.writes.values())}
     for key, _ in _entries(rest.get("ports")):
         if str(key.value) in ports and ports[str(key.value)] not in used:
             names = sorted(k.removeprefix(prefix) for k in used if k.startswith(prefix))
-            scope.findings.unknown(key.place, "unknown_port", f"port of subtree {path.stem!r}:", str(key.value), names)
+            scope.findings.unknown(key.place, "unknown_port", f"port of subtree {name!r}:", str(key.value), names)
     return NodeSpec("subtree", title, place, (child,), settings)
+
+
+def _find_subtree(given: str, at: Place, scope: Scope) -> tuple[Path, str, Node] | None:
+    """A subtree that the mission carries itself, or a file beside the present one, or a shipped file.
+
+    Returns: Its path, what tells it from others, and what stands there; None if that gave a finding.
+    """
+    if given in scope.reading.carried:
+        path, identity = scope.file.parent / given, f"carried {given}"
+    else:
+        beside, shipped = scope.file.parent / given, shipped_root() / given
+        path = shipped if shipped.is_file() and not beside.is_file() else beside
+        identity = str(path.resolve())
+    if identity in (*scope.trail, str(scope.file.resolve())) or len(scope.trail) >= DEEPEST_SUBTREE:
+        scope.findings.add(at, "subtree_loop", f"subtree {given!r} contains itself or is nested too deep")
+        return None
+    if given in scope.reading.carried:
+        return path, identity, scope.reading.carried[given]
+    try:
+        return path, identity, read_yaml(path, shown(path))
+    except (BadInput, ValueError) as e:  # ValueError: a null byte in the name
+        scope.findings.add(at, "unusable_subtree", f"subtree cannot be read: {e}")
+        return None
 
 
 def _entries(node: Node | None) -> tuple[tuple[Scalar, Node], ...]:

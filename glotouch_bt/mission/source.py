@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -89,13 +90,13 @@ class Map:
 Node = Scalar | Seq | Map
 
 
-def plain(node: Node) -> Any:
-    """The node as dicts, lists and values."""
+def plain(node: Node, renamed: Mapping[Place, str] | None = None) -> Any:
+    """The node as dicts, lists and values; `renamed`: other text for the scalars at some places."""
     if isinstance(node, Scalar):
-        return node.value
+        return renamed.get(node.place, node.value) if renamed else node.value
     if isinstance(node, Seq):
-        return [plain(i) for i in node.items]
-    return {str(k.value): plain(v) for k, v in node.entries}
+        return [plain(i, renamed) for i in node.items]
+    return {str(k.value): plain(v, renamed) for k, v in node.entries}
 
 
 def read_yaml(path: Path, shown: str | None = None) -> Node:
