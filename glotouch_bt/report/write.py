@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from glotouch_bt.report.depth import depth_section
+from glotouch_bt.report.faults import faults_section
 from glotouch_bt.report.force import force_section
 from glotouch_bt.report.map import candidates, map_section
 from glotouch_bt.report.page import esc, number, page, section, table
@@ -227,6 +228,7 @@ def _about(record: RunRecord) -> str:
 PARTS: tuple[tuple[str, Callable[[RunRecord], str]], ...] = (
     ("Verdict", _header),
     ("Why", _reasons),
+    ("Injected faults", faults_section),
     ("Map", map_section),
     ("Force", force_section),
     ("Squeezes", depth_section),
