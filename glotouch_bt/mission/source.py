@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -113,7 +114,10 @@ def read_yaml(path: Path, shown: str | None = None) -> Node:
     try:
         if path.is_dir():
             raise BadInput(f"{shown}: is a folder, not a YAML file")
-        if path.stat().st_size > LARGEST_BYTES:
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode):  # a device or a pipe may have no end, or never begin
+            raise BadInput(f"{shown}: is a device or a pipe, not a YAML file")
+        if found.st_size > LARGEST_BYTES:
             raise BadInput(f"{shown}: is larger than {LARGEST_BYTES} bytes")
         data = path.read_bytes()
     except (OSError, ValueError) as e:

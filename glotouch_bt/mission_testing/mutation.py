@@ -7,7 +7,8 @@ test that is missing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -111,15 +112,13 @@ def try_mutants(
         on_progress: Called after each mutant with (tried, of how many, score so far).
     """
     score, search = MutationScore(mission.name, scripts), Search(mission, scripts)
-    order = dict.fromkeys((name for name, _ in tests), 0)
-    run = dict(tests)
+    bench = _Bench(mission.file.resolve(), session, dict(tests))
     mutants = list(mutants_of(mission.tree))
     for mutant in mutants:
         tree = mutant.apply(mission.tree)
         if findings_of(tree):
             score.refused.append(mutant)
-        elif (name := _noticed_by(mutant, mission.file, session, order, run)) is not None:
-            order[name] += 1
+        elif (name := bench.notices(mutant)) is not None:
             score.noticed.append((mutant, name))
         elif (difference := search.difference(tree)) is not None:
             score.survivors.append(Survivor(mutant, difference))
@@ -130,16 +129,35 @@ def try_mutants(
     return score
 
 
-def _noticed_by(
-    mutant: Mutant, file: Path, session: Session, order: dict[str, int], run: dict[str, Test]
-) -> str | None:
-    """The first test that fails; those that noticed most so far go first."""
+class _Bench:
+    """Runs tests against mutants; those that notice much in little time go first."""
 
-    def change(loaded: Mission) -> Mission:
-        return replace(loaded, tree=mutant.apply(loaded.tree)) if loaded.file == file else loaded
+    def __init__(self, file: Path, session: Session, tests: Mapping[str, Test]) -> None:
+        self._file, self._session, self._tests = file, session, tests
+        self._noticed = dict.fromkeys(tests, 0)
+        self._spent_s = dict.fromkeys(tests, 1e-3)
 
-    session.change = change
-    try:
-        return next((name for name in sorted(order, key=lambda n: -order[n]) if not run[name]()), None)
-    finally:
-        session.change = None
+    def notices(self, mutant: Mutant) -> str | None:
+        """The first test that fails, or None."""
+
+        def change(loaded: Mission) -> Mission:
+            return replace(loaded, tree=mutant.apply(loaded.tree)) if loaded.file.resolve() == self._file else loaded
+
+        self._session.change = change
+        try:
+            return next((name for name in self._in_order() if not self._passes(name)), None)
+        finally:
+            self._session.change = None
+
+    def _in_order(self) -> list[str]:
+        def worth(name: str) -> float:
+            return (self._noticed[name] + 1) / self._spent_s[name]
+
+        return sorted(self._tests, key=worth, reverse=True)
+
+    def _passes(self, name: str) -> bool:
+        began = time.perf_counter()
+        passed = self._tests[name]()
+        self._spent_s[name] += time.perf_counter() - began
+        self._noticed[name] += not passed
+        return passed

@@ -25,7 +25,7 @@ def mutate(pytest_session: pytest.Session, session: Session, given: str) -> None
         mission = session.load(path, {}, None, None, path.parent, "")
     except BadInput as e:
         raise pytest.UsageError(f"--glotouch-mutate {given}: {e}") from e
-    users = session.users.get(path, {})
+    users = session.users.get(path.resolve(), {})
     items = [i for i in pytest_session.items if i.nodeid in users]
     if not items:
         session.mutation_lines.append(f"{given}: no test of this session loads it with the fixture `scripted`")
@@ -50,6 +50,7 @@ class _Progress:
     def __init__(self, config: pytest.Config) -> None:
         self._writer = config.get_terminal_writer()
         self._tenth = -1
+        self._writer.line("")
 
     def __call__(self, tried: int, of: int, score: MutationScore) -> None:
         words = f"{score.mission}: mutant {tried} of {of}, {len(score.noticed)} noticed, {len(score.survivors)} survive"

@@ -84,7 +84,7 @@ class ScriptMaker:
                         if isinstance(value, str):
                             texts.add(value)
                         elif value is not None and not isinstance(value, bool):
-                            numbers |= {value - 1.0, float(value), value + 1.0}
+                            numbers |= {value - 1.0, 0.95 * value, float(value), 1.05 * value, value + 1.0}
             if isinstance(node.settings, TimeoutSettings):
                 seconds.append(node.settings.seconds)
         self._numbers, self._texts, self._seconds = sorted(numbers), sorted(texts), 2.5 * max(seconds)

@@ -54,19 +54,20 @@ class Session:
         if known not in self._loaded:
             self._loaded[known] = load_mission(path, settings, objects=objects, skills=skills)
         mission = self._loaded[known]
-        self.users.setdefault(path, {})[test] = None
+        self.users.setdefault(path.resolve(), {})[test] = None
         return mission if self.change is None else self.change(mission)
 
     def find(self, given: str | Path, *folders: Path) -> Path:
-        """A mission's file: as given, in one of the folders, under the root, or shipped.
+        """A mission's file: as given, in one of the folders, under the root, or shipped; short where that is possible.
 
         Raises:
             BadInput: Nowhere.
         """
         for folder in (Path(), *folders, self._root):
             if Path(given).suffix in (".yaml", ".yml") and (folder / given).is_file():
-                return (folder / given).resolve()
-        return find_shipped("", str(given), "mission").resolve()
+                found = (folder / given).resolve()
+                return found.relative_to(Path.cwd()) if found.is_relative_to(Path.cwd()) else found
+        return find_shipped("", str(given), "mission")
 
     def ran(self, mission: Mission, run: ScriptedRun) -> None:
         """Count a run, unless its mission was changed on purpose."""

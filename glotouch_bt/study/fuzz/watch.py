@@ -15,7 +15,7 @@ CANARY = "glotouch_fuzz_canary"
 PROCESSES = ("os.system", "os.exec", "os.posix_spawn", "os.fork", "os.forkpty", "subprocess.Popen", "pty.spawn",
              "socket.connect", "socket.bind", "ctypes.dlopen", "os.remove", "os.rename", "shutil.rmtree")  # fmt: skip
 """Audit events (PEP 578) of leaving this process or changing the disk."""
-LARGEST_BYTES = 12 * 1024**3
+LARGEST_BYTES = 4 * 1024**3
 
 
 class TooLong(BaseException):
@@ -43,7 +43,7 @@ class Watch:
         """
         self.seen.clear()
         before = signal.signal(signal.SIGALRM, _alarm)
-        signal.setitimer(signal.ITIMER_REAL, seconds, 1.0)
+        signal.setitimer(signal.ITIMER_REAL, seconds)
         self._on = True
         try:
             yield
