@@ -9,6 +9,7 @@ import numpy as np
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.touch import Candidate, Layer, TouchSequence, TouchSet
+from glotouch_bt.touch.jaw_zero import JawZero
 from skills.allowance import keeping_clear_of
 from skills.base import UNCHANGED, In, Out, Skill, SkillFailed, SkillRun
 from skills.squeeze_motion import LEAST_GAP_M, ClosureParams, Squeezing, disturbance, layer_heights
@@ -45,6 +46,7 @@ class Squeeze(Skill):
 
     candidate = In(Candidate, "what to squeeze")
     known = In(tuple, "all candidates, to keep clear of", key="candidates", required=False)
+    jaw_zero = In(JawZero, "what the jaws report too much", required=False)
     touchset = Out(TouchSet, "what was felt")
 
     def run(self) -> SkillRun:
@@ -87,7 +89,7 @@ class Squeeze(Skill):
         A height that gives no layer is tried once more a little beside it. What fails there too slopes or stands free,
         and does so higher up: the sequence ends.
         """
-        hand = Squeezing(self.context, candidate, at, self.params)
+        hand = Squeezing(self.context, candidate, at, self.params, self.jaw_zero)
         layers: list[Layer] = []
         yield from hand.go_down(float(heights[0]))
         for height, elsewhere in zip(heights.tolist(), _elsewhere(heights), strict=True):

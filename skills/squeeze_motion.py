@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose
 from glotouch_bt.touch import Candidate, Layer, Yielding, make_layer, watch_yielding
+from glotouch_bt.touch.jaw_zero import JawZero
 from skills.base import Context, SkillParams, param
 from skills.closing import close_gently, let_go
 from skills.hand import glide, hand_pose_B
@@ -76,13 +79,17 @@ class Squeezing:
         candidate: What is squeezed.
         at: Where the open hand stands.
         params: How.
+        zero: What the jaws report too much; taken off every aperture.
 
     Attributes:
         yaw_K_rad: Direction of x_P the hand really takes (`at`'s or its half turn).
     """
 
-    def __init__(self, context: Context, candidate: Candidate, at: Stance, params: ClosureParams) -> None:
+    def __init__(
+        self, context: Context, candidate: Candidate, at: Stance, params: ClosureParams, zero: JawZero | None = None
+    ) -> None:
         self.candidate, self.at = candidate, at
+        self._zero = zero or JawZero()
         self._context, self._p = context, params
         arm, container = context.arm, context.world.container
         self.yaw_K_rad = hand_pose_B(arm, container, np.zeros(3), at.yaw_K_rad).yaw_rad - container.pose_B_K.yaw_rad
@@ -140,7 +147,8 @@ class Squeezing:
             yielding=yielding,
         )
         yield from let_go(arm, self.at.opening_m)
-        return layer, yielding
+        true_m = layer.aperture_m - self._zero.error_m
+        return replace(layer, aperture_m=true_m, zero_sd_m=self._zero.sd_m), yielding
 
     def rise(self) -> Motion[None]:
         """Straight up to travelling height."""

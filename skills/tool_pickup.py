@@ -9,6 +9,7 @@ import numpy as np
 
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Pose, SetPayload, Tare
+from glotouch_bt.touch.jaw_zero import JawZero, measured_zero
 from skills.allowance import may_touch
 from skills.base import UNCHANGED, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.floor import FLOOR_SEARCH_M, feel_floor
@@ -63,6 +64,7 @@ class ToolPickup(Skill):
     }
 
     tool = Out(HeldTool, "the probe in the jaws")
+    jaw_zero = Out(JawZero, "what the jaws report too much, by the handle's width")
 
     def run(self) -> SkillRun:
         """See the class."""
@@ -88,7 +90,8 @@ class ToolPickup(Skill):
             )
         payload = SetPayload(probe.mass_kg, np.array([0.0, 0.0, probe.com_below_grasp_m]))
         yield from finish(self.context.requests.start(payload), "payload")
-        yield from arm.hold(0.2)
+        seen = yield from arm.hold(0.2, tactile=True)
+        self.jaw_zero = measured_zero(seen, probe.handle_m[1], arm.description.gripper.pad_shape)
         yield from finish(self.context.requests.start(Tare()), "tare")
         tool = HeldTool(
             tip_P_m=np.array([0.0, 0.0, probe.grasp_to_tip_m]),
@@ -100,8 +103,9 @@ class ToolPickup(Skill):
         if p.floor_touch:
             tool = yield from self._feel_floor(tool)
         self.event(
-            "tool", held=True, grasp_to_tip_m=probe.grasp_to_tip_m, floor_z_K_m=tool.floor_z_K_m, weight_N=weight_N
-        )
+            "tool", held=True, grasp_to_tip_m=probe.grasp_to_tip_m, floor_z_K_m=tool.floor_z_K_m, weight_N=weight_N,
+            jaw_zero=self.jaw_zero,
+        )  # fmt: skip
         self.tool = tool
 
     def _handle_wide(self, aperture_m: float) -> bool:

@@ -13,6 +13,7 @@ from glotouch_bt.recognition import PadSpec, TargetModel
 from glotouch_bt.recognition.gain import Belief, believe, expected_gain
 from glotouch_bt.robot import HOLD, Array, MotionRefused, ParamError
 from glotouch_bt.touch import Candidate, Layer, TouchSequence, TouchSet
+from glotouch_bt.touch.jaw_zero import JawZero
 from skills.allowance import keeping_clear_of
 from skills.base import UNCHANGED, Context, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.hand import CLEARANCE_M, hand_pose_B, require_clear
@@ -58,6 +59,7 @@ class TouchNext(Skill):
     candidates = In(tuple, "what may be touched", element=Candidate)
     felt = In(tuple, "what was felt so far", key="touchsets", required=False)
     rejected = In(tuple, "indices of candidates to be left alone", required=False)
+    jaw_zero = In(JawZero, "what the jaws report too much", required=False)
     touchsets = Out(tuple, "what was felt, one TouchSet per candidate", element=TouchSet)
     decided = Out(bool, "no further closure is wanted")
 
@@ -221,7 +223,7 @@ class TouchNext(Skill):
         if hand is None or hand.at is not chosen.at:
             yield from self._rise(down)
             (candidate,) = (c for c in candidates if c.index == index)
-            hand = Squeezing(self.context, candidate, chosen.at, self.params)
+            hand = Squeezing(self.context, candidate, chosen.at, self.params, self.jaw_zero)
         with keeping_clear_of(self.context.arm, [c for c in candidates if c.index != index]):
             if hand is not down:
                 yield from hand.go_down(chosen.closure.height_m)

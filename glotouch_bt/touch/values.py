@@ -16,6 +16,9 @@ from glotouch_bt.robot import Array
 ContourKind = Literal["round", "box"]
 ContourFamily = Literal["circle", "rectangle", "free"]
 
+ZERO_SD_M = 0.3e-3
+"""Standard deviation of a gripper's zero that nobody measured. Source: CONDITIONS, nominal 0.23 mm, harsh 0.58 mm."""
+
 
 @dataclass(frozen=True)
 class Contact:
@@ -149,6 +152,7 @@ class Layer:
         slide_m, turn_rad, gave_m: What the closure did to the object, as far as the robot can tell (`touch.yielding`):
             displacement along the closing direction (+y_P), turn about +z_K, closing after both pads touched; NaN if
             nobody watched.
+        zero_sd_m: Standard deviation of the error that `aperture_m` shares with every other layer.
     """
 
     height_m: float
@@ -163,6 +167,7 @@ class Layer:
     slide_m: float = math.nan
     turn_rad: float = math.nan
     gave_m: float = math.nan
+    zero_sd_m: float = ZERO_SD_M
 
 
 @dataclass(frozen=True)
