@@ -20,7 +20,7 @@ from glotouch_bt.cli_doctor import doctor, link, read_settings
 from glotouch_bt.cli_faults import bench_faults, faults
 from glotouch_bt.cli_pause import bench_pause
 from glotouch_bt.cli_replay import replay
-from glotouch_bt.cli_resume import resume
+from glotouch_bt.cli_resume import bench_resume, resume
 from glotouch_bt.cli_testing import bench_fuzz, mission_tests
 from glotouch_bt.guarded import guarded, set_debug, showing_tracebacks
 
@@ -35,6 +35,7 @@ app = typer.Typer(
 bench.command("link")(link)
 bench.command("pause")(bench_pause)
 bench.command("faults")(bench_faults)
+bench.command("resume")(bench_resume)
 bench.command("fuzz")(bench_fuzz)
 app.command("doctor")(doctor)
 app.command("test")(mission_tests)

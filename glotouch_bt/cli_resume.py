@@ -6,7 +6,7 @@ import json
 import sys
 import traceback
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -57,6 +57,52 @@ def resume(
             traceback.print_exception(done.outcome.error)
         console.print_error(done.outcome.reasons[-1])
     return done.exit_code
+
+
+@guarded
+def bench_resume(
+    mission: Annotated[str, typer.Option(help="a mission with `target` and `expected_objects`")] = "retrieve",
+    set_: Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="a mission parameter")] = None,
+    trials: Annotated[int, typer.Option(min=1, help="seeds, one unbroken twin each")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="first seed")] = 0,
+    kills: Annotated[int, typer.Option(min=1, help="moments a seed")] = 3,
+    conditions: Annotated[str, typer.Option(help="disturbances: ideal, nominal, harsh, or a file")] = "nominal",
+    objects: Annotated[Path | None, typer.Option(metavar="DIR", help="folder of watertight STL files")] = None,
+    few: Annotated[int, typer.Option(min=1, help="only the first so many objects are in the box: it is quicker")] = 2,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="where trials and summary go")] = None,
+    json_: Json = False,
+) -> None:
+    """Kill missions (SIGKILL) at random moments, resume them, and compare each with its unbroken twin."""
+    from glotouch_bt.cli_bench import _check, _folder
+    from glotouch_bt.cli_doctor import read_settings
+    from glotouch_bt.mission.load import load_mission
+    from glotouch_bt.study.faults import few_objects
+    from glotouch_bt.study.killing import KillStudy, run_study
+
+    settings = read_settings(set_)
+    _check(conditions, "mujoco")
+    world = load_mission(mission, settings, objects=objects).world
+    folder = _folder(out, "resume")
+    box, names = few_objects(world.objects, few, folder / "objects")
+    settings = {"target": names[0], "expected_objects": str(len(names))} | settings
+    load_mission(mission, settings, objects=box)
+    study = KillStudy(mission, range(seed, seed + trials), kills, folder, settings, conditions, box)
+
+    def show(row: dict[str, Any], done: int, total: int) -> None:
+        at = f"{row['moment']:.0%} of the mission, checkpoint {row.get('checkpoint')} of {row.get('checkpoints')}"
+        said = "as its twin" if row["same_end"] else f"NOT as its twin: {row.get('status')} {row['message']}"
+        exact = ", to the bit" if row["same_result"] and row["same_record"] else ""
+        sys.stderr.write(f"[{done}/{total}] seed {row['seed']}: {row['outcome']} at {at}: {said}{exact}\n")
+
+    summary = run_study(study, show)
+    if json_:
+        sys.stdout.write(json.dumps(summary, indent=2) + "\n")
+        return
+    for name in ("same_end", "same_result", "same_record", "readable", "at_most_the_running_skill_lost"):
+        r = summary[name]
+        words = name.replace("_", " ")
+        sys.stdout.write(f"{words:32s} {r['rate'] * r['n']:.0f} of {r['n']}  ({r['lo']:.3f} .. {r['hi']:.3f})\n")
+    sys.stdout.write(f"robot time lost {summary['lost_s']['mean']:.1f} s on average; {folder}\n")
 
 
 def _list(folder: Path, json_: bool) -> None:

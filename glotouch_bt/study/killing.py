@@ -45,6 +45,7 @@ class KillStudy:
         out: Folder of the study.
         settings: `--set` words.
         conditions: Path or shipped name.
+        objects: Folder of STL files instead of the world's.
         words: The command line's first words.
     """
 
@@ -54,13 +55,15 @@ class KillStudy:
     out: Path
     settings: Mapping[str, str] = field(default_factory=dict)
     conditions: str = "nominal"
+    objects: Path | None = None
     words: tuple[str, ...] = (sys.executable, "-m", "glotouch_bt.cli")
 
     def run_words(self, seed: int, folder: Path) -> list[str]:
         """The command that runs one mission."""
         sets = [w for k, v in self.settings.items() for w in ("--set", f"{k}={v}")]
         head = [*self.words, "run", self.mission, "--seed", str(seed), "--conditions", self.conditions]
-        return [*head, *sets, "--out", str(folder), "--json"]
+        box = [] if self.objects is None else ["--objects", str(self.objects)]
+        return [*head, *sets, *box, "--out", str(folder), "--json"]
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,7 @@ class Twin:
 
 
 def run_study(study: KillStudy, on_row: Callable[[dict[str, Any], int, int], None] | None = None) -> dict[str, Any]:
-    """Every twin and every kill; writes trials.csv and summary.json, returns the summary.
+    """Every twin and every kill; writes trials.csv and summary.json after each, returns the summary.
 
     Raises:
         BadInput: The mission or an option is wrong.
@@ -95,8 +98,13 @@ def run_study(study: KillStudy, on_row: Callable[[dict[str, Any], int, int], Non
         twin = _twin(study, seed)
         for number, share in enumerate(stream(seed, "kill").random(study.kills)):
             rows.append(_trial(study, seed, number, float(share), twin))
+            _write(study, rows)
             if on_row is not None:
                 on_row(rows[-1], len(rows), total)
+    return _write(study, rows)
+
+
+def _write(study: KillStudy, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     with (study.out / "trials.csv").open("w", newline="") as f:
         table = csv.DictWriter(f, COLUMNS, extrasaction="ignore")
         table.writeheader()
