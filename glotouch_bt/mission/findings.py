@@ -91,6 +91,12 @@ class Findings:
         near = difflib.get_close_matches(name, sorted(valid), n=1)
         return near[0] if near else ""
 
+    @staticmethod
+    def near(name: str, valid: Iterable[str], most: int = 12) -> list[str]:
+        """The valid names, if they are many those that are most like another, in order of the alphabet."""
+        names = sorted(valid)
+        return names if len(names) <= most else sorted(difflib.get_close_matches(name, names, n=most, cutoff=0.0))
+
     def unknown(self, place: Place, code: str, kind: str, name: str, valid: Iterable[str]) -> str:
         """Note a name nobody knows; returns the nearest valid one or an empty string."""
         names = sorted(valid)

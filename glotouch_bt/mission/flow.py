@@ -11,8 +11,8 @@ of `a`, makes all of them sure). Loops are followed pass by pass until their set
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
+from glotouch_bt.mission.after import After
 from glotouch_bt.mission.configurations import EMPTY
 from glotouch_bt.mission.demands import Demand, Demands, until_condition, verdicts
 from glotouch_bt.mission.nodes import (
@@ -38,20 +38,6 @@ from skills.base import UNCHANGED
 HOW = ("success", "failure", "running")
 
 
-@dataclass(frozen=True)
-class After:
-    """Sets of configurations after a node.
-
-    Attributes:
-        success, failure: How it may have ended.
-        running: Where it may be broken off.
-    """
-
-    success: int = EMPTY
-    failure: int = EMPTY
-    running: int = EMPTY
-
-
 class Flow:
     """One evaluation of a tree.
 
@@ -64,6 +50,7 @@ class Flow:
 
     Attributes:
         entered: Set in which each node was entered, by node id.
+        left: What each node was left in, by node id.
         asked: Set in which each demand was made.
         end: After the root.
     """
@@ -73,6 +60,7 @@ class Flow:
         self._sets = variables.sets
         self._has_unknown = any(n.kind == "unknown" for n in tree.walk())
         self.entered: dict[int, int] = {}
+        self.left: dict[int, After] = {}
         self.asked: dict[Demand, int] = {}
         self._known: dict[tuple[int, int], After] = {}
         self.end = self.run(tree, variables.start)
@@ -85,7 +73,8 @@ class Flow:
         if key not in self._known:
             self.entered[id(node)] = self._sets.union(self.entered.get(id(node), EMPTY), entry)
             method: Callable[[NodeSpec, int], After] | None = getattr(self, f"_of_{node.kind}", None)
-            self._known[key] = method(node, entry) if method else self._nobody_knows(entry)
+            made = self._known[key] = method(node, entry) if method else self._nobody_knows(entry)
+            self.left[id(node)] = self.left.get(id(node), After()).joined(made, self._sets)
         return self._known[key]
 
     # -- demands -----------------------------------------------------------------------------------------------------

@@ -12,23 +12,27 @@ from glotouch_bt.mission.configurations import EMPTY
 from glotouch_bt.mission.demands import Demand, all_demands, same_quantity
 from glotouch_bt.mission.findings import Findings
 from glotouch_bt.mission.flow import Flow
+from glotouch_bt.mission.habits import check_habits
 from glotouch_bt.mission.nodes import ForEachSettings, NodeSpec
 from glotouch_bt.mission.paths import Goal, shortest_path
 from glotouch_bt.mission.source import Place
-from glotouch_bt.mission.variables import UNSET, Kind, Variables, item_kind, written_kinds
+from glotouch_bt.mission.variables import ANYTHING, UNSET, Kind, Variables, item_kind, written_kinds
 
 MOST_PATHS = 40
 """Findings beyond so many are reported without a path."""
 DEEPEST_PYTHON = 50_000
 
 
-def check_flow(tree: NodeSpec, findings: Findings, leaves: Mapping[str, tuple[frozenset[str], Place]]) -> None:
+def check_flow(
+    tree: NodeSpec, findings: Findings, leaves: Mapping[str, tuple[frozenset[str], Place]], timeout_s: float
+) -> None:
     """Report what can go wrong on some run of a tree.
 
     Args:
         tree: Its root, names numbered.
         findings: Where faults go.
         leaves: States in which the mission says it leaves resources after success, and where it says so.
+        timeout_s: Longest duration of the mission.
     """
     with _deep_recursion():
         variables = Variables(tree)
@@ -37,6 +41,7 @@ def check_flow(tree: NodeSpec, findings: Findings, leaves: Mapping[str, tuple[fr
         blocked = any(exact.entered.get(id(n), EMPTY) == EMPTY for n in tree.walk())
         lenient = Flow(tree, variables, demands, lenient=True) if blocked else exact
         _Judge(exact, lenient, findings).all(leaves)
+        check_habits(exact, findings, timeout_s)
 
 
 @contextmanager
@@ -76,6 +81,8 @@ class _Judge:
         if asked == EMPTY:
             return
         found = self._sets.values(asked, demand.variable)
+        if demand.unset == "not always":  # what a mistake before it kept from being written is no mistake here
+            found |= self._sets.values(self._lenient.judged(demand), demand.variable) - {ANYTHING}
         wrong = found - demand.good - {UNSET}
         if demand.of_resource:
             if bad := found - demand.good:
@@ -114,7 +121,9 @@ class _Judge:
             if "@" not in key.removeprefix(prefix) and self._sets.values(asked, variable) - {UNSET}
         )
         names = [k.rpartition("/")[2] for k in written if k.rpartition("/")[0] == prefix]
-        valid = ", ".join(names) or "no key is written yet"
+        near = Findings.near(demand.key.rpartition("/")[2], names)
+        valid = ", ".join(near) + (f" and {len(names) - len(near)} more" if len(names) > len(near) else "")
+        valid = valid or "no key is written yet"
         if prefix and (outer := [k for k in written if "/" not in k]):
             valid += f"; of the caller, to be wired with ports: {', '.join(outer)}"
         hint = self._findings.nearest(demand.key.rpartition("/")[2], names)

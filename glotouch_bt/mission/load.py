@@ -14,7 +14,7 @@ from glotouch_bt.mission.findings import Finding, Findings, MissionFaults
 from glotouch_bt.mission.judge import check_flow
 from glotouch_bt.mission.library import SkillShelf, find_shipped, shipped_root, shown
 from glotouch_bt.mission.nodes import NodeSpec, number_names
-from glotouch_bt.mission.parameters import Parameter, Value, read_parameters, resolved, substitute
+from glotouch_bt.mission.parameters import Parameter, Value, check_used, read_parameters, resolved, substitute
 from glotouch_bt.mission.parse import parse_tree
 from glotouch_bt.mission.scope import Reading, Scope
 from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, plain, read_yaml
@@ -134,7 +134,8 @@ def _read(
     scope = Scope(skills, findings, path, folder, reading=reading)
     tree = parse_tree(substitute(tree_node, parameters, findings), scope)
     number_names(tree)
-    check_flow(tree, findings, _leaves(source, findings))
+    check_used(source.get("parameters"), tree_node, findings)
+    check_flow(tree, findings, _leaves(source, findings), timeout_s)
     if world is None or len(findings):
         return None
     values = {n: p.value for n, p in parameters.items() if p.value is not None}

@@ -210,6 +210,25 @@ def substitute(node: Node, parameters: Mapping[str, Parameter], findings: Findin
     return replace(node, value=found.value, unit=found.declared.unit, origin=node.value)
 
 
+def check_used(section: Node | None, tree: Node, findings: Findings) -> None:
+    """Report declared parameters that a tree does not use."""
+    if not isinstance(section, Map):
+        return
+    used: set[str] = set()
+    stack = [tree]
+    while stack:
+        node = stack.pop()
+        if isinstance(node, Seq):
+            stack.extend(node.items)
+        elif isinstance(node, Map):
+            stack.extend(v for _, v in node.entries)
+        elif isinstance(node.value, str) and node.value.startswith("$"):
+            used.add(node.value[1:])
+    for key, _ in section.entries:
+        if key.value not in used:
+            findings.add(key.place, "unused_parameter", f"no node uses the parameter {key.value!r}")
+
+
 def resolved(node: Node | None, parameters: Mapping[str, Parameter]) -> dict[str, object]:
     """The `parameters` section as plain data with the values in use as defaults."""
     if not isinstance(node, Map):
@@ -220,4 +239,4 @@ def resolved(node: Node | None, parameters: Mapping[str, Parameter]) -> dict[str
     return dict(section)
 
 
-__all__ = ["Declaration", "Parameter", "Value", "read_parameters", "resolved", "substitute"]
+__all__ = ["Declaration", "Parameter", "Value", "check_used", "read_parameters", "resolved", "substitute"]

@@ -11,7 +11,7 @@ from glotouch_bt.mission.fields import validate
 from glotouch_bt.mission.library import shipped_root, shown
 from glotouch_bt.mission.literals import is_literal, read_literal
 from glotouch_bt.mission.nodes import KINDS, ConditionSettings, Kind, NodeSpec, RepeatSettings, SubtreeSettings, Wire
-from glotouch_bt.mission.parameters import Parameter, Value, read_parameters, substitute
+from glotouch_bt.mission.parameters import Parameter, Value, check_used, read_parameters, substitute
 from glotouch_bt.mission.scope import Scope
 from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, read_yaml
 from glotouch_bt.robot import BadInput
@@ -364,4 +364,6 @@ def _open_subtree(
     tree = source.get("tree")
     if tree is None:
         scope.findings.add(source.place, "missing_key", "a subtree file needs 'tree'")
+    else:
+        check_used(source.get("parameters"), tree, scope.findings)
     return parameters, tree

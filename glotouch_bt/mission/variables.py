@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from glotouch_bt.mission.configurations import FULL, Configurations
+from glotouch_bt.mission.configurations import START, Configurations
 from glotouch_bt.mission.nodes import NodeSpec
 from glotouch_bt.mission.units import unit_of_name
 from skills.base import UNCHANGED
@@ -74,9 +74,7 @@ class Variables:
         self.names = (*self.keys, *self.resources)
         sizes = [*(len(k) for k in self._kinds.values()), *(len(s) for s in self._states.values()), 2]
         self.sets = Configurations(sizes)
-        self.start = FULL
-        for variable in range(len(sizes)):
-            self.start = self.sets.where(self.start, variable, (0,))
+        self.start = START
 
     def kind(self, key: str, value: int) -> Kind:
         """What a value of a key's variable stands for."""
