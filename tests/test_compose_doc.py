@@ -47,7 +47,7 @@ def fits(expected: str, found: str) -> bool:
 
 
 def own_environment(folder: Path) -> dict[str, str]:
-    """An environment of one's own that sees what is installed here, so that the reader's package leaves no trace here."""
+    """An environment that sees what is installed here, and where the reader's package leaves its traces."""
     venv.create(folder, with_pip=False)
     bin_ = folder / "bin"
     site = Path(sysconfig.get_path("purelib", vars={"base": str(folder), "platbase": str(folder)}))

@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from py_trees.common import Status
+
 from glotouch_bt.mission_testing.outcomes import Decide, Outcome
 from glotouch_bt.mission_testing.standins import port_value
 from glotouch_bt.robot import HOLD
@@ -87,25 +89,30 @@ class _Playing(Skill):
 
     part: Part
     stage: Stage
+    _call: Call
 
     def __init__(self, name: str, params: SkillParams, context: Context) -> None:
         Skill.__init__(self, name, params, context)
 
     initialise = Skill.initialise
-    update = Skill.update
     terminate = Skill.terminate
 
+    def update(self) -> Status:
+        status = Skill.update(self)
+        if status is Status.FAILURE and self.reason is not None:  # the base class may have ended it: it took too long
+            self._call.ending, self._call.code = "FAILURE", self.reason.code
+        return status
+
     def run(self) -> SkillRun:
-        call = self._begin()
+        self._call = call = self._begin()
         try:
             outcome = self.part.answer(call)
             yield from self._wait(outcome)
             self._end(call, outcome)
         except GeneratorExit:
-            call.ending = "PREEMPTED"
+            call.ending = "PREEMPTED" if call.ending == "RUNNING" else call.ending
             raise
-        except SkillFailed as e:
-            call.ending, call.code = "FAILURE", e.reason.code
+        except SkillFailed:
             raise
         except BaseException:
             call.ending = "RAISED"
@@ -134,9 +141,11 @@ class _Playing(Skill):
     def _wait(self, outcome: Outcome) -> SkillRun:
         if outcome.kind == "hangs":
             self._write(outcome.ports)
-        until = float("inf") if outcome.kind == "hangs" else self.context.observation.now_s + outcome.after_s
+        begin_s = self.context.observation.now_s
+        until = float("inf") if outcome.kind == "hangs" else begin_s + outcome.after_s
+        longest = begin_s + self.LONGEST_S
         while self.context.observation.now_s < until - 1e-9:
-            self.stage.wake(min([until, *(getattr(node, "deadline_s", until) for node in self._above())]))
+            self.stage.wake(min([until, longest, *(getattr(node, "deadline_s", until) for node in self._above())]))
             yield HOLD
 
     def _above(self) -> list[Any]:

@@ -73,7 +73,7 @@ def fails(code: str = "", message: str = "", /, **ports: object) -> Outcome:
 
 
 def hangs(**ports: object) -> Outcome:
-    """RUNNING until a timeout, a sibling or the end of the mission breaks it off; `ports` are written first."""
+    """RUNNING until a timeout, a sibling, the skill's own longest time or the mission's end; `ports` written first."""
     return Outcome("hangs", ports=ports)
 
 
@@ -93,6 +93,8 @@ def flat(answer: Answer) -> tuple[Outcome | Decide, ...]:
     Raises:
         ParamError: Something in it is neither an outcome nor a function, or there is nothing in it.
     """
+    if answer in (ok, fails, hangs, raises, real):
+        raise ParamError("script", getattr(answer, "__name__", answer), "called: ok(), fails('code'), ...")
     if isinstance(answer, Outcome) or (callable(answer) and not isinstance(answer, type)):
         return (answer,)
     if not isinstance(answer, Sequence) or isinstance(answer, (str, bytes)) or not answer:
