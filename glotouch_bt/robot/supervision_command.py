@@ -8,7 +8,6 @@ import numpy as np
 
 from glotouch_bt.robot.command import Command, GripperTarget, JointSetpoint
 from glotouch_bt.robot.description import RobotDescription
-from glotouch_bt.robot.geometry import Array
 from glotouch_bt.robot.limits import Limits
 from glotouch_bt.robot.observation import Observation
 from glotouch_bt.robot.supervision_limits import Finding, SupervisionLimits
@@ -36,29 +35,21 @@ class CommandWatch:
         first: Observation,
     ) -> None:
         self._joints, self._hand, self._period_s = description.joints, description.gripper, period_s
-        dof = description.dof
-        lower = np.array([j.lower_rad for j in description.joints])
-        upper = np.array([j.upper_rad for j in description.joints])
-        self._fastest = rules.command_slack * np.array([j.velocity_rad_s for j in description.joints])
         self._start_rad = rules.following_rad
-        # Rows: q, dq, ddq, step since the last setpoint. |value - middle| <= half; false for NaN.
-        self._asked = np.zeros((4, dof))
-        self._middle = np.stack([0.5 * (lower + upper), *np.zeros((3, dof))])
-        half = [
-            0.5 * (upper - lower) + ROUND,
-            self._fastest,
-            np.full(dof, GREATEST_RAD_S2),
-            self._fastest * period_s,
+        # lower, upper, largest speed, largest step in a period
+        self._ranges = [
+            (j.lower_rad - ROUND, j.upper_rad + ROUND, fastest, fastest * period_s)
+            for j in description.joints
+            for fastest in (rules.command_slack * j.velocity_rad_s,)
         ]
-        self._half = np.stack(half)
-        self._most_m = (rules.command_slack * limits.tcp_speed_m_s * period_s) ** 2
+        self._most_2 = (rules.command_slack * limits.tcp_speed_m_s * period_s) ** 2
         self._speed_m_s = limits.tcp_speed_m_s
         self.forget(first)
 
     def forget(self, newest: Observation) -> None:
         """The next setpoint begins where the robot is now."""
-        self._q: Array = np.array(newest.q[-1])
-        self._P: Array | None = None
+        self._q: list[float] = newest.q[-1].tolist()
+        self._P: list[float] | None = None
         self._moving = False
 
     def look(self, command: Command, newest: Observation) -> Finding | None:
@@ -70,42 +61,50 @@ class CommandWatch:
             if self._moving:  # it brakes by itself: the next setpoint is measured from where it stands then
                 self._moving, self._P = False, None
             return None
-        asked = self._asked
-        first = self._P is None
+        before, spare = (newest.q[-1].tolist(), self._start_rad) if self._P is None else (self._q, 0.0)
         try:
-            asked[0], asked[1], asked[2] = motion.q, motion.dq, motion.ddq
-            P = np.asarray(motion.pose_B_P.position_m, dtype=np.float64)
+            asked, P = motion.q.tolist(), motion.pose_B_P.position_m.tolist()
+            for q, dq, ddq, last, (low, high, fastest, step) in zip(
+                asked, motion.dq.tolist(), motion.ddq.tolist(), before, self._ranges, strict=True
+            ):
+                if not (
+                    low <= q <= high
+                    and -fastest <= dq <= fastest
+                    and -GREATEST_RAD_S2 <= ddq <= GREATEST_RAD_S2
+                    and abs(q - last) <= step + spare
+                ):
+                    return self._setpoint(motion, before, spare, newest)
+            x, y, z = P
         except (ValueError, TypeError, AttributeError):
-            return self._wrong(f"a setpoint that is not {asked.shape[1]} numbers a quantity", math.nan, 0.0, newest)
-        np.subtract(asked[0], newest.q[-1] if first else self._q, out=asked[3])
-        half = self._half
-        bad = np.abs(asked - self._middle) <= half
-        if np.count_nonzero(bad) < bad.size and (wrong := self._setpoint(asked, bad, first, newest)) is not None:
-            return wrong
+            count = len(self._ranges)
+            return self._wrong(f"a setpoint that is not {count} numbers a quantity", math.nan, 0.0, newest)
         if self._P is not None:
-            way = P - self._P
-            if not way @ way <= self._most_m:
-                speed = float(np.linalg.norm(way)) / self._period_s
+            a, b, c = self._P
+            way_2 = (x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2
+            if not way_2 <= self._most_2:
+                speed = math.sqrt(way_2) / self._period_s
                 return self._wrong(
                     f"P would move at {speed:.3f} m/s, {self._speed_m_s:.3f} is allowed", speed, self._speed_m_s, newest
                 )
-        self._q, self._P, self._moving = motion.q, P, _moves(motion)
+        self._q, self._P, self._moving = asked, P, bool(np.count_nonzero(motion.dq))
         return None
 
-    def _setpoint(self, asked: Array, good: Array, first: bool, newest: Observation) -> Finding | None:
+    def _setpoint(self, motion: JointSetpoint, before: list[float], spare: float, newest: Observation) -> Finding:
         """The first thing out of range; after a hold a setpoint may begin within the following error."""
-        for row, i in np.argwhere(~good.astype(bool)).tolist():
-            name, unit = (("q", "rad"), ("dq", "rad/s"), ("ddq", "rad/s2"), ("step", "rad"))[row]
-            value, half = float(asked[row, i]), float(self._half[row, i])
-            if row == 3 and first:
-                half += self._start_rad
-                if abs(value) <= half:
-                    continue
-            middle = float(self._middle[row, i])
-            valid = f"{middle - half:.4f}..{middle + half:.4f} {unit}"
-            what = f"{name} of {self._joints[i].name} would be {value:.4g} {unit}, valid is {valid}"
-            return self._wrong(what, value, middle + math.copysign(half, value - middle), newest)
-        return None
+        q, dq, ddq = (np.asarray(v, dtype=np.float64) for v in (motion.q, motion.dq, motion.ddq))
+        low, high, fastest, step = np.array(self._ranges).T
+        greatest = np.full(len(q), GREATEST_RAD_S2)
+        quantities = (
+            ("q", "rad", q, low, high),
+            ("dq", "rad/s", dq, -fastest, fastest),
+            ("ddq", "rad/s2", ddq, -greatest, greatest),
+            ("the step", "rad", q - before, -step - spare, step + spare),
+        )
+        name, unit, value, least, most = next(x for x in quantities if not np.all((x[3] <= x[2]) & (x[2] <= x[4])))
+        i = int(np.argmin((least <= value) & (value <= most)))
+        valid = f"{least[i]:.4f}..{most[i]:.4f} {unit}"
+        what = f"{name} of {self._joints[i].name} would be {value[i]:.4g} {unit}, valid is {valid}"
+        return self._wrong(what, float(value[i]), float(most[i] if value[i] > most[i] else least[i]), newest)
 
     def _jaws(self, target: GripperTarget, newest: Observation) -> Finding | None:
         hand = self._hand
@@ -122,7 +121,3 @@ class CommandWatch:
     @staticmethod
     def _wrong(what: str, value: float, limit: float, newest: Observation) -> Finding:
         return Finding("command", what, value, limit, newest.now_s)
-
-
-def _moves(motion: JointSetpoint) -> bool:
-    return bool(np.count_nonzero(motion.dq))

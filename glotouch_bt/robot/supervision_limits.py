@@ -17,7 +17,7 @@ GUARDS = {
     "out_of_reach": "a pose that no arm of this size has, or a rotation that is none",
     "wrench": "a sensed wrench beyond the hard limit, sample after sample",
     "wrench_stuck": "a noisy wrench sensor that gives the same numbers over and over",
-    "following": "the arm is not where it was told to be",
+    "following": "the hand is not where it was told to be",
     "gripper_stale": "the gripper does not report any more",
     "tactile_stale": "depth maps were asked for and do not come",
     "tactile_dead": "depth maps with hardly a live taxel, or with infinities, again and again",
@@ -38,9 +38,10 @@ class SupervisionLimits:
         reach_m: No part of the hand is farther from the base. Source: twice the reach of the largest supported arm.
         wrench_samples: Samples in a row beyond the hard wrench limit. Source: that of the simulated backend's own
             guard, 5 ms: what is shorter is the sensor's noise or the ringing of a stop.
-        following_rad: Largest distance of a joint from its setpoint at rest. Source: ours, 3 degrees: ten times what a
-            force at the hard limit causes at the stiffness of the simulated arm.
-        lag_s: In motion, a joint may be late by this as well. Source: driver 30 ms (its hold) and servo, doubled.
+        following_m, following_rad: Largest distance of the hand from where it was told to be, and angle. The hand's, not
+            the joints': a device that is sent poses finds its own posture for them. Source: ours; the simulated arm
+            gives way by less than 1 mm under a force at the hard limit.
+        lag_s: It may be where it was told to be so long ago. Source: ours, driver 30 ms (its hold) and servo, doubled.
         command_slack: Commanded against allowed speeds. Source: ours, rounding and the end of a profile.
         gripper_age_s, tactile_age_s: Oldest report, and longest wait for a depth map that was asked for. Source:
             `Limits.max_age_s`, five times the slowest gripper of CONDITIONS, twice its slowest depth maps.
@@ -61,6 +62,7 @@ class SupervisionLimits:
     speed_slack: float = 1.2
     reach_m: float = 3.0
     wrench_samples: int = 5
+    following_m: float = 0.01
     following_rad: float = 0.05
     lag_s: float = 0.1
     command_slack: float = 1.1

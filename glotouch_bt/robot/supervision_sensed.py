@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import replace
-from itertools import pairwise
 from operator import lt
 
 import numpy as np
 
 from glotouch_bt.robot.command import Command
 from glotouch_bt.robot.description import RobotDescription
-from glotouch_bt.robot.geometry import Array
 from glotouch_bt.robot.limits import Limits
 from glotouch_bt.robot.observation import Observation, TactileFrame
 from glotouch_bt.robot.supervision_limits import Finding, Patience, SupervisionLimits
@@ -42,38 +41,19 @@ class SensedWatch:
         self._rules, self._limits, self._period_s = rules, limits, period_s
         self._joints = description.joints
         self._patience = Patience(rules)
-        self._samples, dof = len(first.stamp_s), description.dof
+        self._samples = len(first.stamp_s)
         self._last_s = float(first.stamp_s[-1])
         self._late_s = (1.0 + COMPLETE) * period_s
-        lower = np.array([j.lower_rad for j in description.joints]) - rules.joint_slack_rad
-        upper = np.array([j.upper_rad for j in description.joints]) + rules.joint_slack_rad
-        fastest = rules.speed_slack * np.array([j.velocity_rad_s for j in description.joints])
-        # One row of a block: q, dq, wrench, position, quaternion; good if |value - middle| <= half, and false for NaN.
-        # A wrench whose every component is below limit / sqrt(3) has a norm below the limit.
-        share = 1.0 / math.sqrt(3.0)
-        middle = np.concatenate([0.5 * (lower + upper), np.zeros(dof + 13)])
-        half = np.concatenate(
-            [
-                0.5 * (upper - lower),
-                fastest,
-                [share * limits.hard_force_N] * 3,
-                [share * limits.hard_torque_Nm] * 3,
-                [rules.reach_m] * 3,
-                [1.0 + QUAT_SLACK] * 4,
-            ]
-        )
-        # After the block's rows: the newest q against where it shall be.
-        width = len(middle)
-        self._flat = np.zeros(self._samples * width + dof)
-        self._middle = np.concatenate([np.tile(middle, self._samples), np.zeros(dof)])
-        per_half = np.concatenate([np.tile(1.0 / half, self._samples), np.full(dof, 1.0 / rules.following_rad)])
-        self._per_half = per_half
-        rows = self._flat[: self._samples * width].reshape(self._samples, width)
-        ends = np.cumsum([0, dof, dof, 6, 3, 4])
-        self._q, self._dq, self._wrench, self._position, self._quat = (rows[:, a:b] for a, b in pairwise(ends.tolist()))
-        self._newest_q, self._wanted_q = self._flat[-dof:], self._middle[-dof:]
-        self._setpoint: Array | None = None
-        self._lead: Array | None = None
+        slack = rules.joint_slack_rad
+        self._ranges = [(j.lower_rad - slack, j.upper_rad + slack) for j in description.joints]
+        self._fastest = rules.speed_slack * np.array([j.velocity_rad_s for j in description.joints])
+        # Of whole blocks, sums of squares: below their limits surely in order, and never with a NaN among them.
+        self._per_limit = np.array([1.0 / limits.hard_force_N] * 3 + [1.0 / limits.hard_torque_Nm] * 3)
+        self._slow_2, self._reach_2 = float(self._fastest.min()) ** 2, rules.reach_m**2
+        self._near_2, self._alike = rules.following_m**2, math.cos(0.5 * rules.following_rad)
+        # Position and quaternion of P in B as it was told to be lately, newest last; empty: it brakes to where it will.
+        self._told: deque[list[float]] = deque(maxlen=max(1, round(rules.lag_s / period_s)))
+        self._brakes = False
         self._moving = False
         self._over = 0
         self._force = math.nan
@@ -83,22 +63,25 @@ class SensedWatch:
     def forget(self, newest: Observation) -> None:
         """The robot was set back: its clock and posture begin anew."""
         self._last_s = float(newest.stamp_s[-1])
-        self._setpoint = self._lead = self._tactile_since_s = None
-        self._moving, self._over, self._force = False, 0, math.nan
+        self._tactile_since_s = None
+        self._told.clear()
+        self._moving = self._brakes = False
+        self._over, self._force = 0, math.nan
         self._noisy_periods = self._same_periods = 0
 
     def told(self, command: Command) -> None:
         """What the coming block answers to."""
         motion = command.motion
         if motion is not None:
-            self._setpoint, self._lead = motion.q, motion.dq
-            self._moving = True
-        elif self._moving:
-            # Told to hold: at rest where it is if it was at rest; else it brakes to where it will stand.
+            pose = motion.pose_B_P
+            self._told.append([*pose.position_m.tolist(), *pose.quat.tolist()])
+            self._moving, self._brakes = True, bool(np.count_nonzero(motion.dq))
+        elif self._moving and self._brakes:
+            self._told.clear()
             self._moving = False
-            if self._lead is not None and np.count_nonzero(self._lead):
-                self._setpoint = None
-            self._lead = None
+        elif self._told:
+            self._told.append(self._told[-1])
+            self._moving = False
         if not command.tactile:
             self._tactile_since_s = None
         elif self._tactile_since_s is None:
@@ -135,21 +118,30 @@ class SensedWatch:
         return o, found
 
     def _fine(self, o: Observation) -> bool:
-        """Nothing in the block is out of the ordinary."""
-        flat = self._flat
-        self._q[:], self._dq[:], self._wrench[:] = o.q, o.dq, o.wrench_S
-        self._position[:], self._quat[:] = o.position_B_P, o.quat_B_P
-        self._newest_q[:] = o.q[-1]
-        self._wanted_q[:] = o.q[-1] if self._setpoint is None else self._setpoint
-        np.subtract(flat, self._middle, out=flat)
-        flat *= self._per_half
-        np.abs(flat, out=flat)
-        if self._setpoint is None and not self._moving and np.abs(o.dq[-1]).max() < STANDS_RAD_S:
-            self._setpoint = np.array(o.q[-1])
-        fine = bool(flat.max() <= 1.0)
-        if fine:
-            self._over = 0
-        return fine
+        """Nothing in the block is out of the ordinary: sums of squares of all of it, range and pose of its newest."""
+        scaled = (o.wrench_S * self._per_limit).ravel()
+        q, dq, position, quat = o.q.ravel(), o.dq.ravel(), o.position_B_P.ravel(), o.quat_B_P.ravel()
+        if not (
+            scaled @ scaled < 1.0
+            and math.isfinite(q @ q)
+            and (dq @ dq <= self._slow_2 or bool((np.abs(o.dq).max(axis=0) <= self._fastest).all()))
+            and position @ position <= self._reach_2
+            and abs(quat @ quat - len(o.quat_B_P)) <= QUAT_SLACK
+        ):
+            return False
+        self._over = 0
+        for value, (low, high) in zip(o.q[-1].tolist(), self._ranges, strict=True):
+            if not low <= value <= high:
+                return False
+        x, y, z = o.position_B_P[-1].tolist()
+        w, i, j, k = o.quat_B_P[-1].tolist()
+        if not self._told:
+            if not self._moving and np.abs(o.dq[-1]).max() < STANDS_RAD_S:
+                self._told.append([x, y, z, w, i, j, k])
+            return True
+        a, b, c, d, e, f, g = self._told[-1]
+        away_2 = (x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2
+        return bool(away_2 <= self._near_2 and abs(w * d + i * e + j * f + k * g) >= self._alike)
 
     def _look_at_stamps(self, o: Observation, found: list[Finding]) -> Observation:
         """Samples out of order are dropped; gaps and missing samples are put on record, or end patience."""
@@ -172,7 +164,7 @@ class SensedWatch:
                 fatal = self._patience.ends("overrun", now_s)
             what = f"{periods:.1f} control periods passed in one cycle" + (" while the arm moved" * self._moving)
             found.append(Finding("overrun", what, periods, 1.0 + self._rules.late_periods, now_s, fatal))
-        missing = round(self._samples * max(periods, 1.0)) - len(o.stamp_s) - bad
+        missing = self._samples - len(o.stamp_s) - bad
         if missing > 0:
             short = len(o.stamp_s) < COMPLETE * self._samples
             fatal = self._patience.ends("samples_missing", now_s, self._rules.tolerated if short else missing)
@@ -201,10 +193,11 @@ class SensedWatch:
         if far > self._rules.reach_m:
             what = f"the pads' mid-point is reported {far:.2f} m from the base"
             found.append(Finding("out_of_reach", what, far, self._rules.reach_m, float(o.stamp_s[-1])))
-        norm = float(np.abs(np.linalg.norm(o.quat_B_P, axis=1) - 1.0).max())
+        norm = float(np.abs((o.quat_B_P * o.quat_B_P).sum(axis=1) - 1.0).max())
         if norm > QUAT_SLACK:
-            what = f"a reported quaternion's length is off by {norm:.3g}"
+            what = f"the square of a reported quaternion's length is off by {norm:.3g}"
             found.append(Finding("out_of_reach", what, norm, QUAT_SLACK, float(o.stamp_s[-1])))
+        self._look_at_pose(o, found)
         self._look_at_wrench(o, found)
         return o
 
@@ -222,19 +215,26 @@ class SensedWatch:
             if fastest > rules.speed_slack * joint.velocity_rad_s:
                 what = f"{joint.name} turns at {fastest:.2f} rad/s, its limit is {joint.velocity_rad_s:.2f}"
                 found.append(Finding("joint_speed", what, fastest, joint.velocity_rad_s, stamp_s))
-        if self._setpoint is None:
+
+    def _look_at_pose(self, o: Observation, found: list[Finding]) -> None:
+        """Whether the hand is where it was told to be, now or within the lag.
+
+        The hand's pose, not the joints': where a device is sent poses, a redundant arm finds its own posture for them.
+        """
+        if not self._told:
             return
-        lead = 0.0 if self._lead is None else np.abs(self._lead)
-        away = np.abs(o.q[-1] - self._setpoint)
-        allowed = rules.following_rad + rules.lag_s * np.broadcast_to(lead, away.shape)
-        i = int(np.argmax(away - allowed))
-        if away[i] > allowed[i]:
-            what = (
-                f"{self._joints[i].name} is {away[i]:.3f} rad from where it was told to "
-                + ("be" if self._moving else "stay")
-                + f", {allowed[i]:.3f} is allowed"
-            )
-            found.append(Finding("following", what, float(away[i]), float(allowed[i]), stamp_s))
+        rules, p, q = self._rules, o.position_B_P[-1].tolist(), o.quat_B_P[-1].tolist()
+        aways = [(math.dist(p, t[:3]), _turn_rad(q, t[3:])) for t in self._told]
+        if any(m <= rules.following_m and rad <= rules.following_rad for m, rad in aways):
+            return
+        told = "told to " + ("be" if self._moving else "stay")
+        m, rad = min(aways)
+        if m > rules.following_m:
+            what = f"the hand is {m * 1e3:.1f} mm from where it was {told}, {rules.following_m * 1e3:.1f} are allowed"
+            found.append(Finding("following", what, m, rules.following_m, float(o.stamp_s[-1])))
+        else:
+            what = f"the hand is turned {rad:.3f} rad from how it was {told}, {rules.following_rad:.3f} are allowed"
+            found.append(Finding("following", what, rad, rules.following_rad, float(o.stamp_s[-1])))
 
     def _look_at_wrench(self, o: Observation, found: list[Finding]) -> None:
         """The hard limit, so many samples running, also across blocks."""
@@ -310,3 +310,9 @@ def _picked(o: Observation, good: np.ndarray[tuple[int], np.dtype[np.bool_]]) ->
         quat_B_P=o.quat_B_P[good],
         wrench_S=o.wrench_S[good],
     )
+
+
+def _turn_rad(a: list[float], b: list[float]) -> float:
+    """Angle between two rotations given as unit quaternions."""
+    half = abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3])
+    return 2.0 * math.acos(min(1.0, half))
