@@ -123,7 +123,8 @@ def run_campaign(campaign: Campaign, executor: Executor, on_row: OnRow | None = 
 
     def submit(seed: int, name: str, plan: FaultPlan, labels: Mapping[str, Any]) -> Future[dict[str, Any]]:
         request = campaign.request(seed, name, plan)
-        return executor.submit(run_trial, request, labels, hard_force_N, campaign.resume, campaign.keep)
+        twin = campaign.out / f"twin-s{seed}" if plan.faults else None
+        return executor.submit(run_trial, request, labels, hard_force_N, campaign.resume, campaign.keep, twin)
 
     nothing = FaultPlan("none", ())
     twins = {

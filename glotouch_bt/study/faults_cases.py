@@ -27,12 +27,14 @@ class Case:
         given: Parameters beside their defaults.
         lasting: How long it lasts.
         skills: Where it can act at all.
+        warm_up_s: The trial runs for at least so long before the fault begins.
     """
 
     fault: str
     given: Mapping[str, Any] = field(default_factory=dict)
     lasting: Lasting = field(default_factory=lambda: Lasting(duration_s=2.0))
     skills: tuple[str, ...] = SKILLS
+    warm_up_s: float = 0.5
 
     @property
     def recoverable(self) -> bool:
@@ -58,10 +60,12 @@ def _s(seconds: float) -> Lasting:
     return Lasting(duration_s=seconds)
 
 
+LEARNING_S = 8.0
+"""Supervision learns in 5 s what the sensor's noise is; a trial that goes on from a checkpoint learns it anew."""
 EVER = Lasting(until="ever")
 CASES: tuple[Case, ...] = (
-    Case("wrench_off"),
-    Case("wrench_stuck"),
+    Case("wrench_off", warm_up_s=LEARNING_S),
+    Case("wrench_stuck", warm_up_s=LEARNING_S),
     Case("wrench_garbage", lasting=_s(0.2)),
     Case("wrench_bias", lasting=EVER),
     Case("wrench_drift", lasting=_s(10.0)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
 import time
 from collections.abc import Iterator, Mapping
@@ -12,9 +13,13 @@ from types import FrameType
 from typing import Any
 
 from glotouch_bt.faults.catalogue import CATALOGUE
+from glotouch_bt.mission.checkpoint import FILE as CHECKPOINTS
 from glotouch_bt.report.run_record import read_run
 from glotouch_bt.robot import BadInput
-from glotouch_bt.study.launch import RunRequest, launch
+from glotouch_bt.study.faults_cases import chosen_cases
+from glotouch_bt.study.faults_start import start_from
+from glotouch_bt.study.going_on import EARLIER
+from glotouch_bt.study.launch import RunRequest, RunResult, launch
 
 HUNG_S = 900.0
 """Wall time after which a trial counts as hanging."""
@@ -77,7 +82,12 @@ def durations(folder: Path) -> dict[str, float]:
 
 
 def run_trial(
-    request: RunRequest, labels: Mapping[str, Any], hard_force_N: float, resume: bool, keep: bool
+    request: RunRequest,
+    labels: Mapping[str, Any],
+    hard_force_N: float,
+    resume: bool = False,
+    keep: bool = False,
+    twin: Path | None = None,
 ) -> dict[str, Any]:
     """One run as a row. Whatever goes wrong is a row, never an exception of the campaign.
 
@@ -87,20 +97,21 @@ def run_trial(
         hard_force_N: The hard limit the true peak force is held against.
         resume: Take the row that is there already.
         keep: Leave the record of a harmless trial on disk.
+        twin: Folder of the unfaulted run of this seed: what they have in common is taken from there.
     """
     assert request.out is not None
     kept = request.out / ROW
     if resume and kept.is_file():
         row: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8"))
         return row
-    starts = _count_start(request.out / STARTED)
+    starts = _count_start(request.out.with_name(f".{request.out.name}.{STARTED}"))
     began = time.perf_counter()
     row = dict(labels) | {"folder": request.out.name}
     try:
         if starts > MOST_STARTS:
             raise Hung(f"took its process down {MOST_STARTS} times")
         with hang_guard():
-            done = launch(request)
+            done = _launched(request, labels, twin)
     except BadInput:
         raise
     except (Exception, Hung) as e:
@@ -111,14 +122,36 @@ def run_trial(
         if labels["class"] == "none":
             row["durations_s"] = durations(done.folder)
     row["wall_s"] = round(time.perf_counter() - began, 2)
-    if not keep and row.get("verdict") in ("recovered", "safely ended"):
-        for name in ("run.mcap", "truth.json", "report.html", "mission.yaml", "checkpoint.sqlite"):
-            (request.out / name).unlink(missing_ok=True)
     request.out.mkdir(parents=True, exist_ok=True)
+    if labels["class"] != "none":
+        _tidy(request.out, everything=not keep and row.get("verdict") in ("recovered", "safely ended"))
     part = request.out / (ROW + ".part")
     part.write_text(json.dumps(row) + "\n", encoding="utf-8")
     part.replace(kept)
     return row
+
+
+def _launched(request: RunRequest, labels: Mapping[str, Any], twin: Path | None) -> RunResult:
+    assert request.out is not None
+    going_on = None
+    if twin is not None:
+        (case,) = chosen_cases([labels["class"]])
+        going_on = start_from(twin, request.out, labels["skill"], labels["after_s"], case.warm_up_s)
+    try:
+        return launch(request, going_on=going_on)
+    finally:
+        if going_on is not None:
+            going_on.file.close()
+
+
+def _tidy(folder: Path, everything: bool) -> None:
+    """Remove what is the twin's or can be had again; with `everything`, the record, too."""
+    shutil.rmtree(folder / EARLIER, ignore_errors=True)
+    for file in folder.glob(f"{CHECKPOINTS}*"):
+        file.unlink()
+    if everything:
+        for name in ("run.mcap", "truth.json", "mission.yaml"):
+            (folder / name).unlink(missing_ok=True)
 
 
 def _count_start(marker: Path) -> int:

@@ -77,7 +77,7 @@ class Here:
         return future
 
 
-def made_up(request: RunRequest) -> Any:
+def made_up(request: RunRequest, *other: Any) -> Any:
     """What a run might have given."""
     assert request.out is not None
     request.out.mkdir(parents=True, exist_ok=True)
@@ -109,7 +109,7 @@ def made_up(request: RunRequest) -> Any:
 
 
 def test_a_campaign_counts_every_trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(faults_trial, "launch", made_up)
+    monkeypatch.setattr(faults_trial, "_launched", made_up)
     monkeypatch.setattr(faults_trial, "durations", lambda folder: dict.fromkeys(("squeeze", "grasp", "lift"), 5.0))
     campaign = Campaign(
         mission="retrieve",
@@ -137,19 +137,18 @@ def test_a_campaign_counts_every_trial(tmp_path: Path, monkeypatch: pytest.Monke
     assert json.loads((campaign.out / "summary.json").read_text())["classes"] == ["wrench_bias", "exception"]
     assert not (campaign.out / "wrench_bias-lift-s1" / "run.mcap").exists()
 
-    def never(request: RunRequest) -> Any:
+    def never(*given: Any) -> Any:
         raise AssertionError("it was there already")
 
-    monkeypatch.setattr(faults_trial, "launch", never)
+    monkeypatch.setattr(faults_trial, "_launched", never)
     again = run_campaign(replace(campaign, resume=True), Here())  # type: ignore[arg-type]
     assert again == summary
 
 
 def test_a_trial_that_ends_its_process_twice_counts_as_hanging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(faults_trial, "launch", made_up)
+    monkeypatch.setattr(faults_trial, "_launched", made_up)
     request = RunRequest("m", out=tmp_path / "t", faults=Case("wrench_off").plan("lift", 0.0))
-    (tmp_path / "t").mkdir()
-    (tmp_path / "t" / faults_trial.STARTED).write_text("2")
+    (tmp_path / f".t.{faults_trial.STARTED}").write_text("2")
     labels = {"class": "wrench_off", "skill": "lift", "seed": 1}
     row = faults_trial.run_trial(request, labels, 30.0, True, False)
     assert (row["status"], row["verdict"]) == ("hang", "unsafe")
