@@ -5,12 +5,15 @@ from __future__ import annotations
 from glotouch_bt.mission.control import Preempted
 from glotouch_bt.mission.reasons import Failure
 from glotouch_bt.mission.watchdog import SkillHung
+from glotouch_bt.mission.world_check import WorldChanged
 from glotouch_bt.robot import BackendError, GuardTripped
 from skills.base import Reason
 
 
 def why_aborted(error: BaseException, node: str) -> Failure:
     """What was raised at a node, as the end of a mission: a code, words, and the numbers it carries."""
+    if isinstance(error, WorldChanged):
+        return Failure(error.reason.node, str(error), error.reason)
     if isinstance(error, KeyboardInterrupt):
         code, text = "interrupted", "stopped by the operator"
     elif isinstance(error, Preempted):

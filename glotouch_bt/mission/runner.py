@@ -22,6 +22,7 @@ from glotouch_bt.mission.reasons import Failure, ReasonBook
 from glotouch_bt.mission.resolution import Rounding
 from glotouch_bt.mission.tally import Record, Tally
 from glotouch_bt.mission.watchdog import STUCK_S, BrokenOff, SkillHung, Stuck, Watchdog, deferred_interrupt
+from glotouch_bt.mission.world_check import WorldChanged, world_check
 from glotouch_bt.robot import HOLD, Command, Observation, Robot, World
 from glotouch_bt.robot.supervision import Supervisor
 from glotouch_bt.robot.supervision_limits import Finding, SupervisionLimits
@@ -203,6 +204,7 @@ class _Loop:
         self._keeper: Keeper | None = None
         self._work: Work | None = None
         self._resumed: TreeAtWork | None = None
+        self._world_check: Skill | None = None
 
     def begin(
         self, device: Robot, requests: JournaledRequests, keeper: Keeper | None, taken_up: TakenUp | None
@@ -221,6 +223,7 @@ class _Loop:
         )
         if taken_up is not None:
             self._resumed = take_up(work, taken_up)
+            self._world_check = None if taken_up.same_world else world_check(self._tree, self._context)
             outcome.start_s, outcome.ticks = work.start_s, work.ticks
         elif keeper is not None:
             keeper.keep(work, [])
@@ -233,6 +236,8 @@ class _Loop:
         """
         context, root, outcome, gate = self._context, self._tree.root, self._outcome, self._gate
         self._interrupted = interrupted
+        if self._world_check is not None:
+            self._look_first(self._world_check)
         while True:
             self._heed()
             if context.mission_s - outcome.start_s >= timeout_s - ROUNDING_S:
@@ -246,6 +251,23 @@ class _Loop:
                 self._decide(outcome, root)
                 return
             gate.send(context.command, outcome.ticks)
+
+    def _look_first(self, skill: Skill) -> None:
+        """A resumed mission looks at its world before it goes on.
+
+        Raises:
+            WorldChanged: It is not as it was.
+        """
+        context = self._context
+        self._tally.node = skill.name
+        while True:
+            context.command = HOLD
+            skill.tick_once()
+            if skill.status is Status.SUCCESS:
+                return
+            if skill.status is not Status.RUNNING:
+                raise WorldChanged(skill.reason or Reason("world_changed", skill.feedback_message, node=skill.name))
+            self._gate.send(context.command, self._outcome.ticks)
 
     def end(self, interrupted: Callable[[], bool]) -> None:
         """After a stop: close what runs, bring the arm to rest, raise it if it is free."""
