@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterable
 
 from glotouch_bt.robot import GlotouchError
+
+STAMP_ROUNDING_S = 5e-4
 
 
 class Preempted(GlotouchError):
@@ -56,3 +59,20 @@ class Control:
     def wants_pause(self, ticks: int, now_s: float) -> bool:
         """Asked by the runner once a period, with its ticks so far and the robot's clock; scripts override it."""
         return self._paused
+
+
+class TimedPauses(Control):
+    """Pauses that are known beforehand, as those of a recorded run.
+
+    Args:
+        spans_s: (asked for, going on) of each pause on the robot's clock: the stamps of `pause` and `resumed` events.
+    """
+
+    def __init__(self, spans_s: Iterable[tuple[float, float]]) -> None:
+        super().__init__()
+        self._spans_s = sorted(spans_s)
+
+    def wants_pause(self, ticks: int, now_s: float) -> bool:
+        """True within a span; half a millisecond is left for rounded stamps."""
+        at_s = now_s + STAMP_ROUNDING_S
+        return any(begin <= at_s < end for begin, end in self._spans_s)

@@ -45,7 +45,7 @@ class PauseGate:
         wanted = self._control.wants_pause(ticks, now_s)
         if wanted is not self.feed.wanted:
             self.feed.wanted = wanted
-            self._event(PAUSE if wanted else RESUMED, now_s)
+            self._event(PAUSE if wanted else RESUMED, now_s, tick=ticks)
             self._standing = False
         elif wanted and self.feed.standing:
             self._stands("on the way")

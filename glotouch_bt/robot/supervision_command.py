@@ -35,7 +35,7 @@ class CommandWatch:
         first: Observation,
     ) -> None:
         self._joints, self._hand, self._period_s = description.joints, description.gripper, period_s
-        self._start_rad = rules.following_rad
+        self._start_rad = rules.start_rad
         # lower, upper, largest speed, largest step in a period
         self._ranges = [
             (j.lower_rad - ROUND, j.upper_rad + ROUND, fastest, fastest * period_s)
@@ -90,7 +90,7 @@ class CommandWatch:
         return None
 
     def _setpoint(self, motion: JointSetpoint, before: list[float], spare: float, newest: Observation) -> Finding:
-        """The first thing out of range; after a hold a setpoint may begin within the following error."""
+        """The first thing out of range; after a hold a setpoint may begin within `start_rad` of where the arm is."""
         q, dq, ddq = (np.asarray(v, dtype=np.float64) for v in (motion.q, motion.dq, motion.ddq))
         low, high, fastest, step = np.array(self._ranges).T
         greatest = np.full(len(q), GREATEST_RAD_S2)

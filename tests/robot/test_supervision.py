@@ -196,7 +196,10 @@ def missing(count: int) -> Spoil:
 
 
 def test_missing_samples_are_put_on_record_and_then_end_it() -> None:
-    robot, found = supervised(Device(missing(1), since=5, until=8))
+    robot, found = supervised(Device(missing(1)))
+    spin(robot, 30)
+    assert found == [], "real devices give nine to eleven of ten"
+    robot, found = supervised(Device(missing(2), since=5, until=7))
     spin(robot, 30)
     assert {f.guard for f in found} == {"samples_missing"}
     robot, found = supervised(Device(missing(6), since=5))
@@ -233,6 +236,20 @@ def test_a_gap_ends_a_motion_but_not_a_rest() -> None:
         robot.cycle(move(k + 1, device.description.home_q))
     with pytest.raises(GuardTripped, match="overrun"):
         robot.cycle(move(6, device.description.home_q))
+
+
+def test_how_many_samples_a_period_has_is_learnt_from_the_first_block_of_several() -> None:
+    class Single(Device):
+        """As a driver that answers with one sample when it is opened."""
+
+        def observe(self) -> Observation:
+            return super().observe() if self.cycles else missing(9)(super().observe())
+
+    robot, found = supervised(Single(missing(6), since=5))
+    spin(robot, 5)
+    assert found == []
+    with pytest.raises(GuardTripped, match="6 of 10 samples are missing"):
+        spin(robot, 5)
 
 
 def test_an_arm_that_moves_while_it_is_held_is_noticed() -> None:
