@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -57,7 +58,6 @@ class Explorer:
         self._arm, self._tool, self._speeds, self._journal = context.arm, tool, speeds, journal
         probe = context.world.probe
         self._weight_N = probe.mass_kg * GRAVITY_M_S2 if context.arm.scene.holding_tool else math.inf
-        self._up_N: float | None = None
 
     @property
     def lowered(self) -> bool:
@@ -122,12 +122,15 @@ class Explorer:
 
         From one rest to the next, for a tare drifts farther than that in minutes.
         """
-        before, self._up_N = self._up_N, self._prober.resting_up_N
-        if before is None or self._up_N is None or not self._up_N - before > LIGHTER * self._weight_N:
+        rests = self._prober.resting_up_N
+        steps = [(b - a, a) for a, b in pairwise(rests)]
+        del rests[:-1]
+        step_N, before_N = max(steps, default=(0.0, 0.0))
+        if not step_N > LIGHTER * self._weight_N:
             return
         tip = self._prober.tip_K_m
         yield from rise_clear(self._arm)
-        missing_N = -(yield from weigh_N(self._arm)) - before
+        missing_N = -(yield from weigh_N(self._arm)) - before_N
         if missing_N > LIGHTER * self._weight_N:
             raise SkillFailed(
                 "tool_lost",

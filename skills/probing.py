@@ -53,6 +53,9 @@ class Prober:
         tool: The held probe.
         guard: Contact thresholds; the sensor's latency is the tool's, where it may have been measured.
         carried: What hangs below the wrist; by default the described hand, and the world's probe if it is held.
+
+    Attributes:
+        resting_up_N: Force straight up on the wrist at each rest so far.
     """
 
     def __init__(
@@ -70,18 +73,12 @@ class Prober:
         probe = context.world.probe if context.arm.scene.holding_tool else None
         self._carried = carried or Carried.hand(context.arm.description.gripper, probe)
         self._rested: tuple[float, Baseline] | None = None
+        self.resting_up_N: list[float] = []
 
     @property
     def tip_K_m(self) -> Array:
         """(3,) where the ball's centre is commanded to be."""
         return self._tool.tip_K_m(self._world, self._context.arm.pose_B_P)
-
-    @property
-    def resting_up_N(self) -> float | None:
-        """Force straight up on the wrist at the newest rest; None before the first."""
-        if self._rested is None:
-            return None
-        return float((self._context.arm.pose_B_P.rotation @ self._rested[1].median[:3])[2])
 
     def rest(self) -> Motion[Baseline]:
         """Hold still until wrench and twist have settled, at most `LONGEST_REST_S`; the wrench of "nothing touched".
@@ -101,6 +98,7 @@ class Prober:
                 break
         baseline = fit_baseline(np.concatenate([o.wrench_S for o in window]))
         self._rested = (window[-1].now_s, baseline)
+        self.resting_up_N.append(float((self._context.arm.pose_B_P.rotation @ baseline.median[:3])[2]))
         return baseline
 
     def move(self, tip_K_m: Array, speed_m_s: float, *, any_direction: bool = False) -> Motion[Probed]:

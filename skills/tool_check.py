@@ -13,6 +13,8 @@ from skills.held_tool import HeldTool
 from skills.rising import rise_clear
 from skills.weighing import GRAVITY_M_S2, weigh_N
 
+PUT_IT_THERE = "it lies in the container or beside it; take it out by hand and put it into its holder"
+
 
 class ToolCheckParams(SkillParams):
     """Parameters of `tool_check`."""
@@ -61,6 +63,9 @@ class ToolCheck(Skill):
         """See the class."""
         self.tool_lost = False
         arm, tool, p = self.context.arm, self.tool, self.params
+        if not arm.scene.holding_tool:
+            self.tool_lost = True
+            raise SkillFailed("tool_lost", "the probe is not in the hand any more", advice=PUT_IT_THERE)
         yield from rise_clear(arm, p.speed_m_s)
         missing_N = -(yield from weigh_N(arm))  # the tare was taken with the probe in the hand
         weight_N = self.context.world.probe.mass_kg * GRAVITY_M_S2
@@ -68,20 +73,20 @@ class ToolCheck(Skill):
         light = not missing_N < p.light * weight_N
         other = not abs(apart - tool.aperture_m) <= HELD_TOLERANCE_M
         floor_m: float | None = tool.floor_z_K_m
-        if not arm.scene.holding_tool or (light and other):
+        if light and other:
             floor_m = None
         elif light or other or p.touch:
             floor_m = yield from feel_floor(self.context, tool, p.corner_gap_m, p.speed_m_s)
         self.event("tool_check", missing_N=missing_N, aperture_m=apart, floor_z_K_m=floor_m)
         if floor_m is None:
             self.tool_lost = True
+            why = "" if light and other else ", and nothing was met where the floor is"
             arm.scene.hold_tool(False)
             raise SkillFailed(
                 "tool_lost",
                 f"the probe is not in the hand: {missing_N:.2f} N of its {weight_N:.2f} N are missing, the jaws are "
-                f"{apart * 1e3:.1f} mm apart and were {tool.aperture_m * 1e3:.1f} with it"
-                + ("" if light == other else ", and nothing was met where the floor is"),
-                advice="it lies in the container or beside it; take it out by hand and put it into its holder",
+                f"{apart * 1e3:.1f} mm apart and were {tool.aperture_m * 1e3:.1f} with it" + why,
+                advice=PUT_IT_THERE,
                 missing_N=missing_N,
                 aperture_m=apart,
                 taken_m=tool.aperture_m,
