@@ -243,7 +243,9 @@ def test_how_many_samples_a_period_has_is_learnt_from_the_first_block_of_several
         """As a driver that answers with one sample when it is opened."""
 
         def observe(self) -> Observation:
-            return super().observe() if self.cycles else missing(9)(super().observe())
+            seen = super().observe()
+            names = ("stamp_s", "q", "dq", "position_B_P", "quat_B_P", "wrench_S")
+            return seen if self.cycles else dataclasses.replace(seen, **{n: getattr(seen, n)[-1:] for n in names})
 
     robot, found = supervised(Single(missing(6), since=5))
     spin(robot, 5)
