@@ -25,7 +25,7 @@ class DriverProcess:
     Attributes:
         address: Where it listens.
         world: What the driver is told about the simulated world: a file or the cell's address.
-        folder: Private; removed at the end.
+        folder: Private; removed at the end, by the driver if this process is killed.
     """
 
     def __init__(self, options: Options) -> None:
@@ -58,7 +58,7 @@ class DriverProcess:
         """Begin the driver; whether it comes up shows when it is talked to."""
         python = self._options.python
         module = HERE if python == sys.executable else INSTALLED
-        arguments = ["--address", self.address, "--log", str(self.driver_log)]
+        arguments = ["--address", self.address, "--log", str(self.driver_log), "--private", str(self.folder)]
         self._process = self._spawn([python, "-m", module, *arguments], "driver.txt")
 
     def _spawn(self, command: list[str], output: str) -> subprocess.Popen[bytes]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import os
+import shutil
 import signal
 import sys
 from pathlib import Path
@@ -17,8 +19,10 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--address", required=True, help="ipc://PATH, or tcp://HOST:PORT with --keys")
     parser.add_argument("--keys", type=Path, help="folder with driver.key_secret and clients/*.key (CURVE)")
     parser.add_argument("--log", type=Path, help="append one JSON line per event here")
+    parser.add_argument("--private", type=Path, help="remove this folder at the end if who started us was killed")
     parser.add_argument("--stay", action="store_true", help="wait for the next client when one has gone")
     options = parser.parse_args(argv)
+    starter = os.getppid()
     stopped: list[int] = []
     signal.signal(signal.SIGTERM, lambda number, _: stopped.append(number))
     signal.signal(signal.SIGINT, lambda number, _: stopped.append(number))
@@ -32,6 +36,8 @@ def main(argv: list[str] | None = None) -> int:
         with socket:
             code = serve(socket, log, lambda: bool(stopped), forever=options.stay)
         if not options.stay or stopped:
+            if options.private and os.getppid() != starter:  # it can no longer do so itself
+                shutil.rmtree(options.private, ignore_errors=True)
             return code
 
 

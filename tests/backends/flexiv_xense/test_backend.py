@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -92,3 +95,26 @@ def test_a_killed_driver_is_an_error_and_closing_still_works(robot: FlexivXenseR
     robot.hold()
     robot.close()
     assert robot.process._process is None
+
+
+def test_a_killed_executive_leaves_nothing_behind() -> None:
+    """Its private folder is removed by the driver, which outlives it."""
+    code = (
+        "import sys, time\n"
+        "from glotouch_bt.mission.load import load_mission\n"
+        "from glotouch_bt.robot import Conditions, load_backend\n"
+        "world = load_mission('calibrate').world\n"
+        "robot = load_backend('flexiv_xense').open(world, Conditions(), 0, {'devices': 'simulated'})\n"
+        "print(robot.process.pid, robot.process.folder, flush=True)\n"
+        "time.sleep(600)\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as executive:
+        assert executive.stdout is not None
+        pid, folder = executive.stdout.readline().split()
+        assert Path(folder).is_dir()
+        executive.kill()
+    for _ in range(600):
+        if not Path(folder).exists():
+            break
+        time.sleep(0.1)
+    assert not Path(folder).exists(), f"driver {pid} left it"
