@@ -13,10 +13,11 @@ SKILL_GROUP = "glotouch_bt.skills"
 
 
 def shipped_root() -> Path:
-    """The folder of shipped missions (a checkout's or the installed package's)."""
-    import missions
+    """The folder of shipped missions (a checkout's or the installed package's).
 
-    return Path(missions.__path__[0]).resolve()
+    It stands beside this package; `import missions` may find a folder of that name where the user works instead.
+    """
+    return Path(__file__).resolve().parents[2] / "missions"
 
 
 def shipped(kind: str) -> dict[str, Path]:

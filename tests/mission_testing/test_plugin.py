@@ -1,0 +1,134 @@
+"""The plugin as a third party meets it: a folder with a mission and tests, and pytest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import glotouch_bt.mission_testing.rerun  # noqa: F401  loaded before pytester, which unloads what it loads
+from glotouch_bt.mission.library import SkillShelf
+
+dict(SkillShelf())
+pytest_plugins = ["pytester"]
+
+MISSION = """
+mission: put_back
+world: container_five
+tree:
+  sequence:
+    - tool_pickup
+    - retry: {attempts: 2, do: tool_return}
+"""
+
+WEAK = """
+def test_it_ends_well(scripted):
+    assert scripted("missions/put_back.yaml").succeeded
+"""
+
+STRONG = """
+import pytest
+from glotouch_bt.mission_testing import fails, ok
+
+def test_it_ends_well(scripted):
+    run = scripted("missions/put_back.yaml")
+    assert run.succeeded and run.order == ["tool_pickup", "tool_return"]
+
+@pytest.mark.parametrize("code", ["request_failed", "motion_refused"])
+def test_it_is_put_back_twice_at_most(scripted, code):
+    run = scripted("missions/put_back.yaml", {"tool_return": fails(code)})
+    assert run.failed_with(code) and run.ran("tool_return") == 2
+
+def test_without_a_probe_there_is_nothing_to_put_back(scripted):
+    run = scripted("missions/put_back.yaml", {"tool_pickup": fails("no_probe")})
+    assert run.failed_with("no_probe") and run.never_ran("tool_return")
+"""
+
+
+@pytest.fixture
+def folder(pytester: pytest.Pytester) -> pytest.Pytester:
+    """A user's project."""
+    (pytester.path / "missions").mkdir()
+    (pytester.path / "missions/put_back.yaml").write_text(MISSION)
+    pytester.makeini("[pytest]\naddopts = -p no:cacheprovider\n")
+    return pytester
+
+
+def test_outcomes_are_counted_and_too_few_fail(folder: pytest.Pytester) -> None:
+    folder.makepyfile(WEAK)
+    done = folder.runpytest_inprocess("--glotouch-coverage-min", "80")
+    done.assert_outcomes(passed=1)
+    done.stdout.fnmatch_lines(["missions/put_back.yaml: 2 of * outcomes exercised*", "*tool_return*failure 0/*missing:*",
+                               "FAILED: 2 of *at least 80 % asked"])  # fmt: skip
+    assert done.ret == pytest.ExitCode.TESTS_FAILED
+
+
+def test_without_options_nothing_is_said(folder: pytest.Pytester) -> None:
+    folder.makepyfile(WEAK)
+    done = folder.runpytest_inprocess()
+    assert "glotouch:" not in done.stdout.str()
+    assert done.ret == 0
+
+
+def test_what_no_test_notices_is_named_with_the_test_that_would(folder: pytest.Pytester) -> None:
+    folder.makepyfile(WEAK)
+    done = folder.runpytest_inprocess("--glotouch-mutate", "missions/put_back.yaml", "--glotouch-mutate-min", "90")
+    done.stdout.fnmatch_lines(
+        ["missions/put_back.yaml:7:*'retry': attempts 2 becomes 3: no test notices", "*scripted(..., {'tool_return': fails(*",
+         "*they part after*", "FAILED:*of the mutants noticed, at least 90 % asked"]
+    )  # fmt: skip
+    assert done.ret == pytest.ExitCode.TESTS_FAILED
+
+
+def test_enough_tests_notice_every_mutant(folder: pytest.Pytester) -> None:
+    folder.makepyfile(STRONG)
+    done = folder.runpytest_inprocess("--glotouch-mutate", "missions/put_back.yaml", "--glotouch-mutate-min", "100")
+    assert done.ret == 0, done.stdout.str()
+    done.stdout.fnmatch_lines(["100.0 % of the mutants noticed, at least 100 % asked"])
+    assert "no test notices" not in done.stdout.str()
+
+
+def test_no_mutant_is_tried_where_a_test_fails_without_any(folder: pytest.Pytester) -> None:
+    folder.makepyfile("def test_no(scripted):\n    assert scripted('missions/put_back.yaml').never_ran('tool_pickup')\n")
+    done = folder.runpytest_inprocess("--glotouch-mutate", "missions/put_back.yaml")
+    done.stdout.fnmatch_lines(["no mutant was tried, for a test fails without any"])
+    assert done.ret == pytest.ExitCode.TESTS_FAILED
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--glotouch-mutate", "put_bak.yaml"), "*--glotouch-mutate put_bak.yaml: *no such mission file*"),
+        (("--glotouch-mutate", "calibrate"), "*no test of this session loads it with the fixture `scripted`*"),
+        (("--glotouch-mutate", "calibrate", "-n", "2"), "*runs its tests in one process: leave out -n*"),
+    ],
+)
+def test_what_cannot_be_is_said(folder: pytest.Pytester, options: tuple[str, ...], words: str) -> None:
+    folder.makepyfile(WEAK)
+    done = folder.runpytest_inprocess(*options)
+    (done.stdout if "fixture" in words else done.stderr).fnmatch_lines([words])
+    assert "Traceback" not in done.stdout.str() + done.stderr.str()
+
+
+def test_workers_send_what_they_have_seen(folder: pytest.Pytester) -> None:
+    folder.makepyfile(STRONG)
+    one = folder.runpytest_inprocess("--glotouch-coverage").stdout.str()
+    two = folder.runpytest_subprocess("--glotouch-coverage", "-n", "2").stdout.str()
+    line = "missions/put_back.yaml: "
+    said = [next(text for text in out.splitlines() if text.startswith(line)) for out in (one, two)]
+    assert said[0] == said[1]
+
+
+def test_a_mission_is_found_beside_the_test_too(folder: pytest.Pytester) -> None:
+    (folder.path / "deep").mkdir()
+    (folder.path / "deep/test_it.py").write_text(WEAK.replace("missions/put_back", "mine"))
+    (folder.path / "deep/mine.yaml").write_text(MISSION)
+    folder.runpytest_inprocess("deep").assert_outcomes(passed=1)
+
+
+def test_a_mission_that_does_not_pass_the_check_fails_its_test(folder: pytest.Pytester) -> None:
+    Path(folder.path / "missions/put_back.yaml").write_text(MISSION.replace("tool_return", "tool_retrun"))
+    folder.makepyfile(WEAK)
+    done = folder.runpytest_inprocess()
+    done.assert_outcomes(failed=1)
+    done.stdout.fnmatch_lines(["*did you mean 'tool_return'*"])
