@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from glotouch_bt.mission.control import TimedPauses
 from glotouch_bt.mission.journaled import REQUEST_DONE
 from glotouch_bt.mission.load import load_mission
 from glotouch_bt.mission.mcap_json import Json, to_json
@@ -17,8 +18,17 @@ from glotouch_bt.mission.runner import Outcome, run_mission
 from glotouch_bt.mission.tally import NullRecord, Tally
 from glotouch_bt.report.run_record import Event, RunRecord, read_run
 from glotouch_bt.robot import BadInput, Limits, RobotDescription
+from glotouch_bt.robot.supervision_limits import SupervisionLimits
 from glotouch_bt.study.replay.compare import Difference, compare_events, compare_ticks
 from glotouch_bt.study.replay.robot import Parting, RecordEnded, ReplayedRobot
+
+NOT_THE_TREES = frozenset({"guard", "stuck", "fault", "ending"})
+"""Events of what watches the run from outside, and of its end when it was stopped: no skill made them."""
+UNGUARDED = SupervisionLimits(
+    joint_slack_rad=1e9, speed_slack=1e9, reach_m=1e9, wrench_samples=10**9, following_m=1e9, following_rad=1e9,
+    command_slack=1e9, gripper_age_s=1e9, tactile_age_s=1e9, stuck_s=1e9, late_periods=1e9, tolerated=10**9,
+)  # fmt: skip
+"""What was let pass then is let pass again; where a guard ended the run, its record ends."""
 
 
 class _Notes(NullRecord):
@@ -98,9 +108,13 @@ def replay(
         if on_progress is not None:
             on_progress(seconds, last_s - first_s)
 
-    outcome = run_mission(mission, robot, notes, on_progress=progress)
+    pauses = TimedPauses(_pauses(record))
+    outcome = run_mission(mission, robot, notes, on_progress=progress, control=pauses, supervision=UNGUARDED)
     ended = isinstance(outcome.error, RecordEnded)
-    differences, compared, largest = compare_events(record.events, notes.events, tolerance)
+    then_events, now_events = (
+        [e for e in events if e.kind not in NOT_THE_TREES] for events in (record.events, notes.events)
+    )
+    differences, compared, largest = compare_events(then_events, now_events, tolerance)
     differences += compare_ticks([(t.stamp_s, t.node, t.new) for t in record.ticks], notes.ticks)
     then = str(record.result.get("status", "unknown")) if isinstance(record.result, dict) else "unknown"
     # A run that was stopped from outside ends its record in the middle of a skill; so does the replay, and rightly.
@@ -114,6 +128,16 @@ def replay(
         sorted(differences, key=lambda d: d.stamp_s),
         (then, now),
     )
+
+
+def _pauses(record: RunRecord) -> list[tuple[float, float]]:
+    """From when to when the run was paused; a pause that nothing ended lasts for ever."""
+    ends = [e.stamp_s for e in record.of_kind("resumed")]
+    spans = []
+    for event in record.of_kind("pause"):
+        after = [s for s in ends if s > event.stamp_s]
+        spans.append((event.stamp_s, after[0] if after else float("inf")))
+    return spans
 
 
 def replayed_robot(record: RunRecord) -> ReplayedRobot:
