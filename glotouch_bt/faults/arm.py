@@ -89,7 +89,10 @@ class LostCycle(Effect):
 
     def command(self, command: Command) -> Command:
         """See `Effect`."""
-        return HOLD if command is not HOLD and self.scene.rng.random() < self.params.lost else command
+        asks = command.motion is not None or command.gripper is not None
+        return (
+            replace(HOLD, tactile=command.tactile) if asks and self.scene.rng.random() < self.params.lost else command
+        )
 
 
 class SlowCycleParams(FaultParams):

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from glotouch_bt.faults import arm, gripper, process, touch, world, wrench
+from glotouch_bt.faults import arm, gripper, model, process, touch, world, wrench
 from glotouch_bt.faults.effect import Effect
 from glotouch_bt.mission.fields import unit_of
 
-CHANNELS = ("wrench", "touch", "gripper", "arm", "world", "process")
+CHANNELS = ("wrench", "touch", "gripper", "arm", "world", "model", "process")
 
 NAMED_BY: Mapping[str, str] = {
     "wrench": r"wrench|wrist|force|torque|weigh|off_zero|hard_contact|\btare",
@@ -19,6 +19,7 @@ NAMED_BY: Mapping[str, str] = {
     "gripper": r"jaw|gripper|aperture|\bgrip|clos(?:ed|ure)|tool_lost|slipped|\bheld\b|in the hand",
     "arm": r"joint|setpoint|following|overrun|control period|stamps|samples|controller|robot fault|not_at_rest|stale",
     "world": r"object|candidate|container|\bwall|\bfloor|moved|not_met|nothing was|in the way|recognis|\btouched",
+    "model": r"recognis|candidate|target|model|\bwide|fits?\b|object",
     "process": r"driver|cycle|overrun|control period|RuntimeError",
 }
 """What counts as naming the cause, by channel: one of these words in a guard's finding, a skill's failure or the chain
@@ -132,6 +133,7 @@ def _kinds() -> Mapping[str, FaultKind]:
         ("object_added", "world", "an object appears", world.Add, tree, True),
         ("object_removed", "world", "an object is taken away", world.Remove, tree, True),
         ("container_offset", "world", "the container is moved with its content", world.ContainerOffset, tree, True),
+        ("wrong_scale_stl", "model", "the target's STL has another size", model.WrongScale, "match", False),
         ("exception", "process", "the driver raises an unknown error", process.Unexpected, "the runner", False),
         ("hang", "process", "one cycle does not come back for a while", process.Hang, watch, True),
         ("kill", "process", "the process is killed (SIGKILL)", process.Kill, "glotouch resume", False),

@@ -77,7 +77,7 @@ CASES: tuple[Case, ...] = (
     Case("wrench_sign_flip"),
     Case("following_error", {"offset_rad": 0.03}),
     Case("lost_cycle"),
-    Case("slow_cycle", {"share": 0.05}),
+    Case("slow_cycle", {"periods": 2, "share": 0.02}),
     Case("stale_data", lasting=_s(0.3)),
     Case("robot_fault"),
     Case("exception"),
@@ -94,6 +94,7 @@ CASES: tuple[Case, ...] = (
     Case("object_shoved", skills=_AMONG_OBJECTS),
     Case("object_toppled", skills=_AMONG_OBJECTS),
     Case("object_removed", skills=_AMONG_OBJECTS),
+    Case("wrong_scale_stl", lasting=EVER, skills=("tool_pickup",)),
     Case("container_offset", lasting=EVER, skills=_AMONG_OBJECTS),
 )
 

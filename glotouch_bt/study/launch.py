@@ -18,6 +18,7 @@ from typing import Any
 from glotouch_bt import __version__
 from glotouch_bt.faults import FaultInjector, FaultPlan, read_plan
 from glotouch_bt.faults.listening import ListeningRecord, injector_in
+from glotouch_bt.faults.models import wrong_models
 from glotouch_bt.mission.checkpoint import FILE as CHECKPOINTS
 from glotouch_bt.mission.checkpoint import CheckpointFile
 from glotouch_bt.mission.control import Control
@@ -141,6 +142,8 @@ def launch(
     options = split_settings(mission, request.settings)
     folder = RunFolder(request.out) if request.out else RunFolder.named(mission.name, request.seed)
     try:
+        if plan is not None and going_on is None and (models := wrong_models(plan, mission, folder.path / "models")):
+            mission = load_mission(request.mission, {**request.settings, **models}, objects=request.objects)
         try:
             robot = backend.open(mission.world, conditions, request.seed, options)
         except BadInput as e:
