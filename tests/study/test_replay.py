@@ -11,6 +11,7 @@ import pytest
 import typer
 
 from glotouch_bt.cli_replay import replay as replay_command
+from glotouch_bt.mission.control import Control
 from glotouch_bt.report import read_run
 from glotouch_bt.report.run_record import Event
 from glotouch_bt.robot import HOLD, BadInput, Command
@@ -123,3 +124,19 @@ def test_only_the_first_other_tick_is_told() -> None:
     now = [(0.0, "a", "RUNNING"), (0.1, "a", "FAILURE"), (0.1, "c", "RUNNING")]
     assert len(compare_ticks(then, now)) == 1
     assert compare_ticks(then, then) == []
+
+
+class EveryNow(Control):
+    """Asks for a pause of 0.3 s every 2 s."""
+
+    def wants_pause(self, ticks: int, now_s: float) -> bool:
+        return now_s % 2.0 < 0.3
+
+
+def test_a_paused_run_is_replayed_with_its_pauses(tmp_path: Path) -> None:
+    done = launch(RunRequest("calibrate", seed=4, out=tmp_path / "paused"), control=EveryNow())
+    assert done.outcome.status == "success"
+    assert done.outcome.paused_s > 1.0
+    again = replay(done.folder)
+    assert again.parted is None
+    assert again.same
