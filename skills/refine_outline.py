@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.search import refined, trace_more
+from glotouch_bt.search import TraceParams, refined, trace_more
 from glotouch_bt.touch import Candidate
 from skills.base import In, Out, Skill, SkillFailed, SkillRun, param
 from skills.exploring import Explorer
 from skills.held_tool import HeldTool
 from skills.tracing_params import TracingParams
 
+GAP_M = (0.004, 0.020)
+"""So far from every contact the outline begins to be, and is fully, what no family of outlines may have thought of:
+with contacts all round even their hull has the object's centre, where a limb was missed no family has."""
+
 
 class RefineOutlineParams(TracingParams):
     """Parameters of `refine_outline`; contacts it had before count."""
 
     wall_gap_m: float = param("Ball centre kept from the walls", unit="m", default=0.012, ge=0.008, le=0.05)
+    hop_m: float = param("A way over the top counts as so much travel", unit="m", default=0.1, ge=0.02, le=1.0)
+
+    def rule(self) -> TraceParams:
+        """As the plans take them: the gaps between contacts are closed, also on the far side."""
+        return replace(super().rule(), hop_m=self.hop_m, keen=2.0, near_m=GAP_M[0], far_m=GAP_M[1])
 
 
 class RefineOutline(Skill):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
@@ -24,6 +25,9 @@ class TraceParams:
         along_m, along_reach_m: ... so far, and then looks for it so far deeper than it was.
         back: How much a bearing counts that lies behind, against the way round so far.
         way_m: Travel that every probe costs beside the way to it (in and out).
+        hop_m: What is farther round than `step_m` is reached over the top, which counts as so much travel. Infinite: it
+            is not reached at once.
+        keen: Power of the deviation when a bearing's worth is weighed against the way: 2 takes the variance.
         reach_sds: A probe goes so many standard deviations past the prediction.
         facing: Cosine between the force on the ball and the direction from the object's middle below which the contact
             is with something else.
@@ -57,6 +61,8 @@ class TraceParams:
     along_reach_m: float = 0.014
     back: float = 0.4
     way_m: float = 0.03
+    hop_m: float = math.inf
+    keen: float = 1.0
     reach_sds: float = 2.5
     facing: float = -0.4
     same_m: float = 0.003

@@ -101,6 +101,7 @@ class TraceState:
         moved_K_m: (2,) how far in all.
         fresh: Index of the first of `paths` since the last of them.
         odd: Index of the first contact that was odd; -1: none was.
+        raised: It stands on the object, not beside it.
         told: (2, 2) 1/m^2 what contacts made now say of such a move.
         given: How many of `raw` were there at the beginning.
         known: How many of `raw` were made before, with who knows what in between.
@@ -121,6 +122,7 @@ class TraceState:
     odd: int = -1
     given: int = 0
     known: int = 0
+    raised: bool = False
     told: Array = field(default_factory=lambda: np.zeros((2, 2)))
 
     @classmethod

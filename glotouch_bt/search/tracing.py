@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +20,8 @@ LEAST_MORE = 3
 """Contacts made of an object that was thought to be known."""
 BESIDE_RAD = np.deg2rad(10.0)
 """The ball is not sent nearer than this to the bearing of something else beside the object."""
+OUTWARDS_M = (0.0, 0.012, 0.024)
+"""Where the ball lands on what nothing predicted, it is brought down so much farther out, and finds a limb's end."""
 INSIDE_M = 0.004
 """A probe that came this near to the object's supposed middle has passed through: nothing is there."""
 
@@ -74,15 +77,11 @@ def trace_more(
     outline = s.outline()
     bearings = all_bearings()
     distance, sd = s.ring(outline, bearings, p)
-    ring = distance + p.clearance_m + np.minimum(2.0 * sd, p.widest_margin_m)
-    places = outline.centre_K_m + ring[:, None] * np.column_stack([np.cos(bearings), np.sin(bearings)])
-    within = np.all(np.abs(places) <= s.half, axis=1)
+    within = np.all(np.abs(_beside(outline, bearings, distance, sd, p)) <= s.half, axis=1)
     for i in _apart(np.where(within, sd, -1.0), p.misses):
-        felt = yield Move("hop", places[i])
-        s.felt(felt)
-        if felt.refused or felt.contact is not None:
+        if not (yield from _come_down(outline, s, p, float(bearings[i]))):
             continue
-        felt = yield Move("probe", outline.centre_K_m + INSIDE_M * (places[i] - outline.centre_K_m) / ring[i])
+        felt = yield Move("probe", outline.centre_K_m + INSIDE_M * unit(s.tip - outline.centre_K_m))
         s.felt(felt)
         if felt.contact is not None and s.belongs(outline, felt.contact, p):
             s.add(felt.contact, outline, p)
@@ -118,12 +117,13 @@ def _until_known(s: TraceState, p: TraceParams, elsewhere: Callable[[Contact], b
         ended = _enough(outline, s, p)
         if ended:
             break
-        bearing, side = _choose(outline, s, p)
-        if bearing is None:
+        aim = _choose(outline, s, p)
+        if aim is None:
             ended = "no side is left that can be reached"
             break
-        s.side = s.side or side
-        found = yield from _probe_at(outline, s, p, bearing, side)
+        bearing = aim.bearing
+        s.side = s.side or aim.side
+        found = yield from _probe_at(outline, s, p, aim)
         if found is None:
             missed += 1
             s.blocked.append(bearing)
@@ -173,30 +173,41 @@ def _enough(outline: OutlineBelief, s: TraceState, p: TraceParams) -> str:
     return ""
 
 
-def _choose(outline: OutlineBelief, s: TraceState, p: TraceParams) -> tuple[float | None, float]:
-    """The bearing with the most uncertainty for the way to it, and which way round (+1 counter-clockwise)."""
+class _Aim(NamedTuple):
+    """A bearing to be probed, rad; which way round (+1 counter-clockwise); whether it is reached over the top."""
+
+    bearing: float
+    side: float
+    over: bool
+
+
+def _choose(outline: OutlineBelief, s: TraceState, p: TraceParams) -> _Aim | None:
+    """The bearing with the most uncertainty for the way to it; None if none can be reached."""
     bearings = all_bearings()
     distance, sd = s.ring(outline, bearings, p)
     offset = s.tip - outline.centre_K_m
     here = float(np.arctan2(offset[1], offset[0]))
-    best: tuple[float, float, float] | None = None
+    walled = np.any(np.abs(_beside(outline, bearings, distance, sd, p)) > s.half, axis=1)
+    over_m = np.where(walled, np.inf, p.hop_m)
+    best, worth = None, 0.0
     step = 2 * np.pi / BEARINGS
     for side in (1.0, -1.0):
         turn = wrapped(side * (bearings - here)) % (2 * np.pi)
         order = np.argsort(turn, kind="stable")
         way = np.zeros(BEARINGS)
         way[order] = np.cumsum((distance + p.clearance_m)[order] * step)
-        gain = sd / (way + p.way_m)
-        gain[(way > p.step_m) | (turn > np.pi) | (turn > _barred(outline, s, p, here, side))] = 0.0
+        barred = (way > p.step_m) | (turn > np.pi) | (turn > _barred(outline, s, p, here, side)) | s.raised
+        over = barred & np.isfinite(over_m)
+        gain = sd**p.keen / (np.where(barred, over_m, way) + p.way_m)
         if side == -s.side:
             gain *= p.back
         if s.blocked:
             near = np.min(np.abs(wrapped(bearings[:, None] - np.array(s.blocked)[None, :])), axis=1)
             gain[near < np.deg2rad(12.0)] = 0.0
         i = int(np.argmax(gain))
-        if gain[i] > 0 and (best is None or gain[i] > best[0]):
-            best = (float(gain[i]), float(bearings[i]), side)
-    return (None, 1.0) if best is None else (best[1], best[2])
+        if gain[i] > worth:
+            best, worth = _Aim(float(bearings[i]), side, bool(over[i])), float(gain[i])
+    return best
 
 
 def _barred(outline: OutlineBelief, s: TraceState, p: TraceParams, here: float, side: float) -> float:
@@ -208,29 +219,55 @@ def _barred(outline: OutlineBelief, s: TraceState, p: TraceParams, here: float, 
     return float(np.min(turns - BESIDE_RAD, initial=2 * np.pi))
 
 
-def _probe_at(
-    outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: float, side: float
-) -> Plan[Contact | None]:
-    """Round to `bearing`, and inwards. A touch on the way round is as good as the one that was meant.
+def _probe_at(outline: OutlineBelief, s: TraceState, p: TraceParams, aim: _Aim) -> Plan[Contact | None]:
+    """To the bearing aimed at, and inwards. A touch on the way round is as good as the one that was meant.
 
     Where the way round is too uncertain to be planned, the ball goes on along the surface it touched last.
     """
-    beside = float(np.linalg.norm(s.tip - s.raw[-1].tip_K_m[:2])) < 3.0 * p.clearance_m
-    if beside and _doubt(outline, s, p, bearing, side) > p.doubt_m:
-        return (yield from _along(s, p, side))
-    for waypoint in _way_round(outline, s, p, bearing, side):
-        felt = yield Move("step", waypoint)
-        s.felt(felt)
-        if felt.refused:
+    if aim.over:
+        if not (yield from _come_down(outline, s, p, aim.bearing)):
             return None
-        if felt.contact is not None:
-            return felt.contact
-    distance, sd = (float(v[0]) for v in s.ring(outline, np.array([bearing]), p))
+    else:
+        beside = float(np.linalg.norm(s.tip - s.raw[-1].tip_K_m[:2])) < 3.0 * p.clearance_m
+        if beside and _doubt(outline, s, p, aim.bearing, aim.side) > p.doubt_m:
+            return (yield from _along(s, p, aim.side))
+        for waypoint in _way_round(outline, s, p, aim.bearing, aim.side):
+            felt = yield Move("step", waypoint)
+            s.felt(felt)
+            if felt.refused:
+                return None
+            if felt.contact is not None:
+                return felt.contact
+    distance, sd = (float(v[0]) for v in s.ring(outline, np.array([aim.bearing]), p))
     inner = max(distance - p.reach_sds * sd - 0.003, INSIDE_M)
-    u = np.array([np.cos(bearing), np.sin(bearing)])
+    u = np.array([np.cos(aim.bearing), np.sin(aim.bearing)])
     felt = yield Move("probe", outline.centre_K_m + inner * u)
     s.felt(felt)
     return felt.contact
+
+
+def _come_down(outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: float) -> Plan[bool]:
+    """Over the top to beside `bearing`, or farther out where the ball lands on the object. Whether it is down."""
+    at = np.array([bearing])
+    distance, sd = s.ring(outline, at, p)
+    for farther in OUTWARDS_M:
+        place = _beside(outline, at, distance + farther, sd, p)[0]
+        if np.any(np.abs(place) > s.half):
+            return False
+        felt = yield Move("hop", place)
+        s.felt(felt)
+        if felt.refused:
+            return False
+        s.raised = felt.contact is not None
+        if not s.raised:
+            return True
+    return False
+
+
+def _beside(outline: OutlineBelief, bearings: Array, distance: Array, sd: Array, p: TraceParams) -> Array:
+    """(n, 2) places to come down at, clear of what is predicted at these distances from the outline's middle."""
+    ring = distance + p.clearance_m + np.minimum(2.0 * sd, p.widest_margin_m)
+    return np.asarray(outline.centre_K_m + ring[:, None] * np.column_stack([np.cos(bearings), np.sin(bearings)]))
 
 
 def _doubt(outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: float, side: float) -> float:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -46,6 +46,8 @@ COEFFICIENT_SD_M = np.where(HARMONICS == 1, 0.001, 0.018 / HARMONICS**1.8)
 random offset outlines (rectangles, ellipses, convex polygons, unions of discs, lobed rings; ball of 6 mm)."""
 REST_SD_M = 0.0006
 """What such outlines keep beyond the last harmonic, root mean square 0.7 mm."""
+UPHELD = 1.0
+"""A correction may raise the squared misfit, in standard deviations, by so much: what rounding corners does to it."""
 MIN_COSINE = 0.35
 """A ray is taken to meet the outline no more obliquely than this: beyond, the linear picture says nothing."""
 
@@ -170,6 +172,8 @@ def explain(
     evidence = posterior.log_density - np.log(noise).sum(axis=1)
     # A contact on a face that looks along its approach would have been made from inside.
     evidence -= 10.0 * (-(g.by_params[:, :k, :2] * touches.approach).sum(axis=2) > 0.3).sum(axis=1)
+    if not wavy and not touches.strays:
+        posterior = replace(posterior, mean=_upheld(shape, params, posterior.mean, start, sd, noise, touches))
     residuals = g.distance_m[:, :k] - r + (rows[:, :k] @ posterior.mean[..., None])[..., 0]
     own = posterior.mean.shape[1] - (2 if touches.strays else 0)
     return [
@@ -185,6 +189,27 @@ def explain(
         )
         for i in range(s)
     ]
+
+
+def _upheld(shape: Shape, params: Array, mean: Array, start: Array, sd: Array, noise: Array, touches: Touches) -> Array:
+    """Corrections (s, p), each cut back as far as it must be to explain the contacts as well as none does.
+
+    The linear picture does not know that a side must reach as far as its contacts do: the prior would pull an end that
+    nothing touched in past them.
+    """
+
+    def misfit(correction: Array) -> Array:
+        gap = (shape(clipped(params + correction), touches.tips_m).distance_m - touches.radius_m) / noise
+        return np.asarray((gap * gap).sum(axis=1) + (((correction - start) / sd) ** 2).sum(axis=1))
+
+    kept = mean.copy()
+    most = misfit(np.zeros_like(mean)) + UPHELD
+    for share in (0.5, 0.25, 0.0):
+        worse = misfit(kept) > most
+        if not worse.any():
+            break
+        kept[worse] = share * mean[worse]
+    return kept
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from glotouch_bt import touch
 from glotouch_bt.robot import ParamError
 from glotouch_bt.touch import believe_outline, informative_direction, present_tips, signed_distance
 from glotouch_bt.touch.deviation import explain
-from glotouch_bt.touch.primitives import Touches, circle
+from glotouch_bt.touch.primitives import Touches, circle, rounded
 
 R = 0.006
 
@@ -231,3 +231,28 @@ def test_a_side_that_nobody_touched_may_stand_farther_out():
         tips, 0.006, approach_K=-out, reaction_K=out, free_K_m=np.array([[0.040, 0.0], [0.04, 0.01]])
     )
     assert near.centre_sd_m[0] < three.centre_sd_m[0]
+
+
+LONG_FELT = np.array([
+    [0.0, 0.0, 53, -132], [18.1, -19.3, 50, -128], [37.1, -37.1, 51, -121], [51.9, -51.2, -34, -144],
+    [70.4, -57.9, 95, -54], [98.2, -28.8, 155, -31], [81.1, -5.0, -155, 36], [52.3, 22.6, -85, 57],
+    [46.1, 28.4, 160, 36], [61.9, -58.0, 100, -123], [70.2, -58.4, 115, -54], [80.6, -47.1, 130, -48],
+    [82.4, -44.8, 135, -45], [93.3, -18.0, 170, 4],
+])  # fmt: skip
+"""Ball centre x, y mm, bearings of approach and reaction deg: a simulated object 105 x 41 mm, one end never touched."""
+
+
+@pytest.mark.parametrize("contacts", range(5, 15))
+def test_a_rectangle_reaches_as_far_as_its_contacts(contacts):
+    """The prior of sizes does not pull an end that nothing touched in past the contacts on the sides beside it."""
+    tips, (approach, reaction) = 1e-3 * LONG_FELT[:contacts, :2], np.deg2rad(LONG_FELT[:contacts, 2:]).T
+    belief = believe_outline(
+        tips,
+        R,
+        approach_K=np.c_[np.cos(approach), np.sin(approach)],
+        reaction_K=np.c_[np.cos(reaction), np.sin(reaction)],
+    )
+    x, y, yaw, *half = next(h.corrected for h in belief.hypotheses if h.shape is rounded and h.amplitude == 0)[:5]
+    c, s = np.cos(yaw), np.sin(yaw)
+    over = np.maximum(np.abs((tips - (x, y)) @ np.array([[c, -s], [s, c]])) - half, 0.0)
+    assert np.linalg.norm(over, axis=1).max() - R < 0.002
