@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from glotouch_bt.mission.findings import Finding, Findings
-from glotouch_bt.mission.flow import check_flow
+from glotouch_bt.mission.judge import check_flow
+from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.nodes import (
     KINDS,
     ConditionSettings,
@@ -60,11 +61,16 @@ class Mutant:
         return self.change(node) if (node.place, node.kind) == self.target else node
 
 
-def findings_of(root: NodeSpec) -> list[Finding]:
-    """The faults `glotouch check` finds in a tree."""
+def findings_of(mission: Mission, tree: NodeSpec) -> list[Finding]:
+    """The faults `glotouch check` finds when a mission has another tree."""
     findings = Findings()
-    check_flow(root, findings)
-    return findings.sorted()
+    promised: Mapping[str, Any] = mission.document.get("leaves") or {}
+    leaves = {
+        resource: (frozenset([states] if isinstance(states, str) else states), mission.tree.place)
+        for resource, states in promised.items()
+    }
+    check_flow(tree, findings, leaves, mission.timeout_s)
+    return findings.errors
 
 
 def mutants_of(root: NodeSpec) -> Iterator[Mutant]:

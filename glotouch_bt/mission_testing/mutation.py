@@ -116,7 +116,7 @@ def try_mutants(
     mutants = list(mutants_of(mission.tree))
     for mutant in mutants:
         tree = mutant.apply(mission.tree)
-        if findings_of(tree):
+        if findings_of(mission, tree):
             score.refused.append(mutant)
         elif (name := bench.notices(mutant)) is not None:
             score.noticed.append((mutant, name))

@@ -93,7 +93,8 @@ def flat(answer: Answer) -> tuple[Outcome | Decide, ...]:
     Raises:
         ParamError: Something in it is neither an outcome nor a function, or there is nothing in it.
     """
-    if answer in (ok, fails, hangs, raises, real):
+    makers: tuple[object, ...] = (ok, fails, hangs, raises, real)
+    if any(answer is maker for maker in makers):
         raise ParamError("script", getattr(answer, "__name__", answer), "called: ok(), fails('code'), ...")
     if isinstance(answer, Outcome) or (callable(answer) and not isinstance(answer, type)):
         return (answer,)
