@@ -37,6 +37,7 @@ class PauseGate:
         self.feed = Feed()
         context.arm.feed = self.feed
         self._standing = False
+        self._looked_s = 0.0
         self._last = HOLD
 
     def look(self, ticks: int) -> None:
@@ -48,7 +49,10 @@ class PauseGate:
             self._event(PAUSE if wanted else RESUMED, now_s, tick=ticks)
             self._standing = False
         elif wanted and self.feed.standing:
+            if self._standing:
+                self._context.paused_s += now_s - self._looked_s
             self._stands("on the way")
+        self._looked_s = now_s
 
     def begins(self, style: Style) -> None:
         """A skill that declares this has begun."""
@@ -69,12 +73,13 @@ class PauseGate:
 
     def _wait(self, ticks: int) -> None:
         """Hold until the pause is over."""
-        context, period_s = self._context, self._context.arm.period_s
+        context = self._context
         waiting = self._waiting(ticks)
         command = next(waiting)
         while True:
+            before_s = context.observation.now_s
             observation = self._cycle(command)
-            context.paused_s += period_s
+            context.paused_s += observation.now_s - before_s
             try:
                 command = waiting.send(observation)
             except StopIteration:
@@ -94,8 +99,6 @@ class PauseGate:
             yield from arm.come_back(way)
 
     def _stands(self, where: str) -> None:
-        if self.feed.standing:
-            self._context.paused_s += self._context.arm.period_s
         if not self._standing:
             self._standing = True
             self._event(PAUSED, self._context.observation.now_s, where=where, style=self.feed.style)

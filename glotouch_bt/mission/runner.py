@@ -18,7 +18,7 @@ from glotouch_bt.mission.journaled import JournaledRequests
 from glotouch_bt.mission.keeping import Keeper, TakenUp, Work, take_up
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.pausing import PauseGate
-from glotouch_bt.mission.reasons import Failure, ReasonBook
+from glotouch_bt.mission.reasons import Failure, ReasonBook, sensed
 from glotouch_bt.mission.resolution import Rounding
 from glotouch_bt.mission.tally import Record, Tally
 from glotouch_bt.mission.watchdog import STUCK_S, BrokenOff, SkillHung, Stuck, Watchdog, deferred_interrupt
@@ -174,7 +174,7 @@ def _preempt(root: Behaviour) -> None:
     if root.status is Status.RUNNING:
         try:
             root.stop(Status.INVALID)
-        except (Exception, BrokenOff) as e:
+        except (Exception, SystemExit, BrokenOff) as e:
             root.feedback_message = f"could not be closed: {e}"
 
 
@@ -223,7 +223,7 @@ class _Loop:
         )
         if taken_up is not None:
             self._resumed = take_up(work, taken_up)
-            self._world_check = None if taken_up.same_world else world_check(self._tree, self._context)
+            self._world_check = None if taken_up.same_world else world_check(self._tree, self._context, taken_up.start)
             outcome.start_s, outcome.ticks = work.start_s, work.ticks
         elif keeper is not None:
             keeper.keep(work, [])
@@ -280,7 +280,9 @@ class _Loop:
                 command = ending.send(self._cycle(command, heed=False))
         except StopIteration as end:
             self._outcome.ending = end.value
-            self._tally.event("ending", self._context.observation.now_s, {"done": end.value})
+        except Exception as e:
+            self._outcome.ending = f"held where it was: {type(e).__name__}: {e}"
+        self._tally.event("ending", self._context.observation.now_s, {"done": self._outcome.ending})
 
     def _heed(self) -> None:
         """Someone may have asked for an end."""
@@ -315,12 +317,15 @@ class _Loop:
         A node that raises in its first update has no status yet, so that its status cannot tell.
         """
         found: str | None = None
-        step = error.__traceback__
-        while step is not None:
-            raising = step.tb_frame.f_locals.get("self")
-            if isinstance(raising, Behaviour):
-                found = self._tree.paths.get(raising.id, found)
-            step = step.tb_next
+        cause: BaseException | None = error
+        while cause is not None:  # a StopIteration in a node becomes the RuntimeError of the generator that ticks it
+            step = cause.__traceback__
+            while step is not None:
+                raising = step.tb_frame.f_locals.get("self")
+                if isinstance(raising, Behaviour):
+                    found = self._tree.paths.get(raising.id, found)
+                step = step.tb_next
+            cause = cause.__cause__
         return found or self.running_node()
 
     def _tick(self, now_s: float) -> None:
@@ -334,7 +339,7 @@ class _Loop:
             changed = True
             again = self._resumed is not None and self._resumed.replays(node)
             if node.status is Status.FAILURE:
-                self._book.note(node)
+                self._book.note(node, sensed(self._context.observation))
                 if isinstance(node, Skill) and not again:
                     self._tally.event("failure", now_s, self._book.of(node).as_dict())
             if node.status is not Status.RUNNING and self._keeper is not None:

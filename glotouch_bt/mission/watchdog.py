@@ -67,15 +67,23 @@ class Watchdog:
         stuck_s: Longest wall time between two beats; see `STUCK_S`.
         on_lost: Called from the watching thread with what was seen, if the stuck one cannot be broken off; it is
             expected to end the process.
+        grace_s: See `GRACE_S`.
 
     Attributes:
         stuck: What was seen, once it was.
     """
 
     def __init__(
-        self, robot: Robot, node: Callable[[], str], stuck_s: float, on_lost: Callable[[Stuck], None] | None = None
+        self,
+        robot: Robot,
+        node: Callable[[], str],
+        stuck_s: float,
+        on_lost: Callable[[Stuck], None] | None = None,
+        *,
+        grace_s: float = GRACE_S,
     ) -> None:
         self._robot, self._node, self._stuck_s, self._on_lost = robot, node, stuck_s, on_lost
+        self._grace_s = grace_s
         self._watched = threading.get_ident()
         self._main = threading.current_thread() is threading.main_thread()
         self._beat_s = time.monotonic()
@@ -113,7 +121,7 @@ class Watchdog:
             if time.monotonic() - told > 0.5 * self._stuck_s:
                 told = time.monotonic()
                 self._break_off()
-            if silent_s > self._stuck_s + GRACE_S and self._on_lost is not None:
+            if silent_s > self._stuck_s + self._grace_s and self._on_lost is not None:
                 self._on_lost(self.stuck)
 
     def _stack(self) -> str:
