@@ -16,6 +16,7 @@ from typing import Annotated, Any
 import typer
 
 from glotouch_bt.cli_bench import bench
+from glotouch_bt.cli_check import bench_check, check
 from glotouch_bt.cli_doctor import doctor, link, read_settings
 from glotouch_bt.cli_faults import bench_faults, faults
 from glotouch_bt.cli_pause import bench_pause
@@ -38,6 +39,8 @@ bench.command("faults")(bench_faults)
 bench.command("resume")(bench_resume)
 bench.command("fuzz")(bench_fuzz)
 app.command("doctor")(doctor)
+app.command("check")(check)
+bench.command("check")(bench_check)
 app.command("test")(mission_tests)
 app.command("replay")(replay)
 app.command("resume")(resume)
@@ -109,45 +112,6 @@ def run(
     elif done.exit_code and json_:
         console.print_error(" <- ".join(done.outcome.reasons))
     return done.exit_code
-
-
-@app.command()
-@guarded
-def check(
-    missions: Annotated[list[str], typer.Argument(metavar="MISSION...", help="mission files or shipped names")],
-    set_: Sets = None,
-    objects: Objects = None,
-    json_: Json = False,
-) -> int:
-    """Find every fault of missions before anything moves; nothing is run."""
-    from glotouch_bt.mission.findings import MissionFaults
-    from glotouch_bt.mission.load import load_mission, split_settings
-    from glotouch_bt.robot import BadInput
-
-    settings = read_settings(set_)
-    reports: list[dict[str, object]] = []
-    for given in missions:
-        findings: list[object] = []
-        try:
-            mission = load_mission(given, settings, objects=objects)
-        except MissionFaults as e:
-            findings = [f.as_dict() for f in e.findings]
-            if not json_:
-                sys.stderr.write(f"{e}\n{given}: {len(findings)} fault{'s' if len(findings) != 1 else ''}\n")
-        except BadInput as e:
-            findings = [{"file": given, "line": 0, "column": 0, "code": "unreadable", "what": str(e)}]
-            if not json_:
-                sys.stderr.write(f"{e}\n")
-        else:
-            left = ", ".join(split_settings(mission, settings))
-            note = f" (not parameters of it, for the backend: {left})" if left else ""
-            if not json_:
-                sys.stdout.write(f"{given}: ok, {sum(1 for _ in mission.tree.walk())} nodes{note}\n")
-        reports.append({"mission": given, "ok": not findings, "findings": findings})
-    ok = all(r["ok"] for r in reports)
-    if json_:
-        _print_json({"ok": ok, "missions": reports})
-    return 0 if ok else 2
 
 
 @app.command()

@@ -99,7 +99,7 @@ def test_check_reports_every_file(command: CliRunner, tmp_path: Path) -> None:
     codes = {(f["line"], f["column"], f["code"]) for f in data["missions"][1]["findings"]}
     assert {(4, 5, "unknown_skill"), (5, 22, "wrong_range")} <= codes
     text = command.invoke(cli.app, ["check", str(bad)])
-    assert f"{bad}:4:5: unknown skill or node 'liift'; did you mean 'lift'?" in text.stderr
+    assert f"{bad}:4:5: error: unknown skill or node 'liift'; did you mean 'lift'?" in text.stderr
 
 
 def test_tree_draws_text_and_svg(command: CliRunner, tmp_path: Path) -> None:

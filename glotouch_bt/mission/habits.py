@@ -29,7 +29,7 @@ def check_habits(flow: Flow, findings: Findings, timeout_s: float) -> None:
     """Report what is probably not meant.
 
     Args:
-        flow: The exact analysis.
+        flow: The analysis; lenient, if there are mistakes, so that what follows from them is not reported.
         findings: Where it goes.
         timeout_s: Longest duration of the mission.
     """

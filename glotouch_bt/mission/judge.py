@@ -41,7 +41,7 @@ def check_flow(
         blocked = any(exact.entered.get(id(n), EMPTY) == EMPTY for n in tree.walk())
         lenient = Flow(tree, variables, demands, lenient=True) if blocked else exact
         _Judge(exact, lenient, findings).all(leaves)
-        check_habits(exact, findings, timeout_s)
+        check_habits(lenient, findings, timeout_s)
 
 
 @contextmanager
@@ -168,7 +168,7 @@ class _Judge:
             return
         key = node.reads["items"].key
         kinds = {k for _, _, found in self._writers.get(key, []) for k in found}
-        elements = {k.element for k in kinds}
+        elements = {k.element for k in kinds} - {object}
         element = elements.pop() if len(elements) == 1 else object
         if element is not object and settings.least_first not in _fields(element):
             kind = f"field of {element.__name__}:"

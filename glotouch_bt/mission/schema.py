@@ -52,6 +52,26 @@ def mission_schema(skills: Mapping[str, type[Skill]]) -> dict[str, Any]:
             "world": {"anyOf": [{"type": "string"}, _model(WorldFile, definitions)]},
             "parameters": {"type": "object", "additionalProperties": declaration},
             "timeout_s": {"type": "number", "exclusiveMinimum": 0, "maximum": 86400},
+            "leaves": {
+                "type": "object",
+                "description": "states in which a mission that succeeds leaves things: {hand: empty}",
+                "additionalProperties": {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]},
+            },
+            "subtrees": {
+                "type": "object",
+                "description": "subtrees that stand in the mission itself, used by `subtree: {file: NAME}`",
+                "additionalProperties": {
+                    "type": "object",
+                    "required": ["tree"],
+                    "properties": {
+                        "subtree": {"type": "string"},
+                        "description": {"type": "string"},
+                        "parameters": {"type": "object", "additionalProperties": declaration},
+                        "tree": _NODE,
+                    },
+                    "additionalProperties": False,
+                },
+            },
             "tree": _NODE,
         },
         "$defs": definitions,

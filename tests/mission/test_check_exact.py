@@ -1,0 +1,321 @@
+"""The checker against the executive itself: every outcome of every leaf of small random trees, ticked, none guessed.
+
+The trees are built and ticked as missions are; leaves take their outcomes from an oracle that is led through all
+choices in turn. What was found missing, and where, must be what `check` says, to the node, port and state.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+from py_trees.common import Status
+
+from glotouch_bt.mission import build, decorators
+from glotouch_bt.mission.build import build_tree
+from glotouch_bt.mission.configurations import EMPTY
+from glotouch_bt.mission.demands import all_demands
+from glotouch_bt.mission.findings import Findings
+from glotouch_bt.mission.flow import Flow
+from glotouch_bt.mission.nodes import ConditionSettings, NodeSpec, number_names
+from glotouch_bt.mission.parse import parse_tree
+from glotouch_bt.mission.paths import Goal, shortest_path
+from glotouch_bt.mission.scope import Scope
+from glotouch_bt.mission.source import parse_yaml
+from glotouch_bt.mission.variables import Variables
+from skills.base import UNCHANGED, Context, In, Out, Skill, SkillFailed, SkillRun
+
+MOST_RUNS = 600
+MOST_STEPS = 16
+ITEMS = 2
+
+
+class Oracle:
+    """Leads through all sequences of choices: the first run takes 0 everywhere, the next run the next branch."""
+
+    def __init__(self) -> None:
+        self.trail: list[list[int]] = []  # [taken, of how many]
+        self.at = 0
+
+    def choose(self, among: int) -> int:
+        if self.at == len(self.trail):
+            self.trail.append([0, among])
+        self.at += 1
+        assert self.trail[self.at - 1][1] == among, "the tree is not deterministic"
+        return self.trail[self.at - 1][0]
+
+    def next(self) -> bool:
+        """Set up the next run; False after the last."""
+        self.at = 0
+        while self.trail and self.trail[-1][0] + 1 == self.trail[-1][1]:
+            self.trail.pop()
+        if not self.trail:
+            return False
+        self.trail[-1][0] += 1
+        return True
+
+
+class TooLong(Exception):
+    """A run that the oracle does not follow to its end."""
+
+
+class World:
+    """What the leaves share in one run."""
+
+    oracle: Oracle
+    hand: str
+    steps: int
+    seen: set[tuple[str, str, str]]
+    timeouts: ClassVar[dict[str, bool]] = {}
+
+
+class Leaf(Skill):
+    """A skill whose outcome the oracle chooses."""
+
+    def run(self) -> SkillRun:
+        for port, info in self.INPUT_PORTS.items():
+            if info.required and not self.blackboard_client.exists(port):
+                World.seen.add((self.name, port, "unset"))
+                raise TooLong
+        if "hand" in self.NEEDS and World.hand not in self.NEEDS["hand"]:
+            World.seen.add((self.name, "hand", World.hand))
+            raise TooLong
+        World.steps += 1
+        if World.steps > MOST_STEPS:
+            raise TooLong
+        how = World.oracle.choose(3 if World.timeouts.get(self.name) else 2)
+        for port in self.OUTPUT_PORTS:
+            sure = how == 0 or (how == 1 and getattr(type(self), port).always)
+            if sure or World.oracle.choose(2):
+                self.write_port(port, self.value(port))
+        if "hand" in {*self.LEAVES, *self.AFTER_FAILURE}:
+            left = self.LEAVES.get("hand", UNCHANGED)
+            after = sorted(self.AFTER_FAILURE.get("hand", {UNCHANGED, left}))
+            states = [left] if how == 0 else after if how == 1 else sorted({*after, UNCHANGED, left})
+            state = states[World.oracle.choose(len(states))]
+            World.hand = World.hand if state == UNCHANGED else state
+        if how == 2:
+            while True:
+                yield self.context.command  # until it is broken off
+        if how == 1:
+            raise SkillFailed("told", "to fail")
+        return
+        yield  # a generator all the same
+
+    def value(self, port: str) -> object:
+        if port == "list":
+            return tuple(range(World.oracle.choose(ITEMS + 1)))
+        return 1
+
+
+class A(Leaf):
+    """Writes a."""
+
+    a = Out(int, "a")
+
+
+class B(Leaf):
+    """Reads a, writes b whatever happens."""
+
+    a = In(int, "a")
+    b = Out(int, "b", always=True)
+
+
+class C(Leaf):
+    """Reads b."""
+
+    b = In(int, "b")
+
+
+class Lister(Leaf):
+    """Writes a tuple."""
+
+    list = Out(tuple, "a tuple")
+
+
+class Take(Leaf):
+    """Takes the tool."""
+
+    NEEDS: ClassVar = {"hand": frozenset({"empty", "tool"})}
+    LEAVES: ClassVar = {"hand": "tool"}
+    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "tool"})}
+
+
+class Use(Leaf):
+    """Needs the tool."""
+
+    NEEDS: ClassVar = {"hand": frozenset({"tool"})}
+    a = Out(int, "a")
+
+
+class Give(Leaf):
+    """Puts the tool back."""
+
+    NEEDS: ClassVar = {"hand": frozenset({"tool"})}
+    LEAVES: ClassVar = {"hand": "empty"}
+
+
+SKILLS: dict[str, type[Skill]] = {"a": A, "b": B, "c": C, "lister": Lister, "take": Take, "use": Use, "give": Give}
+LEAVES_ = st.sampled_from(list(SKILLS)) | st.sampled_from(
+    [
+        {"condition": {"port": "a", "at_least": 1}},
+        {"condition": {"port": "b", "is_set": True}},
+        {"condition": {"port": "a", "is_set": False}},
+    ]
+)
+
+
+def decorated(inner: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
+    many = st.lists(inner, min_size=1, max_size=3)
+    return st.one_of(
+        many.map(lambda c: {"sequence": c}),
+        many.map(lambda c: {"selector": c}),
+        inner.map(lambda c: {"succeed": {"do": c}}),
+        inner.map(lambda c: {"fail": {"do": c}}),
+        inner.map(lambda c: {"invert": {"do": c}}),
+        inner.map(lambda c: {"timeout": {"seconds": 1.0, "do": c}}),
+        inner.map(lambda c: {"retry": {"attempts": 2, "do": c}}),
+        inner.map(lambda c: {"repeat": {"times": 2, "do": c}}),
+        inner.map(lambda c: {"repeat": {"until": {"port": "b", "at_least": 1}, "limit": 2, "do": c}}),
+        st.tuples(inner, st.sampled_from(["stop", "continue"])).map(
+            lambda c: {"for_each": {"items": "list", "item": "a", "on_failure": c[1], "do": c[0]}}
+        ),
+    )
+
+
+TREES = st.recursive(LEAVES_, decorated, max_leaves=5)
+
+
+def read(tree: Any) -> NodeSpec:
+    findings = Findings()
+    scope = Scope(SKILLS, findings, Path("m.yaml"))
+    spec = parse_tree(parse_yaml(json.dumps(tree).encode(), "m.yaml"), scope)
+    assert not findings.sorted(), [str(f) for f in findings.sorted()]
+    number_names(spec)
+    return spec
+
+
+@contextmanager
+def free_comparisons() -> Iterator[None]:
+    """A comparison of what is written says what the oracle wants."""
+    true = decorators.holds
+
+    def chosen(condition: ConditionSettings, value: Any) -> bool:
+        if value is None or condition.is_set is not None:
+            return true(condition, value)
+        World.steps += 1
+        if World.steps > MOST_STEPS:
+            raise TooLong
+        return World.oracle.choose(2) == 0
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(decorators, "holds", chosen)
+        patch.setattr(build, "holds", chosen)
+        yield
+
+
+def by_ticking(spec: NodeSpec) -> tuple[set[tuple[str, str, str]], set[tuple[Status, str, bool, bool]], bool]:
+    """What is found wrong in some run, how runs end (status, hand, a set, b set), and whether all runs were made."""
+    from glotouch_bt.robot import HOLD
+
+    World.oracle, World.seen = Oracle(), set()
+    World.timeouts = {
+        below.name: True for n in spec.walk() if n.kind == "timeout" for below in n.walk() if below.kind == "skill"
+    }
+    ends: set[tuple[Status, str, bool, bool]] = set()
+    whole = True
+    for _ in range(MOST_RUNS):
+        World.hand, World.steps = "empty", 0
+        context = Context(None, None, None, None, None)  # type: ignore[arg-type]
+        clock = {"now": 0.0}
+        context.observation = type("Seen", (), {"now_s": 0.0})()
+        context.command = HOLD
+        built = build_tree(spec, context, "m")
+        try:
+            for _ in range(60):
+                context.preempted = False
+                built.root.tick_once()
+                if built.root.status is not Status.RUNNING:
+                    break
+                clock["now"] += 2.0
+                context.observation.now_s = clock["now"]
+            else:
+                whole = False
+            if built.root.status is not Status.RUNNING:
+                found = (built.value("a") is not None, built.value("b") is not None)
+                ends.add((built.root.status, World.hand, *found))
+        except TooLong:
+            whole = whole and World.steps <= MOST_STEPS
+        finally:
+            built.root.stop(Status.INVALID)
+            built.forget()
+        if not World.oracle.next():
+            return World.seen, ends, whole
+    return World.seen, ends, False
+
+
+def by_sets(spec: NodeSpec) -> tuple[Flow, set[tuple[str, str, str]], set[tuple[Status, str, bool, bool]]]:
+    variables = Variables(spec)
+    flow = Flow(spec, variables, all_demands(spec, variables))
+    wrong: set[tuple[str, str, str]] = set()
+    for demand, asked in flow.asked.items():
+        if not demand.stops:
+            continue
+        for value in variables.sets.values(asked, demand.variable) - demand.good:
+            state = variables.state_names("hand")[value] if demand.of_resource else "unset"
+            wrong.add((demand.node.name, demand.port, state))
+    ends = set()
+    for status, end in ((Status.SUCCESS, flow.end.success), (Status.FAILURE, flow.end.failure)):
+        for state in variables.state_names("hand") if "hand" in variables.resources else ["empty"]:
+            for a in (False, True):
+                for b in (False, True):
+                    kept = end
+                    if "hand" in variables.resources:
+                        kept = variables.sets.where(
+                            kept, variables.resources["hand"], (variables.state("hand", state),)
+                        )
+                    for key, is_set in (("a", a), ("b", b)):
+                        if key in variables.keys:
+                            values = variables.written(key) if is_set else (0,)
+                            kept = variables.sets.where(kept, variables.keys[key], values)
+                        elif is_set:
+                            kept = EMPTY
+                    if kept != EMPTY:
+                        ends.add((status, state, a, b))
+    return flow, wrong, ends
+
+
+@settings(max_examples=400, deadline=None, suppress_health_check=list(HealthCheck))
+@given(tree=TREES)
+def test_what_is_found_is_what_can_happen(tree: Any) -> None:
+    """Same wrong looks, same ends: nothing is missed, nothing is made up."""
+    spec = read(tree)
+    with free_comparisons():
+        seen, ends, whole = by_ticking(spec)
+    _, wrong, possible = by_sets(spec)
+    assert seen <= wrong
+    assert ends <= possible
+    assume(whole)
+    if not any(n.kind == "for_each" for n in spec.walk()):  # more items than were tried may show more
+        assert wrong == seen
+        assert possible == ends
+
+
+@settings(max_examples=400, deadline=None, suppress_health_check=list(HealthCheck))
+@given(tree=TREES)
+def test_every_wrong_look_has_a_path_that_leads_there(tree: Any) -> None:
+    """The path ends at the node, and what it says happens when the tree is ticked along it."""
+    spec = read(tree)
+    flow, _, _ = by_sets(spec)
+    for demand, asked in flow.asked.items():
+        bad = flow.variables.sets.values(asked, demand.variable) - demand.good
+        if demand.stops and bad:
+            path = shortest_path(flow, Goal(demand.node, demand.port, demand.variable, bad))
+            assert path, (demand.node.name, demand.port)
+            assert path[-1] == demand.node.name
