@@ -36,6 +36,7 @@ class RecheckParams(SkillParams):
     moved_m: float = param("A candidate may have moved so far", unit="m", default=0.006, gt=0.0, le=0.02)
     slip_m: float = param("The floor may be felt so far from where it was", unit="m", default=0.002, gt=0.0, le=0.005)
     headroom_m: float = param("Tool's height above the floor on the way", unit="m", default=0.13, ge=0.05, le=0.2)
+    touch: bool = param("Touch one of the candidates", default=True)
     corner_gap_m: float = param("Ball centre to each wall where the floor is felt", unit="m", default=0.014, ge=0.008)
 
 
@@ -142,7 +143,7 @@ class Recheck(Skill):
 
     def _touch_with_fingers(self) -> Motion[int | None]:
         """As with the probe, with the closed fingers."""
-        if not self.candidates:
+        if not (self.candidates and self.params.touch):
             return None
         arm = self.context.arm
         state = yield from arm.jaws(0.0)
@@ -199,7 +200,8 @@ class Recheck(Skill):
 
     def _ways(self, tool: HeldTool, least_m: float) -> list[tuple[Candidate, Array, Array]]:
         """(candidate, where to be lowered, where to go) with the most room first; places (2,) in K."""
-        known: tuple[Candidate, ...] = self.candidates or ()
+        p = self.params
+        known: tuple[Candidate, ...] = (self.candidates or ()) if p.touch else ()
         half = 0.5 * np.array(self.context.world.container.interior_m[:2]) - tool.tip_radius_m - ROOM_M
         ways: list[tuple[float, int, Candidate, Array, Array]] = []
         for candidate in known:

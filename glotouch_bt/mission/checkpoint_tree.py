@@ -50,9 +50,9 @@ def _node_state(node: Behaviour, tree: BuiltTree) -> dict[str, Any]:
         state["count"] = getattr(node, counted)
     elif hasattr(node, "progress"):
         state["progress"] = node.progress
+    if getattr(node, "reason", None) is not None:
+        state["reason"] = node.reason
     if isinstance(node, Skill):
-        if node.reason is not None:
-            state["reason"] = node.reason
         remembered = node.remember()
         if remembered is not None:
             state["remembered"] = remembered
@@ -164,7 +164,7 @@ def _set_node(node: Behaviour, state: Mapping[str, Any], nodes: Mapping[str, Beh
         setattr(node, counted, state["count"])
     elif "progress" in state:
         node.progress = state["progress"]
-    if isinstance(node, Skill):
+    if hasattr(node, "reason"):
         node.reason = state.get("reason")
-        if "remembered" in state:
-            node.recall(state["remembered"])
+    if isinstance(node, Skill) and "remembered" in state:
+        node.recall(state["remembered"])

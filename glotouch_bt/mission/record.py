@@ -22,6 +22,7 @@ from glotouch_bt.mission.mcap_json import dumps, to_json
 from glotouch_bt.mission.mcap_packing import Column, pack
 from glotouch_bt.mission.mcap_scene import container_scene, event_scene
 from glotouch_bt.mission.mcap_schemas import EVENT_PREFIX, schema_of
+from glotouch_bt.mission.record_reading import WrittenChunk
 from glotouch_bt.mission.resolution import (
     APERTURE_M,
     DEPTH_M,
@@ -118,16 +119,18 @@ class Recorder:
         """What a record that goes on from here must know, to write what this one would have."""
         return {"cycles": self._cycles, "next_image_ns": self._next_image_ns}
 
-    def go_on_from(self, chunks: Iterable[Sequence[tuple[int, str, bytes]]], state: Mapping[str, int]) -> None:
+    def go_on_from(self, chunks: Iterable[WrittenChunk], state: Mapping[str, int]) -> None:
         """Begin with what another record of the same run had written, instead of the scene.
 
         Args:
-            chunks: Its chunks, each as (log time ns, topic, message).
+            chunks: Its chunks.
             state: Its `state` after them.
         """
         self._pending.clear()
         for chunk in chunks:
-            self._pending.extend((ns, self._channel(topic), message) for ns, topic, message in chunk)
+            for topic in chunk.topics:
+                self._channel(topic)
+            self._pending.extend((ns, self._channel(topic), message) for ns, topic, message in chunk.messages)
             self._flush()
         self._cycles, self._next_image_ns = state["cycles"], state["next_image_ns"]
 

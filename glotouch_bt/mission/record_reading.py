@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import struct
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import zstandard
@@ -14,11 +15,22 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 
 from glotouch_bt.robot import BadInput
 
-WrittenChunk = list[tuple[int, str, bytes]]
+
+@dataclass
+class WrittenChunk:
+    """One chunk of a record.
+
+    Attributes:
+        topics: Of the channels that begin in it, in their order.
+        messages: (log time ns, topic, message), in their order.
+    """
+
+    topics: list[str] = field(default_factory=list)
+    messages: list[tuple[int, str, bytes]] = field(default_factory=list)
 
 
 def read_chunks(path: Path, length: int) -> Iterator[WrittenChunk]:
-    """Each chunk as (log time ns, topic, message), in the order written.
+    """Each chunk, in the order written.
 
     Args:
         path: The record; it may have been cut off beyond `length`.
@@ -38,13 +50,14 @@ def read_chunks(path: Path, length: int) -> Iterator[WrittenChunk]:
     try:
         for item in StreamReader(stream, emit_chunks=True).records:
             if isinstance(item, Chunk):
-                chunk: WrittenChunk = []
+                chunk = WrittenChunk()
                 for inside in breakup_chunk(item):
                     if isinstance(inside, Channel):
                         topics[inside.id] = inside.topic
+                        chunk.topics.append(inside.topic)
                     elif isinstance(inside, Message):
-                        chunk.append((inside.log_time, topics[inside.channel_id], inside.data))
+                        chunk.messages.append((inside.log_time, topics[inside.channel_id], inside.data))
                 yield chunk
-    except (McapError, struct.error, zstandard.ZstdError, KeyError, ValueError) as e:
+    except (McapError, struct.error, zstandard.ZstdError, KeyError, ValueError, OverflowError) as e:
         if stream.tell() < length:
             raise BadInput(f"{path}: damaged at byte {stream.tell()} ({type(e).__name__})") from e

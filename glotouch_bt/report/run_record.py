@@ -143,7 +143,7 @@ def read_run(path: Path) -> RunRecord:
         if type(e).__name__ == "InvalidMagic":
             raise BadInput(f"{file}: is not an MCAP record") from e
         record.complete = False
-    except (struct.error, zstandard.ZstdError, OSError, ValueError):
+    except (struct.error, zstandard.ZstdError, OSError, ValueError, OverflowError):
         record.complete = False  # a cut or damaged tail: what came before it stands
     record.samples, record.cycles, record.tactile = (join(packed[n]) for n in ("samples", "cycles", "tactile"))
     folder = file.parent

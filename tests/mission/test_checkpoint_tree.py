@@ -1,4 +1,4 @@
-"""A tree broken off at any skill's end and built anew goes on as if nothing had happened: random trees, every moment."""
+"""A tree broken off at any skill's end and built anew goes on as if nothing had happened: random trees."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class StepParams(SkillParams):
 
 
 class Step(Skill):
-    """One run plays letters of the script up to an S (success) or F (failure); R is a period more. Counts its periods."""
+    """One run plays letters of the script up to an S (success) or F (failure); R is a period more. Counts runs."""
 
     Params = StepParams
     params: StepParams
@@ -312,7 +312,7 @@ def test_a_mission_starts_inside_a_for_each_and_inside_a_selector(tmp_path: Path
     inner = node("sequence", [leaf("RS"), leaf("RS")])
     tree = for_each(node("selector", [leaf("RF"), inner]), go_on=False)
     file = CheckpointFile.create(tmp_path / "a.sqlite", {})
-    whole, trace = run(tree, file)
+    whole, _ = run(tree, file)
     assert whole.status == "success"
     path = "m/sequence/for_each/selector/sequence 2/step 3"
     fresh = next(r.number for r in file.rows() if r.node.endswith("items"))
