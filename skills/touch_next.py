@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from skills.touch_options import Option, Standing, best_rates, options
 
 MOST_IN_VAIN = 4
 """Closures without a plateau, after which a candidate is left alone: it is not where it was traced."""
+
+STILL_THERE_M = 0.003
+"""A hand that stood beside a candidate before a break still does if it is this near."""
 
 
 class TouchNextParams(ClosureParams):
@@ -69,6 +72,21 @@ class TouchNext(Skill):
         self._down: Squeezing | None = None
         self._refused: set[tuple[int, int, int, int]] = set()
         self._hopeless: frozenset[int] = frozenset()
+        self._stood_B_m: Array | None = None
+
+    def remember(self) -> object:
+        """See `Skill`: what was refused, and over which candidate the hand stands, down beside it."""
+        down = None
+        if self._down is not None:
+            down = (self._down.candidate, self._down.at, self.context.arm.pose_B_P.position_m)
+        return {"refused": tuple(sorted(self._refused)), "down": down}
+
+    def recall(self, remembered: Any) -> None:
+        """See `Skill`. The hand counts as down only if it is still there when the skill begins."""
+        self._refused = set(remembered["refused"])
+        if remembered["down"] is not None:
+            candidate, at, self._stood_B_m = remembered["down"]
+            self._down = Squeezing(self.context, candidate, at, self.params, self.jaw_zero)
 
     def run(self) -> SkillRun:
         """See the class."""
@@ -83,6 +101,9 @@ class TouchNext(Skill):
             self._refused.clear()
             self._down = None
         down, self._down = self._down, None  # if this is broken off, nobody knows where the hand stands
+        stood, self._stood_B_m = self._stood_B_m, None
+        if stood is not None and np.linalg.norm(self.context.arm.pose_B_P.position_m - stood) > STILL_THERE_M:
+            down = None
         self.touchsets, self.decided = touchsets, False
         yield HOLD  # thinking takes longer than a control period; on hardware the arm holds meanwhile
         belief = believe(self._target_model(), touchsets)
