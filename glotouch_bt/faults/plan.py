@@ -44,6 +44,7 @@ class FaultSpec:
         params: Its parameters.
         when, lasting, repeat: Its moments.
         place: Where it stands.
+        node_place: Where the name of its node stands, if it has one.
     """
 
     name: str
@@ -53,6 +54,7 @@ class FaultSpec:
     lasting: Lasting
     repeat: Repeat
     place: Place
+    node_place: Place | None = None
 
     def requested(self) -> dict[str, object]:
         """What was asked for, as plain data."""
@@ -102,7 +104,7 @@ def check_plan(source: Node, tree: NodeSpec | None = None, root: str = "") -> Fa
     findings = Findings()
     plan = _plan(source, findings)
     if plan is not None and tree is not None:
-        _check_nodes(plan, source, tree, root, findings)
+        _check_nodes(plan, tree, root, findings)
     if plan is None or len(findings):
         raise MissionFaults(findings.sorted())
     return plan
@@ -160,23 +162,24 @@ def _fault(source: Node, taken: set[str], findings: Findings) -> FaultSpec | Non
         if "fault" not in source:
             findings.add(source.place, "missing_key", "a fault needs 'fault', one of the catalogue (glotouch faults)")
         return None
-    if word not in CATALOGUE:
+    kind = CATALOGUE.get(word)
+    if kind is None:
         node = source.get("fault")
         findings.unknown(node.place if node else source.place, "unknown_fault", "fault", word, CATALOGUE)
-        return None
-    kind = CATALOGUE[word]
-    params = _model(kind.effect.Params, source, "with", f"fault {word!r}", findings)
+    params = None if kind is None else _model(kind.effect.Params, source, "with", f"fault {word!r}", findings)
     when = _model(When, source, "when", "'when'", findings)
     lasting = _lasting(source, when, findings)
     repeat = _model(Repeat, source, "repeat", "'repeat'", findings)
-    if params is None or when is None or lasting is None or repeat is None:
+    if kind is None or params is None or when is None or lasting is None or repeat is None:
         return None
     base = _text(source, "name", findings) or word
     name, n = base, 2
     while name in taken:
         name, n = f"{base} {n}", n + 1
     taken.add(name)
-    return FaultSpec(name, kind, params, when, lasting, repeat, source.place)
+    moment = source.get("when")
+    node = moment.get("node") if isinstance(moment, Map) else None
+    return FaultSpec(name, kind, params, when, lasting, repeat, source.place, node.place if node else None)
 
 
 def _model(model: type[M], source: Map, key: str, what: str, findings: Findings) -> M | None:
@@ -215,14 +218,16 @@ def _lasting(source: Map, when: When | None, findings: Findings) -> Lasting | No
     return made
 
 
-def _check_nodes(plan: FaultPlan, source: Node, tree: NodeSpec, root: str, findings: Findings) -> None:
+def _check_nodes(plan: FaultPlan, tree: NodeSpec, root: str, findings: Findings) -> None:
     paths = dict(_paths(tree, root))
     for fault in plan.faults:
         pattern = fault.when.node
         if pattern is None or any(matches(p, pattern) for p in paths):
             continue
         names = sorted({p.rsplit("/", 1)[-1] for p in paths})
-        findings.unknown(fault.place, "unknown_node", f"node of fault {fault.name!r}:", pattern, names)
+        findings.unknown(
+            fault.node_place or fault.place, "unknown_node", f"node of fault {fault.name!r}:", pattern, names
+        )
 
 
 def _paths(tree: NodeSpec, above: str) -> list[tuple[str, NodeSpec]]:

@@ -12,8 +12,9 @@ from typing import Any
 import pytest
 
 from glotouch_bt.faults.catalogue import CATALOGUE
+from glotouch_bt.mission.checkpoint import Row
 from glotouch_bt.robot import UnknownName
-from glotouch_bt.study import faults_trial
+from glotouch_bt.study import faults_start, faults_trial
 from glotouch_bt.study.faults import Campaign, run_campaign
 from glotouch_bt.study.faults_cases import CASES, SKILLS, Case, chosen_cases
 from glotouch_bt.study.faults_exhaustive import Exhaustive, run_exhaustive
@@ -161,3 +162,14 @@ def test_every_call_of_a_short_mission_can_fail(tmp_path: Path) -> None:
     summary = run_exhaustive(study)
     assert summary["bad"] == []
     assert summary["tried"] >= 10
+
+
+def test_a_trial_begins_at_the_last_checkpoint_before_the_first_run_of_its_skill() -> None:
+    paths = [(), ("m/a",), ("m/b", "m/seq"), ("m/a",), ("m/b",)]
+    rows = [Row(i, 10.0 * i, "", "", begun, {}, None, True) for i, begun in enumerate(paths)]
+    found = faults_start._first(rows, "b")
+    assert found is not None
+    path, before, index = found
+    assert (path, before.number, index) == ("m/b", 1, 1)
+    assert faults_start._first(rows, "seq") == ("m/seq", rows[1], 1)
+    assert faults_start._first(rows, "c") is None
