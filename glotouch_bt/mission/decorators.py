@@ -1,6 +1,6 @@
 """Nodes that py_trees lacks, or has on the wall clock: timeout on the robot's clock, repeat-until, for-each, condition.
 
-All read and write only the keys they are wired to, through `Keys`.
+All read and write only the keys they are wired to, through `Keys`. A failure of their own has a reason.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from py_trees.common import Access, Status
 from py_trees.decorators import Decorator
 
 from glotouch_bt.mission.nodes import ConditionSettings
+from skills.base import Reason
 
 
 class Keys:
@@ -74,18 +75,20 @@ class PortCondition(Behaviour):
 
     def __init__(self, name: str, keys: Keys, key: str, settings: ConditionSettings) -> None:
         super().__init__(name)
+        self.reason: Reason | None = None
         self._keys, self._key, self._settings = keys, key, settings
 
     def update(self) -> Status:
         """Compare."""
         value = self._keys.get(self._key)
         if holds(self._settings, value):
-            self.feedback_message = ""
+            self.feedback_message, self.reason = "", None
             return Status.SUCCESS
-        found = (
-            "not set" if value is None else repr(value) if isinstance(value, (int, float, str)) else "something else"
-        )
+        plain = isinstance(value, (int, float, str))
+        found = "not set" if value is None else repr(value) if plain else "something else"
         self.feedback_message = f"{in_words(self._settings)} does not hold: it is {found}"
+        evidence = {"wanted": in_words(self._settings), "found": value if plain else found}
+        self.reason = Reason("condition_false", self.feedback_message, evidence, node=self.name)
         return Status.FAILURE
 
 
@@ -96,6 +99,7 @@ class ClockTimeout(Decorator):
         super().__init__(name, child)
         self._seconds, self._clock = seconds, clock
         self._start_s = 0.0
+        self.reason: Reason | None = None
 
     @property
     def progress(self) -> dict[str, Any]:
@@ -114,13 +118,16 @@ class ClockTimeout(Decorator):
 
     def initialise(self) -> None:
         """Start the clock."""
-        self.feedback_message = ""
+        self.feedback_message, self.reason = "", None
         self._start_s = self._clock()
 
     def update(self) -> Status:
         """The child's status, unless time is up."""
         if self.decorated.status is Status.RUNNING and self._clock() - self._start_s >= self._seconds:
             self.feedback_message = f"{self.decorated.name!r} took longer than {self._seconds:g} s"
+            evidence = {"limit_s": self._seconds, "took_s": round(self._clock() - self._start_s, 3)}
+            advice = "allow more time, or see in the record what it waited for"
+            self.reason = Reason("timed_out", self.feedback_message, evidence, advice, self.name)
             return Status.FAILURE
         return self.decorated.status
 
@@ -132,6 +139,7 @@ class RepeatUntil(Decorator):
         super().__init__(name, child)
         self._done, self._limit, self._words = done, limit, words
         self._passes = 0
+        self.reason: Reason | None = None
 
     @property
     def progress(self) -> dict[str, Any]:
@@ -144,7 +152,7 @@ class RepeatUntil(Decorator):
 
     def initialise(self) -> None:
         """Start counting passes."""
-        self.feedback_message = ""
+        self.feedback_message, self.reason = "", None
         self._passes = 0
 
     def update(self) -> Status:
@@ -156,6 +164,9 @@ class RepeatUntil(Decorator):
             return Status.SUCCESS
         if self._passes >= self._limit:
             self.feedback_message = f"{self._words!r} does not hold after {self._passes} passes"
+            evidence = {"passes": self._passes, "limit": self._limit}
+            advice = "raise its limit, or end it by another condition"
+            self.reason = Reason("passes_ran_out", self.feedback_message, evidence, advice, self.name)
             return Status.FAILURE
         return Status.RUNNING
 
@@ -188,6 +199,7 @@ class ForEach(Decorator):
         self._next = 0
         self._succeeded = 0
         self._gathered: dict[str, dict[int, Any]] = {}
+        self.reason: Reason | None = None
 
     @property
     def progress(self) -> dict[str, Any]:
@@ -214,7 +226,7 @@ class ForEach(Decorator):
 
     def initialise(self) -> None:
         """Take the items as they are now."""
-        self.feedback_message = ""
+        self.feedback_message, self.reason = "", None
         self._next = self._succeeded = 0
         self._gathered = {source: {} for source in self._collect}
         items = self._keys.get(self._items_key)
@@ -223,7 +235,7 @@ class ForEach(Decorator):
         if self._least_first is not None:
             self._order.sort(key=lambda i: getattr(self._items[i], str(self._least_first)))
         if items is None:
-            self.feedback_message = f"{self._items_key!r} has not been written"
+            self._because("no_items", f"{self._items_key!r} has not been written")
         for target in self._collect.values():
             self._keys.set(target, ())
 
@@ -254,15 +266,19 @@ class ForEach(Decorator):
             self._succeeded += 1
             self._gather()
         elif not self._go_on:
-            self.feedback_message = f"item {self._next + 1} of {len(self._items)} failed"
+            self._because("item_failed", f"item {self._next + 1} of {len(self._items)} failed", item=self._next + 1)
             return Status.FAILURE
         self._next += 1
         if self._next < len(self._items):
             return Status.RUNNING
         if self._succeeded == 0:
-            self.feedback_message = f"none of {len(self._items)} items succeeded"
+            self._because("all_items_failed", f"none of {len(self._items)} items succeeded", items=len(self._items))
             return Status.FAILURE
         return Status.SUCCESS
+
+    def _because(self, code: str, text: str, **evidence: int) -> None:
+        self.feedback_message = text
+        self.reason = Reason(code, text, evidence, node=self.name)
 
     def _gather(self) -> None:
         """Only whole rows: an item whose child left a key unwritten is not gathered at all."""
