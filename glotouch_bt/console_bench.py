@@ -121,7 +121,8 @@ def print_search(summary: dict[str, Any], folder: Path) -> None:
 
 def print_contact(summary: dict[str, Any], folder: Path) -> None:
     """The table of a contact campaign: errors of probe and bare gripper beside the paper's, and what was not traced."""
-    from glotouch_bt.study.contact import METRICS, TOOLS
+    from glotouch_bt.study.contact import METRICS
+    from glotouch_bt.study.square import TOOLS
 
     def mean(of: dict[str, Any], metric: str) -> str:
         m = of.get(metric)

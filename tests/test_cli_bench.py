@@ -13,8 +13,9 @@ from typer.testing import CliRunner
 
 from glotouch_bt import cli, cli_bench
 from glotouch_bt.study import contact, detection, search
-from glotouch_bt.study.contact import METRICS, MORE, PAPER, TOOLS
+from glotouch_bt.study.contact import METRICS, MORE, PAPER
 from glotouch_bt.study.search_summary import ERRORS, summarise
+from glotouch_bt.study.square import TOOLS
 
 
 class NoPool:

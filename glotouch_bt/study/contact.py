@@ -13,22 +13,18 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from glotouch_bt.mission.worlds import load_world
 from glotouch_bt.report.run_record import RunRecord, read_run
 from glotouch_bt.robot import Array, BadInput, Pose
-from glotouch_bt.robot.meshes import load_folder
+from glotouch_bt.study.contact_plots import plot_errors, plot_traces
 from glotouch_bt.study.launch import RunRequest, launch
 from glotouch_bt.study.retrieve import cause
-from glotouch_bt.study.square import TrueSquare, fit_square, polygon_distance
+from glotouch_bt.study.square import TOOLS, Tool, TracedSquare, polygon_distance, traced_square, true_square
 from glotouch_bt.study.statistics import bootstrap_mean, wilson
 
-Tool = Literal["probe", "gripper"]
-WORLD = "calibration_square"
-TOOLS: tuple[Tool, ...] = ("probe", "gripper")
 METRICS = ("centre_error_mm", "contact_std_mm", "contact_rms_mm", "max_contact_mm", "side_error_mm")
 PAPER = {
     "probe": dict(zip(METRICS, (0.37, 0.84, 0.87, 1.58, 0.95), strict=True)),
@@ -80,25 +76,6 @@ class Campaign:
         ]
 
 
-@dataclass(frozen=True)
-class TracedSquare:
-    """What a run believes, in B.
-
-    Attributes:
-        points_B_m: (k, 2) contact points.
-        tips_B_m: (k, 2) where the tool's reference point was.
-        centre_B_m, side_m, yaw_rad: The fitted square: centre (2,), sides (2,) longer first, direction of the longer.
-        tip_radius_m: 0 for a tool that is no ball.
-    """
-
-    points_B_m: Array
-    tips_B_m: Array
-    centre_B_m: Array
-    side_m: Array
-    yaw_rad: float
-    tip_radius_m: float
-
-
 def run_trial(tool: Tool, fixed: bool, request: RunRequest) -> dict[str, Any]:
     """One trial in this process, as a row. Whatever goes wrong is a row, never an exception of the campaign."""
     row: dict[str, Any] = {"tool": tool, "square": "fixed" if fixed else "free", "seed": request.seed}
@@ -122,46 +99,6 @@ def run_trial(tool: Tool, fixed: bool, request: RunRequest) -> dict[str, Any]:
 
 def _fault(e: Exception) -> dict[str, Any]:
     return {"status": "traceback", "exit_code": -1, "cause": f"traceback {type(e).__name__}: {e}"}
-
-
-def traced_square(record: RunRecord, tool: Tool, fixed: bool) -> TracedSquare:
-    """The contacts of the traced candidate and the square through them.
-
-    A trace moves its contacts along with an object it pushed. The bolted square was not pushed: its contacts are taken
-    as they were felt.
-
-    Raises:
-        BadInput: The record holds no candidate.
-    """
-    pose_B_K = record.pose_B_K
-    found = record.of_kind("candidate")
-    if not found or pose_B_K is None:
-        raise BadInput(f"{record.path}: holds no traced square")
-    contacts = found[-1].data["candidate"]["contacts"]
-    if fixed:
-        felt = {c["stamp_s"]: c for e in record.of_kind("contact") for c in (e.data["contact"],)}
-        contacts = [felt[c["stamp_s"]] for c in contacts]
-    tips = np.array([c["tip_K_m"][:2] for c in contacts], dtype=np.float64)
-    points = np.array([c["point_K_m"] for c in contacts], dtype=np.float64)
-    radius = float(record.of_run("probe", "tip_radius_m")) if tool == "probe" else 0.0
-    fit = fit_square(tips if radius else points, radius)
-    return TracedSquare(
-        _planar(pose_B_K, points),
-        _planar(pose_B_K, tips),
-        _planar(pose_B_K, fit.centre_K_m[None])[0],
-        np.array(fit.size_m),
-        fit.yaw_rad + pose_B_K.yaw_rad,
-        radius,
-    )
-
-
-def true_square(record: RunRecord, when: Literal["start", "end"] = "end") -> TrueSquare:
-    """The square as it really stood."""
-    item = record.truth[when][0]
-    pose = Pose(np.array(item["pose_B_O"]["position_m"], float), np.array(item["pose_B_O"]["quat"], float))
-    world = load_world(WORLD)
-    (block,) = load_folder(world.objects.folder, world.objects.names)
-    return TrueSquare(pose, block.extents_m[:2])
 
 
 def score(record: RunRecord, traced: TracedSquare) -> dict[str, Any]:
@@ -208,8 +145,6 @@ def run_campaign(
         executor: Any `concurrent.futures` executor.
         on_row: Called with (row, done, total) after each trial.
     """
-    from glotouch_bt.study.contact_plots import plot_errors, plot_traces
-
     requests = campaign.requests()
     campaign.out.mkdir(parents=True, exist_ok=True)
     futures = [executor.submit(run_trial, *request) for request in requests]
@@ -255,11 +190,6 @@ def summarise(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "free": {tool: of("free", tool) for tool in TOOLS},
         "not_traced": causes,
     }
-
-
-def _planar(pose_B_K: Pose, points_K_m: Array) -> Array:
-    """Points (n, 2) on K's floor, as (n, 2) in B."""
-    return pose_B_K.apply(np.column_stack([points_K_m, np.zeros(len(points_K_m))]))[:, :2]
 
 
 def _quarter_deg(angle_rad: float) -> float:

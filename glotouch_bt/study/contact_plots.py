@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from glotouch_bt.report.run_record import read_run
 from glotouch_bt.robot import Array
-from glotouch_bt.study.square import rectangle
+from glotouch_bt.study.square import TOOLS, rectangle, traced_square, true_square
 
 SHOWN = 4
 COLOURS = {"probe": "#2567c9", "gripper": "#e08a1e"}
@@ -54,8 +54,6 @@ def plot_errors(rows: Sequence[Mapping[str, Any]], paper: Mapping[str, Mapping[s
 
 def plot_traces(rows: Sequence[Mapping[str, Any]], out: Path) -> None:
     """A grid of traced squares: truth, contacts and fit, each about the true centre, in mm. Writes traces.png."""
-    from glotouch_bt.study.contact import TOOLS, traced_square, true_square
-
     figure = Figure(figsize=(3.1 * SHOWN, 3.2 * len(TOOLS)), layout="constrained")
     for line, tool in enumerate(TOOLS):
         good = [r for r in rows if (r["square"], r["tool"]) == ("fixed", tool) and not r["cause"]][:SHOWN]
