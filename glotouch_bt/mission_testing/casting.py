@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 from py_trees.ports_utils import is_instance_of_type
 
 from glotouch_bt.mission.nodes import NodeSpec
-from glotouch_bt.mission_testing.leaf import Part
+from glotouch_bt.mission_testing.leaf import Part, promised
 from glotouch_bt.mission_testing.outcomes import Decide, Outcome, Script, flat, ok
 from glotouch_bt.robot import BadInput
 from skills.base import Skill
@@ -42,28 +42,41 @@ def leaves_of(root: NodeSpec, title: str) -> dict[str, NodeSpec]:
     return {p: n for p, n in paths_of(root, title).items() if n.kind == "skill"}
 
 
-def fits(pattern: str, path: str, node: NodeSpec) -> bool:
-    """A pattern fits a node by its name, its skill's name or its path; `*`, `?` and `[...]` as in file names."""
-    return any(fnmatchcase(name, pattern) for name in (node.name, node.skill, path))
+def fitting(pattern: str, leaves: Mapping[str, NodeSpec]) -> dict[str, NodeSpec]:
+    """The leaves, by path, that a pattern means.
+
+    The name of a node means that node alone. Else it is laid over names, skills' names and paths; `*`, `?` and `[...]`
+    as in file names: `squeeze*` means `squeeze`, `squeeze 2` and whatever else is done by the skill `squeeze`.
+    """
+    named = {path: node for path, node in leaves.items() if node.name == pattern}
+    if named:
+        return named
+    return {
+        path: node
+        for path, node in leaves.items()
+        if any(fnmatchcase(name, pattern) for name in (node.name, node.skill, path))
+    }
 
 
 def cast(root: NodeSpec, title: str, script: Script) -> dict[str, Part | None]:
     """The part of each leaf by its path; None: the skill plays itself. What no pattern fits succeeds.
 
-    A name of a node wins over all patterns; of several patterns that fit, the last one wins.
+    Patterns as in `fitting`. A node's name wins over all of them; of several that fit, the last one wins.
 
     Raises:
         ScriptError: A pattern fits no leaf, or an outcome is none the skill can have.
     """
     leaves = leaves_of(root, title)
     rows = {pattern: flat(answer) for pattern, answer in script.items()}
-    for pattern in rows:
-        if not any(fits(pattern, path, node) for path, node in leaves.items()):
+    meant: dict[str, str] = {}
+    for pattern in sorted(rows, key=lambda p: any(p == node.name for node in leaves.values())):
+        found = fitting(pattern, leaves)
+        if not found:
             raise ScriptError(f"script: no leaf of {title!r} is called {pattern!r}{_near(pattern, leaves.values())}")
+        meant |= dict.fromkeys(found, pattern)
     parts: dict[str, Part | None] = {}
     for path, node in leaves.items():
-        fitting = [p for p in rows if fits(p, path, node)]
-        chosen = node.name if node.name in rows else fitting[-1] if fitting else None
+        chosen = meant.get(path)
         row: Row = (ok(),) if chosen is None else rows[chosen]
         if any(isinstance(o, Outcome) and o.kind == "real" for o in row):
             if len(row) > 1:
@@ -95,12 +108,12 @@ def _outcome(outcome: Outcome, node: NodeSpec) -> Outcome:
     if outcome.kind == "fails" and outcome.code and skill.FAILURES and outcome.code not in codes:
         hint, known = _hint(outcome.code, codes), ", ".join(codes)
         raise ScriptError(f"script: {node.skill!r} never fails with {outcome.code!r}{hint} (it declares: {known})")
-    return replace(outcome, ports=_ports(outcome.ports, node.name, node.skill, skill))
+    return replace(outcome, ports=_ports(outcome, node.name, node.skill, skill))
 
 
-def _ports(given: Mapping[str, object], name: str, skill_name: str, skill: type[Skill]) -> dict[str, object]:
+def _ports(outcome: Outcome, name: str, skill_name: str, skill: type[Skill]) -> dict[str, object]:
     ports: dict[str, object] = {}
-    for port, value in given.items():
+    for port, value in outcome.ports.items():
         if port not in skill.OUTPUT_PORTS:
             known = ", ".join(skill.OUTPUT_PORTS) or "none"
             hint = _hint(port, skill.OUTPUT_PORTS)
@@ -111,6 +124,9 @@ def _ports(given: Mapping[str, object], name: str, skill_name: str, skill: type[
         if value is None or not is_instance_of_type(value, kind):
             shown = getattr(kind, "__name__", str(kind))
             raise ScriptError(f"script: {name!r}: port {port!r} takes a {shown}, not {value!r}")
+        always = promised(skill, port, outcome.kind) if outcome.kind in ("ok", "fails") else None
+        if always is not None and value != always:
+            raise ScriptError(f"script: {name!r}: {skill_name!r} promises {port} = {always!r} when it ends so")
         ports[port] = value
     return ports
 

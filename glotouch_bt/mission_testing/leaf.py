@@ -161,8 +161,8 @@ class _Playing(Skill):
             raise outcome.error
         kind = type(self)
         written = {
-            p: port_value(info.data_type, getattr(getattr(kind, p, None), "element", None))
-            for p, info in self.OUTPUT_PORTS.items()
+            p: default_value(kind, p, outcome.kind)
+            for p in self.OUTPUT_PORTS
             if p not in outcome.ports and (outcome.kind == "ok" or getattr(getattr(kind, p, None), "always", False))
         }
         call.outputs = {**written, **outcome.ports}
@@ -175,6 +175,21 @@ class _Playing(Skill):
     def _write(self, ports: Mapping[str, object]) -> None:
         for port, value in ports.items():
             self.write_port(port, value)
+
+
+def promised(skill: type[Skill], port: str, outcome: str) -> object | None:
+    """The value a skill always gives a port when it ends so; None if it promises none."""
+    found: object | None = getattr(getattr(skill, port, None), "on_success" if outcome == "ok" else "on_failure", None)
+    return found
+
+
+def default_value(skill: type[Skill], port: str, outcome: str) -> object:
+    """What a port is given that the script does not name: what the skill promises, else a stand-in."""
+    value = promised(skill, port, outcome)
+    if value is not None:
+        return value
+    element = getattr(getattr(skill, port, None), "element", None)
+    return port_value(skill.OUTPUT_PORTS[port].data_type, element)
 
 
 def playing(skill: type[Skill], part: Part, stage: Stage) -> type[Skill]:

@@ -116,7 +116,7 @@ class ScriptedRun:
         return found[0]
 
     def _fitting(self, pattern: str) -> dict[str, NodeSpec]:
-        found = {p: n for p, n in self._leaves.items() if casting.fits(pattern, p, n)}
+        found = casting.fitting(pattern, self._leaves)
         if not found:
             raise ScriptError(f"no leaf of {self.mission!r} is called {pattern!r} "
                               f"(leaves: {', '.join(n.name for n in self._leaves.values())})")  # fmt: skip

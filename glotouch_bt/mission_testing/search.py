@@ -12,7 +12,7 @@ from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.nodes import ConditionSettings, NodeSpec, TimeoutSettings
 from glotouch_bt.mission_testing.casting import leaves_of
 from glotouch_bt.mission_testing.coverage import expected_endings
-from glotouch_bt.mission_testing.leaf import Call
+from glotouch_bt.mission_testing.leaf import Call, promised
 from glotouch_bt.mission_testing.outcomes import Outcome
 from glotouch_bt.mission_testing.scripted import RunsAway, ScriptedRun, run_scripted
 from glotouch_bt.mission_testing.standins import port_value, stand_in
@@ -107,10 +107,15 @@ class ScriptMaker:
         if path in self._breakable and rng.random() < 0.1:
             return Outcome("hangs")
         failing = rng.random() < wild
-        ports = {p: self._port(skill, p, rng) for p in skill.OUTPUT_PORTS if not failing or rng.random() < 0.3}
+        kind: Literal["ok", "fails"] = "fails" if failing else "ok"
+        ports = {
+            p: self._port(skill, p, rng)
+            for p in skill.OUTPUT_PORTS
+            if promised(skill, p, kind) is None and (not failing or rng.random() < 0.3)
+        }
         codes = list(skill.FAILURES) or [""]
         code = codes[int(rng.integers(len(codes)))] if failing else ""
-        return Outcome("fails" if failing else "ok", code, ports=ports, after_s=after)
+        return Outcome(kind, code, ports=ports, after_s=after)
 
     def _port(self, skill: type[Skill], port: str, rng: np.random.Generator) -> object:
         kind: Any = skill.OUTPUT_PORTS[port].data_type

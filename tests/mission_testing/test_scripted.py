@@ -48,9 +48,9 @@ def test_a_failure_names_its_root_cause(mission: Make) -> None:
     assert run.status_of("for_each") == "INVALID"
 
 
-def test_a_condition_that_fails_has_no_code(mission: Make) -> None:
+def test_a_condition_that_fails_is_a_reason(mission: Make) -> None:
     run = run_scripted(mission(), {"find": ok(found=1)})
-    assert (run.status, run.code, run.chain[-1].node) == ("failure", "", "enough")
+    assert (run.status, run.code, run.chain[-1].node) == ("failure", "condition_false", "enough")
 
 
 def test_a_function_decides_when_it_is_called(mission: Make, item: Any) -> None:
