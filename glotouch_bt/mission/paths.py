@@ -187,13 +187,13 @@ class _Search:
 
     def _enter(self, node: NodeSpec, above: Frames, values: Values) -> Iterator[_At]:
         here, kind = self._number[id(node)], node.kind
-        if kind == "for_each" and "items" in node.reads and "item" in node.writes:
+        if not node.children:
+            yield _At((*above, (here, None)), values)
+        elif kind == "for_each" and "items" in node.reads and "item" in node.writes:
             if self._looked(node, values, "items"):
                 yield _At((), values, "goal")
                 return
             yield from self._enter_for_each(node, above, values)
-        elif not node.children:
-            yield _At((*above, (here, None)), values)
         elif kind == "parallel":
             for order in permutations(range(len(node.children))) if len(node.children) <= 3 else _turns(node):
                 yield from self._enter(node.children[order[0]], (*above, (here, (order, 0))), values)
@@ -226,7 +226,7 @@ class _Search:
             yield from self._leave_repeat(node, above, good, values, memory)
         elif node.kind == "parallel":
             yield from self._leave_parallel(node, above, good, values, memory)
-        elif node.kind == "for_each":
+        elif node.kind == "for_each" and memory is not None:
             yield from self._leave_for_each(node, above, good, values, memory)
         else:
             yield from self._leave(above, good, values)
@@ -355,7 +355,7 @@ class _Search:
         if goal.node is node and any(self._looked(node, values, d.port) for d in self._flow.demands[id(node)]):
             yield "", _At((), values, "goal")
             return
-        if node.kind == "for_each":
+        if node.kind == "for_each" and node.children:
             good = bool(at.frames[-1][1])
             for there in self._leave(above, good, values):
                 yield f"{node.name} has {'no item' if good else 'nothing to go through'}", there

@@ -212,3 +212,50 @@ def test_any_tree_is_loaded_or_refused(tree: Any, parameters: Any, tmp_path: Pat
     except BadInput as refused:
         if str(path) not in str(refused):
             raise
+
+
+def test_the_resolved_mission_carries_its_subtrees(tmp_path: Path, registry: dict[str, Any]) -> None:
+    """It loads alike without their files: the same nodes, names and keys; a second time the same text."""
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "b").mkdir()
+    (tmp_path / "a" / "sub.yaml").write_text(
+        "tree:\n  - find\n  - subtree: {file: b/sub.yaml, ports: {found: found}}\n"
+    )
+    (tmp_path / "a" / "b" / "sub.yaml").write_text(
+        "parameters: {n: {type: int, default: 1}}\ntree: {find: {how_many: $n}}\n"
+    )
+    path = tmp_path / "m.yaml"
+    sub = "  - subtree: {file: a/sub.yaml, ports: {found: ours}}\n"
+    path.write_text(HEAD + "tree:\n" + sub + sub + "  - number: {in: {number: ours}}\n")
+    mission = load_mission(path, skills=registry)
+    again = tmp_path / "elsewhere" / "m.yaml"
+    again.parent.mkdir()
+    again.write_text(mission.resolved_yaml())
+    loaded = load_mission(again, skills=registry)
+
+    def nodes(of: Any) -> list[Any]:
+        return [
+            (n.kind, n.name, [w.key for w in (*n.reads.values(), *n.writes.values())], n.params) for n in of.tree.walk()
+        ]
+
+    assert nodes(loaded) == nodes(mission)
+    assert loaded.resolved_yaml() == mission.resolved_yaml()
+    assert sorted(loaded.document["subtrees"]) == ["sub", "sub_2"]
+
+
+def test_trees_without_end_are_refused(tmp_path: Path, registry: dict[str, Any]) -> None:
+    """Eight levels of ten copies each would be a hundred million nodes."""
+    for level in range(7):
+        text = f"  - subtree: {{file: s{level + 1}.yaml}}\n" * 10 if level < 6 else "  - act\n"
+        (tmp_path / f"s{level}.yaml").write_text("tree:\n" + text)
+    path = tmp_path / "m.yaml"
+    path.write_text(HEAD + "tree: {subtree: {file: s0.yaml}}\n")
+    with pytest.raises(MissionFaults, match="more than 3000 nodes"):
+        load_mission(path, skills=registry)
+
+
+def test_what_a_mission_leaves_is_checked(load: Callable[..., Any]) -> None:
+    for text, code in (("[]", "wrong_type"), ("{hand: 3}", "wrong_type"), ("{hnd: empty}", "unknown_resource")):
+        with pytest.raises(MissionFaults) as e:
+            load(HEAD + f"leaves: {text}\ntree: act\n")
+        assert [f.code for f in e.value.findings] == [code]

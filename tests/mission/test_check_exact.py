@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import product
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -19,7 +20,7 @@ from py_trees.common import Status
 
 from glotouch_bt.mission import build, decorators
 from glotouch_bt.mission.build import build_tree
-from glotouch_bt.mission.configurations import EMPTY
+from glotouch_bt.mission.configurations import EMPTY, START, Configurations
 from glotouch_bt.mission.demands import all_demands
 from glotouch_bt.mission.findings import Findings
 from glotouch_bt.mission.flow import Flow
@@ -71,8 +72,16 @@ class World:
     oracle: Oracle
     hand: str
     steps: int
-    seen: set[tuple[str, str, str]]
+    looks: int  # leaves that have ended, conditions included
+    seen: dict[tuple[str, str, str], int]  # fewest of them before each wrong look
+    hanging: bool  # a leaf waits to be broken off
     timeouts: ClassVar[dict[str, bool]] = {}
+
+
+def wrong(*look: str) -> None:
+    """A wrong look; in a run nothing follows it."""
+    World.seen[look] = min(World.looks, World.seen.get(look, World.looks))  # type: ignore[index]
+    raise TooLong
 
 
 class Leaf(Skill):
@@ -81,12 +90,11 @@ class Leaf(Skill):
     def run(self) -> SkillRun:
         for port, info in self.INPUT_PORTS.items():
             if info.required and not self.blackboard_client.exists(port):
-                World.seen.add((self.name, port, "unset"))
-                raise TooLong
+                wrong(self.name, port, "unset")
         if "hand" in self.NEEDS and World.hand not in self.NEEDS["hand"]:
-            World.seen.add((self.name, "hand", World.hand))
-            raise TooLong
+            wrong(self.name, "hand", World.hand)
         World.steps += 1
+        World.looks += 1
         if World.steps > MOST_STEPS:
             raise TooLong
         how = World.oracle.choose(3 if World.timeouts.get(self.name) else 2)
@@ -101,6 +109,7 @@ class Leaf(Skill):
             state = states[World.oracle.choose(len(states))]
             World.hand = World.hand if state == UNCHANGED else state
         if how == 2:
+            World.hanging = True
             while True:
                 yield self.context.command  # until it is broken off
         if how == 1:
@@ -201,6 +210,14 @@ def read(tree: Any) -> NodeSpec:
     return spec
 
 
+def broken_off(self: decorators.ClockTimeout) -> Status:
+    """What runs is broken off when the oracle wants: how long anything takes is not the checker's business."""
+    if self.decorated.status is Status.RUNNING and World.oracle.choose(2):
+        World.hanging = False
+        return Status.FAILURE
+    return self.decorated.status
+
+
 @contextmanager
 def free_comparisons() -> Iterator[None]:
     """A comparison of what is written says what the oracle wants."""
@@ -214,26 +231,30 @@ def free_comparisons() -> Iterator[None]:
             raise TooLong
         return World.oracle.choose(2) == 0
 
+    def condition(settings: ConditionSettings, value: Any) -> bool:
+        World.looks += 1
+        return chosen(settings, value)
+
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(decorators, "holds", chosen)
+        patch.setattr(decorators, "holds", condition)
+        patch.setattr(decorators.ClockTimeout, "update", broken_off)
         patch.setattr(build, "holds", chosen)
         yield
 
 
-def by_ticking(spec: NodeSpec) -> tuple[set[tuple[str, str, str]], set[tuple[Status, str, bool, bool]], bool]:
+def by_ticking(spec: NodeSpec) -> tuple[dict[tuple[str, str, str], int], set[tuple[Status, str, bool, bool]], bool]:
     """What is found wrong in some run, how runs end (status, hand, a set, b set), and whether all runs were made."""
     from glotouch_bt.robot import HOLD
 
-    World.oracle, World.seen = Oracle(), set()
+    World.oracle, World.seen = Oracle(), {}
     World.timeouts = {
         below.name: True for n in spec.walk() if n.kind == "timeout" for below in n.walk() if below.kind == "skill"
     }
     ends: set[tuple[Status, str, bool, bool]] = set()
     whole = True
     for _ in range(MOST_RUNS):
-        World.hand, World.steps = "empty", 0
+        World.hand, World.steps, World.looks, World.hanging = "empty", 0, 0, False
         context = Context(None, None, None, None, None)  # type: ignore[arg-type]
-        clock = {"now": 0.0}
         context.observation = type("Seen", (), {"now_s": 0.0})()
         context.command = HOLD
         built = build_tree(spec, context, "m")
@@ -243,8 +264,8 @@ def by_ticking(spec: NodeSpec) -> tuple[set[tuple[str, str, str]], set[tuple[Sta
                 built.root.tick_once()
                 if built.root.status is not Status.RUNNING:
                     break
-                clock["now"] += 2.0
-                context.observation.now_s = clock["now"]
+                if World.hanging:  # it may be broken off at once as well as later
+                    raise TooLong
             else:
                 whole = False
             if built.root.status is not Status.RUNNING:
@@ -299,23 +320,62 @@ def test_what_is_found_is_what_can_happen(tree: Any) -> None:
     with free_comparisons():
         seen, ends, whole = by_ticking(spec)
     _, wrong, possible = by_sets(spec)
-    assert seen <= wrong
+    assert set(seen) <= wrong
     assert ends <= possible
     assume(whole)
     if not any(n.kind == "for_each" for n in spec.walk()):  # more items than were tried may show more
-        assert wrong == seen
+        assert wrong == set(seen)
         assert possible == ends
 
 
 @settings(max_examples=400, deadline=None, suppress_health_check=list(HealthCheck))
 @given(tree=TREES)
-def test_every_wrong_look_has_a_path_that_leads_there(tree: Any) -> None:
-    """The path ends at the node, and what it says happens when the tree is ticked along it."""
+def test_the_path_shown_is_the_shortest_there_is(tree: Any) -> None:
+    """It ends at the node that looks, after as few outcomes of leaves as any run that was ticked."""
     spec = read(tree)
+    with free_comparisons():
+        seen, _, whole = by_ticking(spec)
     flow, _, _ = by_sets(spec)
+    variables = flow.variables
+    loops = any(n.kind == "for_each" for n in spec.walk())
     for demand, asked in flow.asked.items():
-        bad = flow.variables.sets.values(asked, demand.variable) - demand.good
-        if demand.stops and bad:
-            path = shortest_path(flow, Goal(demand.node, demand.port, demand.variable, bad))
+        for value in variables.sets.values(asked, demand.variable) - demand.good if demand.stops else ():
+            path = shortest_path(flow, Goal(demand.node, demand.port, demand.variable, frozenset({value})))
             assert path, (demand.node.name, demand.port)
             assert path[-1] == demand.node.name
+            state = variables.state_names("hand")[value] if demand.of_resource else "unset"
+            if whole and not loops:
+                assert len(path) - 1 == seen[demand.node.name, demand.port, state], path
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    sizes=st.lists(st.integers(2, 3), min_size=1, max_size=4),
+    steps=st.lists(st.tuples(st.integers(0, 4), st.integers(0, 3), st.integers(0, 7), st.integers(0, 9)), max_size=12),
+)
+def test_diagrams_are_sets(sizes: list[int], steps: list[tuple[int, int, int, int]]) -> None:
+    """Every operation of `Configurations` against plain sets of tuples."""
+    algebra = Configurations(sizes)
+    kept: list[tuple[int, set[tuple[int, ...]]]] = [(EMPTY, set()), (START, {(0,) * len(sizes)})]
+    for operation, variable, bits, which in steps:
+        variable %= len(sizes)
+        values = [v for v in range(sizes[variable]) if bits >> v & 1]
+        (a, plain), (b, other) = kept[-1], kept[which % len(kept)]
+        if operation == 0:
+            made, want = algebra.union(a, b), plain | other
+        elif operation == 1:
+            made, want = algebra.meet(a, b), plain & other
+        elif operation == 2:
+            made, want = algebra.where(a, variable, values), {c for c in plain if c[variable] in values}
+        else:
+            want = {(*c[:variable], v, *c[variable + 1 :]) for c in plain for v in values}
+            made = algebra.allow(a, variable, values)
+            want |= plain
+            if operation == 3 and values:
+                made = algebra.assign(a, variable, values[0])
+                want = {(*c[:variable], values[0], *c[variable + 1 :]) for c in plain}
+        assert {c for c in product(*map(range, sizes)) if algebra.holds(made, c)} == want
+        assert algebra.values(made, variable) == {c[variable] for c in want}
+        for before, same in kept:
+            assert (before == made) == (same == want)
+        kept.append((made, want))
