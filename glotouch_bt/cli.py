@@ -53,6 +53,7 @@ class TreeFormat(StrEnum):
 
     text = "text"
     svg = "svg"
+    btcpp = "btcpp"
 
 
 Mission = Annotated[
@@ -92,12 +93,11 @@ def run(
 ) -> int:
     """Run a mission and write its record, result and report. `p` (or SIGUSR1) pauses it, SIGTERM ends it safely."""
     from glotouch_bt import console
-    from glotouch_bt.mission.control import Control
-    from glotouch_bt.operated import operated
+    from glotouch_bt.operated import Operator, operated
     from glotouch_bt.study.launch import RunRequest, launch
 
     request = RunRequest(mission, backend, seed, read_settings(set_), objects, conditions, out, faults, may_kill=True)
-    with console.RunProgress(quiet=json_) as progress, operated(Control()) as control:
+    with console.RunProgress(quiet=json_) as progress, operated(Operator()) as control:
         done = launch(request, on_start=progress.start, on_progress=progress.update, control=control)
     if json_:
         _print_json({**done.result, "folder": str(done.folder)})
@@ -164,12 +164,13 @@ def tree(
     objects: Objects = None,
 ) -> None:
     """Draw a mission's tree."""
+    from glotouch_bt.mission.btcpp import as_btcpp
     from glotouch_bt.mission.drawing import as_svg, as_text
     from glotouch_bt.mission.load import load_mission
     from glotouch_bt.robot import BadInput
 
     loaded = load_mission(mission, read_settings(set_), objects=objects)
-    drawn = as_svg(loaded) if format_ is TreeFormat.svg else as_text(loaded)
+    drawn = {TreeFormat.text: as_text, TreeFormat.svg: as_svg, TreeFormat.btcpp: as_btcpp}[format_](loaded)
     if out is None:
         sys.stdout.write(drawn)
         return

@@ -98,6 +98,8 @@ def print_result(done: RunResult) -> None:
         console.print(f"in the gripper: [bold]{escape(str(held))}[/], {word}", highlight=False)
     for i, reason in enumerate(r["reasons"]):
         console.print(f"{'  ' * i}{'because ' if i else ''}{reason}", markup=False, highlight=False, soft_wrap=True)
+    if r.get("ending"):
+        console.print(str(r["ending"]), markup=False, highlight=False, soft_wrap=True)
     if done.report is not None:
         console.print(f"report: {done.report}", markup=False, highlight=False, soft_wrap=True)
     else:

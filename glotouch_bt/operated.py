@@ -10,13 +10,23 @@ import select
 import signal
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from glotouch_bt.mission.control import Control
 
 LOOK_EVERY_S = 0.1
+LONGEST_REST_S = 0.1
 PAUSE_KEYS = frozenset("pP ")
+
+
+class Operator(Control):
+    """A person's control: a simulation goes no faster than the wall's clock while it is paused."""
+
+    def rest(self, period_s: float) -> None:
+        """See `Control`."""
+        time.sleep(min(max(period_s, 0.0), LONGEST_REST_S))
 
 
 @contextmanager

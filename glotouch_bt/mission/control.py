@@ -60,6 +60,9 @@ class Control:
         """Asked by the runner once a period, with its ticks so far and the robot's clock; scripts override it."""
         return self._paused
 
+    def rest(self, period_s: float) -> None:
+        """Called once a period in a pause of a robot whose clock is its own (a simulation's): nothing by default."""
+
 
 class TimedPauses(Control):
     """Pauses that are known beforehand, as those of a recorded run.

@@ -27,13 +27,16 @@ class PauseGate:
         control: Who asks for pauses.
         context: Of the run; `context.paused_s` is kept here.
         cycle: Sends one command and sets `context.observation`; raises what ends the run.
+        paced: The robot's clock is the wall's.
 
     Attributes:
         feed: What the arm's motions read.
     """
 
-    def __init__(self, control: Control, context: Context, cycle: Callable[[Command], Observation]) -> None:
-        self._control, self._context, self._cycle = control, context, cycle
+    def __init__(
+        self, control: Control, context: Context, cycle: Callable[[Command], Observation], *, paced: bool = False
+    ) -> None:
+        self._control, self._context, self._cycle, self._paced = control, context, cycle, paced
         self.feed = Feed()
         context.arm.feed = self.feed
         self._standing = False
@@ -52,6 +55,8 @@ class PauseGate:
             if self._standing:
                 self._context.paused_s += now_s - self._looked_s
             self._stands("on the way")
+        if self._standing and not self._paced:
+            self._control.rest(now_s - self._looked_s)
         self._looked_s = now_s
 
     def begins(self, style: Style) -> None:

@@ -191,7 +191,7 @@ class _Loop:
         outcome: Outcome,
     ) -> None:
         self._rounding, self._control, self._outcome = rounding, control, outcome
-        self._gate = PauseGate(control, context, self._cycle)
+        self._gate = PauseGate(control, context, self._cycle, paced=robot.paced)
         self._next_progress_s = outcome.start_s
         self._interrupted: Callable[[], bool] = lambda: False
         self.watchdog: Watchdog | None = None
