@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import operator
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -36,6 +37,9 @@ _WORDS = {
     "too_short": "must have at least {min_length} items",
     "too_long": "must have at most {max_length} items",
 }
+
+
+_RULES = (("gt", ">", operator.gt), ("ge", ">=", operator.ge), ("lt", "<", operator.lt), ("le", "<=", operator.le))
 
 
 class Poison:
@@ -85,7 +89,24 @@ def validate(model: type[M], given: Map, what: str, findings: Findings, *, where
         if len(findings) == before and not poisoned and known:
             findings.add(where or given.place, "wrong_value", f"{what}: {e.errors()[0]['msg']}")
         return None
+    for key, node in given.entries if not poisoned else ():
+        if isinstance(node, Scalar) and node.span is not None and str(key.value) in model.model_fields:
+            _check_span(node, str(key.value), model.model_fields[str(key.value)], findings)
     return made if known and not poisoned else None
+
+
+def _check_span(node: Scalar, name: str, field: FieldInfo, findings: Findings) -> None:
+    """Report a parameter that may be given values which the field refuses; its present value is fine."""
+    unit = unit_of(field)
+    for end in node.span or ():
+        value = convert(end, node.unit, unit) if node.unit and unit else end
+        for rule in field.metadata:
+            for word, symbol, holds in _RULES:
+                limit = getattr(rule, word, None)
+                if isinstance(limit, (int, float)) and not holds(value, limit):
+                    shown = f"{end:g} {node.unit}".strip()
+                    what = f"{node.origin} may be set to {shown}, but {name} must be {symbol} {limit:g} {unit}".rstrip()
+                    findings.add(node.place, "range_too_wide", what)
 
 
 def _one_a_scalar(errors: Sequence[Any], given: Map) -> list[Any]:

@@ -207,7 +207,7 @@ def substitute(node: Node, parameters: Mapping[str, Parameter], findings: Findin
         return replace(node, poisoned=True)
     if found.value is None:
         return replace(node, poisoned=True)
-    return replace(node, value=found.value, unit=found.declared.unit, origin=node.value)
+    return replace(node, value=found.value, unit=found.declared.unit, origin=node.value, span=found.declared.range)
 
 
 def check_used(section: Node | None, tree: Node, findings: Findings) -> None:

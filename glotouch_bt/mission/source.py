@@ -47,6 +47,7 @@ class Scalar:
         place: Where it stands.
         unit: Unit of the number when it came from a mission parameter that declares one; else empty.
         origin: "$name" when it came from a mission parameter; else empty.
+        span: Least and largest value that parameter may be given, in its unit; or None.
         poisoned: The value is not usable and has been reported already.
     """
 
@@ -54,6 +55,7 @@ class Scalar:
     place: Place
     unit: str = ""
     origin: str = ""
+    span: tuple[float, float] | None = None
     poisoned: bool = False
 
 

@@ -149,6 +149,7 @@ MISTAKES = (
     M("one failing item ends it", "    - for_each:\n        name: squeeze all\n        items: candidates\n        item: candidate\n        collect: {touchset: touchsets}\n        on_failure: continue\n", "    - for_each:  # squeeze\n        items: candidates\n        item: candidate\n        collect: {touchset: touchsets}\n", "all_or_nothing", "# squeeze", "on_failure: continue"),
     M("a timeout beyond the mission's", "seconds: 60 s", "seconds: 40 min", "timeout_never", "40 min", "1800"),
     M("a parameter nobody uses", "speed_m_s: $speed", "speed_m_s: 0.04", "unused_parameter", "  speed: {", "'speed'"),
+    M("a parameter may be set too high", "default: 30, range: [10, 60]", "default: 30, range: [10, 600]", "range_too_wide", "speed_m_s: $speed", "<= 0.08"),
     M("renames what nobody reads", "    - lift\n", "    - lift: {out: {weight_N: wieght}}\n", "unused_key", "wieght", "'weight_N'"),
     M("tries again once", "attempts: 2", "attempts: 1", "no_effect", "attempts: 1", "one attempt"),
     M("catches what cannot fail", "          - succeed: touch_top\n", "          - succeed: {succeed: touch_top}\n", "no_effect", "succeed: {succeed", "never fails"),
