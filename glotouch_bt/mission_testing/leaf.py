@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextvars import ContextVar
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any, Literal
 
 from py_trees.common import Status
@@ -52,12 +54,14 @@ class Stage:
     """What all leaves of one run share.
 
     Attributes:
+        parts: What each node plays, by its name.
         calls: Every call, in order of start.
         begin_s: Robot time at which the mission began.
         wake: Told by each waiting leaf until when it only waits.
         note: Told of every call that begins or ends.
     """
 
+    parts: Mapping[str, Part] = field(default_factory=dict)
     calls: list[Call] = field(default_factory=list)
     begin_s: float = 0.0
     wake: Callable[[float], None] = lambda until_s: None
@@ -84,15 +88,19 @@ class Part:
         return found if isinstance(found, Outcome) else found(call)
 
 
+STAGE: ContextVar[Stage] = ContextVar("stage")
+"""The run that is being set up: the executive makes its nodes by name, parameters and context alone."""
+
+
 class _Playing(Skill):
     """Mixed into the skill's own class, so that whoever asks finds its ports and declarations; nothing of it runs."""
 
-    part: Part
-    stage: Stage
     _call: Call
 
     def __init__(self, name: str, params: SkillParams, context: Context) -> None:
         Skill.__init__(self, name, params, context)
+        self.stage = STAGE.get()
+        self.part = self.stage.parts[name]
 
     initialise = Skill.initialise
     terminate = Skill.terminate
@@ -192,8 +200,7 @@ def default_value(skill: type[Skill], port: str, outcome: str) -> object:
     return port_value(skill.OUTPUT_PORTS[port].data_type, element)
 
 
-def playing(skill: type[Skill], part: Part, stage: Stage) -> type[Skill]:
-    """The class of a node that plays a part."""
-    return type(
-        f"Scripted{skill.__name__}", (_Playing, skill), {"part": part, "stage": stage, "__doc__": skill.__doc__}
-    )
+@lru_cache(maxsize=256)
+def playing(skill: type[Skill]) -> type[Skill]:
+    """The class of nodes that play a skill; they take their parts from the present `STAGE` when they are made."""
+    return type(f"Scripted{skill.__name__}", (_Playing, skill), {"__doc__": skill.__doc__})

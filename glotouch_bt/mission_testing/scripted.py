@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from glotouch_bt.mission.load import Mission
@@ -14,7 +13,7 @@ from glotouch_bt.mission.runner import default_arm, run_mission
 from glotouch_bt.mission.tally import NullRecord
 from glotouch_bt.mission_testing import casting
 from glotouch_bt.mission_testing.casting import ScriptError
-from glotouch_bt.mission_testing.leaf import Call, Part, Stage, playing
+from glotouch_bt.mission_testing.leaf import STAGE, Call, Part, Stage, playing
 from glotouch_bt.mission_testing.outcomes import Script
 from glotouch_bt.mission_testing.skipping import PATIENT, SkippingRobot, may_skip
 from glotouch_bt.robot import Command, GlotouchError, Observation, Robot, World
@@ -181,8 +180,9 @@ def run_scripted(
     Raises:
         ScriptError: The script does not fit the mission.
     """
+    paths = casting.paths_of(mission.tree, mission.name)
     parts = casting.cast(mission.tree, mission.name, script or {})
-    stage = Stage()
+    stage = Stage({paths[path].name: part for path, part in parts.items() if part is not None})
     end_s = mission.timeout_s if timeout_s is None else timeout_s
     if robot is None:
         robot = _robot(mission.tree, end_s, stage, all(p is not None for p in parts.values()))
@@ -190,13 +190,14 @@ def run_scripted(
     if make_arm is None:
         moving = any(p is None for p in parts.values())
         make_arm = default_arm if moving else lambda robot, world: cast("Arm", StillArm())
-    paths = casting.paths_of(mission.tree, mission.name)
     supervision = PATIENT if isinstance(robot, SkippingRobot) else None
     heard = _Heard(dict.fromkeys(paths, "INVALID"), most_ticks)
-    tree = _played(mission.tree, mission.name, parts, stage)
-    outcome = run_mission(
-        replace(mission, tree=tree), robot, heard, make_arm=make_arm, timeout_s=end_s, supervision=supervision
-    )
+    scripted = replace(mission, tree=_played(mission.tree, stage.parts))
+    token = STAGE.set(stage)
+    try:
+        outcome = run_mission(scripted, robot, heard, make_arm=make_arm, timeout_s=end_s, supervision=supervision)
+    finally:
+        STAGE.reset(token)
     if isinstance(outcome.error, ScriptError | KeyboardInterrupt):
         raise outcome.error
     leaves = {p: n for p, n in paths.items() if n.kind == "skill"}
@@ -211,10 +212,9 @@ def _robot(tree: NodeSpec, end_s: float, stage: Stage, still: bool) -> FakeRobot
     return robot
 
 
-def _played(node: NodeSpec, above: str, parts: Mapping[str, Part | None], stage: Stage) -> NodeSpec:
-    path = f"{above}/{node.name}"
-    children = tuple(map(partial(_played, above=path, parts=parts, stage=stage), node.children))
-    part = parts.get(path)
-    if part is None or node.skill_type is None:
+def _played(node: NodeSpec, parts: Mapping[str, Part]) -> NodeSpec:
+    children = tuple(_played(child, parts) for child in node.children)
+    skill: Any = node.skill_type
+    if skill is None or node.name not in parts:
         return replace(node, children=children)
-    return replace(node, children=children, skill_type=playing(node.skill_type, part, stage))
+    return replace(node, children=children, skill_type=playing(skill))
