@@ -37,7 +37,8 @@ class FaultKind:
         effect: The class at work.
         seen_by: Who should notice it, for people.
         recoverable: A mission can still reach its goal: the fault passes or can be worked round. A device that gives
-            no numbers, old ones or ever the same is not trusted again before a person has looked: it is not.
+            no numbers, old ones or ever the same, or goes beside its setpoints, is not trusted again before a person
+            has looked: it is not.
     """
 
     name: str
@@ -121,7 +122,7 @@ def _kinds() -> Mapping[str, FaultKind]:
         ),
         ("grip_misreport", "gripper", "the reported aperture is wrong", gripper.Misreport, tree, True),
         ("grip_drop", "gripper", "the jaws open for a moment: what they hold falls", gripper.Drop, tree, True),
-        ("following_error", "arm", "a joint goes beside its setpoint", arm.FollowingError, watch, True),
+        ("following_error", "arm", "a joint goes beside its setpoint", arm.FollowingError, watch, False),
         ("joint_limit", "arm", "the device refuses setpoints near its own range", arm.JointLimit, watch, False),
         ("ik_failure", "arm", "the device finds no joint solution", arm.IkFailure, tree, False),
         ("lost_cycle", "arm", "commands do not arrive", arm.LostCycle, watch, True),
