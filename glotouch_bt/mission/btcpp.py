@@ -1,9 +1,8 @@
 """A mission's tree as BehaviorTree.CPP 4 XML, for editors and people that know that format (Groot2 opens it).
 
 Composites and decorators are its own where it has them (its `Sequence` and `Fallback` remember where they are, as ours
-do). A skill is an `Action` with its ports and parameters; what BehaviorTree.CPP lacks, a loop over a list of objects and
-a repetition until a key is true, are `Decorator`s of ours. All of these stand in the `TreeNodesModel`. `is_set(key)` in a
-condition is ours, too.
+do). A skill is an `Action` with its ports and parameters; what it lacks, a loop over a list of objects and a repetition
+until a key is true, are `Decorator`s of ours. All of these stand in the `TreeNodesModel`. `is_set(key)` is ours, too.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ _LIMITS = (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
 
 
 def describe_skill(name: str, skill: type[Skill]) -> dict[str, Any]:
-    """A skill as JSON data: name, description, parameters, inputs, outputs."""
+    """A skill as JSON data: name, description, parameters, inputs, outputs, states of resources, failures."""
     keys = skill.default_keys()
     parameters: list[dict[str, Any]] = []
     for field_name, field in skill.Params.model_fields.items():
@@ -37,6 +37,12 @@ def describe_skill(name: str, skill: type[Skill]) -> dict[str, Any]:
         "parameters": parameters,
         "inputs": [{**_port(p, info, keys), "required": bool(info.required)} for p, info in skill.INPUT_PORTS.items()],
         "outputs": [_port(p, info, keys) for p, info in skill.OUTPUT_PORTS.items()],
+        "needs": {r: sorted(s) for r, s in skill.NEEDS.items()},
+        "leaves": dict(skill.LEAVES),
+        "after_failure": {r: sorted(s) for r, s in skill.AFTER_FAILURE.items()},
+        "uses": sorted(skill.USES),
+        "failures": skill.failure_codes(),
+        "pause": skill.PAUSE,
     }
 
 
