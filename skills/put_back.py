@@ -17,13 +17,15 @@ from skills.rising import rise_clear
 
 OVER_M = 0.03
 """From so far above its place it is lowered carefully."""
+SHORT_M = 0.0015
+"""So far above its place it is let go: what is pressed on the floor by a stiff arm is pressed hard."""
 
 
 class PutBackParams(SkillParams):
     """Parameters of `put_back`."""
 
     speed_m_s: float = param("Speed high above the objects", unit="m/s", default=0.10, gt=0.0, le=0.25)
-    lower_speed_m_s: float = param("Speed of setting down", unit="m/s", default=0.015, gt=0.0, le=0.04)
+    lower_speed_m_s: float = param("Speed of setting down", unit="m/s", default=0.008, gt=0.0, le=0.04)
     drop_m: float = param("It may stand so far above its place when it is let go", unit="m", default=0.015, ge=0.0,
                           le=0.05)  # fmt: skip
     least_aperture_m: float = param("Closed farther than this: nothing held", unit="m", default=0.003, ge=0.0)
@@ -32,7 +34,7 @@ class PutBackParams(SkillParams):
 class PutBack(Skill):
     """Rise, lower what is in the hand to where it was taken, open gently, rise again. Empty jaws only open.
 
-    It is let go of when it stands: at the height at which it was taken, or where it meets something on the way down.
+    It is let go of when it stands: just above where it was taken, or where it meets something on the way down.
 
     SUCCESS: the jaws are open and high.
     FAILURE `in_the_way`: it met something high above its place; it is still held, and high.
@@ -65,7 +67,7 @@ class PutBack(Skill):
             return
         opening = min(max(made.opening_m, opening), arm.description.gripper.stroke_m)
         container = self.context.world.container
-        place = hand_pose_B(arm, container, made.position_K_m, made.yaw_rad)
+        place = hand_pose_B(arm, container, made.position_K_m + np.array([0.0, 0.0, SHORT_M]), made.yaw_rad)
         high = float(arm.pose_B_P.position_m[2])
         over = Pose(np.array([*place.position_m[:2], high]), place.quat)
         near = Pose(place.position_m + np.array([0.0, 0.0, OVER_M]), place.quat)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from glotouch_bt.motion import Motion
+from glotouch_bt.robot import Probe
 from skills.base import UNCHANGED, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.exploring import HELD_TOLERANCE_M
 from skills.rising import RISE_M_S, rise_clear
 from skills.stowing import nothing_in_hand, return_probe
+from skills.weighing import GRAVITY_M_S2, weigh_N
 
 LEAST_HELD_M, LEAST_HELD_N = 0.003, 1.0
 """Jaws farther apart than this that still press hold something."""
@@ -24,8 +27,8 @@ class StowParams(SkillParams):
 class Stow(Skill):
     """Rise clear of the container, return a held probe to its holder, and hold. For endings, and for going on without.
 
-    It asks for no port, and may start with anything in the hand. If the probe was lost, the hand is empty from now on;
-    an object in the jaws is kept, for it must not fall from here.
+    It asks for no port, and may start with anything in the hand. If jaws and weight say that the probe was lost, the
+    hand is empty from now on; an object in the jaws is kept, for it must not fall from here.
 
     SUCCESS: the hand is high and empty, the wrist zeroed.
     FAILURE `object_held`: the hand is high; the jaws hold something that is not the probe, and keep it.
@@ -50,8 +53,9 @@ class Stow(Skill):
         """See the class."""
         arm, p = self.context.arm, self.params
         yield from rise_clear(arm, p.rise_speed_m_s)
-        apart, pressed = arm.aperture_m, self.context.observation.gripper.force_N
-        if arm.scene.holding_tool and abs(apart - self.context.world.probe.handle_m[1]) <= HELD_TOLERANCE_M:
+        apart, pressed, probe = arm.aperture_m, self.context.observation.gripper.force_N, self.context.world.probe
+        handle_wide = abs(apart - probe.handle_m[1]) <= HELD_TOLERANCE_M
+        if arm.scene.holding_tool and (handle_wide or (yield from self._weighs(probe))):
             yield from return_probe(
                 self.context,
                 arm.pose_B_P.yaw_rad,
@@ -71,3 +75,8 @@ class Stow(Skill):
             )
         arm.scene.hold_tool(False)
         yield from nothing_in_hand(self.context)
+
+    def _weighs(self, probe: Probe) -> Motion[bool]:
+        """True if the wrist, zeroed with the probe in the hand, does not miss its weight."""
+        missing_N = -(yield from weigh_N(self.context.arm))
+        return missing_N < 0.5 * probe.mass_kg * GRAVITY_M_S2

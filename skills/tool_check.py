@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -56,13 +57,14 @@ class ToolCheck(Skill):
         "motion_refused": "the hand cannot rise, or the corner not be reached",
     }
 
-    tool = In(HeldTool, "the probe as it was taken")
+    taken = In(HeldTool, "the probe as it was taken", key="tool")
+    tool = Out(HeldTool, "the probe, the jaws as far apart as they are said to be now")
     tool_lost = Out(bool, "the probe is not in the hand", always=True)
 
     def run(self) -> SkillRun:
         """See the class."""
         self.tool_lost = False
-        arm, tool, p = self.context.arm, self.tool, self.params
+        arm, tool, p = self.context.arm, self.taken, self.params
         if not arm.scene.holding_tool:
             self.tool_lost = True
             raise SkillFailed("tool_lost", "the probe is not in the hand any more", advice=PUT_IT_THERE)
@@ -99,3 +101,4 @@ class ToolCheck(Skill):
                 advice="put it back into its holder and take it anew",
                 off_m=float(off),
             )
+        self.tool = replace(tool, aperture_m=apart)

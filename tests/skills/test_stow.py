@@ -14,8 +14,8 @@ STOWED = np.array([0.45, -0.32, -0.06])
 
 @pytest.fixture
 def make(bench, tool):
-    def make_one(grip_width_m: float | None = 0.016, probe: bool = True):
-        b = bench(grip_width_m=grip_width_m)
+    def make_one(grip_width_m: float | None = 0.016, probe: bool = True, lighter_N: float = 0.0):
+        b = bench(grip_width_m=grip_width_m, weight_N=lambda position, aperture: -lighter_N)
         goal = tool.pose_B_P(b.world, np.array([0.02, 0.05, 0.03]))
         if not probe:
             goal = Pose(np.array([0.62, 0.05, -0.16]), goal.quat)
@@ -48,8 +48,15 @@ def test_it_rises_before_it_goes_anywhere(make) -> None:
         assert ball_m > 0.12 or np.linalg.norm(at[:2] - here[:2]) < 2e-3 or np.linalg.norm(at[:2] - STOWED[:2]) < 2e-3
 
 
+def test_what_weighs_is_held_whatever_the_jaws_report(make) -> None:
+    b, skill = make(grip_width_m=0.025)
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    np.testing.assert_allclose(b.arm.pose_B_P.position_m, STOWED + np.array([0, 0, 0.08]), atol=1e-4)
+
+
 def test_a_lost_probe(make) -> None:
-    b, skill = make(grip_width_m=None)
+    b, skill = make(grip_width_m=None, lighter_N=0.59)
     b.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message
     assert not b.arm.scene.holding_tool

@@ -24,7 +24,7 @@ def make(bench, tool, things):
         b.arm.scene.hold_tool(True)
         b.go(b.arm.joints(b.arm.kinematics.ik(taken.pose_B_P(b.world, np.array([0.02, 0.05, 0.06])), b.arm.q)))
         b.go(b.arm.jaws(0.0, speed_m_s=0.2))
-        return b, b.make(ToolCheck, inputs={"tool": taken}, **params)
+        return b, b.make(ToolCheck, inputs={"taken": taken}, **params)
 
     return make_one
 
@@ -61,6 +61,7 @@ def test_where_the_two_differ_the_floor_decides(make, lighter_N: float, jaws_m: 
     b, skill = make(lighter_N, jaws_m)
     b.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message  # a drifted tare, or jaws that report wrongly
+    assert skill.tool.aperture_m == pytest.approx(jaws_m, abs=1e-4), "what is reported from now on"
     b, skill = make(lighter_N, jaws_m, floor_m=None)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "tool_lost")
