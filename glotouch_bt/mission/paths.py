@@ -15,7 +15,7 @@ from itertools import permutations, product
 from typing import Any
 
 from glotouch_bt.mission.configurations import EMPTY
-from glotouch_bt.mission.demands import Demand, until_condition, verdicts
+from glotouch_bt.mission.demands import until_condition, verdicts
 from glotouch_bt.mission.flow import Flow
 from glotouch_bt.mission.nodes import (
     ConditionSettings,
@@ -25,6 +25,7 @@ from glotouch_bt.mission.nodes import (
     RepeatSettings,
     RetrySettings,
 )
+from glotouch_bt.mission.relevance import deciding, living
 from glotouch_bt.mission.variables import UNSET, gathered_kind, item_kind, written_kind
 from skills.base import UNCHANGED
 
@@ -32,8 +33,6 @@ MOST_STATES = 30_000
 """A search that sees more gives up: the finding then stands without a path."""
 OUT_OF_PATIENCE = 3
 """Passes that are followed one by one; a loop that allows more may be left as if the rest had gone alike."""
-
-LOOPS = {"retry", "repeat", "for_each", "parallel"}
 
 Values = tuple[int, ...]
 Frames = tuple[tuple[int, Any], ...]
@@ -80,45 +79,10 @@ class _Search:
         self._variables, self._sets = flow.variables, flow.variables.sets
         self._nodes = list(flow.tree.walk())
         self._number = {id(n): i for i, n in enumerate(self._nodes)}
-        followed = dict.fromkeys([goal.variable, *self._deciding()])
+        followed = dict.fromkeys([goal.variable, *deciding(flow)])
         self._index = {v: i for i, v in enumerate(followed)}
-        self._alive = self._living()
-
-    def _deciding(self) -> Iterator[int]:
-        """Variables that change the way: those whose value lets a run end, or makes a comparison say something else."""
-        for demand, asked in self._flow.asked.items():
-            found = self._sets.values(asked, demand.variable)
-            if len(found) > 1 and self._tells_apart(demand, found):
-                yield demand.variable
-
-    def _tells_apart(self, demand: Demand, found: frozenset[int]) -> bool:
-        settings = demand.node.settings
-        if isinstance(settings, RepeatSettings):
-            settings = until_condition(settings)
-        if isinstance(settings, ConditionSettings):
-            yes, no = verdicts(self._variables, demand, settings)
-            return len({(v in yes, v in no) for v in found}) > 1
-        return not found <= demand.good or (UNSET in found and demand.node.kind == "for_each")
-
-    def _living(self) -> list[frozenset[int]]:
-        """Places (in `Values`) of the variables that are still looked at from each node on."""
-        last: dict[int, int] = {self._goal.variable: len(self._nodes)} if self._goal.node is None else {}
-        looks: dict[int, set[int]] = {}
-        for i, node in enumerate(self._nodes):
-            for demand in self._flow.demands[id(node)]:
-                if demand.variable in self._index:
-                    last[demand.variable] = i
-                    looks.setdefault(demand.variable, set()).add(i)
-        living: list[frozenset[int]] = []
-        loops: list[tuple[int, int]] = []  # round the present node: first node, and the first behind
-        for i, node in enumerate(self._nodes):
-            loops = [e for e in loops if e[1] > i]
-            if node.kind in LOOPS:
-                loops.append((i, i + sum(1 for _ in node.walk())))
-            again = {v for v, at in looks.items() for first, end in loops if any(first <= j < end for j in at)}
-            now = {v for v, at in last.items() if at >= i} | again
-            living.append(frozenset(self._index[v] for v in now))
-        return living
+        lasting = goal.variable if goal.node is None else None
+        self._alive = living(flow, self._nodes, self._index, lasting)
 
     def run(self) -> tuple[str, ...]:
         first = tuple(0 for _ in self._index)
