@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import sys
 from collections.abc import Mapping
 from typing import Any
@@ -14,10 +15,12 @@ from glotouch_bt.robot import (
     BackendError,
     BadInput,
     GripperState,
+    Limits,
     Observation,
     Robot,
     SafetyStop,
 )
+from glotouch_bt.robot.fake import FAKE_ARM
 from skills.base import Out, Skill, SkillFailed, SkillParams, SkillRun, param
 
 
@@ -35,7 +38,7 @@ class Wait(Skill):
 
     def run(self) -> SkillRun:
         until = self.context.observation.now_s + self.params.seconds
-        while self.context.observation.now_s < until:
+        while self.context.observation.now_s < until - 1e-6:
             yield HOLD
         if self.params.end == "fail":
             raise SkillFailed("told_to", "the script says so", advice="say ok", waited_s=self.params.seconds)
@@ -53,16 +56,26 @@ class NullArm:
     def sync(self, observation: Observation) -> None:
         pass
 
+    def state(self) -> dict[str, Any]:
+        return {}
+
+    def restore(self, state: Any) -> None:
+        pass
+
 
 class NullRobot(Robot):
     period_s = 0.01
 
     def __init__(self, seed: int) -> None:
-        self.description = self.limits = None  # type: ignore[assignment]
+        self.description, self.limits = FAKE_ARM, Limits()
         self._n = 0
         self._noise = np.random.default_rng(seed)
+        self._newest = self._sense()
 
     def observe(self) -> Observation:
+        return self._newest
+
+    def _sense(self) -> Observation:
         now_s = self._n * self.period_s
         jaws = GripperState(now_s, 0.05, 0.0, False)
         return Observation(
@@ -71,13 +84,14 @@ class NullRobot(Robot):
             dq=np.zeros((10, 7)),
             position_B_P=np.zeros((10, 3)),
             quat_B_P=np.tile([1.0, 0.0, 0.0, 0.0], (10, 1)),
-            wrench_S=self._noise.normal(size=(10, 6)),
+            wrench_S=self._noise.normal(scale=0.05, size=(10, 6)),
             gripper=jaws,
         )
 
     def cycle(self, command: object) -> Observation:
         self._n += 1
-        return self.observe()
+        self._newest = self._sense()
+        return self._newest
 
     def start(self, request: object) -> Any:
         raise NotImplementedError
@@ -87,6 +101,13 @@ class NullRobot(Robot):
 
     def close(self) -> None:
         pass
+
+    def snapshot(self) -> dict[str, object]:
+        return {"n": self._n, "noise": copy.deepcopy(self._noise), "newest": self._newest}
+
+    def restore(self, snapshot: Any) -> None:
+        self._n, self._noise = snapshot["n"], copy.deepcopy(snapshot["noise"])
+        self._newest = snapshot["newest"]
 
 
 class NullBackend(Backend):

@@ -170,7 +170,8 @@ def test_a_run_leaves_its_folder(command: CliRunner, house: ModuleType, tmp_path
     assert done.exit_code == 0, done.stderr
     (folder,) = (tmp_path / "runs").iterdir()
     assert folder.name.endswith("-nap-s3")
-    assert {p.name for p in folder.iterdir()} == {"mission.yaml", "run.mcap", "result.json", "report.html"}
+    files = {"mission.yaml", "run.mcap", "checkpoint.sqlite", "result.json", "report.html"}
+    assert {p.name for p in folder.iterdir()} == files
     assert "report: " in done.stdout
     result = json.loads((folder / "result.json").read_text())
     assert (result["mission"], result["seed"], result["status"], result["reasons"]) == ("nap", 3, "success", [])

@@ -44,6 +44,7 @@ class Work:
     Attributes:
         status: Status of each node as last recorded, by node id.
         written: Value of each key as last recorded.
+        guards: Findings of the supervision so far, by guard.
         start_s: Robot clock at the first tick of the first run.
         ticks: Ticks done, over all runs.
     """
@@ -56,6 +57,7 @@ class Work:
     requests: JournaledRequests
     status: dict[object, Status]
     written: dict[str, object] = field(default_factory=dict)
+    guards: dict[str, int] = field(default_factory=dict)
     start_s: float = 0.0
     ticks: int = 0
 
@@ -146,6 +148,7 @@ class Keeper:
             "reasons": {paths[i]: failure for i, failure in work.book.noted().items()},
             "status": {paths[i]: status.value for i, status in work.status.items()},
             "ticks": work.ticks,
+            "guards": dict(work.guards),
             "requests": work.requests.count,
             "elapsed": (work.start_s, work.context.observation.now_s),
             "record": None if self._record is None else self._record.state(),
@@ -181,6 +184,7 @@ def take_up(work: Work, kept: TakenUp) -> TreeAtWork | None:
     odd = [p for p in (*state["status"], *state["reasons"]) if p not in ids]
     if odd:
         raise BadInput(f"checkpoint {kept.number} is of another tree (it knows {odd[0]})")
+    work.guards.update(state["guards"])
     work.book.take_up({ids[p]: failure for p, failure in state["reasons"].items()})
     work.tally.take_up(state["tally"])
     resumed: TreeAtWork | None = None

@@ -133,7 +133,7 @@ def run_mission(
     tree = build_tree(mission.tree, context, mission.name)
     outcome = Outcome("aborted", tally, start_s=observation.now_s)
     loop = _Loop(tree, context, robot, tally, rounding, on_progress, control or Control(), outcome)
-    loop.begin(device, requests, keeper, taken_up)
+    loop.begin(device, requests, supervisor.counts, keeper, taken_up)
 
     def lost(stuck: Stuck) -> None:
         if on_lost is not None:
@@ -207,7 +207,12 @@ class _Loop:
         self._world_check: Skill | None = None
 
     def begin(
-        self, device: Robot, requests: JournaledRequests, keeper: Keeper | None, taken_up: TakenUp | None
+        self,
+        device: Robot,
+        requests: JournaledRequests,
+        guards: dict[str, int],
+        keeper: Keeper | None,
+        taken_up: TakenUp | None,
     ) -> None:
         """Take up a checkpoint, or write the first one.
 
@@ -219,6 +224,7 @@ class _Loop:
         self._keeper, outcome = keeper, self._outcome
         self._work = work = Work(
             *(self._tree, self._context, device, self._tally, self._book, requests, self._status, self._written),
+            guards=guards,
             start_s=outcome.start_s,
         )
         if taken_up is not None:

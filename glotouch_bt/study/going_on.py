@@ -35,6 +35,7 @@ class GoingOn:
         row: The one to go on from.
         mission: As it was.
         start: Path of the node to begin with, or empty: what came next.
+        leads: It need not be told to: what came next at the checkpoint is that node.
         request: What the run was asked for: mission, backend, seed, settings, objects, conditions, faults.
         before: What is known of earlier resumptions.
         notes: What a person should know, for the result and the terminal.
@@ -45,13 +46,15 @@ class GoingOn:
     row: Row
     mission: Mission
     start: str
+    leads: bool
     request: Mapping[str, Any]
     before: tuple[Mapping[str, Any], ...]
     notes: list[str] = field(default_factory=list)
 
     def taken_up(self, same_world: bool) -> TakenUp:
         """For the runner."""
-        return TakenUp(self.row.number, self.file.state(self.row.number), same_world, self.start)
+        start = "" if self.leads else self.start
+        return TakenUp(self.row.number, self.file.state(self.row.number), same_world, start)
 
     def told(self) -> dict[str, Any]:
         """This resumption, as result.json has it."""
@@ -152,9 +155,10 @@ def _find(folder: Path, file: CheckpointFile, start: str | None, versions: Mappi
         raise BadInput(f"{folder}: the conditions {run['request']['conditions']!r} have changed since this run began")
     path = "" if start is None else _node(mission, start)
     row = _row_before(rows, path)
-    if path:
-        _require_inputs(mission, path, file.state(row.number))
-    return GoingOn(folder, file, row, mission, path, run["request"], tuple(run["resumed"]), notes)
+    if path and row is None:
+        _require_inputs(mission, path, file.state(rows[-1].number))
+    leads = row is not None
+    return GoingOn(folder, file, row or rows[-1], mission, path, leads, run["request"], tuple(run["resumed"]), notes)
 
 
 def _as_loaded(data: Mapping[str, Any]) -> dict[str, Any]:
@@ -208,13 +212,16 @@ def _node(mission: Mission, given: str) -> str:
     raise UnknownName("node", given, [p.rsplit("/", 1)[-1] for p in paths])
 
 
-def _row_before(rows: list[Row], path: str) -> Row:
-    """The last checkpoint after which the node began; the newest, if it has not begun since any, or none is asked."""
+def _row_before(rows: list[Row], path: str) -> Row | None:
+    """The last checkpoint after which the node began, with the world of then; None if there is none, or none is asked.
+
+    A real world does not go back: there, a node starts with the newest checkpoint.
+    """
     if path:
         for before, after in zip(reversed(rows[:-1]), reversed(rows[1:]), strict=True):
-            if path in after.begun:
+            if path in after.begun and before.has_world:
                 return before
-    return rows[-1]
+    return None
 
 
 def _require_inputs(mission: Mission, path: str, state: Mapping[str, Any]) -> None:
