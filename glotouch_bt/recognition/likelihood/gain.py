@@ -29,10 +29,13 @@ from glotouch_bt.recognition.model import TargetModel
 from glotouch_bt.recognition.pads import POOLED, Array32
 from glotouch_bt.recognition.raster import hand_axes
 from glotouch_bt.robot import Array
+from glotouch_bt.touch.jaw_zero import MEASURED_SD_M
 from glotouch_bt.touch.values import Candidate
 
 POSES, OTHERS, SURFACES = 10, 16, 96
 """Poses of the target, other objects, and background surfaces the sums run over."""
+UNEVEN_M = 4e-4
+"""What neighbouring cells of the width table differ by, mostly."""
 NEAR_M, NEAR_RAD = 0.008, math.radians(20.0)
 """A closure this near to one already made (height and track; yaw) repeats it."""
 
@@ -123,7 +126,7 @@ def _width_ratios(width: Array, guess: Array, quantile: Array, weight: Array, p:
     w = np.where(felt, width, 1.0)
     seen = np.concatenate([w, middle + scale * quantile], axis=1)
     generic = scale / math.pi / (scale**2 + (seen - middle) ** 2)
-    sd = math.sqrt(p.width_sd_m**2 + p.bias_sd_m**2 + (p.width_rough * p.bias_limit_m) ** 2)
+    sd = math.hypot(p.width_sd_m, MEASURED_SD_M, p.width_rough * UNEVEN_M)
     near = width_kernel((seen[:, :, None] - w[:, None, :]) / sd) * felt[:, None, :]
     target = (near @ weight) * (T_PEAK / sd)
     log_ratio = np.log((1 - p.width_outlier) * target / generic + p.width_outlier)

@@ -11,6 +11,7 @@ import numpy as np
 from glotouch_bt.recognition.decision import Fit
 from glotouch_bt.recognition.evidence import Evidence, read_evidence
 from glotouch_bt.recognition.likelihood.background import log_generic_images, log_generic_widths
+from glotouch_bt.recognition.likelihood.bands import Residual, log_banded_twin, residual
 from glotouch_bt.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.recognition.likelihood.scalars import (
     contour_ratio,
@@ -116,7 +117,8 @@ def compare(model: TargetModel, reading: Reading, p: LikelihoodParams) -> Pair:
     if not reading.sequences:
         ratio = p.offset + p.slope * sum(terms.values())
         return Pair(candidate.index, ratio, 0.0, terms, None, 0.0, 0.0, None, unfelt_pose(touchset), 0.0)
-    grid = Grid.of(p)
+    zero_sd = max(layer.zero_sd_m for layer in touchset.layers)
+    grid = Grid.of(p, zero_sd)
     first = reading.sequences[0][0].layer.yaw_rad
     turns = np.array([seen[0].layer.yaw_rad - first for seen in reading.sequences])
     parallel = bool(np.abs((turns + np.pi / 2) % np.pi - np.pi / 2).max() < PARALLEL_RAD)
@@ -124,14 +126,16 @@ def compare(model: TargetModel, reading: Reading, p: LikelihoodParams) -> Pair:
     if parallel:  # tracks share one shift along x_P, but for what each slides
         common = common + shift_prior(model, candidate, 0.0, grid.shift_m, p)[None, :, :, None]
     twin = common.astype(np.float32)
-    joint = (common + _log_normal(grid.bias_m, p.bias_sd_m)[:, None, None, None]).astype(np.float32)
+    log_bias = _log_normal(grid.bias_m, zero_sd)
+    joint = (common + log_bias[:, None, None, None]).astype(np.float32)
     slide = slide_matrix(grid, p)
     moved = watched_turns(touchset)
     parts = []
     for seen, turn in zip(reading.sequences, turns, strict=True):
         flip = bool(np.cos(turn) < 0)
         sd = math.hypot(p.turn_sd_rad, moved[seen[0].layer.sequence])
-        widths, twins = (np.float32(p.temper_width) * w for w in width_ratios(model, seen, turn, grid, p))
+        widths, twins, offs = width_ratios(model, seen, turn, grid, p)
+        widths, twins = np.float32(p.temper_width) * widths, np.float32(p.temper_width) * twins
         images = np.float32(p.temper_image) * image_ratios(model, seen, turn, grid, p)
         volume = np.concatenate([widths, twins]) + images[None]  # the twin's is one more bias
         if parallel:
@@ -141,19 +145,24 @@ def compare(model: TargetModel, reading: Reading, p: LikelihoodParams) -> Pair:
             volume = volume + shift_prior(model, candidate, turn, grid.shift_m, p)[None, :, :, None].astype(np.float32)
             mean = turned(log_sum(volume, 2), p, sd)[:, :, None]
         joint, twin = joint + mean[:-1], twin + mean[-1:]
-        parts.append((widths, images, volume, flip))
+        parts.append((widths, images, volume, flip, offs))
     total = float(log_sum(joint.reshape(1, -1), 1)[0])
-    log_twin = p.twin_slope * (float(log_sum(twin.reshape(1, -1), 1)[0]) - total)
+    by_places = float(log_sum(twin.reshape(1, -1), 1)[0]) - total
+    felt: list[Residual] = []
     b, i, c, z = (int(k) for k in np.unravel_index(int(np.argmax(joint)), joint.shape))
     shifts = np.zeros(len(touchset.sequences))
     terms["width"] = terms["image"] = 0.0
-    for seen, (widths, images, volume, flip) in zip(reading.sequences, parts, strict=True):
+    for seen, (widths, images, volume, flip, offs) in zip(reading.sequences, parts, strict=True):
         along = volume[b, i, :, z] + (np.log(slide[:, c]) if parallel else 0)
         d = int(np.argmax(along))
         d = len(grid.shift_m) - 1 - d if parallel and flip else d
         shifts[seen[0].layer.sequence] = grid.shift_m[d]
         terms["width"] += float(widths[b, i, d, z])
         terms["image"] += float(images[i, d, z])
+        sharp = [(o, *at) for o, at in zip(seen, offs, strict=True) if not o.layer.upper_only]
+        felt += [r for o, off, sd in sharp if (r := residual(off, sd, o.layer.height_m, (i, d, z)))]
+    by_bands = p.temper_width * log_banded_twin(felt, grid.bias_m, log_bias, p)
+    log_twin = p.twin_slope * 0.5 * (by_places + by_bands)
     terms["pose"] = total - terms["width"] - terms["image"]
     log_pose = log_sum(joint, (0, 2))
     yaw = _refined(log_sum(log_pose, 1), i)

@@ -17,7 +17,7 @@ class LikelihoodParams:
         width_rough: Share of the table's unevenness that is added to it: a pose lies between the cells.
         width_outlier: Probability that a width has nothing to do with the prediction.
         width_range_m: Such a width is uniform over this.
-        bias_sd_m, bias_limit_m, bias_steps: Aperture bias, one a TouchSet.
+        bias_span, bias_steps: Aperture bias, one a TouchSet: tried to so many of its standard deviations.
         shift_sd_m, shift_limit_m, shift_steps: Object's middle along x_P about the contour's; one for all
             parallel tracks, else one a sequence.
         slide_sd_m: Spread of the object's own sliding along x_P between parallel tracks.
@@ -37,7 +37,7 @@ class LikelihoodParams:
         slope, offset: Calibration: log odds against the background = offset + slope * summed log ratios.
         prior_absent: Probability, before touching, that the target is none of the candidates.
         twin: Probability that some other object is a twin: made much like the target.
-        twin_width: Probability that a closure meets a place where a twin differs.
+        twin_width: Probability that a closure, or a height, meets a place where a twin differs.
         twin_width_sd_m: By how much it then does.
         twin_slope: Calibration: log odds of a twin against the target = twin_slope * log ratio of their widths.
         twin_fit: Power of how much better than a candidate a twin would fit (layers are correlated).
@@ -49,8 +49,7 @@ class LikelihoodParams:
     width_rough: float = 0.6
     width_outlier: float = 0.01
     width_range_m: float = 0.060
-    bias_sd_m: float = 0.3e-3
-    bias_limit_m: float = 0.4e-3
+    bias_span: float = 1.5
     bias_steps: int = 3
     shift_sd_m: float = 3e-3
     shift_limit_m: float = 7.5e-3
@@ -72,14 +71,14 @@ class LikelihoodParams:
     yaw_sd_rad: float = math.radians(6.0)
     temper_width: float = 0.5
     temper_image: float = 0.35
-    slope: float = 0.95
-    offset: float = -3.1
+    slope: float = 0.8
+    offset: float = -3.2
     prior_absent: float = 0.2
-    twin: float = 0.17
+    twin: float = 0.12
     twin_width: float = 0.5
     twin_width_sd_m: float = 3e-3
-    twin_slope: float = 2.8
-    twin_fit: float = 0.5
+    twin_slope: float = 2.3
+    twin_fit: float = 0.6
     accept: float = 0.8
     evidence: float = 2.0
 

@@ -35,14 +35,14 @@ class Grid:
     z0_m: Array
 
     @classmethod
-    def of(cls, p: LikelihoodParams) -> Grid:
-        """Evenly over the limits."""
+    def of(cls, p: LikelihoodParams, zero_sd_m: float) -> Grid:
+        """Evenly over the limits; `zero_sd_m` is what the aperture's bias is known to."""
 
         def span(limit: float, n: int) -> Array:
             return np.linspace(-limit, limit, n) if n > 1 else np.zeros(1)
 
         return cls(
-            span(p.bias_limit_m, p.bias_steps),
+            span(p.bias_span * zero_sd_m, p.bias_steps),
             span(p.shift_limit_m, p.shift_steps),
             span(p.z0_limit_m, p.z0_steps),
         )
@@ -64,14 +64,16 @@ def width_kernel(z: Floats) -> Floats:
 
 def width_ratios(
     model: TargetModel, seen: Sequence[Observed], turn_rad: float, grid: Grid, p: LikelihoodParams
-) -> tuple[Array32, Array32]:
-    """(nb, 72, nd, nz) sum over layers of log p(width | pose) / p(width | background); and (1, 72, nd, nz) of a twin.
+) -> tuple[Array32, Array32, list[tuple[Array32, Array32]]]:
+    """(nb, 72, nd, nz) sum over layers of log p(width | pose) / p(width | background); (1, 72, nd, nz) of a twin; and
+    by how much each layer is off, and on what scale, (72, nd, nz).
 
-    A twin is the target with its wall moved: a closure meets a place where it differs with probability `twin_width`.
+    This twin is the target with its wall moved: a closure meets a place where it differs with probability `twin_width`.
     """
     shape = (len(model.phi_rad), len(grid.shift_m), len(grid.z0_m))
     total, twin = np.zeros((len(grid.bias_m), *shape), dtype=np.float32), np.zeros((1, *shape), dtype=np.float32)
     bias = grid.bias_m.astype(np.float32)[:, None, None, None]
+    offs: list[tuple[Array32, Array32]] = []
     outlier, far_sd = np.float32(p.width_outlier), np.float32(p.twin_width_sd_m)
     for o in seen:
         e = o.layer
@@ -79,6 +81,7 @@ def width_ratios(
         off = np.float32(e.width_m) - interpolated_width(model, at, z_m, turn_rad)[None]
         sd = np.float32(p.width_rough) * nearest_unevenness(model, at, z_m, turn_rad)[None]
         sd = np.sqrt(sd * sd + np.float32(p.width_sd_m**2))
+        offs.append((off[0], sd[0]))
         scale = (1 - p.width_outlier) * math.exp(-o.log_width)
         if e.upper_only:  # the other finger touched outside its gel: the width is only bounded
             far_peak = np.float32(scale / p.width_range_m)
@@ -93,7 +96,7 @@ def width_ratios(
         total += np.log(_or_none(width_kernel(biased / sd) * peak) + outlier)
         near, far = width_kernel(off / sd) * peak, width_kernel(off / far_sd) * far_peak
         twin += np.log(_or_none(near + np.float32(p.twin_width) * (far - near)) + outlier)
-    return total, twin
+    return total, twin, offs
 
 
 def _or_none(density: Floats) -> Floats:
