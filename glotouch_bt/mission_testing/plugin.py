@@ -1,18 +1,19 @@
 """The pytest plugin: comes with the package (entry point `pytest11`), costs nothing until a fixture or option is used.
 
 Fixtures: `scripted` runs a mission with scripted leaves, `load` loads one, `fake_robot` makes robots without physics,
-`faults` makes fault plans for them. Options: `--glotouch-coverage`, `--glotouch-coverage-min`, `--glotouch-mutate`.
+`faulty` puts faults round them. Options: `--glotouch-coverage`, `--glotouch-coverage-min`, `--glotouch-mutate`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 if TYPE_CHECKING:
+    from glotouch_bt.faults import FaultInjector
     from glotouch_bt.mission.load import Mission
     from glotouch_bt.mission_testing.outcomes import Script
     from glotouch_bt.mission_testing.scripted import ScriptedRun
@@ -132,6 +133,27 @@ def fake_robot() -> Iterator[Callable[..., FakeRobot]]:
     yield make
     for robot in made:
         robot.close()
+
+
+@pytest.fixture
+def faulty() -> Iterator[Callable[..., FaultInjector]]:
+    """Put faults round a robot: `faulty([{"fault": "wrench_bias", "with": {"force_N": [0, 0, 3]}}], fake_robot())`.
+
+    The faults are those of a plan's `plan` (see `glotouch faults`), or the path of a plan. A fault that altered
+    nothing by the end of the test fails it: such a test shows nothing.
+    """
+    from glotouch_bt.mission_testing.faulting import faulted, idle
+
+    made: list[FaultInjector] = []
+
+    def make(plan: Sequence[Mapping[str, Any]] | str | Path, robot: Robot, seed: int = 0) -> FaultInjector:
+        made.append(faulted(plan, robot, seed))
+        return made[-1]
+
+    yield make
+    for injector in made:
+        if found := idle(injector):
+            pytest.fail(f"altered nothing: {', '.join(found)}", pytrace=False)
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -6,11 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, cast
 
+from glotouch_bt.faults.listening import ListeningRecord, injector_in
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.nodes import NodeSpec
 from glotouch_bt.mission.reasons import Failure
 from glotouch_bt.mission.runner import default_arm, run_mission
-from glotouch_bt.mission.tally import NullRecord
+from glotouch_bt.mission.tally import NullRecord, Record
 from glotouch_bt.mission_testing import casting
 from glotouch_bt.mission_testing.casting import ScriptError
 from glotouch_bt.mission_testing.leaf import STAGE, Call, Part, Stage, playing
@@ -193,11 +194,15 @@ def run_scripted(
     supervision = PATIENT if isinstance(robot, SkippingRobot) else None
     heard = _Heard(dict.fromkeys(paths, "INVALID"), most_ticks)
     scripted = replace(mission, tree=_played(mission.tree, stage.parts))
+    injector = injector_in(robot)
+    record: Record = heard if injector is None else ListeningRecord(heard, injector)
     token = STAGE.set(stage)
     try:
-        outcome = run_mission(scripted, robot, heard, make_arm=make_arm, timeout_s=end_s, supervision=supervision)
+        outcome = run_mission(scripted, robot, record, make_arm=make_arm, timeout_s=end_s, supervision=supervision)
     finally:
         STAGE.reset(token)
+    if injector is not None:
+        injector.conclude(outcome.status, "", "; ".join(outcome.reasons), outcome.end_s)
     if isinstance(outcome.error, ScriptError | KeyboardInterrupt):
         raise outcome.error
     leaves = {p: n for p, n in paths.items() if n.kind == "skill"}
