@@ -132,7 +132,7 @@ def _kinds() -> Mapping[str, FaultKind]:
         ("object_shoved", "world", "an object is knocked and slides", world.Shove, tree, True),
         ("object_toppled", "world", "an object is laid on its side", world.Topple, tree, True),
         ("object_added", "world", "an object appears", world.Add, tree, True),
-        ("object_removed", "world", "an object is taken away", world.Remove, tree, True),
+        ("object_removed", "world", "an object is taken away", world.Remove, tree, False),
         ("container_offset", "world", "the container is moved with its content", world.ContainerOffset, tree, True),
         ("wrong_scale_stl", "model", "the target's STL has another size", model.WrongScale, "match", False),
         ("exception", "process", "the driver raises an unknown error", process.Unexpected, "the runner", False),

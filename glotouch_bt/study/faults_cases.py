@@ -87,7 +87,7 @@ CASES: tuple[Case, ...] = (
     Case("touch_dropped", lasting=_s(5.0), skills=("squeeze",)),
     Case("touch_swapped", lasting=EVER, skills=("squeeze",)),
     Case("gel_offset", lasting=EVER, skills=("squeeze",)),
-    Case("grip_stall", lasting=_s(4.0), skills=_JAWS),
+    Case("grip_stall", lasting=Lasting(until="node"), skills=_JAWS),
     Case("grip_short", lasting=Lasting(until="node"), skills=_JAWS),
     Case("grip_slip", lasting=EVER, skills=("tool_pickup", "grasp")),
     Case("grip_drop", lasting=_s(1.0), skills=(*_PROBING, "tool_return", "lift")),
