@@ -118,11 +118,15 @@ class Squeezing:
         return (yield from glide(self._context, self._pose(height_m), self._p.descent_speed_m_s))
 
     def close(self) -> Motion[tuple[Layer, Yielding]]:
-        """One closure where the hand is; the jaws are open again afterwards.
+        """One closure where the hand is; the jaws are open again afterwards, and a pause comes then.
 
         Raises:
             MotionRefused: The hand was pressed too hard; the jaws are open.
         """
+        with self._context.arm.feed.finishing():
+            return (yield from self._close())
+
+    def _close(self) -> Motion[tuple[Layer, Yielding]]:
         p, arm = self._p, self._context.arm
         gripper = arm.description.gripper
         closing: list[Observation] = []

@@ -16,10 +16,12 @@ GUARDS = {
     "joint_speed": "a joint measured faster than its limit",
     "out_of_reach": "a pose that no arm of this size has, or a rotation that is none",
     "wrench": "a sensed wrench beyond the hard limit, sample after sample",
-    "wrench_stuck": "a noisy wrench sensor that gives the same numbers over and over",
+    "wrench_stuck": "a noisy wrench sensor of which some or all components stand still",
+    "wrench_noise": "a force that jumps from sample to sample (only put on record)",
     "following": "the hand is not where it was told to be",
     "gripper_stale": "the gripper does not report any more",
     "tactile_stale": "depth maps were asked for and do not come",
+    "tactile_frozen": "noisy depth maps that come again and again",
     "tactile_dead": "depth maps with hardly a live taxel, or with infinities, again and again",
     "command": "a setpoint or a jaw target that is not finite, out of range, or a jump",
     "device": "the device or its driver failed",
@@ -52,6 +54,8 @@ class SupervisionLimits:
             may it be called stuck. Noise-free simulations never get there. Source: ours.
         noise_N: A change between two periods that is less is no noise. Source: ours, a fiftieth of the force sensors'
             resolution.
+        most_noise_N, noise_over_s: Mean jump of a force component from sample to sample, over so long. Source: three
+            times that of harsh CONDITIONS (0.15 N sd jump by 0.17 N).
         live_taxels: Least share of a pad that gives numbers. Source: harsh CONDITIONS have 3 % dead; half of a pad
             cannot be matched.
         late_periods: The arm may wait for so many periods while it moves. Source: the driver holds after 30 ms.
@@ -73,6 +77,8 @@ class SupervisionLimits:
     stuck_s: float = 0.04
     noisy_s: float = 5.0
     noise_N: float = 1e-6
+    most_noise_N: float = 0.5
+    noise_over_s: float = 0.3
     live_taxels: float = 0.5
     late_periods: float = 3.0
     tolerated: int = 5

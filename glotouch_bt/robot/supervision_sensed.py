@@ -12,8 +12,9 @@ import numpy as np
 from glotouch_bt.robot.command import Command
 from glotouch_bt.robot.description import RobotDescription
 from glotouch_bt.robot.limits import Limits
-from glotouch_bt.robot.observation import Observation, TactileFrame
+from glotouch_bt.robot.observation import Observation
 from glotouch_bt.robot.supervision_limits import Finding, Patience, SupervisionLimits
+from glotouch_bt.robot.supervision_signals import PadWatch, WristWatch
 
 STANDS_RAD_S = 0.01
 QUAT_SLACK = 0.01
@@ -56,18 +57,17 @@ class SensedWatch:
         self._brakes = False
         self._moving = False
         self._over = 0
-        self._force = math.nan
-        self._noisy_periods = self._same_periods = 0
-        self._tactile_since_s: float | None = None
+        self._wrist = WristWatch(period_s, rules, self._patience)
+        self._pads = PadWatch(rules, self._patience)
 
     def forget(self, newest: Observation) -> None:
         """The robot was set back: its clock and posture begin anew."""
         self._last_s = float(newest.stamp_s[-1])
-        self._tactile_since_s = None
+        self._wrist.forget()
+        self._pads.forget()
         self._told.clear()
         self._moving = self._brakes = False
-        self._over, self._force = 0, math.nan
-        self._noisy_periods = self._same_periods = 0
+        self._over = 0
 
     def told(self, command: Command) -> None:
         """What the coming block answers to."""
@@ -82,10 +82,7 @@ class SensedWatch:
         elif self._told:
             self._told.append(self._told[-1])
             self._moving = False
-        if not command.tactile:
-            self._tactile_since_s = None
-        elif self._tactile_since_s is None:
-            self._tactile_since_s = self._last_s
+        self._pads.told(command.tactile, self._last_s)
 
     def look(self, o: Observation) -> tuple[Observation, list[Finding]]:
         """Check a block; the block without its unusable samples, and what was found, gravest last.
@@ -105,18 +102,12 @@ class SensedWatch:
         if not self._fine(o):
             o = self._look_closely(o, found)
         self._last_s = stamp_s = float(o.stamp_s[-1])
-        force = o.wrench_S[-1].item(0)
-        if force == self._force:
-            self._look_for_stuck(o, found)
-        else:
-            self._same_periods = 0
-            self._noisy_periods = self._noisy_periods + 1 if abs(force - self._force) > self._rules.noise_N else 0
-            self._force = force
+        self._wrist.look(o, found)
         jaws = o.gripper
         if not (stamp_s - jaws.stamp_s <= self._rules.gripper_age_s and math.isfinite(jaws.aperture_m + jaws.force_N)):
             self._look_at_jaws(o, found)
-        if self._tactile_since_s is not None:
-            self._look_at_pads(o.tactile, stamp_s, found)
+        if self._pads.asked:
+            self._pads.look(o, found)
         return o, found
 
     def _count(self, o: Observation) -> int:
@@ -262,19 +253,6 @@ class SensedWatch:
             found.append(Finding("wrench", what, value, limit, float(o.stamp_s[i])))
             return
 
-    def _look_for_stuck(self, o: Observation, found: list[Finding]) -> None:
-        """The newest force is the last block's newest, to the bit."""
-        if np.count_nonzero(o.wrench_S != o.wrench_S[-1]):
-            return
-        self._same_periods += 1
-        same_s = self._same_periods * self._period_s
-        if same_s < self._rules.stuck_s:
-            return
-        if self._noisy_periods * self._period_s >= self._rules.noisy_s:
-            what = f"the wrench has been the same to the bit for {same_s:.2f} s, it was noisy before"
-            found.append(Finding("wrench_stuck", what, same_s, self._rules.stuck_s, float(o.stamp_s[-1])))
-        self._noisy_periods = 0
-
     def _look_at_jaws(self, o: Observation, found: list[Finding]) -> None:
         jaws, now_s, limit = o.gripper, float(o.stamp_s[-1]), self._rules.gripper_age_s
         if not math.isfinite(jaws.aperture_m + jaws.force_N + jaws.stamp_s):
@@ -285,25 +263,6 @@ class SensedWatch:
         age = now_s - jaws.stamp_s
         what = f"the gripper's last report is {age:.3f} s old"
         found.append(Finding("gripper_stale", what, age, limit, now_s))
-
-    def _look_at_pads(self, frame: TactileFrame | None, now_s: float, found: list[Finding]) -> None:
-        limit = self._rules.tactile_age_s
-        if frame is None:
-            waited = now_s - (self._tactile_since_s or 0.0)
-            if waited > limit:
-                what = f"no depth map for {waited:.3f} s although they were asked for"
-                found.append(Finding("tactile_stale", what, waited, limit, now_s))
-            return
-        self._tactile_since_s = now_s
-        if now_s - frame.stamp_s > limit:
-            age = now_s - frame.stamp_s
-            found.append(Finding("tactile_stale", f"a depth map is {age:.3f} s old", age, limit, now_s))
-        for side, depth in (("left", frame.left_m), ("right", frame.right_m)):
-            live = float(np.count_nonzero(np.isfinite(depth))) / depth.size
-            if live < self._rules.live_taxels or np.isinf(depth).any():
-                fatal = self._patience.ends("tactile_dead", now_s)
-                what = f"{100.0 * live:.0f} % of the {side} pad give numbers"
-                found.append(Finding("tactile_dead", what, live, self._rules.live_taxels, now_s, fatal))
 
 
 def _picked(o: Observation, good: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Observation:
