@@ -23,7 +23,7 @@ from glotouch_bt.mission.tally import NullRecord
 from glotouch_bt.mission.worlds import load_conditions
 from glotouch_bt.robot import HOLD
 from glotouch_bt.robot.referee import Referee
-from glotouch_bt.touch import TouchSet
+from glotouch_bt.touch import Candidate, TouchSet
 from skills.base import Out, Skill, SkillFailed, SkillRun
 from skills.grasp_plan import GraspPlan
 
@@ -304,3 +304,51 @@ def test_jaws_that_report_wrongly_do_not_end_a_search_with_a_held_probe(run: Run
     assert done.outcome.status == "success", done.outcome.reasons
     assert done.notes.codes()[:1] == ["tool_lost"]
     assert done.referee.probe_in_holder()
+
+
+def knowing(candidate: Candidate) -> type[Skill]:
+    """A skill that knows a candidate without searching."""
+
+    class Known(Skill):
+        """Writes the candidate."""
+
+        candidates = Out(tuple, "what was found", element=Candidate)
+
+        def run(self) -> SkillRun:
+            yield HOLD
+            self.candidates = (candidate,)
+
+    return Known
+
+
+def test_what_frozen_gels_did_not_feel_is_touched_again(run: Run, found: Any) -> None:
+    """One image comes again and again while the only candidate is squeezed; then the jaws touch where it tells most."""
+    tree = """
+sequence:
+  - known
+  - subtree: {file: SUBTREES/squeeze_all.yaml, ports: {candidates: candidates, touchsets: touchsets}}
+  - subtree:
+      file: SUBTREES/take_target.yaml
+      parameters: {target: block}
+      ports: {candidates: candidates, touchsets: touchsets}
+"""
+    faults = "  - {fault: touch_frozen, when: {node: squeeze}, for: node}"
+    done = run(tree, faults, stubs={"known": knowing(found.box((0.02, 0.05), WIDE[:2], height_m=WIDE[2]))}, **ONE)
+    assert done.outcome.status == "success", done.outcome.reasons
+    assert done.held == ["block"]
+    assert "not_recognised" in done.notes.codes()
+    assert done.notes.how_often("touch_next", "SUCCESS") > 1
+
+
+def test_a_squeeze_spoilt_by_the_wrist_is_made_again(run: Run, found: Any) -> None:
+    """Fourteen newtons that are not there: every closure looks wedged and is given up."""
+    done = run(
+        "sequence:\n  - known\n  - subtree: {file: SUBTREES/squeeze_all.yaml, ports: {candidates: candidates}}",
+        "  - {fault: wrench_bias, with: {force_N: [14, 0, 0]}, when: {node: squeeze, after_s: 5}, for: ever}",
+        stubs={"known": knowing(found.box((0.02, 0.05), WIDE[:2], height_m=WIDE[2]))},
+        **ONE,
+    )
+    assert done.outcome.status == "success", done.outcome.reasons
+    assert "off_zero" in done.notes.codes()
+    assert done.notes.how_often("squeeze", "FAILURE") == 1
+    assert done.notes.how_often("squeeze", "SUCCESS") == 1
