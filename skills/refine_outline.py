@@ -27,7 +27,7 @@ class RefineOutlineParams(TracingParams):
 
     def rule(self) -> TraceParams:
         """As the plans take them: the gaps between contacts are closed, also on the far side."""
-        return replace(super().rule(), hop_m=self.hop_m, keen=2.0, near_m=GAP_M[0], far_m=GAP_M[1])
+        return replace(super().rule(), hop_m=self.hop_m, keen=2.0, odd_near_m=GAP_M[0], odd_far_m=GAP_M[1])
 
 
 class RefineOutline(Skill):

@@ -37,7 +37,8 @@ class TraceParams:
         other: Odds, before it is looked at, that a contact on the way round belongs to another object.
         unmodelled_m: What no contact is near is not known better than this, whatever the families say that have been
             thought of ...
-        near_m, far_m: ... fully so from the second of these distances on, not at all within the first.
+        near_m, far_m: ... fully so from the second of these distances on, not at all within the first ...
+        odd_near_m, odd_far_m: ... and these, as far as it is believed to be neither a circle nor a rectangle.
         misses: So many probes may meet nothing, or be refused, one after another.
         surprise_sds, surprise_m: A contact farther off the prediction than so many standard deviations and this is odd:
             has the object moved without being felt to? ...
@@ -71,6 +72,8 @@ class TraceParams:
     unmodelled_m: float = 0.006
     near_m: float = 0.024
     far_m: float = 0.042
+    odd_near_m: float = 0.024
+    odd_far_m: float = 0.042
     misses: int = 5
     surprise_sds: float = 2.0
     surprise_m: float = 0.0015

@@ -183,7 +183,9 @@ class TraceState:
         at = _polar(outline, bearings, distance)
         known = np.array([self.place(c) for c in self.present()])
         apart = np.linalg.norm(at[:, None] - known[None], axis=2).min(axis=1)
-        share = np.clip((apart - p.near_m) / (p.far_m - p.near_m), 0.0, 1.0)
+        odd = outline.family_weights["free"]
+        share = (1.0 - odd) * np.clip((apart - p.near_m) / (p.far_m - p.near_m), 0.0, 1.0)
+        share += odd * np.clip((apart - p.odd_near_m) / (p.odd_far_m - p.odd_near_m), 0.0, 1.0)
         return distance, at, np.hypot(sd, share * p.unmodelled_m)
 
     def _shift_variance(self, outline: OutlineBelief, bearings: Array, at_K_m: Array, p: TraceParams) -> Array:
