@@ -21,8 +21,9 @@ from glotouch_bt.mission.journaled import JournaledRequests
 from glotouch_bt.mission.reasons import ReasonBook
 from glotouch_bt.mission.tally import Tally
 from glotouch_bt.mission.values import CannotKeep, encode, encode_parts
+from glotouch_bt.mission.world_check import world_check
 from glotouch_bt.robot import BadInput, Robot
-from skills.base import Context
+from skills.base import Context, Skill
 
 
 class Flushed(Protocol):
@@ -155,6 +156,64 @@ class Keeper:
         }
         encoded, self.lacking = encode_parts(parts)
         return encoded
+
+
+class Keeping:
+    """What a run's loop tells of itself, and what it is told, so that it can be kept and gone on with.
+
+    Args:
+        keeper: Writes checkpoints; None: nobody does.
+        taken_up: A checkpoint to go on from, or None.
+
+    Attributes:
+        look_first: A skill to be run before the mission goes on, or None.
+    """
+
+    def __init__(self, keeper: Keeper | None = None, taken_up: TakenUp | None = None) -> None:
+        self._keeper, self._taken_up = keeper, taken_up
+        self._work: Work | None = None
+        self._resumed: TreeAtWork | None = None
+        self._finished: list[Behaviour] = []
+        self.look_first: Skill | None = None
+
+    def begin(self, work: Work) -> None:
+        """Before the first tick: take up the checkpoint, or write the first one.
+
+        Raises:
+            BadInput: The checkpoint is of another mission.
+        """
+        self._work, kept = work, self._taken_up
+        if kept is not None:
+            self._resumed = take_up(work, kept)
+            if not kept.same_world:
+                self.look_first = world_check(work.tree, work.context, kept.start)
+        elif self._keeper is not None:
+            self._keeper.keep(work, [])
+
+    def hands_up_again(self, node: Behaviour) -> bool:
+        """The node's end is not a new one: a resumed tree hands it up once more."""
+        return self._resumed is not None and self._resumed.replays(node)
+
+    def ended(self, node: Behaviour, ticks: int) -> None:
+        """A node has ended, and nothing above has reacted to that yet; `ticks` are done before this one."""
+        if self._keeper is None or self._work is None:
+            return
+        self._finished.append(node)
+        if isinstance(node, Skill) and not self.hands_up_again(node):
+            self._work.ticks = ticks
+            self._keeper.keep(self._work, self._finished)
+
+    def tick_over(self) -> None:
+        """A tick in which something changed is over."""
+        self._finished = []
+        if self._resumed is not None:
+            self._resumed.done()
+            self._resumed = None
+
+    def began(self, paths: Sequence[str]) -> None:
+        """These nodes run from now on."""
+        if self._keeper is not None:
+            self._keeper.began(paths)
 
 
 def take_up(work: Work, kept: TakenUp) -> TreeAtWork | None:

@@ -11,18 +11,17 @@ from py_trees.common import Status
 
 from glotouch_bt.mission.aborting import why_aborted
 from glotouch_bt.mission.build import BuiltTree, build_tree
-from glotouch_bt.mission.checkpoint_tree import TreeAtWork
 from glotouch_bt.mission.control import Control, Preempted
 from glotouch_bt.mission.ending import end_high
 from glotouch_bt.mission.journaled import JournaledRequests
-from glotouch_bt.mission.keeping import Keeper, TakenUp, Work, take_up
+from glotouch_bt.mission.keeping import Keeper, Keeping, TakenUp, Work
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.pausing import PauseGate
 from glotouch_bt.mission.reasons import Failure, ReasonBook, sensed
 from glotouch_bt.mission.resolution import Rounding
 from glotouch_bt.mission.tally import Record, Tally
 from glotouch_bt.mission.watchdog import STUCK_S, BrokenOff, SkillHung, Stuck, Watchdog, deferred_interrupt
-from glotouch_bt.mission.world_check import WorldChanged, world_check
+from glotouch_bt.mission.world_check import WorldChanged
 from glotouch_bt.robot import HOLD, Command, Observation, Robot, World
 from glotouch_bt.robot.supervision import Supervisor
 from glotouch_bt.robot.supervision_limits import Finding, SupervisionLimits
@@ -133,7 +132,7 @@ def run_mission(
     tree = build_tree(mission.tree, context, mission.name)
     outcome = Outcome("aborted", tally, start_s=observation.now_s)
     loop = _Loop(tree, context, robot, tally, rounding, on_progress, control or Control(), outcome)
-    loop.begin(device, requests, supervisor.counts, keeper, taken_up)
+    loop.begin(device, requests, supervisor.counts, Keeping(keeper, taken_up))
 
     def lost(stuck: Stuck) -> None:
         if on_lost is not None:
@@ -201,38 +200,19 @@ class _Loop:
         self._nodes = list(tree.root.iterate())
         self._status: dict[object, Status] = {n.id: Status.INVALID for n in self._nodes}
         self._written: dict[str, object] = {}
-        self._keeper: Keeper | None = None
-        self._work: Work | None = None
-        self._resumed: TreeAtWork | None = None
-        self._world_check: Skill | None = None
+        self._keeping = Keeping()
 
-    def begin(
-        self,
-        device: Robot,
-        requests: JournaledRequests,
-        guards: dict[str, int],
-        keeper: Keeper | None,
-        taken_up: TakenUp | None,
-    ) -> None:
+    def begin(self, device: Robot, requests: JournaledRequests, guards: dict[str, int], keeping: Keeping) -> None:
         """Take up a checkpoint, or write the first one.
 
         Raises:
             BadInput: The checkpoint is not of this mission.
         """
-        if keeper is None and taken_up is None:
-            return
-        self._keeper, outcome = keeper, self._outcome
-        self._work = work = Work(
-            *(self._tree, self._context, device, self._tally, self._book, requests, self._status, self._written),
-            guards=guards,
-            start_s=outcome.start_s,
-        )
-        if taken_up is not None:
-            self._resumed = take_up(work, taken_up)
-            self._world_check = None if taken_up.same_world else world_check(self._tree, self._context, taken_up.start)
-            outcome.start_s, outcome.ticks = work.start_s, work.ticks
-        elif keeper is not None:
-            keeper.keep(work, [])
+        self._keeping, outcome = keeping, self._outcome
+        held = (self._tree, self._context, device, self._tally, self._book, requests, self._status, self._written)
+        work = Work(*held, guards=guards, start_s=outcome.start_s)
+        keeping.begin(work)
+        outcome.start_s, outcome.ticks = work.start_s, work.ticks
 
     def run(self, timeout_s: float, interrupted: Callable[[], bool]) -> None:
         """Tick until the root has decided; fills the outcome.
@@ -242,8 +222,8 @@ class _Loop:
         """
         context, root, outcome, gate = self._context, self._tree.root, self._outcome, self._gate
         self._interrupted = interrupted
-        if self._world_check is not None:
-            self._look_first(self._world_check)
+        if self._keeping.look_first is not None:
+            self._look_first(self._keeping.look_first)
         while True:
             self._heed()
             if context.mission_s - outcome.start_s >= timeout_s - ROUNDING_S:
@@ -338,32 +318,20 @@ class _Loop:
         """Tick the tree once and write down what changed. Unchanged RUNNING nodes, nearly all, cost one comparison."""
         changed = False
         status = self._status
-        finished: list[Behaviour] = []
         for node in self._tree.root.tick():
             if node.status is Status.RUNNING and status[node.id] is Status.RUNNING:
                 continue
             changed = True
-            again = self._resumed is not None and self._resumed.replays(node)
+            again = self._keeping.hands_up_again(node)
             if node.status is Status.FAILURE:
                 self._book.note(node, sensed(self._context.observation))
                 if isinstance(node, Skill) and not again:
                     self._tally.event("failure", now_s, self._book.of(node).as_dict())
-            if node.status is not Status.RUNNING and self._keeper is not None:
-                finished.append(node)
-                if isinstance(node, Skill) and not again:
-                    self._keep(finished)
-        if self._resumed is not None:
-            self._resumed.done()
-            self._resumed = None
+            if node.status is not Status.RUNNING:
+                self._keeping.ended(node, self._outcome.ticks)
         if changed:
+            self._keeping.tick_over()
             self._record_changes(now_s)
-
-    def _keep(self, finished: list[Behaviour]) -> None:
-        """The last of `finished` is a skill that has just ended, and nothing has reacted to that yet."""
-        assert self._keeper is not None
-        assert self._work is not None
-        self._work.ticks = self._outcome.ticks
-        self._keeper.keep(self._work, finished)
 
     def _record_changes(self, now_s: float) -> None:
         changes: list[tuple[str, object, object]] = []
@@ -379,8 +347,7 @@ class _Loop:
                     self._gate.begins(node.PAUSE)
         if changes:
             self._tally.tick(now_s, changes)
-            if self._keeper is not None:
-                self._keeper.began([path for path, _, new in changes if new is Status.RUNNING])
+            self._keeping.began([path for path, _, new in changes if new is Status.RUNNING])
         for key in self._tree.keys:
             value = self._tree.value(key)
             if value is not None and value is not self._written.get(key):
