@@ -55,5 +55,4 @@ def test_every_shape_knows_itself_among_all(meshes) -> None:
         model = TargetModel.from_mesh(meshes[name])
         ranking = MATCHERS["likelihood"](model, touched)
         assert ranking.best.index == i, (name, [(names[m.index], round(m.loss, 2)) for m in ranking.matches])
-        # Each of the others may be a twin, so that many candidates leave each less than few do.
-        assert ranking.best.probability > 0.4
+        assert ranking.accepted, (name, ranking.reasons)
