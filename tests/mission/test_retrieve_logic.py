@@ -135,7 +135,7 @@ def test_without_a_probe_nothing_is_found_and_the_first_reason_is_kept(retrieve:
 def test_a_probe_that_was_lost_is_taken_from_its_holder_before_the_sweep_goes_on(retrieve: Run, code: str) -> None:
     run = retrieve({"tool_check": [fails(code), ok()], FELT: fails(code)})
     assert run.succeeded
-    lost = ["tool_check", "tool_check", "stow", "tool_pickup", "tool_calibrate"]
+    lost = ["tool_check", "tool_check", "stow", "tool_pickup", "tool_calibrate", "search_anew"]
     assert skills(run, SWEEP) == [*lost, "tool_check", "wrist_check", "guarded_sweep", "orbit_probe"]
 
 
