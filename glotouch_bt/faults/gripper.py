@@ -71,7 +71,6 @@ class Slip(Effect):
     def begin(self) -> None:
         """See `Effect`."""
         self._told = 0.0
-        self._again: GripperTarget | None = None
 
     def command(self, command: Command) -> Command:
         """See `Effect`."""

@@ -6,67 +6,15 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from glotouch_bt.faults.effect import Effect, Scene, samples_altered
-from glotouch_bt.faults.plan import FaultPlan, FaultSpec
+from glotouch_bt.faults.effect import Scene, samples_altered
+from glotouch_bt.faults.plan import FaultPlan
 from glotouch_bt.faults.proof import Proof, Sighting
-from glotouch_bt.faults.trigger import Moment, holds, running_node
+from glotouch_bt.faults.scheduled import Scheduled
+from glotouch_bt.faults.trigger import Moment
 from glotouch_bt.robot import BadInput, Command, GuardTripped, Observation, Request, Robot, Tare, Ticket
 from glotouch_bt.robot.disturber import Disturber
 from glotouch_bt.robot.interface import Snapshot
 from glotouch_bt.robot.streams import stream
-
-
-class _Fault:
-    """One fault of the plan and where it stands."""
-
-    def __init__(self, spec: FaultSpec, effect: Effect) -> None:
-        self.spec, self.effect = spec, effect
-        self.proof = Proof(spec, effect.acts)
-        self.active = False
-        self.spent = False
-        self._node: str | None = None
-        self._until_s: float | None = None
-        self._until_cycle: int | None = None
-        self._next_s = float("-inf")
-
-    def try_begin(self, moment: Moment) -> bool:
-        """Begin if its moment has come."""
-        when = self.spec.when
-        if moment.now_s < self._next_s - 1e-9 or not holds(when, moment):
-            return False
-        self._node = running_node(when, moment)
-        if when.node is not None and self._node is None:
-            return False
-        lasting, now_s = self.spec.lasting, moment.now_s
-        self._until_s = None if lasting.duration_s is None else now_s + lasting.duration_s
-        self._until_cycle = None if lasting.cycles is None else moment.cycles + lasting.cycles
-        self._next_s = now_s + self.spec.repeat.every_s
-        self.effect.scene.sensed = moment.sensed
-        self.effect.begin()
-        self.active = True
-        self.proof.begun_s.append(now_s)
-        self.proof.nodes.extend([self._node] if self._node else [p for p in moment.running if _is_leaf(p, moment)])
-        if self.effect.acts.times:
-            self.proof.changed(now_s)
-        return True
-
-    def try_end(self, moment: Moment) -> bool:
-        """End if its time is over."""
-        over = (
-            (self._until_s is not None and moment.now_s >= self._until_s - 1e-9)
-            or (self._until_cycle is not None and moment.cycles >= self._until_cycle)
-            or (self.spec.lasting.until == "node" and self._node not in moment.running)
-        )
-        if over:
-            self.active = False
-            self.effect.end()
-            self.proof.ended_s.append(moment.now_s)
-            self.spent = len(self.proof.begun_s) >= self.spec.repeat.times
-        return over
-
-
-def _is_leaf(path: str, moment: Moment) -> bool:
-    return not any(other.startswith(path + "/") for other in moment.running)
 
 
 class FaultInjector(Robot):
@@ -111,9 +59,9 @@ class FaultInjector(Robot):
                 effect.prepare()
             except BadInput as e:
                 raise BadInput(f"{spec.place}: {spec.name}: {e}") from e
-            self._faults.append(_Fault(spec, effect))
+            self._faults.append(Scheduled(spec, effect))
         self._waiting = list(self._faults)
-        self._active: list[_Fault] = []
+        self._active: list[Scheduled] = []
 
     # -- the seam ----------------------------------------------------------------------------------------------------
 
@@ -247,7 +195,7 @@ class FaultInjector(Robot):
             order = {id(f): i for i, f in enumerate(self._faults)}
             self._active = sorted([*self._active, *begun], key=lambda f: order[id(f)])
 
-    def _tell(self, fault: _Fault, what: str) -> None:
+    def _tell(self, fault: Scheduled, what: str) -> None:
         data: dict[str, object] = {
             "fault": fault.spec.kind.name,
             "name": fault.spec.name,
@@ -309,7 +257,7 @@ class FaultInjector(Robot):
         self._moment.sensed = observation = self._robot.cycle(command)
         return observation
 
-    def _driven(self, fault: _Fault, cycle: Callable[[Command], Observation], command: Command) -> Observation:
+    def _driven(self, fault: Scheduled, cycle: Callable[[Command], Observation], command: Command) -> Observation:
         acts, now_s = fault.effect.acts.times, self._moment.now_s
         try:
             return fault.effect.drive(cycle, command)
