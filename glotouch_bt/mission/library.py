@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from importlib.metadata import EntryPoint, entry_points
+from os.path import isfile
 from pathlib import Path
 
 from glotouch_bt.robot import BadInput, UnknownName
@@ -34,9 +35,9 @@ def find_shipped(kind: str, given: str, what: str) -> Path:
     """
     path = Path(given)
     if path.suffix in (".yaml", ".yml") or "/" in given:
-        if path.is_file():
+        if isfile(path):  # unlike Path.is_file, false for names that no file can have
             return path
-        if not path.is_absolute() and (inside := shipped_root() / given).is_file():
+        if not path.is_absolute() and isfile(inside := shipped_root() / given):
             return inside
         raise BadInput(f"{given}: no such {what} file (shipped: {', '.join(shipped(kind))})")
     found = shipped(kind)

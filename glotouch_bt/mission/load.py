@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from os.path import isfile
 from pathlib import Path
 from typing import Any
 
@@ -199,7 +200,7 @@ def _find_world(given: str, mission: Path) -> Path | None:
     names = [given] if given.endswith((".yaml", ".yml")) else [given, f"worlds/{given}.yaml"]
     for root in (mission.parent, shipped_root()):
         for name in names:
-            if (root / name).is_file():
+            if isfile(root / name):
                 return root / name
     return None
 

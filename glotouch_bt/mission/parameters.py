@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from os.path import isdir
 from pathlib import Path
 from typing import Literal
 
@@ -179,7 +180,7 @@ def _stl_usable(name: str, folder: Path, place: Place, findings: Findings) -> bo
     """An stl parameter names a file of the objects' folder, or is a path to one; it must be a good solid."""
     path = Path(name)
     if path.suffix.lower() != ".stl":
-        files = {p.stem: p for p in sorted(folder.iterdir()) if p.suffix.lower() == ".stl"} if folder.is_dir() else {}
+        files = {p.stem: p for p in sorted(folder.iterdir()) if p.suffix.lower() == ".stl"} if isdir(folder) else {}
         if name not in files:
             findings.unknown(place, "no_such_stl", f"object (in {shown(folder)})", name, files)
             return False

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import replace
+from os.path import isfile
 from pathlib import Path
 
 from glotouch_bt.mission.fields import validate
@@ -327,7 +328,7 @@ def _find_subtree(given: str, at: Place, scope: Scope) -> tuple[Path, str, Node]
         path, identity = scope.file.parent / given, f"carried {given}"
     else:
         beside, shipped = scope.file.parent / given, shipped_root() / given
-        path = shipped if shipped.is_file() and not beside.is_file() else beside
+        path = shipped if isfile(shipped) and not isfile(beside) else beside
         identity = str(path.resolve())
     if identity in (*scope.trail, str(scope.file.resolve())) or len(scope.trail) >= DEEPEST_SUBTREE:
         scope.findings.add(at, "subtree_loop", f"subtree {given!r} contains itself or is nested too deep")

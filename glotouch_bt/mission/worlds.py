@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import fields
+from os.path import isdir
 from pathlib import Path
 from typing import TypeVar
 
@@ -168,7 +169,7 @@ def _objects(
 
 
 def _stems(folder: Path) -> list[str]:
-    return sorted(p.stem for p in folder.iterdir() if p.suffix.lower() == ".stl") if folder.is_dir() else []
+    return sorted(p.stem for p in folder.iterdir() if p.suffix.lower() == ".stl") if isdir(folder) else []
 
 
 def _section_place(node: Map, section: str, dotted: str) -> Place:

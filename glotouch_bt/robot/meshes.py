@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from os.path import isdir, isfile
 from pathlib import Path
 
 import numpy as np
@@ -62,7 +63,7 @@ def load_mesh(path: Path) -> Mesh:
         BadInput: No such file, not an STL, not watertight, several bodies, or a size that cannot be metres. The message
             names the file, what is wrong and what to do.
     """
-    if not path.is_file():
+    if not isfile(path):
         raise BadInput(f"{path}: no such STL file")
     try:
         mesh = trimesh.load_mesh(path, file_type="stl", process=True)
@@ -161,7 +162,7 @@ def load_folder(folder: Path, names: tuple[str, ...] = ()) -> list[Mesh]:
     Raises:
         BadInput: The folder is missing or empty, a name is not in it, or a file is unusable.
     """
-    if not folder.is_dir():
+    if not isdir(folder):
         raise BadInput(f"{folder}: no such folder of STL files")
     files = {p.stem: p for p in sorted(folder.iterdir()) if p.suffix.lower() == ".stl"}
     if not files:
