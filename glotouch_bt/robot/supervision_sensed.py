@@ -11,6 +11,7 @@ import numpy as np
 
 from glotouch_bt.robot.command import Command
 from glotouch_bt.robot.description import RobotDescription
+from glotouch_bt.robot.geometry import Array
 from glotouch_bt.robot.limits import Limits
 from glotouch_bt.robot.observation import Observation
 from glotouch_bt.robot.supervision_limits import Finding, Patience, SupervisionLimits
@@ -117,10 +118,11 @@ class SensedWatch:
 
     def _fine(self, o: Observation) -> bool:
         """Nothing in the block is out of the ordinary: sums of squares of all of it, range and pose of its newest."""
-        scaled = (o.wrench_S * self._per_limit).ravel()
+        wrench = o.wrench_S * self._per_limit
+        scaled = wrench.ravel()
         q, dq, position, quat = o.q.ravel(), o.dq.ravel(), o.position_B_P.ravel(), o.quat_B_P.ravel()
         if not (
-            scaled @ scaled < 1.0
+            (scaled @ scaled < 1.0 or _within(wrench))
             and math.isfinite(q @ q)
             and (dq @ dq <= self._slow_2 or bool((np.abs(o.dq).max(axis=0) <= self._fastest).all()))
             and position @ position <= self._reach_2
@@ -276,6 +278,12 @@ def _picked(o: Observation, good: np.ndarray[tuple[int], np.dtype[np.bool_]]) ->
         quat_B_P=o.quat_B_P[good],
         wrench_S=o.wrench_S[good],
     )
+
+
+def _within(wrench: Array) -> bool:
+    """No sample of a block (n, 6) of shares of the limits is beyond one."""
+    squares = (wrench * wrench).reshape(-1, 2, 3).sum(axis=2)
+    return bool(squares.max() < 1.0)
 
 
 def _turn_rad(a: list[float], b: list[float]) -> float:
