@@ -83,7 +83,7 @@ def _first_missing(path: Path) -> Path | None:
     """The topmost folder that `mkdir(parents=True)` would make, or None."""
     missing: Path | None = None
     for folder in (path, *path.parents):
-        if folder.exists():
+        if os.path.exists(folder):  # unlike Path.exists, false for names that no folder can have
             break
         missing = folder
     return missing
