@@ -22,7 +22,7 @@ class GraspParams(SkillParams):
     force_N: float = param("Jaw force", unit="N", default=30.0, gt=0.0, le=30.0)
     closing_speed_m_s: float = param("Closing speed", unit="m/s", default=0.03, gt=0.0, le=0.2)
     travel_speed_m_s: float = param("Speed above the objects", unit="m/s", default=0.25, gt=0.0, le=0.25)
-    descent_speed_m_s: float = param("Speed down beside the object", unit="m/s", default=0.015, gt=0.0, le=0.04)
+    descent_speed_m_s: float = param("Speed down beside the object", unit="m/s", default=0.010, gt=0.0, le=0.04)
     headroom_m: float = param("Fingertips above the floor on the way", unit="m", default=0.14, ge=0.05, le=0.25)
     side_gap_m: float = param("Least gap between open jaw and object", unit="m", default=0.005, ge=0.001, le=0.03)
     least_aperture_m: float = param("Closed farther than this: nothing held", unit="m", default=0.003, ge=0.0)
