@@ -108,7 +108,9 @@ def run(
     if done.outcome.error is not None:
         if showing_tracebacks():
             traceback.print_exception(done.outcome.error)
-        console.print_error(done.outcome.reasons[-1])
+        console.print_error(
+            f"{done.outcome.reasons[-1]}\nglotouch resume {done.folder}   goes on from the last checkpoint"
+        )
     elif done.exit_code and json_:
         console.print_error(" <- ".join(done.outcome.reasons))
     return done.exit_code

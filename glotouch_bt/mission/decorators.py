@@ -148,6 +148,7 @@ class RepeatUntil(Decorator):
 
     @progress.setter
     def progress(self, kept: dict[str, Any]) -> None:
+        """Go on from there."""
         self._passes = kept["passes"]
 
     def initialise(self) -> None:
@@ -214,6 +215,7 @@ class ForEach(Decorator):
 
     @progress.setter
     def progress(self, kept: dict[str, Any]) -> None:
+        """Go on from there."""
         self._items, self._order = kept["items"], kept["order"]
         self._next, self._succeeded, self._gathered = kept["next"], kept["succeeded"], kept["gathered"]
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from glotouch_bt.mission.checkpoint import FILE, CheckpointFile, Row
 from glotouch_bt.study.going_on import GoingOn, copy_run, find
-from glotouch_bt.study.launch import installed_versions
+from glotouch_bt.study.result import installed_versions
 
 
 def _first(rows: list[Row], node: str) -> tuple[str, Row, int] | None:

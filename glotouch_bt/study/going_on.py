@@ -66,16 +66,21 @@ class GoingOn:
             "notes": list(self.notes),
         }
 
-    def begin(self, part: Path, recorder: Recorder) -> None:
-        """The record goes on from the checkpoint, in `part`; what it replaces moves to `earlier`."""
+    def begin(self, part: Path, recorder: Recorder, same_world: bool) -> None:
+        """The record goes on from the checkpoint, in `part`; what it replaces moves to `earlier`.
+
+        On another world the clock is another one, too: the record begins anew.
+        """
         record = self.folder / "run.mcap"
         try:
+            if not same_world:
+                raise BadInput("the robot's clock began anew (it is in the folder 'earlier')")
             if self.row.record_bytes is None:
                 raise BadInput(f"{record}: the checkpoint knows of no record")
             chunks = list(read_chunks(record, self.row.record_bytes))
             recorder.go_on_from(chunks, self.file.state(self.row.number)["record"])
         except BadInput as e:
-            self.notes.append(f"the record before the checkpoint is lost: {e}")
+            self.notes.append(f"the record does not hold what was before the checkpoint: {e}")
         kept = self._put_by()
         if record.is_file():
             _link(record, kept / "run.mcap")

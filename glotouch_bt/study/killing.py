@@ -6,13 +6,13 @@ shift it. Killed and resumed are processes of their own, the very command line a
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -149,7 +149,7 @@ def _twin(study: KillStudy, seed: int) -> Twin:
                 began_s = cpu_s
             if not (folder / "result.json").is_file():
                 ended_s = cpu_s
-        time.sleep(POLL_S)
+        _wait(process)
     if process.returncode not in (0, 1, 3):
         assert process.stderr is not None
         raise BadInput(process.stderr.read().decode().strip().removeprefix("glotouch: ") or "the twin did not run")
@@ -166,7 +166,7 @@ def _trial(study: KillStudy, seed: int, number: int, share: float, twin: Twin) -
         if cpu_s >= moment_s:
             process.send_signal(signal.SIGKILL)
             break
-        time.sleep(POLL_S)
+        _wait(process)
     process.wait()
     row: dict[str, Any] = {
         "seed": seed,
@@ -244,6 +244,12 @@ def _read(folder: Path) -> RunRecord | None:
 
 def _start(words: Sequence[str]) -> subprocess.Popen[bytes]:
     return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=_environment())
+
+
+def _wait(process: subprocess.Popen[bytes]) -> None:
+    """A moment, or until the process ends."""
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(POLL_S)
 
 
 def _environment() -> dict[str, str]:

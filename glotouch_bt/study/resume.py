@@ -9,7 +9,8 @@ from glotouch_bt.mission.control import Control
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.tally import Tally
 from glotouch_bt.study.going_on import GoingOn, copy_run, find
-from glotouch_bt.study.launch import RunRequest, RunResult, installed_versions, launch
+from glotouch_bt.study.launch import RunRequest, RunResult, launch
+from glotouch_bt.study.result import installed_versions
 
 
 def resume(
