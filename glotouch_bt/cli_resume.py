@@ -70,6 +70,7 @@ def bench_resume(
     objects: Annotated[Path | None, typer.Option(metavar="DIR", help="folder of watertight STL files")] = None,
     few: Annotated[int, typer.Option(min=1, help="only the first so many objects are in the box: it is quicker")] = 2,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="where trials and summary go")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="keep the trials that are in --out already")] = False,
     json_: Json = False,
 ) -> None:
     """Kill missions (SIGKILL) at random moments, resume them, and compare each with its unbroken twin."""
@@ -86,7 +87,7 @@ def bench_resume(
     box, names = few_objects(world.objects, few, folder / "objects")
     settings = {"target": names[0], "expected_objects": str(len(names))} | settings
     load_mission(mission, settings, objects=box)
-    study = KillStudy(mission, range(seed, seed + trials), kills, folder, settings, conditions, box)
+    study = KillStudy(mission, range(seed, seed + trials), kills, folder, settings, conditions, box, resume)
 
     def show(row: dict[str, Any], done: int, total: int) -> None:
         at = f"{row['moment']:.0%} of the mission, checkpoint {row.get('checkpoint')} of {row.get('checkpoints')}"

@@ -46,6 +46,7 @@ class KillStudy:
         settings: `--set` words.
         conditions: Path or shipped name.
         objects: Folder of STL files instead of the world's.
+        resume: Keep the twins and trials that are in `out` already.
         words: The command line's first words.
     """
 
@@ -56,6 +57,7 @@ class KillStudy:
     settings: Mapping[str, str] = field(default_factory=dict)
     conditions: str = "nominal"
     objects: Path | None = None
+    resume: bool = False
     words: tuple[str, ...] = (sys.executable, "-m", "glotouch_bt.cli")
 
     def run_words(self, seed: int, folder: Path) -> list[str]:
@@ -97,7 +99,10 @@ def run_study(study: KillStudy, on_row: Callable[[dict[str, Any], int, int], Non
     for seed in study.seeds:
         twin = _twin(study, seed)
         for number, share in enumerate(stream(seed, "kill").random(study.kills)):
-            rows.append(_trial(study, seed, number, float(share), twin))
+            done = study.out / f"killed-s{seed}-{number}.json"
+            if not (study.resume and done.is_file()):
+                done.write_text(json.dumps(_trial(study, seed, number, float(share), twin)))
+            rows.append(json.loads(done.read_text()))
             _write(study, rows)
             if on_row is not None:
                 on_row(rows[-1], len(rows), total)
@@ -139,7 +144,10 @@ def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def _twin(study: KillStudy, seed: int) -> Twin:
-    folder = study.out / f"twin-s{seed}"
+    folder, done = study.out / f"twin-s{seed}", study.out / f"twin-s{seed}.json"
+    if study.resume and done.is_file():
+        began_s, ended_s = json.loads(done.read_text())
+        return Twin(folder, json.loads((folder / "result.json").read_text()), began_s, ended_s)
     process = _start(study.run_words(seed, folder))
     began_s = ended_s = 0.0
     while process.poll() is None:
@@ -153,6 +161,7 @@ def _twin(study: KillStudy, seed: int) -> Twin:
     if process.returncode not in (0, 1, 3):
         assert process.stderr is not None
         raise BadInput(process.stderr.read().decode().strip().removeprefix("glotouch: ") or "the twin did not run")
+    done.write_text(json.dumps([began_s, ended_s]))
     return Twin(folder, json.loads((folder / "result.json").read_text()), began_s, ended_s)
 
 
