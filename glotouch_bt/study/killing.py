@@ -148,19 +148,19 @@ def _twin(study: KillStudy, seed: int) -> Twin:
     if study.resume and done.is_file():
         began_s, ended_s = json.loads(done.read_text())
         return Twin(folder, json.loads((folder / "result.json").read_text()), began_s, ended_s)
-    process = _start(study.run_words(seed, folder))
     began_s = ended_s = 0.0
-    while process.poll() is None:
-        cpu_s = _cpu_s(process.pid)
-        if cpu_s is not None:
-            if not began_s and (folder / FILE).is_file():
-                began_s = cpu_s
-            if not (folder / "result.json").is_file():
-                ended_s = cpu_s
-        _wait(process)
+    with _start(study.run_words(seed, folder)) as process:
+        while process.poll() is None:
+            cpu_s = _cpu_s(process.pid)
+            if cpu_s is not None:
+                if not began_s and (folder / FILE).is_file():
+                    began_s = cpu_s
+                if not (folder / "result.json").is_file():
+                    ended_s = cpu_s
+            _wait(process)
+        said = b"" if process.stderr is None else process.stderr.read()
     if process.returncode not in (0, 1, 3):
-        assert process.stderr is not None
-        raise BadInput(process.stderr.read().decode().strip().removeprefix("glotouch: ") or "the twin did not run")
+        raise BadInput(said.decode().strip().removeprefix("glotouch: ") or "the twin did not run")
     done.write_text(json.dumps([began_s, ended_s]))
     return Twin(folder, json.loads((folder / "result.json").read_text()), began_s, ended_s)
 
@@ -168,15 +168,14 @@ def _twin(study: KillStudy, seed: int) -> Twin:
 def _trial(study: KillStudy, seed: int, number: int, share: float, twin: Twin) -> dict[str, Any]:
     folder = study.out / f"killed-s{seed}-{number}"
     moment_s = twin.began_s + share * (twin.ended_s - twin.began_s)
-    process = _start(study.run_words(seed, folder))
     cpu_s = 0.0
-    while process.poll() is None:
-        cpu_s = _cpu_s(process.pid) or cpu_s
-        if cpu_s >= moment_s:
-            process.send_signal(signal.SIGKILL)
-            break
-        _wait(process)
-    process.wait()
+    with _start(study.run_words(seed, folder)) as process:
+        while process.poll() is None:
+            cpu_s = _cpu_s(process.pid) or cpu_s
+            if cpu_s >= moment_s:
+                process.send_signal(signal.SIGKILL)
+                break
+            _wait(process)
     row: dict[str, Any] = {
         "seed": seed,
         "moment": round(share, 4),
