@@ -27,7 +27,7 @@ from glotouch_bt.study.launch import RunRequest
 COLUMNS = (
     "class", "skill", "seed", "verdict", "effective", "after_s", "status", "cause", "named", "seen_by", "seen_code",
     "latency_s", "recovery", "applied", "changes", "moved_m", "retrieved", "correct", "peak_force_N", "sim_s", "wall_s",
-    "twin_ok", "folder",
+    "rejoined", "twin_ok", "folder",
 )  # fmt: skip
 OnRow = Callable[[Mapping[str, Any], int, int], None]
 

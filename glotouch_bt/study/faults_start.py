@@ -9,7 +9,9 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+from glotouch_bt.faults.plan import FaultPlan
 from glotouch_bt.mission.checkpoint import FILE, CheckpointFile, Row
+from glotouch_bt.study.faults_rejoin import watched
 from glotouch_bt.study.going_on import GoingOn, copy_run, find
 from glotouch_bt.study.result import installed_versions
 
@@ -23,31 +25,32 @@ def _first(rows: list[Row], node: str) -> tuple[str, Row, int] | None:
     return None
 
 
-def start_from(twin: Path, out: Path, node: str, after_s: float, warm_up_s: float) -> GoingOn | None:
-    """A copy of the twin's run in `out`, to go on with shortly before a fault; None if there is nothing to save.
+def start_from(twin: Path, out: Path, plan: FaultPlan, warm_up_s: float) -> GoingOn | None:
+    """A copy of the twin's run in `out`, to go on with shortly before a fault; None if its node never ran.
 
     Args:
         twin: The folder of the unfaulted run.
         out: Folder of the trial; what is in it is removed.
-        node: In whose first run the fault begins,
-        after_s: and how long after that began.
-        warm_up_s: The trial runs for at least so long before the fault begins.
+        plan: Of one fault, in the first run of a node.
+        warm_up_s: The trial runs for at least so long before the fault begins, if the mission does.
 
     Raises:
         BadInput: The twin's checkpoints cannot be used.
     """
+    (spec,) = plan.faults
     file = CheckpointFile(twin / FILE)
     try:
         rows = file.rows()
     finally:
         file.close()
-    found = _first(rows, node)
+    found = _first(rows, str(spec.when.node))
     if found is None:
         return None
     path, before, index = found
-    soon = [r for r in rows[: index + 1] if r.stamp_s <= before.stamp_s + after_s - warm_up_s]
-    if not soon or soon[-1].number == rows[0].number:
-        return None
+    begins_s = before.stamp_s + spec.when.after_s
+    soon = [r for r in rows[: index + 1] if r.stamp_s <= begins_s - warm_up_s] or rows[:1]
     shutil.rmtree(out, ignore_errors=True)
     copy_run(twin, out)
-    return replace(find(out, path, installed_versions()), row=soon[-1], start="")
+    going_on = find(out, path, installed_versions())
+    going_on.file.close()
+    return replace(going_on, file=watched(out, twin, plan, begins_s), row=soon[-1], start="")

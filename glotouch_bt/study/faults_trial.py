@@ -13,13 +13,15 @@ from types import FrameType
 from typing import Any
 
 from glotouch_bt.faults.catalogue import CATALOGUE
+from glotouch_bt.faults.plan import FaultPlan
 from glotouch_bt.mission.checkpoint import FILE as CHECKPOINTS
 from glotouch_bt.report.run_record import read_run
 from glotouch_bt.robot import BadInput
 from glotouch_bt.study.faults_cases import chosen_cases
+from glotouch_bt.study.faults_rejoin import Rejoined
 from glotouch_bt.study.faults_start import start_from
 from glotouch_bt.study.going_on import EARLIER
-from glotouch_bt.study.launch import RunRequest, RunResult, launch
+from glotouch_bt.study.launch import RunRequest, launch
 
 HUNG_S = 900.0
 """Wall time after which a trial counts as hanging."""
@@ -111,16 +113,16 @@ def run_trial(
         if starts > MOST_STARTS:
             raise Hung(f"took its process down {MOST_STARTS} times")
         with hang_guard():
-            done = _launched(request, labels, twin)
+            result = _launched(request, twin)
     except BadInput:
         raise
     except (Exception, Hung) as e:
         status = "hang" if isinstance(e, Hung) else "traceback"
         row |= {"status": status, "verdict": "unsafe", "cause": f"{type(e).__name__}: {e}", "effective": True}
     else:
-        row |= _row(done.result, hard_force_N)
+        row |= _row(result, hard_force_N)
         if labels["class"] == "none":
-            row["durations_s"] = durations(done.folder)
+            row["durations_s"] = durations(request.out)
     row["wall_s"] = round(time.perf_counter() - began, 2)
     request.out.mkdir(parents=True, exist_ok=True)
     if labels["class"] != "none":
@@ -131,17 +133,30 @@ def run_trial(
     return row
 
 
-def _launched(request: RunRequest, labels: Mapping[str, Any], twin: Path | None) -> RunResult:
-    assert request.out is not None
+def _launched(request: RunRequest, twin: Path | None) -> Mapping[str, Any]:
+    """The result of a run; of one that was its twin again, the twin's, with what the faults did here."""
     going_on = None
-    if twin is not None:
-        (case,) = chosen_cases([labels["class"]])
-        going_on = start_from(twin, request.out, labels["skill"], labels["after_s"], case.warm_up_s)
+    plan = request.faults
+    if twin is not None and isinstance(plan, FaultPlan) and request.out is not None:
+        (spec,) = plan.faults
+        if spec.kind.channel != "model":  # another model is another mission
+            (case,) = chosen_cases([spec.kind.name])
+            going_on = start_from(twin, request.out, plan, case.warm_up_s)
     try:
-        return launch(request, going_on=going_on)
+        done = launch(request, going_on=going_on)
     finally:
         if going_on is not None:
             going_on.file.close()
+    if not isinstance(done.outcome.error, Rejoined):
+        return done.result
+    assert twin is not None
+    known: dict[str, Any] = json.loads((twin / "result.json").read_text(encoding="utf-8"))
+    (fault,) = done.result["faults"]
+    sightings = [s for s in fault["sightings"] if s["by"] != "runner"]
+    seen = sightings[0] if sightings else None
+    latency_s = None if seen is None else seen["stamp_s"] - fault["first_s"]
+    fault = fault | {"sightings": sightings, "seen": seen, "latency_s": latency_s, "outcome": known["status"]}
+    return known | {"faults": [fault], "rejoined": True}
 
 
 def _tidy(folder: Path, everything: bool) -> None:
@@ -173,6 +188,7 @@ def _row(result: Mapping[str, Any], hard_force_N: float) -> dict[str, Any]:
         "retrieved": result["retrieved"],
         "correct": result["correct"],
         "peak_force_N": result["peak_force_N"],
+        "rejoined": bool(result.get("rejoined")),
         "sim_s": result["sim_time_s"],
     }
     if not reports:

@@ -6,7 +6,6 @@ import json
 from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -86,7 +85,7 @@ def made_up(request: RunRequest, *other: Any) -> Any:
     assert request.faults is not None
     specs = request.faults.faults  # type: ignore[union-attr]
     if not specs:
-        return SimpleNamespace(result=GOOD | {"faults": []}, folder=request.out)
+        return GOOD | {"faults": []}
     if specs[0].kind.name == "exception" and specs[0].when.node == "lift":
         raise ZeroDivisionError("a bug")
     seen = {"by": "squeeze", "code": "off_zero", "text": "the wrist reads 3 N", "stamp_s": 2.0}
@@ -106,7 +105,7 @@ def made_up(request: RunRequest, *other: Any) -> Any:
     }
     ended = {"status": "failure", "retrieved": None, "correct": False, "reasons": ["squeeze: off_zero"]}
     ended["reason_chain"] = [{"node": "squeeze", "code": "off_zero", "message": "m", "advice": "a"}]
-    return SimpleNamespace(result=GOOD | (ended if specs[0].when.node == "squeeze" else {}) | {"faults": [fault]})
+    return GOOD | (ended if specs[0].when.node == "squeeze" else {}) | {"faults": [fault]}
 
 
 def test_a_campaign_counts_every_trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
