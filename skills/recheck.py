@@ -36,6 +36,7 @@ class RecheckParams(SkillParams):
     moved_m: float = param("A candidate may have moved so far", unit="m", default=0.006, gt=0.0, le=0.02)
     slip_m: float = param("The floor may be felt so far from where it was", unit="m", default=0.002, gt=0.0, le=0.005)
     headroom_m: float = param("Tool's height above the floor on the way", unit="m", default=0.13, ge=0.05, le=0.2)
+    may_be_gone: bool = param("The probe may have been put back meanwhile", default=False)
     touch: bool = param("Touch one of the candidates", default=True)
     corner_gap_m: float = param("Ball centre to each wall where the floor is felt", unit="m", default=0.014, ge=0.008)
 
@@ -82,6 +83,8 @@ class Recheck(Skill):
         arm, context = self.context.arm, self.context
         held_m: float | None = self.grip_m
         yield from come_to_rest(context)
+        if self.params.may_be_gone and self.tool is not None and not self._as_wide_as(self.tool):
+            arm.scene.hold_tool(False)
         found: dict[str, object] = {"probe": arm.scene.holding_tool}
         if arm.scene.holding_tool and self.tool is not None:
             self._require_tool(self.tool)
@@ -102,9 +105,12 @@ class Recheck(Skill):
             found["candidate"] = yield from self._touch_with_fingers()
         self.event("recheck", **found)
 
+    def _as_wide_as(self, tool: HeldTool) -> bool:
+        return abs(self.context.arm.aperture_m - tool.aperture_m) <= HELD_TOLERANCE_M
+
     def _require_tool(self, tool: HeldTool) -> None:
         apart = self.context.arm.aperture_m
-        if abs(apart - tool.aperture_m) > HELD_TOLERANCE_M:
+        if not self._as_wide_as(tool):
             raise SkillFailed(
                 "tool_lost",
                 f"the jaws are {apart * 1e3:.1f} mm apart, with the probe they were {tool.aperture_m * 1e3:.1f}",

@@ -21,19 +21,21 @@ class WorldChanged(GlotouchError):
 def world_check(tree: BuiltTree, context: Context, start: str = "") -> Recheck:
     """The skill that looks; its inputs are the mission's keys of the usual names, as far as they are written.
 
-    Where a person says at which node to `start`, that node's skill says whether the probe is in the hand now (it may
-    have been put back), and no candidate is touched: that they have moved may be why it starts there.
+    Where a person says at which node to `start`, that node's skill says whether the probe may be out of the hand by
+    now (it may have been put back), and no candidate is touched: that they have moved may be why it starts there.
     """
-    if start and not _needs_probe(tree, start):
+    hand = _hand_at(tree, start) if start else None
+    if hand is not None and "probe" not in hand:
         context.arm.scene.hold_tool(False)
-    skill = Recheck(NAME, Recheck.Params(touch=not start), context)
+    params = Recheck.Params(touch=not start, may_be_gone=hand is not None and "empty" in hand)
+    skill = Recheck(NAME, params, context)
     skill.setup_ports({port: f"{tree.namespace}/{key}" for port, key in Recheck.default_keys().items()})
     return skill
 
 
-def _needs_probe(tree: BuiltTree, path: str) -> bool:
-    """The first skill at a node may begin with the probe in the hand."""
+def _hand_at(tree: BuiltTree, path: str) -> frozenset[str] | None:
+    """What may be in the hand when the first skill at a node begins; None: it does not say."""
     for node in tree.root.iterate():
         if isinstance(node, Skill) and (tree.paths[node.id] + "/").startswith(path + "/"):
-            return "probe" in node.NEEDS.get("hand", frozenset({"probe"}))
-    return True
+            return node.NEEDS.get("hand")
+    return None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -68,3 +69,27 @@ def test_every_skill_that_remembers_something_says_so_to_checkpoints() -> None:
         if stored - {*skill.INPUT_PORTS, *skill.OUTPUT_PORTS} and "remember" not in vars(skill):
             forgetful.append(name)
     assert not forgetful
+
+
+class Stood(Recheck):
+    """What it would do first, without an arm."""
+
+    tool = None  # type: ignore[assignment]
+
+
+@pytest.mark.parametrize(("aperture_mm", "held"), [(15.0, True), (40.0, False)])
+def test_a_probe_that_may_have_been_put_back_counts_as_held_only_between_the_jaws(
+    aperture_mm: float, held: bool
+) -> None:
+    told: list[bool] = []
+    arm = SimpleNamespace(
+        aperture_m=1e-3 * aperture_mm, scene=SimpleNamespace(holding_tool=True, hold_tool=told.append)
+    )
+    skill = Stood.__new__(Stood)
+    skill.context = SimpleNamespace(arm=arm)  # type: ignore[assignment]
+    tool: Any = SimpleNamespace(aperture_m=0.0149)
+    assert skill._as_wide_as(tool) is held
+    if not held:
+        with pytest.raises(SkillFailed) as e:
+            skill._require_tool(tool)
+        assert e.value.reason.code == "tool_lost"
