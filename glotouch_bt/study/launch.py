@@ -71,34 +71,41 @@ def launch(
     backend = load_backend(request.backend)
     options = split_settings(mission, request.settings)
     folder = RunFolder(request.out) if request.out else RunFolder.named(mission.name, request.seed)
-    try:
-        if plan is not None and going_on is None and (models := wrong_models(plan, mission, folder.path / "models")):
-            mission = load_mission(request.mission, {**request.settings, **models}, objects=request.objects)
+    with folder.claimed():
         try:
-            robot = backend.open(mission.world, conditions, request.seed, options)
-        except BadInput as e:
-            if not options:
-                raise
-            known = ", ".join(mission.parameters) or "none"
-            raise BadInput(f"{e} (parameters of mission {mission.name!r}: {known})") from e
-        referee = backend.referee(robot)
-        world = None if going_on is None else going_on.file.world(going_on.row.number)
-        objects_at_start = referee.objects() if referee else []
-        if world is not None:
-            robot.restore(world)
-        if plan is not None:
-            robot = _faulted(robot, plan, request, backend)
-    except BaseException:
-        folder.abandon()
-        raise
-    with robot:
-        if going_on is None:
-            folder.clear()
-        if on_start is not None:
-            on_start(mission, folder.path)
-        taken_up = None if going_on is None else going_on.taken_up(same_world=world is not None)
-        run = _Run(request, mission, conditions, robot, referee, folder, objects_at_start, began, going_on, taken_up)
-        return _run(run, on_progress, control)
+            if (
+                plan is not None
+                and going_on is None
+                and (models := wrong_models(plan, mission, folder.path / "models"))
+            ):
+                mission = load_mission(request.mission, {**request.settings, **models}, objects=request.objects)
+            try:
+                robot = backend.open(mission.world, conditions, request.seed, options)
+            except BadInput as e:
+                if not options:
+                    raise
+                known = ", ".join(mission.parameters) or "none"
+                raise BadInput(f"{e} (parameters of mission {mission.name!r}: {known})") from e
+            referee = backend.referee(robot)
+            world = None if going_on is None else going_on.file.world(going_on.row.number)
+            objects_at_start = referee.objects() if referee else []
+            if world is not None:
+                robot.restore(world)
+            if plan is not None:
+                robot = _faulted(robot, plan, request, backend)
+        except BaseException:
+            folder.abandon()
+            raise
+        with robot:
+            if going_on is None:
+                folder.clear()
+            if on_start is not None:
+                on_start(mission, folder.path)
+            taken_up = None if going_on is None else going_on.taken_up(same_world=world is not None)
+            run = _Run(
+                request, mission, conditions, robot, referee, folder, objects_at_start, began, going_on, taken_up
+            )
+            return _run(run, on_progress, control)
 
 
 def _fault_plan(request: RunRequest, mission: Mission) -> FaultPlan | None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 
@@ -51,6 +53,23 @@ class RunFolder:
         for name in (*FILES, *LEFT_BY_SQLITE):
             (self.path / name).unlink(missing_ok=True)
         shutil.rmtree(self.path / "earlier", ignore_errors=True)
+
+    @contextmanager
+    def claimed(self) -> Iterator[None]:
+        """For this run alone, until it ends or its process does.
+
+        Raises:
+            BadInput: Another run is under way in the folder.
+        """
+        handle = os.open(self.path, os.O_RDONLY)
+        try:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as e:
+                raise BadInput(f"{self.path}: a run is under way in this folder") from e
+            yield
+        finally:
+            os.close(handle)
 
     def abandon(self) -> None:
         """The run did not begin: remove what was made for it."""

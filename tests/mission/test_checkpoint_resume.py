@@ -185,6 +185,22 @@ def test_the_mission_s_file_may_be_gone_or_have_changed(mission: Path, tmp_path:
         assert told(folder)["reason_chain"][-1]["code"] == "safety_stop"
 
 
+def test_a_run_that_is_under_way_is_left_alone(mission: Path, tmp_path: Path) -> None:
+    """A second process neither resumes it nor runs over it; when it is dead, it may."""
+    folder = tmp_path / "run"
+    process = started("run", mission, "--seed", 4, "--out", folder)
+    while process.poll() is None and checkpoints(folder) < 1:
+        time.sleep(0.002)
+    process.send_signal(signal.SIGSTOP)
+    for words in (("resume", folder), ("run", mission, "--out", folder)):
+        done = glotouch(*words)
+        assert done.returncode == 2
+        assert "a run is under way" in done.stderr
+    process.kill()
+    process.communicate()
+    assert glotouch("resume", folder).returncode == 0
+
+
 def refused(*words: object) -> str:
     done = glotouch("resume", *words)
     assert done.returncode == 2, done.stderr
