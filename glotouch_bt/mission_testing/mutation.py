@@ -77,7 +77,8 @@ class MutationScore:
         yield f"  refused by check  {len(self.refused):4d}"
         yield f"  noticed by tests  {len(self.noticed):4d}"
         yield f"  survive           {len(self.survivors):4d}"
-        yield f"  equivalent        {len(self.equivalent):4d}  (no difference in {self.scripts} random scripts)"
+        if self.scripts:
+            yield f"  equivalent        {len(self.equivalent):4d}  (no difference in {self.scripts} random scripts)"
         yield (
             f"  score             {self.percent:.1f} % of those that run and differ"
             f" ({self.strict_percent:.1f} % with the equivalent ones)"
@@ -108,7 +109,7 @@ def try_mutants(
         mission: The mission as it is.
         session: Where the tests get their missions from; changed while a mutant is tried.
         tests: The tests that use it, by name; all pass on the mission as it is.
-        scripts: Random scripts tried for each survivor.
+        scripts: Random scripts tried for each survivor; 0: none, all count as survivors.
         on_progress: Called after each mutant with (tried, of how many, score so far).
     """
     score, search = MutationScore(mission.name, scripts), Search(mission, scripts)
@@ -120,7 +121,7 @@ def try_mutants(
             score.refused.append(mutant)
         elif (name := bench.notices(mutant)) is not None:
             score.noticed.append((mutant, name))
-        elif (difference := search.difference(tree)) is not None:
+        elif (difference := search.difference(tree)) is not None or scripts == 0:
             score.survivors.append(Survivor(mutant, difference))
         else:
             score.equivalent.append(mutant)

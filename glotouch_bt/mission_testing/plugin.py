@@ -45,6 +45,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--glotouch-mutate-min", type=float, metavar="PERCENT", help="fail if fewer mutants than this are noticed"
     )
+    group.addoption(
+        "--glotouch-search",
+        type=int,
+        default=300,
+        metavar="N",
+        help="random scripts tried on each mutant no test notices (default 300; 0: quick, none is called equivalent)",
+    )
 
 
 def session_of(config: pytest.Config) -> Session:

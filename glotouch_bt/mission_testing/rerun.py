@@ -32,7 +32,8 @@ def mutate(pytest_session: pytest.Session, session: Session, given: str) -> None
         return
     progress = _Progress(pytest_session.config)
     tests = [(i.nodeid, partial(_passes, i)) for i in items]
-    score = try_mutants(mission, session, tests, on_progress=progress)
+    scripts = pytest_session.config.getoption("--glotouch-search")
+    score = try_mutants(mission, session, tests, scripts=scripts, on_progress=progress)
     progress.end()
     session.scores.append(score)
     session.mutation_lines += [*score.lines(), ""]

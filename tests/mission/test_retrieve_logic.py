@@ -146,6 +146,15 @@ def test_a_probe_that_is_felt_where_it_was_is_kept(retrieve: Run) -> None:
     assert [c.params.touch for c in run.calls_of("tool_check*")] == [False, True, False, False]
 
 
+@pytest.mark.parametrize("skill", ["stow", "tool_pickup", "tool_calibrate"])
+def test_a_probe_that_is_not_taken_anew_ends_the_search(retrieve: Run, skill: str) -> None:
+    node = f"*/take it from its holder/{skill}*"
+    run = retrieve({"guarded_sweep": fails("tool_lost"), FELT: fails("tool_lost"), node: fails()})
+    assert run.ran(node) == 3
+    after = {"stow": "tool_pickup*", "tool_pickup": "tool_calibrate*", "tool_calibrate": None}[skill]
+    assert after is None or run.never_ran(f"*/take it from its holder/{after}")
+
+
 def test_a_wrist_that_reads_something_in_free_air_is_zeroed(retrieve: Run) -> None:
     run = retrieve({"wrist_check": fails("off_zero")})
     assert run.succeeded
