@@ -10,7 +10,6 @@ import select
 import signal
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -26,7 +25,7 @@ class Operator(Control):
 
     def rest(self, period_s: float) -> None:
         """See `Control`."""
-        time.sleep(min(max(period_s, 0.0), LONGEST_REST_S))
+        threading.Event().wait(min(max(period_s, 0.0), LONGEST_REST_S))
 
 
 @contextmanager

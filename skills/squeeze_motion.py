@@ -30,7 +30,7 @@ class ClosureParams(SkillParams):
     """What all squeezing skills take.
 
     The descent is slow for the worst it may meet: both fingertips flat on a rigid foot. At 15 mm/s that was 26 N before
-    the first sample could show it and 34 N 10 ms later (MuJoCo; it goes with the speed); the hard limit is 30 N.
+    the first sample could show it and 34 N 10 ms later (simulated; it goes with the speed); the hard limit is 30 N.
     """
 
     force_N: float = param("Closing force of one jaw", unit="N", default=10.0, gt=0.0, le=10.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-import time
+import threading
 
 from glotouch_bt.faults.effect import Cycle, Effect, FaultParams, param
 from glotouch_bt.robot import BadInput, Command, Observation
@@ -50,7 +50,7 @@ class Hang(Effect):
         if not self._slept:
             self._slept = True
             self.acts.times += 1
-            time.sleep(self.params.wall_s)
+            threading.Event().wait(self.params.wall_s)  # this thread is gone for as long, as in a blocking call
         return cycle(command)
 
 

@@ -106,8 +106,9 @@ class PadWatch:
     def look(self, o: Observation, found: list[Finding]) -> None:
         """One block."""
         now_s, limit, frame = o.now_s, self._rules.tactile_age_s, o.tactile
-        if frame is None:
-            waited = now_s - (self._since_s or 0.0)
+        since_s = now_s if self._since_s is None else self._since_s
+        if frame is None or frame.stamp_s < since_s - limit:  # also one from before it was asked for
+            waited = now_s - since_s
             if waited > limit:
                 what = f"no depth map for {waited:.3f} s although they were asked for"
                 found.append(Finding("tactile_stale", what, waited, limit, now_s))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -23,80 +22,11 @@ from glotouch_bt.robot import (
     Pose,
     SafetyStop,
     StaleReading,
-    TactileFrame,
 )
 from glotouch_bt.robot.fake import FakeRobot, forward
-from glotouch_bt.robot.supervision import RECORDED, Supervisor
-from glotouch_bt.robot.supervision_limits import GUARDS, Finding, SupervisionLimits
-
-Spoil = Callable[[Observation], Observation]
-
-
-class Device(FakeRobot):
-    """A fake robot whose readings a test spoils from a cycle on; counts holds."""
-
-    def __init__(self, spoil: Spoil | None = None, since: int = 0, until: int = 10**9, noise_N: float = 0.0) -> None:
-        self._spoil, self._since, self._until, self._noise = spoil, since, until, noise_N
-        self._rng = np.random.default_rng(7)
-        self.holds = 0
-        super().__init__()
-
-    def cycle(self, command: Command) -> Observation:
-        seen = super().cycle(command)
-        if self._noise:
-            wrench = seen.wrench_S + self._noise * self._rng.standard_normal(seen.wrench_S.shape)
-            seen = dataclasses.replace(seen, wrench_S=wrench)
-        if self._spoil is not None and self._since <= self.cycles - 1 < self._until:
-            seen = self._spoil(seen)
-        return seen
-
-    def hold(self) -> None:
-        self.holds += 1
-
-
-def supervised(device: FakeRobot, **rules: float) -> tuple[Supervisor, list[Finding]]:
-    found: list[Finding] = []
-    robot = Supervisor(device, SupervisionLimits(**rules))  # type: ignore[arg-type]
-    robot.on_finding = found.append
-    return robot, found
-
-
-def setpoint(q: Any, dq: Any = None) -> Command:
-    q = np.asarray(q, dtype=np.float64)
-    dq = np.zeros(7) if dq is None else np.asarray(dq, dtype=np.float64)
-    return Command(JointSetpoint(q, dq, np.zeros(7), forward(FakeRobot().description, np.nan_to_num(q))))
-
-
-def spin(robot: Supervisor, cycles: int, command: Command = HOLD) -> None:
-    for _ in range(cycles):
-        robot.cycle(command)
-
-
-def with_part(name: str, row: int, column: int, value: float) -> Spoil:
-    def spoil(seen: Observation) -> Observation:
-        part = np.array(getattr(seen, name))
-        part[row, column] = value
-        return dataclasses.replace(seen, **{name: part})
-
-    return spoil
-
-
-def all_of(name: str, column: int, value: float) -> Spoil:
-    def spoil(seen: Observation) -> Observation:
-        part = np.array(getattr(seen, name))
-        part[:, column] = value
-        return dataclasses.replace(seen, **{name: part})
-
-    return spoil
-
-
-def jaws(**changes: Any) -> Spoil:
-    return lambda seen: dataclasses.replace(seen, gripper=dataclasses.replace(seen.gripper, **changes))
-
-
-def stamps(change: Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]) -> Spoil:
-    return lambda seen: dataclasses.replace(seen, stamp_s=change(np.array(seen.stamp_s)))
-
+from glotouch_bt.robot.supervision import RECORDED
+from glotouch_bt.robot.supervision_limits import GUARDS, SupervisionLimits
+from tests.robot.supervised import Device, Spoil, all_of, jaws, setpoint, spin, stamps, supervised, with_part
 
 FATAL: list[tuple[str, Spoil]] = [
     ("not_finite", all_of("wrench_S", 2, np.nan)),
@@ -285,114 +215,6 @@ def test_an_arm_that_lags_in_motion_is_let_go_on() -> None:
     for k in range(100):
         robot.cycle(setpoint(home + 0.0125 * k * np.eye(7)[6], 1.25 * np.eye(7)[6]))
     assert found == []
-
-
-def test_a_noisy_sensor_that_freezes_is_stuck() -> None:
-    frozen: list[np.ndarray[Any, Any]] = []
-
-    def freeze(seen: Observation) -> Observation:
-        frozen.append(np.tile(seen.wrench_S[-1], (10, 1)))
-        return dataclasses.replace(seen, wrench_S=frozen[0])
-
-    robot, _ = supervised(Device(freeze, since=800, noise_N=0.05))
-    with pytest.raises(GuardTripped, match="wrench_stuck") as trip:
-        spin(robot, 900)
-    assert trip.value.stamp_s < 8.0 + 0.06
-
-
-def test_a_loose_contact_ends_patience() -> None:
-    """Single blocks that repeat the last sample, three of ten."""
-
-    def loose(seen: Observation) -> Observation:
-        lost = round(seen.now_s * 100) % 10 in (0, 3, 6)
-        return dataclasses.replace(seen, wrench_S=np.tile(seen.wrench_S[-1], (10, 1))) if lost else seen
-
-    robot, found = supervised(Device(loose, since=800, noise_N=0.05))
-    with pytest.raises(GuardTripped, match="wrench_stuck") as trip:
-        spin(robot, 1000)
-    assert trip.value.stamp_s < 8.3
-    assert sum(not f.fatal for f in found) == SupervisionLimits().tolerated
-
-
-def test_a_clipped_component_is_noticed() -> None:
-    def clip(seen: Observation) -> Observation:
-        wrench = seen.wrench_S.copy()
-        wrench[:, 2] = np.minimum(wrench[:, 2] + 9.0, 1.0)
-        return dataclasses.replace(seen, wrench_S=wrench)
-
-    robot, _ = supervised(Device(clip, since=800, noise_N=0.05))
-    with pytest.raises(GuardTripped, match="Fz stand still"):
-        spin(robot, 900)
-
-
-@pytest.mark.parametrize(("noise_N", "noted"), [(0.15, False), (1.0, True)])
-def test_a_drowned_force_is_put_on_record_only(noise_N: float, noted: bool) -> None:
-    robot, found = supervised(Device(noise_N=noise_N))
-    spin(robot, 1000)
-    assert {f.guard for f in found} == ({"wrench_noise"} if noted else set())
-    assert not any(f.fatal for f in found)
-    assert len(found) < 12, "once a second"
-
-
-@pytest.mark.parametrize("noise_m", [2e-5, 0.0])
-def test_maps_that_come_again_and_again(noise_m: float) -> None:
-    """Of noisy pads they are frozen; flat ones without noise say nothing."""
-    rng = np.random.default_rng(3)
-    frames = [noise_m * rng.standard_normal((2, 35, 20)) for _ in range(30)]
-    count = [0]
-
-    def pads(seen: Observation) -> Observation:
-        count[0] += 1
-        left, right = frames[min(count[0], 29)]
-        return dataclasses.replace(seen, tactile=TactileFrame(seen.now_s, left, right))
-
-    robot, found = supervised(Device(pads))
-    if noise_m == 0.0:
-        spin(robot, 100, Command(tactile=True))
-        assert found == []
-        return
-    spin(robot, 29, Command(tactile=True))
-    with pytest.raises(GuardTripped, match="tactile_frozen"):
-        spin(robot, 4, Command(tactile=True))
-
-
-def test_a_noise_free_sensor_is_never_stuck() -> None:
-    def pressed(seen: Observation) -> Observation:
-        """Loads and unloads without noise, as an ideal simulation does; constant in between."""
-        wrench = np.zeros((10, 6))
-        wrench[:, 2] = 5.0 * np.clip(np.sin(seen.stamp_s), 0.0, 0.9)
-        return dataclasses.replace(seen, wrench_S=wrench)
-
-    robot, found = supervised(Device(pressed))
-    spin(robot, 3000)
-    assert found == []
-
-
-def test_depth_maps_that_do_not_come_are_missed_only_when_asked_for() -> None:
-    device = FakeRobot(frame_rate_Hz=1e-3)
-    robot, _ = supervised(device)
-    robot.cycle(Command(tactile=True))  # the only frame for a thousand seconds
-    spin(robot, 100)
-    with pytest.raises(GuardTripped, match="tactile_stale"):
-        spin(robot, 25, Command(tactile=True))
-
-
-@pytest.mark.parametrize(
-    ("value", "share", "fatal"), [(np.nan, 0.03, False), (np.nan, 0.6, True), (np.inf, 0.01, True)]
-)
-def test_dead_taxels_are_borne_dead_pads_are_not(value: float, share: float, fatal: bool) -> None:
-    def spoil(seen: Observation) -> Observation:
-        left = np.zeros((35, 20))
-        left.ravel()[: round(share * left.size)] = value
-        return dataclasses.replace(seen, tactile=TactileFrame(seen.now_s, left, np.zeros((35, 20))))
-
-    robot, found = supervised(Device(spoil))
-    if not fatal:
-        spin(robot, 100, Command(tactile=True))
-        assert found == []
-        return
-    with pytest.raises(GuardTripped, match="tactile_dead"):
-        spin(robot, 100, Command(tactile=True))
 
 
 HOME = np.array(FakeRobot().description.home_q)

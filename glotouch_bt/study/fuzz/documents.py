@@ -196,7 +196,7 @@ def _value(field: Any, rng: np.random.Generator) -> Any:
     if kind is float:
         return float(np.round(rng.uniform(low, high), 4))
     if kind is str:
-        return pick(rng, ("apple", "wukong", "squeeze", "*"))
+        return pick(rng, ("nobody", "squeeze", "*", ""))
     if get_origin(kind) is tuple:
         return [float(np.round(rng.normal(), 3)) for _ in range(3)]
     return None if field.default is PydanticUndefined else field.default
