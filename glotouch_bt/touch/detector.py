@@ -25,8 +25,8 @@ from glotouch_bt.touch.onset import onset_index
 HISTORY_BLOCKS = 10
 """Blocks kept for dating an onset: 100 ms at 100 Hz, of which the last third may belong to the contact."""
 DRIFT_S = 2.0
-"""While a paused motion stands, what changes over this time or slower is the sensor's drift (harsh CONDITIONS: 0.02 N in
-it), what changes faster is a push."""
+"""While a paused motion stands, what changes over this time or slower is the sensor's drift (harsh CONDITIONS: 0.02 N
+in it), what changes faster is a push."""
 
 
 @dataclass(frozen=True)
