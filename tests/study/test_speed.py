@@ -93,8 +93,8 @@ def study(tmp_path: Path, **other: Any) -> SpeedStudy:
 def test_a_study_of_known_durations(
     house: ModuleType, clock: Clock, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """31 cycles of 2 ms for 0.31 s of robot time: 5x real time; twice as long as 310 bare steps of 0.1 ms."""
-    furnish(house, clock, monkeypatch, BareSteps(310, 0.031, 0.031, True))
+    """30 cycles of 2 ms for 0.3 s of robot time: 5x real time; twice as long as 300 bare steps of 0.1 ms."""
+    furnish(house, clock, monkeypatch, BareSteps(300, 0.030, 0.030, True))
     seen = []
     found = speed.run_study(study(tmp_path), lambda row, done, total: seen.append((row["seed"], done, total)))
     assert seen == [(3, 1, 2), (4, 2, 2)]
@@ -103,7 +103,7 @@ def test_a_study_of_known_durations(
     assert found["bare_factor"]["median"] == pytest.approx(10.0)
     assert found["robot_cycle_us"] == {"p50": 2000.0, "p99": 2000.0, "max": 2000.0}
     assert found["tick_us"]["max"] == 0.0
-    parts = {"physics": 0.031, "robot": 0.031, "tree": 0.0, "record": 0.0, "rest": 0.0}
+    parts = {"physics": 0.030, "robot": 0.030, "tree": 0.0, "record": 0.0, "rest": 0.0}
     assert found["breakdown_s"] == pytest.approx(parts, abs=1e-9)
     assert found["same_end_state"] is True
     assert found["targets"]["realtime_factor"] == {"least": 15.0, "met": False}
@@ -112,7 +112,7 @@ def test_a_study_of_known_durations(
     with (tmp_path / "out" / "trials.csv").open() as f:
         rows = list(csv.DictReader(f))
     assert [r["seed"] for r in rows] == ["3", "4"]
-    assert {r["steps"] for r in rows} == {"310"}
+    assert {r["steps"] for r in rows} == {"300"}
     assert (tmp_path / "out" / "s3" / "report.html").exists()
 
 
