@@ -15,15 +15,16 @@ from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.cli_bench import bench
-from glotouch_bt.cli_check import bench_check, check
-from glotouch_bt.cli_doctor import doctor, link, read_settings
-from glotouch_bt.cli_faults import bench_faults, faults
-from glotouch_bt.cli_pause import bench_pause
-from glotouch_bt.cli_replay import replay
-from glotouch_bt.cli_resume import bench_resume, resume
-from glotouch_bt.cli_testing import bench_fuzz, mission_tests
-from glotouch_bt.guarded import guarded, set_debug, showing_tracebacks
+from glotouch_bt.commands.bench import bench
+from glotouch_bt.commands.check import bench_check, check
+from glotouch_bt.commands.doctor import doctor, link
+from glotouch_bt.commands.faults import bench_faults, faults
+from glotouch_bt.commands.guarded import guarded, set_debug, showing_tracebacks
+from glotouch_bt.commands.options import read_settings
+from glotouch_bt.commands.pause import bench_pause
+from glotouch_bt.commands.replay import replay
+from glotouch_bt.commands.resume import bench_resume, resume
+from glotouch_bt.commands.testing import bench_fuzz, mission_tests
 
 app = typer.Typer(
     name="glotouch",
@@ -92,8 +93,8 @@ def run(
     json_: Json = False,
 ) -> int:
     """Run a mission and write its record, result and report. `p` (or SIGUSR1) pauses it, SIGTERM ends it safely."""
-    from glotouch_bt import console
-    from glotouch_bt.operated import Operator, operated
+    from glotouch_bt.commands import console
+    from glotouch_bt.commands.operated import Operator, operated
     from glotouch_bt.study.launch import RunRequest, launch
 
     request = RunRequest(mission, backend, seed, read_settings(set_), objects, conditions, out, faults, may_kill=True)
@@ -122,7 +123,7 @@ def skills(
     name: Annotated[str | None, typer.Argument(metavar="NAME", help="one skill")] = None, json_: Json = False
 ) -> None:
     """List the installed skills, or describe one: parameters, units, ranges, ports."""
-    from glotouch_bt import console
+    from glotouch_bt.commands import console
     from glotouch_bt.mission.catalogue import describe_skill
     from glotouch_bt.mission.library import SkillShelf
 
@@ -140,7 +141,7 @@ def skills(
 @guarded
 def backends(json_: Json = False) -> None:
     """List the installed backends and whether they can be used here."""
-    from glotouch_bt import console
+    from glotouch_bt.commands import console
     from glotouch_bt.robot import BackendError, backend_entry_points, load_backend
 
     found: list[dict[str, Any]] = []

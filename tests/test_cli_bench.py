@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from glotouch_bt import cli, cli_bench
+from glotouch_bt import cli
+from glotouch_bt.commands import bench as bench_command
 from glotouch_bt.study import contact, detection, search
 from glotouch_bt.study.contact import METRICS, MORE, PAPER
 from glotouch_bt.study.search_summary import ERRORS, summarise
@@ -38,7 +39,7 @@ class NoPool:
 def command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[CliRunner]:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setattr(cli_bench, "ProcessPoolExecutor", NoPool)
+    monkeypatch.setattr(bench_command, "ProcessPoolExecutor", NoPool)
     yield CliRunner()
     cli._debug = False
 

@@ -13,11 +13,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from glotouch_bt.commands.operated import operated
 from glotouch_bt.mission.control import Control, Preempted, TimedPauses
 from glotouch_bt.mission.runner import Outcome, run_mission
 from glotouch_bt.mission.tally import NullRecord
 from glotouch_bt.motion import Arm
-from glotouch_bt.operated import operated
 from glotouch_bt.robot import Command, Observation, Robot, World
 from glotouch_bt.robot.fake import FakeRobot
 from glotouch_bt.study.pausing import EveryNthTick

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import typer
 
-from glotouch_bt.cli_replay import replay as replay_command
+from glotouch_bt.commands.replay import replay as replay_command
 from glotouch_bt.mission.control import Control
 from glotouch_bt.report import read_run
 from glotouch_bt.report.run_record import Event

@@ -11,7 +11,8 @@ from types import SimpleNamespace
 import pytest
 from typer.testing import CliRunner
 
-from glotouch_bt import cli, cli_bench
+from glotouch_bt import cli
+from glotouch_bt.commands import bench as bench_command
 from glotouch_bt.robot import BadInput
 from glotouch_bt.study.match import bench, closures, trials
 from glotouch_bt.study.match.bench import Campaign, objects_of, run_campaign
@@ -145,7 +146,7 @@ BAD = [
 def command(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setattr(cli_bench, "ProcessPoolExecutor", Threads)
+    monkeypatch.setattr(bench_command, "ProcessPoolExecutor", Threads)
     yield CliRunner()
     cli._debug = False
 

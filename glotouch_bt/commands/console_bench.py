@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.console import Console
 
-from glotouch_bt.console import print_table
+from glotouch_bt.commands.console import print_table
 
 
 def print_retrieve(summary: dict[str, Any], folder: Path) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from glotouch_bt.console import print_table
+from glotouch_bt.commands.console import print_table
 from glotouch_bt.study.faults_trial import VERDICTS
 
 

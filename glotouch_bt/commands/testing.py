@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.guarded import guarded
+from glotouch_bt.commands.guarded import guarded
 
 
 @guarded
@@ -57,12 +57,12 @@ def bench_fuzz(
     json_: Annotated[bool, typer.Option("--json", help="print summary.json on stdout, nothing else")] = False,
 ) -> int:
     """Random and spoilt missions and fault plans: no traceback, no hang, no code run, nothing wrong accepted."""
-    from glotouch_bt import console
-    from glotouch_bt.cli_bench import _folder
+    from glotouch_bt.commands import console
+    from glotouch_bt.commands.options import bench_folder
     from glotouch_bt.study.fuzz.campaign import FuzzCampaign, run_campaign
     from glotouch_bt.study.fuzz.trial import BAD
 
-    campaign = FuzzCampaign(trials, seed, _folder(out, "fuzz"))
+    campaign = FuzzCampaign(trials, seed, bench_folder(out, "fuzz"))
 
     def show(done: int, total: int, counts: Mapping[str, int]) -> None:
         bad = sum(counts.get(name, 0) for name in BAD)

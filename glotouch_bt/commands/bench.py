@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -13,7 +12,19 @@ from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.guarded import guarded
+from glotouch_bt.commands.guarded import guarded
+from glotouch_bt.commands.options import (
+    Conditions,
+    Json,
+    Objects,
+    Out,
+    Seed,
+    Trials,
+    Workers,
+    bench_folder,
+    check_names,
+    read_settings,
+)
 
 bench = typer.Typer(
     name="bench",
@@ -21,40 +32,6 @@ bench = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
 )
-
-Trials = Annotated[int, typer.Option(min=1, help="seeds per target")]
-Seed = Annotated[int, typer.Option(min=0, help="first seed")]
-Workers = Annotated[int, typer.Option(min=1, help="processes")]
-Conditions = Annotated[str, typer.Option(help="disturbances: ideal, nominal, harsh, or a file")]
-Objects = Annotated[Path | None, typer.Option(metavar="DIR", help="folder of watertight STL files in metres")]
-Out = Annotated[Path | None, typer.Option(metavar="DIR", help="where trials and summary go (default: runs/bench-...)")]
-Json = Annotated[bool, typer.Option("--json", help="print summary.json on stdout, nothing else")]
-
-
-def _check(conditions: str, backend: str) -> None:
-    """Before anything is written: both must exist.
-
-    Raises:
-        BadInput: One does not; the message lists those that do.
-    """
-    from glotouch_bt.mission.worlds import load_conditions
-    from glotouch_bt.robot import load_backend
-
-    load_conditions(conditions)
-    load_backend(backend)
-
-
-def _folder(out: Path | None, name: str) -> Path:
-    """Where the experiment's files go; nothing is left there yet.
-
-    Raises:
-        BadInput: No file can be written there.
-    """
-    from glotouch_bt.study.run_folder import RunFolder
-
-    folder = out or Path("runs") / f"{time.strftime('%Y%m%d-%H%M%S')}-bench-{name}"
-    RunFolder(folder).abandon()
-    return folder
 
 
 @bench.command()
@@ -76,8 +53,7 @@ def retrieve(
     json_: Json = False,
 ) -> None:
     """The whole mission for every target on every seed."""
-    from glotouch_bt import console_bench
-    from glotouch_bt.cli_doctor import read_settings
+    from glotouch_bt.commands import console_bench
     from glotouch_bt.mission.load import load_mission
     from glotouch_bt.robot import BadInput
     from glotouch_bt.study.retrieve import Campaign, run_campaign, targets_of
@@ -95,7 +71,7 @@ def retrieve(
         conditions=conditions,
         objects=objects,
         backend=backend,
-        out=_folder(out, "retrieve"),
+        out=bench_folder(out, "retrieve"),
         settings=settings,
         resume=resume,
     )
@@ -126,7 +102,7 @@ def speed(
     json_: Json = False,
 ) -> None:
     """A mission's wall time against its simulated time, and against its bare solver steps."""
-    from glotouch_bt import console_bench
+    from glotouch_bt.commands import console_bench
     from glotouch_bt.robot import BadInput
     from glotouch_bt.study.speed import SpeedStudy, run_study
 
@@ -143,7 +119,7 @@ def speed(
         conditions=conditions,
         objects=objects,
         backend=backend,
-        out=_folder(out, "speed"),
+        out=bench_folder(out, "speed"),
     )
 
     def show(row: Mapping[str, Any], done: int, total: int) -> None:
@@ -181,10 +157,10 @@ def search(
     json_: Json = False,
 ) -> None:
     """How soon every object is found, by policy: the mission, and its planar stand-in on the same and more layouts."""
-    from glotouch_bt import console_bench
+    from glotouch_bt.commands import console_bench
     from glotouch_bt.study.search import Campaign, run_campaign
 
-    _check(conditions, backend)
+    check_names(conditions, backend)
     campaign = Campaign(
         policies=tuple(p.strip() for p in policies.split(",") if p.strip()),
         seeds=tuple(range(seed, seed + trials)),
@@ -192,7 +168,7 @@ def search(
         conditions=conditions,
         objects=objects,
         backend=backend,
-        out=_folder(out, "search"),
+        out=bench_folder(out, "search"),
         resume=resume,
         recorded=tuple(recorded or ()),
     )
@@ -231,11 +207,11 @@ def match(
     json_: Json = False,
 ) -> None:
     """Which touched object is the target: the matchers and the paper's ablation on TouchSets of the real skills."""
-    from glotouch_bt import console_bench
+    from glotouch_bt.commands import console_bench
     from glotouch_bt.study.match.bench import Campaign, run_campaign
     from glotouch_bt.study.match.methods import chosen
 
-    _check(conditions, backend)
+    check_names(conditions, backend)
     campaign = Campaign(
         seeds=tuple(range(seed, seed + phases)),
         conditions=conditions,
@@ -244,7 +220,7 @@ def match(
         dataset=dataset,
         methods=chosen(method or ()),
         backend=backend,
-        out=_folder(out, "match"),
+        out=bench_folder(out, "match"),
     )
 
     def show(row: Mapping[str, Any], done: int, total: int) -> None:
@@ -274,11 +250,11 @@ def contact(
     json_: Json = False,
 ) -> None:
     """Calibration square traced by probe and by bare gripper, bolted down and free: errors and the paper's."""
-    from glotouch_bt import console_bench
+    from glotouch_bt.commands import console_bench
     from glotouch_bt.study.contact import Campaign, run_campaign
 
-    _check(conditions, "mujoco")
-    campaign = Campaign(tuple(range(seed, seed + trials)), conditions, per_side, "mujoco", _folder(out, "contact"))
+    check_names(conditions, "mujoco")
+    campaign = Campaign(tuple(range(seed, seed + trials)), conditions, per_side, "mujoco", bench_folder(out, "contact"))
 
     def show(row: dict[str, Any], done: int, total: int) -> None:
         said = row["cause"] or f"centre {row['centre_error_mm']:.2f} mm"
@@ -313,9 +289,9 @@ def detection(
 
     profiles = tuple(conditions or ("nominal", "harsh"))
     for profile in profiles:
-        _check(profile, backend)
+        check_names(profile, backend)
     seeds = tuple(range(seed, seed + trials))
-    study = DetectionStudy(profiles, seeds, hours, minutes, pushes, robots, backend, _folder(out, "detection"))
+    study = DetectionStudy(profiles, seeds, hours, minutes, pushes, robots, backend, bench_folder(out, "detection"))
     summary = run_study(study, lambda line: print(line, file=sys.stderr))
     if json_:
         sys.stdout.write(json.dumps(summary, indent=2) + "\n")

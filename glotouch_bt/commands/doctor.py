@@ -9,30 +9,12 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.guarded import guarded
+from glotouch_bt.commands.guarded import guarded
+from glotouch_bt.commands.options import bench_folder, read_settings
 
 Backend = Annotated[str, typer.Option(help="a registered backend (see: glotouch backends)")]
 Sets = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="a backend option")]
 Json = Annotated[bool, typer.Option("--json", help="print JSON on stdout, nothing else")]
-
-
-def read_settings(given: list[str] | None) -> dict[str, str]:
-    """NAME=VALUE words as a mapping.
-
-    Raises:
-        BadInput: A word without "=", or a name given twice.
-    """
-    from glotouch_bt.robot import BadInput
-
-    settings: dict[str, str] = {}
-    for item in given or []:
-        name, equals, value = item.partition("=")
-        if not equals or not name.strip():
-            raise BadInput(f"--set {item}: must be NAME=VALUE")
-        if name.strip() in settings:
-            raise BadInput(f"--set {name.strip()}: given twice")
-        settings[name.strip()] = value
-    return settings
 
 
 @guarded
@@ -44,10 +26,9 @@ def link(
     json_: Json = False,
 ) -> None:
     """How long one cycle takes, setpoint out to state in: p50, p99, p99.9."""
-    from glotouch_bt.cli_bench import _folder
     from glotouch_bt.study.link import LinkStudy, run_study
 
-    summary = run_study(LinkStudy(backend, _folder(out, "link"), read_settings(set_), duration))
+    summary = run_study(LinkStudy(backend, bench_folder(out, "link"), read_settings(set_), duration))
     if json_:
         sys.stdout.write(json.dumps(summary, indent=2) + "\n")
         return

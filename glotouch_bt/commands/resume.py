@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.guarded import guarded, showing_tracebacks
+from glotouch_bt.commands.guarded import guarded, showing_tracebacks
 
 Json = Annotated[bool, typer.Option("--json", help="print JSON on stdout, nothing else")]
 
@@ -26,7 +26,7 @@ def resume(
     json_: Json = False,
 ) -> int:
     """Go on with a run after a crash, a kill, Ctrl-C or a safety stop; finished skills are not done again."""
-    from glotouch_bt import console
+    from glotouch_bt.commands import console
     from glotouch_bt.study.going_on import GoingOn
     from glotouch_bt.study.resume import resume as go_on
 
@@ -74,16 +74,15 @@ def bench_resume(
     json_: Json = False,
 ) -> None:
     """Kill missions (SIGKILL) at random moments, resume them, and compare each with its unbroken twin."""
-    from glotouch_bt.cli_bench import _check, _folder
-    from glotouch_bt.cli_doctor import read_settings
+    from glotouch_bt.commands.options import bench_folder, check_names, read_settings
     from glotouch_bt.mission.load import load_mission
     from glotouch_bt.study.faults import few_objects
     from glotouch_bt.study.killing import KillStudy, run_study
 
     settings = read_settings(set_)
-    _check(conditions, "mujoco")
+    check_names(conditions, "mujoco")
     world = load_mission(mission, settings, objects=objects).world
-    folder = _folder(out, "resume")
+    folder = bench_folder(out, "resume")
     box, names = few_objects(world.objects, few, folder / "objects")
     settings = {"target": names[0], "expected_objects": str(len(names))} | settings
     load_mission(mission, settings, objects=box)
@@ -107,7 +106,7 @@ def bench_resume(
 
 
 def _list(folder: Path, json_: bool) -> None:
-    from glotouch_bt import console
+    from glotouch_bt.commands import console
     from glotouch_bt.mission.checkpoint import FILE, CheckpointFile
 
     file = CheckpointFile(folder / FILE)

@@ -10,8 +10,9 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.cli_doctor import Json, read_settings
-from glotouch_bt.guarded import guarded
+from glotouch_bt.commands.doctor import Json
+from glotouch_bt.commands.guarded import guarded
+from glotouch_bt.commands.options import read_settings
 
 
 @guarded
@@ -69,7 +70,7 @@ def check(
 
 
 def _show(given: str, found: Sequence[object], said: str, *, ok: bool) -> None:
-    from glotouch_bt.console_check import print_findings, texts_of
+    from glotouch_bt.commands.console_check import print_findings, texts_of
     from glotouch_bt.mission.findings import Finding
     from glotouch_bt.mission.library import shipped_root
 

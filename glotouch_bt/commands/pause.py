@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.guarded import guarded
+from glotouch_bt.commands.guarded import guarded
 
 
 @guarded
@@ -31,17 +31,16 @@ def bench_pause(
     json_: Annotated[bool, typer.Option("--json", help="print summary.json on stdout, nothing else")] = False,
 ) -> None:
     """Pause a mission at every n-th tick: does it end as its twin does, and keep the hard limit?"""
-    from glotouch_bt import console
-    from glotouch_bt.cli_bench import _check, _folder
-    from glotouch_bt.cli_doctor import read_settings
+    from glotouch_bt.commands import console
+    from glotouch_bt.commands.options import bench_folder, check_names, read_settings
     from glotouch_bt.mission.load import load_mission
     from glotouch_bt.study.pausing import PauseStudy, run_pauses
 
-    _check(conditions, backend)
+    check_names(conditions, backend)
     settings = read_settings(set_)
     load_mission(mission, settings, objects=objects)
     seeds = tuple(range(seed, seed + trials))
-    study = PauseStudy(mission, settings, seeds, every, pause, conditions, backend, objects, _folder(out, "pause"))
+    study = PauseStudy(mission, settings, seeds, every, pause, conditions, backend, objects, bench_folder(out, "pause"))
 
     def told(row: dict[str, Any], done: int, total: int) -> None:
         same = "as its twin" if row["same"] else f"NOT as its twin ({row['cause'] or row['retrieved']})"

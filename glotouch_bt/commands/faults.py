@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.guarded import guarded
+from glotouch_bt.commands.guarded import guarded
 
 
 @guarded
@@ -22,7 +22,7 @@ def faults(
     json_: Annotated[bool, typer.Option("--json", help="print JSON on stdout, nothing else")] = False,
 ) -> None:
     """List the faults a plan may ask for (glotouch run --faults FILE), or describe one."""
-    from glotouch_bt import console
+    from glotouch_bt.commands import console
     from glotouch_bt.faults.catalogue import CATALOGUE
     from glotouch_bt.mission.library import shipped
     from glotouch_bt.robot import UnknownName
@@ -74,9 +74,8 @@ def bench_faults(
     json_: Annotated[bool, typer.Option("--json", help="print summary.json on stdout, nothing else")] = False,
 ) -> None:
     """Break a mission on purpose: each class of fault in each skill, beside the unfaulted run of the same seed."""
-    from glotouch_bt import console_faults
-    from glotouch_bt.cli_bench import _check, _folder
-    from glotouch_bt.cli_doctor import read_settings
+    from glotouch_bt.commands import console_faults
+    from glotouch_bt.commands.options import bench_folder, check_names, read_settings
     from glotouch_bt.mission.load import load_mission
     from glotouch_bt.robot import GlotouchError
     from glotouch_bt.study.faults import Campaign, few_objects, run_campaign
@@ -84,17 +83,17 @@ def bench_faults(
     from glotouch_bt.study.faults_exhaustive import Exhaustive, run_exhaustive
 
     settings = read_settings(set_)
-    _check(conditions, backend)
+    check_names(conditions, backend)
     world = load_mission(mission, settings, objects=objects).world
     if exhaustive:
-        study = Exhaustive(mission, settings, backend, seed, stride, _folder(out, "faults-exhaustive"))
+        study = Exhaustive(mission, settings, backend, seed, stride, bench_folder(out, "faults-exhaustive"))
         found = run_exhaustive(study, lambda n, name: print(f"{name}: call {n}", file=sys.stderr))
         if json_:
             sys.stdout.write(json.dumps(found, indent=2) + "\n")
         else:
             console_faults.print_exhaustive(found, study.out)
         return
-    folder = _folder(out, "faults")
+    folder = bench_folder(out, "faults")
     box, names = few_objects(world.objects, few, folder / "objects")
     settings = {"target": names[0], "expected_objects": str(len(names))} | settings
     load_mission(mission, settings, objects=box)

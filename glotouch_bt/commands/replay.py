@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.guarded import guarded
+from glotouch_bt.commands.guarded import guarded
 
 SHOWN = 12
 

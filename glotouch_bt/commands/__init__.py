@@ -1,0 +1,1 @@
+"""The commands behind `glotouch`, one file each, and what they print."""
