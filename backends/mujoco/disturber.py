@@ -84,10 +84,23 @@ class MujocoDisturber:
         inside = [i for i in range(len(r.handles.object_bodies)) if i not in self._from]
         body = r.handles.container_body
         r.model.body_pos[body], r.model.body_quat[body] = new.position_m, new.quat
+        self._take_up_static_bodies()
         r.truth = replace(r.truth, pose_B_K=new)
         for index in inside:
             pose = body_pose(r.data, r.handles.object_bodies[index])
             self._place(index, change @ Pose(np.array(pose.position_m), np.array(pose.quat)))
+
+    def _take_up_static_bodies(self) -> None:
+        """MuJoCo computes where bodies without joints stand once, when its data are made or reset."""
+        model, data = self._robot.model, self._robot.data
+        fresh = mujoco.MjData(model)
+        bodies = np.flatnonzero(model.body_weldid == 0)
+        for name in ("xpos", "xquat", "xmat", "xipos", "ximat"):
+            getattr(data, name)[bodies] = getattr(fresh, name)[bodies]
+        for kind in ("geom", "site"):
+            of = np.flatnonzero(np.isin(getattr(model, f"{kind}_bodyid"), bodies))
+            for name in ("xpos", "xmat"):
+                getattr(data, f"{kind}_{name}")[of] = getattr(fresh, f"{kind}_{name}")[of]
 
     def _joint(self, index: int) -> int:
         joint = int(self._robot.model.body_jntadr[self._robot.handles.object_bodies[index]])

@@ -39,6 +39,12 @@ class Cell:
     def places(self) -> np.ndarray:
         return np.array([o.pose_B_O.position_m for o in self.referee.objects()])
 
+    def walls(self) -> np.ndarray:
+        """Where the container's geoms are when they collide."""
+        robot = self.device
+        mine = robot.model.geom_bodyid == robot.handles.container_body
+        return np.array(robot.data.geom_xpos[mine])
+
     def run(self, cycles: int) -> None:
         for _ in range(cycles):
             self.injector.cycle(HOLD)
@@ -92,7 +98,9 @@ def test_taken_away_and_put_back(folder: Path) -> None:
 def test_the_container_takes_its_content_along(folder: Path) -> None:
     cell = Cell(folder, "  - {fault: container_offset, with: {shift_m: [10 mm, 5 mm]}, when: {cycle: 5}, for: 1 s}")
     before, box = cell.places(), cell.referee.pose_B_K().position_m
+    walls = cell.walls()
     cell.run(60)
+    assert np.allclose(cell.walls() - walls, [0.01, 0.005, 0.0]), "its walls, as they collide"
     assert np.allclose(cell.referee.pose_B_K().position_m - box, [0.01, 0.005, 0.0])
     assert np.allclose(cell.places() - before, [0.01, 0.005, 0.0], atol=5e-4)
 

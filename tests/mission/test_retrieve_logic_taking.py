@@ -1,0 +1,125 @@
+"""missions/retrieve.yaml as a specification, continued: recognising, taking, the wrong object, the end."""
+
+from __future__ import annotations
+
+import pytest
+
+from glotouch_bt.mission_testing import fails, ok
+from tests.mission.retrieve_scripts import SAFE_END, SHELF, TAKE, Run, each_code, ended, retrieve, safely
+
+__all__ = ["retrieve"]
+
+# --- recognising -----------------------------------------------------------------------------------------------------
+
+
+@each_code("match")
+def test_thin_evidence_is_touched_again_until_it_is_known(retrieve: Run, code: str) -> None:
+    run = retrieve(
+        {"match": fails(code), "match 2": ok(), "touch_next": [ok(decided=False), ok(decided=False), ok(decided=True)]}
+    )
+    assert run.succeeded
+    assert run.ran("touch_next") == 3
+    assert run.before("touch_next", "match 2")
+
+
+def test_it_touches_no_more_than_told_and_then_decides(retrieve: Run) -> None:
+    run = retrieve({"match": fails("not_recognised"), "match 2": ok(), "touch_next": ok(decided=False)})
+    assert run.succeeded
+    assert run.ran("touch_next") == 12
+
+
+@each_code("touch_next")
+def test_what_cannot_be_touched_again_is_decided_as_it_is(retrieve: Run, code: str) -> None:
+    run = retrieve({"match": fails("not_recognised"), "match 2": ok(), "touch_next": fails(code)})
+    assert run.succeeded
+    assert run.ran("touch_next") == 1
+
+
+def test_what_is_not_recognised_is_not_taken(retrieve: Run) -> None:
+    run = retrieve({"match*": fails("not_recognised"), "touch_next": ok(decided=True)})
+    assert safely(run, "not_recognised")
+    assert (run.ran("match"), run.ran("match 2")) == (1, 1)
+    assert run.never_ran("grasp")
+
+
+# --- taking ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("node", "code"), [(s, c) for s in ("grasp", "lift", "hold_check") for c in SHELF[s].FAILURES])
+def test_what_is_not_held_is_put_back_and_taken_anew(retrieve: Run, node: str, code: str) -> None:
+    run = retrieve({node: [fails(code), fails(code), ok()]})
+    assert run.succeeded
+    stage = ["put_back", "wrist_check 6", "grasp", "lift", "hold_check"]
+    once = stage[: stage.index(node) + 1]
+    assert [c.node for c in run.calls_of("*/hold/*")] == once * 2 + stage
+
+
+def test_what_slips_three_times_is_left_where_it_was(retrieve: Run) -> None:
+    run = retrieve({"hold_check": fails("slipped")})
+    assert safely(run, "slipped")
+    assert (run.ran("grasp"), run.ran("put_back"), run.ran("put_back 2")) == (3, 3, 1)
+    assert run.never_ran("object_check")
+
+
+@each_code("put_back")
+def test_without_an_empty_hand_nothing_is_grasped(retrieve: Run, code: str) -> None:
+    run = retrieve({"put_back": fails(code), "put_back 2": fails(code)})
+    assert safely(run, code)
+    assert run.ran("put_back") == 3
+    assert run.never_ran("grasp")
+
+
+def test_the_wrist_is_zeroed_before_a_grasp_if_need_be(retrieve: Run) -> None:
+    run = retrieve({"wrist_check 6": fails("off_zero")})
+    assert run.succeeded
+    assert run.order[run.order.index("grasp") - 4 :][:4] == ["put_back", "wrist_check 6", "tare 4", "wrist_check 7"]
+    off = retrieve({"wrist_check 6": fails("off_zero"), "wrist_check 7": fails("off_zero")})
+    assert safely(off, "off_zero")
+    assert off.never_ran("grasp")
+
+
+# --- the wrong object ------------------------------------------------------------------------------------------------
+
+
+@each_code("object_check")
+def test_what_does_not_fit_is_put_back_and_the_next_one_is_taken(retrieve: Run, code: str) -> None:
+    run = retrieve({"object_check": [fails(code, fits=False, impossible=True), ok()], "reject": ok(rejected=(4,))})
+    assert run.succeeded
+    stage = ["match", "put_back", "wrist_check 6", "grasp", "lift", "hold_check", "object_check"]
+    assert [c.node for c in run.calls_of(TAKE)] == [*stage, "put_back 3", "reject", *stage]
+    assert run.calls_of("match")[1].inputs["rejected"] == (4,)
+    assert run.calls_of("reject")[0].params.most == 2
+
+
+def test_what_has_been_taken_in_vain_often_enough_ends_it(retrieve: Run) -> None:
+    run = retrieve({"object_check": fails("wrong_object", fits=False), "reject": [ok(), ok(), fails("wrong_object")]})
+    assert safely(run, "wrong_object")
+    assert (run.ran("grasp"), run.ran("reject")) == (3, 3)
+
+
+def test_however_it_goes_no_more_than_four_objects_are_taken(retrieve: Run) -> None:
+    run = retrieve({"object_check": fails("not_as_felt", fits=False)})
+    assert not run.succeeded
+    assert run.ran("grasp") == 4
+    assert ended(run)
+
+
+@each_code("put_back")
+def test_a_wrong_object_that_cannot_be_put_back_ends_it(retrieve: Run, code: str) -> None:
+    run = retrieve({"object_check": fails("wrong_object", fits=False), "put_back 3": fails(code)})
+    assert run.status == "failure"
+    assert ended(run)
+    assert run.never_ran("reject")
+
+
+# --- the end ---------------------------------------------------------------------------------------------------------
+
+
+@each_code("stow")
+def test_the_first_reason_is_kept_whatever_the_safe_ending_does(retrieve: Run, code: str) -> None:
+    run = retrieve({"match*": fails("too_wide"), SAFE_END: fails(code)})
+    assert safely(run, "too_wide")
+
+
+def test_a_mission_that_succeeds_holds_what_it_has(retrieve: Run) -> None:
+    assert retrieve().never_ran("stow*")
