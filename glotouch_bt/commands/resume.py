@@ -27,6 +27,7 @@ def resume(
 ) -> int:
     """Go on with a run after a crash, a kill, Ctrl-C or a safety stop; finished skills are not done again."""
     from glotouch_bt.commands import console
+    from glotouch_bt.commands.operated import Operator, operated
     from glotouch_bt.study.going_on import GoingOn
     from glotouch_bt.study.resume import resume as go_on
 
@@ -44,8 +45,16 @@ def resume(
         for note in found.notes:
             sys.stderr.write(f"note: {note}\n")
 
-    with console.RunProgress(quiet=json_) as progress:
-        done = go_on(folder, start=from_, out=out, on_found=tell, on_start=progress.start, on_progress=progress.update)
+    with console.RunProgress(quiet=json_) as progress, operated(Operator()) as control:
+        done = go_on(
+            folder,
+            start=from_,
+            out=out,
+            on_found=tell,
+            on_start=progress.start,
+            on_progress=progress.update,
+            control=control,
+        )
     if json_:
         sys.stdout.write(json.dumps({**done.result, "folder": str(done.folder)}, indent=2) + "\n")
     else:
