@@ -53,7 +53,13 @@ class Match(Skill):
         rejected = self.rejected or ()
         touchsets = tuple(t for t in self.touchsets or () if t.candidate.index not in rejected)
         if not touchsets:
-            raise SkillFailed("no_touch", "no candidate was squeezed, so nothing can be recognised")
+            raise SkillFailed(
+                "no_touch",
+                "no candidate was squeezed, so nothing can be recognised",
+                advice="squeeze the candidates first; the squeezes' own failures say why none was felt",
+                candidates=len(self.known or ()),
+                rejected=len(rejected),
+            )
         yield HOLD  # matching takes longer than a control period; on hardware the arm holds meanwhile
         gripper = self.context.arm.description.gripper
         mesh = self._target()

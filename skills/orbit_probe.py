@@ -78,7 +78,13 @@ class OrbitProbe(Skill):
         self.candidates, self.found, self.complete = known, len(known), belief.complete
         if belief.knows(first):
             self.map = belief.with_dropped(first.point_K_m)
-            raise SkillFailed("known_object", "the contact lies on an object that is traced already")
+            raise SkillFailed(
+                "known_object",
+                "the contact lies on an object that is traced already",
+                advice="sweep on: its place is dropped from the search",
+                x_K_m=float(first.point_K_m[0]),
+                y_K_m=float(first.point_K_m[1]),
+            )
         explorer = Explorer(self.context, self.tool, p.speeds(), self.event)
         if float(np.linalg.norm(explorer.tip_K_m - first.tip_K_m[:2])) > NEAR_M:
             yield from explorer.run(_back_to(first, p.clearance_m))

@@ -19,4 +19,9 @@ def finish(ticket: Ticket, what: str) -> SkillRun:
             break
         yield HOLD
     if not ticket.done or ticket.error:
-        raise SkillFailed("request_failed", f"{what} did not finish: {ticket.error or 'timed out'}")
+        raise SkillFailed(
+            "request_failed",
+            f"{what} did not finish: {ticket.error or 'timed out'}",
+            advice="see the device's own log; the skill may be tried again",
+            limit_periods=TIMEOUT_PERIODS,
+        )

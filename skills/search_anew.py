@@ -28,7 +28,7 @@ class SearchAnew(Skill):
         """See the class."""
         yield HOLD
         if self.before is None:
-            raise SkillFailed("nothing_searched", "there is no map yet")
+            raise SkillFailed("nothing_searched", "there is no map yet", advice="sweep first, with guarded_sweep")
         nowhere = np.zeros((0, 2))
         nowhere.setflags(write=False)
         self.map = replace(self.before, path_K_m=nowhere, dropped=nowhere)

@@ -72,7 +72,10 @@ class Squeeze(Skill):
         self.event("touchset", touchset=touchset, refusals=refusals)
         if not sequences:
             raise SkillFailed(
-                "no_squeeze", f"no squeeze of candidate {candidate.index} is possible: {'; '.join(refusals[:3])}"
+                "no_squeeze",
+                f"no squeeze of candidate {candidate.index} is possible: {'; '.join(refusals[:3])}",
+                advice="neighbours or walls leave the jaws no room; take away what stands beside it, or trace it again",
+                refusals=len(refusals),
             )
         if stable == 0:
             raise SkillFailed(

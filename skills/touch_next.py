@@ -93,7 +93,12 @@ class TouchNext(Skill):
         candidates: tuple[Candidate, ...] = self.candidates
         wanted = [c for c in candidates if c.index not in (self.rejected or ())]
         if not wanted:
-            raise SkillFailed("no_candidates", "there is no candidate to touch")
+            raise SkillFailed(
+                "no_candidates",
+                "there is no candidate to touch",
+                advice="explore first; candidates that were put back are not touched again",
+                candidates=len(candidates),
+            )
         touchsets: tuple[TouchSet, ...] = self.felt or ()
         if {t.candidate.index for t in touchsets} != {c.index for c in wanted}:
             felt = {t.candidate.index: t for t in touchsets}

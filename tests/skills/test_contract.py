@@ -114,3 +114,16 @@ def test_a_code_that_is_not_declared_fails_a_test_and_nothing_else() -> None:
     assert skill.reason.node == "x"
     skill._fail(Reason("known", ""))
     skill._fail(Reason("not_at_rest", ""))
+
+
+def test_every_failure_says_what_to_do() -> None:
+    """Every `SkillFailed(...)` of the skills carries an advice."""
+    silent = [
+        f"{path.name}:{call.lineno}"
+        for path in sorted(FOLDER.glob("*.py"))
+        for call in ast.walk(ast.parse(path.read_text()))
+        if isinstance(call, ast.Call)
+        and getattr(call.func, "id", "") == "SkillFailed"
+        and "advice" not in {k.arg for k in call.keywords}
+    ]
+    assert silent == []
