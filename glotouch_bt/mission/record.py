@@ -199,7 +199,8 @@ class Recorder:
 
     def _put_rows(self, topic: str, stamps_ns: plots.Stamps, messages: list[bytes]) -> None:
         channel = self._channel(topic)
-        self._pending.extend(zip(stamps_ns.tolist(), [channel] * len(messages), messages, strict=True))
+        log_ns = np.maximum(stamps_ns, 0).tolist()  # MCAP times are unsigned
+        self._pending.extend(zip(log_ns, [channel] * len(messages), messages, strict=True))
 
     def _encode_samples(self, observations: list[Observation]) -> None:
         """The full-rate block, and its decimation to plots: the newest sample of every second cycle."""

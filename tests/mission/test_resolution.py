@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from glotouch_bt.mission.record import Recorder
@@ -32,6 +32,7 @@ def observation(rng: np.random.Generator, start_s: float, n: int = 10) -> Observ
 
 
 @settings(max_examples=25, deadline=None)
+@example(seed=1, start_s=-0.01)
 @given(seed=st.integers(0, 2**32 - 1), start_s=st.floats(-0.01, 3600.0))
 def test_a_record_gives_back_what_the_skills_were_given(
     seed: int, start_s: float, tmp_path_factory: pytest.TempPathFactory
