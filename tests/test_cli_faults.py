@@ -61,3 +61,18 @@ def test_a_faulted_run_says_what_became_of_its_faults(tmp_path: Path) -> None:
     assert fault["effective"] is True
     assert fault["seen"]["code"] == "RuntimeError"
     assert "Injected faults" in (out / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--skill", "nobody"], "unknown skill that is broken here 'nobody'"),
+        (["--skill", "graps"], "did you mean 'grasp'"),
+        (["--fault", "touch_dead", "--skill", "grasp"], "no chosen fault acts there"),
+    ],
+)
+def test_what_cannot_be_tried_is_said_before_anything_runs(words: list[str], said: str, tmp_path: Path) -> None:
+    done = runner.invoke(app, ["bench", "faults", *words, "--out", str(tmp_path / "out")])
+    assert done.exit_code == 2
+    assert said in done.stderr
+    assert not (tmp_path / "out").exists()

@@ -79,11 +79,13 @@ def bench_faults(
     from glotouch_bt.mission.load import load_mission
     from glotouch_bt.robot import GlotouchError
     from glotouch_bt.study.faults import Campaign, few_objects, run_campaign
-    from glotouch_bt.study.faults_cases import SKILLS, chosen_cases
+    from glotouch_bt.study.faults_cases import chosen_cases, chosen_skills
     from glotouch_bt.study.faults_exhaustive import Exhaustive, run_exhaustive
 
     settings = read_settings(set_)
     check_names(conditions, backend)
+    cases = chosen_cases(fault or ())
+    skills = chosen_skills(skill or (), cases)
     world = load_mission(mission, settings, objects=objects).world
     if exhaustive:
         study = Exhaustive(mission, settings, backend, seed, stride, bench_folder(out, "faults-exhaustive"))
@@ -100,8 +102,8 @@ def bench_faults(
     campaign = Campaign(
         mission=mission,
         settings=settings,
-        cases=chosen_cases(fault or ()),
-        skills=tuple(skill or SKILLS),
+        cases=cases,
+        skills=skills,
         seeds=tuple(range(seed, seed + trials)),
         conditions=conditions,
         objects=box,

@@ -48,7 +48,8 @@ def replay(
             sys.stdout.write("\n".join(map(str, made)) + "\n" if made else "no decision was made in this run\n")
         return 0 if all(d.same for d in made) else 1
     columns = (TextColumn("replaying"), BarColumn(), TextColumn("{task.completed:.0f} of {task.total:.0f} s"))
-    with Progress(*columns, console=Console(stderr=True), transient=True, disable=json_) as progress:
+    err = Console(stderr=True)
+    with Progress(*columns, console=err, transient=True, disable=json_ or not err.is_terminal) as progress:
         task = progress.add_task("", total=1.0)
         done = run_replay(
             folder,

@@ -384,7 +384,3 @@ class Flow:
             ]
             whole = sets.union(*gathered)
         return After(sets.union(whole, part), after.failure, after.running)
-
-
-def check_flow(root: NodeSpec, findings: object) -> None:
-    """PLACEHOLDER so that others can load missions while the new check is being written: remove me."""

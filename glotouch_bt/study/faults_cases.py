@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,7 +10,7 @@ from glotouch_bt.faults.catalogue import CATALOGUE
 from glotouch_bt.faults.plan import FaultPlan, FaultSpec
 from glotouch_bt.faults.trigger import Lasting, Repeat, When
 from glotouch_bt.mission.source import Place
-from glotouch_bt.robot import UnknownName
+from glotouch_bt.robot import BadInput, UnknownName
 
 SKILLS = ("tool_pickup", "guarded_sweep", "orbit_probe", "touch_top", "tool_return", "squeeze", "grasp", "lift")
 _PROBING = ("guarded_sweep", "orbit_probe", "touch_top")
@@ -111,3 +111,20 @@ def chosen_cases(names: Iterable[str]) -> tuple[Case, ...]:
         if name not in known:
             raise UnknownName("class of faults", name, known)
     return tuple(known[n] for n in wanted) if wanted else CASES
+
+
+def chosen_skills(names: Iterable[str], cases: Sequence[Case]) -> tuple[str, ...]:
+    """The skills to break; all of them if there is no name.
+
+    Raises:
+        UnknownName: One is not broken by this bench.
+        BadInput: None of the cases acts in any of them.
+    """
+    wanted = tuple(names) or SKILLS
+    for name in wanted:
+        if name not in SKILLS:
+            raise UnknownName("skill that is broken here", name, SKILLS)
+    if not any(name in case.skills for case in cases for name in wanted):
+        acts = sorted({name for case in cases for name in case.skills})
+        raise BadInput(f"--skill {', '.join(wanted)}: no chosen fault acts there (they act in {', '.join(acts)})")
+    return wanted
