@@ -10,8 +10,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from glotouch_bt.mission_testing.call import Call
     from glotouch_bt.mission_testing.casting import ScriptError
-    from glotouch_bt.mission_testing.leaf import Call
     from glotouch_bt.mission_testing.outcomes import fails, hangs, ok, raises, real
     from glotouch_bt.mission_testing.scripted import ScriptedRun, run_scripted
     from glotouch_bt.mission_testing.standins import stand_in

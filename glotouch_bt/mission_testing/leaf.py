@@ -6,47 +6,15 @@ from collections.abc import Callable, Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Any
 
 from py_trees.common import Status
 
+from glotouch_bt.mission_testing.call import Call
 from glotouch_bt.mission_testing.outcomes import Decide, Outcome
 from glotouch_bt.mission_testing.standins import port_value
 from glotouch_bt.robot import HOLD
 from skills.base import Context, Skill, SkillFailed, SkillParams, SkillRun
-
-Ending = Literal["SUCCESS", "FAILURE", "PREEMPTED", "RAISED", "RUNNING"]
-
-
-@dataclass
-class Call:
-    """One call of a leaf.
-
-    Attributes:
-        node: Name of the node.
-        path: Path in the tree.
-        skill: Name of the skill.
-        number: How often the node had been called before.
-        start_s: Robot time since the start of the mission.
-        params: The skill's parameters.
-        inputs: Values of the input ports that are written.
-        outputs: Values of the output ports it wrote.
-        ending: How it ended.
-        code: Failure code, or empty.
-        end_s: Robot time at its end.
-    """
-
-    node: str
-    path: str
-    skill: str
-    number: int
-    start_s: float
-    params: SkillParams
-    inputs: Mapping[str, Any]
-    outputs: dict[str, Any] = field(default_factory=dict)
-    ending: Ending = "RUNNING"
-    code: str = ""
-    end_s: float = 0.0
 
 
 @dataclass

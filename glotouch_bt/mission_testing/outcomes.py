@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias, Union
 from glotouch_bt.robot import ParamError
 
 if TYPE_CHECKING:
-    from glotouch_bt.mission_testing.leaf import Call
+    from glotouch_bt.mission_testing.call import Call
 
 Kind = Literal["ok", "fails", "hangs", "raises", "real"]
 

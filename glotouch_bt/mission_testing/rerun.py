@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 from _pytest.runner import runtestprotocol
 
-from glotouch_bt.mission_testing.mutation import MutationScore, try_mutants
+from glotouch_bt.mission_testing.mutation import try_mutants
+from glotouch_bt.mission_testing.score import MutationScore
 from glotouch_bt.mission_testing.session import Session
 
 

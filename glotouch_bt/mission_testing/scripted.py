@@ -13,8 +13,9 @@ from glotouch_bt.mission.reasons import Failure
 from glotouch_bt.mission.runner import default_arm, run_mission
 from glotouch_bt.mission.tally import NullRecord, Record
 from glotouch_bt.mission_testing import casting
+from glotouch_bt.mission_testing.call import Call
 from glotouch_bt.mission_testing.casting import ScriptError
-from glotouch_bt.mission_testing.leaf import STAGE, Call, Part, Stage, playing
+from glotouch_bt.mission_testing.leaf import STAGE, Part, Stage, playing
 from glotouch_bt.mission_testing.outcomes import Script
 from glotouch_bt.mission_testing.skipping import PATIENT, SkippingRobot, may_skip
 from glotouch_bt.robot import Command, GlotouchError, Observation, Robot, World

@@ -10,9 +10,10 @@ import numpy as np
 
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.nodes import ConditionSettings, NodeSpec, TimeoutSettings
+from glotouch_bt.mission_testing.call import Call
 from glotouch_bt.mission_testing.casting import leaves_of
 from glotouch_bt.mission_testing.coverage import expected_endings
-from glotouch_bt.mission_testing.leaf import Call, promised
+from glotouch_bt.mission_testing.leaf import promised
 from glotouch_bt.mission_testing.outcomes import Outcome
 from glotouch_bt.mission_testing.scripted import RunsAway, ScriptedRun, run_scripted
 from glotouch_bt.mission_testing.standins import port_value, stand_in

@@ -12,7 +12,7 @@ from glotouch_bt.mission_testing.coverage import OutcomeCoverage
 from glotouch_bt.mission_testing.scripted import ScriptedRun
 
 if TYPE_CHECKING:
-    from glotouch_bt.mission_testing.mutation import MutationScore
+    from glotouch_bt.mission_testing.score import MutationScore
 
 
 class Session:
