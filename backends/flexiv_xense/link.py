@@ -73,7 +73,7 @@ class Link:
         self._alive, self._paced = alive, paced
         self._address, self._keys = address, keys
         self._context = zmq.Context()
-        self._name = uuid.uuid4().bytes
+        self._name = uuid.uuid4().hex.encode()  # in hex, so that no name ends as a heart's does, or begins with zero
         self._socket = self._connect(self._name)
         self.patient = False
         self._number = 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import uuid
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -68,3 +69,19 @@ def test_others_are_not_heard(server: str, keys: Path, who: str) -> None:
 def test_no_port_without_keys(address: str, text: str) -> None:
     with pytest.raises(ValueError, match=text):
         DriverSocket(address)
+
+
+@pytest.mark.parametrize("number", [int.from_bytes(bytes(15) + b"+"), int.from_bytes(b"\0" + b"+" * 15)])
+def test_any_name_a_client_draws_is_heard(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, number: int) -> None:
+    monkeypatch.setattr(uuid, "uuid4", lambda: uuid.UUID(int=number))
+    address, stop = f"ipc://{tmp_path / 'driver'}", threading.Event()
+    with DriverSocket(address) as socket:
+        thread = threading.Thread(target=answer_one, args=(socket, stop))
+        thread.start()
+        link = Link(address, lambda: None, paced=False)
+        try:
+            assert link.ask(HoldRequest(number=7), Accepted, limit_s=10.0).number == 7
+        finally:
+            link.close()
+            stop.set()
+            thread.join()
