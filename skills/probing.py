@@ -144,7 +144,7 @@ class Prober:
         gripper = arm.description.gripper
         R_S_B = gripper.pose_E_P.rotation @ arm.pose_B_P.rotation.T
         inertial = CommandedInertia(
-            self._carried, R_S_B @ direction_B, lambda: arm.along_m_s2, params.latency_s, params.rate_Hz
+            self._carried, R_S_B @ direction_B, lambda: arm.along_m_s2, self._tool.inertia_lag_s, arm.period_s
         )
         approach_B = None if any_direction else direction_B
         soft = ContactGuard(baseline, approach_B, self._tool.tip_P_m, gripper.pose_E_P, params, inertial)

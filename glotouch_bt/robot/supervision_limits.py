@@ -10,8 +10,8 @@ from glotouch_bt.robot.errors import ParamError
 GUARDS = {
     "not_finite": "a reading that is no number (single samples are dropped)",
     "stamps": "samples that do not follow each other in time (single samples are dropped)",
-    "samples_missing": "fewer samples than a control period has, again and again",
-    "overrun": "control periods that passed without a command while the arm moved",
+    "samples_missing": "less than half of the samples that a control period has, again and again",
+    "overrun": "control periods that passed without a command while the arm moved, very many or again and again",
     "joint_range": "a joint measured outside its range",
     "joint_speed": "a joint measured faster than its limit",
     "out_of_reach": "a pose that no arm of this size has, or a rotation that is none",
@@ -58,7 +58,8 @@ class SupervisionLimits:
             times that of harsh CONDITIONS (0.15 N sd jump by 0.17 N).
         live_taxels: Least share of a pad that gives numbers. Source: harsh CONDITIONS have 3 % dead; half of a pad
             cannot be matched.
-        late_periods: The arm may wait for so many periods while it moves. Source: the driver holds after 30 ms.
+        late_periods: The arm may wait for so many periods while it moves. Source: that of the watchdog (0.25 s). The
+            device holds by itself meanwhile (the driver after 30 ms), and looks at the hard limit.
         tolerated: Findings of one transient kind within `window_s` that are only put on record.
         window_s: See `tolerated`.
     """
@@ -80,7 +81,7 @@ class SupervisionLimits:
     most_noise_N: float = 0.5
     noise_over_s: float = 0.3
     live_taxels: float = 0.5
-    late_periods: float = 3.0
+    late_periods: float = 25.0
     tolerated: int = 5
     window_s: float = 1.0
 

@@ -20,7 +20,8 @@ from glotouch_bt.robot.supervision_signals import PadWatch, WristWatch
 STANDS_RAD_S = 0.01
 QUAT_SLACK = 0.01
 COMPLETE = 0.5
-"""A block with fewer than this share of its samples is not complete."""
+"""A block with fewer than this share of its samples is not complete. A device that is polled every millisecond by a loop
+that is not hard real time gives seven to nine of ten."""
 
 
 class SensedWatch:
@@ -94,7 +95,7 @@ class SensedWatch:
         found: list[Finding] = []
         if self._samples == 0:
             self._samples = self._count(o)
-        if abs(len(stamps) - self._samples) > 1 or not (
+        if len(stamps) < COMPLETE * self._samples or not (
             self._last_s < stamps[0] and stamps[-1] - self._last_s < self._late_s and all(map(lt, stamps, stamps[1:]))
         ):
             o = self._look_at_stamps(o, found)
@@ -164,11 +165,12 @@ class SensedWatch:
                 fatal = self._patience.ends("overrun", now_s)
             what = f"{periods:.1f} control periods passed in one cycle" + (" while the arm moved" * self._moving)
             found.append(Finding("overrun", what, periods, 1.0 + self._rules.late_periods, now_s, fatal))
-        missing = self._samples - len(o.stamp_s) - bad
-        if missing > 1:  # of ten, real devices give nine to eleven
-            short = len(o.stamp_s) < COMPLETE * self._samples
-            fatal = self._patience.ends("samples_missing", now_s, self._rules.tolerated if short else missing)
-            what = f"{missing} of {missing + len(o.stamp_s)} samples are missing"
+        expected = round(self._samples * periods)
+        missing = expected - len(o.stamp_s) - bad
+        if missing > 1 and len(o.stamp_s) < COMPLETE * expected:
+            unseen = max(1, missing // self._samples) if self._moving else 1
+            fatal = self._patience.ends("samples_missing", now_s, unseen)
+            what = f"{missing} of {expected} samples are missing"
             found.append(Finding("samples_missing", what, float(missing), float(self._rules.tolerated), now_s, fatal))
         return o
 

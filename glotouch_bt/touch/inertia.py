@@ -7,6 +7,7 @@ from the robot's and the probe's data, a from the motion plan.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -17,7 +18,7 @@ from glotouch_bt.robot import Array, Gripper, ParamError, Probe
 from glotouch_bt.robot.geometry import frozen_array
 
 TRACKING_S = 0.001
-"""The arm's acceleration follows the commanded one by this much (one servo step; 0-2 ms fit alike in simulation)."""
+"""The arm's acceleration follows the commanded one by this much where nobody has measured it (one servo step)."""
 
 
 @dataclass(frozen=True)
@@ -62,14 +63,15 @@ class Carried:
 class CommandedInertia:
     """The inertial wrench of a straight move, block by block, from the plan's acceleration along it.
 
-    Between two control periods the plan's acceleration is taken to run straight, and the sensor reports it late.
+    Within a control period the plan's acceleration is taken to run straight, to reach its value with the newest sample;
+    before it, however long that was, it stays. The sensor reports it late. Samples may be missing: stamps count.
 
     Args:
         carried: What is moved.
         direction_S: (3,) unit direction of the move in S.
         along_m_s2: Gives the commanded acceleration along the move at the end of the newest control period.
-        latency_s: Age of a wrench sample when it arrives.
-        rate_Hz: Sampling rate.
+        lag_s: The sensor reports it so much later than it was commanded.
+        period_s: Control period.
     """
 
     def __init__(
@@ -77,24 +79,29 @@ class CommandedInertia:
         carried: Carried,
         direction_S: Array,
         along_m_s2: Callable[[], float],
-        latency_s: float,
-        rate_Hz: float = 1000.0,
+        lag_s: float,
+        period_s: float = 0.01,
     ) -> None:
         self._unit = carried.wrench_S(direction_S)
-        self._along = along_m_s2
-        self._late = round((latency_s + TRACKING_S) * rate_Hz)
-        self._line: Array = np.zeros(self._late)
+        self._along, self._lag_s, self._period_s = along_m_s2, lag_s, period_s
+        self._stamps_s: list[float] = []
+        self._values_m_s2: list[float] = []
         self._last = 0.0
-        self._ramps: dict[int, Array] = {}
+        self._quiet_s = -math.inf
 
-    def __call__(self, n: int) -> Array:
-        """(n, 6) expected wrench of the next n samples, one control period's block."""
-        now, last = self._along(), self._last
-        if now == 0.0 == last and not np.count_nonzero(self._line):
-            return np.zeros((n, 6))
-        ramp = self._ramps.get(n)
-        if ramp is None:
-            ramp = self._ramps[n] = np.arange(1, n + 1) / n
-        line = np.concatenate([self._line, last + (now - last) * ramp])
-        self._line, self._last = line[n:], now
-        return line[:n, None] * self._unit
+    def __call__(self, stamp_s: Array) -> Array:
+        """(n, 6) expected wrench of the newest samples, those of `stamp_s` (n,), the robot's clock."""
+        now, last, end = self._along(), self._last, float(stamp_s[-1])
+        if now == 0.0 == last:
+            if float(stamp_s[0]) - self._lag_s > self._quiet_s:
+                return np.zeros((len(stamp_s), 6))
+        else:
+            self._quiet_s = end
+        stamps, values = self._stamps_s, self._values_m_s2
+        stamps += [max(end - self._period_s, stamps[-1]) if stamps else end - self._period_s, end]
+        values += [last, now]
+        self._last = now
+        line = np.interp(stamp_s - self._lag_s, stamps, values)
+        while len(stamps) > 2 and stamps[2] < end - self._lag_s:
+            del stamps[:2], values[:2]
+        return np.asarray(line[:, None] * self._unit)

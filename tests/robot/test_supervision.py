@@ -126,46 +126,63 @@ def missing(count: int) -> Spoil:
 
 
 def test_missing_samples_are_put_on_record_and_then_end_it() -> None:
-    robot, found = supervised(Device(missing(1)))
+    robot, found = supervised(Device(missing(3)))
     spin(robot, 30)
-    assert found == [], "real devices give nine to eleven of ten"
-    robot, found = supervised(Device(missing(2), since=5, until=7))
+    assert found == [], "a device that is polled gives seven to nine of ten"
+    robot, found = supervised(Device(missing(6), since=5, until=7))
     spin(robot, 30)
-    assert {f.guard for f in found} == {"samples_missing"}
+    assert {f.guard for f in found} == {"samples_missing", "overrun"}, "what came after them, came late"
     robot, found = supervised(Device(missing(6), since=5))
     with pytest.raises(GuardTripped, match="samples_missing"):
         spin(robot, 30)
 
 
 class Late(Device):
-    """Its clock runs on: so many extra periods pass in one cycle."""
+    """Its clock runs on: so many extra periods pass in one cycle, and their samples are lost or come with it."""
 
-    def __init__(self, extra: int, at: int) -> None:
-        self._extra, self._at = extra, at
+    def __init__(self, extra: int, at: int, *, lost: bool) -> None:
+        self._extra, self._at, self._lost = extra, at, lost
         super().__init__()
 
     def cycle(self, command: Command) -> Observation:
+        blocks = []
         if self.cycles == self._at:
-            for _ in range(self._extra):
-                super().cycle(HOLD)
-        return super().cycle(command)
+            blocks = [super(Late, self).cycle(HOLD) for _ in range(self._extra)]
+        newest = super().cycle(command)
+        if self._lost:
+            return newest
+        names = ("stamp_s", "q", "dq", "position_B_P", "quat_B_P", "wrench_S")
+        parts = {n: np.concatenate([getattr(b, n) for b in (*blocks, newest)]) for n in names}
+        return dataclasses.replace(newest, **parts)
 
 
 def move(k: int, home: Any) -> Command:
     return setpoint(np.array(home) + 0.001 * k * np.eye(7)[6], 0.1 * np.eye(7)[6])
 
 
-def test_a_gap_ends_a_motion_but_not_a_rest() -> None:
-    device = Late(10, 5)
+@pytest.mark.parametrize(("extra", "lost", "guard"), [(10, True, "samples_missing"), (40, False, "overrun")])
+def test_a_gap_ends_a_motion_but_not_a_rest(extra: int, lost: bool, guard: str) -> None:
+    device = Late(extra, 5, lost=lost)
     robot, found = supervised(device)
     spin(robot, 20)
-    assert [f.guard for f in found] == ["overrun", "samples_missing"][: len(found)]
-    device = Late(10, 5)
+    assert not any(f.fatal for f in found)
+    assert found[0].guard == "overrun"
+    device = Late(extra, 5, lost=lost)
     robot, _ = supervised(device)
     for k in range(5):
         robot.cycle(move(k + 1, device.description.home_q))
-    with pytest.raises(GuardTripped, match="overrun"):
+    with pytest.raises(GuardTripped, match=guard):
         robot.cycle(move(6, device.description.home_q))
+
+
+@pytest.mark.parametrize(("extra", "lost"), [(4, True), (7, False)])
+def test_a_late_cycle_now_and_then_is_put_on_record(extra: int, lost: bool) -> None:
+    device = Late(extra, 5, lost=lost)
+    robot, found = supervised(device)
+    for k in range(5):
+        robot.cycle(move(k + 1, device.description.home_q))
+    robot.cycle(move(6, device.description.home_q))
+    assert {f.guard for f in found} == {"overrun"} | ({"samples_missing"} if lost else set())
 
 
 def test_how_many_samples_a_period_has_is_learnt_from_the_first_block_of_several() -> None:
@@ -181,7 +198,7 @@ def test_how_many_samples_a_period_has_is_learnt_from_the_first_block_of_several
     spin(robot, 5)
     assert found == []
     with pytest.raises(GuardTripped, match="6 of 10 samples are missing"):
-        spin(robot, 5)
+        spin(robot, 6)
 
 
 def test_an_arm_that_moves_while_it_is_held_is_noticed() -> None:

@@ -46,13 +46,30 @@ def test_commanded_inertia_is_the_plan_drawn_straight_and_late(plan, late):
     plan = [*plan, 0.0, 0.0]
     newest = [0.0]
     u = np.array([0.0, 0.0, 1.0])
-    inertia = CommandedInertia(HAND, u, lambda: newest[0], late * 1e-3 - 1e-3 if late else -1e-3)
+    inertia = CommandedInertia(HAND, u, lambda: newest[0], late * 1e-3)
+    stamps = 5.0 + 1e-3 * np.arange(1, 10 * len(plan) + 1)
     got = []
-    for newest[0] in plan:
-        got.append(inertia(10)[:, 2])
-    t = np.arange(10 * len(plan)) - late
-    want = -HAND.mass_kg * np.interp(t, np.arange(len(plan) + 1) * 10 - 1, [0.0, *plan])
-    np.testing.assert_allclose(np.concatenate(got), want, atol=1e-12)
+    for k, newest[0] in enumerate(plan):
+        got.append(inertia(stamps[10 * k : 10 * k + 10])[:, 2])
+    want = -HAND.mass_kg * np.interp(stamps - late * 1e-3, 5.0 + 1e-2 * np.arange(len(plan) + 1), [0.0, *plan])
+    np.testing.assert_allclose(np.concatenate(got), want, atol=1e-9)
+
+
+@given(st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=12), st.integers(0, 2**32 - 1))
+def test_missing_samples_change_nothing_for_the_others(plan, seed):
+    """Each sample's wrench depends on its stamp alone; a period in which the arm stood waiting counts as standing."""
+    rng = np.random.default_rng(seed)
+    plan, newest, lag = [*plan, 0.0, 0.0], [0.0], 0.0035
+    ends = 0.01 * np.arange(1, len(plan) + 1) + np.cumsum(rng.choice([0.0, 0.0, 0.3], len(plan)))
+    inertias = [CommandedInertia(HAND, np.array([0.0, 0.0, 1.0]), lambda: newest[0], lag) for _ in range(2)]
+    before = 0.0
+    for newest[0], end in zip(plan, ends, strict=True):
+        stamps = np.arange(before + 1e-3, end + 5e-4, 1e-3)
+        kept = rng.random(len(stamps)) < 0.6
+        kept[-1] = True
+        whole, thinned = inertias[0](stamps), inertias[1](stamps[kept])
+        np.testing.assert_allclose(whole[kept], thinned, atol=1e-9)
+        before = stamps[-1]
 
 
 @pytest.mark.parametrize("direction", [[1.0, 0, 0], [0, 0, -1.0], [0.6, 0, -0.8]])
@@ -68,7 +85,7 @@ def test_a_start_and_a_stop_are_no_contact_but_would_be_one(bench, direction):
     outcome = []
     for taken_out in (True, False):
         newest = [0.0]
-        inertia = CommandedInertia(HAND, R_B_S.T @ u, lambda newest=newest: newest[0], 0.003) if taken_out else None
+        inertia = CommandedInertia(HAND, R_B_S.T @ u, lambda newest=newest: newest[0], 0.004) if taken_out else None
         guard = ContactGuard(fit_baseline(rest), u, TIP_P, POSE_E_P, GuardParams(), inertia)
         onset = None
         for k, b in enumerate(blocks):
