@@ -20,8 +20,8 @@ from glotouch_bt.robot.supervision_signals import PadWatch, WristWatch
 STANDS_RAD_S = 0.01
 QUAT_SLACK = 0.01
 COMPLETE = 0.5
-"""A block with fewer than this share of its samples is not complete. A device that is polled every millisecond by a loop
-that is not hard real time gives seven to nine of ten."""
+"""A block with fewer than this share of its samples is not complete. A device that is polled every millisecond,
+by a loop that is not hard real time, gives seven to nine of ten."""
 
 
 class SensedWatch:

@@ -198,7 +198,7 @@ def test_how_many_samples_a_period_has_is_learnt_from_the_first_block_of_several
     spin(robot, 5)
     assert found == []
     with pytest.raises(GuardTripped, match="6 of 10 samples are missing"):
-        spin(robot, 6)
+        spin(robot, 10)
 
 
 def test_an_arm_that_moves_while_it_is_held_is_noticed() -> None:
