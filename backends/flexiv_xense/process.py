@@ -59,6 +59,7 @@ class DriverProcess:
         python = self._options.python
         module = HERE if python == sys.executable else INSTALLED
         arguments = ["--address", self.address, "--log", str(self.driver_log), "--private", str(self.folder)]
+        arguments += [] if self._options.lockstep else ["--urgent"]
         self._process = self._spawn([python, "-m", module, *arguments], "driver.txt")
 
     def _spawn(self, command: list[str], output: str) -> subprocess.Popen[bytes]:

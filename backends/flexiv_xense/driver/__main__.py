@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 from .endpoint import DriverSocket
+from .priority import DRIVER, hurry
 from .serve import Log, serve
 
 
@@ -20,6 +21,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--keys", type=Path, help="folder with driver.key_secret and clients/*.key (CURVE)")
     parser.add_argument("--log", type=Path, help="append one JSON line per event here")
     parser.add_argument("--private", type=Path, help="remove this folder at the end if who started us was killed")
+    parser.add_argument("--urgent", action="store_true", help="ask for real-time priority; go on without if refused")
     parser.add_argument("--stay", action="store_true", help="wait for the next client when one has gone")
     options = parser.parse_args(argv)
     starter = os.getppid()
@@ -27,6 +29,8 @@ def main(argv: list[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, lambda number, _: stopped.append(number))
     signal.signal(signal.SIGINT, lambda number, _: stopped.append(number))
     log = Log(options.log)
+    if options.urgent:  # before any thread is started: they inherit it
+        log("priority", granted=hurry(DRIVER))
     while True:
         try:
             socket = DriverSocket(options.address, options.keys)

@@ -23,6 +23,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from backends.flexiv_xense.driver.priority import DEVICES, hurry
 from backends.flexiv_xense.simulated.vendor import SimulatedVendor, assemble
 from backends.flexiv_xense.simulated.wire import NEW, REFEREE, Reference
 from backends.flexiv_xense.simulated.world import SimulatedWorld
@@ -222,6 +223,7 @@ def main(argv: list[str]) -> int:
     """The process; see the module's text."""
     world_file, address, log_file = argv
     world = SimulatedWorld.unpickle(Path(world_file).read_bytes())
+    granted = hurry(DEVICES)
     with Path(log_file).open("a") as log, Listener(address, family="AF_UNIX") as listener:
         cell = Cell(world, log)
 
@@ -231,7 +233,7 @@ def main(argv: list[str]) -> int:
         signal.signal(signal.SIGTERM, end)
         signal.signal(signal.SIGINT, end)
         threading.Thread(target=cell.serve, args=(listener,), daemon=True).start()
-        cell.write("ready")
+        cell.write("ready", urgent=granted)
         cell.live()
         cell.write("end", peak_force_N=world.peak_force_N)
     return 0
