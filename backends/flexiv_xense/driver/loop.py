@@ -9,6 +9,7 @@ never made up: the arm is held meanwhile.
 
 from __future__ import annotations
 
+import gc
 import time
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
@@ -173,6 +174,8 @@ class Paced(_Loop):
         steps = round(period_s / SAMPLE_S)
         socket.send(session.block(0, tactile=False))
         waiting: Cycle | None = None
+        gc.collect()
+        gc.freeze()  # a full collection takes longer than a sample may be late
         begin = due = clock.now_s()
         heard = commanded = beaten = begin
         late = tick = 0
@@ -181,6 +184,7 @@ class Paced(_Loop):
             due += SAMPLE_S
             now = clock.now_s()
             if now - due > BEHIND_S:
+                self._log("late", by_s=now - due)
                 due = now
             tick += 1
             try:

@@ -10,6 +10,7 @@ It ends when it is told to (SIGTERM), or ALONE_S after its last client once the 
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import signal
@@ -136,6 +137,8 @@ class Cell:
 
     def live(self) -> None:
         """Step at the wall's pace until the end."""
+        gc.collect()
+        gc.freeze()  # a full collection would look at the whole world, for longer than a step may take
         begin, slept = time.monotonic() - self.world.now_s, threading.Event()
         while not self.ended:
             with self.turn:
@@ -152,6 +155,7 @@ class Cell:
             if left > 0.0:
                 slept.wait(left)
             elif left < -BEHIND_S:
+                self.write("late", by_s=-left)
                 begin = now - self.world.now_s
 
     # --- clients ----------------------------------------------------------------------------------------------------
