@@ -1,4 +1,7 @@
-"""Hands inside the simulated world, for faults: they change MuJoCo's state between two cycles."""
+"""Hands inside the simulated world, for faults: they change MuJoCo's state between two cycles.
+
+They move nothing through the robot: `Room` is asked first, and what has none is left as it is (`NoRoom`).
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,10 @@ import mujoco
 import numpy as np
 
 from backends.mujoco.model import Handles
+from backends.mujoco.room import Room
 from backends.mujoco.tactile import body_pose
 from backends.mujoco.truth import Truth, rotation_vector
+from backends.mujoco.wrench import GRAVITY_M_S2
 from glotouch_bt.robot import Array, BadInput, Pose, World
 
 AWAY_B_M = (-0.7, 0.8)
@@ -18,6 +23,10 @@ AWAY_B_M = (-0.7, 0.8)
 AWAY_STEP_M = 0.25
 LIFT_M = 0.002
 """What is put down is put down from so high."""
+WAY_STEP_M, TURN_STEP_RAD = 0.002, np.deg2rad(5.0)
+"""How finely a way is looked at: the probe's shaft is three times as thick as the first."""
+LEAST_FRICTION = 0.3
+"""A knocked object slides no farther than with this coefficient."""
 
 
 class Disturbed(Protocol):
@@ -35,6 +44,7 @@ class MujocoDisturber:
 
     def __init__(self, robot: Disturbed) -> None:
         self._robot = robot
+        self._room = Room(robot)
         self._from: dict[int, Pose] = {}
 
     def places_B_m(self) -> Array:
@@ -43,28 +53,41 @@ class MujocoDisturber:
 
     def shove(self, index: int, velocity_B_m_s: Array) -> None:
         """See `Disturber`."""
-        self._robot.data.qvel[self._dof(index)][:2] += np.asarray(velocity_B_m_s)
+        r, velocity = self._robot, np.asarray(velocity_B_m_s, dtype=np.float64)
+        body = r.handles.object_bodies[index]
+        speed = float(np.linalg.norm(velocity))
+        far = velocity * speed / (2.0 * LEAST_FRICTION * GRAVITY_M_S2)
+        pose, count = self._pose(index), int(np.ceil(np.linalg.norm(far) / WAY_STEP_M))
+        steps = np.linspace(0.0, 1.0, count + 1)[1:, None] * np.array([*far, 0.0])
+        self._room.require({body}, [{body: Pose(pose.position_m + s, pose.quat)} for s in steps], rests=False)
+        r.data.qvel[self._dof(index)][:2] += velocity
 
     def topple(self, index: int, about_rad: float) -> float:
         """See `Disturber`."""
         r = self._robot
         body = r.handles.object_bodies[index]
         before = np.array(r.data.xipos[body])
+        pose = self._pose(index)
         axis = np.array([np.cos(about_rad), np.sin(about_rad), 0.0])
-        pose = body_pose(r.data, body)
-        floor_m = self._lowest(index, pose)
-        turned = Pose(np.zeros(3), rotation_vector(0.5 * np.pi * axis).quat) @ Pose(np.zeros(3), pose.quat)
-        centre_O = pose.inverse().apply(before)
-        laid = Pose(before - turned.apply(centre_O), turned.quat)
-        rise = floor_m + LIFT_M - self._lowest(index, laid)
-        self._place(index, Pose(laid.position_m + np.array([0.0, 0.0, rise]), laid.quat))
+        floor_m, centre_O = self._lowest(index, pose), pose.inverse().apply(before)
+
+        def turned(angle_rad: float) -> Pose:
+            """About its centre of mass, as high as it must be."""
+            quat = (Pose(np.zeros(3), rotation_vector(angle_rad * axis).quat) @ Pose(np.zeros(3), pose.quat)).quat
+            at = Pose(before - Pose(np.zeros(3), quat).apply(centre_O), quat)
+            rise = floor_m + LIFT_M - self._lowest(index, at)
+            return Pose(at.position_m + np.array([0.0, 0.0, rise]), quat)
+
+        angles = np.linspace(0.0, 0.5 * np.pi, round(0.5 * np.pi / TURN_STEP_RAD) + 1)[1:]
+        self._room.require({body}, [{body: turned(float(a))} for a in angles])
+        self._place(index, turned(0.5 * np.pi))
         return float(np.linalg.norm(r.data.xipos[body] - before))
 
     def remove(self, index: int) -> None:
         """See `Disturber`."""
-        r = self._robot
-        pose = body_pose(r.data, r.handles.object_bodies[index])
-        self._from[index] = Pose(np.array(pose.position_m), np.array(pose.quat))
+        r, pose = self._robot, self._pose(index)
+        self._room.require({r.handles.object_bodies[index]})
+        self._from[index] = pose
         table_z = float(r.world.container.pose_B_K.position_m[2]) - r.world.container.wall_m
         place = np.array([AWAY_B_M[0], AWAY_B_M[1] - AWAY_STEP_M * index, 0.0])
         away = Pose(place, pose.quat)
@@ -72,23 +95,40 @@ class MujocoDisturber:
 
     def put_back(self, index: int) -> None:
         """See `Disturber`."""
-        pose = self._from.pop(index)
-        self._place(index, Pose(pose.position_m + np.array([0.0, 0.0, LIFT_M]), pose.quat))
+        was = self._from[index]
+        there = Pose(was.position_m + np.array([0.0, 0.0, LIFT_M]), was.quat)
+        body = self._robot.handles.object_bodies[index]
+        self._room.require({body}, [{body: there}])
+        del self._from[index]
+        self._place(index, there)
 
     def shift_container(self, shift_B_m: Array, yaw_rad: float) -> None:
         """See `Disturber`."""
         r = self._robot
-        old = r.truth.pose_B_K
-        new = Pose(old.position_m + np.array([*shift_B_m, 0.0]), (old @ Pose.planar((0.0, 0.0, 0.0), yaw_rad)).quat)
+        old, body = r.truth.pose_B_K, r.handles.container_body
+        away, held = set(self._from), self._room.held()
+        inside = [i for i, b in enumerate(r.handles.object_bodies) if i not in away and b not in held]
+        places = {i: self._pose(i) for i in inside}
+
+        def moved(share: float) -> tuple[Pose, dict[int, Pose]]:
+            """The container, and each body's pose, after so much of the way."""
+            turn = old @ Pose.planar((0.0, 0.0, 0.0), share * yaw_rad)
+            new = Pose(old.position_m + share * np.array([*shift_B_m, 0.0]), turn.quat)
+            change = new @ old.inverse()
+            return new, {r.handles.object_bodies[i]: change @ places[i] for i in inside}
+
+        interior = r.world.container.interior_m
+        longest = float(np.linalg.norm(shift_B_m)) + abs(yaw_rad) * 0.5 * float(np.hypot(interior[0], interior[1]))
+        count = max(1, int(np.ceil(longest / WAY_STEP_M)))
+        way = [{body: new, **poses} for new, poses in (moved(float(s)) for s in np.linspace(0.0, 1.0, count + 1)[1:])]
+        self._room.require({body, *(r.handles.object_bodies[i] for i in inside)}, way, container=True)
+        new, _ = moved(1.0)
         change = new @ old.inverse()
-        inside = [i for i in range(len(r.handles.object_bodies)) if i not in self._from]
-        body = r.handles.container_body
         r.model.body_pos[body], r.model.body_quat[body] = new.position_m, new.quat
         self._take_up_static_bodies()
         r.truth = replace(r.truth, pose_B_K=new)
         for index in inside:
-            pose = body_pose(r.data, r.handles.object_bodies[index])
-            self._place(index, change @ Pose(np.array(pose.position_m), np.array(pose.quat)))
+            self._place(index, change @ places[index])
 
     def _take_up_static_bodies(self) -> None:
         """MuJoCo computes where bodies without joints stand once, when its data are made or reset."""
@@ -101,6 +141,16 @@ class MujocoDisturber:
             of = np.flatnonzero(np.isin(getattr(model, f"{kind}_bodyid"), bodies))
             for name in ("xpos", "xmat"):
                 getattr(data, f"{kind}_{name}")[of] = getattr(fresh, f"{kind}_{name}")[of]
+
+    def _pose(self, index: int) -> Pose:
+        """Where an object's body is, as a copy.
+
+        Raises:
+            BadInput: The objects are bolted down.
+        """
+        self._joint(index)
+        pose = body_pose(self._robot.data, self._robot.handles.object_bodies[index])
+        return Pose(np.array(pose.position_m), np.array(pose.quat))
 
     def _joint(self, index: int) -> int:
         joint = int(self._robot.model.body_jntadr[self._robot.handles.object_bodies[index]])

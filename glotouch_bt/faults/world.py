@@ -1,17 +1,28 @@
-"""Faults of the world itself, in simulation only: objects pushed, toppled, taken away or added, the container moved."""
+"""Faults of the world itself, in simulation only: objects pushed, toppled, taken away or added, the container moved.
+
+Nothing is moved through the robot, out of its jaws or away from under its touch: a jump of the world would press the
+hand as nothing in the world can. So such a fault may have to wait; its report says for how long and for what.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
 
 from glotouch_bt.faults.effect import Effect, FaultParams, Scene, param, require_disturber
-from glotouch_bt.robot import Array, Observation
+from glotouch_bt.robot import Array, Command, Observation
+from glotouch_bt.robot.disturber import NoRoom
 
 Which = Literal["nearest", "farthest", "random"]
 SLIDE_S = 0.5
 """A knocked object has come to rest by then."""
+ASK_AGAIN_S = 0.05
+"""A fault that has no room asks again after so long."""
+WAYS = 12
+"""So many directions, evenly spaced from the one that was drawn, are tried."""
 WHICH = "Which object: nearest to or farthest from the pads, or any"
 
 
@@ -22,11 +33,67 @@ class ObjectParams(FaultParams):
 
 
 class WorldEffect(Effect):
-    """Acts once when it begins."""
+    """Acts once: when it begins, or as soon after that as there is room."""
 
     def __init__(self, params: Any, scene: Scene) -> None:
         super().__init__(params, scene)
         self.hands = require_disturber(scene)
+        self._why = ""
+
+    def begin(self) -> None:
+        """See `Effect`."""
+        self._since_s = self.scene.sensed.now_s
+        self.draw()
+        self._try()
+
+    def command(self, command: Command) -> Command:
+        """See `Effect`; the command is left as it is."""
+        if not self.acts.times and self.scene.sensed.now_s >= self._again_s - 1e-9:
+            self._try()
+        return command
+
+    def end(self) -> None:
+        """See `Effect`."""
+        if not self.acts.times:
+            self.acts.notes.append(f"never had room: {self._why}")
+
+    def draw(self) -> None:
+        """Choose what shall happen, once."""
+
+    def act(self) -> None:
+        """Do it, and count it.
+
+        Raises:
+            NoRoom: Not now.
+        """
+        raise NotImplementedError
+
+    def _try(self) -> None:
+        now_s = self.scene.sensed.now_s
+        try:
+            self.act()
+        except NoRoom as e:
+            self._why, self._again_s = str(e), now_s + ASK_AGAIN_S
+            return
+        if self._why:
+            self.acts.notes.append(f"after {now_s - self._since_s:.2f} s without room: {self._why}")
+
+    def some_way(self, first_rad: float, go: Callable[[float], object]) -> None:
+        """Go in the drawn direction, or in the nearest to it that has room.
+
+        Raises:
+            NoRoom: None has; why the first has not.
+        """
+        refused: NoRoom | None = None
+        for k in range(WAYS):
+            turn = (k + 1) // 2 * (1 if k % 2 else -1)
+            try:
+                go(first_rad + turn * 2.0 * math.pi / WAYS)
+                return
+            except NoRoom as e:
+                refused = refused or e
+        assert refused is not None
+        raise refused
 
     def chosen(self, which: Which) -> int:
         """Index of the object the plan means."""
@@ -51,17 +118,23 @@ class ShoveParams(ObjectParams):
 
 
 class Shove(WorldEffect):
-    """An object is knocked and slides in a random direction: some 20 mm at 0.5 m/s."""
+    """An object is knocked and slides: some 20 mm at 0.5 m/s, in a random direction, but not into the robot."""
 
     Params = ShoveParams
     params: ShoveParams
 
-    def begin(self) -> None:
-        """See `Effect`."""
-        index, angle = self.chosen(self.params.which), float(self.scene.rng.uniform(-np.pi, np.pi))
-        self._index, self._before, self._until_s = index, self.hands.places_B_m(), self.scene.sensed.now_s + SLIDE_S
-        self.hands.shove(index, self.params.speed_m_s * np.array([np.cos(angle), np.sin(angle)]))
-        self.note(index, self._before, f"shoved at {self.params.speed_m_s:g} m/s")
+    def draw(self) -> None:
+        """See `WorldEffect`."""
+        self._index, self._angle = self.chosen(self.params.which), float(self.scene.rng.uniform(-np.pi, np.pi))
+        self._until_s = -math.inf
+
+    def act(self) -> None:
+        """See `WorldEffect`."""
+        speed = self.params.speed_m_s
+        self._before = self.hands.places_B_m()
+        self.some_way(self._angle, lambda a: self.hands.shove(self._index, speed * np.array([np.cos(a), np.sin(a)])))
+        self._until_s = self.scene.sensed.now_s + SLIDE_S
+        self.note(self._index, self._before, f"shoved at {speed:g} m/s")
 
     def sense(self, observation: Observation) -> Observation:
         """See `Effect`; nothing is altered, how far it slid is measured."""
@@ -72,17 +145,20 @@ class Shove(WorldEffect):
 
 
 class Topple(WorldEffect):
-    """An object is laid on its side."""
+    """An object is laid on its side, where there is room for that."""
 
     Params = ObjectParams
     params: ObjectParams
 
-    def begin(self) -> None:
-        """See `Effect`."""
-        index = self.chosen(self.params.which)
+    def draw(self) -> None:
+        """See `WorldEffect`."""
+        self._index, self._angle = self.chosen(self.params.which), float(self.scene.rng.uniform(-np.pi, np.pi))
+
+    def act(self) -> None:
+        """See `WorldEffect`."""
         before = self.hands.places_B_m()
-        self.hands.topple(index, float(self.scene.rng.uniform(-np.pi, np.pi)))
-        self.note(index, before, "toppled")
+        self.some_way(self._angle, lambda a: self.hands.topple(self._index, a))
+        self.note(self._index, before, "toppled")
 
 
 class Remove(WorldEffect):
@@ -91,11 +167,15 @@ class Remove(WorldEffect):
     Params = ObjectParams
     params: ObjectParams
 
-    def begin(self) -> None:
-        """See `Effect`."""
-        index, before = self.chosen(self.params.which), self.hands.places_B_m()
-        self.hands.remove(index)
-        self.note(index, before, "taken away")
+    def draw(self) -> None:
+        """See `WorldEffect`."""
+        self._index = self.chosen(self.params.which)
+
+    def act(self) -> None:
+        """See `WorldEffect`."""
+        before = self.hands.places_B_m()
+        self.hands.remove(self._index)
+        self.note(self._index, before, "taken away")
 
 
 class Add(WorldEffect):
@@ -109,8 +189,8 @@ class Add(WorldEffect):
         self._index = self.chosen(self.params.which)
         self.hands.remove(self._index)
 
-    def begin(self) -> None:
-        """See `Effect`."""
+    def act(self) -> None:
+        """See `WorldEffect`."""
         before = self.hands.places_B_m()
         self.hands.put_back(self._index)
         self.note(self._index, before, "added")
@@ -129,8 +209,8 @@ class ContainerOffset(WorldEffect):
     Params = OffsetParams
     params: OffsetParams
 
-    def begin(self) -> None:
-        """See `Effect`."""
+    def act(self) -> None:
+        """See `WorldEffect`."""
         p = self.params
         self.hands.shift_container(np.array(p.shift_m), p.yaw_rad)
         self.acts.times += 1
