@@ -8,7 +8,6 @@ import numpy as np
 
 from glotouch_bt.robot import Array, Pose, World
 from glotouch_bt.touch import GuardParams
-from glotouch_bt.touch.inertia import TRACKING_S
 from glotouch_bt.touch.localisation import Disc, Section, section_point
 
 
@@ -26,7 +25,6 @@ class HeldTool:
             Heights measured with this tool subtract it.
         section: Its planar section about the reference point, in P's x and y; None: the ball's disc.
         latency_s: Age of a wrench sample when it arrives, as believed.
-        inertia_lag_s: The wrist feels an acceleration so long after it was commanded.
         tip_sd_m: Standard deviation of the reference point in P, per planar axis; None: not calibrated.
         corner_K_m: (2,) where the calibration found the container's corner it touched, in K as registered; None: not
             calibrated.
@@ -40,7 +38,6 @@ class HeldTool:
     floor_z_K_m: float = 0.0
     section: Section | None = None
     latency_s: float = GuardParams().latency_s
-    inertia_lag_s: float = GuardParams().latency_s + TRACKING_S
     tip_sd_m: float | None = None
     corner_K_m: Array | None = None
 

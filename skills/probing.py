@@ -12,12 +12,12 @@ from glotouch_bt.robot import Array, MotionRefused, Observation, Pose
 from glotouch_bt.touch import (
     Baseline,
     Carried,
-    CommandedInertia,
     Contact,
     ContactGuard,
     GuardParams,
     HardStop,
     HardTrip,
+    MeasuredInertia,
     Onset,
     fit_baseline,
     pushed,
@@ -96,7 +96,8 @@ class Prober:
             window.append(seen)
             if len(window) == window.maxlen and settled(list(window)):
                 break
-        baseline = fit_baseline(np.concatenate([o.wrench_S for o in window]))
+        inertia = self._inertia()  # where there is none, what measuring it adds in noise
+        baseline = fit_baseline(np.concatenate([o.wrench_S - inertia(o) for o in window]))
         self._rested = (window[-1].now_s, baseline)
         self.resting_up_N.append(float((self._context.arm.pose_B_P.rotation @ baseline.median[:3])[2]))
         return baseline
@@ -142,13 +143,14 @@ class Prober:
         baseline = yield from self.rest()
         arm, params = self._context.arm, self._guard
         gripper = arm.description.gripper
-        R_S_B = gripper.pose_E_P.rotation @ arm.pose_B_P.rotation.T
-        inertial = CommandedInertia(
-            self._carried, R_S_B @ direction_B, lambda: arm.along_m_s2, self._tool.inertia_lag_s, arm.period_s
-        )
+        inertial = self._inertia()
         approach_B = None if any_direction else direction_B
         soft = ContactGuard(baseline, approach_B, self._tool.tip_P_m, gripper.pose_E_P, params, inertial)
         return _Listener(HardStop(baseline, params), soft)
+
+    def _inertia(self) -> MeasuredInertia:
+        gripper = self._context.arm.description.gripper
+        return MeasuredInertia(self._carried, gripper.pose_E_P, self._guard.latency_s)
 
     def _outcome(self, result: MoveResult, approach_K: Array) -> Probed:
         poses = result.path_B_m + self._context.arm.pose_B_P.rotation @ self._tool.tip_P_m

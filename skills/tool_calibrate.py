@@ -10,7 +10,7 @@ import numpy as np
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Array, MotionRefused, Observation
 from glotouch_bt.touch import GuardParams
-from glotouch_bt.touch.calibration import TipCalibration, WallTouch, command_lag, solve_tip, wrench_delay
+from glotouch_bt.touch.calibration import TipCalibration, WallTouch, solve_tip, wrench_delay
 from skills.allowance import may_touch
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.corner import corner_place, corner_walls, quiet_corner
@@ -27,19 +27,8 @@ LARGEST_RESIDUAL_M = 4e-4
 """Touches that disagree by more were not of these walls, or the probe slipped in the jaws between them."""
 RISE_ACCELERATION_M_S2, RISE_JERK_M_S3 = 1.0, 20.0
 """How the hand is shaken to be heard in the wrist: the robot-wide limits."""
-BEFORE_S, AFTER_S = 0.1, 0.15
-"""It is listened to at rest so long before and after: longer than the longest lag that is looked for."""
 RATE_HZ = 1000.0
 """Samples are laid on a grid of this rate: some may be missing."""
-
-
-@dataclasses.dataclass(frozen=True)
-class _Late:
-    """How late the wrist's force is: behind the motion that is measured (and how sure that is), behind the command."""
-
-    latency_s: float
-    latency_sd_s: float
-    inertia_lag_s: float
 
 
 class ToolCalibrateParams(SkillParams):
@@ -94,8 +83,8 @@ class ToolCalibrate(Skill):
         height = given.floor_z_K_m + world.container.interior_m[2] - self.params.below_edge_m
         place = np.array([*corner_place(world, self.params.gap_m), height])
         yield from self._enter(given, place)
-        late = yield from self._rise(given, place)
-        listening = dataclasses.replace(given, latency_s=late.latency_s, inertia_lag_s=late.inertia_lag_s)
+        latency, latency_sd = yield from self._rise(given, place)
+        listening = dataclasses.replace(given, latency_s=latency)
         touches: list[WallTouch] = []
         turned = 0
         with may_touch(self.context.arm, "tool", *corner_walls(world)):
@@ -111,7 +100,7 @@ class ToolCalibrate(Skill):
             yield from self._turn(listening, place, given.yaw_B_rad)
         if turned < 2:
             raise MotionRefused("calibration", "the hand cannot be turned at that corner")
-        found = solve_tip(touches, given.tip_radius_m, touch_sd_m=TOUCH_SD_M, late_sd_s=late.latency_sd_s)
+        found = solve_tip(touches, given.tip_radius_m, touch_sd_m=TOUCH_SD_M, late_sd_s=latency_sd)
         self.tool = self._measured(listening, found)
 
     def _enter(self, tool: HeldTool, place: Array) -> Motion[None]:
@@ -124,39 +113,29 @@ class ToolCalibrate(Skill):
         low = np.array([*place[:2], tool.floor_z_K_m + LOW_M])
         yield from self.context.arm.line(tool.pose_B_P(world, low), p.travel_speed_m_s)
 
-    def _rise(self, tool: HeldTool, place: Array) -> Motion[_Late]:
-        """Up to the touching height, and how late the wrist felt it. Pauses come later."""
+    def _rise(self, tool: HeldTool, place: Array) -> Motion[tuple[float, float]]:
+        """Up to the touching height; the wrist sensor's latency and its standard deviation, s. Pauses come later."""
         with self.context.arm.feed.finishing():
             return (yield from self._measured_rise(tool, place))
 
-    def _measured_rise(self, tool: HeldTool, place: Array) -> Motion[_Late]:
+    def _measured_rise(self, tool: HeldTool, place: Array) -> Motion[tuple[float, float]]:
         arm = self.context.arm
         blocks: list[Observation] = []
-        commanded: list[tuple[float, float]] = []
-
-        def listen(o: Observation) -> None:
-            blocks.append(o)
-            commanded.append((float(o.stamp_s[-1]), arm.along_m_s2))
-
-        for o in (yield from arm.hold(BEFORE_S)):
-            listen(o)
+        blocks += yield from arm.hold(0.1)
         yield from arm.line(
             tool.pose_B_P(self.context.world, place),
             self.params.travel_speed_m_s,
             acceleration_m_s2=RISE_ACCELERATION_M_S2,
             jerk_m_s3=RISE_JERK_M_S3,
-            guard=listen,
+            guard=blocks.append,
         )
-        for o in (yield from arm.hold(AFTER_S)):
-            listen(o)
+        blocks += yield from arm.hold(0.15)
         up_S = arm.description.gripper.pose_E_P.rotation @ arm.pose_B_P.rotation[2]
         stamps = np.concatenate([b.stamp_s for b in blocks])
-        even = np.arange(stamps[0], stamps[-1], 1.0 / RATE_HZ)  # samples may be missing
+        even = np.arange(stamps[0], stamps[-1], 1.0 / RATE_HZ)
         height = np.interp(even, stamps, np.concatenate([b.position_B_P[:, 2] for b in blocks]))
         force = np.interp(even, stamps, np.concatenate([b.wrench_S for b in blocks])[:, :3] @ up_S)
-        acceleration = np.interp(even, *np.transpose(commanded))
-        latency_s, sd_s = wrench_delay(height, force, RATE_HZ)
-        return _Late(latency_s, sd_s, command_lag(acceleration, force, RATE_HZ)[0])
+        return wrench_delay(height, force, RATE_HZ)
 
     def _turn(self, tool: HeldTool, place: Array, yaw_B_rad: float) -> Motion[None]:
         """About the vertical through the ball, through the grasp's yaw, so that the last joint stays off its stops."""
@@ -220,7 +199,6 @@ class ToolCalibrate(Skill):
             tip_sd_m=found.tip_sd_m,
             latency_s=latency,
             latency_sd_s=found.late_sd_s,
-            inertia_lag_s=measured.inertia_lag_s,
             corner_K_m=measured.corner_K_m,
             residuals_m=found.residuals_m,
         )

@@ -67,8 +67,6 @@ class Arm(Mover):
     Attributes:
         kinematics: Forward and inverse kinematics.
         scene: What must not be hit; skills add what they find to it.
-        along_m_s2: Commanded acceleration along the path at the end of the newest period of a motion along a path;
-            what a guard needs to know the inertia it will feel.
         feed: Whether motions go on or are paused; the runner writes it.
     """
 
@@ -79,13 +77,13 @@ class Arm(Mover):
 
     def state(self) -> dict[str, Any]:
         """What it remembers between two motions, its scene included; for `restore`."""
-        remembered = {"q": self._q.copy(), "aperture_m": self._aperture_m, "along_m_s2": self.along_m_s2}
+        remembered = {"q": self._q.copy(), "aperture_m": self._aperture_m}
         return remembered | {"scene": self.scene.state()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go back to a `state`; where the arm really is elsewhere, `sync` after it."""
         self._q = np.array(state["q"])
-        self._aperture_m, self.along_m_s2, self._touched = state["aperture_m"], state["along_m_s2"], None
+        self._aperture_m, self._touched = state["aperture_m"], None
         self.scene.restore(state["scene"])
 
     # -- motions -----------------------------------------------------------------------------------------------------

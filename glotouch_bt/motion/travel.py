@@ -50,7 +50,6 @@ class BackedOff:
     at_m: float
     away_m: float
     q: Array
-    along_m_s2: float
 
 
 class _Trip:
@@ -99,8 +98,6 @@ class Mover:
 
     Attributes:
         kinematics: Forward and inverse kinematics.
-        along_m_s2: Commanded acceleration along the path at the end of the newest period of a motion along a path;
-            what a guard needs to know the inertia it will feel.
         feed: Whether motions go on or are paused; the runner writes it.
     """
 
@@ -109,7 +106,6 @@ class Mover:
         self.kinematics = Kinematics(description)
         self._q: Array = self.kinematics.home.copy()
         self._aperture_m = description.gripper.stroke_m
-        self.along_m_s2 = 0.0
         self.feed = Feed()
         self._touched: tuple[Plan, float] | None = None
 
@@ -179,7 +175,6 @@ class Mover:
         listening = trip.guard is not None and trip.stop is None
         for k in range(len(plan)):
             self._q = plan.q[k]
-            self.along_m_s2 = float(plan.progress.a[k])
             observation = yield Command(plan.setpoint(k), None, tactile)
             self._see(observation)
             if breakable:
@@ -215,7 +210,6 @@ class Mover:
 
     def _wait(self, trip: _Trip, tactile: bool) -> Motion[None]:
         """Stand until the pause is over or the guard trips."""
-        self.along_m_s2 = 0.0
         self.feed.standing = True
         while self.feed.stops:
             observation = yield Command(tactile=tactile)
@@ -237,7 +231,7 @@ class Mover:
         if self._touched is None:
             return None
         plan, at_m = self._touched
-        out = BackedOff(plan, at_m, max(0.0, at_m - BACK_OFF_M), self._q, self.along_m_s2)
+        out = BackedOff(plan, at_m, max(0.0, at_m - BACK_OFF_M), self._q)
         if at_m - out.away_m < 1e-6:
             return None
         yield from self._play(plan.between(at_m, out.away_m, self.period_s, BACK_OFF_M_S), _Trip(None), False)
@@ -247,7 +241,7 @@ class Mover:
         """To where `back_off` began, as slowly."""
         way = out.plan.between(out.away_m, out.at_m, self.period_s, BACK_OFF_M_S)
         yield from self._play(way, _Trip(None), False)
-        self._q, self.along_m_s2 = out.q, out.along_m_s2
+        self._q = out.q
 
     def _turn(self, profile: JointProfile, *, breakable: bool = False) -> Motion[int | None]:
         """Command a joint profile; the period after which a pause broke it off, or None: it is done."""

@@ -12,7 +12,7 @@ from glotouch_bt.touch.filtering import LowPass
 from glotouch_bt.touch.fusion import TipFusion
 from glotouch_bt.touch.guard_params import GuardParams
 from glotouch_bt.touch.hard_stop import HardStop, HardTrip
-from glotouch_bt.touch.inertia import Carried, CommandedInertia
+from glotouch_bt.touch.inertia import Carried, MeasuredInertia
 from glotouch_bt.touch.latency import LatencyEstimate, latency_from_two_speeds
 from glotouch_bt.touch.localisation import contact_direction, contact_point, disc_support, polygon_support
 from glotouch_bt.touch.mixture import OutlineBelief, informative_direction
@@ -38,7 +38,6 @@ __all__ = [
     "Baseline",
     "Candidate",
     "Carried",
-    "CommandedInertia",
     "Contact",
     "ContactGuard",
     "Contour",
@@ -50,6 +49,7 @@ __all__ = [
     "LatencyEstimate",
     "Layer",
     "LowPass",
+    "MeasuredInertia",
     "Onset",
     "OutlineBelief",
     "PatchStats",

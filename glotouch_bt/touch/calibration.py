@@ -136,51 +136,15 @@ def wrench_delay(
     Raises:
         ParamError: Wrong shapes, or too short to hold a shake.
     """
-    x, f = _pair("position_m", position_m, force_N, longest_s, rate_Hz)
-    smooth = gaussian_filter1d(x, SMOOTH_S * rate_Hz)
-    return _delay(np.gradient(np.gradient(smooth)) * rate_Hz**2, f, rate_Hz, longest_s, steps)
-
-
-def command_lag(
-    acceleration_m_s2: Array, force_N: Array, rate_Hz: float, *, longest_s: float = 0.06, steps: int = 601
-) -> tuple[float, float]:
-    """How late the wrist feels an acceleration that was commanded: (lag s, its standard deviation s).
-
-    As `wrench_delay`, with the plan's acceleration in the place of the measured one: the arm's own lag, the way of the
-    command to it and the sensor's latency together.
-
-    Args:
-        acceleration_m_s2: (n,) commanded along the direction of the shake.
-        force_N: (n,) wrist force along it at the same stamps.
-        rate_Hz: Of both.
-        longest_s: Lags up to this are looked at.
-        steps: How many.
-
-    Raises:
-        ParamError: Wrong shapes, or too short to hold a shake.
-    """
-    a, f = _pair("acceleration_m_s2", acceleration_m_s2, force_N, longest_s, rate_Hz)
-    return _delay(gaussian_filter1d(a, SMOOTH_S * rate_Hz), f, rate_Hz, longest_s, steps)
-
-
-def _pair(name: str, signal: Array, force_N: Array, longest_s: float, rate_Hz: float) -> tuple[Array, Array]:
-    x, f = np.asarray(signal, dtype=np.float64), np.asarray(force_N, dtype=np.float64)
-    least = 4 * _edge(longest_s, rate_Hz)
-    if x.ndim != 1 or f.shape != x.shape or len(x) < least:
-        raise ParamError(f"{name}, force_N", (x.shape, f.shape), f"both (n,) with n >= {least}")
-    return x, f
-
-
-def _edge(longest_s: float, rate_Hz: float) -> int:
-    """Samples at either end that a delay or the smoothing reaches into."""
-    return round((longest_s + 4 * SMOOTH_S) * rate_Hz)
-
-
-def _delay(acceleration: Array, force_N: Array, rate_Hz: float, longest_s: float, steps: int) -> tuple[float, float]:
-    """Of the force behind the (smoothed) acceleration, with mass and constant fitted, and its standard deviation."""
-    width, edge = SMOOTH_S * rate_Hz, _edge(longest_s, rate_Hz)
-    felt = _centred(gaussian_filter1d(force_N, width)[edge:-edge])
-    samples = np.arange(len(force_N), dtype=np.float64)
+    x, f = np.asarray(position_m, dtype=np.float64), np.asarray(force_N, dtype=np.float64)
+    width = SMOOTH_S * rate_Hz
+    edge = round(longest_s * rate_Hz + 4 * width)
+    if x.ndim != 1 or f.shape != x.shape or len(x) < 4 * edge:
+        raise ParamError("position_m, force_N", (x.shape, f.shape), f"both (n,) with n >= {4 * edge}")
+    smooth = gaussian_filter1d(x, width)
+    acceleration = np.gradient(np.gradient(smooth)) * rate_Hz**2
+    felt = _centred(gaussian_filter1d(f, width)[edge:-edge])
+    samples = np.arange(len(x), dtype=np.float64)
     delays = np.linspace(0.0, longest_s, steps)
     errors, change = np.zeros(steps), np.zeros(steps)
     for k, delay in enumerate(delays):

@@ -61,8 +61,8 @@ class ContactGuard:
         tip_P_m: (3,) the tip in P.
         pose_E_P: P in E (S = E).
         params: Thresholds.
-        inertial: Gives the (n, 6) wrench in S that the hand's own acceleration causes in the samples of these stamps
-            (n,), as `inertia.CommandedInertia` does; None: the hand is not accelerated, or too little to matter.
+        inertial: Gives the (n, 6) wrench in S that the hand's own acceleration causes in a block's n samples, as
+            `inertia.MeasuredInertia` does; None: the hand is not accelerated, or too little to matter.
 
     Raises:
         ParamError: An approach of no length or a wrong shape.
@@ -75,7 +75,7 @@ class ContactGuard:
         tip_P_m: Array,
         pose_E_P: Pose,
         params: GuardParams,
-        inertial: Callable[[Array], Array] | None = None,
+        inertial: Callable[[Observation], Array] | None = None,
     ) -> None:
         self.params = params
         self._inertial = inertial
@@ -104,7 +104,7 @@ class ContactGuard:
             return self._onset
         residual = observation.wrench_S - self._zero
         if self._inertial is not None:
-            residual -= self._inertial(observation.stamp_s)
+            residual -= self._inertial(observation)
         smooth = self._low_pass(residual)
         self._history.append((observation, residual))
         force = smooth @ self._gain.T

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glotouch_bt.robot import ParamError
-from glotouch_bt.touch.calibration import WallTouch, command_lag, solve_tip, wrench_delay
+from glotouch_bt.touch.calibration import WallTouch, solve_tip, wrench_delay
 
 RADIUS = 0.006
 WALLS = (0.151, 0.1985)
@@ -88,14 +88,6 @@ def test_a_known_delay_is_found(delay_s: float) -> None:
     position, force = shaken(delay_s, 0.0, np.random.default_rng(0))
     found, _ = wrench_delay(position + 0.6, force, 1000.0)
     assert found == pytest.approx(delay_s, abs=2e-5)
-
-
-@pytest.mark.parametrize("lag_s", [0.0, 0.004, 0.0125, 0.04])
-def test_a_known_lag_behind_the_command_is_found(lag_s: float) -> None:
-    _, command = shaken(0.0, 0.0, np.random.default_rng(0))
-    _, force = shaken(lag_s, 0.0, np.random.default_rng(0))
-    found, _ = command_lag((command - 0.3) / -0.94, force, 1000.0)
-    assert found == pytest.approx(lag_s, abs=2e-5)
 
 
 def test_its_standard_deviation_is_honest() -> None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from glotouch_bt.motion.timing import rest_to_rest
 from glotouch_bt.robot import Array, Conditions, GripperState, Observation, Pose
-from glotouch_bt.touch import Carried, ContactGuard, GuardParams, Onset, fit_baseline
+from glotouch_bt.touch import Carried, ContactGuard, GuardParams, MeasuredInertia, Onset, fit_baseline
 
 RATE_HZ, PERIOD_S = 1000.0, 0.01
 REST = 120
@@ -77,7 +77,7 @@ class Wrist:
         hand: As believed.
         conditions: Disturbances.
         params: The guard's; its latency is what is believed.
-        compensate: Take the commanded inertia out, as the prober does.
+        compensate: Take the inertia of the measured motion out, as the prober does.
         rng: Of this trial.
     """
 
@@ -111,18 +111,17 @@ class Wrist:
             clean[:, 3:] += np.cross(self._hand.tip_S_m, force_S)
         wrench = self._sensed(np.vstack([np.zeros((REST, 6)), clean]))
         baseline = fit_baseline(wrench[:REST])
-        believed: Array | None = None
-        if self._compensate:
-            believed = _late(along, self._params.latency_s)[:, None] * self._hand.carried.wrench_S(direction_S)
+        hand = self._hand
+        inertia = MeasuredInertia(hand.carried, hand.pose_E_P, self._params.latency_s) if self._compensate else None
         guard = ContactGuard(
             baseline,
             None if move.kind == "step" else move.direction_B,
-            self._hand.tip_P_m,
-            self._hand.pose_E_P,
+            hand.tip_P_m,
+            hand.pose_E_P,
             self._params,
-            None if believed is None else lambda _: believed,
+            inertia,
         )
-        return guard(_block(wrench[REST:], move, profile.s)), n / RATE_HZ
+        return guard(_block(wrench[REST:], move, along)), n / RATE_HZ
 
     def _sensed(self, true: Array) -> Array:
         """(n, 6) reported for true wrenches (n, 6)."""
@@ -137,11 +136,11 @@ def _late(values: Array, latency_s: float) -> Array:
     return values if k == 0 else np.concatenate([np.repeat(values[:1], k, axis=0), values[:-k]])
 
 
-def _block(wrench: Array, move: FreeMove, s: Array) -> Observation:
+def _block(wrench: Array, move: FreeMove, along_m_s2: Array) -> Observation:
     """All samples of the move as one block."""
     n = len(wrench)
     stamps = np.arange(1, n + 1) / RATE_HZ
-    way = np.interp(stamps, np.arange(1, len(s) + 1) * PERIOD_S, s, left=0.0)
+    way = np.cumsum(np.cumsum(along_m_s2)) / RATE_HZ**2
     idle = np.zeros((n, 7))
     return Observation(
         stamp_s=stamps,
