@@ -71,8 +71,8 @@ class MeasuredInertia:
 
     Its acceleration at a time is that of the parabola that fits the `NEAREST` positions best (on an even grid the
     filter of Savitzky and Golay, 1964), read `lag_s` before each sample: for a sensor that reports late, no samples of
-    the future are needed. What the plan says would be free of noise, but an arm does not follow it to the millisecond when
-    commands come late. Samples may be missing: stamps count. The hand does not turn.
+    the future are needed. What the plan says would be free of noise, but an arm does not follow it to the millisecond
+    when commands come late. Samples may be missing: stamps count. The hand does not turn.
 
     Args:
         carried: What is moved.
