@@ -5,11 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from glotouch_bt.motion import Arm, Motion
+from glotouch_bt.robot import MotionRefused
+from skills.force_limit import Pressed, force_limit
 
 CLEAR_M = 0.13
 """Height over the container's floor that clears its walls (80 mm) and any object, as the skills' own headroom."""
 RISE_M_S = 0.10
 NEAR_ENOUGH_M = 0.002
+CAUGHT_N = 15.0
+"""Change of force at which the hand rises no farther, half of the robot's hard limit: it is caught. What it takes up
+weighs 4 N at most (CONDITIONS)."""
 
 
 def rise_clear(arm: Arm, speed_m_s: float = RISE_M_S) -> Motion[float]:
@@ -18,7 +23,7 @@ def rise_clear(arm: Arm, speed_m_s: float = RISE_M_S) -> Motion[float]:
     The lowest point is the ball while the probe is held, else the fingertips.
 
     Raises:
-        MotionRefused: The arm does not reach so high there.
+        MotionRefused: The arm does not reach so high there, or the hand is caught under something.
     """
     world = arm.world
     below = arm.description.gripper.fingertip_below_P_m
@@ -28,5 +33,8 @@ def rise_clear(arm: Arm, speed_m_s: float = RISE_M_S) -> Motion[float]:
     short = CLEAR_M - height
     if short <= NEAR_ENOUGH_M:
         return 0.0
-    yield from arm.shift(np.array([0.0, 0.0, short]), speed_m_s, check=False, what="rise")
+    guard = yield from force_limit(arm, CAUGHT_N)
+    moved = yield from arm.shift(np.array([0.0, 0.0, short]), speed_m_s, check=False, guard=guard, what="rise")
+    if isinstance(moved.stop, Pressed):
+        raise MotionRefused("rise", f"the hand is caught: {moved.stop.force_N:.0f} N more than at rest")
     return short

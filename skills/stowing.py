@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from functools import partial
 
 import numpy as np
 
-from glotouch_bt.robot import Array, Observation, Pose, SetPayload, Tare
+from glotouch_bt.robot import Pose, SetPayload, Tare
 from skills.base import Context, SkillRun
+from skills.force_limit import force_limit
 from skills.requests import finish
-from skills.weighing import STAND_S
 
 OVER_HOLDER_M = 0.002
 """This near to the holder's axis the probe is in it, or on its way in (the skill was broken off there)."""
@@ -47,19 +46,12 @@ def return_probe(
     near = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, NEAR_M]))
     if float(arm.pose_B_P.position_m[2]) > float(near.position_m[2]):
         yield from arm.line(near, insert_speed_m_s, check=False)
-    blocks = yield from arm.hold(STAND_S)
-    free = np.concatenate([b.wrench_S[:, :3] for b in blocks]).mean(axis=0)
-    yield from arm.line(grasp, min(LAST_M_S, insert_speed_m_s), check=False, guard=partial(_stands, free))
+    stands = yield from force_limit(arm, STANDS_N)
+    yield from arm.line(grasp, min(LAST_M_S, insert_speed_m_s), check=False, guard=stands)
     yield from arm.jaws(min(aperture_m + 0.03, arm.description.gripper.stroke_m), speed_m_s=0.08)
     arm.scene.hold_tool(False)
     yield from arm.shift(np.array([0.0, 0.0, OVER_STOWED_M]), 0.08, check=False)
     yield from nothing_in_hand(context)
-
-
-def _stands(free_S_N: Array, seen: Observation) -> str | None:
-    """A guard: the force (3,) differs from that in free air by what the probe presses with when it stands."""
-    pressed = float(np.linalg.norm(seen.wrench_S[:, :3].mean(axis=0) - free_S_N))
-    return None if pressed <= STANDS_N else "stands"
 
 
 def nothing_in_hand(context: Context) -> SkillRun:

@@ -13,11 +13,15 @@ from glotouch_bt.touch.jaw_zero import JawZero, measured_zero
 from skills.allowance import may_touch
 from skills.base import UNCHANGED, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.floor import FLOOR_SEARCH_M, feel_floor
+from skills.force_limit import Pressed, force_limit
 from skills.hand import easy_yaw
 from skills.held_tool import HeldTool
 from skills.requests import finish
 from skills.weighing import GRAVITY_M_S2, weigh_N
 
+STUCK_N = 8.0
+"""Change of force at which the probe is not drawn on: it is stuck in its holder, or the arm goes astray. Drawn out it
+is 2 N (harsh, simulated)."""
 HANDLE_TOLERANCE_M = 0.004
 """The jaws hold the handle if they are this near to its width: twice the largest bias of their report, and its give."""
 
@@ -40,6 +44,7 @@ class ToolPickup(Skill):
     SUCCESS: the probe is held and its floor height is known.
     FAILURE `no_probe`: the jaws closed on nothing (or on something of another width).
     FAILURE `probe_not_lifted`: the hand came up without the probe's weight.
+    FAILURE `hard_contact`: the probe is stuck in its holder, or met something hard on the way to the floor; it is held.
     FAILURE `no_floor`: the ball met nothing where the container's floor should be; the probe is held.
     FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
     FAILURE `motion_refused`: the holder cannot be reached.
@@ -58,7 +63,7 @@ class ToolPickup(Skill):
         "no_probe": "the jaws closed on nothing, or on something of another width",
         "probe_not_lifted": "the hand came up without the probe's weight",
         "no_floor": "the ball met nothing where the container's floor should be",
-        "hard_contact": "the wrench passed a hard limit on the way to the floor",
+        "hard_contact": "the wrench passed a limit on the way out of the holder, or to the floor",
         "request_failed": "the sensor could not be zeroed, or the payload not be set",
         "motion_refused": "the holder cannot be reached",
     }
@@ -140,10 +145,25 @@ class ToolPickup(Skill):
         return state.aperture_m
 
     def _rise(self, short_m: float) -> Motion[None]:
-        """Straight up until the ball is well above the holder, from `short_m` below the stowed probe's grasp."""
-        up = self.context.world.probe.length_m + 0.06 + short_m
-        if up > 1e-4:
-            yield from self.context.arm.shift(np.array([0.0, 0.0, up]), self.params.speed_m_s, check=False)
+        """Straight up until the ball is well above the holder, from `short_m` below the stowed probe's grasp.
+
+        Raises:
+            SkillFailed: `hard_contact`.
+        """
+        arm, up = self.context.arm, self.context.world.probe.length_m + 0.06 + short_m
+        if up <= 1e-4:
+            return
+        guard = yield from force_limit(arm, STUCK_N)
+        moved = yield from arm.shift(np.array([0.0, 0.0, up]), self.params.speed_m_s, check=False, guard=guard)
+        if isinstance(moved.stop, Pressed):
+            raise SkillFailed(
+                "hard_contact",
+                f"{moved.stop.force_N:.0f} N more than at rest after {moved.travelled_m * 1e3:.0f} mm of drawing the "
+                f"probe out, {STUCK_N:.0f} are allowed",
+                advice="check the holder's pose, and that nothing blocks the probe",
+                force_N=moved.stop.force_N,
+                limit_N=STUCK_N,
+            )
 
     def _feel_floor(self, tool: HeldTool) -> Motion[HeldTool]:
         """Learn the floor's height in the corner nearest to the holder."""

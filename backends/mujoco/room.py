@@ -39,15 +39,11 @@ class Room:
         self._container = robot.handles.container_body
 
     def held(self) -> frozenset[int]:
-        """Bodies that are the robot's now: its own, the probe or an object that it touches and nothing else carries."""
+        """Bodies that are not to be moved or met: the robot's, its probe, and objects that nothing but they carry."""
         touching = self._pairs(self._scratch())
-        loose = {self._robot.handles.probe_body, *self._robot.handles.object_bodies}
-        own = set(self._arm)
-        while new := {b for b in loose - own if touching.get(b, set()) & own and not touching[b] - own}:
+        own, objects = set(self._arm) | {self._robot.handles.probe_body}, set(self._robot.handles.object_bodies)
+        while new := {b for b in objects - own if touching.get(b) and touching[b] <= own}:
             own |= new
-        probe = self._robot.handles.probe_body
-        if touching.get(probe, set()) & own:  # it leans on what it feels
-            own.add(probe)
         return frozenset(own)
 
     def require(

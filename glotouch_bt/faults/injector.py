@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from glotouch_bt.faults.effect import Scene, samples_altered
-from glotouch_bt.faults.plan import FaultPlan
+from glotouch_bt.faults.plan import FaultPlan, FaultSpec
 from glotouch_bt.faults.proof import Proof, Sighting
 from glotouch_bt.faults.scheduled import Scheduled
 from glotouch_bt.faults.trigger import Moment
@@ -50,18 +50,36 @@ class FaultInjector(Robot):
         self.outcome = ""
         self.held = False
         draws = seed if plan.seed is None else plan.seed
-        self._faults = []
-        for spec in plan.faults:
-            rng = stream(draws, f"fault {spec.name}")
-            scene = Scene(rng, robot.period_s, robot.description, disturber, first, may_kill)
-            try:
-                effect = spec.kind.effect(spec.params, scene)
-                effect.prepare()
-            except BadInput as e:
-                raise BadInput(f"{spec.place}: {spec.name}: {e}") from e
-            self._faults.append(Scheduled(spec, effect))
-        self._waiting = list(self._faults)
+        self._scene = partial(
+            Scene,
+            period_s=robot.period_s,
+            description=robot.description,
+            disturber=disturber,
+            sensed=first,
+            may_kill=may_kill,
+        )
+        self._draws = draws
+        self._faults: list[Scheduled] = []
+        self._waiting: list[Scheduled] = []
         self._active: list[Scheduled] = []
+        for spec in plan.faults:
+            self.arm(spec)
+
+    def arm(self, spec: FaultSpec) -> None:
+        """One more fault, from now on.
+
+        Raises:
+            BadInput: It cannot be done here.
+        """
+        scene = self._scene(stream(self._draws, f"fault {spec.name}"))
+        try:
+            effect = spec.kind.effect(spec.params, scene)
+            effect.prepare()
+        except BadInput as e:
+            raise BadInput(f"{spec.place}: {spec.name}: {e}") from e
+        fault = Scheduled(spec, effect)
+        self._faults.append(fault)
+        self._waiting.append(fault)
 
     # -- the seam ----------------------------------------------------------------------------------------------------
 

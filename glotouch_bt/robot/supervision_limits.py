@@ -44,6 +44,9 @@ class SupervisionLimits:
         following_m, following_rad: Largest distance of the hand from where it was told to be, and angle. The hand's,
             not the joints': a device that is sent poses finds its own posture for them. Source: ten times what was
             measured in a whole retrieval (harsh, MuJoCo): 0.5 mm at 8 N, 0.003 rad.
+        touching_N, touching_m: While at least this force is sensed, the hand may only be so far from there: a servo
+            that does not follow presses more with every millimetre. Source: twice what whole retrievals show beyond
+            4 N (MuJoCo, nominal: 0.8 mm, in one that pressed sideways with 11 N 1.7 mm).
         lag_s: It may be where it was told to be so long ago. Source: ours, driver 30 ms (its hold) and servo, doubled.
         command_slack: Commanded against allowed speeds. Source: ours, rounding and the end of a profile.
         gripper_age_s, tactile_age_s: Oldest report, and longest wait for a depth map that was asked for. Source:
@@ -60,6 +63,8 @@ class SupervisionLimits:
             cannot be matched.
         late_periods: The arm may wait for so many periods while it moves. Source: that of the watchdog (0.25 s). The
             device holds by itself meanwhile (the driver after 30 ms), and looks at the hard limit.
+        held_periods: A wait of so many periods has made the device hold. Source: the driver does after 30 ms. Shorter
+            ones are only put on record.
         tolerated: Findings of one transient kind within `window_s` that are only put on record.
         window_s: See `tolerated`.
     """
@@ -71,6 +76,8 @@ class SupervisionLimits:
     wrench_samples: int = 5
     following_m: float = 0.006
     following_rad: float = 0.03
+    touching_N: float = 8.0
+    touching_m: float = 0.003
     lag_s: float = 0.1
     command_slack: float = 1.1
     gripper_age_s: float = 0.2
@@ -82,6 +89,7 @@ class SupervisionLimits:
     noise_over_s: float = 0.3
     live_taxels: float = 0.5
     late_periods: float = 25.0
+    held_periods: float = 3.0
     tolerated: int = 5
     window_s: float = 1.0
 

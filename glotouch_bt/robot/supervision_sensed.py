@@ -54,6 +54,7 @@ class SensedWatch:
         self._per_limit = np.array([1.0 / limits.hard_force_N] * 3 + [1.0 / limits.hard_torque_Nm] * 3)
         self._slow_2, self._reach_2 = float(self._fastest.min()) ** 2, rules.reach_m**2
         self._near_2, self._alike = rules.following_m**2, math.cos(0.5 * rules.following_rad)
+        self._touching_2, self._nearer_2 = rules.touching_N**2, rules.touching_m**2
         # Position and quaternion of P in B as it was told to be lately, newest last; empty: it brakes to where it will.
         self._told: deque[list[float]] = deque(maxlen=max(1, round(rules.lag_s / period_s)))
         self._brakes = False
@@ -142,7 +143,14 @@ class SensedWatch:
             return True
         a, b, c, d, e, f, g = self._told[-1]
         away_2 = (x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2
+        if away_2 > self._nearer_2 and self._touches(o):
+            return False
         return bool(away_2 <= self._near_2 and abs(w * d + i * e + j * f + k * g) >= self._alike)
+
+    def _touches(self, o: Observation) -> bool:
+        """The newest sample feels more than a following servo may press with."""
+        force = o.wrench_S[-1, :3]
+        return bool(force @ force > self._touching_2)
 
     def _look_at_stamps(self, o: Observation, found: list[Finding]) -> Observation:
         """Samples out of order are dropped; gaps and missing samples are put on record, or end patience."""
@@ -161,7 +169,7 @@ class SensedWatch:
         periods = (now_s - last) / self._period_s
         if periods >= 1.0 + COMPLETE:
             fatal = periods > 1.0 + self._rules.late_periods and self._moving
-            if not fatal and self._moving:
+            if not fatal and self._moving and periods > 1.0 + self._rules.held_periods:
                 fatal = self._patience.ends("overrun", now_s)
             what = f"{periods:.1f} control periods passed in one cycle" + (" while the arm moved" * self._moving)
             found.append(Finding("overrun", what, periods, 1.0 + self._rules.late_periods, now_s, fatal))
@@ -227,13 +235,17 @@ class SensedWatch:
             return
         rules, p, q = self._rules, o.position_B_P[-1].tolist(), o.quat_B_P[-1].tolist()
         aways = [(math.dist(p, t[:3]), _turn_rad(q, t[3:])) for t in self._told]
-        if any(m <= rules.following_m and rad <= rules.following_rad for m, rad in aways):
+        touches = self._touches(o)
+        most_m = min(rules.touching_m, rules.following_m) if touches else rules.following_m
+        if any(m <= most_m and rad <= rules.following_rad for m, rad in aways):
             return
         told = "told to " + ("be" if self._moving else "stay")
         m, rad = min(aways)
-        if m > rules.following_m:
-            what = f"the hand is {m * 1e3:.1f} mm from where it was {told}, {rules.following_m * 1e3:.1f} are allowed"
-            found.append(Finding("following", what, m, rules.following_m, float(o.stamp_s[-1])))
+        if m > most_m:
+            what = f"the hand is {m * 1e3:.1f} mm from where it was {told}, {most_m * 1e3:.1f} are allowed"
+            if touches:
+                what += f" while {float(np.linalg.norm(o.wrench_S[-1, :3])):.0f} N press"
+            found.append(Finding("following", what, m, most_m, float(o.stamp_s[-1])))
         else:
             what = f"the hand is turned {rad:.3f} rad from how it was {told}, {rules.following_rad:.3f} are allowed"
             found.append(Finding("following", what, rad, rules.following_rad, float(o.stamp_s[-1])))

@@ -216,6 +216,46 @@ def test_an_arm_that_moves_while_it_is_held_is_noticed() -> None:
     assert limit < trip.value.value < limit * 1.02
 
 
+@pytest.mark.parametrize("force_N", [0.0, 7.0, 9.0, -20.0])
+def test_an_arm_that_strays_trips_sooner_while_it_presses(force_N: float) -> None:
+    """What presses goes with how far the hand strays: half as far is allowed then."""
+
+    def astray(seen: Observation) -> Observation:
+        away = [[0.002, 0.0, 0.0]] * np.maximum(seen.stamp_s[:, None] - 0.2, 0.0)
+        wrench = seen.wrench_S + [force_N, 0, 0, 0, 0, 0]
+        return dataclasses.replace(seen, position_B_P=seen.position_B_P + away, wrench_S=wrench)
+
+    device = Device(astray)
+    robot, found = supervised(device)
+    robot.cycle(setpoint(device.description.home_q))
+    with pytest.raises(GuardTripped) as trip:
+        spin(robot, 1000)
+    rules = SupervisionLimits()
+    touches = abs(force_N) > rules.touching_N
+    limit = rules.touching_m if touches else rules.following_m
+    assert trip.value.guard == "following"
+    assert limit < trip.value.value < limit * 1.02
+    assert ("N press" in found[-1].what) is touches
+
+
+def test_an_arm_that_gives_as_a_servo_does_may_press() -> None:
+    """0.15 mm a newton, what the simulated servo gives at most, up to 12 N."""
+
+    def gives(seen: Observation) -> Observation:
+        force = np.minimum(10.0 * np.maximum(seen.stamp_s - 0.2, 0.0), 12.0)
+        wrench = seen.wrench_S.copy()
+        wrench[:, 1] = force
+        position = seen.position_B_P.copy()
+        position[:, 1] += 1.5e-4 * force
+        return dataclasses.replace(seen, position_B_P=position, wrench_S=wrench)
+
+    device = Device(gives)
+    robot, found = supervised(device)
+    robot.cycle(setpoint(device.description.home_q))
+    spin(robot, 200)
+    assert not [f for f in found if f.fatal]
+
+
 def test_an_arm_that_lags_in_motion_is_let_go_on() -> None:
     """A servo's delay of 50 ms at half of a joint's speed is no following error."""
     device = Device()

@@ -55,6 +55,20 @@ def test_what_weighs_is_held_whatever_the_jaws_report(make) -> None:
     np.testing.assert_allclose(b.arm.pose_B_P.position_m, STOWED + np.array([0, 0, 0.08]), atol=1e-4)
 
 
+def test_a_caught_hand_does_not_pull(bench, tool) -> None:
+    """Something holds it from 20 mm above where it begins, with 3 N/mm."""
+    tie_m: list[float] = []
+    b = bench(grip_width_m=0.016, weight_N=lambda p, aperture: 3000.0 * max(p[2] - tie_m[0], 0.0) if tie_m else 0.0)
+    b.go(b.arm.joints(b.arm.kinematics.ik(tool.pose_B_P(b.world, np.array([0.02, 0.05, 0.03])), b.arm.q)))
+    b.arm.scene.hold_tool(True)
+    tie_m.append(b.arm.pose_B_P.position_m[2] + 0.02)
+    skill = b.make(Stow)
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "motion_refused")
+    assert "caught" in skill.reason.message
+    assert 0.0 < b.arm.pose_B_P.position_m[2] - tie_m[0] < 0.01
+
+
 def test_a_lost_probe(make) -> None:
     b, skill = make(grip_width_m=None, lighter_N=0.59)
     b.run(skill)

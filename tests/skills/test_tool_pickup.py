@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from py_trees.common import Status
 
-from skills.tool_pickup import ToolPickup
+from skills.tool_pickup import STUCK_N, ToolPickup
 
 STOWED = np.array([0.45, -0.32, -0.06])
 WEIGHT_N = 0.060 * 9.81
@@ -66,6 +66,21 @@ def test_probe_not_lifted(make) -> None:
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "probe_not_lifted")
     assert not b.arm.scene.holding_tool
+
+
+def test_a_probe_that_is_stuck_in_its_holder_is_not_torn_out(make) -> None:
+    """A spring of 3 N/mm holds it: the rise ends within a few millimetres, far below the robot's own limit."""
+
+    def stuck(position_B, aperture: float) -> float:
+        return 3000.0 * max(position_B[2] - STOWED[2], 0.0) if aperture < 0.0161 else 0.0
+
+    b, skill = make(weight_N=stuck)
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "hard_contact")
+    assert b.arm.scene.holding_tool, "it is still in the jaws"
+    assert b.arm.aperture_m < 0.0161
+    assert STUCK_N < b.robot.peak_force_N < 2.0 * STUCK_N
+    assert not b.arm.scene._allowed
 
 
 def test_no_floor(make) -> None:

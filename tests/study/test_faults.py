@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
+import time
 from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +16,7 @@ import pytest
 from glotouch_bt.faults.catalogue import CATALOGUE
 from glotouch_bt.mission.checkpoint import Row
 from glotouch_bt.robot import UnknownName
-from glotouch_bt.study import faults_start, faults_trial
+from glotouch_bt.study import faults_exhaustive, faults_start, faults_trial
 from glotouch_bt.study.faults import Campaign, run_campaign
 from glotouch_bt.study.faults_cases import CASES, SKILLS, Case, chosen_cases
 from glotouch_bt.study.faults_exhaustive import Exhaustive, run_exhaustive
@@ -154,13 +157,42 @@ def test_a_trial_that_ends_its_process_twice_counts_as_hanging(tmp_path: Path, m
     assert (row["status"], row["verdict"]) == ("hang", "unsafe")
 
 
-def test_every_call_of_a_short_mission_can_fail(tmp_path: Path) -> None:
-    mission = tmp_path / "short.yaml"
+def short_mission(folder: Path) -> str:
+    mission = folder / "short.yaml"
     mission.write_text("mission: short\nworld: worlds/container_five.yaml\ntree:\n  sequence:\n    - tool_pickup\n")
-    study = Exhaustive(str(mission), {}, "fake", 0, 60, tmp_path / "out")
+    return str(mission)
+
+
+def test_every_call_of_a_short_mission_can_fail(tmp_path: Path) -> None:
+    study = Exhaustive(short_mission(tmp_path), {}, "fake", 0, 60, tmp_path / "out")
     summary = run_exhaustive(study)
     assert summary["bad"] == []
-    assert summary["tried"] >= 10
+    assert summary["unfaulted"] == "failure"  # nothing is in the fake robot's holder
+    assert summary["tried"] == len(summary["kinds"]) * -(-summary["calls"] // 60)
+    assert json.loads((tmp_path / "out" / "summary.json").read_text()) == summary
+
+
+def test_a_run_that_does_not_end_as_it_must_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An arm that nobody holds, a process that dies, and one that hangs: at every call, and the parent goes on."""
+    monkeypatch.setattr(faults_exhaustive, "HUNG_S", 1)
+
+    def judge(injector: Any, outcome: Any, error: Any) -> str:
+        name, call = injector.failing
+        if call == 0:
+            return "the arm was not held"
+        if call == 300:
+            os.kill(os.getpid(), signal.SIGKILL)
+        while name == "exception":
+            time.sleep(0.01)
+        raise RuntimeError
+
+    monkeypatch.setattr(faults_exhaustive, "_judged", judge)
+    summary = run_exhaustive(Exhaustive(short_mission(tmp_path), {}, "fake", 0, 300, tmp_path / "out"))
+    found = {(b["fault"], b["call"]): b["what"] for b in summary["bad"]}
+    assert found["robot_fault", 0] == found["exception", 0] == "the arm was not held"
+    assert found["robot_fault", 300] == "the process died of SIGKILL"
+    assert found["robot_fault", 600] == "the process ended with code 1"
+    assert found["exception", 600].startswith("hangs")
 
 
 def test_a_trial_begins_at_the_last_checkpoint_before_the_first_run_of_its_skill() -> None:
