@@ -63,6 +63,7 @@ def _s(seconds: float) -> Lasting:
 LEARNING_S = 8.0
 """Supervision learns in 5 s what the sensor's noise is; a trial that goes on from a checkpoint learns it anew."""
 EVER = Lasting(until="ever")
+_NODE = Lasting(until="node")  # what changes the world may wait for room as long as the skill runs; it is never undone
 CASES: tuple[Case, ...] = (
     Case("wrench_off", warm_up_s=LEARNING_S),
     Case("wrench_stuck", warm_up_s=LEARNING_S),
@@ -87,15 +88,15 @@ CASES: tuple[Case, ...] = (
     Case("touch_dropped", lasting=_s(5.0), skills=("squeeze",)),
     Case("touch_swapped", lasting=EVER, skills=("squeeze",)),
     Case("gel_offset", lasting=EVER, skills=("squeeze",)),
-    Case("grip_stall", lasting=Lasting(until="node"), skills=_JAWS),
-    Case("grip_short", lasting=Lasting(until="node"), skills=_JAWS),
+    Case("grip_stall", lasting=_NODE, skills=_JAWS),
+    Case("grip_short", lasting=_NODE, skills=_JAWS),
     Case("grip_slip", lasting=EVER, skills=("tool_pickup", "grasp")),
     Case("grip_drop", lasting=_s(1.0), skills=(*_PROBING, "tool_return", "lift")),
-    Case("object_shoved", skills=_AMONG_OBJECTS),
-    Case("object_toppled", skills=_AMONG_OBJECTS),
-    Case("object_removed", skills=_AMONG_OBJECTS),
+    Case("object_shoved", lasting=_NODE, skills=_AMONG_OBJECTS),
+    Case("object_toppled", lasting=_NODE, skills=_AMONG_OBJECTS),
+    Case("object_removed", lasting=_NODE, skills=_AMONG_OBJECTS),
     Case("wrong_scale_stl", lasting=EVER, skills=("tool_pickup",)),
-    Case("container_offset", lasting=EVER, skills=_AMONG_OBJECTS),
+    Case("container_offset", lasting=_NODE, skills=_AMONG_OBJECTS),
 )
 
 

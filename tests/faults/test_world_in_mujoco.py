@@ -127,7 +127,8 @@ def touch_with_the_probe(cell: Cell, index: int) -> None:
     probe, item = robot.world.probe, cell.referee.objects()[index].pose_B_O
     vertices = item.apply(robot.truth.objects[index].mesh.vertices_m)
     top = vertices[vertices[:, 2].argmax()]
-    put(cell, robot.handles.probe_body, top + [0.0, 0.0, probe.grasp_to_tip_m + probe.tip_radius_m - 1e-4])
+    up = np.array([0.0, 0.0, probe.grasp_to_tip_m + probe.tip_radius_m - 1e-4])
+    put(cell, robot.handles.probe_body, top + up)
 
 
 @pytest.mark.parametrize("fault", ["container_offset", "object_shoved", "object_toppled", "object_removed"])

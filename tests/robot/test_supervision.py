@@ -222,7 +222,7 @@ def test_an_arm_that_strays_trips_sooner_while_it_presses(force_N: float) -> Non
 
     def astray(seen: Observation) -> Observation:
         away = [[0.002, 0.0, 0.0]] * np.maximum(seen.stamp_s[:, None] - 0.2, 0.0)
-        wrench = seen.wrench_S + [force_N, 0, 0, 0, 0, 0]
+        wrench = seen.wrench_S + force_N * np.eye(6)[0]
         return dataclasses.replace(seen, position_B_P=seen.position_B_P + away, wrench_S=wrench)
 
     device = Device(astray)
