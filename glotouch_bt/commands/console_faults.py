@@ -40,6 +40,7 @@ def print_faults(summary: Mapping[str, Any], out: Path) -> None:
 
 def print_exhaustive(summary: Mapping[str, Any], out: Path) -> None:
     """How many calls were failed, and which did not end as they must."""
+    sys.stdout.write(f"{summary['mission']} on {summary['backend']} ({summary['unfaulted']} if nothing fails): ")
     sys.stdout.write(f"{summary['tried']} runs, each with one of {summary['calls']} calls failed: ")
     sys.stdout.write(f"{len(summary['bad'])} did not end held, with the reason named\n")
     for bad in summary["bad"][:20]:

@@ -51,7 +51,12 @@ def faults(
 
 @guarded
 def bench_faults(
-    mission: Annotated[str, typer.Option(help="a mission with `target` and `expected_objects`")] = "retrieve",
+    mission: Annotated[
+        str | None,
+        typer.Option(
+            help="a mission with `target` and `expected_objects` (retrieve); with --exhaustive any (calibrate)"
+        ),
+    ] = None,
     set_: Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="a mission parameter")] = None,
     fault: Annotated[list[str] | None, typer.Option(help="only these classes (default: all that are tried)")] = None,
     skill: Annotated[list[str] | None, typer.Option(help="only in these skills (default: eight)")] = None,
@@ -83,6 +88,7 @@ def bench_faults(
     from glotouch_bt.study.faults_exhaustive import Exhaustive, run_exhaustive
 
     settings = read_settings(set_)
+    mission = mission or ("calibrate" if exhaustive else "retrieve")
     check_names(conditions, backend)
     cases = chosen_cases(fault or ())
     skills = chosen_skills(skill or (), cases)
