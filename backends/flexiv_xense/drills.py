@@ -89,7 +89,8 @@ def _end(pids: list[int]) -> None:
             continue
 
 
-def run_drill(victim: str, moment_s: float, mission: str, seed: int, folder: Path, settings: list[str]) -> Drill:
+def run_drill(victim: str, moment_s: float, mission: str, seed: int, folder: Path, settings: list[str],
+              objects: Path | None = None) -> Drill:  # fmt: skip
     """One mission, one kill."""
     folder.mkdir(parents=True, exist_ok=True)
     driver_log, cell_log = folder / "driver.jsonl", folder / "cell.jsonl"
@@ -97,6 +98,7 @@ def run_drill(victim: str, moment_s: float, mission: str, seed: int, folder: Pat
     words = [word for option in options for word in ("--set", option)]
     command = [sys.executable, "-m", "glotouch_bt.cli", "run", mission, "--backend", "flexiv_xense"]
     command += ["--seed", str(seed), "--out", str(folder / "run"), *words]
+    command += [] if objects is None else ["--objects", str(objects)]
     with (folder / "executive.txt").open("wb") as out:
         executive = subprocess.Popen(command, stdout=out, stderr=out, start_new_session=True)
     opened = _await(lambda: _event(driver_log, "opened"), OPEN_S)
@@ -153,6 +155,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--window", type=float, default=60.0, help="moments lie within so many seconds of readiness")
     parser.add_argument("--mission", default="retrieve")
     parser.add_argument("--set", dest="settings", action="append", default=["target=apple"], metavar="NAME=VALUE")
+    parser.add_argument("--objects", type=Path, help="folder of STL files in metres: fewer make a shorter mission")
     parser.add_argument("--out", type=Path, required=True)
     o = parser.parse_args(argv)
     rng = np.random.default_rng(o.seed)
@@ -160,7 +163,7 @@ def main(argv: list[str] | None = None) -> int:
     for k in range(2 * o.trials):
         moment = float(rng.uniform(0.5, o.window))
         folder = o.out / f"kill{k:02d}"
-        drill = run_drill(VICTIMS[k % 2], moment, o.mission, o.seed + k, folder, o.settings)
+        drill = run_drill(VICTIMS[k % 2], moment, o.mission, o.seed + k, folder, o.settings, o.objects)
         drills.append(drill)
         sys.stdout.write(json.dumps(asdict(drill) | {"passed": drill.passed}) + "\n")
         sys.stdout.flush()

@@ -168,10 +168,11 @@ class SensedWatch:
         now_s = float(o.stamp_s[-1])
         periods = (now_s - last) / self._period_s
         if periods >= 1.0 + COMPLETE:
-            fatal = periods > 1.0 + self._rules.late_periods and self._moving
-            if not fatal and self._moving and periods > 1.0 + self._rules.held_periods:
+            moves = self._moving and self._brakes  # at the end of a way it stands, told to be where it is
+            fatal = moves and periods > 1.0 + self._rules.late_periods
+            if not fatal and moves and periods > 1.0 + self._rules.held_periods:
                 fatal = self._patience.ends("overrun", now_s)
-            what = f"{periods:.1f} control periods passed in one cycle" + (" while the arm moved" * self._moving)
+            what = f"{periods:.1f} control periods passed in one cycle" + (" while the arm moved" * moves)
             found.append(Finding("overrun", what, periods, 1.0 + self._rules.late_periods, now_s, fatal))
         expected = round(self._samples * periods)
         missing = expected - len(o.stamp_s) - bad

@@ -126,7 +126,8 @@ def _write(study: KillStudy, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any
 
 
 def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Rates over all kills."""
+    """Rates over all kills in a mission; `outside`: how many came before its first checkpoint or after its end."""
+    everything, rows = len(rows), [r for r in rows if r["outcome"] == "killed"]
     n = len(rows)
 
     def rate(key: str) -> Rate:
@@ -134,6 +135,7 @@ def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
     readable = sum(bool(r["readable_after_kill"]) and bool(r["readable_at_end"]) for r in rows)
     return {
+        "outside": everything - n,
         "same_end": rate("same_end"),
         "same_result": rate("same_result"),
         "same_record": rate("same_record"),
@@ -185,9 +187,15 @@ def _trial(study: KillStudy, seed: int, number: int, share: float, twin: Twin) -
         "twin_retrieved": twin.result["retrieved"],
         "outcome": "killed" if process.returncode == -signal.SIGKILL else "ended before",
     }
+    if row["outcome"] == "killed" and (folder / "result.json").exists():
+        row["outcome"] = "ended before"  # it was only closing
+    if not (folder / FILE).exists():
+        return row | {"outcome": "not begun"}
     row |= _after_kill(folder, twin)
     done = subprocess.run([*study.words, "resume", str(folder), "--json"], capture_output=True, env=_environment())
     row |= {"exit_code": done.returncode, "message": done.stderr.decode().strip()[-300:]}
+    if row.get("checkpoint") is not None and row["checkpoint"] == row.get("checkpoints"):
+        row["outcome"] = "ended before"
     return row | _at_end(folder, twin)
 
 
