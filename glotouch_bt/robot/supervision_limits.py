@@ -10,7 +10,7 @@ from glotouch_bt.robot.errors import ParamError
 GUARDS = {
     "not_finite": "a reading that is no number (single samples are dropped)",
     "stamps": "samples that do not follow each other in time (single samples are dropped)",
-    "samples_missing": "less than half of the samples that a control period has, again and again",
+    "samples_missing": "less than a quarter of the samples that a control period has, again and again",
     "overrun": "control periods that passed without a command while the arm moved, very many or again and again",
     "joint_range": "a joint measured outside its range",
     "joint_speed": "a joint measured faster than its limit",

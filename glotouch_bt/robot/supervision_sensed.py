@@ -19,9 +19,11 @@ from glotouch_bt.robot.supervision_signals import PadWatch, WristWatch
 
 STANDS_RAD_S = 0.01
 QUAT_SLACK = 0.01
-COMPLETE = 0.5
-"""A block with fewer than this share of its samples is not complete. A device that is polled every millisecond,
-by a loop that is not hard real time, gives seven to nine of ten."""
+LATE = 0.5
+"""A cycle that took so many periods more than one was late."""
+SEEN = 0.25
+"""A block with fewer than this share of its samples misses some. A device that is polled every millisecond, by a loop
+that is not hard real time, gives seven to nine of ten; a machine that is busy besides, half of them."""
 
 
 class SensedWatch:
@@ -46,7 +48,7 @@ class SensedWatch:
         self._patience = Patience(rules)
         self._samples = self._count(first)
         self._last_s = float(first.stamp_s[-1])
-        self._late_s = (1.0 + COMPLETE) * period_s
+        self._late_s = (1.0 + LATE) * period_s
         slack = rules.joint_slack_rad
         self._ranges = [(j.lower_rad - slack, j.upper_rad + slack) for j in description.joints]
         self._fastest = rules.speed_slack * np.array([j.velocity_rad_s for j in description.joints])
@@ -96,7 +98,7 @@ class SensedWatch:
         found: list[Finding] = []
         if self._samples == 0:
             self._samples = self._count(o)
-        if len(stamps) < COMPLETE * self._samples or not (
+        if len(stamps) < SEEN * self._samples or not (
             self._last_s < stamps[0] and stamps[-1] - self._last_s < self._late_s and all(map(lt, stamps, stamps[1:]))
         ):
             o = self._look_at_stamps(o, found)
@@ -167,7 +169,7 @@ class SensedWatch:
             o = _picked(o, good)
         now_s = float(o.stamp_s[-1])
         periods = (now_s - last) / self._period_s
-        if periods >= 1.0 + COMPLETE:
+        if periods >= 1.0 + LATE:
             moves = self._moving and self._brakes  # at the end of a way it stands, told to be where it is
             fatal = moves and periods > 1.0 + self._rules.late_periods
             if not fatal and moves and periods > 1.0 + self._rules.held_periods:
@@ -176,7 +178,7 @@ class SensedWatch:
             found.append(Finding("overrun", what, periods, 1.0 + self._rules.late_periods, now_s, fatal))
         expected = round(self._samples * periods)
         missing = expected - len(o.stamp_s) - bad
-        if missing > 1 and len(o.stamp_s) < COMPLETE * expected:
+        if missing > 1 and len(o.stamp_s) < SEEN * expected:
             unseen = max(1, missing // self._samples) if self._moving else 1
             fatal = self._patience.ends("samples_missing", now_s, unseen)
             what = f"{missing} of {expected} samples are missing"
