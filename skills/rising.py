@@ -6,7 +6,7 @@ import numpy as np
 
 from glotouch_bt.motion import Arm, Motion
 from glotouch_bt.robot import MotionRefused
-from skills.force_limit import Pressed, force_limit
+from skills.straight import straight_guard
 
 CLEAR_M = 0.13
 """Height over the container's floor that clears its walls (80 mm) and any object, as the skills' own headroom."""
@@ -15,6 +15,9 @@ NEAR_ENOUGH_M = 0.002
 CAUGHT_N = 15.0
 """Change of force at which the hand rises no farther, half of the robot's hard limit: it is caught. What it takes up
 weighs 4 N at most (CONDITIONS)."""
+ASTRAY_M = 0.0025
+"""So far beside its line it rises no farther: the arm gives 0.15 mm a newton at most (simulated)."""
+UP_B = np.array([0.0, 0.0, 1.0])
 
 
 def rise_clear(arm: Arm, speed_m_s: float = RISE_M_S) -> Motion[float]:
@@ -23,7 +26,7 @@ def rise_clear(arm: Arm, speed_m_s: float = RISE_M_S) -> Motion[float]:
     The lowest point is the ball while the probe is held, else the fingertips.
 
     Raises:
-        MotionRefused: The arm does not reach so high there, or the hand is caught under something.
+        MotionRefused: The arm does not reach so high there, the hand is caught under something, or goes astray.
     """
     world = arm.world
     below = arm.description.gripper.fingertip_below_P_m
@@ -33,8 +36,8 @@ def rise_clear(arm: Arm, speed_m_s: float = RISE_M_S) -> Motion[float]:
     short = CLEAR_M - height
     if short <= NEAR_ENOUGH_M:
         return 0.0
-    guard = yield from force_limit(arm, CAUGHT_N)
-    moved = yield from arm.shift(np.array([0.0, 0.0, short]), speed_m_s, check=False, guard=guard, what="rise")
-    if isinstance(moved.stop, Pressed):
-        raise MotionRefused("rise", f"the hand is caught: {moved.stop.force_N:.0f} N more than at rest")
+    guard = yield from straight_guard(arm, UP_B, CAUGHT_N, ASTRAY_M)
+    moved = yield from arm.shift(short * UP_B, speed_m_s, check=False, guard=guard, what="rise")
+    if moved.stop is not None:
+        raise MotionRefused("rise", f"after {moved.travelled_m * 1e3:.0f} mm of {short * 1e3:.0f}: {moved.stop}")
     return short

@@ -6,10 +6,10 @@ import dataclasses
 
 import numpy as np
 
-from glotouch_bt.robot import Pose, SetPayload, Tare
+from glotouch_bt.robot import MotionRefused, Pose, SetPayload, Tare
 from skills.base import Context, SkillRun
-from skills.force_limit import force_limit
 from skills.requests import finish
+from skills.straight import Strayed, straight_guard
 
 OVER_HOLDER_M = 0.002
 """This near to the holder's axis the probe is in it, or on its way in (the skill was broken off there)."""
@@ -17,6 +17,9 @@ NEAR_M, LAST_M_S = 0.02, 0.01
 """From so far above its place it is lowered slowly, by the second."""
 STANDS_N = 8.0
 """Change of force at which it stands before its time: it slipped down in the jaws."""
+BESIDE_M = 0.0015
+"""So far beside its line nothing is moved in the holder, whose slot is 4 mm wider than the shaft to each side."""
+DOWN_B = np.array([0.0, 0.0, -1.0])
 OVER_STOWED_M = 0.08
 """The empty hand rises so far from the stowed probe's handle."""
 
@@ -34,7 +37,7 @@ def return_probe(
 
     Raises:
         SkillFailed: `request_failed`; the probe stands in its holder.
-        MotionRefused: The holder cannot be reached; the probe is held.
+        MotionRefused: The holder cannot be reached, or the hand goes astray; the probe is held.
     """
     arm, world = context.arm, context.world
     grasp = Pose.pointing_down(world.holder.pose_B_grasp.position_m, yaw_B_rad)
@@ -46,8 +49,10 @@ def return_probe(
     near = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, NEAR_M]))
     if float(arm.pose_B_P.position_m[2]) > float(near.position_m[2]):
         yield from arm.line(near, insert_speed_m_s, check=False)
-    stands = yield from force_limit(arm, STANDS_N)
-    yield from arm.line(grasp, min(LAST_M_S, insert_speed_m_s), check=False, guard=stands)
+    guard = yield from straight_guard(arm, DOWN_B, STANDS_N, BESIDE_M)
+    moved = yield from arm.line(grasp, min(LAST_M_S, insert_speed_m_s), check=False, guard=guard)
+    if isinstance(moved.stop, Strayed):
+        raise MotionRefused("into the holder", str(moved.stop))
     yield from arm.jaws(min(aperture_m + 0.03, arm.description.gripper.stroke_m), speed_m_s=0.08)
     arm.scene.hold_tool(False)
     yield from arm.shift(np.array([0.0, 0.0, OVER_STOWED_M]), 0.08, check=False)

@@ -13,10 +13,12 @@ from glotouch_bt.touch.jaw_zero import JawZero, measured_zero
 from skills.allowance import may_touch
 from skills.base import UNCHANGED, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.floor import FLOOR_SEARCH_M, feel_floor
-from skills.force_limit import Pressed, force_limit
 from skills.hand import easy_yaw
 from skills.held_tool import HeldTool
 from skills.requests import finish
+from skills.rising import UP_B
+from skills.stowing import BESIDE_M
+from skills.straight import straight_guard
 from skills.weighing import GRAVITY_M_S2, weigh_N
 
 STUCK_N = 8.0
@@ -153,16 +155,14 @@ class ToolPickup(Skill):
         arm, up = self.context.arm, self.context.world.probe.length_m + 0.06 + short_m
         if up <= 1e-4:
             return
-        guard = yield from force_limit(arm, STUCK_N)
-        moved = yield from arm.shift(np.array([0.0, 0.0, up]), self.params.speed_m_s, check=False, guard=guard)
-        if isinstance(moved.stop, Pressed):
+        guard = yield from straight_guard(arm, UP_B, STUCK_N, BESIDE_M)
+        moved = yield from arm.shift(up * UP_B, self.params.speed_m_s, check=False, guard=guard)
+        if moved.stop is not None:
             raise SkillFailed(
                 "hard_contact",
-                f"{moved.stop.force_N:.0f} N more than at rest after {moved.travelled_m * 1e3:.0f} mm of drawing the "
-                f"probe out, {STUCK_N:.0f} are allowed",
-                advice="check the holder's pose, and that nothing blocks the probe",
-                force_N=moved.stop.force_N,
-                limit_N=STUCK_N,
+                f"after {moved.travelled_m * 1e3:.0f} mm of drawing the probe out: {moved.stop}",
+                advice="check the holder's pose, that nothing blocks the probe, and that the arm goes where it is told",
+                travelled_m=moved.travelled_m,
             )
 
     def _feel_floor(self, tool: HeldTool) -> Motion[HeldTool]:

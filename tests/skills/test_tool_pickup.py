@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from py_trees.common import Status
 
+from skills.stowing import BESIDE_M
 from skills.tool_pickup import STUCK_N, ToolPickup
 
 STOWED = np.array([0.45, -0.32, -0.06])
@@ -81,6 +84,27 @@ def test_a_probe_that_is_stuck_in_its_holder_is_not_torn_out(make) -> None:
     assert b.arm.aperture_m < 0.0161
     assert STUCK_N < b.robot.peak_force_N < 2.0 * STUCK_N
     assert not b.arm.scene._allowed
+
+
+def test_an_arm_that_goes_astray_in_the_holder_is_stopped(make) -> None:
+    """The hand goes sideways as it rises, a millimetre in ten: it ends within the slot's 4 mm of room."""
+    b, skill = make()
+    cycle, far_m = b.robot.cycle, []
+
+    def astray(command):
+        seen = cycle(command)
+        if not b.arm.scene.holding_tool:
+            return seen
+        off = 0.1 * np.maximum(seen.position_B_P[:, 2] - STOWED[2], 0.0)
+        far_m.append(float(off.max()))
+        return dataclasses.replace(seen, position_B_P=seen.position_B_P + off[:, None] * np.eye(3)[1])
+
+    b.robot.cycle = astray
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "hard_contact")
+    assert "beside its setpoint" in skill.reason.message
+    assert b.arm.scene.holding_tool
+    assert BESIDE_M < max(far_m) < 0.003
 
 
 def test_no_floor(make) -> None:

@@ -1,0 +1,73 @@
+"""A guard for straight moves that may neither press nor stray: into the probe's holder and out of it, and any rise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from glotouch_bt.motion import Arm, Motion
+from glotouch_bt.robot import Array, Observation
+from skills.weighing import STAND_S
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """The move ended because something pressed.
+
+    Attributes:
+        force_N: How much more than at rest.
+    """
+
+    force_N: float
+
+    def __str__(self) -> str:
+        return f"{self.force_N:.0f} N more than at rest"
+
+
+@dataclass(frozen=True)
+class Strayed:
+    """The move ended because the hand left its way: the arm does not do what it is told.
+
+    Attributes:
+        off_m: How far beside the line it is.
+    """
+
+    off_m: float
+
+    def __str__(self) -> str:
+        return f"the hand is {self.off_m * 1e3:.1f} mm beside its setpoint"
+
+
+@dataclass(frozen=True)
+class StraightGuard:
+    """Trips on a force, and on a distance from the commanded line: that is free of the servo's lag along it.
+
+    Attributes:
+        free_S_N: (3,) force at rest; a period's mean is compared with it.
+        most_N: Largest difference.
+        start_B_m, along_B: (3,) each, a point of the commanded line and its direction.
+        most_off_m: Largest distance of P from it.
+    """
+
+    free_S_N: Array
+    most_N: float
+    start_B_m: Array
+    along_B: Array
+    most_off_m: float
+
+    def __call__(self, seen: Observation) -> Pressed | Strayed | None:
+        """See `motion.Guard`."""
+        force = float(np.linalg.norm(seen.wrench_S[:, :3].mean(axis=0) - self.free_S_N))
+        if force > self.most_N:
+            return Pressed(force)
+        way = seen.position_B_P[-1] - self.start_B_m
+        off = float(np.linalg.norm(way - (way @ self.along_B) * self.along_B))
+        return Strayed(off) if off > self.most_off_m else None
+
+
+def straight_guard(arm: Arm, along_B: Array, most_N: float, most_off_m: float) -> Motion[StraightGuard]:
+    """Stand a moment and take the force felt now as that of a free hand; for a move from here along `along_B` (3,)."""
+    blocks = yield from arm.hold(STAND_S)
+    free = np.concatenate([b.wrench_S[:, :3] for b in blocks]).mean(axis=0)
+    return StraightGuard(free, most_N, arm.pose_B_P.position_m, along_B / np.linalg.norm(along_B), most_off_m)
