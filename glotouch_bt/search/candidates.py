@@ -37,7 +37,9 @@ in its evidence."""
 FLAT_M = 1e-4
 """Contacts no wider apart than this across their line have no hull."""
 SURE, ON_M = 0.5, 0.004
-"""A candidate of this quality was touched from all sides: what is met this near to its outline is its own."""
+"""A candidate touched so evenly from all sides, and explained so well, has as its own what is met this near to it."""
+HALF_KNOWN_M = 0.005
+"""Standard deviation of a centre whose candidate has quality 1/2."""
 LARGEST_M = 0.125
 """Nothing that is looked for is longer; two things that touch are not made one beyond it."""
 
@@ -86,9 +88,7 @@ def admit(
         return Admitted(belief.with_dropped(first.point_K_m), known, None)
     radius = traced.outline.touches.radius_m
     if part_of is not None and traced.continued:
-        points = np.array([c.tip_K_m[:2] for c in traced.contacts])
-        quality = contour_quality(points, traced.outline.contour)
-        better = replace(part_of, contour=traced.outline.contour, contacts=traced.contacts, quality=quality)
+        better = _with(part_of, traced.contacts, traced.outline)
         belief = belief.with_exclusion(envelope(better), exclusion_m, new=False)
         return Admitted(belief, tuple(better if c.index == better.index else c for c in known), better.index)
     for old in known:
@@ -96,9 +96,7 @@ def admit(
         if more is not None:
             belief = belief.with_exclusion(envelope(more), exclusion_m, new=False)
             return Admitted(belief, tuple(more if c.index == old.index else c for c in known), old.index)
-    contour = traced.outline.contour
-    quality = contour_quality(np.array([c.tip_K_m[:2] for c in traced.contacts]), contour)
-    candidate = Candidate(len(known), contour, height_m, quality, traced.contacts)
+    candidate = Candidate(len(known), traced.outline.contour, height_m, quality(traced.outline), traced.contacts)
     return Admitted(belief.with_exclusion(envelope(candidate), exclusion_m), (*known, candidate), candidate.index)
 
 
@@ -106,9 +104,24 @@ def refined(before: Candidate, traced: Trace) -> Candidate | None:
     """The candidate with what tracing it on gave; None if that was nothing."""
     if traced.outline is None or len(traced.contacts) == len(before.contacts):
         return None
-    contour = traced.outline.contour
-    quality = contour_quality(np.array([c.tip_K_m[:2] for c in traced.contacts]), contour)
-    return replace(before, contour=contour, contacts=traced.contacts, quality=quality)
+    return _with(before, traced.contacts, traced.outline)
+
+
+def quality(outline: OutlineBelief) -> float:
+    """0..1: 1 / (1 + (sd / 5 mm)^2) of the standard deviation of the object's middle, x and y together.
+
+    A rule of thumb for how evenly it was touched would not do: from the middle of an outline that takes the near end of
+    a long thing for all of it, the contacts are all round.
+    """
+    return 1.0 / (1.0 + (float(np.hypot(*outline.centre_sd_m)) / HALF_KNOWN_M) ** 2)
+
+
+def _with(candidate: Candidate, contacts: tuple[Contact, ...], outline: OutlineBelief) -> Candidate:
+    return replace(candidate, contour=outline.contour, contacts=contacts, quality=quality(outline))
+
+
+def _touched_all_round(c: Candidate) -> bool:
+    return contour_quality(np.array([k.tip_K_m[:2] for k in c.contacts]), c.contour) >= SURE
 
 
 def part_of(known: tuple[Candidate, ...], first: Contact, radius_m: float) -> Candidate | None:
@@ -131,7 +144,7 @@ def part_of(known: tuple[Candidate, ...], first: Contact, radius_m: float) -> Ca
 def of_another(known: tuple[Candidate, ...], contact: Contact) -> bool:
     """Whether a contact made while something new is traced is with a candidate that is known from all sides."""
     return any(
-        c.quality >= SURE and float(signed_distance(envelope(c), contact.point_K_m[None])[0]) < ON_M for c in known
+        float(signed_distance(envelope(c), contact.point_K_m[None])[0]) < ON_M and _touched_all_round(c) for c in known
     )
 
 
@@ -153,15 +166,14 @@ def _merged(old: Candidate, traced: Trace, radius_m: float, height_m: float) -> 
     before = (replace(c, tip_K_m=c.tip_K_m + shift, point_K_m=c.point_K_m + shift[:2]) for c in old.contacts)
     everything = tuple(replace(c, pushed_K_m=np.zeros(2)) for c in (*before, *traced.contacts))
     contacts = split_moved(everything, radius_m, likely=len(old.contacts))[1]
-    contour = _outline(contacts, radius_m).contour
-    if max(contour.size_m) > LARGEST_M:
+    outline = _outline(contacts, radius_m)
+    if max(outline.contour.size_m) > LARGEST_M:
         middle = points.mean(axis=0)[None]
         if float(signed_distance(envelope(old), middle)[0]) > 0.0:
             return None
         # Nothing else can be where it stands: it is what was traced last, and what was felt before was not all its own.
-        contacts, contour = traced.contacts, _outline(traced.contacts, radius_m).contour
-    quality = contour_quality(np.array([c.tip_K_m[:2] for c in contacts]), contour)
-    return Candidate(old.index, contour, max(old.height_m, height_m), quality, contacts)
+        contacts, outline = traced.contacts, _outline(traced.contacts, radius_m)
+    return _with(replace(old, height_m=max(old.height_m, height_m)), contacts, outline)
 
 
 def _apart_m(contacts: tuple[Contact, ...], points: Array) -> float:

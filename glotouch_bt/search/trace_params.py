@@ -19,6 +19,7 @@ class TraceParams:
         least_contacts, most_contacts: Bounds whatever the covariance says.
         unfelt_m: Standard deviation of how far what was known before may have moved unfelt, each way; contacts made
             since say how far it did not.
+        smallest_m: What is shorter is a part of an object: not enough is known.
         largest_m: What is longer are two objects.
         step_m: Longest way round before the ball probes again.
         doubt_m: With a deviation above this on the way round, the ball goes along the surface instead ...
@@ -31,6 +32,8 @@ class TraceParams:
         reach_sds: A probe goes so many standard deviations past the prediction.
         facing: Cosine between the force on the ball and the direction from the object's middle below which the contact
             is with something else.
+        between_m: A contact so near to an earlier one is the object's own: objects stand 30 mm apart, and are pushed a
+            few.
         same_m: A contact so near to an earlier one says nothing new.
         own_m: A contact within this (and twice the deviation) of the prediction is the object's own; farther out the
             evidence for one object or two decides.
@@ -55,6 +58,7 @@ class TraceParams:
     least_contacts: int = 4
     most_contacts: int = 14
     unfelt_m: float = 0.004
+    smallest_m: float = 0.030
     largest_m: float = 0.118
     step_m: float = 0.045
     doubt_m: float = 0.012
@@ -66,6 +70,7 @@ class TraceParams:
     keen: float = 1.0
     reach_sds: float = 2.5
     facing: float = -0.4
+    between_m: float = 0.018
     same_m: float = 0.003
     own_m: float = 0.010
     other: float = 0.02

@@ -215,15 +215,33 @@ class TraceState:
 
     def is_new(self, contact: Contact, p: TraceParams) -> bool:
         """Whether a contact is not where there was one before."""
+        return not self.near(contact, p.same_m)
+
+    def bearing(self, outline: OutlineBelief) -> float:
+        """Where the ball is, seen from the outline's middle, rad."""
+        off = self.tip - outline.centre_K_m
+        return float(np.arctan2(off[1], off[0]))
+
+    def lone(self, apart_m: float) -> bool:
+        """Whether all contacts are nearer to one another than this: they may be with the end of a limb."""
+        places = np.array([self.place(c) for c in self.present()])
+        return bool(np.linalg.norm(places[:, None] - places[None], axis=2).max() < apart_m)
+
+    def near(self, contact: Contact, apart_m: float) -> bool:
+        """Whether a contact is nearer than this to one made before."""
         known = np.array([self.place(c) for c in self.present()])
-        return bool(np.linalg.norm(known - self.place(contact), axis=1).min() > p.same_m)
+        return bool(np.linalg.norm(known - self.place(contact), axis=1).min() < apart_m)
 
     def belongs(self, outline: OutlineBelief, contact: Contact, p: TraceParams) -> bool:
         """Whether a new contact was made with this object.
 
-        Not if the surface it met faces the object's middle. Else if it is near to the prediction, or one object
-        explains it together with the others better than two.
+        It is if it is so near to another one that no second object has room. Else not if the surface it met faces the
+        object's middle. Else if it is near to the prediction, or one object explains it together with the others
+        better than two.
         """
+        points = np.array([c.point_K_m for c in self.present()])
+        if float(np.linalg.norm(points - contact.point_K_m, axis=1).min()) < p.between_m:
+            return True
         off = contact.tip_K_m[:2] - outline.centre_K_m
         far = float(np.hypot(off[0], off[1]))
         if float(contact.reaction_K[:2] @ off) < p.facing * far:

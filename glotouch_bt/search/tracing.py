@@ -22,6 +22,10 @@ BESIDE_RAD = np.deg2rad(10.0)
 """The ball is not sent nearer than this to the bearing of something else beside the object."""
 OUTWARDS_M = (0.0, 0.012, 0.024)
 """Where the ball lands on what nothing predicted, it is brought down so much farther out, and finds a limb's end."""
+OWN_M = 0.030
+"""What is met beside a lone contact, this near to it, is the same thing: objects stand so far apart."""
+LOST = 2
+"""After so many misses in a row round a lone contact, what is ahead of it is not what was touched."""
 INSIDE_M = 0.004
 """A probe that came this near to the object's supposed middle has passed through: nothing is there."""
 
@@ -112,22 +116,26 @@ def _until_known(s: TraceState, p: TraceParams, elsewhere: Callable[[Contact], b
 
     Once a contact was odd, each one asks whether the object moved without being felt to: three are needed to tell.
     """
-    outline, missed, ended = s.outline(), 0, ""
+    outline, missed, ended, about = s.outline(), 0, "", False
     while not ended:
         ended = _enough(outline, s, p)
         if ended:
             break
-        aim = _choose(outline, s, p)
-        if aim is None:
+        aim, beside = _choose(outline, s, p), False
+        if (aim is None or missed == LOST) and not about and s.lone(OWN_M):
+            about, bearing = True, s.bearing(outline)
+            found = yield from _feel_about(s, p)
+            beside = found is not None and s.near(found, OWN_M)
+        elif aim is None:
             ended = "no side is left that can be reached"
             break
-        bearing = aim.bearing
-        s.side = s.side or aim.side
-        found = yield from _probe_at(outline, s, p, aim)
+        else:
+            bearing, s.side = aim.bearing, s.side or aim.side
+            found = yield from _probe_at(outline, s, p, aim)
         if found is None:
             missed += 1
             s.blocked.append(bearing)
-        elif not (elsewhere is not None and elsewhere(found)) and s.belongs(outline, found, p):
+        elif not (elsewhere is not None and elsewhere(found)) and (beside or s.belongs(outline, found, p)):
             if s.is_new(found, p):
                 missed = 0
             else:
@@ -164,7 +172,11 @@ def _enough(outline: OutlineBelief, s: TraceState, p: TraceParams) -> str:
     n = len(s.raw)
     if n >= p.most_contacts and (s.known or n >= s.given + LEAST_MORE):
         return f"{n} contacts"
-    if n < p.least_contacts or (s.known and s.odd >= 0 and n < s.odd + p.settling):
+    if (
+        n < p.least_contacts
+        or max(outline.contour.size_m) < p.smallest_m
+        or (s.known and s.odd >= 0 and n < s.odd + p.settling)
+    ):
         return ""
     _, sd = s.ring(outline, all_bearings(), p)
     centre_sd = np.sqrt(outline.centre_sd_m**2 + np.diag(s.shift_covariance(p)))
@@ -185,8 +197,7 @@ def _choose(outline: OutlineBelief, s: TraceState, p: TraceParams) -> _Aim | Non
     """The bearing with the most uncertainty for the way to it; None if none can be reached."""
     bearings = all_bearings()
     distance, sd = s.ring(outline, bearings, p)
-    offset = s.tip - outline.centre_K_m
-    here = float(np.arctan2(offset[1], offset[0]))
+    here = s.bearing(outline)
     walled = np.any(np.abs(_beside(outline, bearings, distance, sd, p)) > s.half, axis=1)
     over_m = np.where(walled, np.inf, p.hop_m)
     best, worth = None, 0.0
@@ -289,10 +300,27 @@ def _along(s: TraceState, p: TraceParams, side: float) -> Plan[Contact | None]:
     return None
 
 
+def _feel_about(s: TraceState, p: TraceParams) -> Plan[Contact | None]:
+    """Along the surface to either side of the last contact, the side away from the way round so far first.
+
+    What was touched at its end, a limb say, is not ahead of the contact, where every outline would have it.
+    """
+    last = s.raw[-1]
+    beside = last.tip_K_m[:2] + p.clearance_m * unit(2.0 * last.reaction_K[:2] - last.approach_K[:2])
+    for side in (-(s.side or 1.0), s.side or 1.0):
+        felt = yield Move("step", np.clip(beside, -s.half, s.half))
+        s.felt(felt)
+        if felt.refused or felt.contact is not None:
+            return felt.contact
+        found = yield from _along(s, p, side)
+        if found is not None:
+            return found
+    return None
+
+
 def _angles(outline: OutlineBelief, s: TraceState, bearing: float, side: float) -> Array:
     """(k,) bearings on the way round from where the ball is, this left out, to `bearing`."""
-    offset = s.tip - outline.centre_K_m
-    here = float(np.arctan2(offset[1], offset[0]))
+    here = s.bearing(outline)
     turn = float(wrapped(np.array(side * (bearing - here))) % (2 * np.pi))
     n = max(int(np.ceil(turn / np.deg2rad(5.0))), 1)
     return np.asarray(here + side * np.linspace(0.0, turn, n + 1)[1:])

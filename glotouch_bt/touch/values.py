@@ -111,7 +111,7 @@ class Candidate:
         index: Order of discovery, from 0.
         contour: Its outline at the sensing height.
         height_m: Top above the container floor.
-        quality: 0..1, how well the contour is supported (coverage and residual).
+        quality: 0..1, how well its centre is known: 1/2 at a standard deviation of 5 mm (`search.candidates.quality`).
         contacts: What it was fitted to.
     """
 
