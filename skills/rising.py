@@ -15,8 +15,6 @@ NEAR_ENOUGH_M = 0.002
 CAUGHT_N = 15.0
 """Change of force at which the hand rises no farther, half of the robot's hard limit: it is caught. What it takes up
 weighs 4 N at most (CONDITIONS)."""
-ASTRAY_M = 0.0025
-"""So far beside its line it rises no farther: the arm gives 0.15 mm a newton at most (simulated)."""
 UP_B = np.array([0.0, 0.0, 1.0])
 
 
@@ -36,7 +34,7 @@ def rise_clear(arm: Arm, speed_m_s: float = RISE_M_S) -> Motion[float]:
     short = CLEAR_M - height
     if short <= NEAR_ENOUGH_M:
         return 0.0
-    guard = yield from straight_guard(arm, UP_B, CAUGHT_N, ASTRAY_M)
+    guard = yield from straight_guard(arm, UP_B, CAUGHT_N)
     moved = yield from arm.shift(short * UP_B, speed_m_s, check=False, guard=guard, what="rise")
     if moved.stop is not None:
         raise MotionRefused("rise", f"after {moved.travelled_m * 1e3:.0f} mm of {short * 1e3:.0f}: {moved.stop}")

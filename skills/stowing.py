@@ -17,8 +17,6 @@ NEAR_M, LAST_M_S = 0.02, 0.01
 """From so far above its place it is lowered slowly, by the second."""
 STANDS_N = 8.0
 """Change of force at which it stands before its time: it slipped down in the jaws."""
-BESIDE_M = 0.0015
-"""So far beside its line nothing is moved in the holder, whose slot is 4 mm wider than the shaft to each side."""
 DOWN_B = np.array([0.0, 0.0, -1.0])
 OVER_STOWED_M = 0.08
 """The empty hand rises so far from the stowed probe's handle."""
@@ -49,7 +47,7 @@ def return_probe(
     near = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, NEAR_M]))
     if float(arm.pose_B_P.position_m[2]) > float(near.position_m[2]):
         yield from arm.line(near, insert_speed_m_s, check=False)
-    guard = yield from straight_guard(arm, DOWN_B, STANDS_N, BESIDE_M)
+    guard = yield from straight_guard(arm, DOWN_B, STANDS_N)
     moved = yield from arm.line(grasp, min(LAST_M_S, insert_speed_m_s), check=False, guard=guard)
     if isinstance(moved.stop, Strayed):
         raise MotionRefused("into the holder", str(moved.stop))

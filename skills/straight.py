@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from glotouch_bt.motion import Arm, Motion
 from glotouch_bt.robot import Array, Observation
 from skills.weighing import STAND_S
+
+ASTRAY_M, FARTHER_M = 0.0015, 0.0005
+"""The arm gives 0.15 mm a newton at most (simulated); the slot of the probe's holder is 4 mm wider than the shaft to each
+side. A hand that is astray already may go so much farther."""
 
 
 @dataclass(frozen=True)
@@ -61,13 +65,22 @@ class StraightGuard:
         force = float(np.linalg.norm(seen.wrench_S[:, :3].mean(axis=0) - self.free_S_N))
         if force > self.most_N:
             return Pressed(force)
-        way = seen.position_B_P[-1] - self.start_B_m
-        off = float(np.linalg.norm(way - (way @ self.along_B) * self.along_B))
+        off = self.off_m(seen)
         return Strayed(off) if off > self.most_off_m else None
 
+    def off_m(self, seen: Observation) -> float:
+        """How far P is beside the line, newest sample."""
+        way = seen.position_B_P[-1] - self.start_B_m
+        return float(np.linalg.norm(way - (way @ self.along_B) * self.along_B))
 
-def straight_guard(arm: Arm, along_B: Array, most_N: float, most_off_m: float) -> Motion[StraightGuard]:
-    """Stand a moment and take the force felt now as that of a free hand; for a move from here along `along_B` (3,)."""
+
+def straight_guard(arm: Arm, along_B: Array, most_N: float) -> Motion[StraightGuard]:
+    """Stand a moment and take what is felt now as a free hand's force; for a move from here along `along_B` (3,).
+
+    A hand that something presses beside its setpoint at the start may be there still, but hardly farther.
+    """
     blocks = yield from arm.hold(STAND_S)
     free = np.concatenate([b.wrench_S[:, :3] for b in blocks]).mean(axis=0)
-    return StraightGuard(free, most_N, arm.pose_B_P.position_m, along_B / np.linalg.norm(along_B), most_off_m)
+    unit = along_B / np.linalg.norm(along_B)
+    guard = StraightGuard(free, most_N, arm.pose_B_P.position_m, unit, ASTRAY_M)
+    return replace(guard, most_off_m=max(ASTRAY_M, guard.off_m(blocks[-1]) + FARTHER_M))

@@ -17,7 +17,6 @@ from skills.hand import easy_yaw
 from skills.held_tool import HeldTool
 from skills.requests import finish
 from skills.rising import UP_B
-from skills.stowing import BESIDE_M
 from skills.straight import straight_guard
 from skills.weighing import GRAVITY_M_S2, weigh_N
 
@@ -155,7 +154,7 @@ class ToolPickup(Skill):
         arm, up = self.context.arm, self.context.world.probe.length_m + 0.06 + short_m
         if up <= 1e-4:
             return
-        guard = yield from straight_guard(arm, UP_B, STUCK_N, BESIDE_M)
+        guard = yield from straight_guard(arm, UP_B, STUCK_N)
         moved = yield from arm.shift(up * UP_B, self.params.speed_m_s, check=False, guard=guard)
         if moved.stop is not None:
             raise SkillFailed(

@@ -38,9 +38,9 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
         "hard_limit_broken": _over(tried),
         "tracebacks": sum(r["status"] == "traceback" for r in tried),
         "hangs": sum(r["status"] == "hang" for r in tried),
-        "wrong_object": wilson(len(wrong_object), len(tried)),
-        "named": wilson(sum(bool(r.get("named")) for r in ended), len(ended)),
-        "recovered": wilson(sum(r["verdict"] == "recovered" for r in can), len(can)),
+        "wrong_object": _rate(len(wrong_object), len(tried)),
+        "named": _rate(sum(bool(r.get("named")) for r in ended), len(ended)),
+        "recovered": _rate(sum(r["verdict"] == "recovered" for r in can), len(can)),
         "largest_peak_force_N": max(peaks, default=0.0),
         "latency_s": _mean(latencies),
         "wall_s": _mean([float(r["wall_s"]) for r in rows]),
@@ -66,8 +66,16 @@ def _who(row: Row) -> str:
     return f"{by}: {row['seen_code']}" if row.get("seen_code") else by
 
 
+def _rate(successes: int, n: int) -> dict[str, Any]:
+    return _as_json(wilson(successes, n))
+
+
 def _mean(values: Sequence[float]) -> dict[str, Any]:
-    found = bootstrap_mean(values)
+    return _as_json(bootstrap_mean(values))
+
+
+def _as_json(found: Mapping[str, Any]) -> dict[str, Any]:
+    """None where there is no number."""
     return {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in found.items()}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from py_trees.common import Status
 
-from skills.stowing import BESIDE_M
+from skills.straight import ASTRAY_M
 from skills.tool_pickup import STUCK_N, ToolPickup
 
 STOWED = np.array([0.45, -0.32, -0.06])
@@ -104,7 +104,7 @@ def test_an_arm_that_goes_astray_in_the_holder_is_stopped(make) -> None:
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "hard_contact")
     assert "beside its setpoint" in skill.reason.message
     assert b.arm.scene.holding_tool
-    assert BESIDE_M < max(far_m) < 0.003
+    assert ASTRAY_M < max(far_m) < 0.003
 
 
 def test_no_floor(make) -> None:
