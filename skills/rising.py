@@ -6,7 +6,7 @@ import numpy as np
 
 from glotouch_bt.motion import Arm, Motion
 from glotouch_bt.robot import MotionRefused
-from skills.straight import straight_guard
+from skills.straight import straight_guard, why_stopped
 
 CLEAR_M = 0.13
 """Height over the container's floor that clears its walls (80 mm) and any object, as the skills' own headroom."""
@@ -24,7 +24,8 @@ def rise_clear(arm: Arm, speed_m_s: float = RISE_M_S) -> Motion[float]:
     The lowest point is the ball while the probe is held, else the fingertips.
 
     Raises:
-        MotionRefused: The arm does not reach so high there, the hand is caught under something, or goes astray.
+        MotionRefused: The arm does not reach so high there, or the hand is caught under something.
+        GuardTripped: The arm does not follow its setpoints.
     """
     world = arm.world
     below = arm.description.gripper.fingertip_below_P_m
@@ -36,6 +37,6 @@ def rise_clear(arm: Arm, speed_m_s: float = RISE_M_S) -> Motion[float]:
         return 0.0
     guard = yield from straight_guard(arm, UP_B, CAUGHT_N)
     moved = yield from arm.shift(short * UP_B, speed_m_s, check=False, guard=guard, what="rise")
-    if moved.stop is not None:
-        raise MotionRefused("rise", f"after {moved.travelled_m * 1e3:.0f} mm of {short * 1e3:.0f}: {moved.stop}")
+    if (why := why_stopped(moved)) is not None:
+        raise MotionRefused("rise", why)
     return short

@@ -9,7 +9,7 @@ import numpy as np
 from glotouch_bt.robot import MotionRefused, Pose, SetPayload, Tare
 from skills.base import Context, SkillRun
 from skills.requests import finish
-from skills.straight import Strayed, straight_guard
+from skills.straight import Strayed, straight_guard, why_stopped
 
 OVER_HOLDER_M = 0.002
 """This near to the holder's axis the probe is in it, or on its way in (the skill was broken off there)."""
@@ -35,7 +35,8 @@ def return_probe(
 
     Raises:
         SkillFailed: `request_failed`; the probe stands in its holder.
-        MotionRefused: The holder cannot be reached, or the hand goes astray; the probe is held.
+        MotionRefused: The holder cannot be reached, or the hand is pressed aside; the probe is held.
+        GuardTripped: The arm does not follow its setpoints; the probe is held.
     """
     arm, world = context.arm, context.world
     grasp = Pose.pointing_down(world.holder.pose_B_grasp.position_m, yaw_B_rad)
@@ -49,8 +50,9 @@ def return_probe(
         yield from arm.line(near, insert_speed_m_s, check=False)
     guard = yield from straight_guard(arm, DOWN_B, STANDS_N)
     moved = yield from arm.line(grasp, min(LAST_M_S, insert_speed_m_s), check=False, guard=guard)
+    why = why_stopped(moved)
     if isinstance(moved.stop, Strayed):
-        raise MotionRefused("into the holder", str(moved.stop))
+        raise MotionRefused("into the holder", str(why))
     yield from arm.jaws(min(aperture_m + 0.03, arm.description.gripper.stroke_m), speed_m_s=0.08)
     arm.scene.hold_tool(False)
     yield from arm.shift(np.array([0.0, 0.0, OVER_STOWED_M]), 0.08, check=False)

@@ -6,13 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glotouch_bt.motion import Arm, Motion
-from glotouch_bt.robot import Array, Observation
+from glotouch_bt.motion import Arm, Motion, MoveResult
+from glotouch_bt.robot import Array, GuardTripped, Observation
 from skills.weighing import STAND_S
 
 ASTRAY_M, FARTHER_M = 0.0015, 0.0005
-"""The arm gives 0.15 mm a newton at most (simulated); the slot of the probe's holder is 4 mm wider than the shaft to each
-side. A hand that is astray already may go so much farther."""
+"""The slot of the probe's holder is 4 mm wider than the shaft to each side, and an arm that goes astray needs half of
+that to stop. A hand that is so far beside its setpoint at the start may go so much farther."""
+GIVES_M_N = 1.5e-4
+"""The arm gives so much a newton at most (simulated). What is farther beside its setpoint does not follow."""
 
 
 @dataclass(frozen=True)
@@ -31,16 +33,22 @@ class Pressed:
 
 @dataclass(frozen=True)
 class Strayed:
-    """The move ended because the hand left its way: the arm does not do what it is told.
+    """The move ended because the hand left its way.
 
     Attributes:
-        off_m: How far beside the line it is.
+        off_m: How far beside the line it is; most_off_m: how far it may be.
+        force_N: How much more than at rest was felt.
+        stamp_s: Robot clock.
     """
 
     off_m: float
+    most_off_m: float
+    force_N: float
+    stamp_s: float
 
     def __str__(self) -> str:
-        return f"the hand is {self.off_m * 1e3:.1f} mm beside its setpoint"
+        off, most = 1e3 * self.off_m, 1e3 * self.most_off_m
+        return f"the hand is {off:.1f} mm beside its setpoint with {self.force_N:.0f} N on it, {most:.1f} are allowed"
 
 
 @dataclass(frozen=True)
@@ -66,7 +74,7 @@ class StraightGuard:
         if force > self.most_N:
             return Pressed(force)
         off = self.off_m(seen)
-        return Strayed(off) if off > self.most_off_m else None
+        return Strayed(off, self.most_off_m, force, seen.now_s) if off > self.most_off_m else None
 
     def off_m(self, seen: Observation) -> float:
         """How far P is beside the line, newest sample."""
@@ -75,12 +83,22 @@ class StraightGuard:
 
 
 def straight_guard(arm: Arm, along_B: Array, most_N: float) -> Motion[StraightGuard]:
-    """Stand a moment and take what is felt now as a free hand's force; for a move from here along `along_B` (3,).
-
-    A hand that something presses beside its setpoint at the start may be there still, but hardly farther.
-    """
+    """Stand a moment and take what is felt now as a free hand's force; for a move from here along `along_B` (3,)."""
     blocks = yield from arm.hold(STAND_S)
     free = np.concatenate([b.wrench_S[:, :3] for b in blocks]).mean(axis=0)
     unit = along_B / np.linalg.norm(along_B)
     guard = StraightGuard(free, most_N, arm.pose_B_P.position_m, unit, ASTRAY_M)
     return replace(guard, most_off_m=max(ASTRAY_M, guard.off_m(blocks[-1]) + FARTHER_M))
+
+
+def why_stopped(moved: MoveResult) -> str | None:
+    """What ended a straight move before its end, in words; None: nothing did.
+
+    Raises:
+        GuardTripped: The hand is where no force can have pushed it: the arm does not follow its setpoints, and no other
+            move will help.
+    """
+    stop = moved.stop
+    if isinstance(stop, Strayed) and stop.off_m > stop.force_N * GIVES_M_N + FARTHER_M:
+        raise GuardTripped("following", str(stop), stop.off_m, stop.most_off_m, stop.stamp_s)
+    return None if stop is None else f"after {moved.travelled_m * 1e3:.0f} mm {stop}"

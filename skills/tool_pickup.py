@@ -17,7 +17,7 @@ from skills.hand import easy_yaw
 from skills.held_tool import HeldTool
 from skills.requests import finish
 from skills.rising import UP_B
-from skills.straight import straight_guard
+from skills.straight import straight_guard, why_stopped
 from skills.weighing import GRAVITY_M_S2, weigh_N
 
 STUCK_N = 8.0
@@ -150,17 +150,18 @@ class ToolPickup(Skill):
 
         Raises:
             SkillFailed: `hard_contact`.
+            GuardTripped: The arm does not follow its setpoints.
         """
         arm, up = self.context.arm, self.context.world.probe.length_m + 0.06 + short_m
         if up <= 1e-4:
             return
         guard = yield from straight_guard(arm, UP_B, STUCK_N)
         moved = yield from arm.shift(up * UP_B, self.params.speed_m_s, check=False, guard=guard)
-        if moved.stop is not None:
+        if (why := why_stopped(moved)) is not None:
             raise SkillFailed(
                 "hard_contact",
-                f"after {moved.travelled_m * 1e3:.0f} mm of drawing the probe out: {moved.stop}",
-                advice="check the holder's pose, that nothing blocks the probe, and that the arm goes where it is told",
+                f"the probe does not come out of its holder: {why}",
+                advice="check the holder's pose, and that nothing blocks the probe",
                 travelled_m=moved.travelled_m,
             )
 
