@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from glotouch_bt.search import SearchMap, Trace, admit, part_of
-from glotouch_bt.search.candidates import _outline
+from glotouch_bt.search.candidates import _outline, quality
 from glotouch_bt.touch import Candidate, Contact
 
 R = 0.006
@@ -67,3 +67,19 @@ def test_what_stands_too_near_for_another_object_is_the_same(candidate):
         near = dataclasses.replace(candidate, contour=_outline(candidate.contacts[:3], R).contour)
         two[gap] = len(admit(belief, (near,), contacts[0], traced, 0.018, 0.01).candidates)
     assert two == {0.016: 1, 0.026: 2}
+
+
+def test_the_end_of_something_long_is_less_known_than_a_disc():
+    """Both are touched all round their supposed middles: by coverage alone they are alike."""
+    angles = np.deg2rad([10.0, 100.0, 190.0, 280.0])
+    disc = tuple(
+        contact(*(0.022 * np.array([c, s])), c, s) for c, s in zip(np.cos(angles), np.sin(angles), strict=True)
+    )
+    end = (
+        contact(0.0, 0.022, 0, 1),
+        contact(-0.022, 0.008, -1, 0),
+        contact(-0.01, -0.022, 0, -1),
+        contact(0.012, -0.022, 0, -1),
+    )
+    assert quality(_outline(disc, R)) > 0.9
+    assert quality(_outline(end, R)) < 0.6

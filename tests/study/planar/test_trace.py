@@ -14,6 +14,7 @@ from glotouch_bt.search.trace_state import TraceState
 from glotouch_bt.study.planar import ContactModel, PlanarWorld
 from glotouch_bt.study.planar.drive import drive
 from glotouch_bt.touch import Contact
+from skills.orbit_probe import OrbitProbeParams
 from skills.refine_outline import RefineOutlineParams
 
 from .conftest import TIP, WorldOf, as_mesh, box, cylinder
@@ -75,6 +76,31 @@ def test_what_has_gone_ends_with_few_contacts(world_of: WorldOf) -> None:
     assert len(result.contacts) < 3
     assert result.ended
     assert world.travel_m < 2.5
+
+
+@pytest.mark.parametrize("radius", [0.018, 0.022, 0.025])
+@pytest.mark.parametrize("beside", [(-0.034, 0.012), (-0.03, 0.02), (0.012, -0.034)])
+def test_what_was_touched_at_a_limbs_end_is_beside_it(
+    world_of: WorldOf, radius: float, beside: tuple[float, float]
+) -> None:
+    """A disc with a limb too thin to be drawn: the ball meets its end head-on, and there is nothing behind it."""
+    world = world_of([cylinder(radius)], [(*(CENTRE + beside), 0)])
+    out = -np.array([1.0, 1.0, 0.0]) / np.sqrt(2)
+    tip = np.array([*CENTRE, 0.018])
+    first = Contact(0.0, tip, -out, out, (tip - TIP * out)[:2], 1.0)
+    world.lowered, world.tip_K_m = True, tip[:2] + 0.004 * out[:2]
+    result = drive(trace(first, world.tip_K_m, TIP, OrbitProbeParams().rule(), half_extent_m=INNER), world)
+    assert len(result.contacts) >= TraceParams().least_contacts
+    assert result.outline is not None
+    assert np.linalg.norm(result.outline.centre_K_m - world.centres_K_m()[0]) < 0.02
+
+
+def test_what_is_too_small_is_no_object(world_of: WorldOf) -> None:
+    world = world_of([cylinder(0.01)], [(*CENTRE, 0)])
+    first = touched_from(world, 0.4)
+    assert traced(world, first, TraceParams(smallest_m=0.0)).ended == "the outline is known"
+    again = world_of([cylinder(0.01)], [(*CENTRE, 0)])
+    assert traced(again, touched_from(again, 0.4)).ended != "the outline is known"
 
 
 def test_a_contact_that_faces_the_middle_is_with_something_else(world_of: WorldOf) -> None:
