@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from glotouch_bt.motion import Arm, Motion
 from glotouch_bt.robot import MotionRefused
-from skills.straight import straight_guard, why_stopped
+from skills.straight import UP_B, straight_guard, why_stopped
 
 CLEAR_M = 0.13
 """Height over the container's floor that clears its walls (80 mm) and any object, as the skills' own headroom."""
@@ -15,7 +13,6 @@ NEAR_ENOUGH_M = 0.002
 CAUGHT_N = 15.0
 """Change of force at which the hand rises no farther, half of the robot's hard limit: it is caught. What it takes up
 weighs 4 N at most (CONDITIONS)."""
-UP_B = np.array([0.0, 0.0, 1.0])
 
 
 def rise_clear(arm: Arm, speed_m_s: float = RISE_M_S) -> Motion[float]:

@@ -9,7 +9,7 @@ import numpy as np
 from glotouch_bt.robot import MotionRefused, Pose, SetPayload, Tare
 from skills.base import Context, SkillRun
 from skills.requests import finish
-from skills.straight import Strayed, straight_guard, why_stopped
+from skills.straight import DOWN_B, Strayed, straight_guard, why_stopped
 
 OVER_HOLDER_M = 0.002
 """This near to the holder's axis the probe is in it, or on its way in (the skill was broken off there)."""
@@ -17,7 +17,6 @@ NEAR_M, LAST_M_S = 0.02, 0.01
 """From so far above its place it is lowered slowly, by the second."""
 STANDS_N = 8.0
 """Change of force at which it stands before its time: it slipped down in the jaws."""
-DOWN_B = np.array([0.0, 0.0, -1.0])
 OVER_STOWED_M = 0.08
 """The empty hand rises so far from the stowed probe's handle."""
 

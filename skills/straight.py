@@ -13,6 +13,7 @@ from skills.weighing import STAND_S
 ASTRAY_M, FARTHER_M = 0.0015, 0.0005
 """The slot of the probe's holder is 4 mm wider than the shaft to each side, and an arm that goes astray needs half of
 that to stop. A hand that is so far beside its setpoint at the start may go so much farther."""
+UP_B, DOWN_B = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0])
 GIVES_M_N = 1.5e-4
 """The arm gives so much a newton at most (simulated). What is farther beside its setpoint does not follow."""
 

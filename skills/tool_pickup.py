@@ -16,12 +16,11 @@ from skills.floor import FLOOR_SEARCH_M, feel_floor
 from skills.hand import easy_yaw
 from skills.held_tool import HeldTool
 from skills.requests import finish
-from skills.rising import UP_B
-from skills.straight import straight_guard, why_stopped
+from skills.straight import DOWN_B, UP_B, straight_guard, why_stopped
 from skills.weighing import GRAVITY_M_S2, weigh_N
 
 STUCK_N = 8.0
-"""Change of force at which the probe is not drawn on: it is stuck in its holder, or the arm goes astray. Drawn out it
+"""Change of force at which the hand does not go on to the handle, nor draw the probe out of its holder. Unhindered it
 is 2 N (harsh, simulated)."""
 HANDLE_TOLERANCE_M = 0.004
 """The jaws hold the handle if they are this near to its width: twice the largest bias of their report, and its give."""
@@ -45,7 +44,8 @@ class ToolPickup(Skill):
     SUCCESS: the probe is held and its floor height is known.
     FAILURE `no_probe`: the jaws closed on nothing (or on something of another width).
     FAILURE `probe_not_lifted`: the hand came up without the probe's weight.
-    FAILURE `hard_contact`: the probe is stuck in its holder, or met something hard on the way to the floor; it is held.
+    FAILURE `hard_contact`: the open hand met something on its way to the handle; or the probe is held, and is stuck in
+        its holder, or met something hard on the way to the floor.
     FAILURE `no_floor`: the ball met nothing where the container's floor should be; the probe is held.
     FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
     FAILURE `motion_refused`: the holder cannot be reached.
@@ -64,7 +64,7 @@ class ToolPickup(Skill):
         "no_probe": "the jaws closed on nothing, or on something of another width",
         "probe_not_lifted": "the hand came up without the probe's weight",
         "no_floor": "the ball met nothing where the container's floor should be",
-        "hard_contact": "the wrench passed a limit on the way out of the holder, or to the floor",
+        "hard_contact": "the wrench passed a limit on the way to the handle, out of the holder, or to the floor",
         "request_failed": "the sensor could not be zeroed, or the payload not be set",
         "motion_refused": "the holder cannot be reached",
     }
@@ -131,7 +131,16 @@ class ToolPickup(Skill):
         )
         yield from finish(self.context.requests.start(Tare()), "tare")
         with may_touch(arm, "hand", "probe", "holder"):
-            yield from arm.line(grasp, 0.05)
+            guard = yield from straight_guard(arm, DOWN_B, STUCK_N)
+            moved = yield from arm.line(grasp, 0.05, guard=guard)
+            if (why := why_stopped(moved)) is not None:
+                yield from arm.line(above, 0.05)
+                raise SkillFailed(
+                    "hard_contact",
+                    f"the open hand met something on its way down over the handle: {why}",
+                    advice="check the holder's pose",
+                    travelled_m=moved.travelled_m,
+                )
             state = yield from arm.jaws(0.0, speed_m_s=0.04, force_N=p.grip_N)
             if not self._handle_wide(state.aperture_m):
                 yield from arm.jaws(opening, speed_m_s=0.1)

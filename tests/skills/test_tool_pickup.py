@@ -87,6 +87,23 @@ def test_a_probe_that_is_stuck_in_its_holder_is_not_torn_out(make) -> None:
     assert not b.arm.scene._allowed
 
 
+def test_an_open_hand_that_meets_something_on_the_way_down_does_not_press_on(make) -> None:
+    """A spring of 3 N/mm, 10 mm above the handle's place."""
+    top_m = STOWED[2] + 0.010
+
+    def stands(position_B, aperture: float) -> float:
+        over = np.linalg.norm(position_B[:2] - STOWED[:2]) < 0.01
+        return -3000.0 * max(top_m - position_B[2], 0.0) if over else 0.0
+
+    b, skill = make(weight_N=stands)
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "hard_contact")
+    assert not b.arm.scene.holding_tool
+    assert b.arm.pose_B_P.position_m[2] > STOWED[2] + 0.05
+    assert STUCK_N < b.robot.peak_force_N < 2.0 * STUCK_N
+    assert not b.arm.scene._allowed
+
+
 def test_an_arm_that_goes_astray_in_the_holder_is_stopped(make) -> None:
     """The hand goes sideways as it rises, a millimetre in ten: it stops within the slot's 4 mm."""
     b, skill = make()
