@@ -99,7 +99,7 @@ def _touchset(columns: Columns) -> TouchSet:
 def _plain(cls: type[Any]) -> list[tuple[Field[Any], Any]]:
     """The fields of a value that are columns, with their types: all but values and tuples of values."""
     hints = get_type_hints(cls)
-    nested = {"contour", "contacts", "layers"}
+    nested = {"contour", "contacts", "layers", "rings"}
     return [(f, hints[f.name]) for f in fields(cls) if f.name not in nested]
 
 

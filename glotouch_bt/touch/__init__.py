@@ -29,6 +29,7 @@ from glotouch_bt.touch.values import (
     ContourFamily,
     ContourKind,
     Layer,
+    Ring,
     TouchSequence,
     TouchSet,
 )
@@ -55,6 +56,7 @@ __all__ = [
     "PatchStats",
     "Plateau",
     "PlateauParams",
+    "Ring",
     "TipFusion",
     "TouchSequence",
     "TouchSet",
