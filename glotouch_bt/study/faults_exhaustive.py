@@ -26,7 +26,7 @@ from glotouch_bt.mission.runner import Outcome, run_mission
 from glotouch_bt.mission.source import Place
 from glotouch_bt.mission.tally import NullRecord
 from glotouch_bt.mission.worlds import load_conditions
-from glotouch_bt.robot import Backend, Command, Observation, Request, Robot, Ticket, load_backend
+from glotouch_bt.robot import Backend, BadInput, Command, Observation, Request, Robot, Ticket, load_backend
 
 KINDS = ("robot_fault", "exception")
 HUNG_S = 30
@@ -147,6 +147,9 @@ def run_exhaustive(study: Exhaustive, on_progress: Callable[[int, str], None] | 
 
     Returns:
         calls: of the unfaulted run, and how it ended; tried; and the calls after which something was not as it must be.
+
+    Raises:
+        BadInput: The mission or the backend cannot be used.
     """
     mission, backend = load_mission(study.mission, study.settings), load_backend(study.backend)
     bad: list[dict[str, Any]] = []
@@ -184,6 +187,9 @@ def _run(
     """The unfaulted run. Every child leaves it from inside, and never returns from here."""
     options = split_settings(mission, study.settings)
     device = backend.open(mission.world, load_conditions("ideal"), study.seed, options)
+    if device.paced:
+        device.close()
+        raise BadInput(f"{study.backend}: its clock is the wall's; only a simulation in this process can be forked")
     injector = _Forking(device, study.seed, study.stride, ended)
     gc.collect()
     gc.freeze()  # children would copy what their collector only looks at

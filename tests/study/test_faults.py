@@ -15,7 +15,8 @@ import pytest
 
 from glotouch_bt.faults.catalogue import CATALOGUE
 from glotouch_bt.mission.checkpoint import Row
-from glotouch_bt.robot import UnknownName
+from glotouch_bt.robot import BadInput, UnknownName
+from glotouch_bt.robot.fake import FakeRobot
 from glotouch_bt.study import faults_exhaustive, faults_start, faults_trial
 from glotouch_bt.study.faults import Campaign, run_campaign
 from glotouch_bt.study.faults_cases import CASES, SKILLS, Case, chosen_cases
@@ -170,6 +171,12 @@ def test_every_call_of_a_short_mission_can_fail(tmp_path: Path) -> None:
     assert summary["unfaulted"] == "failure"  # nothing is in the fake robot's holder
     assert summary["tried"] == len(summary["kinds"]) * -(-summary["calls"] // 60)
     assert json.loads((tmp_path / "out" / "summary.json").read_text()) == summary
+
+
+def test_a_device_in_the_world_is_not_forked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(FakeRobot, "paced", True)
+    with pytest.raises(BadInput, match="its clock is the wall's"):
+        run_exhaustive(Exhaustive(short_mission(tmp_path), {}, "fake", 0, 60, tmp_path / "out"))
 
 
 def test_a_run_that_does_not_end_as_it_must_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
