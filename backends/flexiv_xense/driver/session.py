@@ -11,6 +11,7 @@ import numpy as np
 
 from .checks import SetpointCheck, braked
 from .connect import Connected
+from .dating import Dating
 from .faults import CommandRefused, DeviceFault
 from .frames import payload_on_tool, wrench_map
 from .messages import (
@@ -58,6 +59,7 @@ class Session:
         self._stamps: deque[float] = deque(maxlen=KEPT)
         self._rows: deque[list[float]] = deque(maxlen=KEPT)
         self._device_stamp: object = None
+        self._dating = Dating()
         self._fresh_s = self._zero_s
         self._over = 0
         self._newest: list[float] | None = None
@@ -209,7 +211,7 @@ class Session:
             raise DeviceFault("vendor", "the arm reports numbers that are not finite")
         self._track.append((now, row[14:17]))
         self._fresh_s, self._newest = now, row
-        self._stamps.append(now - self._zero_s)
+        self._stamps.append(self._dating(state.stamp, now - self._zero_s))
         self._rows.append(row)
         self._guard(wrench, state.pose, now)
 

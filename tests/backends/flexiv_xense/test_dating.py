@@ -1,0 +1,42 @@
+"""Readings are dated by the device's clock, whatever the way to us took."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from backends.flexiv_xense.driver.dating import Dating
+
+
+def stamped(made_s: float, drift: float = 0.0) -> tuple[int, int]:
+    whole = round((1_700_000_000.0 * 1e9) + made_s * (1.0 + drift) * 1e9)
+    return divmod(whole, 1_000_000_000)
+
+
+@pytest.mark.parametrize("drift", [0.0, 5e-5, -5e-5])
+def test_jitter_of_the_way_is_taken_out(drift: float) -> None:
+    """True times are known here; after the first window the dates differ from them by the shortest way, 0.2 ms."""
+    rng = np.random.default_rng(0)
+    dating, off, now = Dating(), [], 0.0
+    for k in range(20_000):
+        made = 1e-3 * k
+        now = max(now, made + 0.0002 + rng.exponential(0.002))
+        date = dating(stamped(made, drift), now)
+        assert date <= now + 2e-6
+        off.append(date - made - 0.0002)
+    assert np.abs(off[2000:]).max() < 3e-4, "ms jitter, and the drift of a second"
+    assert np.diff(np.array(off) + 1e-3 * np.arange(20_000)).min() > 0
+
+
+def test_a_device_whose_clock_fell_back_is_followed() -> None:
+    dating = Dating()
+    for k in range(3000):
+        dating(stamped(1e-3 * k), 1e-3 * k)
+    late = [dating(stamped(1e-3 * k), 1e-3 * k + 0.08) - (1e-3 * k + 0.08) for k in range(3000, 6000)]
+    assert late[0] == pytest.approx(-0.08, abs=1e-6)
+    assert late[-1] == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("stamp", [None, 3.5, "x", (1, 2, 3), (1.0, 2)])
+def test_without_a_stamp_it_was_made_now(stamp: object) -> None:
+    assert Dating()(stamp, 12.5) == 12.5
