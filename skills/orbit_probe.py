@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.search import Move, Plan, SearchMap, admit, of_another, part_of, trace
+from glotouch_bt.search import Move, Plan, SearchMap, admit, joins, of_another, part_of, trace
 from glotouch_bt.touch import Candidate, Contact
 from skills.base import In, Out, Skill, SkillFailed, SkillRun, param
 from skills.exploring import Explorer
@@ -88,7 +88,8 @@ class OrbitProbe(Skill):
         explorer = Explorer(self.context, self.tool, p.speeds(), self.event)
         if float(np.linalg.norm(explorer.tip_K_m - first.tip_K_m[:2])) > NEAR_M:
             yield from explorer.run(_back_to(first, p.clearance_m))
-        old = part_of(known, first, self.tool.tip_radius_m if self.tool.round else 0.0)
+        radius = self.tool.tip_radius_m if self.tool.round else 0.0
+        old = part_of(known, first, radius)
         plan = trace(
             first,
             explorer.tip_K_m,
@@ -98,6 +99,7 @@ class OrbitProbe(Skill):
             half_extent_m=belief.half_extent_m,
             known=() if old is None else old.contacts,
             elsewhere=partial(of_another, known) if old is None else None,
+            joined=partial(joins, known, radius_m=radius) if old is None else None,
         )
         traced = yield from explorer.run(plan)
         admitted = admit(belief, known, first, traced, p.height_m, p.exclusion_m, part_of=old)

@@ -141,6 +141,14 @@ def part_of(known: tuple[Candidate, ...], first: Contact, radius_m: float) -> Ca
     return None
 
 
+def joins(known: tuple[Candidate, ...], contacts: tuple[Contact, ...], radius_m: float) -> bool:
+    """Whether what is being traced turns out to be a candidate: then it will be made one with it, and refining has
+    time to learn the rest."""
+    points = np.array([c.point_K_m for c in contacts])
+    near = (old for old in known if _room_is_shared(old, points))
+    return any(max(_outline((*old.contacts, *contacts), radius_m).contour.size_m) <= LARGEST_M for old in near)
+
+
 def of_another(known: tuple[Candidate, ...], contact: Contact) -> bool:
     """Whether a contact made while something new is traced is with a candidate that is known from all sides."""
     return any(
@@ -160,7 +168,7 @@ def _outline(contacts: tuple[Contact, ...], radius_m: float) -> OutlineBelief:
 def _merged(old: Candidate, traced: Trace, radius_m: float, height_m: float) -> Candidate | None:
     """The candidate that both are, or None if they are two."""
     points = np.array([c.point_K_m for c in traced.contacts])
-    if float(signed_distance(envelope(old), points).min()) > SAME_M and _apart_m(old.contacts, points) > BETWEEN_M:
+    if not _room_is_shared(old, points):
         return None
     shift = np.array([*traced.displaced_K_m, 0.0])
     before = (replace(c, tip_K_m=c.tip_K_m + shift, point_K_m=c.point_K_m + shift[:2]) for c in old.contacts)
@@ -174,6 +182,11 @@ def _merged(old: Candidate, traced: Trace, radius_m: float, height_m: float) -> 
         # Nothing else can be where it stands: it is what was traced last, and what was felt before was not all its own.
         contacts, outline = traced.contacts, _outline(traced.contacts, radius_m)
     return _with(replace(old, height_m=max(old.height_m, height_m)), contacts, outline)
+
+
+def _room_is_shared(old: Candidate, points: Array) -> bool:
+    """Whether contact points (n, 2) are so near to a candidate that both are one."""
+    return float(signed_distance(envelope(old), points).min()) <= SAME_M or _apart_m(old.contacts, points) <= BETWEEN_M
 
 
 def _apart_m(contacts: tuple[Contact, ...], points: Array) -> float:

@@ -40,6 +40,7 @@ def trace(
     half_extent_m: Array | None = None,
     known: tuple[Contact, ...] = (),
     elsewhere: Callable[[Contact], bool] | None = None,
+    joined: Callable[[tuple[Contact, ...]], bool] | None = None,
 ) -> Plan[Trace]:
     """Trace the outline of what was touched. The ball ends beside it, at sensing height.
 
@@ -52,12 +53,13 @@ def trace(
         half_extent_m: (2,) the ball's centre keeps within |x|, |y| of it in K; None: no walls near.
         known: Contacts with the same object made before, where it stands now.
         elsewhere: Whether a contact is with another object that is known already; None: none is.
+        joined: Whether these contacts show that it is an object known already; None: they never do.
     """
     p = params or TraceParams()
     s = TraceState.begin([*_still(known), first], tip_K_m, tip_radius_m, round_tip, half_extent_m)
     s.given = len(known)
     yield from _retreat(s, p)
-    return (yield from _until_known(s, p, elsewhere))
+    return (yield from _until_known(s, p, elsewhere, joined))
 
 
 def trace_more(
@@ -111,7 +113,12 @@ def _apart(worth: Array, n: int) -> list[int]:
     return chosen
 
 
-def _until_known(s: TraceState, p: TraceParams, elsewhere: Callable[[Contact], bool] | None = None) -> Plan[Trace]:
+def _until_known(
+    s: TraceState,
+    p: TraceParams,
+    elsewhere: Callable[[Contact], bool] | None = None,
+    joined: Callable[[tuple[Contact, ...]], bool] | None = None,
+) -> Plan[Trace]:
     """Probe on until enough is known, from beside the object.
 
     Once a contact was odd, each one asks whether the object moved without being felt to: three are needed to tell.
@@ -119,6 +126,8 @@ def _until_known(s: TraceState, p: TraceParams, elsewhere: Callable[[Contact], b
     outline, missed, ended, about = s.outline(), 0, "", False
     while not ended:
         ended = _enough(outline, s, p)
+        if not ended and joined is not None and len(s.raw) >= p.least_contacts and joined(s.present()):
+            ended = "it is an object that is known"
         if ended:
             break
         aim, beside = _choose(outline, s, p), False

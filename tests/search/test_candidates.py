@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from glotouch_bt.search import SearchMap, Trace, admit, part_of
+from glotouch_bt.search import SearchMap, Trace, admit, joins, part_of
 from glotouch_bt.search.candidates import _outline, quality
 from glotouch_bt.touch import Candidate, Contact
 
@@ -67,6 +67,17 @@ def test_what_stands_too_near_for_another_object_is_the_same(candidate):
         near = dataclasses.replace(candidate, contour=_outline(candidate.contacts[:3], R).contour)
         two[gap] = len(admit(belief, (near,), contacts[0], traced, 0.018, 0.01).candidates)
     assert two == {0.016: 1, 0.026: 2}
+
+
+@pytest.mark.parametrize("gap", [0.016, 0.026])
+def test_a_trace_turns_out_to_be_of_a_candidate_where_it_will_be_made_one_with_it(candidate, gap):
+    contacts = tuple(contact(0.01 + gap + dx, y, nx, ny) for dx, y, nx, ny in LIMB)
+    near = dataclasses.replace(candidate, contour=_outline(candidate.contacts[:3], R).contour)
+    traced = Trace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)))
+    belief = SearchMap.blank((0.2, 0.15), expected=2).with_exclusion(candidate.contour, 0.01)
+    one = len(admit(belief, (near,), contacts[0], traced, 0.018, 0.01).candidates) == 1
+    assert joins((near,), contacts, R) == one == (gap == 0.016)
+    assert not joins((), contacts, R)
 
 
 def test_the_end_of_something_long_is_less_known_than_a_disc():

@@ -10,6 +10,7 @@ from glotouch_bt.search import (
     SearchPolicy,
     TraceParams,
     admit,
+    joins,
     of_another,
     part_of,
     refined,
@@ -118,8 +119,17 @@ def explore(
             old = part_of(candidates, first, radius)
             known = () if old is None else old.contacts
             elsewhere = partial(of_another, candidates) if old is None else None
-            half = belief.half_extent_m
-            plan = trace(first, world.tip_K_m, radius, tracing, half_extent_m=half, known=known, elsewhere=elsewhere)
+            joined = partial(joins, candidates, radius_m=radius) if old is None else None
+            plan = trace(
+                first,
+                world.tip_K_m,
+                radius,
+                tracing,
+                half_extent_m=belief.half_extent_m,
+                known=known,
+                elsewhere=elsewhere,
+                joined=joined,
+            )
             traced = drive(plan, limited)
             admitted = admit(belief, candidates, first, traced, orbit.height_m, orbit.exclusion_m, part_of=old)
             belief, candidates = admitted.belief, admitted.candidates

@@ -95,6 +95,21 @@ def test_what_was_touched_at_a_limbs_end_is_beside_it(
     assert np.linalg.norm(result.outline.centre_K_m - world.centres_K_m()[0]) < 0.02
 
 
+def test_what_turns_out_to_be_known_is_not_traced_to_the_end(world_of: WorldOf) -> None:
+    world = world_of([box(0.09, 0.05)], [(*CENTRE, 0.4)])
+    first, asked = touched_from(world, 1.2), list[int]()
+
+    def joined(contacts: tuple[Contact, ...]) -> bool:
+        asked.append(len(contacts))
+        return len(contacts) == 5
+
+    params = TraceParams(centre_sd_m=1e-9, radial_sd_m=1e-9)
+    plan = trace(first, world.tip_K_m, TIP, params, half_extent_m=INNER, joined=joined)
+    result = drive(plan, world)
+    assert (result.ended, len(result.contacts)) == ("it is an object that is known", 5)
+    assert min(asked) == params.least_contacts
+
+
 def test_what_is_too_small_is_no_object(world_of: WorldOf) -> None:
     world = world_of([cylinder(0.01)], [(*CENTRE, 0)])
     first = touched_from(world, 0.4)
