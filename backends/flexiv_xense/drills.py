@@ -106,6 +106,8 @@ def run_drill(victim: str, moment_s: float, mission: str, seed: int, folder: Pat
         executive.kill()
         raise RuntimeError(f"the devices did not open: {(folder / 'executive.txt').read_text()[-500:]}")
     CLOCK.sleep_until(CLOCK.now_s() + moment_s)
+    if executive.poll() is not None:  # nothing was shown; counts as not passed
+        return Drill(victim, moment_s, float("nan"), None, None, executive.returncode)
     others = [pid for pid in _children(executive.pid) if pid != opened["pid"]]
     killed_s = time.monotonic()
     os.kill(opened["pid"] if victim == "driver" else executive.pid, signal.SIGKILL)

@@ -61,6 +61,7 @@ class SensedWatch:
         self._told: deque[list[float]] = deque(maxlen=max(1, round(rules.lag_s / period_s)))
         self._brakes = False
         self._moving = False
+        self._moved = False  # by the command before the newest: that is what a late cycle waited with
         self._over = 0
         self._wrist = WristWatch(period_s, rules, self._patience)
         self._pads = PadWatch(rules, self._patience)
@@ -71,11 +72,12 @@ class SensedWatch:
         self._wrist.forget()
         self._pads.forget()
         self._told.clear()
-        self._moving = self._brakes = False
+        self._moving = self._brakes = self._moved = False
         self._over = 0
 
     def told(self, command: Command) -> None:
         """What the coming block answers to."""
+        self._moved = self._moving and self._brakes
         motion = command.motion
         if motion is not None:
             pose = motion.pose_B_P
@@ -170,16 +172,15 @@ class SensedWatch:
         now_s = float(o.stamp_s[-1])
         periods = (now_s - last) / self._period_s
         if periods >= 1.0 + LATE:
-            moves = self._moving and self._brakes  # at the end of a way it stands, told to be where it is
-            fatal = moves and periods > 1.0 + self._rules.late_periods
-            if not fatal and moves and periods > 1.0 + self._rules.held_periods:
+            fatal = self._moved and periods > 1.0 + self._rules.late_periods
+            if not fatal and self._moved and periods > 1.0 + self._rules.held_periods:
                 fatal = self._patience.ends("overrun", now_s)
-            what = f"{periods:.1f} control periods passed in one cycle" + (" while the arm moved" * moves)
+            what = f"{periods:.1f} control periods passed in one cycle" + (" while the arm moved" * self._moved)
             found.append(Finding("overrun", what, periods, 1.0 + self._rules.late_periods, now_s, fatal))
         expected = round(self._samples * periods)
         missing = expected - len(o.stamp_s) - bad
         if missing > 1 and len(o.stamp_s) < SEEN * expected:
-            unseen = max(1, missing // self._samples) if self._moving else 1
+            unseen = max(1, missing // self._samples) if self._moved else 1
             fatal = self._patience.ends("samples_missing", now_s, unseen)
             what = f"{missing} of {expected} samples are missing"
             found.append(Finding("samples_missing", what, float(missing), float(self._rules.tolerated), now_s, fatal))

@@ -175,6 +175,15 @@ def test_a_gap_ends_a_motion_but_not_a_rest(extra: int, lost: bool, guard: str) 
         robot.cycle(move(6, device.description.home_q))
 
 
+def test_a_long_thought_before_a_motion_is_no_overrun() -> None:
+    device = Late(40, 5, lost=False)
+    robot, found = supervised(device)
+    spin(robot, 5)
+    for k in range(5):
+        robot.cycle(move(k + 1, device.description.home_q))
+    assert [f.fatal for f in found] == [False]
+
+
 @pytest.mark.parametrize(("extra", "lost"), [(4, True), (7, False)])
 def test_a_late_cycle_now_and_then_is_put_on_record(extra: int, lost: bool) -> None:
     device = Late(extra, 5, lost=lost)
