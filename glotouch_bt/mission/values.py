@@ -193,7 +193,7 @@ def _named_class(name: str) -> type:
         found: Any = importlib.import_module(module)
         for part in qualname.split("."):
             found = vars(found)[part]
-    except (ImportError, KeyError, TypeError) as e:
+    except (ImportError, KeyError, TypeError, ValueError, AttributeError) as e:
         raise BadInput(f"kept values name {name}, which does not exist here: they are of another version") from e
     if not (isinstance(found, type) and (dataclasses.is_dataclass(found) or issubclass(found, Enum))):
         raise BadInput(f"kept values name {name}, which is neither a dataclass nor an enum")
