@@ -45,6 +45,12 @@ def known_packages() -> frozenset[str]:
     return frozenset(provided | set(OWN_PACKAGES))
 
 
+_DAMAGED = (
+    msgspec.MsgspecError, ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError, OverflowError,
+)  # fmt: skip
+"""What reading damaged bytes can raise."""
+
+
 def encode(value: object) -> bytes:
     """A value as bytes.
 
@@ -64,7 +70,7 @@ def decode(data: bytes) -> Any:
         return _Decoder().value(msgspec.msgpack.decode(data))
     except BadInput:
         raise
-    except (msgspec.MsgspecError, ValueError, TypeError, KeyError, IndexError, RecursionError, OverflowError) as e:
+    except _DAMAGED as e:
         raise BadInput(f"kept values cannot be read ({type(e).__name__}: {e})") from e
 
 
