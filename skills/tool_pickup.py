@@ -19,9 +19,12 @@ from skills.requests import finish
 from skills.straight import DOWN_B, UP_B, straight_guard, why_stopped
 from skills.weighing import GRAVITY_M_S2, weigh_N
 
-STUCK_N = 20.0
-"""Change of force at which the hand does not go on to the handle, nor draw the probe out of its holder. Where the ball
-snags on the slot it is up to 14 N for 30 ms (harsh, simulated, 2 pickups of 12)."""
+MET_N = 8.0
+"""Change of force at which the open hand goes no farther down over the handle; unhindered it is below 2 N."""
+STUCK_N, OUT_M_S = 25.0, 0.05
+"""Change of force at which the probe is drawn out of its holder no farther, and how fast it is at most. At that speed
+a probe held by 3 N/mm is pulled by 2.5 N more until the arm stands: below the hard limit. A ball that snags on its slot
+pulls with up to 23 N (harsh, simulated), and comes out."""
 HANDLE_TOLERANCE_M = 0.004
 """The jaws hold the handle if they are this near to its width: twice the largest bias of their report, and its give."""
 
@@ -131,7 +134,7 @@ class ToolPickup(Skill):
         )
         yield from finish(self.context.requests.start(Tare()), "tare")
         with may_touch(arm, "hand", "probe", "holder"):
-            guard = yield from straight_guard(arm, DOWN_B, STUCK_N)
+            guard = yield from straight_guard(arm, DOWN_B, MET_N)
             moved = yield from arm.line(grasp, 0.05, guard=guard)
             if (why := why_stopped(moved)) is not None:
                 yield from arm.line(above, 0.05)
@@ -165,7 +168,8 @@ class ToolPickup(Skill):
         if up <= 1e-4:
             return
         guard = yield from straight_guard(arm, UP_B, STUCK_N)
-        moved = yield from arm.shift(up * UP_B, self.params.speed_m_s, check=False, guard=guard)
+        speed_m_s = min(self.params.speed_m_s, OUT_M_S)
+        moved = yield from arm.shift(up * UP_B, speed_m_s, check=False, guard=guard)
         if (why := why_stopped(moved)) is not None:
             raise SkillFailed(
                 "hard_contact",

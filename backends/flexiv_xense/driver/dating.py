@@ -24,7 +24,7 @@ class Dating:
         self._last_s = float("-inf")
 
     def __call__(self, stamp: object, now_s: float) -> float:
-        """Seconds on our clock, later than all before, at most `now_s`.
+        """Seconds on our clock, later than all before; at most a microsecond later than `now_s`.
 
         Args:
             stamp: The device's (seconds, nanoseconds); anything else: it is taken to have been made now.
