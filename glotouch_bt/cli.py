@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import sys
-import traceback
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,7 +18,7 @@ from glotouch_bt.commands.bench import bench
 from glotouch_bt.commands.check import bench_check, check
 from glotouch_bt.commands.doctor import doctor, link
 from glotouch_bt.commands.faults import bench_faults, faults
-from glotouch_bt.commands.guarded import guarded, set_debug, showing_tracebacks
+from glotouch_bt.commands.guarded import guarded, set_debug
 from glotouch_bt.commands.options import read_settings
 from glotouch_bt.commands.pause import bench_pause
 from glotouch_bt.commands.replay import replay
@@ -94,27 +93,14 @@ def run(
 ) -> int:
     """Run a mission and write its record, result and report. `p` (or SIGUSR1) pauses it, SIGTERM ends it safely."""
     from glotouch_bt.commands import console
+    from glotouch_bt.commands.ending import tell_end
     from glotouch_bt.commands.operated import Operator, operated
     from glotouch_bt.study.launch import RunRequest, launch
 
     request = RunRequest(mission, backend, seed, read_settings(set_), objects, conditions, out, faults, may_kill=True)
     with console.RunProgress(quiet=json_) as progress, operated(Operator()) as control:
         done = launch(request, on_start=progress.start, on_progress=progress.update, control=control)
-    if json_:
-        _print_json({**done.result, "folder": str(done.folder)})
-    else:
-        console.print_result(done)
-    if done.warning:
-        console.print_error(done.warning)
-    if done.outcome.error is not None:
-        if showing_tracebacks():
-            traceback.print_exception(done.outcome.error)
-        console.print_error(
-            f"{done.outcome.reasons[-1]}\nglotouch resume {done.folder}   goes on from the last checkpoint"
-        )
-    elif done.exit_code and json_:
-        console.print_error(" <- ".join(done.outcome.reasons))
-    return done.exit_code
+    return tell_end(done, json_)
 
 
 @app.command()

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import sys
-import traceback
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.commands.guarded import guarded, showing_tracebacks
+from glotouch_bt.commands.guarded import guarded
 
 Json = Annotated[bool, typer.Option("--json", help="print JSON on stdout, nothing else")]
 
@@ -27,6 +26,7 @@ def resume(
 ) -> int:
     """Go on with a run after a crash, a kill, Ctrl-C or a safety stop; finished skills are not done again."""
     from glotouch_bt.commands import console
+    from glotouch_bt.commands.ending import tell_end
     from glotouch_bt.commands.operated import Operator, operated
     from glotouch_bt.study.going_on import GoingOn
     from glotouch_bt.study.resume import resume as go_on
@@ -55,17 +55,7 @@ def resume(
             on_progress=progress.update,
             control=control,
         )
-    if json_:
-        sys.stdout.write(json.dumps({**done.result, "folder": str(done.folder)}, indent=2) + "\n")
-    else:
-        console.print_result(done)
-    if done.warning:
-        console.print_error(done.warning)
-    if done.outcome.error is not None:
-        if showing_tracebacks():
-            traceback.print_exception(done.outcome.error)
-        console.print_error(done.outcome.reasons[-1])
-    return done.exit_code
+    return tell_end(done, json_)
 
 
 @guarded
@@ -98,10 +88,12 @@ def bench_resume(
     study = KillStudy(mission, range(seed, seed + trials), kills, folder, settings, conditions, box, resume)
 
     def show(row: dict[str, Any], done: int, total: int) -> None:
-        at = f"{row['moment']:.0%} of the mission, checkpoint {row.get('checkpoint')} of {row.get('checkpoints')}"
-        said = "as its twin" if row["same_end"] else f"NOT as its twin: {row.get('status')} {row['message']}"
-        exact = ", to the bit" if row["same_result"] and row["same_record"] else ""
-        sys.stderr.write(f"[{done}/{total}] seed {row['seed']}: {row['outcome']} at {at}: {said}{exact}\n")
+        at = f"[{done}/{total}] seed {row['seed']}: {row['outcome']} at {row['moment']:.0%} of the mission"
+        if row["outcome"] == "killed":
+            said = "as its twin" if row["same_end"] else f"NOT as its twin: {row.get('status')} {row['message']}"
+            exact = ", to the bit" if row["same_result"] and row["same_record"] else ""
+            at += f", checkpoint {row.get('checkpoint')} of {row.get('checkpoints')}: {said}{exact}"
+        sys.stderr.write(f"{at}\n")
 
     summary = run_study(study, show)
     if json_:
@@ -111,7 +103,11 @@ def bench_resume(
         r = summary[name]
         words = name.replace("_", " ")
         sys.stdout.write(f"{words:32s} {r['rate'] * r['n']:.0f} of {r['n']}  ({r['lo']:.3f} .. {r['hi']:.3f})\n")
-    sys.stdout.write(f"robot time lost {summary['lost_s']['mean']:.1f} s on average; {folder}\n")
+    if summary["outside"]:
+        sys.stdout.write(f"{summary['outside']} kills came before the mission or after its last skill; not counted\n")
+    if summary["lost_s"]["n"]:
+        sys.stdout.write(f"robot time lost {summary['lost_s']['mean']:.1f} s on average\n")
+    sys.stdout.write(f"{folder}\n")
 
 
 def _list(folder: Path, json_: bool) -> None:

@@ -9,6 +9,7 @@ import os
 import sys
 import time
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -176,38 +177,38 @@ def _run(run: _Run, on_progress: Callable[[float, Tally], None] | None, control:
         sys.stderr.flush()
         os._exit(3)
 
-    try:
+    with closing(checkpoints):
         try:
-            outcome = run_mission(
-                mission,
-                robot,
-                record,
-                on_progress=on_progress,
-                control=control,
-                on_lost=lost,
-                keeper=keeper,
-                taken_up=run.taken_up,
-            )
-        except BaseException:  # it raises only before the first tick
-            recorder.close()
-            if run.going_on is None:
-                folder.clear()
-                folder.abandon()
-            raise
-        ended = time.perf_counter()
-        result = score(request, mission, outcome, referee)
-        result |= {"wall_time_s": round(ended - ready, 3), "wall_open_s": round(ready - run.began, 3)}
-        if run.going_on is not None:
-            result["resumed"] = [*run.going_on.before, run.going_on.told()]
-        if injector is not None:
-            root = outcome.chain[-1].as_dict() if outcome.chain else {"code": "", "message": ""}
-            injector.conclude(outcome.status, str(root["code"]), str(root["message"]), outcome.end_s)
-            result |= {"faults": injector.report(), "held_at_end": injector.held}
-        checkpoints.note("ended", outcome.status)
-    finally:
-        recorder.close(result)
-        checkpoints.close()
-    folder.write_json("result.json", result)
+            try:
+                outcome = run_mission(
+                    mission,
+                    robot,
+                    record,
+                    on_progress=on_progress,
+                    control=control,
+                    on_lost=lost,
+                    keeper=keeper,
+                    taken_up=run.taken_up,
+                )
+            except BaseException:  # it raises only before the first tick
+                recorder.close()
+                if run.going_on is None:
+                    folder.clear()
+                    folder.abandon()
+                raise
+            ended = time.perf_counter()
+            result = score(request, mission, outcome, referee)
+            result |= {"wall_time_s": round(ended - ready, 3), "wall_open_s": round(ready - run.began, 3)}
+            if run.going_on is not None:
+                result["resumed"] = [*run.going_on.before, run.going_on.told()]
+            if injector is not None:
+                root = outcome.chain[-1].as_dict() if outcome.chain else {"code": "", "message": ""}
+                injector.conclude(outcome.status, str(root["code"]), str(root["message"]), outcome.end_s)
+                result |= {"faults": injector.report(), "held_at_end": injector.held}
+        finally:
+            recorder.close(result)
+        folder.write_json("result.json", result)
+        checkpoints.note("ended", outcome.status)  # a run killed before this can be gone on with
     if referee is not None:
         ends = {"start": truth(run.objects_at_start), "end": truth(referee.objects())}
         folder.write_json("truth.json", {**ends, "tip_B_m": referee.tip_B_m().tolist()})
