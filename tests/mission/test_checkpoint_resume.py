@@ -127,6 +127,24 @@ def test_a_run_that_was_broken_off_ends_as_its_twin_to_the_bit(
     assert "has ended (reached its goal)" in again.stderr
 
 
+def test_a_run_killed_after_its_last_skill_and_before_its_result_is_gone_on_with(
+    mission: Path, twin: Path, tmp_path: Path
+) -> None:
+    """Its last checkpoint is there, its result is not: the tree is brought to its end again."""
+    folder = tmp_path / "run"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("glotouch_bt.study.run_folder.RunFolder.write_json", _killed)
+        assert glotouch("run", mission, "--seed", 4, "--out", folder).returncode == 3
+    assert not (folder / "result.json").exists()
+    done = glotouch("resume", folder)
+    assert done.returncode == 0, done.stderr
+    same_as_twin(folder, twin)
+
+
+def _killed(*told: object) -> None:
+    raise RuntimeError("here")
+
+
 def test_a_resumed_run_may_be_killed_too(mission: Path, twin: Path, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     broken_off(mission, folder, signal.SIGKILL, 1)
