@@ -22,7 +22,7 @@ from glotouch_bt.mission.resolution import Rounding
 from glotouch_bt.mission.tally import Record, Tally
 from glotouch_bt.mission.watchdog import STUCK_S, BrokenOff, SkillHung, Stuck, Watchdog, deferred_interrupt
 from glotouch_bt.mission.world_check import WorldChanged
-from glotouch_bt.robot import HOLD, Command, Observation, Robot, World
+from glotouch_bt.robot import HOLD, Command, GuardTripped, Observation, Robot, World
 from glotouch_bt.robot.supervision import Supervisor
 from glotouch_bt.robot.supervision_limits import Finding, SupervisionLimits
 from skills.base import Context, Reason, Skill
@@ -150,6 +150,8 @@ def run_mission(
                 loop.end(interrupted)
     except (Exception, KeyboardInterrupt, SystemExit, BrokenOff) as e:
         error = watchdog.stuck.error() if watchdog.stuck is not None else e
+        if isinstance(error, GuardTripped):
+            supervisor.heed(error)
         outcome.abort(error, error.node if isinstance(error, SkillHung) else loop.node_of(e))
         if isinstance(error, SkillHung):
             tally.event("stuck", context.observation.now_s, {"node": error.node, "stack": error.stack})

@@ -115,6 +115,13 @@ class Supervisor(Robot):
         self._commands.forget(newest)
         self._sensed.forget(newest)
 
+    def heed(self, error: GuardTripped) -> None:
+        """A guard above this one, a skill's own, tripped: hold from now on; it is put on record as our own are."""
+        if error is not self._error:
+            self._robot.hold()
+            self._error = error
+            self._note(Finding(error.guard, error.what, error.value, error.limit, error.stamp_s))
+
     def _report(self, found: list[Finding]) -> None:
         for finding in found:
             if finding.fatal:

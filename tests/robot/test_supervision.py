@@ -396,3 +396,26 @@ def test_it_is_a_robot_like_the_one_it_watches() -> None:
 def test_limits_are_checked_at_birth(value: float) -> None:
     with pytest.raises(ParamError, match="following_rad"):
         SupervisionLimits(following_rad=value)
+
+
+def test_a_guard_above_holds_the_arm_and_is_on_record_once() -> None:
+    robot, found = supervised(Device())
+    error = GuardTripped("following", "off", 4e-3, 3e-3, 0.2)
+    robot.heed(error)
+    robot.heed(error)
+    assert [(f.guard, f.what, f.value, f.limit, f.stamp_s, f.fatal) for f in found] == [
+        ("following", "off", 4e-3, 3e-3, 0.2, True)
+    ]
+    assert robot.counts == {"following": 1}
+    with pytest.raises(GuardTripped) as again:
+        robot.cycle(HOLD)
+    assert again.value is error
+
+
+def test_a_guard_of_its_own_is_not_on_record_again_when_it_is_handed_back() -> None:
+    robot, found = supervised(Device(with_part("q", slice(None), slice(None), np.nan), since=5))
+    with pytest.raises(GuardTripped) as trip:
+        spin(robot, 30)
+    count = len(found)
+    robot.heed(trip.value)
+    assert len(found) == count
