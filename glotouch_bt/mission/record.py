@@ -53,13 +53,14 @@ class Recorder:
         path: The file; its folder must exist.
         run: What is known beforehand (mission, seed, conditions, pose_B_K, container, probe, ...); any value
             `mcap_json.to_json` takes. Stored as the attachment run.json and as the metadata record "run".
-        batch_cycles: Control cycles encoded at a time; a killed process loses at most these.
+        batch_cycles: Control cycles encoded at a time; a killed process loses at most these, and the cycle that does it
+            lasts longer: by 1.6 ms at 50, by 18 ms at 500, where an arm that is paced notices.
 
     Raises:
         BadInput: The file cannot be written.
     """
 
-    def __init__(self, path: Path, run: Mapping[str, object], *, batch_cycles: int = 500) -> None:
+    def __init__(self, path: Path, run: Mapping[str, object], *, batch_cycles: int = 50) -> None:
         self.path = path
         self._batch = batch_cycles
         self._observations: list[Observation] = []

@@ -180,8 +180,8 @@ class SensedWatch:
         expected = round(self._samples * periods)
         missing = expected - len(o.stamp_s) - bad
         if missing > 1 and len(o.stamp_s) < SEEN * expected:
-            unseen = max(1, missing // self._samples) if self._moved else 1
-            fatal = self._patience.ends("samples_missing", now_s, unseen)
+            blind = missing / (self._samples * self._rules.late_periods) if self._moved else 0.0
+            fatal = self._patience.ends("samples_missing", now_s, max(1, math.ceil(blind * self._rules.tolerated)))
             what = f"{missing} of {expected} samples are missing"
             found.append(Finding("samples_missing", what, float(missing), float(self._rules.tolerated), now_s, fatal))
         return o

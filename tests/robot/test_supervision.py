@@ -140,13 +140,13 @@ def test_missing_samples_are_put_on_record_and_then_end_it() -> None:
 class Late(Device):
     """Its clock runs on: so many extra periods pass in one cycle, and their samples are lost or come with it."""
 
-    def __init__(self, extra: int, at: int, *, lost: bool) -> None:
+    def __init__(self, extra: int, *at: int, lost: bool) -> None:
         self._extra, self._at, self._lost = extra, at, lost
         super().__init__()
 
     def cycle(self, command: Command) -> Observation:
         blocks = []
-        if self.cycles == self._at:
+        if self.cycles in self._at:
             blocks = [super(Late, self).cycle(HOLD) for _ in range(self._extra)]
         newest = super().cycle(command)
         if self._lost:
@@ -160,7 +160,7 @@ def move(k: int, home: Any) -> Command:
     return setpoint(np.array(home) + 0.001 * k * np.eye(7)[6], 0.1 * np.eye(7)[6])
 
 
-@pytest.mark.parametrize(("extra", "lost", "guard"), [(10, True, "samples_missing"), (40, False, "overrun")])
+@pytest.mark.parametrize(("extra", "lost", "guard"), [(40, True, "overrun"), (40, False, "overrun")])
 def test_a_gap_ends_a_motion_but_not_a_rest(extra: int, lost: bool, guard: str) -> None:
     device = Late(extra, 5, lost=lost)
     robot, found = supervised(device)
@@ -173,6 +173,24 @@ def test_a_gap_ends_a_motion_but_not_a_rest(extra: int, lost: bool, guard: str) 
         robot.cycle(move(k + 1, device.description.home_q))
     with pytest.raises(GuardTripped, match=guard):
         robot.cycle(move(6, device.description.home_q))
+
+
+@pytest.mark.parametrize(("extra", "times", "ends"), [(5, 4, False), (20, 1, False), (20, 2, True)])
+def test_blind_gaps_in_a_motion_end_it_when_a_quarter_of_a_second_was_not_seen(
+    extra: int, times: int, ends: bool
+) -> None:
+    """The device holds in each of them."""
+    device = Late(extra, *(5 + (extra + 3) * i for i in range(times)), lost=True)
+    robot, found = supervised(device)
+    guards = []
+    for k in range(5 + 3 * times):
+        try:
+            robot.cycle(move(k + 1, device.description.home_q))
+        except GuardTripped as e:
+            guards.append(e.guard)
+            break
+    assert guards == ["samples_missing"] * ends
+    assert len([f for f in found if f.guard == "samples_missing"]) == times
 
 
 def test_a_long_thought_before_a_motion_is_no_overrun() -> None:
