@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import Array, MotionRefused, Pose, World
 from glotouch_bt.robot.fake import FakeRobot
-from skills.closing import GENTLE_N, GIVE_UP_N, RAMP_N_S, WEDGED_N, YIELD_N, close_gently, let_go
+from skills.closing import GENTLE_N, GIVE_UP_N, LEANING_N, RAMP_N_S, WEDGED_N, YIELD_N, close_gently, let_go
 
 STIFFNESS_N_M = 2500.0
 """Of a standing object pushed sideways by one jaw, as MuJoCo showed it (1.5 N in 0.6 mm)."""
@@ -88,6 +88,26 @@ def test_what_presses_the_hand_away_ends_the_closure(bench: Any, world: World) -
         b.go(close_gently(b.arm, SPEED_M_S, 10.0))
     assert max(robot.felt_N) < 1.3 * WEDGED_N < GIVE_UP_N, "it is known while the jaws are gentle"
     assert b.arm.aperture_m == pytest.approx(RIZON4_XENSE.gripper.stroke_m, abs=1e-3)
+
+
+@pytest.mark.parametrize(("leaning_N", "refused"), [(0.5 * LEANING_N, False), (1.2 * LEANING_N, True), (np.nan, True)])
+def test_what_leans_on_the_hand_between_gentle_jaws_is_not_pressed(
+    bench: Any, world: World, leaning_N: float, refused: bool
+) -> None:
+    class Leaning(Post):
+        def _pushed(self, stamp: Array, position: Array, quat: Array) -> Array:
+            out = super()._pushed(stamp, position, quat)
+            out[:, 2] = leaning_N * (self._aperture < WIDTH_M + 2e-4)
+            return out
+
+    b = bench().on(world, Leaning(0.0))
+    if refused:
+        with pytest.raises(MotionRefused, match="pressed"):
+            b.go(close_gently(b.arm, SPEED_M_S, 10.0))
+    else:
+        b.go(close_gently(b.arm, SPEED_M_S, 10.0))
+    closing = [c.gripper.force_N for c in b.commands if c.gripper is not None and c.gripper.aperture_m == 0.0]
+    assert max(closing) == (GENTLE_N if refused else 10.0)
 
 
 class Sprag(FakeRobot):
