@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from glotouch_bt.motion.jaws import JawWatch
 from glotouch_bt.robot import Pose
 from glotouch_bt.touch import Candidate
 from skills.allowance import keeping_clear_of
@@ -17,6 +18,8 @@ from skills.rising import rise_clear
 
 OVER_M = 0.03
 """From so far above its place it is lowered carefully."""
+REST_S = 1.5
+"""Jaws that lost what they held close; after so long they stand."""
 SHORT_M = 0.0015
 """So far above its place it is let go: what is pressed on the floor by a stiff arm is pressed hard."""
 
@@ -25,6 +28,8 @@ class PutBackParams(SkillParams):
     """Parameters of `put_back`."""
 
     speed_m_s: float = param("Speed high above the objects", unit="m/s", default=0.10, gt=0.0, le=0.25)
+    approach_speed_m_s: float = param("Speed of going down to just above its place", unit="m/s", default=0.02, gt=0.0,
+                                      le=0.10)  # fmt: skip
     lower_speed_m_s: float = param("Speed of setting down", unit="m/s", default=0.008, gt=0.0, le=0.04)
     drop_m: float = param("It may stand so far above its place when it is let go", unit="m", default=0.015, ge=0.0,
                           le=0.05)  # fmt: skip
@@ -60,6 +65,7 @@ class PutBack(Skill):
         """See the class."""
         arm, p, made = self.context.arm, self.params, self.made
         yield from rise_clear(arm, p.speed_m_s)
+        yield from self._let_jaws_rest()
         apart = arm.aperture_m
         opening = min(max(apart, 0.0) + 0.02, arm.description.gripper.stroke_m)
         if apart < p.least_aperture_m or made is None:
@@ -75,7 +81,7 @@ class PutBack(Skill):
         with keeping_clear_of(arm, others):
             if np.linalg.norm(over.position_m - arm.pose_B_P.position_m) > 1e-3:
                 yield from arm.line(over, p.speed_m_s, what="put back")
-            reached = yield from glide(self.context, near, p.speed_m_s)
+            reached = yield from glide(self.context, near, p.approach_speed_m_s)
             reached = reached and (yield from glide(self.context, place, p.lower_speed_m_s))
         above = float(arm.pose_B_P.position_m[2] - place.position_m[2])
         if not reached and above > p.drop_m:
@@ -89,3 +95,12 @@ class PutBack(Skill):
         yield from let_go(arm, opening)
         yield from rise_clear(arm, p.speed_m_s)
         self.event("put_back", candidate=made.candidate, above_m=above)
+
+    def _let_jaws_rest(self) -> SkillRun:
+        """Jaws that are still closing would be taken for jaws that hold something."""
+        arm = self.context.arm
+        watch = JawWatch(arm.period_s)
+        for _ in range(round(REST_S / arm.period_s)):
+            (seen,) = yield from arm.hold(arm.period_s)
+            if watch.still(seen.now_s, seen.gripper):
+                return

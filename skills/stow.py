@@ -32,6 +32,7 @@ class Stow(Skill):
 
     SUCCESS: the hand is high and empty, the wrist zeroed.
     FAILURE `object_held`: the hand is high; the jaws hold something that is not the probe, and keep it.
+    FAILURE `tool_lost`: the probe was dropped on its way into the holder; the hand is empty and above it.
     FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
     FAILURE `motion_refused`: the hand cannot rise, or the holder not be reached.
     """
@@ -44,6 +45,7 @@ class Stow(Skill):
     AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "untared"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
+        "tool_lost": "the probe was dropped on its way into the holder",
         "object_held": "the jaws hold something that is not the probe, and keep it",
         "request_failed": "the sensor could not be zeroed, or the payload not be set",
         "motion_refused": "the hand cannot rise, or the holder not be reached",

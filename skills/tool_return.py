@@ -22,6 +22,7 @@ class ToolReturn(Skill):
     The probe is let go of nowhere but in the holder, also when the skill is broken off.
 
     SUCCESS: the jaws are empty and above the holder.
+    FAILURE `tool_lost`: the probe was dropped on its way into the holder; the hand is empty and above it.
     FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
     FAILURE `motion_refused`: the holder cannot be reached from here.
     """
@@ -35,6 +36,7 @@ class ToolReturn(Skill):
     AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "untared"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
+        "tool_lost": "the probe was dropped on its way into the holder",
         "request_failed": "the sensor could not be zeroed, or the payload not be set",
         "motion_refused": "the holder cannot be reached from here",
     }
