@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from py_trees.common import Status
@@ -75,3 +77,23 @@ def test_nothing_to_put_back(make, made, jaws_m) -> None:
 
 def test_broken_off_anywhere(make, preempt_all_along) -> None:
     preempt_all_along(make, 5)
+
+
+def test_jaws_that_are_still_closing_hold_nothing(make, things) -> None:
+    """What was in them fell as the hand rose: it does not go down to press closed fingertips on it."""
+    b, skill = make(jaws_m=None, things=[things.floor(0.05)])
+    b.go(b.arm.jaws(0.06, speed_m_s=0.2))
+    b.opened.clear()
+    cycle, left, heights = b.robot.cycle, iter(np.linspace(0.06, 0.0, 60)), list[float]()
+
+    def closing(command):
+        heights.append(float(b.arm.pose_B_P.position_m[2]))
+        seen = cycle(command)
+        return dataclasses.replace(seen, gripper=dataclasses.replace(seen.gripper, aperture_m=next(left, 0.0)))
+
+    b.robot.cycle = closing
+    z = float(b.arm.pose_B_P.position_m[2])
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    assert min(heights) == pytest.approx(z)
+    assert b.arm.aperture_m < 0.03

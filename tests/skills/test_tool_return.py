@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from py_trees.common import Status
@@ -68,3 +70,26 @@ def test_a_failed_request(make, monkeypatch) -> None:
 
 def test_broken_off_anywhere_it_lets_go_in_the_holder_only(make, preempt_all_along) -> None:
     preempt_all_along(make, 10)
+
+
+@pytest.mark.parametrize("above_m", [0.12, 0.05, 0.01])
+def test_a_probe_that_is_dropped_on_the_way_in_is_noticed(make, above_m: float) -> None:
+    """The jaws close on nothing: the hand goes no farther down, rises, and the scene says that it is empty."""
+    b, skill = make()
+    cycle, lowest = b.robot.cycle, [np.inf]
+
+    def drop(command):
+        z = b.arm.pose_B_P.position_m[2]
+        if z < STOWED[2] + above_m and np.hypot(*(b.arm.pose_B_P.position_m[:2] - STOWED[:2])) < 1e-3:
+            seen = cycle(command)
+            lowest[0] = min(lowest[0], z)
+            return dataclasses.replace(seen, gripper=dataclasses.replace(seen.gripper, aperture_m=0.0, force_N=0.0))
+        return cycle(command)
+
+    b.robot.cycle = drop
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "tool_lost")
+    assert lowest[0] > STOWED[2] + above_m - 0.005
+    assert b.arm.pose_B_P.position_m[2] > STOWED[2] + above_m + 0.07
+    assert not b.arm.scene.holding_tool
+    assert not [c for c in b.robot.commands[b.begun :] if c.gripper is not None], "the jaws are left as they are"
