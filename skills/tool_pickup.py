@@ -46,7 +46,8 @@ class ToolPickup(Skill):
 
     SUCCESS: the probe is held and its floor height is known.
     FAILURE `no_probe`: the jaws closed on nothing (or on something of another width).
-    FAILURE `probe_not_lifted`: the hand came up without the probe's weight.
+    FAILURE `probe_not_lifted`: the hand came up without the probe's weight; if the jaws are as far apart as its handle
+        is wide, it counts as held all the same, and may be put back.
     FAILURE `hard_contact`: the open hand met something on its way to the handle; or the probe is held, and is stuck in
         its holder, or met something hard on the way to the floor.
     FAILURE `no_floor`: the ball met nothing where the container's floor should be; the probe is held.
@@ -90,10 +91,12 @@ class ToolPickup(Skill):
             yield from self._rise(0.0)
             weight_N = yield from weigh_N(arm)
         if weight_N < 0.5 * probe.mass_kg * GRAVITY_M_S2:
-            arm.scene.hold_tool(False)
+            apart = arm.aperture_m
+            arm.scene.hold_tool(self._handle_wide(apart))  # what they may hold is not dropped: the wrist may be wrong
             raise SkillFailed(
                 "probe_not_lifted",
-                f"the hand carries {weight_N:.2f} N; the probe weighs {probe.mass_kg * GRAVITY_M_S2:.2f} N",
+                f"the hand carries {weight_N:.2f} N; the probe weighs {probe.mass_kg * GRAVITY_M_S2:.2f} N; the jaws "
+                f"are {apart * 1e3:.1f} mm apart, the handle is {probe.handle_m[1] * 1e3:.1f}",
                 advice="raise grip_N, or check the handle",
                 weight_N=weight_N,
             )

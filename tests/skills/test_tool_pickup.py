@@ -69,6 +69,22 @@ def test_probe_not_lifted(make) -> None:
     b, skill = make(weight_N=lambda position, aperture: 0.0)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "probe_not_lifted")
+    assert b.arm.scene.holding_tool, "the jaws say so: it is not dropped from here, whatever the wrist says"
+    assert b.arm.aperture_m == pytest.approx(0.016, abs=1e-3)
+
+
+def test_probe_not_lifted_and_the_jaws_have_closed(make) -> None:
+    b, skill = make(weight_N=lambda position, aperture: 0.0)
+    cycle = b.robot.cycle
+
+    def slid_off(command):
+        if b.arm.pose_B_P.position_m[2] > STOWED[2] + 0.02 and b.arm.aperture_m < 0.017:
+            b.robot.grip_width_m = None
+        return cycle(command)
+
+    b.robot.cycle = slid_off
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "probe_not_lifted")
     assert not b.arm.scene.holding_tool
 
 
