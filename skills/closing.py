@@ -33,10 +33,12 @@ the second, or this share of a larger jaw force, while resting jaws press (on sl
 4 N at 10 N of jaw force); never more than the last, two thirds of the robot's own limit. What presses harder is wedged
 or stands on a fingertip, and pressing would only lever it up."""
 LEANING_N = 4.0
-"""Force on the hand of gentle jaws at rest above which they do not press: what both of them hold can only lean on the
-hand with its friction on the floor (3.1 N for the heaviest object of CONDITIONS); what does more is wedged, and the
-harder it is pressed the harder it snaps. Of 1760 closures (MuJoCo, nominal) 5 % are above, among them both that passed
-30 N for a moment; of all the others the largest is 24 N."""
+"""Change of the force on the hand at which gentle jaws that rest do not press: what both of them hold can only lean on
+the hand with its friction on the floor (3.1 N for the heaviest object of CONDITIONS); what does more is wedged, and
+the harder it is pressed the harder it snaps. Of 1760 closures (simulated, nominal) 5 % are above, among them both that
+passed 30 N for a moment; of all the others the largest is 24 N."""
+FREE_S = 0.05
+"""So long the hand is felt before the jaws move."""
 PACE = 0.75
 """Speed of giving way against the closing speed; half of it would only keep the jaw that touches where it is."""
 LEAST_STEP_M = 0.0005
@@ -85,9 +87,10 @@ def close_gently(
     """
     closing = _Closing(arm, speed_m_s, tactile, seen_by)
     with arm.feed.finishing():  # a pause comes when the jaws rest: until then the hand must be able to give way
+        yield from closing.feel_free()
         state = yield from closing.until_rest([min(GENTLE_N, force_N)])
         if force_N > GENTLE_N:
-            yield from closing.refuse_beyond(LEANING_N)
+            yield from closing.refuse_beyond(LEANING_N, closing.leaning_N)
             steps = int(np.ceil((force_N - GENTLE_N) / (RAMP_N_S * arm.period_s) - 1e-9))
             state = yield from closing.until_rest(np.linspace(GENTLE_N, force_N, steps + 1)[1:].tolist())
     return state
@@ -99,12 +102,21 @@ class _Closing:
     def __init__(self, arm: Arm, speed_m_s: float, tactile: bool, seen_by: Watcher) -> None:
         self._arm, self._speed_m_s, self._tactile, self._seen_by = arm, speed_m_s, tactile, seen_by
         self._opening_m, self._start_B = arm.aperture_m, arm.pose_B_P.position_m
-        self._pressed_N = 0.0
+        self._free_N = self._force_N = np.zeros(3)
 
-    def refuse_beyond(self, most_N: float) -> Motion[None]:
-        """Open again and refuse if the hand is pressed with more than this now; a NaN is more."""
-        if not self._pressed_N <= most_N:
-            pressed_N = self._pressed_N
+    def feel_free(self) -> Motion[None]:
+        """Take what is felt now as a free hand's force: the wrist need not be tared."""
+        blocks = yield from self._arm.hold(FREE_S)
+        self._free_N = np.mean([_force_P(b) for b in blocks], axis=0)
+
+    @property
+    def leaning_N(self) -> float:
+        """How much the force on the hand differs from a free hand's now."""
+        return float(np.linalg.norm(self._force_N - self._free_N))
+
+    def refuse_beyond(self, most_N: float, pressed_N: float) -> Motion[None]:
+        """Open again and refuse if the hand is pressed with more than this; a NaN is more."""
+        if not pressed_N <= most_N:
             yield from let_go(self._arm, self._opening_m)
             raise MotionRefused("closing", f"the hand was pressed with {pressed_N:.0f} N while the jaws closed")
 
@@ -115,8 +127,8 @@ class _Closing:
         for k in range(round(TIMEOUT_S / arm.period_s)):
             force_N = forces_N[min(k, len(forces_N) - 1)]
             seen = yield from self._one_period(force_N if k < len(forces_N) else None)
-            self._pressed_N = float(np.linalg.norm(_force_P(seen)))
-            yield from self.refuse_beyond(_most_N(force_N))
+            self._force_N = _force_P(seen)
+            yield from self.refuse_beyond(_most_N(force_N), float(np.linalg.norm(self._force_N)))
             if k >= len(forces_N) and watch.still(seen.now_s, seen.gripper):
                 break
             yield from self._give_way(seen)
