@@ -61,8 +61,9 @@ class SupervisionLimits:
             times that of harsh CONDITIONS (0.15 N sd jump by 0.17 N).
         live_taxels: Least share of a pad that gives numbers. Source: harsh CONDITIONS have 3 % dead; half of a pad
             cannot be matched.
-        late_periods: The arm may wait for so many periods while it moves. Source: that of the watchdog (0.25 s). The
-            device holds by itself meanwhile (the driver after 30 ms), and looks at the hard limit.
+        late_periods: The arm may wait for so many periods while it moves, and samples of so many may be missing within
+            `window_s`. Source: that of the watchdog (0.25 s). The device holds by itself meanwhile (the driver after
+            30 ms), and looks at the hard limit.
         held_periods: A wait of so many periods has made the device hold. Source: the driver does after 30 ms. Shorter
             ones are only put on record.
         tolerated: Findings of one transient kind within `window_s` that are only put on record.
