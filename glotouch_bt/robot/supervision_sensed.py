@@ -183,7 +183,8 @@ class SensedWatch:
             blind = missing / (self._samples * self._rules.late_periods) if self._moved else 0.0
             fatal = self._patience.ends("samples_missing", now_s, max(1, math.ceil(blind * self._rules.tolerated)))
             what = f"{missing} of {expected} samples are missing"
-            found.append(Finding("samples_missing", what, float(missing), float(self._rules.tolerated), now_s, fatal))
+            most = (1.0 - SEEN) * expected
+            found.append(Finding("samples_missing", what, float(missing), most, now_s, fatal))
         return o
 
     def _look_closely(self, o: Observation, found: list[Finding]) -> Observation:

@@ -85,7 +85,9 @@ def test_blind_gaps_in_a_motion_end_it_when_a_quarter_of_a_second_was_not_seen(
             guards.append(e.guard)
             break
     assert guards == ["samples_missing"] * ends
-    assert len([f for f in found if f.guard == "samples_missing"]) == times
+    blind = [f for f in found if f.guard == "samples_missing"]
+    assert len(blind) == times
+    assert all(f.value > f.limit > 1.0 for f in blind), "a value and its limit are of one kind"
 
 
 def test_a_long_thought_before_a_motion_is_no_overrun() -> None:
