@@ -104,13 +104,13 @@ def demands_of(node: NodeSpec, variables: Variables) -> Iterator[Demand]:
             )
     elif node.kind == "condition" and "port" in node.reads:
         if isinstance(node.settings, ConditionSettings):
-            yield look(
-                "port", "not always" if node.settings.is_set is None else "allowed", compared_type(node.settings)
-            )
+            unset: Literal["not always", "allowed"] = "not always" if node.settings.is_set is None else "allowed"
+            yield look("port", unset, compared_type(node.settings), node.reads["port"].unit)
     elif node.kind == "repeat" and "until" in node.reads:
         if isinstance(node.settings, RepeatSettings):
             condition = until_condition(node.settings)
-            yield look("until", "not always" if condition.is_set is None else "allowed", compared_type(condition))
+            unset = "not always" if condition.is_set is None else "allowed"
+            yield look("until", unset, compared_type(condition), node.reads["until"].unit)
     elif node.kind == "for_each":
         for port in node.reads:
             yield look(port, "not always", tuple if port == "items" else object)

@@ -99,7 +99,7 @@ def _check_span(node: Scalar, name: str, field: FieldInfo, findings: Findings) -
     """Report a parameter that may be given values which the field refuses; its present value is fine."""
     unit = unit_of(field)
     for end in node.span or ():
-        value = convert(end, node.unit, unit) if node.unit and unit else end
+        value = convert(end, node.unit, unit) if node.unit else end
         for rule in field.metadata:
             for word, symbol, holds in _RULES:
                 limit = getattr(rule, word, None)
@@ -134,17 +134,13 @@ def _value(node: Node, unit: str, name: str, findings: Findings) -> Any:
         return POISON
     if isinstance(number, str) and (found := split_quantity(number)) and unit:
         number, given_unit = found
-    if given_unit and unit and isinstance(number, (int, float)):
+    if given_unit and isinstance(number, (int, float)):
         try:
             return convert(number, given_unit, unit)
         except ValueError:
             source = f" (from {node.origin})" if node.origin else ""
-            findings.add(
-                node.place,
-                "wrong_unit",
-                f"{name} is in {unit}, not {given_unit!r}{source}",
-                valid=", ".join(units_for(unit)),
-            )
+            what = f"{name} {f'is in {unit}, not' if unit else 'has no unit; given in'} {given_unit!r}{source}"
+            findings.add(node.place, "wrong_unit", what, valid=", ".join(units_for(unit)) if unit else "")
             return POISON
     return number
 

@@ -7,9 +7,13 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
+from pydantic.config import JsonDict
 
 from glotouch_bt.mission.source import Place
 from skills.base import Skill, SkillParams, param
+
+ANY_UNIT: JsonDict = {"any_unit": True}
+"""Of a number that may be written in any unit: it is compared with what is in that of the key."""
 
 
 class Settings(BaseModel):
@@ -45,8 +49,12 @@ class ConditionSettings(Settings):
 
     port: str = Field(description="key to look at")
     equals: bool | int | float | str | None = Field(default=None, description="succeed if equal")
-    at_least: float | None = Field(default=None, description="succeed if the number is at least this")
-    at_most: float | None = Field(default=None, description="succeed if the number is at most this")
+    at_least: float | None = Field(
+        default=None, description="succeed if the number is at least this", json_schema_extra=ANY_UNIT
+    )
+    at_most: float | None = Field(
+        default=None, description="succeed if the number is at most this", json_schema_extra=ANY_UNIT
+    )
     is_set: bool | None = Field(default=None, description="succeed if somebody wrote it (false: nobody)")
 
 
@@ -117,11 +125,13 @@ class Wire:
         port: Port name (for our own nodes: the setting's name).
         key: Blackboard key; a subtree's private keys carry its name and a slash.
         place: Where the wiring was written, or the node.
+        unit: SI unit of what a condition compares the value with, where the mission says one.
     """
 
     port: str
     key: str
     place: Place
+    unit: str = ""
 
 
 @dataclass

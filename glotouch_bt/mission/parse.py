@@ -12,7 +12,8 @@ from glotouch_bt.mission.fields import validate
 from glotouch_bt.mission.library import shipped_root, shown
 from glotouch_bt.mission.literals import is_literal, read_literal
 from glotouch_bt.mission.nodes import KINDS, ConditionSettings, Kind, NodeSpec, RepeatSettings, SubtreeSettings, Wire
-from glotouch_bt.mission.parameters import Parameter, Value, check_used, read_parameters, substitute
+from glotouch_bt.mission.parameters import Parameter, check_used, read_parameters, substitute
+from glotouch_bt.mission.quantities import compared
 from glotouch_bt.mission.scope import Scope
 from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, read_yaml
 from glotouch_bt.robot import BadInput
@@ -135,6 +136,11 @@ def _decorator(name: str, kind: Kind, place: Place, body: Node, scope: Scope) ->
         rest = Map((), place)
     else:
         taken, rest = _take(_settings_map(name, place, body, scope), "name", "do")
+    until = rest.get("until") if name == "repeat" else None
+    unit = ""
+    if isinstance(until, Map):
+        plain_until, unit = compared(until, scope.findings)
+        rest = replace(rest, entries=tuple((k, plain_until if v is until else v) for k, v in rest.entries))
     settings = validate(kind.settings, rest, f"node {name!r}", scope.findings, where=place)
     below = taken["do"][1] if "do" in taken else None
     if below is None or (isinstance(below, Scalar) and below.value is None):
@@ -144,7 +150,7 @@ def _decorator(name: str, kind: Kind, place: Place, body: Node, scope: Scope) ->
         children = (parse_tree(below, scope),)
     spec = NodeSpec(name, _title(taken, name, scope), place, children, settings)
     if name == "repeat":
-        _check_repeat(spec, rest, scope)
+        _check_repeat(spec, rest, unit, scope)
     elif name == "for_each":
         _wire_for_each(spec, rest, scope)
     return spec
@@ -167,7 +173,7 @@ def _keyed(port: str, key: str, place: Place, scope: Scope) -> Wire | None:
     return Wire(port, scope.key(key), place)
 
 
-def _check_repeat(spec: NodeSpec, given: Map, scope: Scope) -> None:
+def _check_repeat(spec: NodeSpec, given: Map, unit: str, scope: Scope) -> None:
     settings = spec.settings
     if not isinstance(settings, RepeatSettings):
         return
@@ -182,7 +188,7 @@ def _check_repeat(spec: NodeSpec, given: Map, scope: Scope) -> None:
         if isinstance(settings.until, ConditionSettings) and isinstance(below, Map):
             _check_comparison(settings.until, below.place, scope)
     if wire:
-        spec.reads = {"until": wire}
+        spec.reads = {"until": replace(wire, unit=unit)}
 
 
 def _wire_for_each(spec: NodeSpec, given: Map, scope: Scope) -> None:
@@ -210,12 +216,13 @@ def _check_comparison(settings: ConditionSettings, place: Place, scope: Scope) -
 
 def _condition(place: Place, body: Node, scope: Scope) -> NodeSpec:
     taken, rest = _take(_settings_map("condition", place, body, scope), "name")
+    rest, unit = compared(rest, scope.findings)
     settings = validate(ConditionSettings, rest, "node 'condition'", scope.findings, where=place)
     if settings is not None:
         _check_comparison(settings, place, scope)
     default = f"{settings.port}?" if settings is not None else "condition"
     wire = _wire("port", rest, scope)
-    reads = {"port": wire} if wire else {}
+    reads = {"port": replace(wire, unit=unit)} if wire else {}
     return NodeSpec("condition", _title(taken, default, scope), place, (), settings, reads=reads)
 
 
@@ -288,6 +295,7 @@ def _rewire(
 def _subtree(place: Place, body: Node, scope: Scope) -> NodeSpec:
     given = _settings_map("subtree", place, body, scope)
     taken, rest = _take(given, "name")
+    values, rest = _handed_on(rest)
     settings = validate(SubtreeSettings, rest, "node 'subtree'", scope.findings, where=place)
     if settings is None:
         return NodeSpec("unknown", _title(taken, "subtree", scope), place)
@@ -299,7 +307,7 @@ def _subtree(place: Place, body: Node, scope: Scope) -> NodeSpec:
     path, identity, source = found
     name = scope.reading.carry(path.stem, identity, source, at)
     title = _title(taken, name, scope)
-    inner, tree = _open_subtree(source, settings.parameters, rest, scope, at)
+    inner, tree = _open_subtree(source, values, scope, at)
     if tree is None:
         return NodeSpec("unknown", title, place)
     ports: dict[str, str] = {}
@@ -317,6 +325,17 @@ def _subtree(place: Place, body: Node, scope: Scope) -> NodeSpec:
             names = sorted(k.removeprefix(prefix) for k in used if k.startswith(prefix))
             scope.findings.unknown(key.place, "unknown_port", f"port of subtree {name!r}:", str(key.value), names)
     return NodeSpec("subtree", title, place, (child,), settings)
+
+
+def _handed_on(given: Map) -> tuple[dict[Scalar, Scalar], Map]:
+    """The values of a subtree's parameters, with the units and ranges they came with, by key; the settings, plain."""
+    section = given.get("parameters")
+    if not isinstance(section, Map):
+        return {}, given
+    values = {k: v for k, v in section.entries if isinstance(v, Scalar)}
+    bare = ((k, replace(v, unit="", span=None) if isinstance(v, Scalar) else v) for k, v in section.entries)
+    sound = replace(section, entries=tuple((k, v) for k, v in bare if not (isinstance(v, Scalar) and v.poisoned)))
+    return values, replace(given, entries=tuple((k, sound if v is section else v) for k, v in given.entries))
 
 
 def _find_subtree(given: str, at: Place, scope: Scope) -> tuple[Path, str, Node] | None:
@@ -347,7 +366,7 @@ def _entries(node: Node | None) -> tuple[tuple[Scalar, Node], ...]:
 
 
 def _open_subtree(
-    source: Node, values: Mapping[str, Value], given: Map, scope: Scope, at: Place
+    source: Node, values: Mapping[Scalar, Scalar], scope: Scope, at: Place
 ) -> tuple[dict[str, Parameter], Node | None]:
     """The parameters and the tree of a subtree's file; no tree if it has none."""
     if not isinstance(source, Map):
@@ -356,8 +375,9 @@ def _open_subtree(
     for key, _ in source.entries:
         if key.value not in SUBTREE_KEYS:
             scope.findings.unknown(key.place, "unknown_key", "key of a subtree file:", str(key.value), SUBTREE_KEYS)
-    parameters = read_parameters(source.get("parameters"), values, scope.findings, scope.stl_folder)
-    for key, _ in _entries(given.get("parameters")):
+    given = {str(key.value): value for key, value in values.items()}
+    parameters = read_parameters(source.get("parameters"), given, scope.findings, scope.stl_folder, at)
+    for key in values:
         if key.value not in parameters:
             scope.findings.unknown(
                 key.place, "unknown_parameter", "parameter of the subtree:", str(key.value), parameters
