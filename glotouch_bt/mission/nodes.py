@@ -94,26 +94,28 @@ class Kind:
         settings: What may be set.
         children: How many children: none, one (`do`), or a list.
         description: One line for people.
+        btcpp: What BehaviorTree.CPP calls it; empty: it has none like it.
     """
 
     settings: type[Settings]
     children: Literal["none", "one", "many"]
     description: str
+    btcpp: str = ""
 
 
 KINDS: dict[str, Kind] = {
-    "sequence": Kind(Plain, "many", "children in order; fails with the first that fails"),
-    "selector": Kind(Plain, "many", "children in order; succeeds with the first that succeeds"),
-    "parallel": Kind(ParallelSettings, "many", "all children at once; fails with the first that fails"),
-    "retry": Kind(RetrySettings, "one", "try the child again when it fails"),
-    "timeout": Kind(TimeoutSettings, "one", "fail if the child takes longer, robot clock"),
-    "repeat": Kind(RepeatSettings, "one", "do the child again and again"),
-    "for_each": Kind(ForEachSettings, "one", "do the child for every item of a tuple"),
-    "invert": Kind(Plain, "one", "success and failure exchanged"),
-    "succeed": Kind(Plain, "one", "success whatever the child says"),
-    "fail": Kind(Plain, "one", "failure whatever the child says"),
+    "sequence": Kind(Plain, "many", "children in order; fails with the first that fails", "Sequence"),
+    "selector": Kind(Plain, "many", "children in order; succeeds with the first that succeeds", "Fallback"),
+    "parallel": Kind(ParallelSettings, "many", "all children at once; fails with the first that fails", "Parallel"),
+    "retry": Kind(RetrySettings, "one", "try the child again when it fails", "RetryUntilSuccessful"),
+    "timeout": Kind(TimeoutSettings, "one", "fail if the child takes longer, robot clock", "Timeout"),
+    "repeat": Kind(RepeatSettings, "one", "do the child again and again", "Repeat"),
+    "for_each": Kind(ForEachSettings, "one", "do the child for every item of a tuple", "ForEach"),
+    "invert": Kind(Plain, "one", "success and failure exchanged", "Inverter"),
+    "succeed": Kind(Plain, "one", "success whatever the child says", "ForceSuccess"),
+    "fail": Kind(Plain, "one", "failure whatever the child says", "ForceFailure"),
     "condition": Kind(ConditionSettings, "none", "test a port"),
-    "subtree": Kind(SubtreeSettings, "none", "a tree from another file"),
+    "subtree": Kind(SubtreeSettings, "none", "a tree from another file", "SubTree"),
 }
 
 

@@ -22,6 +22,8 @@ from skills.base import Skill
 KEY = re.compile(r"[a-z][a-z0-9_]*")
 DEEPEST_SUBTREE = 8
 MOST_NODES, DEEPEST_NODE = 3000, 100
+BTCPP = {kind.btcpp: name for name, kind in KINDS.items() if kind.btcpp}
+TITLE, CHILD = {"name": ""}, {"name": "", "do": ""}
 SUBTREE_KEYS = ("subtree", "description", "parameters", "tree")
 
 
@@ -75,7 +77,7 @@ def _named(name: str, place: Place, body: Node, scope: Scope) -> NodeSpec:
         return _subtree(place, body, scope) if name == "subtree" else _condition(place, body, scope)
     known = name
     if name not in scope.skills:
-        known = scope.findings.unknown(place, "unknown_skill", "skill or node", name, [*KINDS, *scope.skills])
+        known = scope.findings.unknown(place, "unknown_skill", "skill or node", name, [*KINDS, *scope.skills], BTCPP)
         if known not in scope.skills:
             return NodeSpec("unknown", name, place)
     try:
@@ -117,7 +119,7 @@ def _composite(kind: str, place: Place, body: Node, scope: Scope) -> NodeSpec:
         rest = Map((), place)
     else:
         taken, rest = _take(_settings_map(kind, place, body, scope), "name", "do")
-    settings = validate(KINDS[kind].settings, rest, f"node {kind!r}", scope.findings, where=place)
+    settings = validate(KINDS[kind].settings, rest, f"node {kind!r}", scope.findings, where=place, beside=CHILD)
     children: tuple[NodeSpec, ...] = ()
     below = taken["do"][1] if "do" in taken else None
     if isinstance(below, Seq):
@@ -126,6 +128,7 @@ def _composite(kind: str, place: Place, body: Node, scope: Scope) -> NodeSpec:
         children = (parse_tree(below, scope),)
     if not children:
         scope.findings.add(place, "no_children", f"{kind} has no children", valid=f"{kind}: [node, node, ...]")
+        children = (_lost(body),)
     return NodeSpec(kind, _title(taken, kind, scope), place, children, settings)
 
 
@@ -141,11 +144,11 @@ def _decorator(name: str, kind: Kind, place: Place, body: Node, scope: Scope) ->
     if isinstance(until, Map):
         plain_until, unit = compared(until, scope.findings)
         rest = replace(rest, entries=tuple((k, plain_until if v is until else v) for k, v in rest.entries))
-    settings = validate(kind.settings, rest, f"node {name!r}", scope.findings, where=place)
+    settings = validate(kind.settings, rest, f"node {name!r}", scope.findings, where=place, beside=CHILD)
     below = taken["do"][1] if "do" in taken else None
     if below is None or (isinstance(below, Scalar) and below.value is None):
         scope.findings.add(place, "no_children", f"{name} has no child", valid="do: a node")
-        children: tuple[NodeSpec, ...] = ()
+        children: tuple[NodeSpec, ...] = (_lost(body),)
     else:
         children = (parse_tree(below, scope),)
     spec = NodeSpec(name, _title(taken, name, scope), place, children, settings)
@@ -217,7 +220,7 @@ def _check_comparison(settings: ConditionSettings, place: Place, scope: Scope) -
 def _condition(place: Place, body: Node, scope: Scope) -> NodeSpec:
     taken, rest = _take(_settings_map("condition", place, body, scope), "name")
     rest, unit = compared(rest, scope.findings)
-    settings = validate(ConditionSettings, rest, "node 'condition'", scope.findings, where=place)
+    settings = validate(ConditionSettings, rest, "node 'condition'", scope.findings, where=place, beside=TITLE)
     if settings is not None:
         _check_comparison(settings, place, scope)
     default = f"{settings.port}?" if settings is not None else "condition"
@@ -228,16 +231,17 @@ def _condition(place: Place, body: Node, scope: Scope) -> NodeSpec:
 
 def _skill(name: str, skill: type[Skill], place: Place, body: Node, scope: Scope) -> NodeSpec:
     taken, rest = _take(_settings_map(name, place, body, scope), "name", "in", "out")
-    params = validate(skill.Params, rest, f"skill {name!r}", scope.findings, where=place)
+    ports = {p: "out" for p in skill.OUTPUT_PORTS} | {p: "in" for p in skill.INPUT_PORTS} | {"in": "", "out": ""}
+    params = validate(skill.Params, rest, f"skill {name!r}", scope.findings, where=place, beside=TITLE | ports)
     keys = skill.default_keys()
     reads = {p: Wire(p, scope.key(keys[p]), place) for p in skill.INPUT_PORTS}
     writes = {p: Wire(p, scope.key(keys[p]), place) for p in skill.OUTPUT_PORTS}
     constants: dict[str, object] = {}
     if "in" in taken:
         given, constants = _literals(skill, taken["in"][1], place, reads, scope)
-        _rewire(name, "in", given, reads, skill.OUTPUT_PORTS, scope)
+        _rewire(name, "in", given, reads, skill, scope)
     if "out" in taken:
-        _rewire(name, "out", taken["out"][1], writes, skill.INPUT_PORTS, scope)
+        _rewire(name, "out", taken["out"][1], writes, skill, scope)
     return NodeSpec(
         "skill",
         _title(taken, name, scope),
@@ -270,9 +274,7 @@ def _literals(
     return replace(given, entries=tuple(left)), constants
 
 
-def _rewire(
-    skill: str, direction: str, given: Node, wires: dict[str, Wire], other: Mapping[str, object], scope: Scope
-) -> None:
+def _rewire(name: str, direction: str, given: Node, wires: dict[str, Wire], skill: type[Skill], scope: Scope) -> None:
     if not isinstance(given, Map):
         scope.findings.add(given.place, "wrong_type", f"{direction}: must be a mapping of port: key")
         return
@@ -280,12 +282,15 @@ def _rewire(
     for key, value in given.entries:
         port = str(key.value)
         if port not in wires:
-            if port in other:
+            if port in skill.Params.model_fields:
+                what = f"{port!r} of skill {name!r} is a parameter, not a port: it stands outside of {direction}:"
+                scope.findings.add(key.place, "unknown_port", what, valid=", ".join(wires) or "none")
+            elif port in {**skill.INPUT_PORTS, **skill.OUTPUT_PORTS}:
                 where = "out" if direction == "in" else "in"
-                what = f"port {port!r} of skill {skill!r} is not an {word} port: it belongs under {where}:"
+                what = f"port {port!r} of skill {name!r} is not an {word} port: it belongs under {where}:"
                 scope.findings.add(key.place, "unknown_port", what, valid=", ".join(wires) or "none")
             else:
-                scope.findings.unknown(key.place, "unknown_port", f"{word} port of skill {skill!r}:", port, wires)
+                scope.findings.unknown(key.place, "unknown_port", f"{word} port of skill {name!r}:", port, wires)
         elif not isinstance(value, Scalar) or not isinstance(value.value, str):
             scope.findings.add(value.place, "wrong_key", f"{direction}.{port}: must be the name of a key")
         elif not value.poisoned and (wire := _keyed(port, value.value, value.place, scope)):
@@ -296,7 +301,7 @@ def _subtree(place: Place, body: Node, scope: Scope) -> NodeSpec:
     given = _settings_map("subtree", place, body, scope)
     taken, rest = _take(given, "name")
     values, rest = _handed_on(rest)
-    settings = validate(SubtreeSettings, rest, "node 'subtree'", scope.findings, where=place)
+    settings = validate(SubtreeSettings, rest, "node 'subtree'", scope.findings, where=place, beside=TITLE)
     if settings is None:
         return NodeSpec("unknown", _title(taken, "subtree", scope), place)
     file_node = rest.get("file")
