@@ -121,7 +121,7 @@ class _Habits:
             return
         variables = self._flow.variables
         for demand in self._flow.demands[id(node)]:
-            found = variables.sets.values(self._flow.judged(demand), demand.variable)
+            found = variables.sets.values(self._flow.judged(demand), demand.variable) & (demand.good | {UNSET})
             yes, no = verdicts(variables, demand, settings)
             if found - {UNSET} and not (found & yes and found & no):
                 said = "always holds" if found & yes else "never holds"
@@ -159,7 +159,7 @@ class _Habits:
             why = f"{child.name!r} never fails"
         elif node.kind == "fail" and not self._succeeds(child):
             why = f"{child.name!r} never succeeds"
-        elif node.kind in ("selector", "parallel") and len(node.children) == 1:
+        elif node.kind in ("selector", "parallel") and len(node.children) == 1 and child.kind != "unknown":
             why = "it has one child"
         elif node.kind == "timeout" and not any(n.kind in ("skill", "unknown") for n in child.walk()):
             why = "nothing below it takes time"

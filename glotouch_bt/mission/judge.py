@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -95,8 +95,11 @@ class _Judge:
             what = f"{_reader(demand)}, which is written only on some paths to it, by {by}"
             path = self._path(flow, demand, {UNSET})
             self._findings.add(demand.place, "port_maybe_unset", what, path=path, node=demand.node.name)
+        alike: dict[Kind, set[int]] = {}  # what differs in its value only is one mistake
         for value in sorted(wrong):
-            self._wrong_kind(flow, demand, value)
+            alike.setdefault(dataclasses.replace(self._variables.kind(demand.key, value), value=None), set()).add(value)
+        for kind, values in alike.items():
+            self._wrong_kind(flow, demand, kind, values)
 
     def _never_written(self, demand: Demand, found: frozenset[int]) -> bool:
         if demand.unset == "allowed":
@@ -130,11 +133,11 @@ class _Judge:
         path = self._path(flow, demand, {UNSET})
         self._findings.add(demand.place, "port_unset", what, valid=valid, hint=hint, path=path, node=demand.node.name)
 
-    def _wrong_kind(self, flow: Flow, demand: Demand, value: int) -> None:
-        kind = self._variables.kind(demand.key, value)
-        writer = next(((n, p) for n, p, kinds in self._writers.get(demand.key, []) if kind in kinds), None)
+    def _wrong_kind(self, flow: Flow, demand: Demand, kind: Kind, values: set[int]) -> None:
+        held = {self._variables.kind(demand.key, v) for v in values}
+        writer = next(((n, p) for n, p, kinds in self._writers.get(demand.key, []) if held & set(kinds)), None)
         by = f"{writer[0].name!r} (line {writer[1].line})" if writer else "another node"
-        path = self._path(flow, demand, {value})
+        path = self._path(flow, demand, values)
         if kind.unit and demand.unit and kind.unit != demand.unit:
             what = f"{_reader(demand)} in {demand.unit}, but {by} writes it in {kind.unit}"
             if not same_quantity(kind.unit, demand.unit):
@@ -146,9 +149,8 @@ class _Judge:
 
     def _wrong_state(self, flow: Flow, demand: Demand, bad: frozenset[int], *, always: bool) -> None:
         names = self._variables.state_names(demand.key)
-        states = " or ".join(names[v] for v in sorted(bad))
         may = "is" if always else "may be"
-        what = f"{demand.node.name!r} starts while the {demand.key} {may} {states!r}"
+        what = f"{demand.node.name!r} starts while the {demand.key} {may} {_states(names, bad)}"
         path = self._path(flow, demand, set(bad))
         valid = ", ".join(sorted(demand.wanted))
         self._findings.add(demand.place, "wrong_state", what, valid=valid, path=path, node=demand.node.name)
@@ -188,7 +190,7 @@ class _Judge:
     def _end(self, leaves: Mapping[str, tuple[frozenset[str], Place]]) -> None:
         end, variables = self._exact.end.success, self._variables
         tree = self._exact.tree
-        if self._exact is self._lenient or not len(self._findings):
+        if not len(self._findings):  # how a mission with a mistake in it ends says little
             self._outcomes()
         for resource, variable in variables.resources.items():
             found = self._sets.values(end, variable)
@@ -197,8 +199,7 @@ class _Judge:
                 wanted, place = leaves[resource]
                 bad = frozenset(v for v in found if names[v] not in wanted)
                 if bad:
-                    states = " or ".join(names[v] for v in sorted(bad))
-                    what = f"the mission may end in success with the {resource} {states!r}"
+                    what = f"the mission may end in success with the {resource} {_states(names, bad)}"
                     path = self._search(self._exact, Goal(None, "", variable, bad))
                     self._findings.add(place, "wrong_end", what, valid=", ".join(sorted(wanted)), path=path)
                 continue
@@ -242,6 +243,10 @@ def _writers(tree: NodeSpec, variables: Variables) -> dict[str, list[tuple[NodeS
                 kinds = [variables.kind(wire.key, v) for v in variables.written(wire.key)]
             found.setdefault(wire.key, []).append((node, wire.place, kinds))
     return found
+
+
+def _states(names: Sequence[str], values: frozenset[int]) -> str:
+    return " or ".join(repr(names[v]) for v in sorted(values))
 
 
 def _fields(kind: type) -> list[str]:
