@@ -17,7 +17,7 @@ from skills.grasp_plan import GraspPlan, plan_grasp
 class MatchParams(SkillParams):
     """Parameters of `match`."""
 
-    target: str = param("The object to find: an STL file, or the name of one in the world's object folder")
+    target: str = param("The object to find: an STL file, or the name of one in the world's object folder", names="stl")
     matcher: Literal["likelihood", "paper"] = param("How candidates are compared", default="likelihood")
 
 

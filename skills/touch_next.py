@@ -31,7 +31,7 @@ STILL_THERE_M = 0.003
 class TouchNextParams(ClosureParams):
     """Parameters of `touch_next`."""
 
-    target: str = param("The object to find: an STL file, or the name of one in the world's object folder")
+    target: str = param("The object to find: an STL file, or the name of one in the world's object folder", names="stl")
     confidence: float = param("Probability that is enough", default=0.95, gt=0.5, lt=1.0)
     least_gain_nats: float = param("Expected gain below which no closure is worth it", default=0.005, ge=0.0)
 

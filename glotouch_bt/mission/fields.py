@@ -56,8 +56,17 @@ POISON = Poison()
 
 def unit_of(field: FieldInfo) -> str:
     """The unit a parameter declares, or empty."""
+    return _said_of(field, "unit")
+
+
+def named_by(field: FieldInfo) -> str:
+    """What a text parameter names (`stl`), or empty."""
+    return _said_of(field, "names")
+
+
+def _said_of(field: FieldInfo, word: str) -> str:
     extra = field.json_schema_extra
-    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+    return str(extra.get(word, "")) if isinstance(extra, dict) else ""
 
 
 def validate(

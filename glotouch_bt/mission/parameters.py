@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from os.path import isdir
+from functools import lru_cache
+from os.path import isdir, isfile
 from pathlib import Path
 from typing import Literal
 
@@ -144,7 +145,7 @@ def _valued(name: str, declared: Declaration, given: Scalar, findings: Findings,
         return lost
     if declared.type == "float":
         value = float(value)
-    if declared.type == "stl" and folder is not None and not stl_usable(str(value), folder, place, findings):
+    if declared.type == "stl" and not stl_usable(str(value), folder, place, findings):
         return lost
     _check_span(name, given, declared, unit, findings)
     return Parameter(name, declared, value, unit)
@@ -224,8 +225,10 @@ def _valid(declared: Declaration) -> str:
     return words + (f", {declared.range[0]:g} to {declared.range[1]:g}" if declared.range else "")
 
 
-def stl_usable(name: str, folder: Path, place: Place, findings: Findings) -> bool:
-    """An stl parameter names a file of the objects' folder, or is a path to one; it must be a good solid."""
+def stl_usable(name: str, folder: Path | None, place: Place, findings: Findings) -> bool:
+    """An object is named by its file in the objects' folder, or is a path to one; it must be a good solid."""
+    if folder is None:
+        return True
     path = Path(name)
     if path.suffix.lower() != ".stl":
         files = {p.stem: p for p in sorted(folder.iterdir()) if p.suffix.lower() == ".stl"} if isdir(folder) else {}
@@ -233,12 +236,21 @@ def stl_usable(name: str, folder: Path, place: Place, findings: Findings) -> boo
             findings.unknown(place, "no_such_stl", f"object (in {shown(folder)})", name, files)
             return False
         path = files[name]
+    found = path.stat() if isfile(path) else None
+    fault = _fault_of_solid(path, (found.st_mtime_ns, found.st_size) if found else None)
+    if fault:
+        findings.add(place, "unusable_stl", fault)
+    return not fault
+
+
+@lru_cache(maxsize=256)
+def _fault_of_solid(path: Path, stamp: tuple[int, int] | None) -> str:
+    """Why a file is no good solid, or empty; a mission names it in many places. `stamp`: of the file as it is."""
     try:
         load_mesh(path)
     except BadInput as e:
-        findings.add(place, "unusable_stl", str(e))
-        return False
-    return True
+        return str(e)
+    return ""
 
 
 def substitute(node: Node, parameters: Mapping[str, Parameter], findings: Findings) -> Node:

@@ -8,11 +8,11 @@ from dataclasses import replace
 from os.path import isfile
 from pathlib import Path
 
-from glotouch_bt.mission.fields import validate
+from glotouch_bt.mission.fields import named_by, validate
 from glotouch_bt.mission.library import shipped_root, shown
 from glotouch_bt.mission.literals import is_literal, read_literal
 from glotouch_bt.mission.nodes import KINDS, ConditionSettings, Kind, NodeSpec, RepeatSettings, SubtreeSettings, Wire
-from glotouch_bt.mission.parameters import Parameter, check_used, read_parameters, substitute
+from glotouch_bt.mission.parameters import Parameter, check_used, read_parameters, stl_usable, substitute
 from glotouch_bt.mission.quantities import compared
 from glotouch_bt.mission.scope import Scope
 from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, read_yaml
@@ -233,6 +233,10 @@ def _skill(name: str, skill: type[Skill], place: Place, body: Node, scope: Scope
     taken, rest = _take(_settings_map(name, place, body, scope), "name", "in", "out")
     ports = {p: "out" for p in skill.OUTPUT_PORTS} | {p: "in" for p in skill.INPUT_PORTS} | {"in": "", "out": ""}
     params = validate(skill.Params, rest, f"skill {name!r}", scope.findings, where=place, beside=TITLE | ports)
+    for key, value in rest.entries if scope.stl_folder is not None else ():
+        field = skill.Params.model_fields.get(str(key.value))
+        if field is not None and named_by(field) == "stl" and isinstance(value, Scalar) and not value.poisoned:
+            stl_usable(str(value.value), scope.stl_folder, value.place, scope.findings)
     keys = skill.default_keys()
     reads = {p: Wire(p, scope.key(keys[p]), place) for p in skill.INPUT_PORTS}
     writes = {p: Wire(p, scope.key(keys[p]), place) for p in skill.OUTPUT_PORTS}

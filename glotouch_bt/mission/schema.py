@@ -89,6 +89,7 @@ def _opened(made: dict[str, Any], references: bool) -> dict[str, Any]:
     """A model's schema with what may be written instead of its plain values: quantities, and mission parameters."""
     for name, body in made.get("properties", {}).items():
         unit = body.pop("unit", "")
+        body.pop("names", "")
         units = units_for(unit) if unit else list(UNITS) if body.pop("any_unit", False) else []
         if unit:
             body["description"] = f"{body.get('description', name)}, {unit}"

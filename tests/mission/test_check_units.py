@@ -141,3 +141,59 @@ def test_a_wrong_declaration_is_one_finding(declared: str, column: int, code: st
     (found,) = found_in(load, text)
     assert (found.place.line, found.place.column, found.code) == (4, column, code)
     assert words in found.what
+
+
+PLAN = "candidate: 0, position_K_m: [0, 0, 25 mm], yaw_rad: 30 deg, aperture_m: 50 mm, opening_m: 80 mm"
+
+
+def lifted(plan: str, grip: str = "grip_m") -> str:
+    tree = f"  - grasp: {{in: {{plan: {{{plan}}}}}}}\n  - lift: {{in: {{grip_m: {grip}}}}}\n"
+    return HEAD + "leaves: {hand: object}\ntree:\n" + tree
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code", "words"),
+    [
+        ("25 mm", "25", "wrong_value", "[x, y, z] in metres"),
+        ("[0, 0, 25 mm]", "[0, 25 mm]", "wrong_value", "[x, y, z] in metres"),
+        ("30 deg", "30", "wrong_value", "radians"),
+        ("aperture_m: 50 mm", "aperture_m: 50", "wrong_value", "in metres"),
+        ("aperture_m: 50 mm", "aperture_m: -50 mm", "wrong_value", "in metres"),
+        ("candidate: 0", "candidate: 0, alternatives: [1]", "wrong_type", "alternatives: must be left out"),
+    ],
+)
+def test_a_plan_in_the_wrong_unit(old: str, new: str, code: str, words: str, tmp_path: Path) -> None:
+    """A grasp 25 m above the floor is not tried: the numbers are looked at where they stand."""
+    path = tmp_path / "m.yaml"
+    path.write_text(lifted(PLAN.replace(old, new)))
+    with pytest.raises(MissionFaults) as e:
+        load_mission(path)
+    (found,) = e.value.findings
+    line = path.read_text().splitlines()[found.place.line - 1]
+    named = words.partition(":")[0] if code == "wrong_type" else found.what.split("'plan': ")[-1].partition(" ")[0]
+    assert (found.place.line, found.code) == (5, code)
+    assert line[: found.place.column - 1].endswith(f"{named}: ")
+    assert words in found.what
+
+
+def test_a_quantity_for_a_port(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    path.write_text(lifted(PLAN, "40 mm"))
+    lift = next(n for n in load_mission(path).tree.walk() if n.skill == "lift")
+    assert lift.constants == {"grip_m": pytest.approx(0.04)}
+    path.write_text(lifted(PLAN, "40 N"))
+    with pytest.raises(MissionFaults, match="grip_m is in m, not 'N'"):
+        load_mission(path)
+
+
+@pytest.mark.parametrize("target", ["aple", "Apple", "gone.stl", "$name"])
+def test_an_object_that_is_not_there_is_found_where_a_skill_names_it(target: str, tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        HEAD + f"parameters: {{name: {{type: str, default: apfel}}}}\ntree:\n  - match: {{target: {target}}}\n"
+    )
+    with pytest.raises(MissionFaults) as e:
+        load_mission(path)
+    (found,) = e.value.findings
+    assert (found.place.line, found.place.column) == (5, 21)
+    assert found.code == ("unusable_stl" if "." in target else "no_such_stl")
