@@ -60,7 +60,7 @@ class TouchNext(Skill):
     }
 
     candidates = In(tuple, "what may be touched", element=Candidate)
-    felt = In(tuple, "what was felt so far", key="touchsets", required=False)
+    felt = In(tuple, "what was felt so far", key="touchsets", element=TouchSet, required=False)
     rejected = In(tuple, "indices of candidates to be left alone", required=False)
     jaw_zero = In(JawZero, "what the jaws report too much", required=False)
     touchsets = Out(tuple, "what was felt, one TouchSet per candidate", element=TouchSet)

@@ -44,6 +44,7 @@ class _Habits:
     def __init__(self, flow: Flow, findings: Findings) -> None:
         self._flow, self._findings = flow, findings
         self._read = {w.key for n in flow.tree.walk() for w in n.reads.values()}
+        self._written = {w.key for n in flow.tree.walk() for w in n.writes.values()}
 
     def look(self, node: NodeSpec, above: tuple[NodeSpec, ...], timeout_s: float) -> None:
         if node.kind == "parallel":
@@ -52,6 +53,7 @@ class _Habits:
             self._until(node, above)
         elif node.kind == "for_each":
             self._all_or_nothing(node, above)
+            self._gathered(node)
         elif node.kind == "condition":
             self._condition(node)
         elif node.kind == "selector":
@@ -145,6 +147,16 @@ class _Habits:
                 what = f"nobody reads {name!r}, to which {node.name!r} writes its {port!r}"
                 near = self._findings.nearest(name, (k.rpartition("/")[2] for k in self._read))
                 self._findings.add(wire.place, "unused_key", what, hint=near, node=node.name)
+
+    def _gathered(self, node: NodeSpec) -> None:
+        """What is gathered may be for the record only, unless somebody reads a key of such a name, never written."""
+        for port, wire in node.writes.items():
+            if port in node.reads and wire.key not in self._read:
+                name = wire.key.rpartition("/")[2]
+                missed = {k.rpartition("/")[2] for k in self._read - self._written}
+                if near := self._findings.nearest(name, missed):
+                    what = f"nobody reads {name!r}, in which {node.name!r} gathers, and nobody writes {near!r}"
+                    self._findings.add(wire.place, "unused_key", what, hint=near, node=node.name)
 
     def _no_effect(self, node: NodeSpec) -> None:
         why = ""

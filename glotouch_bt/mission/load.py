@@ -15,6 +15,7 @@ from glotouch_bt.mission.findings import Finding, Findings, MissionFaults
 from glotouch_bt.mission.judge import check_flow
 from glotouch_bt.mission.library import SkillShelf, find_shipped, shipped_root, shown
 from glotouch_bt.mission.nodes import NodeSpec, number_names
+from glotouch_bt.mission.opening import entries_of
 from glotouch_bt.mission.parameters import (
     Parameter,
     Value,
@@ -146,6 +147,9 @@ def _read(
     tree = parse_tree(substitute(tree_node, parameters, findings), scope)
     number_names(tree)
     check_used(source.get("parameters"), tree_node, findings)
+    for key, _ in entries_of(source.get("subtrees")):
+        if f"carried {key.value}" not in reading.sources.values():
+            findings.add(key.place, "unused_subtree", f"no node uses the subtree {key.value!r}, which is not looked at")
     check_flow(tree, findings, _leaves(source, findings), timeout_s)
     if world is None or len(findings):
         return None

@@ -5,26 +5,22 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from os.path import isfile
-from pathlib import Path
 
 from glotouch_bt.mission.fields import named_by, validate
-from glotouch_bt.mission.library import shipped_root, shown
 from glotouch_bt.mission.literals import is_literal, read_literal
 from glotouch_bt.mission.nodes import KINDS, ConditionSettings, Kind, NodeSpec, RepeatSettings, SubtreeSettings, Wire
-from glotouch_bt.mission.parameters import Parameter, check_used, read_parameters, stl_usable, substitute
+from glotouch_bt.mission.opening import entries_of, find_subtree, handed_on, open_subtree
+from glotouch_bt.mission.parameters import stl_usable, substitute
 from glotouch_bt.mission.quantities import compared
 from glotouch_bt.mission.scope import Scope
-from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, read_yaml
+from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq
 from glotouch_bt.robot import BadInput
 from skills.base import Skill
 
 KEY = re.compile(r"[a-z][a-z0-9_]*")
-DEEPEST_SUBTREE = 8
 MOST_NODES, DEEPEST_NODE = 3000, 100
 BTCPP = {kind.btcpp: name for name, kind in KINDS.items() if kind.btcpp}
 TITLE, CHILD = {"name": ""}, {"name": "", "do": ""}
-SUBTREE_KEYS = ("subtree", "description", "parameters", "tree")
 
 
 def parse_tree(node: Node, scope: Scope) -> NodeSpec:
@@ -205,6 +201,9 @@ def _wire_for_each(spec: NodeSpec, given: Map, scope: Scope) -> None:
             if source and isinstance(value, Scalar) and isinstance(value.value, str) and not value.poisoned:
                 target = _keyed(f"collect.{key.value}", value.value, value.place, scope)
                 if target:
+                    if target.key in {w.key for w in writes.values()}:
+                        what = f"two things are written to {value.value!r}"
+                        scope.findings.add(target.place, "written_twice", what)
                     reads[source.port], writes[target.port] = source, target
     spec.reads, spec.writes = reads, writes
 
@@ -304,23 +303,23 @@ def _rewire(name: str, direction: str, given: Node, wires: dict[str, Wire], skil
 def _subtree(place: Place, body: Node, scope: Scope) -> NodeSpec:
     given = _settings_map("subtree", place, body, scope)
     taken, rest = _take(given, "name")
-    values, rest = _handed_on(rest)
+    values, rest = handed_on(rest)
     settings = validate(SubtreeSettings, rest, "node 'subtree'", scope.findings, where=place, beside=TITLE)
     if settings is None:
         return NodeSpec("unknown", _title(taken, "subtree", scope), place)
     file_node = rest.get("file")
     at = file_node.place if file_node else place
-    found = _find_subtree(settings.file, at, scope)
+    found = find_subtree(settings.file, at, scope)
     if found is None:
         return NodeSpec("unknown", _title(taken, "subtree", scope), place)
     path, identity, source = found
     name = scope.reading.carry(path.stem, identity, source, at)
     title = _title(taken, name, scope)
-    inner, tree = _open_subtree(source, values, scope, at)
+    inner, tree = open_subtree(source, values, scope, at)
     if tree is None:
         return NodeSpec("unknown", title, place)
     ports: dict[str, str] = {}
-    for key, value in _entries(rest.get("ports")):
+    for key, value in entries_of(rest.get("ports")):
         if isinstance(value, Scalar) and (wire := _keyed(str(key.value), str(value.value), value.place, scope)):
             ports[str(key.value)] = wire.key
     # py_trees splits keys at dots, so that none may stand in a key.
@@ -329,71 +328,9 @@ def _subtree(place: Place, body: Node, scope: Scope) -> NodeSpec:
     child_scope = replace(scope, file=path, prefix=prefix, ports=ports, trail=(*scope.trail, identity))
     child = parse_tree(substitute(tree, inner, scope.findings), child_scope)
     used = {w.key for n in child.walk() for w in (*n.reads.values(), *n.writes.values())}
-    for key, _ in _entries(rest.get("ports")):
+    for key, _ in entries_of(rest.get("ports")):
         if str(key.value) in ports and ports[str(key.value)] not in used:
-            names = sorted(k.removeprefix(prefix) for k in used if k.startswith(prefix))
+            own = (k.removeprefix(prefix) for k in used if k.startswith(prefix))
+            names = [k for k in own if "/" not in k and "@" not in k]
             scope.findings.unknown(key.place, "unknown_port", f"port of subtree {name!r}:", str(key.value), names)
     return NodeSpec("subtree", title, place, (child,), settings)
-
-
-def _handed_on(given: Map) -> tuple[dict[Scalar, Scalar], Map]:
-    """The values of a subtree's parameters, with the units and ranges they came with, by key; the settings, plain."""
-    section = given.get("parameters")
-    if not isinstance(section, Map):
-        return {}, given
-    values = {k: v for k, v in section.entries if isinstance(v, Scalar)}
-    bare = ((k, replace(v, unit="", span=None) if isinstance(v, Scalar) else v) for k, v in section.entries)
-    sound = replace(section, entries=tuple((k, v) for k, v in bare if not (isinstance(v, Scalar) and v.poisoned)))
-    return values, replace(given, entries=tuple((k, sound if v is section else v) for k, v in given.entries))
-
-
-def _find_subtree(given: str, at: Place, scope: Scope) -> tuple[Path, str, Node] | None:
-    """A subtree that the mission carries itself, or a file beside the present one, or a shipped file.
-
-    Returns: Its path, what tells it from others, and what stands there; None if that gave a finding.
-    """
-    if given in scope.reading.carried:
-        path, identity = scope.file.parent / given, f"carried {given}"
-    else:
-        beside, shipped = scope.file.parent / given, shipped_root() / given
-        path = shipped if isfile(shipped) and not isfile(beside) else beside
-        identity = str(path.resolve())
-    if identity in (*scope.trail, str(scope.file.resolve())) or len(scope.trail) >= DEEPEST_SUBTREE:
-        scope.findings.add(at, "subtree_loop", f"subtree {given!r} contains itself or is nested too deep")
-        return None
-    if given in scope.reading.carried:
-        return path, identity, scope.reading.carried[given]
-    try:
-        return path, identity, read_yaml(path, shown(path))
-    except (BadInput, ValueError) as e:  # ValueError: a null byte in the name
-        scope.findings.add(at, "unusable_subtree", f"subtree cannot be read: {e}")
-        return None
-
-
-def _entries(node: Node | None) -> tuple[tuple[Scalar, Node], ...]:
-    return node.entries if isinstance(node, Map) else ()
-
-
-def _open_subtree(
-    source: Node, values: Mapping[Scalar, Scalar], scope: Scope, at: Place
-) -> tuple[dict[str, Parameter], Node | None]:
-    """The parameters and the tree of a subtree's file; no tree if it has none."""
-    if not isinstance(source, Map):
-        scope.findings.add(at, "unusable_subtree", "a subtree file must be a mapping", valid=", ".join(SUBTREE_KEYS))
-        return {}, None
-    for key, _ in source.entries:
-        if key.value not in SUBTREE_KEYS:
-            scope.findings.unknown(key.place, "unknown_key", "key of a subtree file:", str(key.value), SUBTREE_KEYS)
-    given = {str(key.value): value for key, value in values.items()}
-    parameters = read_parameters(source.get("parameters"), given, scope.findings, scope.stl_folder, at)
-    for key in values:
-        if key.value not in parameters:
-            scope.findings.unknown(
-                key.place, "unknown_parameter", "parameter of the subtree:", str(key.value), parameters
-            )
-    tree = source.get("tree")
-    if tree is None:
-        scope.findings.add(source.place, "missing_key", "a subtree file needs 'tree'")
-    else:
-        check_used(source.get("parameters"), tree, scope.findings)
-    return parameters, tree
