@@ -64,9 +64,12 @@ class SkillParams(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def param(description: str, *, unit: str = "", default: Any = ..., **rules: Any) -> Any:
-    """One parameter: a description, its unit, a default (none: required) and pydantic rules (ge, le, gt, ...)."""
-    return Field(default, description=description, json_schema_extra={"unit": unit}, **rules)
+def param(description: str, *, unit: str = "", names: str = "", default: Any = ..., **rules: Any) -> Any:
+    """One parameter: a description, its unit, a default (none: required) and pydantic rules (ge, le, gt, ...).
+
+    `names="stl"`: its text is the path of an STL file or the name of one in the world's folder, which must be there.
+    """
+    return Field(default, description=description, json_schema_extra={"unit": unit, "names": names}, **rules)
 
 
 class _Port(Generic[T]):

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from glotouch_bt.recognition import Match, TargetModel
-from glotouch_bt.robot import Array, Gripper
+from glotouch_bt.robot import Array, Gripper, ParamError
 from glotouch_bt.robot.meshes import Mesh
 from glotouch_bt.touch import Candidate, Layer, TouchSet, evidence_weight, patch_statistics
 from skills.grasp_holds import AREA_SCALE, LEVER_SCALE_M, Holds, holds_of
@@ -32,6 +32,8 @@ LEAST_OFFSET_M, GREATEST_OFFSET_M = -0.004, 0.0015
 """The offset, of what was felt against the mesh: both gels give, and the jaws' zero is off (CONDITIONS)."""
 LEAST_LAYERS = 3
 FORCE_N = 30.0
+FARTHEST_M, WIDEST_M, GREATEST_ZERO_M, LARGEST_YAW_RAD = 2.0, 0.5, 0.005, 4.0 * math.pi
+"""Beyond what any box, jaws or turn need: such a number was meant in millimetres or degrees."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,16 @@ class GraspPlan:
     opening_m: float
     alternatives: tuple[GraspPlan, ...] = ()
     source: str = "felt"
+
+    def __post_init__(self) -> None:
+        position_K_m = np.asarray(self.position_K_m)
+        if position_K_m.shape != (3,) or not (np.abs(position_K_m) <= FARTHEST_M).all():
+            raise ParamError("position_K_m", position_K_m.tolist(), f"[x, y, z] in metres, up to {FARTHEST_M:g} each")
+        if not abs(self.yaw_rad) <= LARGEST_YAW_RAD:
+            raise ParamError("yaw_rad", self.yaw_rad, f"radians, up to {LARGEST_YAW_RAD:.4g} either way")
+        for name in ("aperture_m", "opening_m"):  # of closed jaws, too, whose zero is a little off
+            if not -GREATEST_ZERO_M <= getattr(self, name) <= WIDEST_M:
+                raise ParamError(name, getattr(self, name), f"in metres, {-GREATEST_ZERO_M:g} to {WIDEST_M:g}")
 
 
 def plan_grasp(

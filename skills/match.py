@@ -10,6 +10,7 @@ from glotouch_bt.model_cache import target_model
 from glotouch_bt.recognition import MATCHERS, PadSpec, Ranking
 from glotouch_bt.robot import HOLD, BadInput, ParamError
 from glotouch_bt.robot.meshes import Mesh, load_folder, load_mesh
+from glotouch_bt.touch import Candidate, TouchSet
 from skills.base import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from skills.grasp_plan import GraspPlan, plan_grasp
 
@@ -17,7 +18,7 @@ from skills.grasp_plan import GraspPlan, plan_grasp
 class MatchParams(SkillParams):
     """Parameters of `match`."""
 
-    target: str = param("The object to find: an STL file, or the name of one in the world's object folder")
+    target: str = param("The object to find: an STL file, or the name of one in the world's object folder", names="stl")
     matcher: Literal["likelihood", "paper"] = param("How candidates are compared", default="likelihood")
 
 
@@ -42,8 +43,10 @@ class Match(Skill):
         "no_touch": "nothing was squeezed",
     }
 
-    touchsets = In(tuple, "one TouchSet per candidate squeezed", required=False)
-    known = In(tuple, "all candidates, to say which were not squeezed", key="candidates", required=False)
+    touchsets = In(tuple, "one TouchSet per candidate squeezed", element=TouchSet, required=False)
+    known = In(
+        tuple, "all candidates, to say which were not squeezed", key="candidates", element=Candidate, required=False
+    )
     rejected = In(tuple, "indices of candidates that were found not to be it", required=False)
     ranking = Out(Ranking, "all candidates, best first")
     plan = Out(GraspPlan, "how to grasp the best one")

@@ -27,7 +27,7 @@ class ObjectCheckParams(SkillParams):
     weight tells only what cannot be.
     """
 
-    target: str = param("The object wanted: an STL file, or the name of one in the world's object folder")
+    target: str = param("The object wanted: an STL file, or the name of one in the world's object folder", names="stl")
     width_m: float = param("The jaws may stop so far beside that", unit="m", default=0.0025, gt=0.0, le=0.02)
     lightest_kg_m3: float = param("Least density of the target", unit="kg/m3", default=100.0, gt=0.0)
     heaviest_kg_m3: float = param("Largest density of the target", unit="kg/m3", default=8000.0, gt=0.0)

@@ -45,7 +45,7 @@ class Squeeze(Skill):
     }
 
     candidate = In(Candidate, "what to squeeze")
-    known = In(tuple, "all candidates, to keep clear of", key="candidates", required=False)
+    known = In(tuple, "all candidates, to keep clear of", key="candidates", element=Candidate, required=False)
     jaw_zero = In(JawZero, "what the jaws report too much", required=False)
     touchset = Out(TouchSet, "what was felt")
 

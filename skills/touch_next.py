@@ -31,7 +31,7 @@ STILL_THERE_M = 0.003
 class TouchNextParams(ClosureParams):
     """Parameters of `touch_next`."""
 
-    target: str = param("The object to find: an STL file, or the name of one in the world's object folder")
+    target: str = param("The object to find: an STL file, or the name of one in the world's object folder", names="stl")
     confidence: float = param("Probability that is enough", default=0.95, gt=0.5, lt=1.0)
     least_gain_nats: float = param("Expected gain below which no closure is worth it", default=0.005, ge=0.0)
 
@@ -60,7 +60,7 @@ class TouchNext(Skill):
     }
 
     candidates = In(tuple, "what may be touched", element=Candidate)
-    felt = In(tuple, "what was felt so far", key="touchsets", required=False)
+    felt = In(tuple, "what was felt so far", key="touchsets", element=TouchSet, required=False)
     rejected = In(tuple, "indices of candidates to be left alone", required=False)
     jaw_zero = In(JawZero, "what the jaws report too much", required=False)
     touchsets = Out(tuple, "what was felt, one TouchSet per candidate", element=TouchSet)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -14,10 +15,12 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+import yaml
 from typer.testing import CliRunner
 
 from glotouch_bt import cli
 from glotouch_bt.mission import library
+from glotouch_bt.mission.library import shipped
 
 
 @pytest.fixture
@@ -143,6 +146,44 @@ def test_schema_accepts_the_shipped_missions(command: CliRunner) -> None:
 
     for reference in references(schema):
         assert reference.removeprefix("#/$defs/") in schema["$defs"]
+    for name, path in shipped("").items():
+        assert _fits(yaml.safe_load(path.read_text()), schema, schema), name
+    head = {"mission": "m", "world": "container_five"}
+    for tree, fits in (
+        ({"condition": {"port": "grip_m", "at_least": "40 mm"}}, True),
+        ({"condition": {"port": "grip_m", "at_least": "40 apples"}}, False),
+        ({"repeat": {"until": {"port": "found", "at_least": "$n"}, "do": "orbit_probe"}}, True),
+        ({"lift": {"in": {"grip_m": 0.04}}}, True),
+        ({"lift": {"in": {"grap_m": 0.04}}}, False),
+        ({"lift": {"out": {"weight_N": 3}}}, False),
+        ("graps", False),
+    ):
+        assert _fits({**head, "tree": tree}, schema, schema) == fits, tree
+
+
+def _fits(value: Any, schema: dict[str, Any], root: dict[str, Any]) -> bool:
+    """As much of a JSON Schema validator as this schema needs."""
+    if "$ref" in schema:
+        return _fits(value, root["$defs"][schema["$ref"].removeprefix("#/$defs/")], root)
+    kinds = {"object": dict, "array": list, "string": str, "integer": int, "number": (int, float), "boolean": bool}
+    kinds["null"] = type(None)
+    if "anyOf" in schema and not any(_fits(value, s, root) for s in schema["anyOf"]):
+        return False
+    if "type" in schema and not isinstance(value, kinds[schema["type"]]):
+        return False
+    if "enum" in schema and value not in schema["enum"]:
+        return False
+    if isinstance(value, str) and not re.search(schema.get("pattern", ""), value):
+        return False
+    if isinstance(value, list):
+        return all(_fits(v, schema.get("items", {}), root) for v in value)
+    if not isinstance(value, dict):
+        return True
+    others = schema.get("additionalProperties", {})
+    known = schema.get("properties", {})
+    if not set(schema.get("required", ())) <= set(value) or (others is False and not set(value) <= set(known)):
+        return False
+    return all(_fits(v, known.get(k, others), root) for k, v in value.items())
 
 
 HOUSE = Path(__file__).parent / "fake_house.py"

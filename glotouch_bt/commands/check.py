@@ -29,7 +29,7 @@ def check(
 ) -> int:
     """Prove missions before anything moves: every fault on any outcome of any skill, with the run that shows it."""
     from glotouch_bt.mission.bounds import worst_case
-    from glotouch_bt.mission.findings import Finding, MissionFaults
+    from glotouch_bt.mission.findings import Finding, Findings, MissionFaults
     from glotouch_bt.mission.load import load_mission, split_settings
     from glotouch_bt.mission.source import Place
     from glotouch_bt.robot import BadInput
@@ -52,7 +52,10 @@ def check(
             continue
         else:
             found = list(mission.warnings)
-            left = ", ".join(split_settings(mission, settings))
+            left = ", ".join(
+                f"{name}; did you mean {near!r}?" if (near := Findings.nearest(name, mission.parameters)) else name
+                for name in split_settings(mission, settings)
+            )
             nodes, runs = sum(1 for _ in mission.tree.walk()), worst_case(mission.tree)
             report |= {"nodes": nodes, "skill_runs": str(runs), "timeout_s": mission.timeout_s}
             items = ", n items a for_each" if len(runs.terms) > 1 else ""

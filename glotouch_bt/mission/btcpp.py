@@ -14,6 +14,7 @@ from typing import Any
 
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.nodes import (
+    KINDS,
     ConditionSettings,
     ForEachSettings,
     NodeSpec,
@@ -23,17 +24,6 @@ from glotouch_bt.mission.nodes import (
     TimeoutSettings,
 )
 
-_TAGS = {
-    "sequence": "Sequence",
-    "selector": "Fallback",
-    "parallel": "Parallel",
-    "retry": "RetryUntilSuccessful",
-    "timeout": "Timeout",
-    "invert": "Inverter",
-    "succeed": "ForceSuccess",
-    "fail": "ForceFailure",
-    "for_each": "ForEach",
-}
 _SIGNS = (("equals", "=="), ("at_least", ">="), ("at_most", "<="))
 
 
@@ -94,7 +84,7 @@ def _written(node: NodeSpec) -> tuple[str | None, dict[str, str]]:
         if pairs:
             attributes["collect"] = ";".join(f"{_key(s.key)}:{_key(t.key)}" for s, t in pairs)
         return "ForEach", {**attributes, "on_failure": settings.on_failure}
-    return (None if node.kind == "subtree" else _TAGS[node.kind]), {}
+    return (None if node.kind == "subtree" else KINDS[node.kind].btcpp), {}
 
 
 def _code(settings: ConditionSettings, key: str) -> str:

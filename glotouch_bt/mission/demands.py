@@ -26,6 +26,7 @@ class Demand:
         good: Values of the variable with which the node works.
         unset: What it means that nobody has written the key: a mistake, a mistake if nobody can have, or nothing.
         wanted: Type it must have, or the states a resource must be in.
+        element: Type its items must have, if it is a tuple; `object`: any.
         unit: Unit the port's name carries, or empty.
     """
 
@@ -38,6 +39,7 @@ class Demand:
     unset: Literal["never", "not always", "allowed"]
     wanted: Any
     unit: str = ""
+    element: type = object
 
     @property
     def of_resource(self) -> bool:
@@ -50,12 +52,14 @@ class Demand:
         return self.unset == "never" or self.of_resource
 
 
-def fits(kind: Kind, wanted: Any, unit: str = "") -> bool:
-    """A value of a kind passes py_trees' run-time check of `wanted`, and is in a unit that measures the same.
+def fits(kind: Kind, wanted: Any, unit: str = "", element: type = object) -> bool:
+    """A value of a kind passes py_trees' run-time check of `wanted`, has such items, and is in the same unit.
 
     Unknown types pass, and so do names without a unit.
     """
     if kind.unit and unit and kind.unit != unit:
+        return False
+    if object not in (kind.element, element) and not issubclass(kind.element, element):
         return False
     given = kind.data_type
     if given is object or wanted is object:
@@ -81,12 +85,18 @@ def all_demands(tree: NodeSpec, variables: Variables) -> Demands:
 def demands_of(node: NodeSpec, variables: Variables) -> Iterator[Demand]:
     """Everything a node asks: keys in the order of its ports, then resources."""
 
-    def look(port: str, unset: Literal["never", "not always", "allowed"], wanted: Any, unit: str = "") -> Demand:
-        wire = node.reads[port]
-        good = {v for v in variables.written(wire.key) if fits(variables.kind(wire.key, v), wanted, unit)}
+    def look(
+        port: str,
+        unset: Literal["never", "not always", "allowed"],
+        wanted: Any,
+        unit: str = "",
+        element: type = object,
+    ) -> Demand:
+        key, place = node.reads[port].key, node.reads[port].place
+        good = {v for v in variables.written(key) if fits(variables.kind(key, v), wanted, unit, element)}
         if unset != "never":
             good.add(UNSET)
-        return Demand(node, port, wire.key, variables.keys[wire.key], wire.place, frozenset(good), unset, wanted, unit)
+        return Demand(node, port, key, variables.keys[key], place, frozenset(good), unset, wanted, unit, element)
 
     if node.skill_type is not None:
         skill = node.skill_type
@@ -96,7 +106,8 @@ def demands_of(node: NodeSpec, variables: Variables) -> Iterator[Demand]:
             info = skill.INPUT_PORTS[port]
             # An optional input may stay unwritten, unless the mission wired it on purpose.
             optional: Literal["not always", "allowed"] = "allowed" if wire.place == node.place else "not always"
-            yield look(port, "never" if info.required else optional, info.data_type, unit_of_name(port))
+            element = getattr(getattr(skill, port, None), "element", None) or object
+            yield look(port, "never" if info.required else optional, info.data_type, unit_of_name(port), element)
         for resource, states in skill.NEEDS.items():
             good = frozenset(variables.state(resource, s) for s in states)
             yield Demand(
@@ -104,13 +115,13 @@ def demands_of(node: NodeSpec, variables: Variables) -> Iterator[Demand]:
             )
     elif node.kind == "condition" and "port" in node.reads:
         if isinstance(node.settings, ConditionSettings):
-            yield look(
-                "port", "not always" if node.settings.is_set is None else "allowed", compared_type(node.settings)
-            )
+            unset: Literal["not always", "allowed"] = "not always" if node.settings.is_set is None else "allowed"
+            yield look("port", unset, compared_type(node.settings), node.reads["port"].unit)
     elif node.kind == "repeat" and "until" in node.reads:
         if isinstance(node.settings, RepeatSettings):
             condition = until_condition(node.settings)
-            yield look("until", "not always" if condition.is_set is None else "allowed", compared_type(condition))
+            unset = "not always" if condition.is_set is None else "allowed"
+            yield look("until", unset, compared_type(condition), node.reads["until"].unit)
     elif node.kind == "for_each":
         for port in node.reads:
             yield look(port, "not always", tuple if port == "items" else object)

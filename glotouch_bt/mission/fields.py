@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import operator
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeVar
+from types import MappingProxyType, UnionType
+from typing import Any, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
@@ -39,7 +40,11 @@ _WORDS = {
 }
 
 
+_SCALARS = {"string_type", "int_type", "float_type", "bool_type"}
 _RULES = (("gt", ">", operator.gt), ("ge", ">=", operator.ge), ("lt", "<", operator.lt), ("le", "<=", operator.le))
+
+
+NOTHING: Mapping[str, str] = MappingProxyType({})
 
 
 class Poison:
@@ -51,11 +56,28 @@ POISON = Poison()
 
 def unit_of(field: FieldInfo) -> str:
     """The unit a parameter declares, or empty."""
+    return _said_of(field, "unit")
+
+
+def named_by(field: FieldInfo) -> str:
+    """What a text parameter names (`stl`), or empty."""
+    return _said_of(field, "names")
+
+
+def _said_of(field: FieldInfo, word: str) -> str:
     extra = field.json_schema_extra
-    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+    return str(extra.get(word, "")) if isinstance(extra, dict) else ""
 
 
-def validate(model: type[M], given: Map, what: str, findings: Findings, *, where: Place | None = None) -> M | None:
+def validate(
+    model: type[M],
+    given: Map,
+    what: str,
+    findings: Findings,
+    *,
+    where: Place | None = None,
+    beside: Mapping[str, str] = NOTHING,
+) -> M | None:
     """Make a model from a mapping; None if that gave findings.
 
     Args:
@@ -64,6 +86,7 @@ def validate(model: type[M], given: Map, what: str, findings: Findings, *, where
         what: What is being filled, for messages (``skill 'squeeze'``).
         findings: Where faults go.
         where: Place of missing keys (default: the mapping).
+        beside: Names that belong to what is filled as well, and where they are written; empty: here.
     """
     values: dict[str, Any] = {}
     poisoned: set[str] = set()
@@ -72,7 +95,12 @@ def validate(model: type[M], given: Map, what: str, findings: Findings, *, where
         name = str(key.value)
         field = model.model_fields.get(name)
         if field is None:
-            findings.unknown(key.place, "unknown_parameter", f"parameter of {what}:", name, model.model_fields)
+            if beside.get(name):
+                said = f"{name!r} is no parameter of {what}: it belongs under {beside[name]}:"
+                findings.add(key.place, "unknown_parameter", said)
+            else:
+                names = [*model.model_fields, *(n for n, under in beside.items() if not under)]
+                findings.unknown(key.place, "unknown_parameter", f"parameter of {what}:", name, names)
             known = False
             continue
         value = _value(node, unit_of(field), name, findings)
@@ -84,7 +112,7 @@ def validate(model: type[M], given: Map, what: str, findings: Findings, *, where
         made = model.model_validate_json(json.dumps(values), strict=True)
     except ValidationError as e:
         before = len(findings)
-        for error in _one_a_scalar(e.errors(), given):
+        for error in _one_a_scalar(_of_the_right_branch(e.errors(), given), given):
             _report(error, model, given, what, findings, poisoned, where or given.place)
         if len(findings) == before and not poisoned and known:
             findings.add(where or given.place, "wrong_value", f"{what}: {e.errors()[0]['msg']}")
@@ -99,7 +127,7 @@ def _check_span(node: Scalar, name: str, field: FieldInfo, findings: Findings) -
     """Report a parameter that may be given values which the field refuses; its present value is fine."""
     unit = unit_of(field)
     for end in node.span or ():
-        value = convert(end, node.unit, unit) if node.unit and unit else end
+        value = convert(end, node.unit, unit) if node.unit else end
         for rule in field.metadata:
             for word, symbol, holds in _RULES:
                 limit = getattr(rule, word, None)
@@ -107,6 +135,13 @@ def _check_span(node: Scalar, name: str, field: FieldInfo, findings: Findings) -
                     shown = f"{end:g} {node.unit}".strip()
                     what = f"{node.origin} may be set to {shown}, but {name} must be {symbol} {limit:g} {unit}".rstrip()
                     findings.add(node.place, "range_too_wide", what)
+
+
+def _of_the_right_branch(errors: Sequence[Any], given: Map) -> list[Any]:
+    """Where a mapping may stand beside plain values, pydantic complains that it is none of those, too."""
+    deep = {e["loc"][0] for e in errors if len(e["loc"]) > 2}
+    kept = [e for e in errors if not (len(e["loc"]) == 2 and e["loc"][0] in deep and e["type"] in _SCALARS)]
+    return kept if kept and all(isinstance(given.get(str(n)), (Map, Seq)) for n in deep) else list(errors)
 
 
 def _one_a_scalar(errors: Sequence[Any], given: Map) -> list[Any]:
@@ -134,17 +169,13 @@ def _value(node: Node, unit: str, name: str, findings: Findings) -> Any:
         return POISON
     if isinstance(number, str) and (found := split_quantity(number)) and unit:
         number, given_unit = found
-    if given_unit and unit and isinstance(number, (int, float)):
+    if given_unit and isinstance(number, (int, float)):
         try:
             return convert(number, given_unit, unit)
         except ValueError:
             source = f" (from {node.origin})" if node.origin else ""
-            findings.add(
-                node.place,
-                "wrong_unit",
-                f"{name} is in {unit}, not {given_unit!r}{source}",
-                valid=", ".join(units_for(unit)),
-            )
+            what = f"{name} {f'is in {unit}, not' if unit else 'has no unit; given in'} {given_unit!r}{source}"
+            findings.add(node.place, "wrong_unit", what, valid=", ".join(units_for(unit)) if unit else "")
             return POISON
     return number
 
@@ -198,20 +229,27 @@ def _report(
     words = _WORDS.get(error["type"])
     rule = words.format(**error.get("ctx", {})) if words else error["msg"][:1].lower() + error["msg"][1:]
     if error["type"] == "missing":
-        rule = f"needs {loc[-1]!r}"
+        rule = f"needs {loc[-1]!r}" if isinstance(loc[-1], str) else "has too few items"
         dotted, shown = ".".join(str(s) for s in loc[:-1]), ""
     subject = f"{dotted}{shown}{source}" if dotted else what
     code = "wrong_range" if error["type"].startswith(("greater", "less")) else "wrong_type"
-    findings.add(place, code, f"{subject}: {rule}{unit if code == 'wrong_range' else ''}", valid=_valid(field, unit))
+    said = f"{subject}: {rule}{unit if code == 'wrong_range' else ''}"
+    known = [a for a in get_args(field.annotation) if isinstance(a, str)] if field else []
+    hint = findings.nearest(node.value, known) if isinstance(node, Scalar) and isinstance(node.value, str) else ""
+    findings.add(place, code, said, valid=_valid(field, unit), hint=hint)
 
 
 def _keys(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
     """The keys valid at a location inside nested models; empty if it is not a plain nesting."""
     for step in loc:
+        if step == model.__name__:  # in a union pydantic names the branch
+            continue
         field = model.model_fields.get(str(step))
-        if field is None or not (isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel)):
+        kinds = get_args(field.annotation) or (field.annotation,) if field else ()
+        models = [k for k in kinds if isinstance(k, type) and issubclass(k, BaseModel)]
+        if not models:
             return []
-        model = field.annotation
+        model = models[0]
     return list(model.model_fields)
 
 
@@ -230,9 +268,9 @@ def _written(given: Map) -> set[str]:
 
 def _valid(field: FieldInfo | None, unit: str) -> str:
     """The field's type, range and unit in words."""
-    if field is None or (isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel)):
+    kind = _kind_in_words(field.annotation) if field is not None else ""
+    if field is None or not kind:
         return ""
-    kind = getattr(field.annotation, "__name__", str(field.annotation).replace("typing.", ""))
     rules = [
         f"{symbol} {getattr(m, attribute)}"
         for m in field.metadata
@@ -240,3 +278,17 @@ def _valid(field: FieldInfo | None, unit: str) -> str:
         if getattr(m, attribute, None) is not None
     ]
     return f"{kind}{unit}" + (f", {', '.join(rules)}" if rules else "")
+
+
+def _kind_in_words(annotation: Any) -> str:
+    """A field's type for people; empty where the rule says it already."""
+    origin, inside = get_origin(annotation), get_args(annotation)
+    if origin is tuple:
+        return "a list" if Ellipsis in inside else f"[{', '.join(map(_kind_in_words, inside))}]"
+    if origin is dict:
+        return "a mapping"
+    if origin in (Union, UnionType):
+        return " or ".join(words for words in map(_kind_in_words, inside) if words)
+    if annotation is type(None) or not isinstance(annotation, type) or issubclass(annotation, BaseModel):
+        return ""
+    return annotation.__name__

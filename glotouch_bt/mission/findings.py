@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from types import MappingProxyType
 from typing import Literal
 
 from glotouch_bt.mission.source import Place
@@ -65,6 +67,9 @@ class Finding:
         }
 
 
+NO_NAMES: Mapping[str, str] = MappingProxyType({})
+
+
 class Findings:
     """A growing, duplicate-free list of faults."""
 
@@ -88,8 +93,9 @@ class Findings:
     @staticmethod
     def nearest(name: str, valid: Iterable[str]) -> str:
         """The valid name that is most like another, or empty."""
-        near = difflib.get_close_matches(name, sorted(valid), n=1)
-        return near[0] if near else ""
+        plain = {_plain(v): v for v in sorted(valid, reverse=True)}
+        near = difflib.get_close_matches(_plain(name), sorted(plain), n=1)
+        return plain[near[0]] if near else ""
 
     @staticmethod
     def near(name: str, valid: Iterable[str], most: int = 12) -> list[str]:
@@ -97,10 +103,16 @@ class Findings:
         names = sorted(valid)
         return names if len(names) <= most else sorted(difflib.get_close_matches(name, names, n=most, cutoff=0.0))
 
-    def unknown(self, place: Place, code: str, kind: str, name: str, valid: Iterable[str]) -> str:
-        """Note a name nobody knows; returns the nearest valid one or an empty string."""
+    def unknown(
+        self, place: Place, code: str, kind: str, name: str, valid: Iterable[str], also: Mapping[str, str] = NO_NAMES
+    ) -> str:
+        """Note a name nobody knows; returns the nearest valid one or an empty string.
+
+        `also`: what others call some of the valid ones.
+        """
         names = sorted(valid)
-        hint = self.nearest(name, names)
+        nearest = self.nearest(name, [*names, *also])
+        hint = also.get(nearest, nearest)
         self._found[Finding(place, code, f"unknown {kind} {name!r}", ", ".join(names) or "none", hint)] = None
         return hint
 
@@ -121,6 +133,11 @@ class Findings:
     def __len__(self) -> int:
         """How many faults."""
         return sum(f.severity == "error" for f in self._found)
+
+
+def _plain(name: str) -> str:
+    """A name without what is easily mistaken: capitals and separators."""
+    return re.sub("[-_ .]", "", name).lower() or name
 
 
 class MissionFaults(BadInput):

@@ -58,7 +58,7 @@ class Flow:
     def __init__(self, tree: NodeSpec, variables: Variables, demands: Demands, *, lenient: bool = False) -> None:
         self.tree, self.variables, self.demands, self._lenient = tree, variables, demands, lenient
         self._sets = variables.sets
-        self._has_unknown = any(n.kind == "unknown" for n in tree.walk())
+        self._has_unknown = any(n.kind == "unknown" or _is_faulty_loop(n) for n in tree.walk())
         self.entered: dict[int, int] = {}
         self.left: dict[int, After] = {}
         self.asked: dict[Demand, int] = {}
@@ -72,7 +72,8 @@ class Flow:
         key = (id(node), entry)
         if key not in self._known:
             self.entered[id(node)] = self._sets.union(self.entered.get(id(node), EMPTY), entry)
-            method: Callable[[NodeSpec, int], After] | None = getattr(self, f"_of_{node.kind}", None)
+            kind = "faulty_loop" if _is_faulty_loop(node) else node.kind
+            method: Callable[[NodeSpec, int], After] | None = getattr(self, f"_of_{kind}", None)
             made = self._known[key] = method(node, entry) if method else self._nobody_knows(entry)
             self.left[id(node)] = self.left.get(id(node), After()).joined(made, self._sets)
         return self._known[key]
@@ -121,6 +122,12 @@ class Flow:
     def _nobody_knows(self, entry: int) -> After:
         lost = self._sets.assign(entry, self.variables.lost, 1)
         return After(lost, lost, lost)
+
+    def _of_faulty_loop(self, node: NodeSpec, entry: int) -> After:
+        """How often, over what, until when: nobody knows, so that of what it holds nothing is claimed either."""
+        lost = self._nobody_knows(entry)
+        self._child(node, lost.success)
+        return lost
 
     def _of_condition(self, node: NodeSpec, entry: int) -> After:
         if "port" not in node.reads or not isinstance(node.settings, ConditionSettings):
@@ -319,6 +326,9 @@ class Flow:
         demand = self._ask(node, "items", entry)
         assert demand is not None
         given = self._where(entry, variables.keys[items], demand.good - {UNSET})
+        if self._has_unknown:  # what nobody knows may have written items of any kind
+            lost = sets.assign(sets.where(given, variables.lost, (1,)), variables.keys[items], ANYTHING)
+            given = sets.union(sets.where(given, variables.lost, (0,)), lost)
         if given == EMPTY and self._lenient:
             given = sets.assign(entry, variables.keys[items], ANYTHING)
         unset = self._where(entry, variables.keys[items], (UNSET,))
@@ -384,3 +394,7 @@ class Flow:
             ]
             whole = sets.union(*gathered)
         return After(sets.union(whole, part), after.failure, after.running)
+
+
+def _is_faulty_loop(node: NodeSpec) -> bool:
+    return node.kind in ("repeat", "for_each") and node.settings is None

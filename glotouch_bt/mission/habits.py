@@ -44,6 +44,7 @@ class _Habits:
     def __init__(self, flow: Flow, findings: Findings) -> None:
         self._flow, self._findings = flow, findings
         self._read = {w.key for n in flow.tree.walk() for w in n.reads.values()}
+        self._written = {w.key for n in flow.tree.walk() for w in n.writes.values()}
 
     def look(self, node: NodeSpec, above: tuple[NodeSpec, ...], timeout_s: float) -> None:
         if node.kind == "parallel":
@@ -52,6 +53,7 @@ class _Habits:
             self._until(node, above)
         elif node.kind == "for_each":
             self._all_or_nothing(node, above)
+            self._gathered(node)
         elif node.kind == "condition":
             self._condition(node)
         elif node.kind == "selector":
@@ -121,7 +123,7 @@ class _Habits:
             return
         variables = self._flow.variables
         for demand in self._flow.demands[id(node)]:
-            found = variables.sets.values(self._flow.judged(demand), demand.variable)
+            found = variables.sets.values(self._flow.judged(demand), demand.variable) & (demand.good | {UNSET})
             yes, no = verdicts(variables, demand, settings)
             if found - {UNSET} and not (found & yes and found & no):
                 said = "always holds" if found & yes else "never holds"
@@ -146,6 +148,16 @@ class _Habits:
                 near = self._findings.nearest(name, (k.rpartition("/")[2] for k in self._read))
                 self._findings.add(wire.place, "unused_key", what, hint=near, node=node.name)
 
+    def _gathered(self, node: NodeSpec) -> None:
+        """What is gathered may be for the record only, unless somebody reads a key of such a name, never written."""
+        for port, wire in node.writes.items():
+            if port in node.reads and wire.key not in self._read:
+                name = wire.key.rpartition("/")[2]
+                missed = {k.rpartition("/")[2] for k in self._read - self._written}
+                if near := self._findings.nearest(name, missed):
+                    what = f"nobody reads {name!r}, in which {node.name!r} gathers, and nobody writes {near!r}"
+                    self._findings.add(wire.place, "unused_key", what, hint=near, node=node.name)
+
     def _no_effect(self, node: NodeSpec) -> None:
         why = ""
         child = node.children[0] if node.children else None
@@ -159,7 +171,7 @@ class _Habits:
             why = f"{child.name!r} never fails"
         elif node.kind == "fail" and not self._succeeds(child):
             why = f"{child.name!r} never succeeds"
-        elif node.kind in ("selector", "parallel") and len(node.children) == 1:
+        elif node.kind in ("selector", "parallel") and len(node.children) == 1 and child.kind != "unknown":
             why = "it has one child"
         elif node.kind == "timeout" and not any(n.kind in ("skill", "unknown") for n in child.walk()):
             why = "nothing below it takes time"

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, get_type_hints
 
 from glotouch_bt.mission.configurations import EMPTY
 from glotouch_bt.mission.demands import Demand, all_demands, same_quantity
@@ -16,7 +17,7 @@ from glotouch_bt.mission.habits import check_habits
 from glotouch_bt.mission.nodes import ForEachSettings, NodeSpec
 from glotouch_bt.mission.paths import Goal, shortest_path
 from glotouch_bt.mission.source import Place
-from glotouch_bt.mission.variables import ANYTHING, UNSET, Kind, Variables, item_kind, written_kinds
+from glotouch_bt.mission.variables import ANYTHING, UNSET, Kind, Variables, gathered_kind, item_kind, written_kinds
 
 MOST_PATHS = 40
 """Findings beyond so many are reported without a path."""
@@ -95,8 +96,11 @@ class _Judge:
             what = f"{_reader(demand)}, which is written only on some paths to it, by {by}"
             path = self._path(flow, demand, {UNSET})
             self._findings.add(demand.place, "port_maybe_unset", what, path=path, node=demand.node.name)
+        alike: dict[Kind, set[int]] = {}  # what differs in its value only is one mistake
         for value in sorted(wrong):
-            self._wrong_kind(flow, demand, value)
+            alike.setdefault(dataclasses.replace(self._variables.kind(demand.key, value), value=None), set()).add(value)
+        for kind, values in alike.items():
+            self._wrong_kind(flow, demand, kind, values)
 
     def _never_written(self, demand: Demand, found: frozenset[int]) -> bool:
         if demand.unset == "allowed":
@@ -111,6 +115,10 @@ class _Judge:
 
     def _unset(self, flow: Flow, demand: Demand, asked: int) -> None:
         what = f"{_reader(demand)}, which no node writes before it"
+        name = demand.key.rpartition("/")[2]
+        inside = {k.partition("@")[0] for k in self._writers if k != demand.key and k.rpartition("/")[2] == name}
+        for subtree in sorted(inside - {name}):
+            what += f"; subtree {subtree!r} keeps its own {name!r} to itself, unless it is wired with ports"
         later = [(n, p) for n, p in self._places(demand) if n is not demand.node]
         if later:
             what += f"; {later[0][0].name!r} at line {later[0][1].line} writes it, but later or elsewhere"
@@ -130,25 +138,27 @@ class _Judge:
         path = self._path(flow, demand, {UNSET})
         self._findings.add(demand.place, "port_unset", what, valid=valid, hint=hint, path=path, node=demand.node.name)
 
-    def _wrong_kind(self, flow: Flow, demand: Demand, value: int) -> None:
-        kind = self._variables.kind(demand.key, value)
-        writer = next(((n, p) for n, p, kinds in self._writers.get(demand.key, []) if kind in kinds), None)
+    def _wrong_kind(self, flow: Flow, demand: Demand, kind: Kind, values: set[int]) -> None:
+        held = {self._variables.kind(demand.key, v) for v in values}
+        writer = next(((n, p) for n, p, kinds in self._writers.get(demand.key, []) if held & set(kinds)), None)
         by = f"{writer[0].name!r} (line {writer[1].line})" if writer else "another node"
-        path = self._path(flow, demand, {value})
+        path = self._path(flow, demand, values)
         if kind.unit and demand.unit and kind.unit != demand.unit:
             what = f"{_reader(demand)} in {demand.unit}, but {by} writes it in {kind.unit}"
             if not same_quantity(kind.unit, demand.unit):
                 what += ": another quantity"
             self._findings.add(demand.place, "port_unit", what, path=path, node=demand.node.name)
             return
-        what = f"{_reader(demand)} as {_type_name(demand.wanted)}, but {by} writes {_type_name(kind.data_type)}"
+        wanted, given = _type_name(demand.wanted), _type_name(kind.data_type)
+        if wanted == given:  # what differs is inside
+            wanted, given = f"{wanted} of {demand.element.__name__}", f"{given} of {kind.element.__name__}"
+        what = f"{_reader(demand)} as {wanted}, but {by} writes {given}"
         self._findings.add(demand.place, "port_type", what, path=path, node=demand.node.name)
 
     def _wrong_state(self, flow: Flow, demand: Demand, bad: frozenset[int], *, always: bool) -> None:
         names = self._variables.state_names(demand.key)
-        states = " or ".join(names[v] for v in sorted(bad))
         may = "is" if always else "may be"
-        what = f"{demand.node.name!r} starts while the {demand.key} {may} {states!r}"
+        what = f"{demand.node.name!r} starts while the {demand.key} {may} {_states(names, bad)}"
         path = self._path(flow, demand, set(bad))
         valid = ", ".join(sorted(demand.wanted))
         self._findings.add(demand.place, "wrong_state", what, valid=valid, path=path, node=demand.node.name)
@@ -188,17 +198,20 @@ class _Judge:
     def _end(self, leaves: Mapping[str, tuple[frozenset[str], Place]]) -> None:
         end, variables = self._exact.end.success, self._variables
         tree = self._exact.tree
-        if self._exact is self._lenient or not len(self._findings):
+        if not len(self._findings):  # how a mission with a mistake in it ends says little
             self._outcomes()
         for resource, variable in variables.resources.items():
             found = self._sets.values(end, variable)
             names = variables.state_names(resource)
             if resource in leaves:
                 wanted, place = leaves[resource]
+                for state in sorted(wanted - set(names)):
+                    self._findings.unknown(place, "unknown_state", f"state of the {resource}:", state, names)
+                if not wanted & set(names):
+                    continue
                 bad = frozenset(v for v in found if names[v] not in wanted)
                 if bad:
-                    states = " or ".join(names[v] for v in sorted(bad))
-                    what = f"the mission may end in success with the {resource} {states!r}"
+                    what = f"the mission may end in success with the {resource} {_states(names, bad)}"
                     path = self._search(self._exact, Goal(None, "", variable, bad))
                     self._findings.add(place, "wrong_end", what, valid=", ".join(sorted(wanted)), path=path)
                 continue
@@ -238,16 +251,36 @@ def _writers(tree: NodeSpec, variables: Variables) -> dict[str, list[tuple[NodeS
             elif port == "item" and "items" in node.reads:
                 items = node.reads["items"].key
                 kinds = [item_kind(variables.kind(items, v)) for v in variables.written(items)]
+            elif port in node.reads:
+                source = node.reads[port].key
+                kinds = [gathered_kind({variables.kind(source, v): None}) for v in variables.written(source)]
             else:
                 kinds = [variables.kind(wire.key, v) for v in variables.written(wire.key)]
             found.setdefault(wire.key, []).append((node, wire.place, kinds))
     return found
 
 
+def _states(names: Sequence[str], values: frozenset[int]) -> str:
+    return " or ".join(repr(names[v]) for v in sorted(values))
+
+
 def _fields(kind: type) -> list[str]:
-    """What values of a type can be asked for: their public attributes."""
-    declared = [f.name for f in dataclasses.fields(kind)] if dataclasses.is_dataclass(kind) else []
-    return [*declared, *(n for n in dir(kind) if not n.startswith("_") and n not in declared)]
+    """What values of a type can be put in order by: their public numbers and texts, as far as types are said."""
+    hints = _hints(kind)
+    for name in dir(kind):
+        attribute = inspect.getattr_static(kind, name)
+        if isinstance(attribute, property):
+            hints.setdefault(name, _hints(attribute.fget).get("return", object))
+        elif not callable(attribute):
+            hints.setdefault(name, type(attribute))
+    return [n for n, hint in hints.items() if not n.startswith("_") and hint in (int, float, bool, str, object, Any)]
+
+
+def _hints(thing: Any) -> dict[str, Any]:
+    try:
+        return get_type_hints(thing)
+    except (NameError, TypeError):  # a name that only type checkers import
+        return dict.fromkeys(getattr(thing, "__annotations__", ()), object)
 
 
 def _reader(demand: Demand) -> str:

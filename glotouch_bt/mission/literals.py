@@ -24,7 +24,9 @@ class _Unusable(Exception):
 
 def is_literal(node: Node) -> bool:
     """A value rather than the name of a key."""
-    return not (isinstance(node, Scalar) and isinstance(node.value, str)) or node.origin != ""
+    if not isinstance(node, Scalar) or not isinstance(node.value, str) or node.origin:
+        return True
+    return split_quantity(node.value) is not None  # no key begins with a digit
 
 
 def read_literal(node: Node, data_type: Any, port: str, findings: Findings) -> object | None:
@@ -68,7 +70,8 @@ def _dataclass(node: Map, kind: type, port: str, findings: Findings) -> object:
     try:
         return kind(**values)
     except (ParamError, TypeError, ValueError) as e:
-        findings.add(node.place, "wrong_value", f"port {port!r}: {e}")
+        at = (node.get(e.name) if isinstance(e, ParamError) else None) or node
+        findings.add(at.place, "wrong_value", f"port {port!r}: {e}")
         raise _Unusable from e
 
 
@@ -78,6 +81,8 @@ def _value(node: Node, kind: Any, name: str, findings: Findings) -> Any:
     if kind is tuple or get_origin(kind) is tuple:
         numbers = _numbers(node, name, findings)
         wanted = [a for a in get_args(kind) if a is not Ellipsis]
+        if not set(wanted) <= {int, float}:
+            return _wrong(node, name, "left out: what is in it cannot be written here", findings)
         if wanted and Ellipsis not in get_args(kind) and len(numbers) != len(wanted):
             return _wrong(node, name, f"a list of {len(wanted)} numbers", findings)
         return tuple(numbers)

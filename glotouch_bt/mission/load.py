@@ -15,7 +15,16 @@ from glotouch_bt.mission.findings import Finding, Findings, MissionFaults
 from glotouch_bt.mission.judge import check_flow
 from glotouch_bt.mission.library import SkillShelf, find_shipped, shipped_root, shown
 from glotouch_bt.mission.nodes import NodeSpec, number_names
-from glotouch_bt.mission.parameters import Parameter, Value, check_used, read_parameters, resolved, substitute
+from glotouch_bt.mission.opening import entries_of
+from glotouch_bt.mission.parameters import (
+    Parameter,
+    Value,
+    check_used,
+    from_command_line,
+    read_parameters,
+    resolved,
+    substitute,
+)
 from glotouch_bt.mission.parse import parse_tree
 from glotouch_bt.mission.scope import Reading, Scope
 from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, plain, read_yaml
@@ -125,7 +134,9 @@ def _read(
     description = _text(source, "description", findings, required=False)
     world, world_document = _world(source, path, objects, findings)
     folder = world.objects.folder if world else None
-    parameters = read_parameters(source.get("parameters"), settings, findings, folder)
+    section = source.get("parameters")
+    given = {n: from_command_line(n, v, section) for n, v in settings.items()}
+    parameters = read_parameters(section, given, findings, folder)
     timeout_s = _timeout(source, findings)
     tree_node = source.get("tree")
     if tree_node is None:
@@ -136,6 +147,9 @@ def _read(
     tree = parse_tree(substitute(tree_node, parameters, findings), scope)
     number_names(tree)
     check_used(source.get("parameters"), tree_node, findings)
+    for key, _ in entries_of(source.get("subtrees")):
+        if f"carried {key.value}" not in reading.sources.values():
+            findings.add(key.place, "unused_subtree", f"no node uses the subtree {key.value!r}, which is not looked at")
     check_flow(tree, findings, _leaves(source, findings), timeout_s)
     if world is None or len(findings):
         return None

@@ -7,9 +7,13 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
+from pydantic.config import JsonDict
 
 from glotouch_bt.mission.source import Place
 from skills.base import Skill, SkillParams, param
+
+ANY_UNIT: JsonDict = {"any_unit": True}
+"""Of a number that may be written in any unit: it is compared with what is in that of the key."""
 
 
 class Settings(BaseModel):
@@ -45,8 +49,12 @@ class ConditionSettings(Settings):
 
     port: str = Field(description="key to look at")
     equals: bool | int | float | str | None = Field(default=None, description="succeed if equal")
-    at_least: float | None = Field(default=None, description="succeed if the number is at least this")
-    at_most: float | None = Field(default=None, description="succeed if the number is at most this")
+    at_least: float | None = Field(
+        default=None, description="succeed if the number is at least this", json_schema_extra=ANY_UNIT
+    )
+    at_most: float | None = Field(
+        default=None, description="succeed if the number is at most this", json_schema_extra=ANY_UNIT
+    )
     is_set: bool | None = Field(default=None, description="succeed if somebody wrote it (false: nobody)")
 
 
@@ -86,26 +94,28 @@ class Kind:
         settings: What may be set.
         children: How many children: none, one (`do`), or a list.
         description: One line for people.
+        btcpp: What BehaviorTree.CPP calls it; empty: it has none like it.
     """
 
     settings: type[Settings]
     children: Literal["none", "one", "many"]
     description: str
+    btcpp: str = ""
 
 
 KINDS: dict[str, Kind] = {
-    "sequence": Kind(Plain, "many", "children in order; fails with the first that fails"),
-    "selector": Kind(Plain, "many", "children in order; succeeds with the first that succeeds"),
-    "parallel": Kind(ParallelSettings, "many", "all children at once; fails with the first that fails"),
-    "retry": Kind(RetrySettings, "one", "try the child again when it fails"),
-    "timeout": Kind(TimeoutSettings, "one", "fail if the child takes longer, robot clock"),
-    "repeat": Kind(RepeatSettings, "one", "do the child again and again"),
-    "for_each": Kind(ForEachSettings, "one", "do the child for every item of a tuple"),
-    "invert": Kind(Plain, "one", "success and failure exchanged"),
-    "succeed": Kind(Plain, "one", "success whatever the child says"),
-    "fail": Kind(Plain, "one", "failure whatever the child says"),
+    "sequence": Kind(Plain, "many", "children in order; fails with the first that fails", "Sequence"),
+    "selector": Kind(Plain, "many", "children in order; succeeds with the first that succeeds", "Fallback"),
+    "parallel": Kind(ParallelSettings, "many", "all children at once; fails with the first that fails", "Parallel"),
+    "retry": Kind(RetrySettings, "one", "try the child again when it fails", "RetryUntilSuccessful"),
+    "timeout": Kind(TimeoutSettings, "one", "fail if the child takes longer, robot clock", "Timeout"),
+    "repeat": Kind(RepeatSettings, "one", "do the child again and again", "Repeat"),
+    "for_each": Kind(ForEachSettings, "one", "do the child for every item of a tuple", "ForEach"),
+    "invert": Kind(Plain, "one", "success and failure exchanged", "Inverter"),
+    "succeed": Kind(Plain, "one", "success whatever the child says", "ForceSuccess"),
+    "fail": Kind(Plain, "one", "failure whatever the child says", "ForceFailure"),
     "condition": Kind(ConditionSettings, "none", "test a port"),
-    "subtree": Kind(SubtreeSettings, "none", "a tree from another file"),
+    "subtree": Kind(SubtreeSettings, "none", "a tree from another file", "SubTree"),
 }
 
 
@@ -117,11 +127,13 @@ class Wire:
         port: Port name (for our own nodes: the setting's name).
         key: Blackboard key; a subtree's private keys carry its name and a slash.
         place: Where the wiring was written, or the node.
+        unit: SI unit of what a condition compares the value with, where the mission says one.
     """
 
     port: str
     key: str
     place: Place
+    unit: str = ""
 
 
 @dataclass

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from os.path import isdir
+from functools import lru_cache
+from os.path import isdir, isfile
 from pathlib import Path
 from typing import Literal
 
@@ -14,8 +15,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from glotouch_bt.mission.fields import validate
 from glotouch_bt.mission.findings import Findings
 from glotouch_bt.mission.library import shown
+from glotouch_bt.mission.quantities import measured
 from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, plain
-from glotouch_bt.mission.units import UNITS, convert, split_quantity, units_for
+from glotouch_bt.mission.units import UNITS, base_of, convert, units_for
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.meshes import load_mesh
 
@@ -45,26 +47,31 @@ class Parameter:
     Attributes:
         name: As used in `$name`.
         declared: Its declaration.
-        value: The value in the declared unit; None if unusable (already reported).
-        place: Where the value came from.
+        value: The value in its unit; None if unusable (already reported).
+        unit: The declared unit; if none is declared, the SI unit of the value given.
     """
 
     name: str
     declared: Declaration
     value: Value | None
-    place: Place
+    unit: str = ""
 
 
 def read_parameters(
-    node: Node | None, overrides: Mapping[str, str | Value], findings: Findings, folder: Path | None
+    node: Node | None,
+    overrides: Mapping[str, Scalar],
+    findings: Findings,
+    folder: Path | None,
+    user: Place | None = None,
 ) -> dict[str, Parameter]:
-    """All parameters of a mission; faults go to `findings`.
+    """All parameters of a mission, or of a subtree; faults go to `findings`.
 
     Args:
-        node: The mission's `parameters` section, or None.
-        overrides: Values of `--set` (text is read as the declared type); only declared names are looked at.
+        node: Its `parameters` section, or None.
+        overrides: Values given from outside, where they stand; only declared names are looked at.
         findings: Where faults go.
         folder: The world's folder of STL files; None leaves stl parameters unchecked.
+        user: The node that uses the subtree; None: a mission, whose user is on the command line.
     """
     if node is None or (isinstance(node, Scalar) and node.value is None):
         return {}
@@ -82,70 +89,112 @@ def read_parameters(
             )
             continue
         declared = validate(Declaration, body, f"parameter {name!r}", findings, where=key.place)
-        if declared is None:
+        if declared is None or not _sound(declared, body, findings):
             # Keep the name known, so that each use of it does not become another finding.
-            parameters[name] = Parameter(name, Declaration.model_construct(type="str"), None, key.place)
+            parameters[name] = Parameter(name, Declaration.model_construct(type="str"), None)
             continue
-        if declared.unit and declared.unit not in UNITS:
-            at = body.get("unit")
-            findings.unknown(at.place if at else key.place, "wrong_unit", "unit", declared.unit, UNITS)
-        parameters[name] = _valued(name, declared, body, key.place, overrides, findings, folder)
+        default = body.get("default")
+        given = overrides.get(name, default if isinstance(default, Scalar) else None)
+        if given is None or given.value is None:
+            at, how = key.place, f"give it with --set {name}=..."
+            if user is not None:
+                at, how = user, f"give it with parameters: {{{name}: ...}}"
+            findings.add(at, "missing_parameter", f"parameter {name!r} has no default: {how}")
+            parameters[name] = Parameter(name, declared, None)
+            continue
+        parameters[name] = _valued(name, declared, given, findings, folder)
     return parameters
 
 
-def _valued(
-    name: str,
-    declared: Declaration,
-    body: Map,
-    at: Place,
-    overrides: Mapping[str, str | Value],
-    findings: Findings,
-    folder: Path | None,
-) -> Parameter:
-    default = body.get("default")
-    place = default.place if default is not None else at
-    given: Value | None = declared.default
-    if name in overrides:
-        place, given = Place(f"--set {name}"), _from_text(overrides[name], declared)
-    elif given is None:
-        findings.add(at, "missing_parameter", f"parameter {name!r} has no default: give it with --set {name}=...")
-        return Parameter(name, declared, None, place)
-    if unit := _wrong_unit(given, declared):
-        valid = ", ".join(units_for(declared.unit))
-        findings.add(place, "wrong_unit", f"{name} is in {declared.unit}, not {unit!r}", valid=valid)
-        return Parameter(name, declared, None, place)
-    fault = _fault(given, declared)
-    if fault:
-        findings.add(place, "wrong_value", f"{name} = {given!r}: {fault}", valid=_valid(declared))
-        return Parameter(name, declared, None, place)
-    if isinstance(given, int) and declared.type == "float":
-        given = float(given)
-    if declared.type == "stl" and folder is not None and not _stl_usable(str(given), folder, place, findings):
-        return Parameter(name, declared, None, place)
-    return Parameter(name, declared, given, place)
+def _sound(declared: Declaration, body: Map, findings: Findings) -> bool:
+    """What a declaration says makes sense as a whole."""
+    if declared.unit and declared.unit not in UNITS:
+        unit = body.get("unit") or body
+        findings.unknown(unit.place, "wrong_unit", "unit", declared.unit, UNITS)
+        return False
+    if declared.range and declared.range[0] > declared.range[1]:
+        lo, hi = declared.range
+        place = (body.get("range") or body).place
+        findings.add(place, "wrong_value", f"range = [{lo:g}, {hi:g}]: nothing is in it", valid="[lowest, highest]")
+        return False
+    return True
 
 
-def _from_text(given: str | Value, declared: Declaration) -> Value:
-    """Text of the command line as the declared type; text that does not fit stays text, and is then a fault."""
-    if not isinstance(given, str) or declared.type in ("str", "stl"):
-        return str(given) if declared.type in ("str", "stl") else given
+def _valued(name: str, declared: Declaration, given: Scalar, findings: Findings, folder: Path | None) -> Parameter:
+    """The parameter with the value given; without one if that gave findings."""
+    lost = Parameter(name, declared, None)
+    if given.poisoned:
+        return lost
+    value, place, unit = given.value, given.place, declared.unit
+    if declared.type in ("int", "float"):
+        found = measured(given)
+        if found.unit and found.unit not in UNITS:
+            findings.unknown(place, "wrong_unit", "unit", found.unit, UNITS)
+            return lost
+        unit = unit or base_of(found.unit)
+        try:
+            value = _converted(found, unit, declared)
+        except ValueError:
+            source = f" (from {given.origin})" if given.origin else ""
+            what = f"{name} is in {unit}, not {found.unit!r}{source}"
+            findings.add(place, "wrong_unit", what, valid=", ".join(units_for(unit)))
+            return lost
+    assert value is not None
+    if fault := _fault(value, declared):
+        findings.add(place, "wrong_value", f"{name} = {value!r}: {fault}", valid=_valid(declared))
+        return lost
+    if declared.type == "float":
+        value = float(value)
+    if declared.type == "stl" and not stl_usable(str(value), folder, place, findings):
+        return lost
+    _check_span(name, given, declared, unit, findings)
+    return Parameter(name, declared, value, unit)
+
+
+def _converted(given: Scalar, unit: str, declared: Declaration) -> Value | None:
+    """The value in the parameter's unit; a whole number stays one.
+
+    Raises:
+        ValueError: It measures something else.
+    """
+    value = given.value
+    if not given.unit or isinstance(value, bool) or not isinstance(value, (int, float)):
+        return value
+    made = convert(value, given.unit, unit)
+    return int(made) if declared.type == "int" and float(made).is_integer() else made
+
+
+def _check_span(name: str, given: Scalar, declared: Declaration, unit: str, findings: Findings) -> None:
+    """Report a parameter that may be given values which the one it is handed on to refuses."""
+    if given.span is None or declared.range is None:
+        return
+    lo, hi = declared.range
+    for end in given.span:
+        if not lo <= convert(end, given.unit, unit) <= hi:
+            said = f"{end:g} {given.unit}".strip()
+            what = f"{given.origin} may be set to {said}, but {name} must be in [{lo:g}, {hi:g}] {unit}".rstrip()
+            findings.add(given.place, "range_too_wide", what)
+
+
+def from_command_line(name: str, given: str | Value, node: Node | None) -> Scalar:
+    """A `--set` value, its text read as the declared type; text that does not fit stays."""
+    body = node.get(name) if isinstance(node, Map) else None
+    kind = body.get("type") if isinstance(body, Map) else None
+    return Scalar(_from_text(given, str(kind.value) if isinstance(kind, Scalar) else ""), Place(f"--set {name}"))
+
+
+def _from_text(given: str | Value, kind: str) -> Value:
+    if kind in ("str", "stl"):
+        return str(given)
+    if not isinstance(given, str):
+        return given
     text = given.strip()
-    if declared.type == "bool":
+    if kind == "bool":
         return True if text.lower() in _TRUE else False if text.lower() in _FALSE else given
     try:
-        if (quantity := split_quantity(text)) is not None and declared.unit:
-            return convert(*quantity, declared.unit)
-        return int(text) if declared.type == "int" else float(text)
+        return int(text) if kind == "int" else float(text) if kind == "float" else given
     except ValueError:
         return given
-
-
-def _wrong_unit(value: Value, declared: Declaration) -> str:
-    """The unit of a number's text that measures something else than the parameter does, or empty."""
-    if not isinstance(value, str) or declared.type not in ("int", "float") or not declared.unit:
-        return ""
-    quantity = split_quantity(value)
-    return quantity[1] if quantity else ""
 
 
 def _fault(value: Value, declared: Declaration) -> str:
@@ -176,8 +225,10 @@ def _valid(declared: Declaration) -> str:
     return words + (f", {declared.range[0]:g} to {declared.range[1]:g}" if declared.range else "")
 
 
-def _stl_usable(name: str, folder: Path, place: Place, findings: Findings) -> bool:
-    """An stl parameter names a file of the objects' folder, or is a path to one; it must be a good solid."""
+def stl_usable(name: str, folder: Path | None, place: Place, findings: Findings) -> bool:
+    """An object is named by its file in the objects' folder, or is a path to one; it must be a good solid."""
+    if folder is None:
+        return True
     path = Path(name)
     if path.suffix.lower() != ".stl":
         files = {p.stem: p for p in sorted(folder.iterdir()) if p.suffix.lower() == ".stl"} if isdir(folder) else {}
@@ -185,12 +236,21 @@ def _stl_usable(name: str, folder: Path, place: Place, findings: Findings) -> bo
             findings.unknown(place, "no_such_stl", f"object (in {shown(folder)})", name, files)
             return False
         path = files[name]
+    found = path.stat() if isfile(path) else None
+    fault = _fault_of_solid(path, (found.st_mtime_ns, found.st_size) if found else None)
+    if fault:
+        findings.add(place, "unusable_stl", fault)
+    return not fault
+
+
+@lru_cache(maxsize=256)
+def _fault_of_solid(path: Path, stamp: tuple[int, int] | None) -> str:
+    """Why a file is no good solid, or empty; a mission names it in many places. `stamp`: of the file as it is."""
     try:
         load_mesh(path)
     except BadInput as e:
-        findings.add(place, "unusable_stl", str(e))
-        return False
-    return True
+        return str(e)
+    return ""
 
 
 def substitute(node: Node, parameters: Mapping[str, Parameter], findings: Findings) -> Node:
@@ -208,7 +268,7 @@ def substitute(node: Node, parameters: Mapping[str, Parameter], findings: Findin
         return replace(node, poisoned=True)
     if found.value is None:
         return replace(node, poisoned=True)
-    return replace(node, value=found.value, unit=found.declared.unit, origin=node.value, span=found.declared.range)
+    return replace(node, value=found.value, unit=found.unit, origin=node.value, span=found.declared.range)
 
 
 def check_used(section: Node | None, tree: Node, findings: Findings) -> None:
@@ -240,4 +300,14 @@ def resolved(node: Node | None, parameters: Mapping[str, Parameter]) -> dict[str
     return dict(section)
 
 
-__all__ = ["Declaration", "Parameter", "Value", "check_used", "read_parameters", "resolved", "substitute"]
+__all__ = [
+    "Declaration",
+    "Parameter",
+    "Value",
+    "check_used",
+    "from_command_line",
+    "read_parameters",
+    "resolved",
+    "stl_usable",
+    "substitute",
+]

@@ -5,23 +5,22 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from os.path import isfile
-from pathlib import Path
 
-from glotouch_bt.mission.fields import validate
-from glotouch_bt.mission.library import shipped_root, shown
+from glotouch_bt.mission.fields import named_by, validate
 from glotouch_bt.mission.literals import is_literal, read_literal
 from glotouch_bt.mission.nodes import KINDS, ConditionSettings, Kind, NodeSpec, RepeatSettings, SubtreeSettings, Wire
-from glotouch_bt.mission.parameters import Parameter, Value, check_used, read_parameters, substitute
+from glotouch_bt.mission.opening import entries_of, find_subtree, handed_on, open_subtree
+from glotouch_bt.mission.parameters import stl_usable, substitute
+from glotouch_bt.mission.quantities import compared
 from glotouch_bt.mission.scope import Scope
-from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, read_yaml
+from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq
 from glotouch_bt.robot import BadInput
 from skills.base import Skill
 
 KEY = re.compile(r"[a-z][a-z0-9_]*")
-DEEPEST_SUBTREE = 8
 MOST_NODES, DEEPEST_NODE = 3000, 100
-SUBTREE_KEYS = ("subtree", "description", "parameters", "tree")
+BTCPP = {kind.btcpp: name for name, kind in KINDS.items() if kind.btcpp}
+TITLE, CHILD = {"name": ""}, {"name": "", "do": ""}
 
 
 def parse_tree(node: Node, scope: Scope) -> NodeSpec:
@@ -74,7 +73,7 @@ def _named(name: str, place: Place, body: Node, scope: Scope) -> NodeSpec:
         return _subtree(place, body, scope) if name == "subtree" else _condition(place, body, scope)
     known = name
     if name not in scope.skills:
-        known = scope.findings.unknown(place, "unknown_skill", "skill or node", name, [*KINDS, *scope.skills])
+        known = scope.findings.unknown(place, "unknown_skill", "skill or node", name, [*KINDS, *scope.skills], BTCPP)
         if known not in scope.skills:
             return NodeSpec("unknown", name, place)
     try:
@@ -116,7 +115,7 @@ def _composite(kind: str, place: Place, body: Node, scope: Scope) -> NodeSpec:
         rest = Map((), place)
     else:
         taken, rest = _take(_settings_map(kind, place, body, scope), "name", "do")
-    settings = validate(KINDS[kind].settings, rest, f"node {kind!r}", scope.findings, where=place)
+    settings = validate(KINDS[kind].settings, rest, f"node {kind!r}", scope.findings, where=place, beside=CHILD)
     children: tuple[NodeSpec, ...] = ()
     below = taken["do"][1] if "do" in taken else None
     if isinstance(below, Seq):
@@ -125,6 +124,7 @@ def _composite(kind: str, place: Place, body: Node, scope: Scope) -> NodeSpec:
         children = (parse_tree(below, scope),)
     if not children:
         scope.findings.add(place, "no_children", f"{kind} has no children", valid=f"{kind}: [node, node, ...]")
+        children = (_lost(body),)
     return NodeSpec(kind, _title(taken, kind, scope), place, children, settings)
 
 
@@ -135,16 +135,21 @@ def _decorator(name: str, kind: Kind, place: Place, body: Node, scope: Scope) ->
         rest = Map((), place)
     else:
         taken, rest = _take(_settings_map(name, place, body, scope), "name", "do")
-    settings = validate(kind.settings, rest, f"node {name!r}", scope.findings, where=place)
+    until = rest.get("until") if name == "repeat" else None
+    unit = ""
+    if isinstance(until, Map):
+        plain_until, unit = compared(until, scope.findings)
+        rest = replace(rest, entries=tuple((k, plain_until if v is until else v) for k, v in rest.entries))
+    settings = validate(kind.settings, rest, f"node {name!r}", scope.findings, where=place, beside=CHILD)
     below = taken["do"][1] if "do" in taken else None
     if below is None or (isinstance(below, Scalar) and below.value is None):
         scope.findings.add(place, "no_children", f"{name} has no child", valid="do: a node")
-        children: tuple[NodeSpec, ...] = ()
+        children: tuple[NodeSpec, ...] = (_lost(body),)
     else:
         children = (parse_tree(below, scope),)
     spec = NodeSpec(name, _title(taken, name, scope), place, children, settings)
     if name == "repeat":
-        _check_repeat(spec, rest, scope)
+        _check_repeat(spec, rest, unit, scope)
     elif name == "for_each":
         _wire_for_each(spec, rest, scope)
     return spec
@@ -167,7 +172,7 @@ def _keyed(port: str, key: str, place: Place, scope: Scope) -> Wire | None:
     return Wire(port, scope.key(key), place)
 
 
-def _check_repeat(spec: NodeSpec, given: Map, scope: Scope) -> None:
+def _check_repeat(spec: NodeSpec, given: Map, unit: str, scope: Scope) -> None:
     settings = spec.settings
     if not isinstance(settings, RepeatSettings):
         return
@@ -182,7 +187,7 @@ def _check_repeat(spec: NodeSpec, given: Map, scope: Scope) -> None:
         if isinstance(settings.until, ConditionSettings) and isinstance(below, Map):
             _check_comparison(settings.until, below.place, scope)
     if wire:
-        spec.reads = {"until": wire}
+        spec.reads = {"until": replace(wire, unit=unit)}
 
 
 def _wire_for_each(spec: NodeSpec, given: Map, scope: Scope) -> None:
@@ -196,6 +201,9 @@ def _wire_for_each(spec: NodeSpec, given: Map, scope: Scope) -> None:
             if source and isinstance(value, Scalar) and isinstance(value.value, str) and not value.poisoned:
                 target = _keyed(f"collect.{key.value}", value.value, value.place, scope)
                 if target:
+                    if target.key in {w.key for w in writes.values()}:
+                        what = f"two things are written to {value.value!r}"
+                        scope.findings.add(target.place, "written_twice", what)
                     reads[source.port], writes[target.port] = source, target
     spec.reads, spec.writes = reads, writes
 
@@ -210,27 +218,33 @@ def _check_comparison(settings: ConditionSettings, place: Place, scope: Scope) -
 
 def _condition(place: Place, body: Node, scope: Scope) -> NodeSpec:
     taken, rest = _take(_settings_map("condition", place, body, scope), "name")
-    settings = validate(ConditionSettings, rest, "node 'condition'", scope.findings, where=place)
+    rest, unit = compared(rest, scope.findings)
+    settings = validate(ConditionSettings, rest, "node 'condition'", scope.findings, where=place, beside=TITLE)
     if settings is not None:
         _check_comparison(settings, place, scope)
     default = f"{settings.port}?" if settings is not None else "condition"
     wire = _wire("port", rest, scope)
-    reads = {"port": wire} if wire else {}
+    reads = {"port": replace(wire, unit=unit)} if wire else {}
     return NodeSpec("condition", _title(taken, default, scope), place, (), settings, reads=reads)
 
 
 def _skill(name: str, skill: type[Skill], place: Place, body: Node, scope: Scope) -> NodeSpec:
     taken, rest = _take(_settings_map(name, place, body, scope), "name", "in", "out")
-    params = validate(skill.Params, rest, f"skill {name!r}", scope.findings, where=place)
+    ports = {p: "out" for p in skill.OUTPUT_PORTS} | {p: "in" for p in skill.INPUT_PORTS} | {"in": "", "out": ""}
+    params = validate(skill.Params, rest, f"skill {name!r}", scope.findings, where=place, beside=TITLE | ports)
+    for key, value in rest.entries if scope.stl_folder is not None else ():
+        field = skill.Params.model_fields.get(str(key.value))
+        if field is not None and named_by(field) == "stl" and isinstance(value, Scalar) and not value.poisoned:
+            stl_usable(str(value.value), scope.stl_folder, value.place, scope.findings)
     keys = skill.default_keys()
     reads = {p: Wire(p, scope.key(keys[p]), place) for p in skill.INPUT_PORTS}
     writes = {p: Wire(p, scope.key(keys[p]), place) for p in skill.OUTPUT_PORTS}
     constants: dict[str, object] = {}
     if "in" in taken:
         given, constants = _literals(skill, taken["in"][1], place, reads, scope)
-        _rewire(name, "in", given, reads, skill.OUTPUT_PORTS, scope)
+        _rewire(name, "in", given, reads, skill, scope)
     if "out" in taken:
-        _rewire(name, "out", taken["out"][1], writes, skill.INPUT_PORTS, scope)
+        _rewire(name, "out", taken["out"][1], writes, skill, scope)
     return NodeSpec(
         "skill",
         _title(taken, name, scope),
@@ -263,9 +277,7 @@ def _literals(
     return replace(given, entries=tuple(left)), constants
 
 
-def _rewire(
-    skill: str, direction: str, given: Node, wires: dict[str, Wire], other: Mapping[str, object], scope: Scope
-) -> None:
+def _rewire(name: str, direction: str, given: Node, wires: dict[str, Wire], skill: type[Skill], scope: Scope) -> None:
     if not isinstance(given, Map):
         scope.findings.add(given.place, "wrong_type", f"{direction}: must be a mapping of port: key")
         return
@@ -273,12 +285,15 @@ def _rewire(
     for key, value in given.entries:
         port = str(key.value)
         if port not in wires:
-            if port in other:
+            if port in skill.Params.model_fields:
+                what = f"{port!r} of skill {name!r} is a parameter, not a port: it stands outside of {direction}:"
+                scope.findings.add(key.place, "unknown_port", what, valid=", ".join(wires) or "none")
+            elif port in {**skill.INPUT_PORTS, **skill.OUTPUT_PORTS}:
                 where = "out" if direction == "in" else "in"
-                what = f"port {port!r} of skill {skill!r} is not an {word} port: it belongs under {where}:"
+                what = f"port {port!r} of skill {name!r} is not an {word} port: it belongs under {where}:"
                 scope.findings.add(key.place, "unknown_port", what, valid=", ".join(wires) or "none")
             else:
-                scope.findings.unknown(key.place, "unknown_port", f"{word} port of skill {skill!r}:", port, wires)
+                scope.findings.unknown(key.place, "unknown_port", f"{word} port of skill {name!r}:", port, wires)
         elif not isinstance(value, Scalar) or not isinstance(value.value, str):
             scope.findings.add(value.place, "wrong_key", f"{direction}.{port}: must be the name of a key")
         elif not value.poisoned and (wire := _keyed(port, value.value, value.place, scope)):
@@ -288,22 +303,23 @@ def _rewire(
 def _subtree(place: Place, body: Node, scope: Scope) -> NodeSpec:
     given = _settings_map("subtree", place, body, scope)
     taken, rest = _take(given, "name")
-    settings = validate(SubtreeSettings, rest, "node 'subtree'", scope.findings, where=place)
+    values, rest = handed_on(rest)
+    settings = validate(SubtreeSettings, rest, "node 'subtree'", scope.findings, where=place, beside=TITLE)
     if settings is None:
         return NodeSpec("unknown", _title(taken, "subtree", scope), place)
     file_node = rest.get("file")
     at = file_node.place if file_node else place
-    found = _find_subtree(settings.file, at, scope)
+    found = find_subtree(settings.file, at, scope)
     if found is None:
         return NodeSpec("unknown", _title(taken, "subtree", scope), place)
     path, identity, source = found
     name = scope.reading.carry(path.stem, identity, source, at)
     title = _title(taken, name, scope)
-    inner, tree = _open_subtree(source, settings.parameters, rest, scope, at)
+    inner, tree = open_subtree(source, values, scope, at)
     if tree is None:
         return NodeSpec("unknown", title, place)
     ports: dict[str, str] = {}
-    for key, value in _entries(rest.get("ports")):
+    for key, value in entries_of(rest.get("ports")):
         if isinstance(value, Scalar) and (wire := _keyed(str(key.value), str(value.value), value.place, scope)):
             ports[str(key.value)] = wire.key
     # py_trees splits keys at dots, so that none may stand in a key.
@@ -312,59 +328,9 @@ def _subtree(place: Place, body: Node, scope: Scope) -> NodeSpec:
     child_scope = replace(scope, file=path, prefix=prefix, ports=ports, trail=(*scope.trail, identity))
     child = parse_tree(substitute(tree, inner, scope.findings), child_scope)
     used = {w.key for n in child.walk() for w in (*n.reads.values(), *n.writes.values())}
-    for key, _ in _entries(rest.get("ports")):
+    for key, _ in entries_of(rest.get("ports")):
         if str(key.value) in ports and ports[str(key.value)] not in used:
-            names = sorted(k.removeprefix(prefix) for k in used if k.startswith(prefix))
+            own = (k.removeprefix(prefix) for k in used if k.startswith(prefix))
+            names = [k for k in own if "/" not in k and "@" not in k]
             scope.findings.unknown(key.place, "unknown_port", f"port of subtree {name!r}:", str(key.value), names)
     return NodeSpec("subtree", title, place, (child,), settings)
-
-
-def _find_subtree(given: str, at: Place, scope: Scope) -> tuple[Path, str, Node] | None:
-    """A subtree that the mission carries itself, or a file beside the present one, or a shipped file.
-
-    Returns: Its path, what tells it from others, and what stands there; None if that gave a finding.
-    """
-    if given in scope.reading.carried:
-        path, identity = scope.file.parent / given, f"carried {given}"
-    else:
-        beside, shipped = scope.file.parent / given, shipped_root() / given
-        path = shipped if isfile(shipped) and not isfile(beside) else beside
-        identity = str(path.resolve())
-    if identity in (*scope.trail, str(scope.file.resolve())) or len(scope.trail) >= DEEPEST_SUBTREE:
-        scope.findings.add(at, "subtree_loop", f"subtree {given!r} contains itself or is nested too deep")
-        return None
-    if given in scope.reading.carried:
-        return path, identity, scope.reading.carried[given]
-    try:
-        return path, identity, read_yaml(path, shown(path))
-    except (BadInput, ValueError) as e:  # ValueError: a null byte in the name
-        scope.findings.add(at, "unusable_subtree", f"subtree cannot be read: {e}")
-        return None
-
-
-def _entries(node: Node | None) -> tuple[tuple[Scalar, Node], ...]:
-    return node.entries if isinstance(node, Map) else ()
-
-
-def _open_subtree(
-    source: Node, values: Mapping[str, Value], given: Map, scope: Scope, at: Place
-) -> tuple[dict[str, Parameter], Node | None]:
-    """The parameters and the tree of a subtree's file; no tree if it has none."""
-    if not isinstance(source, Map):
-        scope.findings.add(at, "unusable_subtree", "a subtree file must be a mapping", valid=", ".join(SUBTREE_KEYS))
-        return {}, None
-    for key, _ in source.entries:
-        if key.value not in SUBTREE_KEYS:
-            scope.findings.unknown(key.place, "unknown_key", "key of a subtree file:", str(key.value), SUBTREE_KEYS)
-    parameters = read_parameters(source.get("parameters"), values, scope.findings, scope.stl_folder)
-    for key, _ in _entries(given.get("parameters")):
-        if key.value not in parameters:
-            scope.findings.unknown(
-                key.place, "unknown_parameter", "parameter of the subtree:", str(key.value), parameters
-            )
-    tree = source.get("tree")
-    if tree is None:
-        scope.findings.add(source.place, "missing_key", "a subtree file needs 'tree'")
-    else:
-        check_used(source.get("parameters"), tree, scope.findings)
-    return parameters, tree

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 
 from glotouch_bt.mission.nodes import KINDS
 from glotouch_bt.mission.parameters import Declaration
-from glotouch_bt.mission.units import units_for
+from glotouch_bt.mission.units import UNITS, units_for
 from glotouch_bt.mission.worlds import WorldFile
 from skills.base import Skill
 
@@ -80,16 +80,24 @@ def mission_schema(skills: Mapping[str, type[Skill]]) -> dict[str, Any]:
 
 def _model(model: type[BaseModel], definitions: dict[str, Any], *, references: bool = False) -> dict[str, Any]:
     made = model.model_json_schema(ref_template="#/$defs/{model}")
-    definitions.update(made.pop("$defs", {}))
+    for name, below in made.pop("$defs", {}).items():
+        definitions[name] = _opened(below, references)
+    return _opened(made, references)
+
+
+def _opened(made: dict[str, Any], references: bool) -> dict[str, Any]:
+    """A model's schema with what may be written instead of its plain values: quantities, and mission parameters."""
     for name, body in made.get("properties", {}).items():
         unit = body.pop("unit", "")
+        body.pop("names", "")
+        units = units_for(unit) if unit else list(UNITS) if body.pop("any_unit", False) else []
         if unit:
             body["description"] = f"{body.get('description', name)}, {unit}"
         options = [body]
         if references:
             options.append(_REFERENCE)
-        if unit:
-            words = "|".join(u.replace("/", r"\/") for u in units_for(unit))
+        if units:
+            words = "|".join(u.replace("/", r"\/") for u in units)
             options.append({"type": "string", "pattern": rf"^[-+0-9.eE]+ *({words})$"})
         if len(options) > 1:
             made["properties"][name] = {"description": body.get("description", name), "anyOf": options}
@@ -118,9 +126,10 @@ def _skill(name: str, skill: type[Skill], definitions: dict[str, Any]) -> dict[s
     made.pop("title", None)
     properties = made.setdefault("properties", {})
     properties["name"] = _NAME
-    for word, ports in (("in", skill.INPUT_PORTS), ("out", skill.OUTPUT_PORTS)):
+    # An input may be a key or a value, a dataclass's fields for instance; an output is a key.
+    for word, ports, kind in (("in", skill.INPUT_PORTS, {}), ("out", skill.OUTPUT_PORTS, {"type": "string"})):
         if ports:
-            wires = {p: {"type": "string", "description": info.description} for p, info in ports.items()}
+            wires = {p: {**kind, "description": info.description} for p, info in ports.items()}
             properties[word] = {"type": "object", "additionalProperties": False, "properties": wires}
     if made.get("required"):
         return made

@@ -5,6 +5,7 @@ The event stream is read without recursion, so that no file can exhaust the stac
 
 from __future__ import annotations
 
+import codecs
 import math
 import re
 import stat
@@ -138,7 +139,9 @@ def parse_yaml(data: bytes | str, shown: str) -> Node:
     except yaml.MarkedYAMLError as e:
         mark = e.problem_mark or e.context_mark
         place = f"{shown}:{mark.line + 1}:{mark.column + 1}" if mark else shown
-        raise BadInput(f"{place}: not valid YAML: {e.problem or e.context}") from e
+        tab = mark is not None and text[mark.index : mark.index + 1] == "\t"
+        what = "a tab; indent with blanks" if tab else e.problem or e.context
+        raise BadInput(f"{place}: not valid YAML: {what}") from e
     except yaml.YAMLError as e:
         raise BadInput(f"{shown}: not valid YAML: {e}") from e
     finally:
@@ -154,7 +157,9 @@ def _decode(data: bytes | str, shown: str) -> str:
         return data.decode("utf-8")
     except UnicodeDecodeError as e:
         line, column = data[: e.start].count(b"\n") + 1, e.start - (data.rfind(b"\n", 0, e.start) + 1) + 1
-        raise BadInput(f"{shown}:{line}:{column}: not UTF-8 text (byte 0x{data[e.start]:02x})") from e
+        utf16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        found = "but UTF-16" if utf16 else f"(byte 0x{data[e.start]:02x})"
+        raise BadInput(f"{shown}:{line}:{column}: not UTF-8 text {found}") from e
 
 
 def _at(text: str, position: int, shown: str) -> str:

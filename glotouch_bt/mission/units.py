@@ -52,7 +52,9 @@ _SUFFIXES: tuple[tuple[str, str], ...] = (
     ("_m", "m"),
 )
 
-_QUANTITY = re.compile(r"([-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([A-Za-z%µ][A-Za-z0-9/%^]*)")
+_QUANTITY = re.compile(
+    r"([-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(?![eE][-+]?[0-9])([A-Za-z%µ][A-Za-z0-9/%^]*)"
+)
 
 
 def split_quantity(text: str) -> tuple[float, str] | None:
@@ -66,6 +68,11 @@ def split_quantity(text: str) -> tuple[float, str] | None:
 def unit_of_name(name: str) -> str:
     """The unit a name carries as its suffix (`weight_N`), or empty."""
     return next((unit for suffix, unit in _SUFFIXES if name.endswith(suffix)), "")
+
+
+def base_of(unit: str) -> str:
+    """The SI unit of what a unit measures; empty: a bare number, or nobody knows the unit."""
+    return UNITS.get(unit, ("", 1.0))[0]
 
 
 def units_for(unit: str) -> list[str]:
@@ -82,7 +89,8 @@ def convert(value: float, unit: str, expected: str) -> float:
     """
     if unit == expected:
         return value
-    if unit not in UNITS or expected not in UNITS or UNITS[unit][0] != UNITS[expected][0]:
+    known = {**UNITS, "": ("", 1.0)}
+    if unit not in known or expected not in known or known[unit][0] != known[expected][0]:
         raise ValueError(f"{unit!r} is not {expected!r}")
     # One rounding to 15 digits: 40 mm/s is 0.04 m/s, not 0.040000000000000001 of a product's last bit.
-    return float(f"{value * UNITS[unit][1] / UNITS[expected][1]:.15g}")
+    return float(f"{value * known[unit][1] / known[expected][1]:.15g}")

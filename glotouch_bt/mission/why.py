@@ -29,6 +29,7 @@ WHY: Mapping[str, str] = {
     "timeout_never": "the outer limit ends the mission first",
     "float_equality": "measured numbers are hardly ever equal: use at_least and at_most",
     "unused_parameter": "setting it changes nothing",
+    "unused_subtree": "it does nothing, and may be full of mistakes",
     "unused_key": "nobody reads what was renamed on purpose: perhaps a name is misspelt",
     "range_too_wide": "a value that the mission allows is refused when it is given",
     "practically_endless": "in the worst case it ends only with the mission's time",
@@ -47,6 +48,7 @@ WARNINGS = frozenset(
         "float_equality",
         "unused_parameter",
         "unused_key",
+        "unused_subtree",
         "range_too_wide",
         "practically_endless",
     }

@@ -67,8 +67,8 @@ class ObjectsSection(_Section):
     expected: int | None = Field(
         default=None, ge=1, le=20, description="how many objects shall be in the folder or the names"
     )
-    min_gap_m: float = Field(default=ObjectSet.min_gap_m, ge=0)
-    min_wall_gap_m: float = Field(default=ObjectSet.min_wall_gap_m, ge=0)
+    min_gap_m: float = Field(default=ObjectSet.min_gap_m, ge=0, le=1.0)
+    min_wall_gap_m: float = Field(default=ObjectSet.min_wall_gap_m, ge=0, le=1.0)
 
 
 class WorldFile(_Section):
@@ -154,11 +154,13 @@ def _objects(
         )
         return None
     before = len(findings)
+    written = node.get("names")
     for i, name in enumerate(given.names):
+        place = written.items[i].place if isinstance(written, Seq) else at.place
         if name not in stems:
-            names = node.get("names")
-            place = names.items[i].place if isinstance(names, Seq) else at.place
             findings.unknown(place, "no_such_stl", "object", name, stems)
+        elif name in given.names[:i]:
+            findings.add(place, "wrong_value", f"objects.names: {name!r} stands twice")
     count = len(given.names or stems)
     if given.expected is not None and count != given.expected:
         expected = node.get("expected") or node

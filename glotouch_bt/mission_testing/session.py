@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from glotouch_bt.mission.library import find_shipped
 from glotouch_bt.mission.load import Mission, load_mission
+from glotouch_bt.mission_testing.casting import ScriptError
 from glotouch_bt.mission_testing.coverage import OutcomeCoverage
 from glotouch_bt.mission_testing.scripted import ScriptedRun
+from glotouch_bt.robot import UnknownName
 
 if TYPE_CHECKING:
     from glotouch_bt.mission_testing.score import MutationScore
@@ -47,13 +49,21 @@ class Session:
         here: Path,
         test: str,
     ) -> Mission:
-        """A mission for a test, from memory if it was loaded before and its file has not changed."""
+        """A mission for a test, from memory if it was loaded before and its file has not changed.
+
+        Raises:
+            ScriptError: A setting that is no parameter of it: here is no backend that might take it.
+            BadInput: It cannot be read, or is faulty.
+        """
         path = self.find(given, here)
         stat = path.stat()
         known = (path, stat.st_mtime_ns, stat.st_size, repr(sorted(settings.items())), objects, id(skills))
         if known not in self._loaded:
             self._loaded[known] = load_mission(path, settings, objects=objects, skills=skills)
         mission = self._loaded[known]
+        for name in settings:
+            if name not in mission.parameters:
+                raise ScriptError(str(UnknownName("setting", name, mission.parameters)))
         self.users.setdefault(path.resolve(), {})[test] = None
         return mission if self.change is None else self.change(mission)
 

@@ -14,6 +14,9 @@ import numpy as np
 from glotouch_bt.robot.errors import ParamError
 from glotouch_bt.robot.geometry import Pose
 
+LARGEST_M = 3.0
+"""Of a container's side: three times an arm's reach; a larger one was meant in millimetres."""
+
 
 def _positive(name: str, *values: float) -> None:
     for v in values:
@@ -37,6 +40,8 @@ class Container:
 
     def __post_init__(self) -> None:
         _positive("container.interior_m", *self.interior_m)
+        if max(self.interior_m) > LARGEST_M:
+            raise ParamError("container.interior_m", self.interior_m, f"in metres, up to {LARGEST_M:g} each")
         _positive("container.wall_m", self.wall_m)
 
 

@@ -51,7 +51,7 @@ def test_scalars(text: str, value: object) -> None:
         ("? [1, 2]\n: 3", "f:1:3", "key"),
         ("1: 2", "f:1:1", "key"),
         ("a: [1, 2\nb: 3", "f:2:", "not valid YAML"),
-        ("a:\n\t- 1", "f:2:1", "not valid YAML"),
+        ("a:\n\t- 1", "f:2:1", "not valid YAML: a tab; indent with blanks"),
         ("a: .nan", "f:1:4", "finite"),
         ("a: -.inf", "f:1:4", "finite"),
         ("a: 1e999", "f:1:4", "finite"),

@@ -192,3 +192,8 @@ def test_stand_ins_have_the_fields_asked_for(mission: Make, item: Any) -> None:
     assert stand_in(item).name == "x"
     with pytest.raises(Exception, match="one of its fields weight, name"):
         stand_in(item, wight=3.0)
+
+
+def test_a_setting_that_the_mission_does_not_have_is_a_slip_of_the_test(scripted: Any) -> None:
+    with pytest.raises(ScriptError, match=r"unknown setting 'targt'; did you mean 'target'\?"):
+        scripted("retrieve", {}, settings={"targt": "apple"})
