@@ -21,7 +21,7 @@ class StowParams(SkillParams):
 
     rise_speed_m_s: float = param("Speed of rising", unit="m/s", default=RISE_M_S, gt=0.0, le=0.15)
     speed_m_s: float = param("Speed with the probe in the hand", unit="m/s", default=0.10, gt=0.0, le=0.15)
-    insert_speed_m_s: float = param("Speed into the holder", unit="m/s", default=0.03, gt=0.0, le=0.1)
+    insert_speed_m_s: float = param("Speed into the holder", unit="m/s", default=0.02, gt=0.0, le=0.1)
 
 
 class Stow(Skill):

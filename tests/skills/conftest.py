@@ -78,6 +78,7 @@ class BenchRobot(FakeRobot):
         world: Its container and probe.
         things: What the ball (at `tip_P_m`) touches.
         weight_N: Weight in the hand for a position (3,) of P in B and an aperture, m.
+        moment_S_Nm: (3,) felt always, of what hangs aside.
     """
 
     def __init__(
@@ -87,8 +88,10 @@ class BenchRobot(FakeRobot):
         weight_N: Callable[[Array, float], float] = lambda position, aperture: 0.0,
         tip_P_m: float = 0.13,
         grip_width_m: float | None = None,
+        moment_S_Nm: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> None:
         self.world, self.things, self.weight_N, self.tip_P_m = world, things, weight_N, tip_P_m
+        self.moment_S_Nm = np.asarray(moment_S_Nm)
         self.speed_rad_s = np.zeros(7)
         self.velocity_B: Array | None = None
         super().__init__(RIZON4_XENSE, wrench=self._all_felt, grip_width_m=grip_width_m)
@@ -116,7 +119,7 @@ class BenchRobot(FakeRobot):
         lever = self.description.gripper.pose_E_P.apply(tip_P)
         down_S = pose.rotation.T @ np.array([0.0, 0.0, -1.0])
         weight = np.array([self.weight_N(p, self._aperture) for p in position])[:, None] * down_S
-        force = np.hstack([contact + weight, np.cross(lever, contact)])
+        force = np.hstack([contact + weight, np.cross(lever, contact) + self.moment_S_Nm])
         return force + self._inertial(position, pose, float(stamp[-1] - stamp[0]))
 
     def _inertial(self, position: Array, pose: Pose, span_s: float) -> Array:

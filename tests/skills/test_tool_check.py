@@ -15,11 +15,12 @@ from skills.tool_check import ToolCheck
 def make(bench, tool, things):
     """The probe in the jaws over the container, weighed away by the tare."""
 
-    def make_one(lighter_N=0.0, jaws_m=0.016, floor_m=0.0, taken=tool, **params):
+    def make_one(lighter_N=0.0, jaws_m=0.016, floor_m=0.0, taken=tool, moment_S_Nm=(0.0, 0.0, 0.0), **params):
         b = bench(
             grip_width_m=jaws_m or None,
             weight_N=lambda position, aperture: -lighter_N,
             things=[] if floor_m is None else [things.floor(floor_m)],
+            moment_S_Nm=moment_S_Nm,
         )
         b.arm.scene.hold_tool(True)
         b.go(b.arm.joints(b.arm.kinematics.ik(taken.pose_B_P(b.world, np.array([0.02, 0.05, 0.06])), b.arm.q)))
@@ -89,3 +90,20 @@ def test_a_hand_that_put_it_away_need_not_look(make) -> None:
 
 def test_broken_off_anywhere(make, preempt_all_along) -> None:
     preempt_all_along(lambda: make(0.59), 4)
+
+
+@pytest.mark.parametrize(("tilt_deg", "held"), [(10.0, True), (20.0, False)])
+@pytest.mark.parametrize("about", [0.0, 1.0, 2.5])
+def test_turned_in_the_jaws(make, tilt_deg: float, held: bool, about: float) -> None:
+    """It weighs as before and fills the jaws; its centre of mass hangs aside. A spin about the hand's axis is none."""
+    probe = make()[0].world.probe
+    moment = 9.81 * probe.mass_kg * probe.com_below_grasp_m * np.sin(np.radians(tilt_deg))
+    b, skill = make(moment_S_Nm=(moment * np.cos(about), moment * np.sin(about), 0.1))
+    before = lowest_m(b)
+    b.run(skill)
+    assert skill.status is (Status.SUCCESS if held else Status.FAILURE)
+    assert b.arm.scene.holding_tool
+    assert lowest_m(b) == before, "a probe that hangs askew touches nothing"
+    if not held:
+        assert skill.reason.code == "tool_slipped"
+        assert skill.reason.evidence["moment_Nm"] == pytest.approx(moment, rel=1e-3)
