@@ -20,7 +20,7 @@ from glotouch_bt.mission.pausing import PauseGate
 from glotouch_bt.mission.reasons import Failure, ReasonBook, sensed
 from glotouch_bt.mission.resolution import Rounding
 from glotouch_bt.mission.tally import Record, Tally
-from glotouch_bt.mission.watchdog import STUCK_S, BrokenOff, SkillHung, Stuck, Watchdog, deferred_interrupt
+from glotouch_bt.mission.watchdog import STUCK_S, SkillHung, Stuck, Watchdog, deferred_interrupt
 from glotouch_bt.mission.world_check import WorldChanged
 from glotouch_bt.robot import HOLD, Command, GuardTripped, Observation, Robot, World
 from glotouch_bt.robot.supervision import Supervisor
@@ -148,7 +148,7 @@ def run_mission(
             except Preempted as e:
                 outcome.abort(e, loop.node_of(e))
                 loop.end(interrupted)
-    except (Exception, KeyboardInterrupt, SystemExit, BrokenOff) as e:
+    except BaseException as e:  # a skill may raise what is no Exception: SystemExit, a cancelled task, a panic
         error = watchdog.stuck.error() if watchdog.stuck is not None else e
         if isinstance(error, GuardTripped):
             supervisor.heed(error)
@@ -175,7 +175,7 @@ def _preempt(root: Behaviour) -> None:
     if root.status is Status.RUNNING:
         try:
             root.stop(Status.INVALID)
-        except (Exception, SystemExit, BrokenOff) as e:
+        except BaseException as e:
             root.feedback_message = f"could not be closed: {e}"
 
 
