@@ -10,6 +10,8 @@ from typer.testing import CliRunner
 
 from glotouch_bt.cli import app
 from glotouch_bt.faults.catalogue import CATALOGUE
+from glotouch_bt.mission.record import Recorder
+from glotouch_bt.robot import GlotouchError
 
 runner = CliRunner()
 
@@ -76,3 +78,21 @@ def test_what_cannot_be_tried_is_said_before_anything_runs(words: list[str], sai
     assert done.exit_code == 2
     assert said in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_a_disk_that_refuses_the_record_hides_no_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    close, closed = Recorder.close, []
+
+    def refused(self: Recorder, result: object = None) -> None:
+        close(self, None)
+        closed.append(self)
+        if len(closed) == 1:
+            raise GlotouchError("run.mcap: the record could not be finished (No space left on device)")
+
+    monkeypatch.setattr(Recorder, "close", refused)
+    out = tmp_path / "run"
+    ended = runner.invoke(app, ["run", "calibrate", "--backend", "fake", "--out", str(out)])
+    assert ended.exit_code == 3
+    assert "could not be finished (No space" in ended.stderr
+    reasons = json.loads((out / "result.json").read_text())["reasons"]
+    assert reasons[-1] in ended.stdout, "result.json was written for all that, and says the same"

@@ -64,7 +64,7 @@ def outlets() -> Iterator[Outlet]:
     """stdout (given) and stderr that never raise, while the block runs."""
     before = sys.stdout, sys.stderr
     out, err = Outlet(sys.stdout), Outlet(sys.stderr)
-    sys.stdout, sys.stderr = out, err  # type: ignore[assignment]
+    sys.stdout, sys.stderr = out, err
     try:
         yield out
     finally:

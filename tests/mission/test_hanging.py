@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import threading
 import time
 from asyncio import CancelledError
@@ -105,7 +107,7 @@ class Stubborn(Skill):
 @pytest.fixture(autouse=True)
 def _skills(registry: dict[str, type[Skill]]) -> Iterator[None]:
     mine = {"forever": Forever, "spins": Spins, "sleeps": Sleeps, "raises": Raises, "stubborn": Stubborn}
-    mine |= {"odd": Odd, "unmade": Unmade}
+    mine |= {"odd": Odd, "unmade": Unmade, "lingers": Lingers}
     registry.update(mine)
     yield
     for name in mine:
@@ -288,6 +290,18 @@ def test_a_body_that_gives_what_no_body_gives_is_not_taken_for_success(
     assert robot.held >= 1
 
 
+class Lingers(Skill):
+    """Waits in its end."""
+
+    def run(self) -> SkillRun:
+        try:
+            while True:
+                yield HOLD
+        finally:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(1000.0)
+
+
 class Unmade(Skill):
     """Cannot be made."""
 
@@ -299,6 +313,29 @@ def test_a_skill_that_cannot_be_made_is_named_before_anything_moves(go: Any, rob
     with pytest.raises(GlotouchError, match="skill 'unmade' cannot be made: KeyError: 'calibration'"):
         go("  - find\n  - unmade\n")
     assert robot.now_s == 0.0
+
+
+def test_impatient_ctrl_c_leaves_no_end_half_done(go: Any, robot: Any) -> None:
+    """The third comes while the arm is held, the fourth while the skill is closed, which may take for ever."""
+    cycle, hold = robot.cycle, robot.hold
+
+    def pressed(command: object) -> Any:
+        if round(robot.now_s, 6) == 0.1:
+            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), signal.SIGINT)
+        return cycle(command)
+
+    def held() -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        hold()
+
+    robot.cycle, robot.hold = pressed, held
+    before, began = signal.getsignal(signal.SIGINT), time.monotonic()
+    outcome = go("  - lingers\n")
+    assert outcome.chain[-1].reason.code == "interrupted"
+    assert robot.held >= 1
+    assert time.monotonic() - began < 20.0
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_failures_keep_their_kind(go: Any, monkeypatch: pytest.MonkeyPatch) -> None:
