@@ -31,7 +31,7 @@ from glotouch_bt.robot import Backend, BadInput, Conditions, GlotouchError, Robo
 from glotouch_bt.robot.referee import Referee, TrueObject
 from glotouch_bt.study.going_on import GoingOn, describe_run
 from glotouch_bt.study.result import description, installed_versions, mission_yaml, score, truth
-from glotouch_bt.study.run_folder import RunFolder
+from glotouch_bt.study.run_folder import RunFolder, claimed
 from glotouch_bt.study.run_request import RunRequest, RunResult
 
 LARGEST_SEED = 2**32 - 1
@@ -72,7 +72,7 @@ def launch(
     backend = load_backend(request.backend)
     options = split_settings(mission, request.settings)
     folder = RunFolder(request.out) if request.out else RunFolder.named(mission.name, request.seed)
-    with folder.claimed():
+    with claimed(folder.path):
         try:
             if (
                 plan is not None
@@ -153,7 +153,12 @@ def _record(run: _Run) -> tuple[Recorder, CheckpointFile, Keeper]:
         return recorder, file, Keeper(file, recorder)
     part = folder.path / ".run.mcap.part"
     recorder = Recorder(part, told_first)
-    going_on.begin(part, recorder, run.taken_up is not None and run.taken_up.same_world)
+    try:
+        going_on.begin(part, recorder, run.taken_up is not None and run.taken_up.same_world)
+    except BaseException:
+        recorder.close()
+        part.unlink(missing_ok=True)
+        raise
     return recorder, going_on.file, Keeper(going_on.file, recorder, going_on.row.number + 1)
 
 
