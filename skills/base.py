@@ -311,7 +311,7 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
 
     def run(self) -> SkillRun:
         """The skill's body; see the module's text."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} has no run()")
 
     def write_port(self, name: str, value: object) -> None:
         """Write an output port (the public door to py_trees' protected setter)."""
@@ -341,7 +341,10 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
     def _body(self) -> SkillRun:
         if self.context.preempted:
             yield from come_to_rest(self.context)
-        yield from self.run()
+        body: Generator[Command, Observation, object] = self.run()
+        returned = yield from body
+        if returned is not None:  # a status, most likely: it would pass as success
+            raise TypeError(f"run() returned {returned!r}; it returns nothing, and raises SkillFailed to fail")
 
     def update(self) -> Status:
         """Hand the newest observation to the body, take its next command."""
@@ -350,16 +353,19 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
             return self._too_long()
         try:
             if self._started:
-                self.context.command = self._run.send(self.context.observation)
+                command = self._run.send(self.context.observation)
             else:
                 self._started = True
-                self.context.command = next(self._run)
+                command = next(self._run)
         except StopIteration:
             return Status.SUCCESS
         except SkillFailed as e:
             return self._fail(e.reason)
         except MotionRefused as e:
             return self._fail(Reason("motion_refused", str(e), advice="move the target or clear the way"))
+        if not isinstance(command, Command):
+            raise TypeError(f"run() yielded {command!r}; it yields a Command, such as HOLD")
+        self.context.command = command
         return Status.RUNNING
 
     def _too_long(self) -> Status:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import re
 import signal
 import subprocess
@@ -280,3 +281,36 @@ def test_ctrl_c_closes_the_record_and_exits_130(house: ModuleType, tmp_path: Pat
     record = read_run(tmp_path / "o")
     assert record.complete
     assert record.result["status"] == "aborted"
+
+
+def _of_fake_run(out: Path, redirected: str) -> int:
+    words = f"run calibrate --backend fake --out {out}"
+    code = f"import sys; sys.argv = ['glotouch', *{words.split()!r}]; from glotouch_bt.cli import main; main()"
+    shell = f'"{sys.executable}" -c "{code}" {redirected}; echo $? > "{out}.code"'
+    subprocess.run(["bash", "-c", shell], check=False, capture_output=True, timeout=120)
+    return int(Path(f"{out}.code").read_text())
+
+
+@pytest.mark.parametrize("redirected", ["2> >(true)", "> >(true)", "2> /dev/full", "<&- >&- 2>&-"])
+def test_a_reader_that_has_gone_takes_no_mission_with_it(tmp_path: Path, redirected: str) -> None:
+    plain, cut = tmp_path / "plain", tmp_path / "cut"
+    assert _of_fake_run(cut, redirected) == _of_fake_run(plain, "") == 1
+    results = [json.loads((run / "result.json").read_text()) for run in (plain, cut)]
+    assert results[0]["reasons"] == results[1]["reasons"] != []
+
+
+def test_a_result_that_stdout_cannot_take_is_no_success() -> None:
+    code = "import sys; sys.argv = ['glotouch', 'faults', '--json']; from glotouch_bt.cli import main; main()"
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([sys.executable, "-c", code], stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+    assert done.returncode == 3
+    assert done.stderr == "glotouch: stdout could not be written (No space left on device)\n"
+
+
+def test_a_terminal_of_few_letters_is_written_to(tmp_path: Path) -> None:
+    code = "import sys; sys.argv = ['glotouch', 'tree', 'calibrate']; from glotouch_bt.cli import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, "PYTHONIOENCODING": "ascii"}, capture_output=True, timeout=60
+    )
+    assert done.returncode == 0
+    assert b"tool_pickup" in done.stdout

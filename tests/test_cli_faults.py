@@ -10,6 +10,8 @@ from typer.testing import CliRunner
 
 from glotouch_bt.cli import app
 from glotouch_bt.faults.catalogue import CATALOGUE
+from glotouch_bt.mission.record import Recorder
+from glotouch_bt.robot import GlotouchError
 
 runner = CliRunner()
 
@@ -76,3 +78,36 @@ def test_what_cannot_be_tried_is_said_before_anything_runs(words: list[str], sai
     assert done.exit_code == 2
     assert said in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_a_disk_that_refuses_the_record_hides_no_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    close, closed = Recorder.close, []
+
+    def refused(self: Recorder, result: object = None) -> None:
+        close(self, None)
+        closed.append(self)
+        if len(closed) == 1:
+            raise GlotouchError("run.mcap: the record could not be finished (No space left on device)")
+
+    monkeypatch.setattr(Recorder, "close", refused)
+    out = tmp_path / "run"
+    ended = runner.invoke(app, ["run", "calibrate", "--backend", "fake", "--out", str(out)])
+    assert ended.exit_code == 3
+    assert "could not be finished (No space" in ended.stderr
+    reasons = json.loads((out / "result.json").read_text())["reasons"]
+    assert reasons[-1] in ended.stdout, "result.json was written for all that, and says the same"
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("{fault: wrench_bias, with: {force_N: [1, 0, 0]}}", "fault wrench_bias: began 1 times"),
+        ("{fault: wrench_bias, when: {time_s: 9999}}", "ALTERED NOTHING: its moment never came"),
+        ("{fault: touch_dead, when: {time_s: 0.1}}", "ALTERED NOTHING: it began, and found nothing to alter"),
+    ],
+)
+def test_the_terminal_says_whether_a_fault_did_anything(tmp_path: Path, fault: str, words: str) -> None:
+    file = tmp_path / "plan.yaml"
+    file.write_text(f"faults: f\nplan:\n  - {fault}\n")
+    told = ["run", "calibrate", "--backend", "fake", "--faults", str(file), "--out", str(tmp_path / "run")]
+    assert words in runner.invoke(app, told).stdout

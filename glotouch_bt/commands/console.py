@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -100,10 +100,24 @@ def print_result(done: RunResult) -> None:
         console.print(f"{'  ' * i}{'because ' if i else ''}{reason}", markup=False, highlight=False, soft_wrap=True)
     if r.get("ending"):
         console.print(str(r["ending"]), markup=False, highlight=False, soft_wrap=True)
+    for fault in r.get("faults", ()):
+        console.print(_fault_in_words(fault), markup=False, highlight=False, soft_wrap=True)
     if done.report is not None:
         console.print(f"report: {done.report}", markup=False, highlight=False, soft_wrap=True)
     else:
         console.print(f"record: {done.folder}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _fault_in_words(fault: Mapping[str, Any]) -> str:
+    """What became of a fault of the plan; one that altered nothing has tested nothing."""
+    if not fault["effective"]:
+        why = "it began, and found nothing to alter" if fault["applied"] else "its moment never came"
+        return f"fault {fault['name']}: ALTERED NOTHING: {why}; this run says nothing about it"
+    seen = fault["seen"]
+    told = (
+        "nobody saw it" if seen is None else f"seen by {seen['by']} ({seen['code']}) after {fault['latency_s']:.2f} s"
+    )
+    return f"fault {fault['name']}: began {fault['applied']} times, {told}"
 
 
 def print_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

@@ -25,6 +25,8 @@ def tell_end(done: RunResult, json_: bool) -> int:
         sys.stdout.write(json.dumps({**done.result, "folder": str(done.folder)}, indent=2, allow_nan=False) + "\n")
     else:
         console.print_result(done)
+    for refused in done.unwritten:
+        console.print_error(refused)
     if done.warning:
         console.print_error(done.warning)
     if done.outcome.error is not None:

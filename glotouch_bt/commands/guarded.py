@@ -13,6 +13,8 @@ from typing import ParamSpec
 
 import typer
 
+from glotouch_bt.commands.outlet import outlets
+
 P = ParamSpec("P")
 _debug: list[bool] = []
 
@@ -34,21 +36,23 @@ def guarded(command: Callable[P, int | None]) -> Callable[P, None]:
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
         from glotouch_bt.robot import BadInput, GlotouchError, MissionFailed
 
-        try:
-            code = command(*args, **kwargs) or 0
-        except KeyboardInterrupt:
-            code = _fail(130, "interrupted")
-        except BrokenPipeError:
-            sys.stderr.close()
-            code = 0
-        except BadInput as e:
-            code = _fail(2, str(e))
-        except MissionFailed as e:
-            code = _fail(1, str(e))
-        except GlotouchError as e:
-            code = _fail(3, str(e))
-        except Exception as e:
-            code = _fail(3, f"internal error: {type(e).__name__}: {e} (--debug shows where)")
+        with outlets() as stdout:
+            try:
+                code = command(*args, **kwargs) or 0
+            except KeyboardInterrupt:
+                code = _fail(130, "interrupted")
+            except BadInput as e:
+                code = _fail(2, str(e))
+            except MissionFailed as e:
+                code = _fail(1, str(e))
+            except GlotouchError as e:
+                code = _fail(3, str(e))
+            except Exception as e:
+                code = _fail(3, f"internal error: {type(e).__name__}: {e} (--debug shows where)")
+            stdout.flush()
+            if stdout.lost is not None:
+                refused = _fail(3, f"stdout could not be written ({stdout.lost.strerror})")
+                code = code or refused
         if code:
             raise typer.Exit(code)
 

@@ -1,6 +1,7 @@
 """The operator of a running mission: signals and keys become calls of its `Control`.
 
-SIGUSR1 pauses and goes on; SIGTERM ends the mission safely, a second one at once; `p` on a terminal is SIGUSR1.
+SIGUSR1 pauses and goes on; SIGTERM ends the mission safely, a second one at once; so does SIGHUP, when its terminal is
+closed; `p` on a terminal is SIGUSR1.
 """
 
 from __future__ import annotations
@@ -11,13 +12,15 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from glotouch_bt.mission.control import Control
 
 LOOK_EVERY_S = 0.1
 LONGEST_REST_S = 0.1
 PAUSE_KEYS = frozenset("pP ")
+LFLAG = 3
+"""Of what `termios.tcgetattr` gives."""
 
 
 class Operator(Control):
@@ -42,13 +45,17 @@ def _signals(control: Control) -> Iterator[None]:
         return
 
     def end(number: int, frame: object) -> None:
-        if control.stopped is not None:
-            raise KeyboardInterrupt
-        control.stop("asked to end (SIGTERM)")
+        if control.stopped is None:
+            control.stop("asked to end (SIGTERM)")
+        else:  # at once: as Ctrl-C twice, for whoever listens to that now
+            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
 
     handlers = {signal.SIGTERM: end}
     if hasattr(signal, "SIGUSR1"):
         handlers[signal.SIGUSR1] = lambda number, frame: control.toggle()
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
+        handlers[signal.SIGHUP] = lambda number, frame: control.stop("asked to end (SIGHUP: its terminal was closed)")
     before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
     try:
         yield
@@ -67,15 +74,24 @@ def _keys(control: Control) -> Iterator[None]:
         yield
         return
     stdin = sys.stdin.fileno() if sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty() else -1
-    if stdin < 0 or os.tcgetpgrp(stdin) != os.getpgrp():  # in the background reading would stop the process
+    if stdin < 0:
         yield
         return
     over = threading.Event()
 
+    def ours() -> bool:
+        """In the background, whoever reads the terminal or sets it is stopped, with the mission."""
+        return os.tcgetpgrp(stdin) == os.getpgrp()
+
     def listen() -> None:
         while not over.is_set():
+            if not ours():
+                over.wait(LOOK_EVERY_S)
+                continue
+            if termios.tcgetattr(stdin)[LFLAG] & termios.ICANON:  # at first, and after the shell had it (Ctrl-Z, fg)
+                tty.setcbreak(stdin, termios.TCSANOW)  # Ctrl-C is still a signal
             ready, _, _ = select.select([stdin], [], [], LOOK_EVERY_S)
-            if not ready:
+            if not ready or not ours():
                 continue
             typed = os.read(stdin, 64).decode(errors="ignore")
             if not typed:
@@ -83,13 +99,18 @@ def _keys(control: Control) -> Iterator[None]:
             if sum(c in PAUSE_KEYS for c in typed) % 2:
                 control.toggle()
 
+    def listen_while_there_is_a_terminal() -> None:
+        with suppress(OSError, termios.error):  # it was hung up: SIGHUP says so, too
+            listen()
+
     before = termios.tcgetattr(stdin)
-    thread = threading.Thread(target=listen, name="keys", daemon=True)
+    thread = threading.Thread(target=listen_while_there_is_a_terminal, name="keys", daemon=True)
+    thread.start()
     try:
-        tty.setcbreak(stdin, termios.TCSANOW)  # Ctrl-C is still a signal
-        thread.start()
         yield
     finally:
         over.set()
         thread.join()
-        termios.tcsetattr(stdin, termios.TCSANOW, before)
+        with suppress(OSError, termios.error):
+            if ours():
+                termios.tcsetattr(stdin, termios.TCSANOW, before)

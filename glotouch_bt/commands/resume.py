@@ -35,7 +35,10 @@ def resume(
         _list(folder, json_)
         return 0
 
+    told: list[str] = []
+
     def tell(found: GoingOn) -> None:
+        told.extend(found.notes)
         if json_:
             return
         row = found.row
@@ -55,6 +58,9 @@ def resume(
             on_progress=progress.update,
             control=control,
         )
+    for note in done.result["resumed"][-1]["notes"] if not json_ else ():
+        if note not in told:  # it was found out when the record was taken up
+            sys.stderr.write(f"note: {note}\n")
     return tell_end(done, json_)
 
 

@@ -20,10 +20,16 @@ def mission_tests(
     mission: Annotated[str, typer.Argument(metavar="MISSION", help="path of a mission file, or a shipped name")],
     tests: Annotated[list[str] | None, typer.Argument(metavar="TESTS...", help="test files or folders")] = None,
     least: Annotated[
-        float | None, typer.Option("--min", metavar="PERCENT", help="fail if the tests notice fewer of the mutants")
+        float | None,
+        typer.Option(
+            "--min", min=0.0, max=100.0, metavar="PERCENT", help="fail if the tests notice fewer of the mutants"
+        ),
     ] = None,
     coverage: Annotated[
-        float | None, typer.Option("--coverage-min", metavar="PERCENT", help="fail if fewer outcomes are exercised")
+        float | None,
+        typer.Option(
+            "--coverage-min", min=0.0, max=100.0, metavar="PERCENT", help="fail if fewer outcomes are exercised"
+        ),
     ] = None,
 ) -> int:
     """Run a mission's tests, say which outcomes they exercise, and which slips in the mission none of them notices."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from glotouch_bt.faults.effect import Cycle, Effect, FaultParams, Scene, param
-from glotouch_bt.robot import HOLD, BackendError, Command, MotionRefused, Observation, ParamError
+from glotouch_bt.robot import HOLD, BackendError, BadInput, Command, MotionRefused, Observation, ParamError
 
 
 class FollowingParams(FaultParams):
@@ -27,7 +27,9 @@ class FollowingError(Effect):
 
     def __init__(self, params: Any, scene: Scene) -> None:
         super().__init__(params, scene)
-        self._joint = min(params.joint, scene.description.dof - 1)
+        if params.joint >= scene.description.dof:
+            raise BadInput(f"joint {params.joint}: this arm has joints 0 to {scene.description.dof - 1}")
+        self._joint = params.joint
         joint = scene.description.joints[self._joint]
         self._range = joint.lower_rad, joint.upper_rad
 

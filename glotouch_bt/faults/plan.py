@@ -26,6 +26,7 @@ from glotouch_bt.mission.findings import Findings, MissionFaults
 from glotouch_bt.mission.library import find_shipped, shown
 from glotouch_bt.mission.nodes import NodeSpec
 from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, read_yaml
+from glotouch_bt.mission.units import split_quantity
 
 PLAN_KEYS = ("faults", "description", "seed", "plan")
 FAULT_KEYS = ("fault", "name", "with", "when", "for", "repeat")
@@ -170,6 +171,11 @@ def _fault(source: Node, taken: set[str], findings: Findings) -> FaultSpec | Non
     when = _model(When, source, "when", "'when'", findings)
     lasting = _lasting(source, when, findings)
     repeat = _model(Repeat, source, "repeat", "'repeat'", findings)
+    if when is not None:
+        _check_when(source, when, findings)
+    if lasting is not None and repeat is not None and lasting.until == "ever" and repeat.times > 1:
+        what = "repeat: what lasts for ever does not begin again"
+        findings.add(source.key_place("repeat"), "wrong_value", what, valid="for: 2 s, {cycles: 20} or node")
     if kind is None or params is None or when is None or lasting is None or repeat is None:
         return None
     base = _text(source, "name", findings) or word
@@ -180,6 +186,21 @@ def _fault(source: Node, taken: set[str], findings: Findings) -> FaultSpec | Non
     moment = source.get("when")
     node = moment.get("node") if isinstance(moment, Map) else None
     return FaultSpec(name, kind, params, when, lasting, repeat, source.place, node.place if node else None)
+
+
+def _check_when(source: Map, when: When, findings: Findings) -> None:
+    """What can never hold, and what would not be looked at."""
+    given = source.get("when")
+    at = given if isinstance(given, Map) else source
+    for sensed, unit in (("force", "N"), ("aperture", "m")):
+        above, below = (getattr(when, f"{sensed}_{side}_{unit}") for side in ("above", "below"))
+        if above is not None and below is not None and above >= below:
+            what = f"when: no {sensed} is above {above:g} {unit} and below {below:g} {unit}"
+            findings.add(at.key_place(f"{sensed}_below_{unit}"), "wrong_value", what)
+    for key in ("visit", "after_s"):
+        if when.node is None and key in when.model_fields_set:
+            what = f"when: {key} is of a node, and 'when' names none"
+            findings.add(at.key_place(key), "wrong_value", what, valid="add node: NAME; time_s is the mission's time")
 
 
 def _model(model: type[M], source: Map, key: str, what: str, findings: Findings) -> M | None:
@@ -206,7 +227,7 @@ def _lasting(source: Map, when: When | None, findings: Findings) -> Lasting | No
             return None
     elif isinstance(node, Scalar) and node.value in ("ever", "node"):
         made = Lasting(until="node" if node.value == "node" else "ever")
-    elif isinstance(node, Scalar) and isinstance(node.value, (int, float, str)) and not isinstance(node.value, bool):
+    elif isinstance(node, Scalar) and (_is_number(node.value) or split_quantity(str(node.value))):
         key = Scalar("duration_s", node.place)
         made = validate(Lasting, Map(((key, node),), node.place), "'for'", findings)
     else:
@@ -216,6 +237,10 @@ def _lasting(source: Map, when: When | None, findings: Findings) -> Lasting | No
         findings.add(node.place, "wrong_value", "for: node, but 'when' names no node", valid="add when: {node: ...}")
         return None
     return made
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def _check_nodes(plan: FaultPlan, tree: NodeSpec, root: str, findings: Findings) -> None:

@@ -159,7 +159,10 @@ class _Builder:
     def _skill(self, spec: NodeSpec, children: list[Behaviour]) -> Behaviour:
         assert spec.skill_type is not None
         assert spec.params is not None
-        skill = spec.skill_type(spec.name, spec.params, self._context)
+        try:
+            skill = spec.skill_type(spec.name, spec.params, self._context)
+        except Exception as e:
+            raise GlotouchError(f"skill {spec.name!r} cannot be made: {type(e).__name__}: {e}") from e
         wiring = {p: f"{self._namespace}/{w.key}" for p, w in (*spec.reads.items(), *spec.writes.items())}
         skill.setup_ports(wiring)
         for port, value in spec.constants.items():

@@ -118,8 +118,8 @@ class CheckpointFile:
             return {k: json.loads(v) for k, v in self._db.execute("SELECT key, value FROM run")}
 
     def note(self, key: str, value: object) -> None:
-        """Set one item of `run`."""
-        with self._errors(), self._db:
+        """Set one item of `run`; errors as in `add`."""
+        with self._writing():
             self._db.execute("INSERT OR REPLACE INTO run VALUES (?, ?)", (key, json.dumps(value)))
 
     def add(self, row: Row, state: bytes, world: bytes | None) -> None:
@@ -133,11 +133,8 @@ class CheckpointFile:
             *(row.number, row.stamp_s, row.node, row.status, json.dumps(row.begun), json.dumps(dict(row.lacking))),
             *(row.record_bytes, pack(state), None if world is None else pack(world)),
         )
-        try:
-            with self._db:
-                self._db.execute("INSERT INTO checkpoint VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", values)
-        except sqlite3.Error as e:
-            raise GlotouchError(f"{self.path}: cannot be written ({e})") from e
+        with self._writing():
+            self._db.execute("INSERT INTO checkpoint VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", values)
 
     def rows(self) -> list[Row]:
         """All checkpoints, oldest first."""
@@ -167,8 +164,8 @@ class CheckpointFile:
         return found
 
     def drop_after(self, number: int) -> None:
-        """Forget every later checkpoint."""
-        with self._errors(), self._db:
+        """Forget every later checkpoint; errors as in `add`."""
+        with self._writing():
             self._db.execute("DELETE FROM checkpoint WHERE number > ?", (number,))
 
     def copy_to(self, path: Path) -> None:
@@ -193,6 +190,15 @@ class CheckpointFile:
                 raise BadInput(f"{self.path}: checkpoint {number} is damaged ({e})") from e
             except BadInput as e:
                 raise BadInput(f"{self.path}: checkpoint {number}: {e}") from e
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """One transaction."""
+        try:
+            with self._db:
+                yield
+        except sqlite3.Error as e:
+            raise GlotouchError(f"{self.path}: cannot be written ({e})") from e
 
     @contextmanager
     def _errors(self) -> Iterator[None]:

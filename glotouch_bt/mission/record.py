@@ -9,6 +9,7 @@ Times are the robot's clock (log time = publish time); no wall clock enters, so 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -145,11 +146,13 @@ class Recorder:
                 kept = {k: v for k, v in result.items() if not k.startswith("wall_")}
                 self._writer.add_attachment(0, 0, RESULT_ATTACHMENT, "application/json", dumps(kept))
             self._writer.finish()
+            self._file.flush()
         except OSError as e:
             raise GlotouchError(f"{self.path}: the record could not be finished ({e.strerror})") from e
         finally:
             self._closed = True
-            self._file.close()
+            with suppress(OSError):  # what it still holds was refused before
+                self._file.close()
 
     def __enter__(self) -> Self:
         return self

@@ -20,7 +20,7 @@ from glotouch_bt.mission.pausing import PauseGate
 from glotouch_bt.mission.reasons import Failure, ReasonBook, sensed
 from glotouch_bt.mission.resolution import Rounding
 from glotouch_bt.mission.tally import Record, Tally
-from glotouch_bt.mission.watchdog import STUCK_S, BrokenOff, SkillHung, Stuck, Watchdog, deferred_interrupt
+from glotouch_bt.mission.watchdog import STUCK_S, SkillHung, Stuck, Watchdog, deferred_interrupt
 from glotouch_bt.mission.world_check import WorldChanged
 from glotouch_bt.robot import HOLD, Command, GuardTripped, Observation, Robot, World
 from glotouch_bt.robot.supervision import Supervisor
@@ -141,27 +141,32 @@ def run_mission(
             on_lost(stuck, outcome)
 
     watchdog = loop.watchdog = Watchdog(robot, lambda: tally.node or mission.name, stuck_s, lost)
-    try:
-        with deferred_interrupt(watchdog) as interrupted, watchdog:
-            try:
-                loop.run(mission.timeout_s if timeout_s is None else timeout_s, interrupted)
-            except Preempted as e:
-                outcome.abort(e, loop.node_of(e))
-                loop.end(interrupted)
-    except (Exception, KeyboardInterrupt, SystemExit, BrokenOff) as e:
-        error = watchdog.stuck.error() if watchdog.stuck is not None else e
-        if isinstance(error, GuardTripped):
-            supervisor.heed(error)
-        outcome.abort(error, error.node if isinstance(error, SkillHung) else loop.node_of(e))
-        if isinstance(error, SkillHung):
-            tally.event("stuck", context.observation.now_s, {"node": error.node, "stack": error.stack})
-    finally:
-        robot.hold()
-        outcome.end_s, outcome.paused_s = context.observation.now_s, context.paused_s
-        outcome.guards = dict(supervisor.counts)
-        _preempt(tree.root)
-        tally.settle()
-        tree.forget()
+    with deferred_interrupt(watchdog) as interrupted:
+        try:
+            with watchdog:
+                try:
+                    loop.run(mission.timeout_s if timeout_s is None else timeout_s, interrupted)
+                except Preempted as e:
+                    outcome.abort(e, loop.node_of(e))
+                    loop.end(interrupted)
+        except BaseException as e:  # a skill may raise what is no Exception: SystemExit, a cancelled task, a panic
+            interrupted.raising = False
+            error = watchdog.stuck.error() if watchdog.stuck is not None else e
+            if isinstance(error, GuardTripped):
+                supervisor.heed(error)
+            outcome.abort(error, error.node if isinstance(error, SkillHung) else loop.node_of(e))
+            if isinstance(error, SkillHung):
+                tally.event("stuck", context.observation.now_s, {"node": error.node, "stack": error.stack})
+        finally:
+            interrupted.raising = False
+            robot.hold()
+            outcome.end_s, outcome.paused_s = context.observation.now_s, context.paused_s
+            outcome.guards = dict(supervisor.counts)
+            interrupted.raising = True  # what a skill does when it is closed may take for ever
+            _preempt(tree.root)
+            interrupted.raising = False
+            tally.settle()
+            tree.forget()
     return outcome
 
 
@@ -175,7 +180,7 @@ def _preempt(root: Behaviour) -> None:
     if root.status is Status.RUNNING:
         try:
             root.stop(Status.INVALID)
-        except (Exception, SystemExit, BrokenOff) as e:
+        except BaseException as e:
             root.feedback_message = f"could not be closed: {e}"
 
 

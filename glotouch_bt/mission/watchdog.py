@@ -91,6 +91,11 @@ class Watchdog:
         self._thread = threading.Thread(target=self._watch, name="watchdog", daemon=True)
         self.stuck: Stuck | None = None
 
+    @property
+    def breaking_off(self) -> bool:
+        """It has seen a stuck tick, and watches still."""
+        return self.stuck is not None and not self._over.is_set()
+
     def beat(self) -> None:
         """The watched thread is alive."""
         self._beat_s = time.monotonic()
@@ -136,26 +141,42 @@ class Watchdog:
             ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(self._watched), ctypes.py_object(BrokenOff))
 
 
+class Interrupts:
+    """Whether Ctrl-C was pressed.
+
+    Attributes:
+        pressed: It was.
+        raising: A second one raises at once. False while nothing may be left half done.
+    """
+
+    def __init__(self, raising: bool = True) -> None:
+        self.pressed, self.raising = False, raising
+
+    def __call__(self) -> bool:
+        """It was pressed."""
+        return self.pressed
+
+
 @contextmanager
-def deferred_interrupt(watchdog: Watchdog | None = None) -> Iterator[Callable[[], bool]]:
-    """Ctrl-C sets a flag, so that it takes effect between two cycles; a second Ctrl-C raises at once.
+def deferred_interrupt(watchdog: Watchdog | None = None, *, raising: bool = True) -> Iterator[Interrupts]:
+    """Ctrl-C sets a flag, so that it takes effect between two cycles; a second Ctrl-C raises at once (`raising`).
 
     The same signal is what a watchdog breaks a stuck tick off with.
     """
-    pressed: list[bool] = []
+    interrupts = Interrupts(raising)
     if threading.current_thread() is not threading.main_thread():
-        yield lambda: False
+        yield interrupts
         return
 
     def handler(number: int, frame: object) -> None:
-        if watchdog is not None and watchdog.stuck is not None:
+        if watchdog is not None and watchdog.breaking_off:
             raise BrokenOff
-        if pressed:
+        if interrupts.pressed and interrupts.raising:
             raise KeyboardInterrupt
-        pressed.append(True)
+        interrupts.pressed = True
 
     before = signal.signal(signal.SIGINT, handler)
     try:
-        yield lambda: bool(pressed)
+        yield interrupts
     finally:
         signal.signal(signal.SIGINT, before)

@@ -147,7 +147,8 @@ def read_run(path: Path) -> RunRecord:
         record.complete = False  # a cut or damaged tail: what came before it stands
     record.samples, record.cycles, record.tactile = (join(packed[n]) for n in ("samples", "cycles", "tactile"))
     folder = file.parent
-    record.result = _json_file(folder / RESULT_NAME) or record.result
+    result = _json_file(folder / RESULT_NAME)
+    record.result = result if isinstance(result, dict) and result else record.result
     record.truth = _json_file(folder / TRUTH_NAME)
     return record
 

@@ -18,7 +18,7 @@ from glotouch_bt.mission.nodes import NodeSpec
 from glotouch_bt.mission.record import Recorder
 from glotouch_bt.mission.record_reading import read_chunks
 from glotouch_bt.mission.worlds import load_conditions
-from glotouch_bt.robot import BadInput, Conditions, UnknownName
+from glotouch_bt.robot import BadInput, Conditions, GlotouchError, UnknownName
 from glotouch_bt.study.run_folder import FILES
 
 EARLIER = "earlier"
@@ -70,6 +70,9 @@ class GoingOn:
         """The record goes on from the checkpoint, in `part`; what it replaces moves to `earlier`.
 
         On another world the clock is another one, too: the record begins anew.
+
+        Raises:
+            GlotouchError: The disk refused.
         """
         record = self.folder / "run.mcap"
         try:
@@ -81,10 +84,13 @@ class GoingOn:
             recorder.go_on_from(chunks, self.file.state(self.row.number)["record"])
         except BadInput as e:
             self.notes.append(f"the record does not hold what was before the checkpoint: {e}")
-        kept = self._put_by()
-        if record.is_file():
-            _link(record, kept / "run.mcap")
-        part.replace(record)
+        try:
+            kept = self._put_by()
+            if record.is_file():
+                _link(record, kept / "run.mcap")
+            part.replace(record)
+        except OSError as e:
+            raise GlotouchError(f"{self.folder}: what is there cannot be moved to '{EARLIER}' ({e.strerror})") from e
         self.file.drop_after(self.row.number)
         self.file.note("resumed", [*self.before, self.told()])
         self.file.note("ended", None)

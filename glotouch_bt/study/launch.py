@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,13 +25,13 @@ from glotouch_bt.mission.load import Mission, load_mission, split_settings
 from glotouch_bt.mission.record import Recorder
 from glotouch_bt.mission.runner import Outcome, run_mission
 from glotouch_bt.mission.tally import Record, Tally
-from glotouch_bt.mission.watchdog import Stuck
+from glotouch_bt.mission.watchdog import Stuck, deferred_interrupt
 from glotouch_bt.mission.worlds import load_conditions
-from glotouch_bt.robot import Backend, BadInput, Conditions, Robot, load_backend
+from glotouch_bt.robot import Backend, BadInput, Conditions, GlotouchError, Robot, load_backend
 from glotouch_bt.robot.referee import Referee, TrueObject
 from glotouch_bt.study.going_on import GoingOn, describe_run
 from glotouch_bt.study.result import description, installed_versions, mission_yaml, score, truth
-from glotouch_bt.study.run_folder import RunFolder
+from glotouch_bt.study.run_folder import RunFolder, claimed
 from glotouch_bt.study.run_request import RunRequest, RunResult
 
 LARGEST_SEED = 2**32 - 1
@@ -72,7 +72,7 @@ def launch(
     backend = load_backend(request.backend)
     options = split_settings(mission, request.settings)
     folder = RunFolder(request.out) if request.out else RunFolder.named(mission.name, request.seed)
-    with folder.claimed():
+    with claimed(folder.path):
         try:
             if (
                 plan is not None
@@ -153,7 +153,12 @@ def _record(run: _Run) -> tuple[Recorder, CheckpointFile, Keeper]:
         return recorder, file, Keeper(file, recorder)
     part = folder.path / ".run.mcap.part"
     recorder = Recorder(part, told_first)
-    going_on.begin(part, recorder, run.taken_up is not None and run.taken_up.same_world)
+    try:
+        going_on.begin(part, recorder, run.taken_up is not None and run.taken_up.same_world)
+    except BaseException:
+        recorder.close()
+        part.unlink(missing_ok=True)
+        raise
     return recorder, going_on.file, Keeper(going_on.file, recorder, going_on.row.number + 1)
 
 
@@ -165,37 +170,37 @@ def _run(run: _Run, on_progress: Callable[[float, Tally], None] | None, control:
     recorder, checkpoints, keeper = _record(run)
     injector = injector_in(robot)
     record: Record = recorder if injector is None else ListeningRecord(recorder, injector)
-    result: dict[str, Any] | None = None
 
     def lost(stuck: Stuck, outcome: Outcome) -> None:
         """The main thread is lost in a skill: write what is known, and end. It writes nothing itself any more."""
-        record.event("stuck", outcome.end_s, {"node": stuck.node, "stack": stuck.stack})
-        told = score(request, mission, outcome, None) | {"wall_time_s": round(time.perf_counter() - ready, 3)}
-        recorder.close(told)
-        folder.write_json("result.json", told)
-        sys.stderr.write(f"glotouch: {outcome.reasons[-1]}\n{stuck.stack}")
-        sys.stderr.flush()
-        os._exit(3)
-
-    with closing(checkpoints):
         try:
-            try:
-                outcome = run_mission(
-                    mission,
-                    robot,
-                    record,
-                    on_progress=on_progress,
-                    control=control,
-                    on_lost=lost,
-                    keeper=keeper,
-                    taken_up=run.taken_up,
-                )
-            except BaseException:  # it raises only before the first tick
-                recorder.close()
-                if run.going_on is None:
-                    folder.clear()
-                    folder.abandon()
-                raise
+            record.event("stuck", outcome.end_s, {"node": stuck.node, "stack": stuck.stack})
+            told = score(request, mission, outcome, None) | {"wall_time_s": round(time.perf_counter() - ready, 3)}
+            _write_end(recorder, folder, told)
+            sys.stderr.write(f"glotouch: {outcome.reasons[-1]}\n{stuck.stack}")
+            sys.stderr.flush()
+        finally:
+            os._exit(3)
+
+    with closing(checkpoints), closing(recorder):
+        try:
+            outcome = run_mission(
+                mission,
+                robot,
+                record,
+                on_progress=on_progress,
+                control=control,
+                on_lost=lost,
+                keeper=keeper,
+                taken_up=run.taken_up,
+            )
+        except BaseException:  # it raises only before the first tick
+            recorder.close()
+            if run.going_on is None:
+                folder.clear()
+                folder.abandon()
+            raise
+        with deferred_interrupt(raising=False):  # it takes a moment, and is what the run was for
             ended = time.perf_counter()
             result = score(request, mission, outcome, referee)
             result |= {"wall_time_s": round(ended - ready, 3), "wall_open_s": round(ready - run.began, 3)}
@@ -205,15 +210,29 @@ def _run(run: _Run, on_progress: Callable[[float, Tally], None] | None, control:
                 root = outcome.chain[-1].as_dict() if outcome.chain else {"code": "", "message": ""}
                 injector.conclude(outcome.status, str(root["code"]), str(root["message"]), outcome.end_s)
                 result |= {"faults": injector.report(), "held_at_end": injector.held}
-        finally:
-            recorder.close(result)
-        folder.write_json("result.json", result)
-        checkpoints.note("ended", outcome.status)  # a run killed before this can be gone on with
-    if referee is not None:
-        ends = {"start": truth(run.objects_at_start), "end": truth(referee.objects())}
-        folder.write_json("truth.json", {**ends, "tip_B_m": referee.tip_B_m().tolist()})
+            unwritten = _write_end(recorder, folder, result)
+            if referee is not None:
+                ends = {"start": truth(run.objects_at_start), "end": truth(referee.objects())}
+                truths = {**ends, "tip_B_m": referee.tip_B_m().tolist()}
+                unwritten += _unless_refused(lambda: folder.write_json("truth.json", truths))
+            if not unwritten:  # a run killed before this can be gone on with
+                unwritten = _unless_refused(lambda: checkpoints.note("ended", outcome.status))
     report, warning = _report(folder.path) if request.report else (None, "")
-    return RunResult(folder.path, result, outcome, report, warning)
+    return RunResult(folder.path, result, outcome, report, warning, tuple(unwritten))
+
+
+def _write_end(recorder: Recorder, folder: RunFolder, result: Mapping[str, Any]) -> list[str]:
+    """Each file by itself, so that a record the disk refused takes no result with it; what was refused."""
+    refused = _unless_refused(lambda: recorder.close(result))
+    return refused + _unless_refused(lambda: folder.write_json("result.json", result))
+
+
+def _unless_refused(write: Callable[[], None]) -> list[str]:
+    try:
+        write()
+    except GlotouchError as e:
+        return [str(e)]
+    return []
 
 
 def _report(folder: Path) -> tuple[Path | None, str]:
@@ -222,5 +241,5 @@ def _report(folder: Path) -> tuple[Path | None, str]:
 
     try:
         return write_report(folder), ""
-    except Exception as e:
+    except (Exception, KeyboardInterrupt) as e:
         return None, f"the report could not be made ({type(e).__name__}: {e}); `glotouch report {folder}` tries again"

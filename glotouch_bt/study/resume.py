@@ -11,6 +11,7 @@ from glotouch_bt.mission.tally import Tally
 from glotouch_bt.study.going_on import GoingOn, copy_run, find
 from glotouch_bt.study.launch import RunRequest, RunResult, launch
 from glotouch_bt.study.result import installed_versions
+from glotouch_bt.study.run_folder import claimed
 
 
 def resume(
@@ -44,13 +45,16 @@ def resume(
     """
     if out is not None:
         find(folder, start, installed_versions()).file.close()  # complain before anything is copied
-        copy_run(folder, out)
+        with claimed(folder):  # a run under way is not copied in the middle
+            copy_run(folder, out)
         folder = out
     going_on = find(folder, start, installed_versions())
     try:
+        asked = going_on.request
+        if asked["faults"] is not None:
+            going_on.notes.append(f"goes on without the faults of {asked['faults']}")
         if on_found is not None:
             on_found(going_on)
-        asked = going_on.request
         request = RunRequest(
             mission=asked["mission"],
             backend=asked["backend"],
@@ -61,8 +65,6 @@ def resume(
             out=folder,
             report=report,
         )
-        if asked["faults"] is not None:
-            going_on.notes.append(f"goes on without the faults of {asked['faults']}")
         return launch(request, on_start=on_start, on_progress=on_progress, control=control, going_on=going_on)
     finally:
         going_on.file.close()

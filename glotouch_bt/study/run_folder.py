@@ -17,6 +17,24 @@ FILES = ("mission.yaml", "run.mcap", "result.json", "truth.json", "report.html",
 LEFT_BY_SQLITE = ("checkpoint.sqlite-wal", "checkpoint.sqlite-shm")
 
 
+@contextmanager
+def claimed(folder: Path) -> Iterator[None]:
+    """For this process alone, until the block or the process ends.
+
+    Raises:
+        BadInput: Another run is under way in the folder.
+    """
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as e:
+            raise BadInput(f"{folder}: a run is under way in this folder") from e
+        yield
+    finally:
+        os.close(handle)
+
+
 class RunFolder:
     """Where one run is kept.
 
@@ -53,23 +71,6 @@ class RunFolder:
         for name in (*FILES, *LEFT_BY_SQLITE):
             (self.path / name).unlink(missing_ok=True)
         shutil.rmtree(self.path / "earlier", ignore_errors=True)
-
-    @contextmanager
-    def claimed(self) -> Iterator[None]:
-        """For this run alone, until it ends or its process does.
-
-        Raises:
-            BadInput: Another run is under way in the folder.
-        """
-        handle = os.open(self.path, os.O_RDONLY)
-        try:
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as e:
-                raise BadInput(f"{self.path}: a run is under way in this folder") from e
-            yield
-        finally:
-            os.close(handle)
 
     def abandon(self) -> None:
         """The run did not begin: remove what was made for it."""

@@ -63,6 +63,7 @@ class RunResult:
         outcome: How it ended.
         report: Path of report.html, or None if none could be made.
         warning: What went wrong after the run (a report that could not be made), or empty.
+        unwritten: What of the record and the result could not be written, and why.
     """
 
     folder: Path
@@ -70,12 +71,15 @@ class RunResult:
     outcome: Outcome
     report: Path | None
     warning: str = ""
+    unwritten: tuple[str, ...] = ()
 
     @property
     def exit_code(self) -> int:
-        """0 done, 1 the mission failed, 3 a safety stop or failure, 130 interrupted."""
+        """0 done, 1 the mission failed, 3 a safety stop or failure (of the disk, too), 130 interrupted."""
         if isinstance(self.outcome.error, KeyboardInterrupt):
             return 130
+        if self.unwritten:
+            return 3
         return {"success": 0, "failure": 1, "aborted": 3}[self.outcome.status]
 
 

@@ -10,6 +10,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from glotouch_bt.faults import FaultInjector
 from glotouch_bt.faults.catalogue import CATALOGUE, NAMED_BY
 from glotouch_bt.faults.plan import check_plan, read_plan
 from glotouch_bt.faults.trigger import Lasting, When
@@ -18,6 +19,7 @@ from glotouch_bt.mission.library import shipped
 from glotouch_bt.mission.load import load_mission
 from glotouch_bt.mission.source import parse_yaml
 from glotouch_bt.robot import BadInput
+from glotouch_bt.robot.fake import FakeRobot
 
 BAD = """\
 faults: everything
@@ -143,3 +145,29 @@ tree = st.recursive(
 def test_no_plan_gives_anything_but_a_plan_or_its_faults(document: object) -> None:
     with suppress(BadInput):
         check_plan(parse_yaml(yaml.safe_dump(document, allow_unicode=True), "p.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("text", "at", "message"),
+    [
+        ("when: {force_above_N: 10, force_below_N: 5}", (4, 31), "no force is above 10 N and below 5 N"),
+        ("when: {aperture_above_m: 50 mm, aperture_below_m: 20 mm}", (4, 37), "above 0.05 m and below 0.02 m"),
+        ("when: {visit: 3}", (4, 12), "visit is of a node"),
+        ("when: {after_s: 2 s}", (4, 12), "after_s is of a node"),
+        ("repeat: {times: 3, every_s: 1}", (4, 5), "for ever does not begin again"),
+        ("for: forever", (4, 10), "a time such as 2 s"),
+    ],
+)
+def test_a_moment_that_never_comes_or_is_not_looked_at_is_refused(text: str, at: tuple[int, int], message: str) -> None:
+    """Each was accepted: the fault never began, began at once, or came once instead of three times."""
+    with pytest.raises(MissionFaults) as e:
+        check_plan(parse_yaml(f"faults: f\nplan:\n  - fault: wrench_bias\n    {text}\n", "bad.yaml"))
+    (found,) = e.value.findings
+    assert (found.place.line, found.place.column) == at
+    assert message in str(found)
+
+
+def test_a_joint_that_the_arm_has_not_is_refused() -> None:
+    plan = check_plan(parse_yaml("faults: f\nplan:\n  - {fault: following_error, with: {joint: 9}}\n", "bad.yaml"))
+    with FakeRobot() as robot, pytest.raises(BadInput, match=r"bad\.yaml:3:5: .*joint 9: this arm has joints 0 to 6"):
+        FaultInjector(robot, plan, 0)

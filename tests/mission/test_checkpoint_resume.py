@@ -141,6 +141,18 @@ def test_a_run_killed_after_its_last_skill_and_before_its_result_is_gone_on_with
     same_as_twin(folder, twin)
 
 
+def test_a_record_that_is_lost_is_said_to_be_on_the_terminal(mission: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("glotouch_bt.study.run_folder.RunFolder.write_json", _killed)
+        glotouch("run", mission, "--seed", 4, "--out", folder)
+    (folder / "run.mcap").unlink()
+    (folder / "run.mcap").mkdir()
+    assert "cannot be moved to 'earlier'" in glotouch("resume", folder).stderr
+    (folder / "run.mcap").rmdir()
+    assert "note: the record does not hold what was before the checkpoint" in glotouch("resume", folder).stderr
+
+
 def _killed(*told: object) -> None:
     raise RuntimeError("here")
 
@@ -210,7 +222,8 @@ def test_a_run_that_is_under_way_is_left_alone(mission: Path, tmp_path: Path) ->
     while process.poll() is None and checkpoints(folder) < 1:
         time.sleep(0.002)
     process.send_signal(signal.SIGSTOP)
-    for words in (("resume", folder), ("run", mission, "--out", folder)):
+    copied = ("resume", folder, "--out", tmp_path / "copy")
+    for words in (("resume", folder), ("run", mission, "--out", folder), copied):
         done = glotouch(*words)
         assert done.returncode == 2
         assert "a run is under way" in done.stderr

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import threading
 import time
+from asyncio import CancelledError
 from collections.abc import Callable, Iterator
 from typing import Any, ClassVar
 
@@ -12,7 +15,7 @@ from py_trees.common import Status
 
 from glotouch_bt.mission.runner import Outcome, run_mission
 from glotouch_bt.mission.watchdog import SkillHung, Stuck, Watchdog
-from glotouch_bt.robot import HOLD, BackendError, MotionRefused, ParamError, StaleReading
+from glotouch_bt.robot import HOLD, BackendError, GlotouchError, MotionRefused, ParamError, StaleReading
 from skills.base import Out, Skill, SkillFailed, SkillRun
 
 from .test_pause import Events
@@ -104,6 +107,7 @@ class Stubborn(Skill):
 @pytest.fixture(autouse=True)
 def _skills(registry: dict[str, type[Skill]]) -> Iterator[None]:
     mine = {"forever": Forever, "spins": Spins, "sleeps": Sleeps, "raises": Raises, "stubborn": Stubborn}
+    mine |= {"odd": Odd, "unmade": Unmade, "lingers": Lingers}
     registry.update(mine)
     yield
     for name in mine:
@@ -202,6 +206,8 @@ RAISED = [
     AssertionError(),
     StopIteration(),
     TimeoutError("socket"),
+    CancelledError(),
+    BaseException("a panic of compiled code"),
 ]
 
 
@@ -249,6 +255,87 @@ def test_a_skill_that_will_not_be_closed_hides_nothing(go: Any, robot: Any) -> N
     timed = go("  - timeout: {seconds: 0.02, do: stubborn}\n")
     assert timed.status == "aborted"
     assert timed.chain[-1].node.endswith("stubborn")
+
+
+class Odd(Skill):
+    """Its body is not what a body is."""
+
+    body: ClassVar[Callable[[], Any]] = staticmethod(lambda: None)
+
+    def run(self) -> SkillRun:
+        return type(self).body()
+
+
+def _returns_a_status() -> Iterator[object]:
+    yield HOLD
+    return Status.FAILURE
+
+
+def _yields_nothing() -> Iterator[object]:
+    yield None
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [(_returns_a_status, "returned <Status.FAILURE"), (_yields_nothing, "yielded None"), (lambda: 3, "not iterable")],
+)
+def test_a_body_that_gives_what_no_body_gives_is_not_taken_for_success(
+    go: Any, robot: Any, monkeypatch: pytest.MonkeyPatch, body: Callable[[], Any], message: str
+) -> None:
+    monkeypatch.setattr(Odd, "body", staticmethod(body))
+    outcome = go("  - odd\n")
+    assert outcome.status == "aborted"
+    assert message in outcome.chain[-1].text
+    assert outcome.chain[-1].node == "m/sequence/odd"
+    assert robot.held >= 1
+
+
+class Lingers(Skill):
+    """Waits in its end."""
+
+    def run(self) -> SkillRun:
+        try:
+            while True:
+                yield HOLD
+        finally:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(1000.0)
+
+
+class Unmade(Skill):
+    """Cannot be made."""
+
+    def __init__(self, *given: Any) -> None:
+        raise KeyError("calibration")
+
+
+def test_a_skill_that_cannot_be_made_is_named_before_anything_moves(go: Any, robot: Any) -> None:
+    with pytest.raises(GlotouchError, match="skill 'unmade' cannot be made: KeyError: 'calibration'"):
+        go("  - find\n  - unmade\n")
+    assert robot.now_s == 0.0
+
+
+def test_impatient_ctrl_c_leaves_no_end_half_done(go: Any, robot: Any) -> None:
+    """The third comes while the arm is held, the fourth while the skill is closed, which may take for ever."""
+    cycle, hold = robot.cycle, robot.hold
+
+    def pressed(command: object) -> Any:
+        if round(robot.now_s, 6) == 0.1:
+            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), signal.SIGINT)
+        return cycle(command)
+
+    def held() -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        hold()
+
+    robot.cycle, robot.hold = pressed, held
+    before, began = signal.getsignal(signal.SIGINT), time.monotonic()
+    outcome = go("  - lingers\n")
+    assert outcome.chain[-1].reason.code == "interrupted"
+    assert robot.held >= 1
+    assert time.monotonic() - began < 20.0
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_failures_keep_their_kind(go: Any, monkeypatch: pytest.MonkeyPatch) -> None:

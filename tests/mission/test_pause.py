@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import pty
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -134,7 +137,7 @@ def test_pause_and_stop_from_another_thread(go: Any, robot: Any, log: list[str])
     assert robot.held >= 1
 
 
-@pytest.mark.parametrize("number", [signal.SIGUSR1, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGUSR1, signal.SIGTERM, signal.SIGHUP])
 def test_signals_reach_the_mission(go: Any, robot: Any, number: signal.Signals) -> None:
     before, record, cycle = signal.getsignal(number), Events(), robot.cycle
 
@@ -152,6 +155,66 @@ def test_signals_reach_the_mission(go: Any, robot: Any, number: signal.Signals) 
         assert record.kinds() == ["pause", "paused", "resumed"]
     else:
         assert outcome.chain[-1].as_dict()["code"] == "preempted"
+
+
+def test_keys_pause_in_the_foreground_and_the_shell_has_its_own_in_the_background() -> None:
+    """A program on a terminal of its own: `p` reaches it; while another group has the terminal, nothing is read."""
+    pid, terminal = pty.fork()
+    if pid == 0:  # in the child, a session leader with the terminal
+        os.execv(sys.executable, [sys.executable, "-c", OPERATED])
+    said = ""
+    with contextlib.suppress(OSError):  # how a terminal ends
+        while not said.endswith("over"):
+            said += os.read(terminal, 1024).decode()
+            if said.endswith(("pause me", "leave me")):
+                os.write(terminal, b"p")
+    _, status = os.waitpid(pid, 0)
+    os.close(terminal)
+    assert (said.split()[-1], os.waitstatus_to_exitcode(status)) == ("over", 0), said
+
+
+OPERATED = """
+import os, signal, sys, termios, time
+from glotouch_bt.commands.operated import operated
+from glotouch_bt.mission.control import Control
+
+def say(word):
+    sys.stdout.write(word)
+    sys.stdout.flush()
+
+def wait(for_it):
+    end = time.monotonic() + 10.0
+    while not for_it() and time.monotonic() < end:
+        time.sleep(0.02)
+    assert for_it()
+
+control, lines = Control(), termios.ICANON
+with operated(control):
+    wait(lambda: not termios.tcgetattr(0)[3] & lines)
+    say("pause me")
+    wait(lambda: control.paused)
+    other = os.fork()
+    if other == 0:
+        time.sleep(30.0)
+        os._exit(0)
+    os.setpgid(other, other)
+    signal.signal(signal.SIGTTOU, signal.SIG_IGN)
+    os.tcsetpgrp(0, other)  # as when a shell takes the terminal, and sets it as it likes it
+    said = termios.tcgetattr(0)
+    said[3] |= lines
+    termios.tcsetattr(0, termios.TCSANOW, said)
+    time.sleep(0.3)
+    say("leave me")
+    time.sleep(0.3)
+    assert control.paused
+    assert termios.tcgetattr(0)[3] & lines
+    termios.tcflush(0, termios.TCIFLUSH)
+    os.tcsetpgrp(0, os.getpgrp())
+    wait(lambda: not termios.tcgetattr(0)[3] & lines)
+    os.kill(other, signal.SIGKILL)
+assert termios.tcgetattr(0)[3] & lines
+say(" over")
+"""
 
 
 def test_timed_pauses_repeat_recorded_ones(go: Any, robot: Any) -> None:

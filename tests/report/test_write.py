@@ -97,6 +97,7 @@ def test_a_run_that_stopped_early_gives_a_shorter_report(tmp_path: Path, writer:
 def test_a_cut_record_without_a_result_still_gives_a_report(whole: SimpleNamespace, tmp_path: Path) -> None:
     data = (whole.folder / "run.mcap").read_bytes()
     (tmp_path / "run.mcap").write_bytes(data[: len(data) // 2])
+    (tmp_path / "result.json").write_text("[1]")  # somebody else's
     text = " ".join(parsed(write_report(tmp_path).read_text()).text)
     assert "The run did not end" in text
     assert "the record was cut short" in text

@@ -19,6 +19,7 @@ from glotouch_bt.study.launch import RunRequest, launch
 from glotouch_bt.study.replay.compare import compare_events, compare_ticks
 from glotouch_bt.study.replay.robot import RecordEnded
 from glotouch_bt.study.replay.run import replay, replayed_robot
+from glotouch_bt.study.replay.summary import as_lines
 from skills.tool_calibrate import ToolCalibrate
 
 
@@ -83,6 +84,8 @@ def test_a_run_that_was_cut_off_is_replayed_to_its_end(folder: Path, tmp_path: P
     assert done.ended
     assert done.parted is None
     assert done.statuses == ("unknown", "unknown")
+    assert "the record is cut off or damaged at t=" in as_lines(done, 3)[1]
+    assert replay(folder).cut_s is None
     late = read_run(cut).span_s[1] - 0.1
     assert all(d.stamp_s >= late for d in done.differences), "only what the cut took from the record's last moment"
 

@@ -61,6 +61,7 @@ class Replay:
         largest: Largest difference of a number in events of each kind, and where.
         differences: What is not the same, in order of time.
         statuses: (of the run, of the replay).
+        cut_s: Where a record ends that was not closed (a killed run, a damaged file), or None.
     """
 
     outcome: Outcome
@@ -70,6 +71,7 @@ class Replay:
     largest: Mapping[str, tuple[float, str]]
     differences: list[Difference]
     statuses: tuple[str, str]
+    cut_s: float | None = None
 
     @property
     def same(self) -> bool:
@@ -127,6 +129,7 @@ def replay(
         largest,
         sorted(differences, key=lambda d: d.stamp_s),
         (then, now),
+        None if record.complete else last_s,
     )
 
 
@@ -148,7 +151,9 @@ def replayed_robot(record: RunRecord) -> ReplayedRobot:
     """
     told = record.of_run("robot")
     if not isinstance(told, dict) or not len(record.cycles) or not len(record.samples):
-        raise BadInput(f"{record.path}: no robot or nothing sensed in it; an older version wrote it, so no replay")
+        raise BadInput(
+            f"{record.path}: no robot or nothing sensed in it: it is cut off, or an older version wrote it; no replay"
+        )
     try:
         description = msgspec.convert(told["description"], RobotDescription, dec_hook=_array, strict=False)
         limits = msgspec.convert(told["limits"], Limits, strict=False)

@@ -31,6 +31,8 @@ def as_lines(replay: Replay, shown: int) -> list[str]:
     """For a terminal: what was compared, where the replay parted from the run, the first differences."""
     compared = ", ".join(f"{n} {kind}" for kind, n in replay.compared.items() if n)
     lines = [f"compared: {compared or 'nothing'}"]
+    if replay.cut_s is not None:
+        lines.append(f"the record is cut off or damaged at t={replay.cut_s:.2f} s: nothing after that is replayed")
     if replay.same:
         worst = max((v for v, _ in replay.largest.values()), default=0.0)
         then = replay.statuses[0]
