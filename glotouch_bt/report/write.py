@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ _LOG_LINES = 200
 def write_report(run_dir: Path) -> Path:
     """Make report.html in a run's folder from run.mcap, result.json and, if present, truth.json.
 
-    Parts the run never reached are left out.
+    Parts the run never reached are left out. It is written whole, or the one before stays.
 
     Returns:
         The file written.
@@ -35,11 +36,14 @@ def write_report(run_dir: Path) -> Path:
     Raises:
         BadInput: There is no record, or the folder cannot be written.
     """
-    target = run_dir / REPORT_NAME
+    target, part = run_dir / REPORT_NAME, run_dir / f".{REPORT_NAME}.part"
     text = render(read_run(run_dir))
     try:
-        target.write_text(text, encoding="utf-8")
+        part.write_text(text, encoding="utf-8")
+        part.replace(target)
     except OSError as e:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
         raise BadInput(f"{target}: the report cannot be written ({e.strerror})") from e
     return target
 

@@ -1,6 +1,8 @@
 """The page against the run it is made of."""
 
+import errno
 import re
+import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 from types import SimpleNamespace
@@ -175,3 +177,22 @@ def test_spans_of_the_tree(whole: SimpleNamespace) -> None:
 def test_no_run_is_bad_input(tmp_path: Path) -> None:
     with pytest.raises(BadInput):
         write_report(tmp_path)
+
+
+def test_a_full_disk_leaves_the_report_before(
+    whole: SimpleNamespace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(whole.folder, folder)
+    before = write_report(folder).read_text(encoding="utf-8")
+    write = Path.write_text
+
+    def full(path: Path, text: str, **how: str) -> int:
+        write(path, text[: len(text) // 2], **how)
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(BadInput, match="No space left"):
+        write_report(folder)
+    assert (folder / "report.html").read_text(encoding="utf-8") == before
+    assert not list(folder.glob(".*"))
