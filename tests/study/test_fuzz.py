@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from copy import deepcopy
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ import pytest
 from glotouch_bt.study.fuzz import campaign as campaign_module
 from glotouch_bt.study.fuzz import trial as trial_module
 from glotouch_bt.study.fuzz.campaign import FuzzCampaign, run_campaign
+from glotouch_bt.study.fuzz.spoiling import ODD_VALUES
 from glotouch_bt.study.fuzz.trial import BAD, Result, document_of, run_trials
 
 SEED = 7
@@ -24,6 +26,13 @@ def test_a_trial_is_the_same_whenever_it_is_made() -> None:
         kind, text, _ = document_of(SEED, n)
         again = document_of(SEED, n)
         assert (kind, text) == again[:2]
+
+
+def test_a_document_does_not_depend_on_those_before_it() -> None:
+    before = deepcopy(ODD_VALUES)
+    first = [document_of(1, n)[1] for n in range(1500)]
+    assert repr(before) == repr(ODD_VALUES)
+    assert first == [document_of(1, n)[1] for n in range(1500)]
 
 
 def test_documents_are_of_both_kinds_and_in_all_states() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -56,7 +57,7 @@ def _places(value: Any) -> Iterator[Place]:
 
 
 def _replace(place: Place, places: list[Place], rng: Rng) -> None:
-    place[0][place[1]] = pick(rng, ODD_VALUES)
+    place[0][place[1]] = deepcopy(pick(rng, ODD_VALUES))  # the next change may be made in it
 
 
 def _delete(place: Place, places: list[Place], rng: Rng) -> None:
