@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.search import TraceParams, refined, trace_more
+from glotouch_bt.search import TraceParams, elsewhere_m, refined, trace_more
 from glotouch_bt.touch import Candidate
 from skills.base import In, Out, Skill, SkillFailed, SkillRun, param
 from skills.exploring import Explorer
@@ -34,7 +34,8 @@ class RefineOutline(Skill):
     """From a candidate known well enough to find it again to one known well enough to squeeze and to grasp.
 
     SUCCESS: `refined` is the candidate with what its new contacts say. An outline known well already is left as it is.
-    FAILURE `not_met`: nothing was touched where it should stand; `refined` is the candidate as it was.
+    FAILURE `not_met`: nothing was touched where it should stand, or the trace ended on another object; `refined` is the
+    candidate as it was.
     FAILURE `hard_contact`, `tool_lost`: as for `orbit_probe`.
     """
 
@@ -45,7 +46,7 @@ class RefineOutline(Skill):
     NEEDS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
-        "not_met": "nothing was touched where it should stand",
+        "not_met": "nothing was touched where it should stand, or the trace ended on another object",
         "hard_contact": "the wrench passed a hard limit on the way",
         "tool_lost": "the jaws are not as far apart as when they took the tool",
         "motion_refused": "the way is not clear",
@@ -74,6 +75,13 @@ class RefineOutline(Skill):
                     advice="it was pushed away, or is gone",
                 )
             return
+        if off_m := elsewhere_m(before, better):
+            raise SkillFailed(
+                "not_met",
+                f"candidate {before.index} was lost among others: what was traced stands {off_m * 1e3:.0f} mm away",
+                advice="it stands too near to them to be traced from the side",
+                off_m=off_m,
+            )
         self.refined = better
         moved = float(np.linalg.norm(traced.displaced_K_m))
         self.event("candidate", candidate=self.refined, moved_m=moved, ended=traced.ended, moves=traced.moves)

@@ -1,6 +1,6 @@
 """Where to probe next. Pure: a map in, moves out."""
 
-from glotouch_bt.search.candidates import Admitted, admit, joins, of_another, part_of, refined
+from glotouch_bt.search.candidates import Admitted, admit, elsewhere_m, joins, of_another, part_of, refined
 from glotouch_bt.search.expectation import ExpectationParams, ExpectedFind
 from glotouch_bt.search.frontier import PAPER_PASSES, NearestFrontier
 from glotouch_bt.search.map import Exclusion, SearchMap
@@ -35,6 +35,7 @@ __all__ = [
     "search_policy",
     "seek",
     "admit",
+    "elsewhere_m",
     "joins",
     "of_another",
     "part_of",

@@ -107,6 +107,16 @@ def refined(before: Candidate, traced: Trace) -> Candidate | None:
     return _with(before, traced.contacts, traced.outline)
 
 
+def elsewhere_m(before: Candidate, after: Candidate) -> float:
+    """How far off a candidate stands that has no place in common with what it was; 0 if it may be the same object.
+
+    The circles round both outlines do not meet: a trace that lost one object among its neighbours has found another.
+    """
+    apart = float(np.linalg.norm(after.contour.centre_K_m - before.contour.centre_K_m))
+    reach = 0.5 * (float(np.hypot(*before.contour.size_m)) + float(np.hypot(*after.contour.size_m)))
+    return apart if apart > reach else 0.0
+
+
 def quality(outline: OutlineBelief) -> float:
     """0..1: 1 / (1 + (sd / 5 mm)^2) of the standard deviation of the object's middle, x and y together.
 

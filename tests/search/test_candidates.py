@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from glotouch_bt.search import SearchMap, Trace, admit, joins, part_of
+from glotouch_bt.search import SearchMap, Trace, admit, elsewhere_m, joins, part_of
 from glotouch_bt.search.candidates import _outline, quality
 from glotouch_bt.touch import Candidate, Contact
 
@@ -94,3 +94,13 @@ def test_the_end_of_something_long_is_less_known_than_a_disc():
     )
     assert quality(_outline(disc, R)) > 0.9
     assert quality(_outline(end, R)) < 0.6
+
+
+@pytest.mark.parametrize(("away_m", "lost"), [(0.0, False), (0.09, False), (0.11, True), (-0.11, True)])
+def test_a_trace_that_ended_on_a_neighbour_is_not_the_candidate(candidate, away_m, lost):
+    """Two boxes of 90 mm x 44 mm: the circles round them, of 100 mm, meet or do not."""
+    box = dataclasses.replace(candidate.contour, size_m=np.array([0.09, 0.044]))
+    before = dataclasses.replace(candidate, contour=box)
+    there = dataclasses.replace(box, centre_K_m=box.centre_K_m + np.array([0.6, 0.8]) * away_m)
+    off = elsewhere_m(before, dataclasses.replace(before, contour=there))
+    assert off == (pytest.approx(abs(away_m)) if lost else 0.0)

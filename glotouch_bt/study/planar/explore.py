@@ -10,6 +10,7 @@ from glotouch_bt.search import (
     SearchPolicy,
     TraceParams,
     admit,
+    elsewhere_m,
     joins,
     of_another,
     part_of,
@@ -164,6 +165,6 @@ def refine_all(
             better = refined(traced.candidate, drive(more, limited))
         except _OutOfBudget:
             break
-        if better is not None:
+        if better is not None and not elsewhere_m(traced.candidate, better):
             out[i] = Traced(world.travel_m, better)
     return tuple(out)
