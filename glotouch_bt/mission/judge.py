@@ -15,7 +15,7 @@ from glotouch_bt.mission.findings import Findings
 from glotouch_bt.mission.flow import Flow
 from glotouch_bt.mission.habits import check_habits
 from glotouch_bt.mission.nodes import ForEachSettings, NodeSpec
-from glotouch_bt.mission.paths import Goal, shortest_path
+from glotouch_bt.mission.paths import Goal, Patience, shortest_path
 from glotouch_bt.mission.source import Place
 from glotouch_bt.mission.variables import ANYTHING, UNSET, Kind, Variables, gathered_kind, item_kind, written_kinds
 
@@ -63,7 +63,7 @@ class _Judge:
         self._exact, self._lenient, self._findings = exact, lenient, findings
         self._variables, self._sets = exact.variables, exact.variables.sets
         self._writers = _writers(exact.tree, exact.variables)
-        self._paths = 0
+        self._paths, self._patience = 0, Patience()
 
     def all(self, leaves: Mapping[str, tuple[frozenset[str], Place]]) -> None:
         for node in self._exact.tree.walk():
@@ -168,7 +168,7 @@ class _Judge:
 
     def _search(self, flow: Flow, goal: Goal) -> tuple[str, ...]:
         self._paths += 1
-        return shortest_path(flow, goal) if self._paths <= MOST_PATHS else ()
+        return shortest_path(flow, goal, self._patience) if self._paths <= MOST_PATHS else ()
 
     # -- the rest ----------------------------------------------------------------------------------------------------
 

@@ -29,8 +29,9 @@ from glotouch_bt.mission.relevance import deciding, living
 from glotouch_bt.mission.variables import UNSET, gathered_kind, item_kind, written_kind
 from skills.base import UNCHANGED
 
-MOST_STATES = 30_000
-"""A search that sees more gives up: the finding then stands without a path."""
+MOST_STATES, MOST_STEPS = 30_000, 120_000
+"""A search that sees more states gives up, and so do all searches of a check that have taken the second together, some
+2 s: the finding then stands without a path."""
 OUT_OF_PATIENCE = 3
 """Passes that are followed one by one; a loop that allows more may be left as if the rest had gone alike."""
 
@@ -68,9 +69,20 @@ class _At:
     said: str = field(default="", compare=False)
 
 
-def shortest_path(flow: Flow, goal: Goal) -> tuple[str, ...]:
-    """Outcomes of leaves on the shortest way to a goal, the node that looks last; empty if none was found."""
-    return _Search(flow, goal).run()
+@dataclass
+class Patience:
+    """How many steps, seen states or new ones, the searches of one check may still take together."""
+
+    steps: int = MOST_STEPS
+
+
+def shortest_path(flow: Flow, goal: Goal, patience: Patience | None = None) -> tuple[str, ...]:
+    """Outcomes of leaves on the shortest way to a goal, the node that looks last; empty if none was found.
+
+    `patience` is used up by the steps of the search.
+    """
+    patience = patience or Patience()
+    return _Search(flow, goal).run(patience) if patience.steps > 0 else ()
 
 
 class _Search:
@@ -84,12 +96,13 @@ class _Search:
         lasting = goal.variable if goal.node is None else None
         self._alive = living(flow, self._nodes, self._index, lasting)
 
-    def run(self) -> tuple[str, ...]:
+    def run(self, patience: Patience) -> tuple[str, ...]:
         first = tuple(0 for _ in self._index)
         came: dict[_At, tuple[_At | None, str]] = {}
         queue: deque[_At] = deque()
 
         def see(at: _At, before: _At | None, label: str) -> _At | None:
+            patience.steps -= 1
             if at.frames:
                 alive = self._alive[at.frames[-1][0]]
                 at = replace(at, values=tuple(v if i in alive else 0 for i, v in enumerate(at.values)))
@@ -102,7 +115,7 @@ class _Search:
         for at in self._enter(self._flow.tree, (), first):
             if found := see(at, None, ""):
                 return self._told(found, came)
-        while queue and len(came) < MOST_STATES:
+        while queue and len(came) < MOST_STATES and patience.steps > 0:
             here = queue.popleft()
             if here.done:
                 continue
