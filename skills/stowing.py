@@ -75,7 +75,7 @@ def return_probe(
 
     Raises:
         SkillFailed: `request_failed`; the probe stands in its holder. `tool_lost`; it was dropped on the way.
-        MotionRefused: The holder cannot be reached, or the hand is pressed aside; the probe is held.
+        MotionRefused: The holder cannot be reached, or the probe does not go in: the hand has risen with it again.
         GuardTripped: The arm does not follow its setpoints; the probe is held.
     """
     arm, world = context.arm, context.world
@@ -89,10 +89,12 @@ def return_probe(
     if float(arm.pose_B_P.position_m[2]) > float(near.position_m[2]):
         moved = yield from _lower(context, near, insert_speed_m_s, aperture_m, STANDS_N)
         if (why := why_stopped(moved)) is not None:
+            yield from _rise(context, insert_speed_m_s)  # what is pressed on is not left pressed on
             raise MotionRefused("into the holder", why)
     moved = yield from _lower(context, grasp, min(LAST_M_S, insert_speed_m_s), aperture_m, STANDS_N)
     why = why_stopped(moved)
     if isinstance(moved.stop, Strayed):
+        yield from _rise(context, insert_speed_m_s)
         raise MotionRefused("into the holder", str(why))
     yield from arm.jaws(min(aperture_m + 0.03, arm.description.gripper.stroke_m), speed_m_s=0.08)
     arm.scene.hold_tool(False)
@@ -114,8 +116,7 @@ def _lower(context: Context, goal: Pose, speed_m_s: float, aperture_m: float, mo
     if not isinstance(moved.stop, Dropped):
         return moved
     arm.scene.hold_tool(False)
-    guard = yield from straight_guard(arm, UP_B, CAUGHT_N)
-    yield from arm.shift(OVER_STOWED_M * UP_B, speed_m_s, check=False, guard=guard)
+    yield from _rise(context, speed_m_s)
     raise SkillFailed(
         "tool_lost",
         f"the probe was dropped on its way into the holder: {moved.stop}",
@@ -123,6 +124,12 @@ def _lower(context: Context, goal: Pose, speed_m_s: float, aperture_m: float, mo
         aperture_m=moved.stop.apart_m,
         taken_m=aperture_m,
     )
+
+
+def _rise(context: Context, speed_m_s: float) -> SkillRun:
+    """Straight up, off what was met."""
+    guard = yield from straight_guard(context.arm, UP_B, CAUGHT_N)
+    yield from context.arm.shift(OVER_STOWED_M * UP_B, speed_m_s, check=False, guard=guard)
 
 
 def nothing_in_hand(context: Context) -> SkillRun:

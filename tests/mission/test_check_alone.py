@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Callable
 
 import pytest
 
 from glotouch_bt.mission.findings import Finding, MissionFaults
 from glotouch_bt.mission.load import load_mission
 from glotouch_bt.study.mistakes import MISSION
+
+Found = Callable[..., list[Finding]]
 
 # (what, is replaced by, code, a piece of the line)
 ALONE = [
@@ -25,21 +27,13 @@ ALONE = [
 ]
 
 
-def found_in(text: str, tmp_path: Path, **settings: str) -> list[Finding]:
-    path = tmp_path / "m.yaml"
-    path.write_text(text)
-    with pytest.raises(MissionFaults) as e:
-        load_mission(path, settings)
-    return [*e.value.findings, *e.value.warnings]
-
-
 @pytest.mark.parametrize(("old", "new", "code", "at"), ALONE, ids=[a[1].strip() for a in ALONE])
-def test_a_mistake_is_found_alone(old: str, new: str, code: str, at: str, tmp_path: Path) -> None:
+def test_a_mistake_is_found_alone(old: str, new: str, code: str, at: str, found_in: Found) -> None:
     text = MISSION.replace("    - for_each:\n        name: squeeze", "    - for_each:  # 2\n        name: squeeze")
     assert text.count(old) == 1
     text = text.replace(old, new)
     (line,) = [i for i, written in enumerate(text.splitlines(), 1) if at in written]
-    assert [(f.code, f.place.line) for f in found_in(text, tmp_path)] == [(code, line)]
+    assert [(f.code, f.place.line) for f in found_in(text)] == [(code, line)]
 
 
 def test_a_value_that_does_not_fit_is_found_alone() -> None:

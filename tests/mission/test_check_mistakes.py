@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Callable
 
 import pytest
 
-from glotouch_bt.mission.findings import Finding, MissionFaults
+from glotouch_bt.mission.findings import Finding
 from glotouch_bt.mission.library import shipped
 from glotouch_bt.mission.load import load_mission
 from glotouch_bt.mission.why import WARNINGS, WHY
 from glotouch_bt.study.mistakes import MISTAKES, RIGHT, Mistake
 
-
-def found_in(text: str, tmp_path: Path) -> list[Finding]:
-    path = tmp_path / "m.yaml"
-    path.write_text(text)
-    try:
-        return list(load_mission(path).warnings)
-    except MissionFaults as e:
-        return [*e.findings, *e.warnings]
+Found = Callable[..., list[Finding]]
 
 
 @pytest.mark.parametrize("mistake", MISTAKES, ids=[m.name for m in MISTAKES])
-def test_each_mistake_is_found_on_its_line(mistake: Mistake, tmp_path: Path) -> None:
-    found = found_in(mistake.text, tmp_path)
+def test_each_mistake_is_found_on_its_line(mistake: Mistake, found_in: Found) -> None:
+    found = found_in(mistake.text)
     told = "\n".join(str(f) for f in found)
     meant = [f for f in found if f.code == mistake.code and f.place.line == mistake.line]
     assert meant, told
@@ -40,8 +33,8 @@ def test_there_are_at_least_forty() -> None:
 
 
 @pytest.mark.parametrize("name", RIGHT)
-def test_nothing_is_found_in_what_is_right(name: str, tmp_path: Path) -> None:
-    assert [str(f) for f in found_in(RIGHT[name], tmp_path)] == []
+def test_nothing_is_found_in_what_is_right(name: str, found_in: Found) -> None:
+    assert [str(f) for f in found_in(RIGHT[name])] == []
 
 
 @pytest.mark.parametrize("name", shipped(""))

@@ -93,3 +93,28 @@ def test_a_probe_that_is_dropped_on_the_way_in_is_noticed(make, above_m: float) 
     assert b.arm.pose_B_P.position_m[2] > STOWED[2] + above_m + 0.07
     assert not b.arm.scene.holding_tool
     assert not [c for c in b.robot.commands[b.begun :] if c.gripper is not None], "the jaws are left as they are"
+
+
+@pytest.mark.parametrize("above_m", [0.12, 0.05])
+def test_what_does_not_go_in_is_not_left_pressed_on(make, above_m: float) -> None:
+    """A probe that hangs askew meets the holder's top: the hand stops, rises with it, and says so."""
+    b, skill = make()
+    cycle, lowest = b.robot.cycle, [np.inf]
+
+    def block(command):
+        seen = cycle(command)
+        way = b.arm.pose_B_P.position_m - STOWED
+        if np.hypot(*way[:2]) > 1e-3:
+            return seen
+        lowest[0] = min(lowest[0], way[2])
+        wrench = seen.wrench_S.copy()
+        wrench[:, 2] -= 37e3 * max(above_m - way[2], 0.0)
+        return dataclasses.replace(seen, wrench_S=wrench)
+
+    b.robot.cycle = block
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "motion_refused")
+    assert 37e3 * (above_m - lowest[0]) < 30.0, "it stops in time"
+    assert b.arm.pose_B_P.position_m[2] > STOWED[2] + above_m + 0.07
+    assert b.arm.scene.holding_tool
+    assert not [c for c in b.robot.commands[b.begun :] if c.gripper is not None], "the jaws are left as they are"
