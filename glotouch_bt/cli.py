@@ -14,16 +14,23 @@ from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.commands.bench import bench
-from glotouch_bt.commands.check import bench_check, check
-from glotouch_bt.commands.doctor import doctor, link
-from glotouch_bt.commands.faults import bench_faults, faults
-from glotouch_bt.commands.guarded import guarded, set_debug
-from glotouch_bt.commands.options import read_settings
-from glotouch_bt.commands.pause import bench_pause
-from glotouch_bt.commands.replay import replay
-from glotouch_bt.commands.resume import bench_resume, resume
-from glotouch_bt.commands.testing import bench_fuzz, mission_tests
+from glotouch_bt.commands import (
+    bench,
+    bench_check,
+    bench_faults,
+    bench_fuzz,
+    bench_pause,
+    bench_resume,
+    check,
+    doctor,
+    faults,
+    link,
+    mission_tests,
+    read_settings,
+    replay,
+    resume,
+)
+from glotouch_bt.commands.terminal import guarded, set_debug
 
 app = typer.Typer(
     name="glotouch",
@@ -92,10 +99,8 @@ def run(
     json_: Json = False,
 ) -> int:
     """Run a mission and write its record, result and report. `p` (or SIGUSR1) pauses it, SIGTERM ends it safely."""
-    from glotouch_bt.commands import console
-    from glotouch_bt.commands.ending import tell_end
-    from glotouch_bt.commands.operated import Operator, operated
-    from glotouch_bt.study.launch import RunRequest, launch
+    from glotouch_bt.commands.terminal import Operator, console, operated, tell_end
+    from glotouch_bt.run import RunRequest, launch
 
     request = RunRequest(mission, backend, seed, read_settings(set_), objects, conditions, out, faults, may_kill=True)
     with console.RunProgress(quiet=json_) as progress, operated(Operator()) as control:
@@ -109,9 +114,9 @@ def skills(
     name: Annotated[str | None, typer.Argument(metavar="NAME", help="one skill")] = None, json_: Json = False
 ) -> None:
     """List the installed skills, or describe one: parameters, units, ranges, ports."""
-    from glotouch_bt.commands import console
-    from glotouch_bt.mission.catalogue import describe_skill
-    from glotouch_bt.mission.library import SkillShelf
+    from glotouch_bt.commands.terminal import console
+    from glotouch_bt.mission.export import describe_skill
+    from glotouch_bt.mission.read import SkillShelf
 
     shelf = SkillShelf()
     described = [describe_skill(n, shelf[n]) for n in ([name] if name else shelf)]
@@ -127,7 +132,7 @@ def skills(
 @guarded
 def backends(json_: Json = False) -> None:
     """List the installed backends and whether they can be used here."""
-    from glotouch_bt.commands import console
+    from glotouch_bt.commands.terminal import console
     from glotouch_bt.robot import BackendError, backend_entry_points, load_backend
 
     found: list[dict[str, Any]] = []
@@ -153,9 +158,8 @@ def tree(
     objects: Objects = None,
 ) -> None:
     """Draw a mission's tree."""
-    from glotouch_bt.mission.btcpp import as_btcpp
-    from glotouch_bt.mission.drawing import as_svg, as_text
-    from glotouch_bt.mission.load import load_mission
+    from glotouch_bt.mission import load_mission
+    from glotouch_bt.mission.export import as_btcpp, as_svg, as_text
     from glotouch_bt.robot import BadInput
 
     loaded = load_mission(mission, read_settings(set_), objects=objects)
@@ -186,8 +190,8 @@ def report(folder: Annotated[Path, typer.Argument(metavar="RUN", help="a run's f
 @guarded
 def schema() -> None:
     """Print the JSON Schema of mission files, for editors."""
-    from glotouch_bt.mission.library import SkillShelf
-    from glotouch_bt.mission.schema import mission_schema
+    from glotouch_bt.mission.export import mission_schema
+    from glotouch_bt.mission.read import SkillShelf
 
     _print_json(mission_schema(SkillShelf()))
 

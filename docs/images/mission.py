@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image, ImageDraw
-
 from backends.mujoco.render import render
-from glotouch_bt.mission.load import load_mission
 from glotouch_bt.mission.runner import run_mission
 from glotouch_bt.mission.worlds import load_conditions
+from PIL import Image, ImageDraw
+
+from glotouch_bt.mission.load import load_mission
 from glotouch_bt.robot import Command, Observation, load_backend
 
 SIZE = (520, 390)

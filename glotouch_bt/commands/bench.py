@@ -12,7 +12,6 @@ from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.commands.guarded import guarded
 from glotouch_bt.commands.options import (
     Conditions,
     Json,
@@ -25,6 +24,7 @@ from glotouch_bt.commands.options import (
     check_names,
     read_settings,
 )
+from glotouch_bt.commands.terminal import guarded
 
 bench = typer.Typer(
     name="bench",
@@ -53,10 +53,10 @@ def retrieve(
     json_: Json = False,
 ) -> None:
     """The whole mission for every target on every seed."""
-    from glotouch_bt.commands import console_bench
-    from glotouch_bt.mission.load import load_mission
+    from glotouch_bt.bench import Campaign, run_campaign, targets_of
+    from glotouch_bt.commands.terminal import bench_tables as console_bench
+    from glotouch_bt.mission import load_mission
     from glotouch_bt.robot import BadInput
-    from glotouch_bt.study.retrieve import Campaign, run_campaign, targets_of
 
     names = tuple(target) if target else targets_of(objects) if objects else ()
     # A mission's default target need not be among other objects: check it with one that is.
@@ -102,9 +102,9 @@ def speed(
     json_: Json = False,
 ) -> None:
     """A mission's wall time against its simulated time, and against its bare solver steps."""
-    from glotouch_bt.commands import console_bench
+    from glotouch_bt.bench import SpeedStudy, run_study
+    from glotouch_bt.commands.terminal import bench_tables as console_bench
     from glotouch_bt.robot import BadInput
-    from glotouch_bt.study.speed import SpeedStudy, run_study
 
     settings = {}
     for item in set_ or []:
@@ -157,8 +157,8 @@ def search(
     json_: Json = False,
 ) -> None:
     """How soon every object is found, by policy: the mission, and its planar stand-in on the same and more layouts."""
-    from glotouch_bt.commands import console_bench
-    from glotouch_bt.study.search import Campaign, run_campaign
+    from glotouch_bt.bench.search import Campaign, run_campaign
+    from glotouch_bt.commands.terminal import bench_tables as console_bench
 
     check_names(conditions, backend)
     campaign = Campaign(
@@ -207,9 +207,8 @@ def match(
     json_: Json = False,
 ) -> None:
     """Which touched object is the target: the matchers and the paper's ablation on TouchSets of the real skills."""
-    from glotouch_bt.commands import console_bench
-    from glotouch_bt.study.match.bench import Campaign, run_campaign
-    from glotouch_bt.study.match.methods import chosen
+    from glotouch_bt.bench.match import Campaign, chosen, run_campaign
+    from glotouch_bt.commands.terminal import bench_tables as console_bench
 
     check_names(conditions, backend)
     campaign = Campaign(
@@ -250,8 +249,8 @@ def contact(
     json_: Json = False,
 ) -> None:
     """Calibration square traced by probe and by bare gripper, bolted down and free: errors and the paper's."""
-    from glotouch_bt.commands import console_bench
-    from glotouch_bt.study.contact import Campaign, run_campaign
+    from glotouch_bt.bench.contact import Campaign, run_campaign
+    from glotouch_bt.commands.terminal import bench_tables as console_bench
 
     check_names(conditions, "mujoco")
     campaign = Campaign(tuple(range(seed, seed + trials)), conditions, per_side, "mujoco", bench_folder(out, "contact"))
@@ -285,7 +284,7 @@ def detection(
     json_: Json = False,
 ) -> None:
     """The guard's false alarms while the arm moves freely, and the smallest pushes it finds."""
-    from glotouch_bt.study.detection import DetectionStudy, run_study, table
+    from glotouch_bt.bench.detection import DetectionStudy, run_study, table
 
     profiles = tuple(conditions or ("nominal", "harsh"))
     for profile in profiles:

@@ -11,8 +11,8 @@ from typing import Annotated
 import typer
 
 from glotouch_bt.commands.doctor import Json
-from glotouch_bt.commands.guarded import guarded
 from glotouch_bt.commands.options import read_settings
+from glotouch_bt.commands.terminal import guarded
 
 
 @guarded
@@ -28,10 +28,9 @@ def check(
     json_: Json = False,
 ) -> int:
     """Prove missions before anything moves: every fault on any outcome of any skill, with the run that shows it."""
-    from glotouch_bt.mission.bounds import worst_case
-    from glotouch_bt.mission.findings import Finding, Findings, MissionFaults
-    from glotouch_bt.mission.load import load_mission, split_settings
-    from glotouch_bt.mission.source import Place
+    from glotouch_bt.mission import load_mission, split_settings
+    from glotouch_bt.mission.check import worst_case
+    from glotouch_bt.mission.spec import Finding, Findings, MissionFaults, Place
     from glotouch_bt.robot import BadInput
 
     settings = read_settings(set_)
@@ -73,9 +72,9 @@ def check(
 
 
 def _show(given: str, found: Sequence[object], said: str, *, ok: bool) -> None:
-    from glotouch_bt.commands.console_check import print_findings, texts_of
-    from glotouch_bt.mission.findings import Finding
-    from glotouch_bt.mission.library import shipped_root
+    from glotouch_bt.commands.terminal import print_findings, texts_of
+    from glotouch_bt.mission.read import shipped_root
+    from glotouch_bt.mission.spec import Finding
 
     findings = [f for f in found if isinstance(f, Finding)]
     print_findings(findings, texts_of({f.place.file for f in findings}, shipped_root()))
@@ -94,7 +93,7 @@ def bench_check(
 ) -> None:
     """Seeded mistakes: what `check` finds, what py_trees finds by itself, false alarms on missions that are right."""
     from glotouch_bt.robot import BadInput
-    from glotouch_bt.study.check import as_markdown, compare, summary
+    from glotouch_bt.validation.seeded_mistakes import as_markdown, compare, summary
 
     rows = compare()
     counted = summary(rows)

@@ -9,8 +9,8 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.guarded import guarded
 from glotouch_bt.commands.options import bench_folder, read_settings
+from glotouch_bt.commands.terminal import guarded
 
 Backend = Annotated[str, typer.Option(help="a registered backend (see: glotouch backends)")]
 Sets = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="a backend option")]
@@ -26,7 +26,7 @@ def link(
     json_: Json = False,
 ) -> None:
     """How long one cycle takes, setpoint out to state in: p50, p99, p99.9."""
-    from glotouch_bt.study.link import LinkStudy, run_study
+    from glotouch_bt.commissioning import LinkStudy, run_study
 
     summary = run_study(LinkStudy(backend, bench_folder(out, "link"), read_settings(set_), duration))
     if json_:
@@ -49,10 +49,10 @@ def doctor(
     json_: Json = False,
 ) -> int:
     """Look at a robot before it is trusted: versions, rates, noise, jaws, pads, walls; asks before it moves."""
-    from glotouch_bt.mission.load import load_mission
-    from glotouch_bt.mission.worlds import load_conditions
+    from glotouch_bt.commissioning import Finding, nearly_empty, visit
+    from glotouch_bt.mission import load_mission
+    from glotouch_bt.mission.read import load_conditions
     from glotouch_bt.robot import BadInput, load_backend
-    from glotouch_bt.study.doctor import Finding, nearly_empty, visit
 
     options = read_settings(set_)
     chosen = load_backend(backend)

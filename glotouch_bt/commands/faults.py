@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.commands.guarded import guarded
+from glotouch_bt.commands.terminal import guarded
 
 
 @guarded
@@ -22,9 +22,9 @@ def faults(
     json_: Annotated[bool, typer.Option("--json", help="print JSON on stdout, nothing else")] = False,
 ) -> None:
     """List the faults a plan may ask for (glotouch run --faults FILE), or describe one."""
-    from glotouch_bt.commands import console
-    from glotouch_bt.faults.catalogue import CATALOGUE
-    from glotouch_bt.mission.library import shipped
+    from glotouch_bt.commands.terminal import console
+    from glotouch_bt.faults import CATALOGUE
+    from glotouch_bt.mission.read import shipped
     from glotouch_bt.robot import UnknownName
 
     if name is not None and name not in CATALOGUE:
@@ -79,13 +79,19 @@ def bench_faults(
     json_: Annotated[bool, typer.Option("--json", help="print summary.json on stdout, nothing else")] = False,
 ) -> None:
     """Break a mission on purpose: each class of fault in each skill, beside the unfaulted run of the same seed."""
-    from glotouch_bt.commands import console_faults
     from glotouch_bt.commands.options import bench_folder, check_names, read_settings
-    from glotouch_bt.mission.load import load_mission
+    from glotouch_bt.commands.terminal import fault_tables as console_faults
+    from glotouch_bt.mission import load_mission
     from glotouch_bt.robot import GlotouchError
-    from glotouch_bt.study.faults import Campaign, few_objects, run_campaign
-    from glotouch_bt.study.faults_cases import chosen_cases, chosen_skills
-    from glotouch_bt.study.faults_exhaustive import Exhaustive, run_exhaustive
+    from glotouch_bt.validation.faults import (
+        Campaign,
+        Exhaustive,
+        chosen_cases,
+        chosen_skills,
+        few_objects,
+        run_campaign,
+        run_exhaustive,
+    )
 
     settings = read_settings(set_)
     mission = mission or ("calibrate" if exhaustive else "retrieve")

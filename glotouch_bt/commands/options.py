@@ -23,7 +23,7 @@ def check_names(conditions: str, backend: str) -> None:
     Raises:
         BadInput: One does not; the message lists those that do.
     """
-    from glotouch_bt.mission.worlds import load_conditions
+    from glotouch_bt.mission.read import load_conditions
     from glotouch_bt.robot import load_backend
 
     load_conditions(conditions)
@@ -36,7 +36,7 @@ def bench_folder(out: Path | None, name: str) -> Path:
     Raises:
         BadInput: No file can be written there.
     """
-    from glotouch_bt.study.run_folder import RunFolder
+    from glotouch_bt.run import RunFolder
 
     folder = out or Path("runs") / f"{time.strftime('%Y%m%d-%H%M%S')}-bench-{name}"
     RunFolder(folder).abandon()

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.commands.guarded import guarded
+from glotouch_bt.commands.terminal import guarded
 
 
 @guarded
@@ -31,10 +31,10 @@ def bench_pause(
     json_: Annotated[bool, typer.Option("--json", help="print summary.json on stdout, nothing else")] = False,
 ) -> None:
     """Pause a mission at every n-th tick: does it end as its twin does, and keep the hard limit?"""
-    from glotouch_bt.commands import console
     from glotouch_bt.commands.options import bench_folder, check_names, read_settings
-    from glotouch_bt.mission.load import load_mission
-    from glotouch_bt.study.pausing import PauseStudy, run_pauses
+    from glotouch_bt.commands.terminal import console
+    from glotouch_bt.mission import load_mission
+    from glotouch_bt.validation import PauseStudy, run_pauses
 
     check_names(conditions, backend)
     settings = read_settings(set_)

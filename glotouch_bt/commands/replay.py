@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.guarded import guarded
+from glotouch_bt.commands.terminal import guarded
 
 SHOWN = 12
 
@@ -36,9 +36,8 @@ def replay(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
-    from glotouch_bt.study.replay.decisions import replay_decisions
-    from glotouch_bt.study.replay.run import replay as run_replay
-    from glotouch_bt.study.replay.summary import as_dict, as_lines, decision_as_dict
+    from glotouch_bt.run.replay import as_dict, as_lines, decision_as_dict, replay_decisions
+    from glotouch_bt.run.replay import replay as run_replay
 
     if decisions:
         made = replay_decisions(folder, objects=objects)

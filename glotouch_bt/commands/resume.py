@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.commands.guarded import guarded
+from glotouch_bt.commands.terminal import guarded
 
 Json = Annotated[bool, typer.Option("--json", help="print JSON on stdout, nothing else")]
 
@@ -25,11 +25,9 @@ def resume(
     json_: Json = False,
 ) -> int:
     """Go on with a run after a crash, a kill, Ctrl-C or a safety stop; finished skills are not done again."""
-    from glotouch_bt.commands import console
-    from glotouch_bt.commands.ending import tell_end
-    from glotouch_bt.commands.operated import Operator, operated
-    from glotouch_bt.study.going_on import GoingOn
-    from glotouch_bt.study.resume import resume as go_on
+    from glotouch_bt.commands.terminal import Operator, console, operated, tell_end
+    from glotouch_bt.run import GoingOn
+    from glotouch_bt.run import resume as go_on
 
     if list_:
         _list(folder, json_)
@@ -80,9 +78,9 @@ def bench_resume(
 ) -> None:
     """Kill missions (SIGKILL) at random moments, resume them, and compare each with its unbroken twin."""
     from glotouch_bt.commands.options import bench_folder, check_names, read_settings
-    from glotouch_bt.mission.load import load_mission
-    from glotouch_bt.study.faults import few_objects
-    from glotouch_bt.study.killing import KillStudy, run_study
+    from glotouch_bt.mission import load_mission
+    from glotouch_bt.validation import KillStudy, run_study
+    from glotouch_bt.validation.faults import few_objects
 
     settings = read_settings(set_)
     check_names(conditions, "mujoco")
@@ -117,7 +115,7 @@ def bench_resume(
 
 
 def _list(folder: Path, json_: bool) -> None:
-    from glotouch_bt.commands import console
+    from glotouch_bt.commands.terminal import console
     from glotouch_bt.mission.checkpoint import FILE, CheckpointFile
 
     file = CheckpointFile(folder / FILE)

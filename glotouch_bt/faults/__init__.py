@@ -6,6 +6,23 @@ it does an effect (`effect`; `wrench`, `touch`, `gripper`, `arm`, `world`, `proc
 
 from glotouch_bt.faults.catalogue import CATALOGUE, FaultKind
 from glotouch_bt.faults.injector import FaultInjector
-from glotouch_bt.faults.plan import FaultPlan, FaultSpec, read_plan
+from glotouch_bt.faults.models import wrong_models
+from glotouch_bt.faults.plan import FaultPlan, FaultSpec, check_plan, read_plan
+from glotouch_bt.faults.run_listener import ListeningRecord, injector_in
+from glotouch_bt.faults.trigger import Lasting, Repeat, When
 
-__all__ = ["CATALOGUE", "FaultInjector", "FaultKind", "FaultPlan", "FaultSpec", "read_plan"]
+__all__ = [
+    "CATALOGUE",
+    "FaultInjector",
+    "FaultKind",
+    "FaultPlan",
+    "FaultSpec",
+    "Lasting",
+    "ListeningRecord",
+    "Repeat",
+    "When",
+    "check_plan",
+    "injector_in",
+    "read_plan",
+    "wrong_models",
+]

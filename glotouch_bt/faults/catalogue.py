@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from glotouch_bt.faults import arm, gripper, model, process, touch, world, wrench
-from glotouch_bt.faults.effect import Effect
-from glotouch_bt.mission.fields import unit_of
+from glotouch_bt.faults.effects import Effect, arm, gripper, model, process, world, wrench
+from glotouch_bt.faults.effects import tactile as touch
+from glotouch_bt.mission.read import unit_of
 
 CHANNELS = ("wrench", "touch", "gripper", "arm", "world", "model", "process")
 

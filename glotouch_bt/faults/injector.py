@@ -6,15 +6,14 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from glotouch_bt.faults.effect import Scene, samples_altered
+from glotouch_bt.faults.effects import Scene, samples_altered
 from glotouch_bt.faults.plan import FaultPlan, FaultSpec
 from glotouch_bt.faults.proof import Proof, Sighting
 from glotouch_bt.faults.scheduled import Scheduled
 from glotouch_bt.faults.trigger import Moment
-from glotouch_bt.robot import BadInput, Command, GuardTripped, Observation, Request, Robot, Tare, Ticket
-from glotouch_bt.robot.disturber import Disturber
-from glotouch_bt.robot.interface import Snapshot
-from glotouch_bt.robot.streams import stream
+from glotouch_bt.robot import BadInput, Command, GuardTripped, Observation, Request, Robot, Snapshot, Tare, Ticket
+from glotouch_bt.robot.scene import stream
+from glotouch_bt.robot.simulation import Disturber
 
 
 class FaultInjector(Robot):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from glotouch_bt.faults.model import ScaleParams
+from glotouch_bt.faults.effects import ScaleParams
 from glotouch_bt.faults.plan import FaultPlan
-from glotouch_bt.mission.load import Mission
+from glotouch_bt.mission import Mission
 from glotouch_bt.robot import BadInput
-from glotouch_bt.robot.meshes import load_mesh
+from glotouch_bt.robot.scene import load_mesh
 
 
 def wrong_models(plan: FaultPlan, mission: Mission, folder: Path) -> dict[str, str]:

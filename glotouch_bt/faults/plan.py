@@ -19,14 +19,10 @@ from typing import TypeVar
 from pydantic import BaseModel
 
 from glotouch_bt.faults.catalogue import CATALOGUE, FaultKind
-from glotouch_bt.faults.effect import FaultParams
+from glotouch_bt.faults.effects import FaultParams
 from glotouch_bt.faults.trigger import Lasting, Repeat, When, matches
-from glotouch_bt.mission.fields import validate
-from glotouch_bt.mission.findings import Findings, MissionFaults
-from glotouch_bt.mission.library import find_shipped, shown
-from glotouch_bt.mission.nodes import NodeSpec
-from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, read_yaml
-from glotouch_bt.mission.units import split_quantity
+from glotouch_bt.mission.read import find_shipped, read_yaml, shown, validate
+from glotouch_bt.mission.spec import Findings, Map, MissionFaults, Node, NodeSpec, Place, Scalar, Seq, split_quantity
 
 PLAN_KEYS = ("faults", "description", "seed", "plan")
 FAULT_KEYS = ("fault", "name", "with", "when", "for", "repeat")

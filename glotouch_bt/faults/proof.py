@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from glotouch_bt.faults.effect import Acts
+from glotouch_bt.faults.effects import Acts
 from glotouch_bt.faults.plan import FaultSpec
 
 KEPT = 50  # beginnings and sightings that are written out

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from glotouch_bt.faults.effect import Effect
+from glotouch_bt.faults.effects import Effect
 from glotouch_bt.faults.plan import FaultSpec
 from glotouch_bt.faults.proof import Proof
 from glotouch_bt.faults.trigger import Moment, holds, running_node

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from glotouch_bt.robot import Observation
-from skills.base import param
+from glotouch_bt.skill import param
 
 
 class When(BaseModel):

@@ -11,26 +11,41 @@ from typing import Any
 
 import yaml
 
-from glotouch_bt.mission.findings import Finding, Findings, MissionFaults
-from glotouch_bt.mission.judge import check_flow
-from glotouch_bt.mission.library import SkillShelf, find_shipped, shipped_root, shown
-from glotouch_bt.mission.nodes import NodeSpec, number_names
-from glotouch_bt.mission.opening import entries_of
-from glotouch_bt.mission.parameters import (
+from glotouch_bt.mission.check import check_flow
+from glotouch_bt.mission.read import (
     Parameter,
+    Reading,
+    Scope,
+    SkillShelf,
     Value,
     check_used,
+    entries_of,
+    find_shipped,
     from_command_line,
+    parse_tree,
     read_parameters,
+    read_world,
+    read_yaml,
     resolved,
+    shipped_root,
+    shown,
     substitute,
 )
-from glotouch_bt.mission.parse import parse_tree
-from glotouch_bt.mission.scope import Reading, Scope
-from glotouch_bt.mission.source import Map, Node, Place, Scalar, Seq, plain, read_yaml
-from glotouch_bt.mission.worlds import read_world
+from glotouch_bt.mission.spec import (
+    Finding,
+    Findings,
+    Map,
+    MissionFaults,
+    Node,
+    NodeSpec,
+    Place,
+    Scalar,
+    Seq,
+    number_names,
+    plain,
+)
 from glotouch_bt.robot import BadInput, World
-from skills.base import Skill
+from glotouch_bt.skill import Skill
 
 MISSION_KEYS = ("mission", "description", "world", "parameters", "tree", "timeout_s", "leaves", "subtrees")
 LONGEST_S = 3600.0
@@ -204,7 +219,7 @@ def _world(source: Map, path: Path, objects: Path | None, findings: Findings) ->
     except BadInput as e:
         findings.add(node.place, "unusable_world", f"the world cannot be read: {e}")
         return None, None
-    inside = shown(found).removeprefix("missions/")
+    inside = shown(found).removeprefix("glotouch_missions/")
     document = inside if inside != shown(found) else str(found.resolve())
     return read_world(content, found, findings, objects), document
 

@@ -13,12 +13,13 @@ if TYPE_CHECKING:
     from glotouch_bt.mission_testing.call import Call
     from glotouch_bt.mission_testing.casting import ScriptError
     from glotouch_bt.mission_testing.outcomes import fails, hangs, ok, raises, real
-    from glotouch_bt.mission_testing.scripted import ScriptedRun, run_scripted
+    from glotouch_bt.mission_testing.scripted import RunsAway, ScriptedRun, run_scripted
     from glotouch_bt.mission_testing.standins import stand_in
 
 _HOME = {
-    "Call": "leaf",
+    "Call": "call",
     "ScriptError": "casting",
+    "RunsAway": "scripted",
     "ScriptedRun": "scripted",
     "fails": "outcomes",
     "hangs": "outcomes",
@@ -29,7 +30,19 @@ _HOME = {
     "stand_in": "standins",
 }
 
-__all__ = ["Call", "ScriptError", "ScriptedRun", "fails", "hangs", "ok", "raises", "real", "run_scripted", "stand_in"]
+__all__ = [
+    "Call",
+    "RunsAway",
+    "ScriptError",
+    "ScriptedRun",
+    "fails",
+    "hangs",
+    "ok",
+    "raises",
+    "real",
+    "run_scripted",
+    "stand_in",
+]
 
 
 def __getattr__(name: str) -> object:

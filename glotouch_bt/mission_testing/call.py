@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from skills.base import SkillParams
+from glotouch_bt.skill import SkillParams
 
 Ending = Literal["SUCCESS", "FAILURE", "PREEMPTED", "RAISED", "RUNNING"]
 

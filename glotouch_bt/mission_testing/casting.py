@@ -10,11 +10,11 @@ from typing import Any, TypeAlias
 
 from py_trees.ports_utils import is_instance_of_type
 
-from glotouch_bt.mission.nodes import NodeSpec
+from glotouch_bt.mission.spec import NodeSpec
 from glotouch_bt.mission_testing.leaf import Part, promised
 from glotouch_bt.mission_testing.outcomes import Decide, Outcome, Script, flat, ok
 from glotouch_bt.robot import BadInput
-from skills.base import Skill
+from glotouch_bt.skill import Skill
 
 Row: TypeAlias = "tuple[Outcome | Decide, ...]"
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from glotouch_bt.mission.library import shown
-from glotouch_bt.mission.load import Mission
-from glotouch_bt.mission.nodes import NodeSpec
+from glotouch_bt.mission import Mission
+from glotouch_bt.mission.read import shown
+from glotouch_bt.mission.spec import NodeSpec
 from glotouch_bt.mission_testing.casting import paths_of
 from glotouch_bt.mission_testing.scripted import ScriptedRun
 

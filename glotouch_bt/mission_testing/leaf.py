@@ -14,7 +14,7 @@ from glotouch_bt.mission_testing.call import Call
 from glotouch_bt.mission_testing.outcomes import Decide, Outcome
 from glotouch_bt.mission_testing.standins import port_value
 from glotouch_bt.robot import HOLD
-from skills.base import Context, Skill, SkillFailed, SkillParams, SkillRun
+from glotouch_bt.skill import Context, Skill, SkillFailed, SkillParams, SkillRun
 
 
 @dataclass

@@ -14,12 +14,11 @@ import pytest
 
 if TYPE_CHECKING:
     from glotouch_bt.faults import FaultInjector
-    from glotouch_bt.mission.load import Mission
+    from glotouch_bt.mission import Mission
     from glotouch_bt.mission_testing.outcomes import Script
     from glotouch_bt.mission_testing.scripted import ScriptedRun
     from glotouch_bt.mission_testing.session import Session
-    from glotouch_bt.robot import Robot
-    from glotouch_bt.robot.fake import FakeRobot
+    from glotouch_bt.robot import FakeRobot, Robot
 
 KEY: pytest.StashKey[Session] = pytest.StashKey()
 
@@ -129,7 +128,7 @@ def scripted(request: pytest.FixtureRequest) -> Scripted:
 @pytest.fixture
 def fake_robot() -> Iterator[Callable[..., FakeRobot]]:
     """Make robots without physics: `fake_robot(walls=[...])`; arguments of `FakeRobot`; closed after the test."""
-    from glotouch_bt.robot.fake import FakeRobot
+    from glotouch_bt.robot import FakeRobot
 
     made: list[FakeRobot] = []
 
@@ -149,7 +148,7 @@ def faulty() -> Iterator[Callable[..., FaultInjector]]:
     The faults are those of a plan's `plan` (see `glotouch faults`), or the path of a plan. A fault that altered
     nothing by the end of the test fails it: such a test shows nothing.
     """
-    from glotouch_bt.mission_testing.faulting import faulted, idle
+    from glotouch_bt.mission_testing.faults import faulted, idle
 
     made: list[FaultInjector] = []
 
@@ -178,7 +177,7 @@ def pytest_runtestloop(session: pytest.Session) -> Iterator[None]:
         if session.testsfailed:
             session_of(session.config).mutation_lines.append("no mutant was tried, for a test fails without any")
         else:
-            from glotouch_bt.mission_testing.rerun import mutate
+            from glotouch_bt.mission_testing.mutation import mutate
 
             for mission in missions:
                 mutate(session, session_of(session.config), mission)

@@ -6,20 +6,19 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from glotouch_bt.faults.listening import ListeningRecord, injector_in
-from glotouch_bt.mission.load import Mission
-from glotouch_bt.mission.nodes import NodeSpec
-from glotouch_bt.mission.reasons import Failure
-from glotouch_bt.mission.runner import default_arm, run_mission
-from glotouch_bt.mission.tally import NullRecord, Record
+from glotouch_bt.faults import ListeningRecord, injector_in
+from glotouch_bt.mission import Mission
+from glotouch_bt.mission.execution import default_arm, run_mission
+from glotouch_bt.mission.record import NullRecord, Record
+from glotouch_bt.mission.spec import NodeSpec
+from glotouch_bt.mission.tree import Failure
 from glotouch_bt.mission_testing import casting
 from glotouch_bt.mission_testing.call import Call
 from glotouch_bt.mission_testing.casting import ScriptError
 from glotouch_bt.mission_testing.leaf import STAGE, Part, Stage, playing
 from glotouch_bt.mission_testing.outcomes import Script
 from glotouch_bt.mission_testing.skipping import PATIENT, SkippingRobot, may_skip
-from glotouch_bt.robot import Command, GlotouchError, Observation, Robot, World
-from glotouch_bt.robot.fake import FakeRobot
+from glotouch_bt.robot import Command, FakeRobot, GlotouchError, Observation, Robot, World
 
 if TYPE_CHECKING:
     from glotouch_bt.motion import Arm

@@ -6,15 +6,15 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from glotouch_bt.mission.library import find_shipped
-from glotouch_bt.mission.load import Mission, load_mission
+from glotouch_bt.mission import Mission, load_mission
+from glotouch_bt.mission.read import find_shipped
 from glotouch_bt.mission_testing.casting import ScriptError
 from glotouch_bt.mission_testing.coverage import OutcomeCoverage
 from glotouch_bt.mission_testing.scripted import ScriptedRun
 from glotouch_bt.robot import UnknownName
 
 if TYPE_CHECKING:
-    from glotouch_bt.mission_testing.score import MutationScore
+    from glotouch_bt.mission_testing.mutation import MutationScore
 
 
 class Session:

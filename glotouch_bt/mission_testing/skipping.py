@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from glotouch_bt.mission.nodes import NodeSpec
-from glotouch_bt.robot import Command, Observation
-from glotouch_bt.robot.fake import FakeRobot
-from glotouch_bt.robot.supervision_limits import SupervisionLimits
+from glotouch_bt.mission.spec import NodeSpec
+from glotouch_bt.robot import Command, FakeRobot, Observation
+from glotouch_bt.robot.supervision import SupervisionLimits
 
 PATIENT = SupervisionLimits(late_periods=1e12, tolerated=10**9)
 """A supervisor that lets skipped time pass."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import fcl
 import numpy as np
 
-from glotouch_bt.robot import Array, Pose, Probe, RobotDescription, World
+from glotouch_bt.robot import Array, Gripper, Pose, Probe, RobotDescription, World
 
 # Between the handle's lower face and the holder block's top ("just below the handle").
 HOLDER_GAP_M = 0.003
@@ -127,3 +127,9 @@ def tool_parts(description: RobotDescription, probe: Probe) -> list[Part]:
         _part("shaft", last, middle, np.array([radius, radius, 0.5 * shaft]), fcl.Cylinder(radius, shaft)),
         _part("handle", last, hand_pose, 0.5 * np.array(probe.handle_m), fcl.Box(*probe.handle_m)),
     ]
+
+
+def finger_outline_half_m(gripper: Gripper, aperture_m: float) -> Array:
+    """(2,) half size along x_P and y_P of the rectangle round both fingers at an aperture."""
+    outer = gripper.finger.centre_m[1] + gripper.finger.half_m[1]
+    return np.array([gripper.finger.half_m[0], outer + 0.5 * aperture_m])

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from glotouch_bt.perception.touch import Contour
 from glotouch_bt.report.force import contact_of
 from glotouch_bt.report.page import esc, legend, number, section, table
 from glotouch_bt.report.run_record import RunRecord
 from glotouch_bt.report.svg import Scale, label, picture, points, polyline
 from glotouch_bt.report.truth import TrueOutline, true_outlines
 from glotouch_bt.robot import Array
-from glotouch_bt.touch.values import Contour
 
 PAD_HALF_WIDTH_M = 0.0086  # for drawing only
 PATH_POINTS = 4000

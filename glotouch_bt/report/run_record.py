@@ -19,10 +19,7 @@ from mcap.exceptions import McapError
 from mcap.records import Attachment, Chunk, Footer
 from mcap.stream_reader import StreamReader, breakup_chunk
 
-from glotouch_bt.mission.mcap_packing import join, unpack
-from glotouch_bt.mission.mcap_schemas import EVENT_PREFIX
-from glotouch_bt.mission.record import RESULT_ATTACHMENT, RUN_ATTACHMENT
-from glotouch_bt.mission.resolution import STAMP_S, to_step
+from glotouch_bt.mission.record import EVENT_PREFIX, RESULT_ATTACHMENT, RUN_ATTACHMENT, STAMP_S, join, to_step, unpack
 from glotouch_bt.robot import Array, BadInput, GlotouchError, Pose
 
 RECORD_NAME, RESULT_NAME, TRUTH_NAME = "run.mcap", "result.json", "truth.json"

@@ -5,7 +5,6 @@ frames in their names; see `observation` for the frames.
 """
 
 from glotouch_bt.robot.command import HOLD, Command, GripperTarget, JointSetpoint, Request, SetPayload, Tare, Ticket
-from glotouch_bt.robot.conditions import Conditions
 from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription
 from glotouch_bt.robot.errors import (
     BackendError,
@@ -19,12 +18,13 @@ from glotouch_bt.robot.errors import (
     StaleReading,
     UnknownName,
 )
-from glotouch_bt.robot.geometry import Array, Pose
-from glotouch_bt.robot.interface import Backend, Robot
+from glotouch_bt.robot.fake import FakeRobot
+from glotouch_bt.robot.geometry import Array, Pose, frozen_array, matrix_to_quat, quat_to_matrix
+from glotouch_bt.robot.interface import Backend, Robot, Snapshot
 from glotouch_bt.robot.limits import Limits
 from glotouch_bt.robot.observation import GripperState, Observation, TactileFrame
 from glotouch_bt.robot.registry import backend_entry_points, load_backend
-from glotouch_bt.robot.world import Container, Holder, ObjectSet, Probe, World
+from glotouch_bt.robot.scene import Conditions, Container, Holder, ObjectSet, Probe, World
 
 __all__ = [
     "HOLD",
@@ -37,6 +37,7 @@ __all__ = [
     "Command",
     "Conditions",
     "Container",
+    "FakeRobot",
     "GlotouchError",
     "Gripper",
     "GripperState",
@@ -59,6 +60,7 @@ __all__ = [
     "RobotDescription",
     "SafetyStop",
     "SetPayload",
+    "Snapshot",
     "StaleReading",
     "TactileFrame",
     "Tare",
@@ -66,5 +68,8 @@ __all__ = [
     "UnknownName",
     "World",
     "backend_entry_points",
+    "frozen_array",
     "load_backend",
+    "matrix_to_quat",
+    "quat_to_matrix",
 ]

@@ -14,14 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from glotouch_bt.robot.command import Command, GripperTarget, Request, SetPayload, Tare
-from glotouch_bt.robot.conditions import Conditions
 from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription
 from glotouch_bt.robot.errors import BadInput, ParamError, SafetyStop
 from glotouch_bt.robot.geometry import Array, Pose, frozen_array
 from glotouch_bt.robot.interface import Backend, Robot
 from glotouch_bt.robot.limits import Limits
 from glotouch_bt.robot.observation import GripperState, Observation, TactileFrame
-from glotouch_bt.robot.world import World
+from glotouch_bt.robot.scene import Conditions, World
 
 WrenchFunction = Callable[[Array, Array, Array], Array]
 

@@ -8,14 +8,12 @@ from types import TracebackType
 from typing import Self
 
 from glotouch_bt.robot.command import Command, Request, Ticket
-from glotouch_bt.robot.conditions import Conditions
 from glotouch_bt.robot.description import RobotDescription
-from glotouch_bt.robot.disturber import Disturber
 from glotouch_bt.robot.errors import BackendError
 from glotouch_bt.robot.limits import Limits
 from glotouch_bt.robot.observation import Observation
-from glotouch_bt.robot.referee import Referee
-from glotouch_bt.robot.world import World
+from glotouch_bt.robot.scene import Conditions, World
+from glotouch_bt.robot.simulation import Disturber, Referee
 
 Snapshot = Mapping[str, object]
 """Plain values, arrays, tuples, mappings, random generators and dataclasses, as `mission.values` can keep."""

@@ -10,7 +10,7 @@ import pytest
 
 from glotouch_bt.faults import FaultInjector
 from glotouch_bt.faults.plan import FaultPlan, check_plan
-from glotouch_bt.mission.source import parse_yaml
+from glotouch_bt.mission.read.yaml_source import parse_yaml
 from glotouch_bt.robot import HOLD, Array, Command, Observation
 from glotouch_bt.robot.fake import FakeRobot
 

@@ -11,7 +11,7 @@ import pytest
 from glotouch_bt.faults.models import wrong_models
 from glotouch_bt.mission.load import load_mission
 from glotouch_bt.robot import BadInput
-from glotouch_bt.robot.meshes import load_mesh
+from glotouch_bt.robot.scene.meshes import load_mesh
 from tests.faults.conftest import plan_of
 
 

@@ -14,10 +14,10 @@ from glotouch_bt.faults import FaultInjector
 from glotouch_bt.faults.catalogue import CATALOGUE, NAMED_BY
 from glotouch_bt.faults.plan import check_plan, read_plan
 from glotouch_bt.faults.trigger import Lasting, When
-from glotouch_bt.mission.findings import MissionFaults
-from glotouch_bt.mission.library import shipped
 from glotouch_bt.mission.load import load_mission
-from glotouch_bt.mission.source import parse_yaml
+from glotouch_bt.mission.read.library import shipped
+from glotouch_bt.mission.read.yaml_source import parse_yaml
+from glotouch_bt.mission.spec.findings import MissionFaults
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.fake import FakeRobot
 

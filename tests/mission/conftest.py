@@ -10,12 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from glotouch_bt.mission.build import BuiltTree, build_tree
-from glotouch_bt.mission.findings import Finding, MissionFaults
 from glotouch_bt.mission.load import Mission, load_mission
+from glotouch_bt.mission.spec.findings import Finding, MissionFaults
+from glotouch_bt.mission.tree.build import BuiltTree, build_tree
 from glotouch_bt.robot import HOLD, Array, GripperState, Limits, Observation
 from glotouch_bt.robot.fake import FAKE_ARM
-from skills.base import Context, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill import Context, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 
 
 class Item:

@@ -1,4 +1,4 @@
-"""What the specification of missions/retrieve.yaml is written with."""
+"""What the specification of glotouch_missions/retrieve.yaml is written with."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from glotouch_bt.mission.library import SkillShelf
+from glotouch_bt.mission.read.library import SkillShelf
 from glotouch_bt.mission_testing import ScriptedRun, ok, stand_in
-from glotouch_bt.touch import Candidate
+from glotouch_bt.perception.touch import Candidate
 
 SWEEP, JAWS, TAKE = "*/explore/*", "*/squeeze_all/*", "*/take_target/*"
 IN_ORDER, GO_ON = "*/bring the probe in order/*", "*/go on with what was found/stow*"

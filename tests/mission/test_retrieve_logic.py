@@ -1,4 +1,4 @@
-"""missions/retrieve.yaml as a specification: what it does when its skills end so or so. Exploring and squeezing.
+"""The mission retrieve.yaml as a specification: what it does when its skills end so or so. Exploring and squeezing.
 
 The skills are scripted, the tree and the runner are real. `glotouch test retrieve` with these files says which slips
 in the mission these tests do not notice.
@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from glotouch_bt.mission_testing import Call, fails, ok, stand_in
-from glotouch_bt.touch import Candidate, TouchSet
+from glotouch_bt.perception.touch import Candidate, TouchSet
 from tests.mission.retrieve_scripts import (
     FELT,
     GO_ON,

@@ -1,4 +1,4 @@
-"""missions/retrieve.yaml as a specification, continued: recognising, taking, the wrong object, the end."""
+"""glotouch_missions/retrieve.yaml as a specification, continued: recognising, taking, the wrong object, the end."""
 
 from __future__ import annotations
 

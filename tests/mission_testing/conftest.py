@@ -11,7 +11,7 @@ import pytest
 
 from glotouch_bt.mission.load import Mission, load_mission
 from glotouch_bt.robot import HOLD
-from skills.base import In, Out, Skill, SkillParams, SkillRun, param
+from glotouch_bt.skill import In, Out, Skill, SkillParams, SkillRun, param
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import pytest
 
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission_testing import ok, run_scripted
-from glotouch_bt.mission_testing.faulting import faulted, idle
+from glotouch_bt.mission_testing.faults import faulted, idle
 from glotouch_bt.robot import BadInput
 
 TREE = "\n  - rest\n  - rest: {name: later}\n"

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-import glotouch_bt.mission_testing.rerun  # noqa: F401  loaded before pytester, which unloads what it loads
-from glotouch_bt.mission.library import SkillShelf
+import glotouch_bt.mission_testing.mutation.rerun  # noqa: F401  loaded before pytester, which unloads what it loads
+from glotouch_bt.mission.read.library import SkillShelf
 
 dict(SkillShelf())
 pytest_plugins = ["pytester"]

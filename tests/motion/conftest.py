@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backends.rizon4 import RIZON4_XENSE
+from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.motion import Arm, Kinematics
 from glotouch_bt.robot import Command, Container, Holder, Limits, ObjectSet, Observation, Pose, Probe, World
 from glotouch_bt.robot.fake import FakeRobot

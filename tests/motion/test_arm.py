@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from backends.rizon4 import RIZON4_XENSE
+from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.motion import Arc, Arm, Line, Polyline
 from glotouch_bt.robot import Limits, MotionRefused, Observation, Pose, World
 from glotouch_bt.robot.fake import FAKE_ARM, FakeRobot, SpringWall

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from backends.rizon4 import RIZON4_XENSE
+from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.motion import Kinematics
 from glotouch_bt.robot import MotionRefused, ParamError, Pose, RobotDescription
 from glotouch_bt.robot.fake import FAKE_ARM
@@ -76,7 +76,7 @@ def test_jacobian_is_the_derivative(kinematics: Kinematics) -> None:
 
 def test_flange_matches_the_vendors_check_values() -> None:
     """flexiv_description's numbers, computed elsewhere: FLEXIV notes section 6."""
-    from backends.rizon4 import XENSE_GRIPPER
+    from glotouch_backends.rizon4 import XENSE_GRIPPER
 
     kinematics = Kinematics(RIZON4_XENSE)
     for degrees, position, quat in (

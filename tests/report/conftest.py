@@ -11,9 +11,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from glotouch_bt.mission.record import Recorder
+from glotouch_bt.mission.record.recorder import Recorder
+from glotouch_bt.perception.touch.values import Candidate, Contact, Contour, Layer, TouchSequence, TouchSet
 from glotouch_bt.robot import HOLD, Command, GripperState, GripperTarget, JointSetpoint, Observation, Pose, TactileFrame
-from glotouch_bt.touch.values import Candidate, Contact, Contour, Layer, TouchSequence, TouchSet
 
 TIP_M = 0.130
 POSE_B_K = Pose.planar([0.60, 0.02, -0.20], 0.1)

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from glotouch_bt.mission.record import Recorder
+from glotouch_bt.mission.record.recorder import Recorder
 from glotouch_bt.report import read_run, write_report
 from glotouch_bt.report.map import tip_path_K_m
 from glotouch_bt.report.timeline import spans

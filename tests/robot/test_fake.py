@@ -5,16 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from glotouch_bt.robot import (
-    Command,
-    GripperTarget,
-    JointSetpoint,
-    ParamError,
-    Pose,
-    SafetyStop,
-    Tare,
-    load_backend,
-)
+from glotouch_bt.robot import Command, GripperTarget, JointSetpoint, ParamError, Pose, SafetyStop, Tare, load_backend
 from glotouch_bt.robot.fake import FAKE_ARM, FakeBackend, FakeRobot, SpringWall, forward
 
 HOME = np.array(FAKE_ARM.home_q)

@@ -13,8 +13,9 @@ import pytest
 from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
-from backends.rizon4 import RIZON4_XENSE
+from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.motion import Arm
+from glotouch_bt.perception.touch import Candidate, Carried, Contact, Contour, fit_contour
 from glotouch_bt.robot import (
     HOLD,
     Array,
@@ -30,9 +31,8 @@ from glotouch_bt.robot import (
     World,
 )
 from glotouch_bt.robot.fake import FakeRobot, forward
-from glotouch_bt.touch import Candidate, Carried, Contact, Contour, fit_contour
-from skills.base import Context, Skill
-from skills.held_tool import HeldTool
+from glotouch_bt.skill import Context, Skill
+from glotouch_skills.common.probe.held_tool import HeldTool
 
 BRAKE_RAD_S2 = 2.5
 JUMP_RAD_S = 0.3  # a setpoint's velocity may change by this in a period; the hardest stop changes it by 0.05

@@ -10,14 +10,14 @@ from typing import ClassVar
 
 import pytest
 
-import skills
-from glotouch_bt.mission.library import SkillShelf
+import glotouch_skills
+from glotouch_bt.mission.read.library import SkillShelf
 from glotouch_bt.robot import HOLD
-from skills.base import UNCHANGED, Reason, Skill, SkillParams, SkillRun, UndeclaredFailure
+from glotouch_bt.skill import UNCHANGED, Reason, Skill, SkillParams, SkillRun, UndeclaredFailure
 
-FOLDER = Path(skills.__path__[0])
+FOLDER = Path(glotouch_skills.__path__[0])
 SHELF = SkillShelf()
-NAMES = sorted(n for n in SHELF if SHELF[n].__module__.startswith("skills."))
+NAMES = sorted(n for n in SHELF if SHELF[n].__module__.startswith("glotouch_skills."))
 # What the base class adds to every skill, and what motions raise deep below (MotionRefused), are not looked for.
 NOT_SEARCHED = {"motion_refused", "not_at_rest"}
 
@@ -26,7 +26,7 @@ class _Module:
     """Functions of one module of `skills` by name (`Class.method` for methods), and where imported names come from."""
 
     def __init__(self, name: str) -> None:
-        tree = ast.parse((FOLDER / f"{name}.py").read_text())
+        tree = ast.parse((FOLDER / f"{name.replace('.', '/')}.py").read_text())
         self.bodies: dict[str, ast.AST] = {}
         self.imports: dict[str, tuple[str, str]] = {}
         for node in tree.body:
@@ -35,8 +35,8 @@ class _Module:
             elif isinstance(node, ast.ClassDef):
                 self.bodies[node.name] = ast.Pass()
                 self.bodies |= {f"{node.name}.{m.name}": m for m in node.body if isinstance(m, ast.FunctionDef)}
-            elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("skills."):
-                self.imports |= {a.asname or a.name: (str(node.module)[7:], a.name) for a in node.names}
+            elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("glotouch_skills."):
+                self.imports |= {a.asname or a.name: (str(node.module)[16:], a.name) for a in node.names}
 
 
 @cache
@@ -63,8 +63,6 @@ def reachable(start: str, cls: str) -> set[str]:
             if word is None:
                 continue
             where, what = here.imports.get(word, (at, word))
-            if where == "base":
-                continue
             for other in module(where).bodies:
                 if (other == what or other.startswith(f"{what}.")) and (where, other) not in seen:
                     seen.add((where, other))
@@ -75,7 +73,7 @@ def reachable(start: str, cls: str) -> set[str]:
 @pytest.mark.parametrize("name", NAMES)
 def test_declared_failures_are_those_the_code_can_raise(name: str) -> None:
     skill = SHELF[name]
-    assert set(skill.FAILURES) - NOT_SEARCHED == reachable(skill.__module__[7:], skill.__name__)
+    assert set(skill.FAILURES) - NOT_SEARCHED == reachable(skill.__module__[16:], skill.__name__)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-from backends.flexiv_xense.simulated import ROBOT_SN, open_vendor_at
+from glotouch_backends.flexiv_xense.simulated import ROBOT_SN, open_vendor_at
 
 REACH_M = 0.08
 

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from backends.flexiv_xense.backend import PERIOD_S, FlexivXenseBackend
-from backends.flexiv_xense.driver import connect
-from backends.flexiv_xense.driver.endpoint import DriverSocket
-from backends.flexiv_xense.driver.messages import Block, Opened
-from backends.flexiv_xense.driver.serve import Log, serve
-from backends.flexiv_xense.link import Link
-from backends.flexiv_xense.options import read_options
-from backends.flexiv_xense.robot import FlexivXenseRobot
+from glotouch_backends.flexiv_xense.client.backend import PERIOD_S, FlexivXenseBackend
+from glotouch_backends.flexiv_xense.client.link import Link
+from glotouch_backends.flexiv_xense.client.options import read_options
+from glotouch_backends.flexiv_xense.client.robot import FlexivXenseRobot
+from glotouch_backends.flexiv_xense.driver.devices import connect
+from glotouch_backends.flexiv_xense.driver.endpoint import DriverSocket
+from glotouch_backends.flexiv_xense.driver.messages import Block, Opened
+from glotouch_backends.flexiv_xense.driver.serve import Log, serve
 from tests.backends.flexiv_xense.scripted import ScriptedVendor
 
 Open = Callable[..., FlexivXenseRobot]

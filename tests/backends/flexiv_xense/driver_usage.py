@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import backends.flexiv_xense.driver as driver
+import glotouch_backends.flexiv_xense.driver as driver
 
 FOLDER = Path(driver.__file__).parent
 ARM = {

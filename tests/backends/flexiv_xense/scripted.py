@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from backends.flexiv_xense.driver.clock import SteppedClock, WallClock
-from backends.rizon4 import RIZON4_XENSE
+from glotouch_backends.flexiv_xense.driver.clock import SteppedClock, WallClock
+from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot.fake import forward
 
 

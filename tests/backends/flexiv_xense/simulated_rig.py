@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from backends.flexiv_xense.simulated import ROBOT_SN, SimulatedVendor, open_vendor
-from backends.mujoco.wrench import hand_mass
-from backends.rizon4 import RIZON4_XENSE
+from glotouch_backends.flexiv_xense.simulated import ROBOT_SN, SimulatedVendor, open_vendor
+from glotouch_backends.mujoco.sensing.wrench import hand_mass
+from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import Array, Conditions
-from tests.testing.conformance_world import OPTIONS, WORLD
+from tests.conformance.conformance_world import OPTIONS, WORLD
 
 P_IN_E = [0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0]
 LIMITS = (0.375, 2.0, 3.0, 10.0)

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from backends.flexiv_xense.backend import FlexivXenseBackend, _arm_limits, _tool
-from backends.flexiv_xense.driver.arm_20 import Arm20
-from backends.flexiv_xense.driver.messages import Setpoint
+from glotouch_backends.flexiv_xense.client.backend import FlexivXenseBackend, _arm_limits, _tool
+from glotouch_backends.flexiv_xense.driver.devices.arm_20 import Arm20
+from glotouch_backends.flexiv_xense.driver.messages import Setpoint
 from tests.backends.flexiv_xense.scripted import Mode, ScriptedVendor
 
 

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from backends.flexiv_xense import FlexivXenseBackend
-from backends.flexiv_xense.options import read_options
-from backends.flexiv_xense.robot import FlexivXenseRobot
+from glotouch_backends.flexiv_xense import FlexivXenseBackend
+from glotouch_backends.flexiv_xense.client.options import read_options
+from glotouch_backends.flexiv_xense.client.robot import FlexivXenseRobot
+from glotouch_bt.commissioning.doctor import nearly_empty
 from glotouch_bt.mission.load import load_mission
 from glotouch_bt.robot import HOLD, BackendError, BadInput, Conditions, Observation, load_backend
-from glotouch_bt.study.doctor import nearly_empty
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def test_wrong_options_say_what_is_right(options: dict[str, object], text: str) 
 
 
 def test_the_simulated_devices_are_the_default_addresses_of_their_kind() -> None:
-    from backends.flexiv_xense.simulated import GRIPPER_ADDRESS, PAD_SNS, ROBOT_SN
+    from glotouch_backends.flexiv_xense.simulated import GRIPPER_ADDRESS, PAD_SNS, ROBOT_SN
 
     o = read_options({"devices": "simulated"})
     assert (o.robot, o.gripper, (o.left_pad, o.right_pad)) == (ROBOT_SN, GRIPPER_ADDRESS, PAD_SNS)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from backends.flexiv_xense.driver.clock import SteppedClock, WallClock
+from glotouch_backends.flexiv_xense.driver.clock import SteppedClock, WallClock
 
 
 def test_without_a_conductor_the_sleeper_moves_the_world() -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from backends.flexiv_xense.simulated import flexivrdk, xensegripper, xensesdk
+from glotouch_backends.flexiv_xense.simulated.vendor_api import flexivrdk, xensegripper, xensesdk
 from tests.backends.flexiv_xense.driver_usage import Use, uses
 from tests.backends.flexiv_xense.introspect_vendor import described, refusals
 from tests.backends.flexiv_xense.vendor_wheels import real_api

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from backends.flexiv_xense.driver.dating import Dating
+from glotouch_backends.flexiv_xense.driver.dating import Dating
 
 
 def stamped(made_s: float, drift: float = 0.0) -> tuple[int, int]:

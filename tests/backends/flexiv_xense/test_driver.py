@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from backends.flexiv_xense.driver.faults import DeviceFault
-from backends.rizon4 import RIZON4_XENSE
+from glotouch_backends.flexiv_xense.driver.faults import DeviceFault
+from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import (
     HOLD,
     BackendError,
@@ -347,7 +347,7 @@ def test_closing_stops_the_arm_and_releases_everything(open_robot: Open) -> None
 
 
 def test_an_unknown_version_is_refused() -> None:
-    from backends.flexiv_xense.driver.connect import api_of
+    from glotouch_backends.flexiv_xense.driver.devices.connect import api_of
 
     with pytest.raises(DeviceFault, match="dropped the Rizon"):
         api_of(SimpleNamespace(__version__="2.1.0"), "")

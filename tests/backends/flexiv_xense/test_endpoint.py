@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 import zmq.auth
 
-from backends.flexiv_xense.driver.endpoint import DriverSocket
-from backends.flexiv_xense.driver.messages import Accepted, HoldRequest, Quit
-from backends.flexiv_xense.link import Link
+from glotouch_backends.flexiv_xense.client.link import Link
+from glotouch_backends.flexiv_xense.driver.endpoint import DriverSocket
+from glotouch_backends.flexiv_xense.driver.messages import Accepted, HoldRequest, Quit
 from glotouch_bt.robot import BackendError
 
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backends.flexiv_xense.chain import Chain
-from backends.flexiv_xense.driver.frames import depth_map_m, payload_on_tool, wrench_map
-from backends.rizon4 import RIZON4_XENSE
+from glotouch_backends.flexiv_xense.client.chain import Chain
+from glotouch_backends.flexiv_xense.driver.frames import depth_map_m, payload_on_tool, wrench_map
+from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import Pose
 from glotouch_bt.robot.fake import forward
 

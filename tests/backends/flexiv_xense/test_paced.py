@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from backends.flexiv_xense.driver.messages import Cycle, Setpoint
-from backends.rizon4 import RIZON4_XENSE
+from glotouch_backends.flexiv_xense.driver.messages import Cycle, Setpoint
+from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import HOLD, BackendError, Command, JointSetpoint, Robot, Tare
 from glotouch_bt.robot.fake import forward
 from tests.backends.flexiv_xense.conftest import Open
@@ -99,8 +99,8 @@ def test_a_tare_runs_beside_the_loop(open_robot: Open) -> None:
 
 
 def test_a_second_client_is_told_so(open_robot: Open) -> None:
-    from backends.flexiv_xense.driver.messages import Block
-    from backends.flexiv_xense.link import Link
+    from glotouch_backends.flexiv_xense.client.link import Link
+    from glotouch_backends.flexiv_xense.driver.messages import Block
 
     robot = open_robot(ScriptedVendor(stepped=False), pace="real")
     other = Link(robot.link._address, lambda: None, paced=False)
@@ -123,7 +123,7 @@ def test_rubbish_is_refused_and_does_not_end_the_driver(open_robot: Open) -> Non
 def test_a_setpoint_of_another_length_is_refused(open_robot: Open) -> None:
     robot = open_robot(ScriptedVendor(), pace="lockstep")
     bad = Setpoint((0.0,) * 6, (0.0,) * 7, (0.0,) * 7, (0.0,) * 6)
-    from backends.flexiv_xense.driver.messages import Block
+    from glotouch_backends.flexiv_xense.driver.messages import Block
     from glotouch_bt.robot import ParamError
 
     with pytest.raises(ParamError, match="7 finite numbers"):

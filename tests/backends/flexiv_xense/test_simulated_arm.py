@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backends.flexiv_xense.simulated import ROBOT_SN
-from backends.flexiv_xense.simulated.arm import LINK_LOST_S
-from backends.mujoco.wrench import hand_mass
-from backends.rizon4 import RIZON4_XENSE
+from glotouch_backends.flexiv_xense.simulated import ROBOT_SN
+from glotouch_backends.flexiv_xense.simulated.arm import LINK_LOST_S
+from glotouch_backends.mujoco.sensing.wrench import hand_mass
+from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import Conditions, Pose
 from glotouch_bt.robot.geometry import quat_to_matrix
 from tests.backends.flexiv_xense.simulated_rig import LIMITS, Bench

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backends.flexiv_xense.simulated import PAD_SNS, ROBOT_SN, DistantVendor, open_vendor_at
-from backends.flexiv_xense.simulated.arm import LINK_LOST_S, STOP_RAD_S2
+from glotouch_backends.flexiv_xense.simulated import PAD_SNS, ROBOT_SN, DistantVendor, open_vendor_at
+from glotouch_backends.flexiv_xense.simulated.arm import LINK_LOST_S, STOP_RAD_S2
 from glotouch_bt.robot import Conditions
-from tests.testing.conformance_world import OPTIONS, WORLD
+from tests.conformance.conformance_world import OPTIONS, WORLD
 
 pytestmark = pytest.mark.slow
 SPEED_M_S = 0.10
@@ -33,7 +33,7 @@ def wait(seconds: float) -> None:
 def cell(tmp_path: Path) -> Iterator[Path]:
     """A running cell's folder: `socket` and `log`."""
     (tmp_path / "world").write_bytes(pickle.dumps((WORLD, Conditions(), 0, OPTIONS)))
-    module = "backends.flexiv_xense.simulated.cell"
+    module = "glotouch_backends.flexiv_xense.simulated.cell"
     command = [sys.executable, "-m", module, tmp_path / "world", tmp_path / "socket", tmp_path / "log"]
     process = subprocess.Popen(command, cwd=ROOT)
     yield tmp_path

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backends.flexiv_xense.simulated import GRIPPER_ADDRESS, PAD_SNS, SimulatedVendor
-from backends.flexiv_xense.simulated.flexiv_types import EPOCH_S
+from glotouch_backends.flexiv_xense.simulated import GRIPPER_ADDRESS, PAD_SNS, SimulatedVendor
+from glotouch_backends.flexiv_xense.simulated.vendor_api.flexiv_types import EPOCH_S
 from glotouch_bt.robot import Conditions, TactileFrame
 from tests.backends.flexiv_xense.simulated_rig import vendor
 

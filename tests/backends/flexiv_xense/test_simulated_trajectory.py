@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from backends.flexiv_xense.simulated.kinematics import rotation_between
-from backends.flexiv_xense.simulated.trajectory import STREAM_S, Trajectory, cubic_extremes, shortest
-from backends.mujoco.model import STEP_S
-from backends.rizon4 import RIZON4_XENSE
+from glotouch_backends.flexiv_xense.simulated.kinematics import rotation_between
+from glotouch_backends.flexiv_xense.simulated.trajectory import STREAM_S, Trajectory, cubic_extremes, shortest
+from glotouch_backends.mujoco.model.compile import STEP_S
+from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.motion import Kinematics as Planner
 from glotouch_bt.robot import Pose
 from tests.backends.flexiv_xense.simulated_rig import vendor

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from backends.mujoco import MujocoBackend
-from backends.mujoco.robot import MujocoRobot
+from glotouch_backends.mujoco import MujocoBackend
+from glotouch_backends.mujoco.robot import MujocoRobot
 from glotouch_bt.robot import (
     Array,
     Command,

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backends.mujoco import MujocoBackend
-from backends.mujoco.jaws import JawReports
-from backends.mujoco.robot import MujocoRobot
-from backends.mujoco.tactile import Pads
+from glotouch_backends.mujoco import MujocoBackend
+from glotouch_backends.mujoco.control.jaws import JawReports
+from glotouch_backends.mujoco.robot import MujocoRobot
+from glotouch_backends.mujoco.sensing.tactile import Pads
 from glotouch_bt.robot import Command, Conditions, GripperState, GripperTarget, ParamError, SetPayload
 
 Open = Callable[..., MujocoRobot]

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backends.mujoco import MujocoBackend
-from backends.mujoco.robot import MujocoRobot
+from glotouch_backends.mujoco import MujocoBackend
+from glotouch_backends.mujoco.robot import MujocoRobot
 from glotouch_bt.robot import (
     HOLD,
     BackendError,

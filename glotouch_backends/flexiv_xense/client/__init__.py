@@ -1,0 +1,5 @@
+"""TODO door of glotouch_backends/flexiv_xense/client."""
+
+from glotouch_backends.flexiv_xense.client.backend import FlexivXenseBackend
+
+__all__ = ["FlexivXenseBackend"]

@@ -1,0 +1,166 @@
+"""The factory of robots behind the vendors' interfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from glotouch_backends.flexiv_xense.client.link import OPEN_S, Link
+from glotouch_backends.flexiv_xense.client.options import Options, read_options
+from glotouch_backends.flexiv_xense.client.process import DriverProcess
+from glotouch_backends.flexiv_xense.client.referee import RemoteReferee
+from glotouch_backends.flexiv_xense.client.robot import FlexivXenseRobot
+from glotouch_backends.flexiv_xense.driver import PROTOCOL, ArmLimits, Block, Devices, HandLimits, Open, Opened, Tool
+from glotouch_backends.rizon4 import RIZON4_XENSE
+from glotouch_bt.robot import Backend, Conditions, Limits, Pose, Robot, RobotDescription, World
+from glotouch_bt.robot.simulation import Referee
+
+PERIOD_S = 0.01
+
+
+def _pose(pose: Pose) -> tuple[float, ...]:
+    return (*pose.position_m.tolist(), *pose.quat.tolist())
+
+
+def _tool(description: RobotDescription) -> Tool:
+    """The bare hand: gripper body and both fingers."""
+    g = description.gripper
+    fingers = 2.0 * g.finger_mass_kg
+    middle = g.pose_E_P.apply((g.finger.centre_m[0], 0.0, g.finger.centre_m[2]))
+    mass = g.mass_kg + fingers
+    com = [(g.mass_kg * c + fingers * m) / mass for c, m in zip(g.com_E_m, middle.tolist(), strict=True)]
+    return Tool(mass_kg=mass, com_E_m=tuple(com), pose_E_P=_pose(g.pose_E_P))
+
+
+def _arm_limits(description: RobotDescription, limits: Limits) -> ArmLimits:
+    joints = description.joints
+    return ArmLimits(
+        q_min=tuple(j.lower_rad for j in joints),
+        q_max=tuple(j.upper_rad for j in joints),
+        dq_max=tuple(j.velocity_rad_s for j in joints),
+        speed_m_s=limits.tcp_speed_m_s,
+        acceleration_m_s2=limits.tcp_acceleration_m_s2,
+        stop_acceleration_m_s2=limits.stop_acceleration_m_s2,
+        force_N=limits.hard_force_N,
+        torque_Nm=limits.hard_torque_Nm,
+        max_age_s=limits.max_age_s,
+    )
+
+
+def _within(description: RobotDescription, opened: Opened) -> RobotDescription:
+    """The description with the device's own joint ranges where those are narrower."""
+    joints = tuple(
+        replace(j, lower_rad=max(j.lower_rad, low), upper_rad=min(j.upper_rad, high))
+        for j, low, high in zip(description.joints, opened.q_min, opened.q_max, strict=True)
+    )
+    return replace(description, joints=joints)
+
+
+class FlexivXenseBackend(Backend):
+    """A Flexiv Rizon arm with a Xense gripper and tactile sensors, or simulated ones that speak the same interfaces.
+
+    Args:
+        description: The robot.
+        limits: Hard limits to enforce.
+    """
+
+    name = "flexiv_xense"
+    summary = "Flexiv Rizon 4 and Xense gripper through the vendors' SDKs, or simulated (--set devices=simulated)"
+
+    def __init__(self, description: RobotDescription = RIZON4_XENSE, limits: Limits | None = None) -> None:
+        self._description, self._limits = description, limits or Limits()
+
+    def open(self, world: World, conditions: Conditions, seed: int, options: Mapping[str, object]) -> Robot:
+        """See `Backend`; options in `Options`. Conditions and seed are for simulated devices."""
+        return self.connect(world, conditions, seed, read_options(options))
+
+    def look(self, world: World, conditions: Conditions, options: Mapping[str, object]) -> Robot:
+        """Connect without enabling, switching or commanding anything: for `glotouch doctor`."""
+        return self.connect(world, conditions, 0, read_options(options), move=False)
+
+    def is_real(self, options: Mapping[str, object]) -> bool:
+        """True if these options mean a real arm."""
+        return read_options(options).devices == "real"
+
+    def connect(
+        self,
+        world: World,
+        conditions: Conditions,
+        seed: int,
+        options: Options,
+        *,
+        move: bool = True,
+        on_progress: Callable[[str], None] | None = None,
+    ) -> FlexivXenseRobot:
+        """As `open`, for those who want to see it coming up, or (`move` false) only look: nothing is enabled."""
+        process: DriverProcess | None = None
+        if not options.driver:
+            process = DriverProcess(options)
+        link: Link | None = None
+        try:
+            if process is not None:
+                if options.devices == "simulated":
+                    process.put_world(world, conditions, seed, options.simulated)
+                process.start()
+            link = Link(
+                options.driver or (process.address if process else ""),
+                (lambda: None) if process is None else process.gone,
+                paced=not options.lockstep,
+                keys=Path(options.keys) if options.keys else None,
+            )
+            request = self._request(options, process, link.number(), move)
+            opened = link.ask(request, Opened, limit_s=OPEN_S, on_progress=on_progress or (lambda _: None))
+            link.beat()
+            first = link.wait(0, Block, limit_s=10.0)
+        except BaseException:
+            if link is not None:
+                link.close()
+            if process is not None:
+                process.end()
+            raise
+        description = _within(self._description, opened)
+        robot = FlexivXenseRobot(description, self._limits, PERIOD_S, link, process, opened.info, first)
+        robot.paced = not options.lockstep
+        return robot
+
+    def _request(self, options: Options, process: DriverProcess | None, number: int, move: bool) -> Open:
+        hand = self._description.gripper
+        simulated = options.devices == "simulated"
+        kind = "real" if not simulated else "simulated" if options.lockstep else "cell"
+        return Open(
+            number=number,
+            protocol=PROTOCOL,
+            devices=Devices(
+                kind=kind,
+                robot=options.robot,
+                api=options.api,
+                network=options.network,
+                gripper=options.gripper,
+                pads=(options.left_pad, options.right_pad) if options.left_pad else (),
+                world="" if process is None else process.world,
+                wrench=options.wrench,
+                feed_forward=options.feed_forward,
+                mirror=options.mirror,
+                link_loss=options.link_loss,
+            ),
+            tool=_tool(self._description),
+            arm=_arm_limits(self._description, self._limits),
+            hand=HandLimits(
+                stroke_m=hand.stroke_m,
+                speed_m_s=hand.speed_m_s,
+                force_N=hand.force_N,
+                pad_shape=hand.pad_shape,
+                pad_depth_m=hand.pad_depth_m,
+            ),
+            posture=self._description.home_q,
+            period_s=PERIOD_S,
+            lockstep=options.lockstep,
+            move=move,
+        )
+
+    def referee(self, robot: Robot) -> Referee | None:
+        """See `Backend`: only where the devices are simulated."""
+        if isinstance(robot, FlexivXenseRobot) and robot.info["devices"] != "real":
+            return RemoteReferee(robot.link)
+        return None

@@ -1,0 +1,196 @@
+"""The client's end of the link to the driver: requests with numbers, answers with limits on the wait, heartbeats."""
+
+from __future__ import annotations
+
+import threading
+import time
+import uuid
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+import zmq
+import zmq.auth
+
+from glotouch_backends.flexiv_xense.driver import (
+    HEART,
+    Answer,
+    Beat,
+    Failed,
+    Progress,
+    Refused,
+    Request,
+    decode_answer,
+    encode,
+)
+from glotouch_bt.robot import BackendError, ParamError, StaleReading
+
+A = TypeVar("A")
+BEAT_S = 0.1
+SILENT_S = 0.5
+"""A paced driver that says nothing for this long is lost; it sends a heartbeat every 0.05 s."""
+PATIENT_S = 10.0
+"""The same while a slow request is under way: the vendor's blocking calls may keep the whole driver waiting."""
+OPEN_S = 120.0
+LOCKSTEP_S = 120.0
+POLL_S = 0.2
+
+
+class DeviceError(BackendError):
+    """A device failed; the message ends with the arm's own event log."""
+
+
+def failure(answer: Failed) -> BackendError:
+    """Our error for the driver's, with the arm's event log in its text."""
+    if answer.kind == "stale":
+        error: BackendError = StaleReading(answer.message, answer.age_s, answer.limit_s)
+    else:
+        text = answer.message if answer.cause in answer.message else f"{answer.message} (from {answer.cause})"
+        error = DeviceError(text)
+    for e in answer.events:
+        error.add_note(f"arm event {e.level} {e.id}: {e.description} {e.advice}".rstrip())
+    if answer.events:
+        last = answer.events[-1]
+        error.args = (f"{error.args[0]}; last arm event: {last.level} {last.id} {last.description}",)
+    return error
+
+
+class Link:
+    """One client of one driver.
+
+    Args:
+        address: ipc://PATH or tcp://HOST:PORT.
+        alive: Tells why the driver's process is gone, or None while it runs.
+        paced: The driver must be heard of all the time.
+        keys: Folder with client.key_secret and driver.key, for tcp.
+
+    Attributes:
+        patient: A slow request is under way; see `PATIENT_S`.
+    """
+
+    def __init__(self, address: str, alive: Callable[[], str | None], *, paced: bool, keys: Path | None = None) -> None:
+        self._alive, self._paced = alive, paced
+        self._address, self._keys = address, keys
+        self._context = zmq.Context()
+        self._name = uuid.uuid4().hex.encode()  # in hex, so that no name ends as a heart's does, or begins with zero
+        self._socket = self._connect(self._name)
+        self.patient = False
+        self._number = 0
+        self._stop = threading.Event()
+        self._heart: threading.Thread | None = None
+        self._closed = False
+
+    def _connect(self, name: bytes) -> zmq.Socket[bytes]:
+        socket = self._context.socket(zmq.DEALER)
+        socket.setsockopt(zmq.LINGER, 200)
+        socket.setsockopt(zmq.IDENTITY, name)
+        if self._keys is not None:
+            public, secret = zmq.auth.load_certificate(self._keys / "client.key_secret")
+            server, _ = zmq.auth.load_certificate(self._keys / "driver.key")
+            socket.curve_publickey, socket.curve_secretkey = public, secret or b""
+            socket.curve_serverkey = server
+        socket.connect(self._address)
+        return socket
+
+    def number(self) -> int:
+        """A number for the next request."""
+        self._number += 1
+        return self._number
+
+    def beat(self) -> None:
+        """Send heartbeats from now on."""
+        self._heart = threading.Thread(target=self._beat_on, daemon=True)
+        self._heart.start()
+
+    def _beat_on(self) -> None:
+        body = encode(Beat())
+        socket = self._connect(self._name + HEART)  # a zmq socket belongs to one thread
+        while not self._stop.wait(BEAT_S):
+            _send(socket, body)
+        socket.close()
+
+    def post(self, request: Request) -> None:
+        """Send a request without waiting for its answer."""
+        if self._closed:
+            raise BackendError("the link to the driver is closed")
+        _send(self._socket, encode(request))
+
+    def ask(
+        self,
+        request: Request,
+        answer: type[A],
+        *,
+        limit_s: float = LOCKSTEP_S,
+        on_progress: Callable[[str], None] | None = None,
+    ) -> A:
+        """Send a request and wait for its answer.
+
+        Raises:
+            BackendError: The driver is gone or silent, or says that a device failed.
+            ParamError: It refused a command.
+        """
+        self.post(request)
+        return self.wait(request.number, answer, limit_s=limit_s, on_progress=on_progress)  # type: ignore[union-attr]
+
+    def wait(
+        self,
+        number: int,
+        kind: type[A],
+        *,
+        limit_s: float = LOCKSTEP_S,
+        on_progress: Callable[[str], None] | None = None,
+    ) -> A:
+        """The answer to a request sent before; errors as in `ask`."""
+        began = heard = time.perf_counter()
+        quiet_s = limit_s
+        if self._paced and on_progress is None:
+            quiet_s = PATIENT_S if self.patient else SILENT_S
+        while True:
+            answer = self._receive(POLL_S)
+            now = time.perf_counter()
+            if answer is None:
+                gone = self._alive()
+                if gone is not None:
+                    raise BackendError(f"the driver has ended: {gone}")
+                if now - heard > quiet_s:
+                    raise BackendError(f"nothing heard of the driver for {now - heard:.2f} s (limit {quiet_s:g} s)")
+                continue
+            heard = now
+            if isinstance(answer, Progress) and on_progress is not None:
+                on_progress(answer.text)
+            if isinstance(answer, Failed) and answer.number in (0, number):
+                raise failure(answer)
+            if isinstance(answer, Refused) and answer.number in (0, number):
+                raise ParamError(answer.name, answer.value, answer.rule)
+            if isinstance(answer, kind) and getattr(answer, "number", number) == number:
+                return answer
+            if now - began > limit_s:
+                raise BackendError(f"the driver did not answer within {limit_s:g} s")
+
+    def _receive(self, timeout_s: float) -> Answer | None:
+        if not self._socket.poll(round(timeout_s * 1e3)):
+            return None
+        try:
+            answer: Answer = decode_answer(self._socket.recv(zmq.NOBLOCK))
+        except msgspec.MsgspecError as e:
+            raise BackendError(f"the driver's answer cannot be read: {e}") from e
+        return answer
+
+    def close(self) -> None:
+        """Idempotent; heartbeats end."""
+        if self._closed:
+            return
+        self._closed = True
+        self._stop.set()
+        if self._heart is not None:
+            self._heart.join()
+        self._socket.close()
+        self._context.term()
+
+
+def _send(socket: zmq.Socket[bytes], body: bytes) -> None:
+    try:
+        socket.send(body, zmq.NOBLOCK)
+    except zmq.Again:
+        return  # nobody takes it; whoever waits for an answer finds out

@@ -1,0 +1,222 @@
+"""The robot behind the driver: one cycle is one request and its block."""
+
+from __future__ import annotations
+
+import math
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from glotouch_backends.flexiv_xense.client.chain import Chain
+from glotouch_backends.flexiv_xense.client.link import Link
+from glotouch_backends.flexiv_xense.client.process import DriverProcess
+from glotouch_backends.flexiv_xense.driver import (
+    COLUMNS,
+    Accepted,
+    Block,
+    Cycle,
+    HoldRequest,
+    Jaws,
+    Maps,
+    PayloadRequest,
+    Quit,
+    Setpoint,
+    TareRequest,
+)
+from glotouch_bt.robot import (
+    HOLD,
+    Array,
+    BackendError,
+    Command,
+    GlotouchError,
+    GripperState,
+    JointSetpoint,
+    Limits,
+    Observation,
+    ParamError,
+    Request,
+    Robot,
+    RobotDescription,
+    SafetyStop,
+    TactileFrame,
+    Tare,
+    Ticket,
+)
+
+AGREE_M, AGREE_RAD = 1e-3, 0.01
+"""A setpoint's pose may differ from its joints' by this; more means that the plan is for another arm."""
+QUIT_S = 10.0
+
+
+@dataclass
+class SlowTicket:
+    """A `Ticket` the driver completes."""
+
+    done: bool = False
+    error: str | None = None
+
+
+class FlexivXenseRobot(Robot):
+    """See `Robot`. Made by `FlexivXenseBackend.open`.
+
+    Attributes:
+        link, process: To the driver, and the driver if it is ours.
+        info: What the devices say about themselves.
+        late_periods: Control periods so far that passed without a command of ours.
+        latency_s: Of the last cycle: from the call to the arm having the setpoint, and from the newest sample's reading
+            to the observation; without the wait for the period's end between them. One machine only.
+    """
+
+    def __init__(
+        self,
+        description: RobotDescription,
+        limits: Limits,
+        period_s: float,
+        link: Link,
+        process: DriverProcess | None,
+        info: dict[str, str],
+        first: Block,
+    ) -> None:
+        self.description, self.limits, self.period_s = description, limits, period_s
+        self.link, self.process, self.info = link, process, info
+        self.late_periods = 0
+        self.latency_s = 0.0
+        self._chain = Chain(description)
+        self._tickets: dict[int, SlowTicket] = {}
+        self._failed: BackendError | None = None
+        self._closed = False
+        self._observation = self._take(first)
+
+    def observe(self) -> Observation:
+        """See `Robot`."""
+        return self._observation
+
+    def cycle(self, command: Command) -> Observation:
+        """See `Robot`."""
+        if self._closed:
+            raise BackendError("the robot is closed")
+        if self._failed is not None:
+            raise self._failed
+        setpoint = None if command.motion is None else self._setpoint(command.motion)
+        g = command.gripper
+        jaws = None if g is None else Jaws(float(g.aperture_m), float(g.speed_m_s), float(g.force_N))
+        number, began = self.link.number(), time.monotonic()
+        try:
+            block = self.link.ask(Cycle(number=number, setpoint=setpoint, jaws=jaws, tactile=command.tactile), Block)
+        except BackendError as e:
+            self._failed = e
+            self._end_tickets(str(e))
+            raise
+        self.latency_s = (block.sent_s - began) + (time.monotonic() - block.read_s)
+        self._observation = self._take(block)
+        if block.stop is not None:
+            raise SafetyStop(*block.stop)
+        return self._observation
+
+    def start(self, request: Request) -> Ticket:
+        """See `Robot`."""
+        number, ticket = self.link.number(), SlowTicket()
+        message: TareRequest | PayloadRequest
+        if isinstance(request, Tare):
+            if not (math.isfinite(request.duration_s) and request.duration_s > 0):
+                raise ParamError("tare.duration_s", request.duration_s, "finite and positive")
+            message = TareRequest(number=number, ticket=number, duration_s=request.duration_s)
+        else:
+            if not (math.isfinite(request.mass_kg) and request.mass_kg >= 0):
+                raise ParamError("payload.mass_kg", request.mass_kg, "finite and not negative")
+            com = tuple(request.com_P_m.tolist())
+            message = PayloadRequest(number=number, ticket=number, mass_kg=float(request.mass_kg), com_P_m=com)
+        self._tickets[number] = ticket
+        self.link.patient = True
+        self.link.ask(message, Accepted)
+        return ticket
+
+    def hold(self) -> None:
+        """See `Robot`."""
+        if self._closed or self._failed is not None:
+            return  # the driver holds by itself: on a fault, and when it hears nothing
+        try:
+            self.link.ask(HoldRequest(number=self.link.number()), Accepted, limit_s=QUIT_S)
+        except GlotouchError as e:
+            self._failed = e if isinstance(e, BackendError) else self._failed
+
+    def close(self) -> None:
+        """See `Robot`: the driver stops the arm, releases the devices and ends."""
+        if self._closed:
+            return
+        self._closed = True
+        with suppress(GlotouchError):  # else it is gone already
+            self.link.post(Quit(number=self.link.number()))
+        if self.process is not None:
+            self.process.end()
+        self.link.close()
+
+    def rest(self) -> Observation:
+        """One period at rest; for those who only want to look."""
+        return self.cycle(HOLD)
+
+    def _setpoint(self, motion: JointSetpoint) -> Setpoint:
+        """What goes over the wire: the pose that is commanded, and the twist its joints' speeds give.
+
+        Raises:
+            ParamError: Not finite, of another shape, or the pose is not what the joints realise.
+        """
+        dof = self.description.dof
+        try:
+            q, dq = np.asarray(motion.q, dtype=np.float64), np.asarray(motion.dq, dtype=np.float64)
+        except (TypeError, ValueError) as e:
+            raise ParamError("setpoint", motion, f"arrays of shape ({dof},)") from e
+        for name, value in (("q", q), ("dq", dq)):
+            if value.shape != (dof,) or np.count_nonzero(np.isfinite(value)) < dof:
+                raise ParamError(f"setpoint.{name}", value.tolist(), f"{dof} finite numbers")
+        pose, twist = self._chain.pose_and_twist(q, dq)
+        asked = motion.pose_B_P
+        away = float(np.abs(pose.position_m - asked.position_m).max())
+        same = abs(float(pose.quat @ asked.quat))
+        if away > AGREE_M or 2.0 * math.acos(min(1.0, same)) > AGREE_RAD:
+            raise ParamError(
+                "setpoint.pose_B_P", f"{away * 1e3:.2f} mm from where its joints put P", "the pose its joints realise"
+            )
+        return Setpoint(
+            tuple(q.tolist()),
+            tuple(dq.tolist()),
+            (*asked.position_m.tolist(), *asked.quat.tolist()),
+            tuple(twist.tolist()),
+        )
+
+    def _take(self, block: Block) -> Observation:
+        for done in block.done:
+            ticket = self._tickets.pop(done.ticket, None)
+            if ticket is not None:
+                ticket.error, ticket.done = done.error or None, True
+        self.link.patient = bool(self._tickets)
+        self.late_periods += block.late
+        rows = np.frombuffer(block.samples, dtype="<f8").reshape(-1, COLUMNS)
+        j = block.jaws
+        return Observation(
+            stamp_s=np.frombuffer(block.stamps, dtype="<f8"),
+            q=rows[:, 0:7],
+            dq=rows[:, 7:14],
+            position_B_P=rows[:, 14:17],
+            quat_B_P=rows[:, 17:21],
+            wrench_S=rows[:, 21:27],
+            gripper=GripperState(j.stamp_s, j.aperture_m, j.force_N, j.moving),
+            tactile=None if block.maps is None else _frame(block.maps),
+        )
+
+    def _end_tickets(self, why: str) -> None:
+        for ticket in self._tickets.values():
+            ticket.error, ticket.done = why, True
+        self._tickets.clear()
+
+
+def _frame(maps: Maps) -> TactileFrame:
+    shape = (maps.rows, maps.columns)
+    left, right = (_map(b, shape) for b in (maps.left, maps.right))
+    return TactileFrame(maps.stamp_s, left, right)
+
+
+def _map(body: bytes, shape: tuple[int, int]) -> Array:
+    return np.frombuffer(body, dtype="<f8").reshape(shape)

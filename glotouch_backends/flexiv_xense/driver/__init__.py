@@ -1,0 +1,76 @@
+"""The driver: a small process that holds the vendors' SDKs, and stops the arm whatever happens to its client.
+
+Stands alone on Python 3.10 (numpy, pyzmq, msgspec and the SDKs), where it is installed as `glotouch_driver`; imports
+nothing of the rest of the project. `messages` is what it shares with its client.
+"""
+
+from .clock import Clock, SteppedClock, WallClock
+from .endpoint import HEART
+from .messages import (
+    COLUMNS,
+    PROTOCOL,
+    Accepted,
+    Answer,
+    ArmLimits,
+    Beat,
+    Block,
+    Cycle,
+    Devices,
+    Failed,
+    HandLimits,
+    HoldRequest,
+    Jaws,
+    Maps,
+    Open,
+    Opened,
+    PayloadRequest,
+    Progress,
+    Quit,
+    RefereeAnswer,
+    RefereeRequest,
+    Refused,
+    Request,
+    Setpoint,
+    TareRequest,
+    Tool,
+    decode_answer,
+    encode,
+)
+from .priority import DEVICES, hurry
+
+__all__ = [
+    "COLUMNS",
+    "DEVICES",
+    "HEART",
+    "PROTOCOL",
+    "Accepted",
+    "Answer",
+    "ArmLimits",
+    "Beat",
+    "Block",
+    "Clock",
+    "Cycle",
+    "Devices",
+    "Failed",
+    "HandLimits",
+    "HoldRequest",
+    "Jaws",
+    "Maps",
+    "Open",
+    "Opened",
+    "PayloadRequest",
+    "Progress",
+    "Quit",
+    "RefereeAnswer",
+    "RefereeRequest",
+    "Refused",
+    "Request",
+    "Setpoint",
+    "SteppedClock",
+    "TareRequest",
+    "Tool",
+    "WallClock",
+    "decode_answer",
+    "encode",
+    "hurry",
+]

@@ -1,0 +1,147 @@
+"""The Xense gripper: our own range clamps, and a watch on readings that repeat for ever when the link is gone."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ..clock import Clock
+from ..faults import CommandRefused, DeviceFault, vendor_call
+from ..frames import MM
+from ..messages import HandLimits, Jaws, JawState
+
+MOVING_M_S = 0.002
+ANSWER_S = 1.0
+"""A gripper that was told to move must show some change within this."""
+FAR_M = 1e-3
+"""A target nearer than this need not show."""
+GRIPPING = 0.5
+"""A force beyond this share of the limit explains why the jaws do not close further."""
+FIRST_STATUS_S = 5.0
+POLL_S = 0.01
+SERIAL = "serial:"
+
+
+def open_gripper(sdk: Any, address: str) -> Any:
+    """The vendor's gripper at a MAC or IP address, or at "serial:PORT".
+
+    Raises:
+        DeviceFault: It cannot be reached (the vendor raises a bare Exception after some seconds).
+    """
+    with vendor_call(f"connecting to the gripper at {address}", "connect"):
+        if address.startswith(SERIAL):
+            return sdk.XenseGripper.create(port=address[len(SERIAL) :])
+        return sdk.XenseGripper.create(address)
+
+
+class Gripper:
+    """Targets in, states out. Aperture 0 is closed, as everywhere in this project (the vendor's 85 mm is open).
+
+    Args:
+        device: From `open_gripper`.
+        clock: Time.
+        limits: Range of the hand.
+        link_loss: What this model does when its link is lost: "holds" or "opens". Nobody can ask it then, so a person
+            is told.
+    """
+
+    def __init__(self, device: Any, clock: Clock, limits: HandLimits, link_loss: str = "holds") -> None:
+        self._then = "keeps its grip" if link_loss == "holds" else "LETS GO of what it holds"
+        self._device, self._clock, self._limits = device, clock, limits
+        self._target: Jaws | None = None
+        self._told_s = -math.inf
+        self._seen: tuple[float, float, float] | None = None
+        self._changed_s = clock.now_s()
+        self._answered = True
+        self.state = JawState(clock.now_s(), math.nan, 0.0, False)
+
+    def wait_for_status(self) -> None:
+        """The vendor has none right after connecting.
+
+        Raises:
+            DeviceFault: None came.
+        """
+        until = self._clock.now_s() + FIRST_STATUS_S
+        while True:
+            with vendor_call("reading the gripper", "link"):
+                status = self._device.get_gripper_status()
+            if status is not None:
+                self._take(status)
+                return
+            now = self._clock.now_s()
+            if now >= until:
+                raise DeviceFault("connect", f"the gripper sent no status within {FIRST_STATUS_S:g} s")
+            self._clock.sleep_until(now + POLL_S)
+
+    def check(self, target: Jaws) -> None:
+        """Refuse what the hand cannot do.
+
+        Raises:
+            CommandRefused: Not finite or out of range.
+        """
+        limits = self._limits
+        for name, value, low, high in (
+            ("aperture_m", target.aperture_m, 0.0, limits.stroke_m),
+            ("speed_m_s", target.speed_m_s, 1e-4, limits.speed_m_s),
+            ("force_N", target.force_N, 0.1, limits.force_N),
+        ):
+            if not (math.isfinite(value) and low - 1e-9 <= value <= high + 1e-9):
+                raise CommandRefused(f"gripper.{name}", value, f"within {low:g} .. {high:g}")
+
+    def send(self, target: Jaws) -> None:
+        """A (checked) target; the vendor's own range checks cannot be relied on, so it is clamped once more."""
+        limits = self._limits
+        aperture = min(max(target.aperture_m, 0.0), limits.stroke_m)
+        speed, force = min(target.speed_m_s, limits.speed_m_s), min(target.force_N, limits.force_N)
+        with vendor_call("commanding the gripper", "link"):
+            self._device.set_position(aperture / MM, speed / MM, force)
+        if self._target is None or abs(aperture - self._target.aperture_m) > FAR_M:
+            self._answered, self._told_s = False, self._clock.now_s()
+        self._target = Jaws(aperture, speed, force)
+
+    def poll(self) -> JawState:
+        """The newest status.
+
+        Raises:
+            DeviceFault: stale: it should have moved by now and shows no sign of it.
+        """
+        with vendor_call("reading the gripper", "link"):
+            status = self._device.get_gripper_status()
+        if status is None:
+            raise DeviceFault("link", f"the gripper has no status any more; without its link this model {self._then}")
+        self._take(status)
+        now, target = self.state.stamp_s, self._target
+        if target is None or self._answered or now - self._told_s < ANSWER_S:
+            return self.state
+        closing = target.aperture_m < self.state.aperture_m
+        blocked = closing and self.state.force_N > GRIPPING * target.force_N
+        if abs(target.aperture_m - self.state.aperture_m) < FAR_M or blocked:
+            self._answered = True
+            return self.state
+        raise DeviceFault(
+            "stale",
+            f"the gripper was told to go to {target.aperture_m / MM:.1f} mm and still reports "
+            f"{self.state.aperture_m / MM:.1f} mm; it is blocked, or its link is lost: then this model "
+            f"{self._then}",
+            age_s=now - self._changed_s,
+            limit_s=ANSWER_S,
+        )
+
+    def _take(self, status: Any) -> None:
+        with vendor_call("reading the gripper's status"):
+            seen = float(status["position"]), float(status["velocity"]), float(status["force"])
+        if not all(map(math.isfinite, seen)):
+            raise DeviceFault("vendor", f"the gripper reports {status!r}")
+        now = self._clock.now_s()
+        if seen != self._seen:
+            self._answered = self._answered or self._seen is not None
+            self._seen, self._changed_s = seen, now
+        position, velocity, force = seen
+        self.state = JawState(now, position * MM, abs(force), abs(velocity * MM) > MOVING_M_S)
+
+    def release(self) -> None:
+        """Let go of the device (not of what it grips); never raises."""
+        try:
+            self._device.release()
+        except Exception:  # it is being left behind; what matters has been stopped before
+            return

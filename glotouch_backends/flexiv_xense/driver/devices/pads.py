@@ -1,0 +1,154 @@
+"""The two tactile sensors: same-frame reads, millimetres to metres, frames that are missing or late.
+
+A read takes as long as the sensor's own processing does, so it is done beside the loop, and only while frames are
+wanted.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any
+
+import numpy as np
+
+from ..clock import Clock
+from ..faults import DeviceFault, vendor_call
+from ..frames import Array, depth_map_m
+from ..messages import HandLimits, Maps
+
+LEFT, RIGHT = 0, 1
+SAME_CLOCK_S = 1.0
+"""Which clock a sensor stamps with is not documented. Stamps this near our clock, or this machine's calendar time, are
+on it; others are shifted by the smallest lateness seen."""
+PAIR_S = 0.04
+"""Two maps belong together if their stamps differ by less: one frame of the slower rate in use."""
+MISSING_S = 1.0
+"""No frame for this long while they are wanted is a fault."""
+IDLE_S = 0.2
+"""The reader ends when nobody has wanted a frame for this long."""
+POLL_S = 0.005
+
+
+def open_sensor(sdk: Any, serial: str) -> Any:
+    """One sensor by serial number, with its reference taken now: nothing may touch the pads.
+
+    Raises:
+        DeviceFault: It cannot be opened.
+    """
+    with vendor_call(f"opening tactile sensor {serial}", "connect"):
+        sensor = sdk.Sensor.create(serial)
+        sensor.calibrateSensor()
+        return sensor
+
+
+class Pads:
+    """Pairs of depth maps, on demand.
+
+    Args:
+        sdk: The vendor's module, for its output types.
+        sensors: Left and right, from `open_sensor`.
+        clock: Time.
+        limits: Shape of the maps.
+        mirror: Which pad's columns run along -x_P.
+    """
+
+    def __init__(self, sdk: Any, sensors: tuple[Any, Any], clock: Clock, limits: HandLimits, mirror: str) -> None:
+        self._sensors, self._clock = sensors, clock
+        self._shape, self._most = limits.pad_shape, limits.pad_depth_m
+        self._types = sdk.Sensor.OutputType.Depth, sdk.Sensor.OutputType.TimeStamp
+        self._mirrored = mirror == "left", mirror == "right"
+        self._lateness = [math.inf, math.inf]
+        self._last = [-math.inf, -math.inf]
+        self._maps: list[Array | None] = [None, None]
+        self._stamps = [-math.inf, -math.inf]
+        self._wanted_s = -math.inf
+        self._reading = False
+        self._newest: Maps | None = None
+        self._newest_s = -math.inf
+        self._failed: DeviceFault | None = None
+        self._closed = False
+
+    def want(self) -> None:
+        """Frames are wanted now; called once a period."""
+        now = self._clock.now_s()
+        if now - self._wanted_s > IDLE_S:
+            self._newest, self._newest_s = None, now
+        self._wanted_s = now
+        if not self._reading and not self._closed:
+            self._reading = True
+            self._clock.spawn(self._read_on)
+
+    def take(self) -> Maps | None:
+        """A new pair, once.
+
+        Raises:
+            DeviceFault: A sensor failed, or no pair has come for too long.
+        """
+        if self._failed is not None:
+            raise self._failed
+        now = self._clock.now_s()
+        if now - self._wanted_s <= IDLE_S and now - self._newest_s > MISSING_S:
+            raise DeviceFault(
+                "stale", "the tactile sensors deliver no frames", age_s=now - self._newest_s, limit_s=MISSING_S
+            )
+        newest, self._newest = self._newest, None
+        return newest
+
+    def _read_on(self) -> None:
+        try:
+            while not self._closed and self._clock.now_s() - self._wanted_s <= IDLE_S:
+                for side in (LEFT, RIGHT):
+                    self._read(side)
+                self._pair()
+                self._clock.sleep_until(self._clock.now_s() + POLL_S)
+        except DeviceFault as e:
+            self._failed = e
+        finally:
+            self._reading = False
+
+    def _read(self, side: int) -> None:
+        """One read; depth and stamp come from the same frame only when asked for in one call."""
+        with vendor_call(f"reading the {('left', 'right')[side]} tactile sensor", "link"):
+            depth, stamp = self._sensors[side].selectSensorInfo(*self._types)
+            if depth is None or stamp is None:
+                return
+            taken = float(stamp)
+            if taken == self._last[side]:
+                return
+            self._last[side] = taken
+            taken = self._on_our_clock(side, taken)
+            self._maps[side] = depth_map_m(depth, self._shape, self._mirrored[side])
+            self._stamps[side] = taken
+
+    def _on_our_clock(self, side: int, stamp_s: float) -> float:
+        now = self._clock.now_s()
+        if abs(now - stamp_s) < SAME_CLOCK_S:
+            return stamp_s
+        calendar = time.time()  # noqa: TID251  the sensor's clock is compared with, no time is measured
+        if abs(calendar - stamp_s) < SAME_CLOCK_S:
+            return now - (calendar - stamp_s)
+        self._lateness[side] = min(self._lateness[side], now - stamp_s)
+        return stamp_s + self._lateness[side]
+
+    def _pair(self) -> None:
+        left, right = self._maps
+        if left is None or right is None or abs(self._stamps[LEFT] - self._stamps[RIGHT]) > PAIR_S:
+            return
+        stamp = 0.5 * (self._stamps[LEFT] + self._stamps[RIGHT])
+        self._maps = [None, None]
+        self._newest = Maps(stamp, *self._shape, _bytes(left), _bytes(right))
+        self._newest_s = self._clock.now_s()
+
+    def release(self) -> None:
+        """Mandatory by the vendor's documentation; never raises."""
+        self._closed = True
+        for sensor in self._sensors:
+            try:
+                sensor.release()
+            except Exception:  # it is being left behind
+                continue
+
+
+def _bytes(array: Array) -> bytes:
+    return np.ascontiguousarray(array, dtype="<f8").tobytes()

@@ -1,0 +1,90 @@
+"""The vendors' modules, real or simulated: the only place that decides which."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol, cast
+
+from ..clock import Clock, WallClock
+from ..faults import DeviceFault
+
+SIMULATED = "glotouch_backends.flexiv_xense.simulated"
+
+
+class Vendor(Protocol):
+    """Modules with the vendors' names, and the clock their devices live by."""
+
+    @property
+    def flexivrdk(self) -> Any:
+        """The arm's interface."""
+        ...
+
+    @property
+    def xensesdk(self) -> Any:
+        """The pads'."""
+        ...
+
+    @property
+    def xensegripper(self) -> Any:
+        """The gripper's."""
+        ...
+
+    @property
+    def clock(self) -> Clock:
+        """Time."""
+        ...
+
+
+@dataclass(frozen=True)
+class _Installed:
+    flexivrdk: Any
+    xensesdk: Any
+    xensegripper: Any
+    clock: Clock
+
+
+def _module(name: str, needed: bool) -> Any:
+    if not needed:
+        return None
+    try:
+        return importlib.import_module(name)
+    except ImportError as e:
+        why = f"the vendor's package {name!r} cannot be imported by {sys.executable} ({e}); --set python=INTERPRETER"
+        raise DeviceFault("connect", f"{why} names one that has it") from e
+
+
+def load_vendor(kind: str, world: str = "", *, gripper: bool = True, pads: bool = True) -> Vendor:
+    """The vendors' modules.
+
+    Args:
+        kind: "real": the installed packages. "simulated": a world in this process, on a clock that steps it; `world` is
+            a file our own client wrote. "cell": a world in a process of its own, on the wall's clock; `world` is its
+            address.
+        world: See `kind`.
+        gripper, pads: False if there is none, so that its package need not be there.
+
+    Raises:
+        DeviceFault: Something is not installed here, or the world cannot be built.
+    """
+    if kind == "real":
+        return _Installed(
+            _module("flexivrdk", True),
+            _module("xensesdk", pads),
+            _module("xensegripper", gripper),
+            WallClock(),
+        )
+    if kind not in ("simulated", "cell"):
+        raise DeviceFault("connect", f"devices {kind!r}: must be real, simulated or cell")
+    try:
+        simulated = importlib.import_module(SIMULATED)
+    except ImportError as e:
+        raise DeviceFault("connect", f"simulated devices need the whole project installed here: {e}") from e
+    try:
+        if kind == "cell":
+            return cast("Vendor", simulated.open_vendor_at(world))
+        return cast("Vendor", simulated.open_vendor(Path(world).read_bytes()))
+    except Exception as e:
+        raise DeviceFault("world", f"the simulated world cannot be opened: {type(e).__name__}: {e}") from e

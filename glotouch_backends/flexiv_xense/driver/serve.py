@@ -1,0 +1,93 @@
+"""One session of the driver with one client."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from .devices import connect
+from .endpoint import DriverSocket
+from .faults import DeviceFault
+from .loop import Lockstep, Paced
+from .messages import PROTOCOL, Beat, Failed, Open, Opened, Progress, Quit
+from .session import Session
+
+FIRST_WORD_S = 60.0
+
+
+class Log:
+    """One JSON line an event, with the wall's monotonic clock; written at once, read after a crash."""
+
+    def __init__(self, path: Path | None) -> None:
+        self._file = None if path is None else path.open("a", encoding="utf-8")
+
+    def __call__(self, event: str, **values: object) -> None:
+        """Write one line."""
+        if self._file is not None:
+            line = {"monotonic_s": time.monotonic(), "pid": os.getpid(), "event": event, **values}
+            self._file.write(json.dumps(line) + "\n")
+            self._file.flush()
+
+    def close(self) -> None:
+        """Idempotent."""
+        if self._file is not None:
+            self._file.close()
+
+
+def serve(socket: DriverSocket, log: Log, stopping: Callable[[], bool], *, forever: bool = False) -> int:
+    """One session, from its Open to its end; the arm is stopped and released on every path.
+
+    Returns:
+        0: ended as asked; 1: a device did not come up, or broke down outside a cycle; 4: nobody came.
+    """
+    request = _first(socket, stopping, forever=forever)
+    if request is None:
+        return 4
+    if request.protocol != PROTOCOL:
+        message = f"client speaks protocol {request.protocol}, this driver {PROTOCOL}: install matching versions"
+        socket.send(Failed(number=request.number, kind="connect", message=message))
+        return 1
+    try:
+        devices = connect(request, lambda text: socket.send(Progress(text)))
+    except DeviceFault as e:
+        log("not opened", kind=e.kind, message=e.message)
+        cause = "" if e.__cause__ is None else f"{type(e.__cause__).__name__}: {e.__cause__}"
+        socket.send(Failed(number=request.number, kind=e.kind, message=e.message, cause=cause, events=e.events))
+        return 1
+    try:
+        session = Session(devices, request)
+        low, high = devices.arm.joint_limits()
+        info = devices.arm.describe() | {"devices": request.devices.kind, "python": sys.version.split()[0]}
+        socket.send(Opened(number=request.number, info=info, q_min=low, q_max=high))
+        log("opened", kind=request.devices.kind)
+        loop = (Lockstep if request.lockstep else Paced)(session, socket, log, stopping)
+        loop.run(request.period_s)
+    except DeviceFault as e:
+        log("fault", kind=e.kind, message=e.message)
+        socket.send(Failed(number=request.number, kind=e.kind, message=e.message, events=e.events))
+        return 1
+    finally:
+        if request.move:
+            devices.release()
+        log("released")
+    return 0
+
+
+def _first(socket: DriverSocket, stopping: Callable[[], bool], *, forever: bool) -> Open | None:
+    """The request that opens a session."""
+    began = time.monotonic()
+    while not stopping():
+        request = socket.receive(1.0)
+        if isinstance(request, Open):
+            return request
+        if isinstance(request, Quit):
+            return None
+        if request is not None and not isinstance(request, Beat):
+            socket.send(Failed(number=request.number, kind="connect", message="the first request must be Open"))
+        if not forever and time.monotonic() - began > FIRST_WORD_S:
+            return None
+    return None

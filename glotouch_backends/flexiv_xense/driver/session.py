@@ -1,0 +1,267 @@
+"""One session with the devices: commands in, samples out, hard limits, slow requests. Knows no socket and no pace."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+
+from .checks import SetpointCheck, braked
+from .dating import Dating
+from .devices import Connected
+from .faults import CommandRefused, DeviceFault
+from .frames import payload_on_tool, wrench_map
+from .messages import COLUMNS, Block, Cycle, Done, Jaws, JawState, Maps, Open, PayloadRequest, Setpoint, TareRequest
+
+IN_A_ROW = 5
+"""So many samples in a row beyond the hard limit stop the arm (5 ms); one alone may be noise."""
+KEPT = 60_000
+"""Samples kept while nobody asks (60 s)."""
+SPEED_SAMPLES = 20
+NO_JAWS = JawState(0.0, math.nan, 0.0, False)
+
+
+class Session:
+    """See the module's text.
+
+    Args:
+        devices: Connected and ready.
+        request: What the client opened it with.
+
+    Attributes:
+        failed: What broke the session, if anything did; every later command raises it again.
+        stop: (quantity, value, limit, stamp) once the hard limit has tripped.
+        peak_force_N: Largest sensed force so far.
+        recent_peak_N: The same since somebody last set it to zero.
+    """
+
+    def __init__(self, devices: Connected, request: Open) -> None:
+        self.devices, self.clock = devices, devices.clock
+        self._arm, self._tool, self._limits = devices.arm, request.tool, request.arm
+        self._check = SetpointCheck(request.arm, request.period_s)
+        self._to_S = wrench_map(request.tool.pose_E_P)
+        self._zero_s = self.clock.now_s()
+        self._stamps: deque[float] = deque(maxlen=KEPT)
+        self._rows: deque[list[float]] = deque(maxlen=KEPT)
+        self._device_stamp: object = None
+        self._dating = Dating()
+        self._fresh_s = self._zero_s
+        self._over = 0
+        self._newest: list[float] | None = None
+        self._last: Setpoint | None = None  # the last one sent, while the arm follows us
+        self._rest: tuple[float, ...] | None = None  # where it shall come to rest, once told to hold
+        self._queue: deque[TareRequest | PayloadRequest] = deque()
+        self._done: list[Done] = []
+        self._busy = False
+        self._jaws = NO_JAWS
+        self._moves = request.move
+        self._sent_s = self._read_s = time.monotonic()
+        self.failed: DeviceFault | None = None
+        self.stop: tuple[str, float, float, float] | None = None
+        self.peak_force_N = self.recent_peak_N = 0.0
+        self._track: deque[tuple[float, list[float]]] = deque(maxlen=SPEED_SAMPLES)
+        self.sample()
+        self._stand()
+        self.poll()
+
+    @property
+    def ready(self) -> bool:
+        """There is at least one sample for the next block."""
+        return bool(self._rows)
+
+    @property
+    def moving(self) -> bool:
+        """The last setpoint had a speed and no hold has followed it."""
+        return self._last is not None and self._rest is None and any(self._last.twist)
+
+    @property
+    def speed_m_s(self) -> float:
+        """Of P, over the last `SPEED_SAMPLES`."""
+        (begin, first), (end, last) = self._track[0], self._track[-1]
+        return math.dist(first, last) / (end - begin) if end > begin else 0.0
+
+    # -- commands ----------------------------------------------------------------------------------------------------
+
+    def command(self, cycle: Cycle) -> None:
+        """Send one period's command; nothing is sent once the hard limit has tripped.
+
+        Raises:
+            CommandRefused: It breaks a rule; nothing was sent, the arm holds.
+            DeviceFault: The device does not take it, or had failed before.
+        """
+        if self.failed is not None:
+            raise self.failed
+        if cycle.tactile and self.devices.pads is not None:
+            self.devices.pads.want()
+        if self.stop is not None:
+            return
+        try:
+            self._look(cycle)
+        except CommandRefused:
+            self.hold()
+            raise
+        if cycle.jaws is not None and self.devices.gripper is not None:
+            self.devices.gripper.send(cycle.jaws)
+        if cycle.setpoint is not None:
+            self._last, self._rest = cycle.setpoint, None
+            self._arm.send(cycle.setpoint)
+        else:
+            self.hold()
+        self._sent_s = time.monotonic()
+
+    def _look(self, cycle: Cycle) -> None:
+        if not self._moves and (cycle.setpoint is not None or cycle.jaws is not None):
+            raise CommandRefused("command", "a motion", "none in a session that only looks")
+        if cycle.jaws is not None:
+            self._look_at_jaws(cycle.jaws)
+        if cycle.setpoint is not None:
+            if self._busy:
+                raise CommandRefused("command.motion", "a setpoint", "none while a tare or payload is under way")
+            self._check.look(cycle.setpoint)
+
+    def _look_at_jaws(self, jaws: Jaws) -> None:
+        if self.devices.gripper is None:
+            raise CommandRefused("command.gripper", jaws, "none: no gripper is connected")
+        self.devices.gripper.check(jaws)
+
+    def hold(self) -> None:
+        """Come to rest on the way of the last setpoint and stay; repeated calls repeat the setpoint.
+
+        Raises:
+            DeviceFault: The arm does not take it.
+        """
+        if self._last is None or self._busy:
+            return  # it stands, or is being stopped by the request under way
+        if self._rest is None:
+            self._rest = braked(self._last, self._limits.stop_acceleration_m_s2)
+        self._arm.hold_at(self._rest)
+
+    def start(self, request: TareRequest | PayloadRequest) -> None:
+        """Queue a slow request; it begins at once if none is under way."""
+
+        self._queue.append(request)
+        if not self._busy:
+            self._busy = True
+            self.clock.spawn(self._work)
+
+    def _work(self) -> None:
+        """Beside the loop: all queued requests, one after another."""
+        while self._queue:
+            request = self._queue.popleft()
+            try:
+                if isinstance(request, TareRequest):
+                    self._arm.zero(request.duration_s)
+                else:
+                    self._arm.idle()
+                    self._arm.load(*self._loaded(request))
+                self._arm.enter_motion()
+            except DeviceFault as e:
+                self.failed = self.failed or e
+                self._done.append(Done(request.ticket, e.message))
+            else:
+                self._done.append(Done(request.ticket))
+        self._stand()
+        self._busy = False
+
+    def _loaded(self, request: PayloadRequest) -> tuple[float, list[float]]:
+        t = self._tool
+        return payload_on_tool(t.mass_kg, t.com_E_m, request.mass_kg, request.com_P_m, t.pose_E_P)
+
+    def _stand(self) -> None:
+        """The arm stands where its own controller has left it, not at a setpoint of ours."""
+        self._last = self._rest = None
+        if self._newest is not None:
+            self._check.stands_at(self._newest[:7], self._newest[14:21])
+
+    # -- sensing -----------------------------------------------------------------------------------------------------
+
+    def sample(self) -> None:
+        """Read the arm once; trips the hard limit.
+
+        Raises:
+            DeviceFault: It cannot be read, or repeats an old reading.
+        """
+        state = self._arm.state()
+        now, self._read_s = self.clock.now_s(), time.monotonic()
+        if state.stamp == self._device_stamp:
+            age = now - self._fresh_s
+            if age > self._limits.max_age_s:
+                limit = self._limits.max_age_s
+                raise DeviceFault("stale", "the arm repeats an old state", age_s=age, limit_s=limit)
+            return
+        self._device_stamp = state.stamp
+        wrench: list[float] = (self._to_S @ state.wrench).tolist()
+        row = [*state.q, *state.dq, *state.pose, *wrench]
+        if not math.isfinite(math.fsum(row)):
+            raise DeviceFault("vendor", "the arm reports numbers that are not finite")
+        self._track.append((now, row[14:17]))
+        self._fresh_s, self._newest = now, row
+        self._stamps.append(self._dating(state.stamp, now - self._zero_s))
+        self._rows.append(row)
+        self._guard(wrench, state.pose, now)
+
+    def _guard(self, wrench: list[float], pose: Sequence[float], now: float) -> None:
+        """The hard limit below the client: stop where the arm is, and stay stopped."""
+        force, torque = math.hypot(*wrench[:3]), math.hypot(*wrench[3:])
+        self.peak_force_N = max(self.peak_force_N, force)
+        self.recent_peak_N = max(self.recent_peak_N, force)
+        limits = self._limits
+        if force <= limits.force_N and torque <= limits.torque_Nm:
+            self._over = 0
+            return
+        self._over += 1
+        if self._over < IN_A_ROW or self.stop is not None or self._busy:
+            return
+        beyond = force > limits.force_N
+        self.stop = (
+            "force_N" if beyond else "torque_Nm",
+            force if beyond else torque,
+            limits.force_N if beyond else limits.torque_Nm,
+            now - self._zero_s,
+        )
+        self._rest = tuple(pose)  # every later hold is here, not where the setpoints led
+        if self._moves:
+            self._arm.hold_at(self._rest)
+
+    def poll(self) -> None:
+        """Once a period: the arm's flags, the gripper.
+
+        Raises:
+            DeviceFault: What is wrong.
+        """
+        if not self._busy and self._moves:
+            self._arm.check()
+        if self.devices.gripper is not None:
+            state = self.devices.gripper.poll()
+            self._jaws = JawState(state.stamp_s - self._zero_s, state.aperture_m, state.force_N, state.moving)
+
+    def block(self, number: int, *, tactile: bool, late: int = 0) -> Block:
+        """Everything sensed since the last block.
+
+        Raises:
+            DeviceFault: The pads failed.
+        """
+        maps: Maps | None = None
+        if tactile and self.devices.pads is not None:
+            m = self.devices.pads.take()
+            if m is not None:
+                maps = Maps(m.stamp_s - self._zero_s, m.rows, m.columns, m.left, m.right)
+        n = len(self._rows)
+        stamps = np.array([self._stamps.popleft() for _ in range(n)])
+        rows = np.array([self._rows.popleft() for _ in range(n)]).reshape(n, COLUMNS)
+        done, self._done = tuple(self._done), []
+        return Block(
+            number=number,
+            stamps=stamps.astype("<f8").tobytes(),
+            samples=rows.astype("<f8").tobytes(),
+            jaws=self._jaws,
+            maps=maps,
+            done=done,
+            late=late,
+            stop=self.stop,
+            sent_s=self._sent_s,
+            read_s=self._read_s,
+        )

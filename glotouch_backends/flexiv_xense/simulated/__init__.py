@@ -1,0 +1,20 @@
+"""Devices that are not there: the vendors' modules, names and quirks over the MuJoCo world. See `open_vendor`."""
+
+from glotouch_backends.flexiv_xense.simulated.distant import DistantVendor, open_vendor_at
+from glotouch_backends.flexiv_xense.simulated.vendor import (
+    GRIPPER_ADDRESS,
+    PAD_SNS,
+    ROBOT_SN,
+    SimulatedVendor,
+    open_vendor,
+)
+
+__all__ = [
+    "GRIPPER_ADDRESS",
+    "PAD_SNS",
+    "ROBOT_SN",
+    "DistantVendor",
+    "SimulatedVendor",
+    "open_vendor",
+    "open_vendor_at",
+]

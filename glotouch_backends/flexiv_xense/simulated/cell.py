@@ -1,0 +1,247 @@
+"""A simulated cell: the world with its devices in a process of its own, living by the wall's clock.
+
+    python -m glotouch_backends.flexiv_xense.simulated.cell WORLD SOCKET LOG
+
+WORLD is a pickle of (World, Conditions, seed, options), SOCKET the Unix socket to listen at, LOG a file of one JSON
+line per event. As a real arm does, the simulated one goes on living when its client dies, and the log says what it did
+then: how fast the tool was, how long it took to stand still, how far it went, and the largest contact force meanwhile.
+It ends when it is told to (SIGTERM), or ALONE_S after its last client once the process that started it is gone.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from multiprocessing.connection import Connection, Listener
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from glotouch_backends.flexiv_xense.driver import DEVICES, hurry
+from glotouch_backends.flexiv_xense.simulated.vendor import SimulatedVendor, assemble
+from glotouch_backends.flexiv_xense.simulated.wire import NEW, REFEREE, Reference
+from glotouch_backends.flexiv_xense.simulated.world import SimulatedWorld
+from glotouch_backends.mujoco.model import STEP_S
+
+ALONE_S = 20.0
+BEHIND_S = 0.05  # when the world is later than this it stops catching up: it lives slower than the wall for a moment
+STILL_M_S = 1e-3
+STILL_STEPS = 20  # and so long below it
+MADE = ("Robot", "Tool", "XenseTCPGripper", "XenseSerialGripper", "Sensor")
+
+
+class CellClock:
+    """World time; whoever sleeps on it lets go of the world's lock meanwhile."""
+
+    def __init__(self, world: SimulatedWorld, turn: threading.Condition) -> None:
+        self._world, self._turn = world, turn
+
+    def now_s(self) -> float:
+        """See `driver.clock.Clock`."""
+        return self._world.now_s
+
+    def sleep_until(self, stamp_s: float) -> None:
+        """See `driver.clock.Clock`."""
+        with self._turn:
+            self._turn.wait_for(lambda: self._world.now_s >= stamp_s - 1e-9)
+
+    def spawn(self, work: Callable[[], None]) -> None:
+        """See `driver.clock.Clock`."""
+        threading.Thread(target=work, daemon=True).start()
+
+
+class Watch:
+    """From the moment a client is lost: how the arm comes to rest."""
+
+    def __init__(self, world: SimulatedWorld, write: Callable[..., None]) -> None:
+        self._world, self._write = world, write
+        self._since: int | None = None
+        self._start = np.zeros(3)
+        self._peak_N = self._farthest_m = 0.0
+        self._still = 0
+
+    def _tool(self) -> tuple[Any, float]:
+        w = self._world
+        now = np.array(w.data.site_xpos[w.handles.pads_site])
+        j = w.arm.kinematics.at(w.arm.sample.row[w.handles.sensors.q])[2]
+        return now, float(np.linalg.norm((j @ w.arm.sample.row[w.handles.sensors.dq])[:3]))
+
+    def begin(self, client: int) -> None:
+        """A client is gone."""
+        position, speed = self._tool()
+        self._since, self._start, self._still = self._world.steps, position, 0
+        self._peak_N = self._farthest_m = 0.0
+        self._write("client lost", client=client, speed_m_s=speed, force_N=self._world.contact_force_N())
+
+    def look(self) -> None:
+        """After each step."""
+        if self._since is None:
+            return
+        position, speed = self._tool()
+        self._peak_N = max(self._peak_N, self._world.contact_force_N())
+        self._farthest_m = max(self._farthest_m, float(np.linalg.norm(position - self._start)))
+        self._still = self._still + 1 if speed < STILL_M_S else 0
+        if self._still == STILL_STEPS:
+            after_s = (self._world.steps - self._since - STILL_STEPS + 1) * STEP_S
+            self._write(
+                "standstill", after_s=after_s, travel_m=self._farthest_m, peak_force_N=self._peak_N, speed_m_s=speed
+            )
+            self._since = None
+
+
+class Cell:
+    """One world, its pace and its clients.
+
+    Args:
+        world: The world.
+        log: Where events go.
+    """
+
+    def __init__(self, world: SimulatedWorld, log: IO[str]) -> None:
+        self.world, self._log = world, log
+        self.turn = threading.Condition(threading.RLock())
+        self.vendor: SimulatedVendor = assemble(world, CellClock(world, self.turn))
+        self._makers = self._find_makers()
+        self._made: dict[int, tuple[int, Any]] = {}
+        self._links: dict[int, int] = {}  # client: open connections
+        self._watch = Watch(world, self.write)
+        self._parent = os.getppid()
+        self._last_client_s = time.monotonic()
+        self.ended = False
+
+    def _find_makers(self) -> dict[str, Any]:
+        v = self.vendor
+        inner = v.xensegripper.xense_gripper
+        return {
+            "Robot": v.flexivrdk.Robot,
+            "Tool": v.flexivrdk.Tool,
+            "XenseTCPGripper": inner.XenseTCPGripper,
+            "XenseSerialGripper": inner.XenseSerialGripper,
+            "Sensor": v.xensesdk.Sensor.create,
+            "scanSerialNumber": v.xensesdk.Sensor.scanSerialNumber,
+        }
+
+    def write(self, event: str, **values: object) -> None:
+        """One line of the log."""
+        self._log.write(json.dumps({"t": round(self.world.now_s, 4), "event": event, **values}) + "\n")
+        self._log.flush()
+
+    # --- time -------------------------------------------------------------------------------------------------------
+
+    def live(self) -> None:
+        """Step at the wall's pace until the end."""
+        gc.collect()
+        gc.freeze()  # a full collection would look at the whole world, for longer than a step may take
+        begin, slept = time.monotonic() - self.world.now_s, threading.Event()
+        while not self.ended:
+            with self.turn:
+                self.world.advance(self.world.now_s + STEP_S)
+                self._watch.look()
+                self.turn.notify_all()
+                alone = not self._links
+            now = time.monotonic()
+            if not alone or os.getppid() == self._parent:
+                self._last_client_s = now
+            elif now - self._last_client_s > ALONE_S:
+                self.ended = True
+            left = begin + self.world.now_s - now
+            if left > 0.0:
+                slept.wait(left)
+            elif left < -BEHIND_S:
+                self.write("late", by_s=-left)
+                begin = now - self.world.now_s
+
+    # --- clients ----------------------------------------------------------------------------------------------------
+
+    def serve(self, listener: Listener) -> None:
+        """Take every connection; each has a thread."""
+        while not self.ended:
+            try:
+                connection = listener.accept()
+            except OSError:
+                return
+            threading.Thread(target=self._talk, args=(connection,), daemon=True).start()
+
+    def _talk(self, connection: Connection[Any, Any]) -> None:
+        """One connection of a client: requests in, results or exceptions out."""
+        client = -1
+        try:
+            client = connection.recv()
+            with self.turn:
+                self._links[client] = self._links.get(client, 0) + 1
+            while True:
+                request = connection.recv()
+                try:
+                    with self.turn:
+                        answer = True, self._do(client, *request)
+                except Exception as e:  # whatever the stand-in raises belongs to its caller
+                    answer = False, e
+                connection.send(answer)
+        except (EOFError, OSError):
+            pass
+        finally:
+            connection.close()
+            self._leave(client)
+
+    def _leave(self, client: int) -> None:
+        with self.turn:
+            left = self._links.get(client, 1) - 1
+            if left > 0:
+                self._links[client] = left
+                return
+            self._links.pop(client, None)
+            owned = [key for key, (owner, _) in self._made.items() if owner == client]
+            robots = [key for key in owned if isinstance(self._made[key][1], self._makers["Robot"])]
+            for key in owned:
+                del self._made[key]
+            if robots:
+                self._watch.begin(client)
+                self.vendor.box.leave()
+
+    def _do(self, client: int, what: str, *arguments: Any) -> Any:
+        if what == REFEREE:
+            return self.vendor.referee(arguments[0])
+        if what == NEW:
+            name, args, kwargs = arguments
+            args = [self._made[a.key][1] if isinstance(a, Reference) else a for a in args]
+            made = self._makers[name](*args, **kwargs)
+            if name not in MADE:
+                return made
+            key = len(self._made) + 1
+            while key in self._made:
+                key += 1
+            self._made[key] = client, made
+            return Reference(key)
+        key, method, args, kwargs = arguments
+        return getattr(self._made[key][1], method)(*args, **kwargs)
+
+
+def main(argv: list[str]) -> int:
+    """The process; see the module's text."""
+    world_file, address, log_file = argv
+    world = SimulatedWorld.unpickle(Path(world_file).read_bytes())
+    granted = hurry(DEVICES)
+    with Path(log_file).open("a") as log, Listener(address, family="AF_UNIX") as listener:
+        cell = Cell(world, log)
+
+        def end(number: int, frame: object) -> None:
+            cell.ended = True
+
+        signal.signal(signal.SIGTERM, end)
+        signal.signal(signal.SIGINT, end)
+        threading.Thread(target=cell.serve, args=(listener,), daemon=True).start()
+        cell.write("ready", urgent=granted)
+        cell.live()
+        cell.write("end", peak_force_N=world.peak_force_N)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

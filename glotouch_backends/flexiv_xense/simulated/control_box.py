@@ -1,0 +1,204 @@
+"""State of the simulated control box behind the vendor's calls: who may do what in which mode, faults and the log."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+
+import numpy as np
+
+from glotouch_backends.flexiv_xense.driver import Clock
+from glotouch_backends.flexiv_xense.simulated.arm import FLANGE, Arm, Load
+from glotouch_backends.flexiv_xense.simulated.vendor_api import (
+    EPOCH_S,
+    Mode,
+    OperationalStatus,
+    RobotEvent,
+    RobotEvent_Level,
+    ToolParams,
+)
+from glotouch_bt.robot import Pose
+
+# ASSUMED durations, in s: the vendor documents only that these block, and "a few seconds" for the brakes.
+CONNECT_S, UNREACHABLE_S, REQUEST_S, BRAKES_S, SWITCH_S, PRIMITIVE_S = 0.5, 3.1, 0.005, 2.0, 0.05, 0.1
+CLEAR_MINOR_S, CLEAR_CRITICAL_S = 1.0, 10.0
+POLL_S = 0.001
+UNLICENSED = (Mode.NRT_PLAN_EXECUTION, Mode.NRT_SUPER_PRIMITIVE)
+NOT_ZEROED = 301004  # reported from a Rizon 4s by users; its text here is ours
+
+
+class ControlBox:
+    """One arm's control box.
+
+    Args:
+        serial: Serial number it answers to.
+        arm: The arm.
+        clock: What blocking calls wait on.
+    """
+
+    def __init__(self, serial: str, arm: Arm, clock: Clock) -> None:
+        self.serial, self.arm, self.clock = serial, arm, clock
+        self.mode = Mode.IDLE
+        self.linked = True
+        self.enabled = False
+        self.estop_released = True
+        self.reduced = False
+        self.recovery = False
+        self.critical = False
+        self.zeroed = False
+        self.frozen = False
+        self.brakes_done_s = 0.0
+        self.tools: dict[str, ToolParams] = {"Flange": _flange()}
+        self.tool = "Flange"
+        self.events: list[RobotEvent] = []
+        self.primitive_started_s: float | None = None
+        self.primitive_s = 0.0
+        self.faulty = False
+
+    # --- status -----------------------------------------------------------------------------------------------------
+
+    def status(self) -> OperationalStatus:
+        """Ready, or why not."""
+        if self.faulty:
+            return OperationalStatus.CRITICAL_FAULT if self.critical else OperationalStatus.MINOR_FAULT
+        if not self.estop_released:
+            return OperationalStatus.ESTOP_NOT_RELEASED
+        if self.recovery:
+            return OperationalStatus.IN_RECOVERY_STATE
+        if self.reduced:
+            return OperationalStatus.IN_REDUCED_STATE
+        if not self.enabled:
+            return OperationalStatus.NOT_ENABLED
+        if self.clock.now_s() < self.brakes_done_s:
+            return OperationalStatus.RELEASING_BRAKE
+        return OperationalStatus.READY
+
+    def log(self, level: RobotEvent_Level, number: int, description: str, advice: str = "") -> None:
+        """Add an event."""
+        stamp = datetime.fromtimestamp(EPOCH_S + self.clock.now_s(), UTC).replace(tzinfo=None)
+        self.events.append(
+            RobotEvent(
+                level=level,
+                id=number,
+                description=description,
+                consequences="the robot has stopped" if level is not RobotEvent_Level.INFO else "none",
+                recommended_actions=advice,
+                timestamp=stamp,
+            )
+        )
+
+    def fail(self, number: int, description: str, *, critical: bool = False) -> None:
+        """A fault: the arm stops by itself and takes no command until it is cleared."""
+        level = RobotEvent_Level.CRITICAL if critical else RobotEvent_Level.ERROR
+        self.log(level, number, description, "clear the fault")
+        self.faulty, self.critical = True, critical
+        self.halt()
+
+    def halt(self) -> None:
+        """Brake at once, in whatever mode."""
+        self.arm.brake()
+        self.arm.limit_wrench(None)
+        self.mode = Mode.IDLE
+        self.primitive_started_s = None
+
+    def leave(self) -> None:
+        """The client is gone: what it had begun ends, and the arm brakes once that has been noticed."""
+        self.mode = Mode.IDLE
+        self.primitive_started_s = None
+        self.arm.lose_link()
+
+    # --- requests ---------------------------------------------------------------------------------------------------
+
+    def wait(self, seconds: float) -> None:
+        """Block the caller.
+
+        Raises:
+            RuntimeError: The link is gone (afterwards as well as before).
+        """
+        self.need_link()
+        self.clock.sleep_until(self.clock.now_s() + seconds)
+        self.need_link()
+
+    def wait_until(self, reached: Callable[[], bool]) -> None:
+        """Block the caller until `reached`."""
+        while not reached():
+            self.wait(POLL_S)
+
+    def need_link(self) -> None:
+        """Raises RuntimeError if the link is gone."""
+        if not self.linked:
+            raise RuntimeError("[flexiv::rdk] failed to deliver the request to the connected robot")
+
+    def need_mode(self, *modes: Mode) -> None:
+        """Raises RuntimeError (the vendor's logic_error) if the robot is in none of these modes."""
+        self.need_link()
+        if self.mode not in modes:
+            names = ", ".join(m.name for m in modes)
+            raise RuntimeError(f"[flexiv::rdk] robot is in mode {self.mode.name}, the call needs {names}")
+
+    def need_ready(self) -> None:
+        """Raises RuntimeError if the robot is not operational."""
+        self.need_link()
+        if self.status() is not OperationalStatus.READY:
+            raise RuntimeError(f"[flexiv::rdk] robot is not operational: {self.status().name}")
+
+    def stand_still(self) -> None:
+        """Brake if moving, and wait for it."""
+        if not self.arm.trajectory.at_rest:
+            self.arm.brake()
+        self.wait_until(lambda: self.arm.stopped)
+
+    def switch(self, mode: Mode) -> None:
+        """Stop, change the mode, wait for it."""
+        if mode is Mode.UNKNOWN or mode in UNLICENSED:
+            raise ValueError(f"[flexiv::rdk] requested mode {mode.name} is invalid or unlicensed")
+        self.need_ready()
+        self.stand_still()
+        self.finish_primitive()
+        self.wait(SWITCH_S)
+        self.need_ready()
+        if mode is Mode.NRT_CARTESIAN_MOTION_FORCE and not self.zeroed:
+            self.fail(NOT_ZEROED, "the force sensor has not been zeroed since this client connected")
+            raise RuntimeError(f"[flexiv::rdk] failed to switch to {mode.name}")
+        self.mode = mode
+        self.arm.limit_wrench(None)
+        self.arm.reference_q = self.arm.trajectory.q.copy()
+
+    def use_tool(self, name: str) -> None:
+        """Make a tool the current one."""
+        self.tool = name
+        params = self.tools[name]
+        self.arm.set_load(FLANGE if name == "Flange" else load_of(params))
+
+    def start_primitive(self, seconds: float) -> None:
+        """Run the zeroing for a while."""
+        self.arm.begin_zeroing()
+        self.primitive_started_s, self.primitive_s = self.clock.now_s(), seconds
+
+    def primitive_done(self) -> bool:
+        """True once its time has passed; ends the zeroing then."""
+        if self.primitive_started_s is None:
+            return self.zeroed
+        if self.clock.now_s() - self.primitive_started_s < self.primitive_s - 1e-9:
+            return False
+        self.finish_primitive()
+        return True
+
+    def finish_primitive(self) -> None:
+        """End the zeroing, if one is under way."""
+        if self.primitive_started_s is not None:
+            self.arm.end_zeroing()
+            self.primitive_started_s = None
+            self.zeroed = True
+
+
+def _flange() -> ToolParams:
+    params = ToolParams()
+    params.tcp_location = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    return params
+
+
+def load_of(params: ToolParams) -> Load:
+    """Tool parameters as the arm's controller takes them."""
+    place = np.array(params.tcp_location)
+    return Load(float(params.mass), np.array(params.CoM), Pose(place[:3], place[3:]))

@@ -1,0 +1,142 @@
+"""The vendors' modules in a client's process while the devices live in a cell: every call goes over a Unix socket."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from dataclasses import dataclass
+from multiprocessing.connection import Client, Connection
+from types import SimpleNamespace
+from typing import Any
+
+from glotouch_backends.flexiv_xense.driver import Clock, WallClock
+from glotouch_backends.flexiv_xense.simulated.vendor_api import flexivrdk, xensegripper, xensesdk
+from glotouch_backends.flexiv_xense.simulated.wire import CALL, NEW, REFEREE, Reference
+
+CONNECT_S = 120.0
+RETRY_S = 0.05
+
+
+class CellLink:
+    """Calls into a cell; every thread has a connection of its own.
+
+    Args:
+        address: The cell's socket.
+    """
+
+    def __init__(self, address: str) -> None:
+        self._address = address
+        self._mine = threading.local()
+
+    def ask(self, *request: Any) -> Any:
+        """The answer to a request; what was raised there is raised here.
+
+        Raises:
+            RuntimeError: The cell is gone.
+        """
+        try:
+            connection = self._connection()
+            connection.send(request)
+            done, answer = connection.recv()
+        except (EOFError, OSError) as e:
+            raise RuntimeError(f"the simulated cell does not answer: {e}") from e
+        if not done:
+            raise answer
+        return answer
+
+    def _connection(self) -> Connection[Any, Any]:
+        found: Connection[Any, Any] | None = getattr(self._mine, "connection", None)
+        if found is None:
+            found = self._connect()
+            found.send(os.getpid())
+            self._mine.connection = found
+        return found
+
+    def _connect(self) -> Connection[Any, Any]:
+        """A cell that is still building its world is waited for."""
+        until, pause = time.monotonic() + CONNECT_S, threading.Event()
+        while True:
+            try:
+                return Client(self._address, family="AF_UNIX")
+            except (FileNotFoundError, ConnectionRefusedError):
+                if time.monotonic() > until:
+                    raise
+                pause.wait(RETRY_S)
+
+
+class Distant:
+    """An object in the cell: every method is a call."""
+
+    def __init__(self, link: CellLink, reference: Reference) -> None:
+        self._link, self._reference = link, reference
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+
+        def call(*args: Any, **kwargs: Any) -> Any:
+            return self._link.ask(CALL, self._reference.key, name, args, kwargs)
+
+        setattr(self, name, call)
+        return call
+
+
+def _maker(link: CellLink, name: str) -> Any:
+    """Stands for a class: calling it makes the object in the cell."""
+
+    def make(*args: Any, **kwargs: Any) -> Distant:
+        plain = [a._reference if isinstance(a, Distant) else a for a in args]
+        return Distant(link, link.ask(NEW, name, plain, kwargs))
+
+    return make
+
+
+@dataclass(frozen=True)
+class DistantVendor:
+    """See `driver.vendor.Vendor`."""
+
+    flexivrdk: Any
+    xensesdk: Any
+    xensegripper: Any
+    clock: Clock
+    link: CellLink
+
+    def referee(self, question: bytes) -> bytes:
+        """As `SimulatedVendor.referee`."""
+        answer = self.link.ask(REFEREE, question)
+        assert isinstance(answer, bytes)
+        return answer
+
+
+def open_vendor_at(address: str) -> DistantVendor:
+    """The vendors' modules over a cell.
+
+    Args:
+        address: Its Unix socket.
+
+    Raises:
+        OSError: Nobody listens there.
+    """
+    link = CellLink(address)
+    arm = {name: getattr(flexivrdk, name) for name in flexivrdk.__all__}
+    arm |= {"Robot": _maker(link, "Robot"), "Tool": _maker(link, "Tool")}
+    tcp, serial = _maker(link, "XenseTCPGripper"), _maker(link, "XenseSerialGripper")
+
+    def create(mac_addr: str | None = None, **kwargs: Any) -> Any:
+        return tcp(mac_addr) if mac_addr is not None else serial(**kwargs)
+
+    gripper = SimpleNamespace(create=create, ControlMode=xensegripper.XenseGripper.ControlMode)
+    sensor = SimpleNamespace(
+        create=_maker(link, "Sensor"),
+        scanSerialNumber=lambda: link.ask(NEW, "scanSerialNumber", [], {}),
+        OutputType=xensesdk.Sensor.OutputType,
+    )
+    inner = SimpleNamespace(XenseGripper=gripper, XenseTCPGripper=tcp, XenseSerialGripper=serial)
+    return DistantVendor(
+        SimpleNamespace(**arm),
+        SimpleNamespace(Sensor=sensor),
+        SimpleNamespace(XenseGripper=gripper, xense_gripper=inner),
+        WallClock(),
+        link,
+    )

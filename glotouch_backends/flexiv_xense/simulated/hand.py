@@ -1,0 +1,104 @@
+"""The simulated gripper's board and the processing of its two pads: what goes on between the calls of their APIs."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from glotouch_backends.mujoco import Truth
+from glotouch_backends.mujoco.control import JawReports, Jaws
+from glotouch_backends.mujoco.model import STEP_S, STEPS, Handles, handle_mesh
+from glotouch_backends.mujoco.sensing import Tactile
+from glotouch_bt.robot import Array, Conditions, GripperState, GripperTarget, RobotDescription, TactileFrame, World
+
+PERIOD_S = STEPS * STEP_S
+WANTED_S = 0.1  # the gels are worked out only while somebody has read a sensor within this time
+
+
+class JawStatus(NamedTuple):
+    """What the board says: m, m/s, N."""
+
+    aperture_m: float
+    speed_m_s: float
+    force_N: float
+
+
+class Hand:
+    """Jaws and pads, stepped by the world once a period.
+
+    Args:
+        description, conditions, seed, world, truth: As for the MuJoCo backend.
+        model, data, handles: The world.
+
+    Attributes:
+        status: The last report of the jaws.
+        frame: The last pair of depth maps that arrived, or None.
+    """
+
+    def __init__(
+        self,
+        description: RobotDescription,
+        conditions: Conditions,
+        seed: int,
+        world: World,
+        truth: Truth,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        handles: Handles,
+    ) -> None:
+        self._s = handles.sensors
+        self.gripper = description.gripper
+        self._aperture = aperture = float(data.qpos[handles.jaw_qpos].sum())
+        self._jaws = Jaws(model, handles, self.gripper, aperture)
+        self._rows = np.zeros((STEPS, 2))
+        surfaces = [(b, o.mesh) for b, o in zip(handles.object_bodies, truth.objects, strict=True)]
+        surfaces.insert(0, (handles.probe_body, handle_mesh(world.probe)))
+        self._tactile = Tactile(model, data, handles, self.gripper, surfaces, conditions, seed)
+        self._reports = JawReports(conditions, seed, PERIOD_S, GripperState(0.0, aperture, 0.0, False))
+        late = round(conditions.gripper_latency_s / PERIOD_S)
+        self._speeds: deque[float] = deque([0.0] * (late + 1), maxlen=late + 1)
+        self._now_s = 0.0
+        self._wanted_s = -math.inf
+        self.status = JawStatus(aperture, 0.0, 0.0)
+        self.frame: TactileFrame | None = None
+
+    def go_to(self, position_m: float, speed_m_s: float, force_N: float) -> None:
+        """A new target, from the next period on; the board clamps what it cannot do and drops what is not a number."""
+        g = self.gripper
+        if not all(map(math.isfinite, (position_m, speed_m_s, force_N))):
+            return
+        target = GripperTarget(
+            min(max(position_m, 0.0), g.stroke_m),
+            min(max(abs(speed_m_s), 1e-4), g.speed_m_s),
+            min(max(abs(force_N), 0.1), g.force_N),
+        )
+        self._jaws.set(target)
+
+    def want_frames(self) -> None:
+        """Somebody reads a sensor."""
+        self._wanted_s = self._now_s
+
+    def begin(self) -> Array:
+        """Before a period: the jaws' servo commands (steps, 2) for it."""
+        self._jaws.plan(self._aperture, PERIOD_S, self._rows)
+        return self._rows
+
+    def end(self, now_s: float, row: Array) -> None:
+        """After a period: take its last sensor row."""
+        s = self._s
+        self._now_s = now_s
+        last = row.tolist()
+        jaws, speeds, forces = last[s.jaws], last[s.jaw_speeds], last[s.jaw_forces]
+        self._aperture = jaws[0] + jaws[1]
+        wanted = now_s - self._wanted_s <= WANTED_S
+        self._tactile.sample(now_s, wanted, jaws, forces)
+        rate = speeds[0] + speeds[1]
+        force = max(0.0, -0.5 * (forces[0] + forces[1]))
+        report = self._reports.report(now_s, self._aperture - self._tactile.shift_m, rate, force)
+        self._speeds.append(rate)
+        self.status = JawStatus(report.aperture_m, self._speeds[0], report.force_N)
+        self.frame = self._tactile.arrived(now_s, True) or self.frame

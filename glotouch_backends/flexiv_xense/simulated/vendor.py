@@ -1,0 +1,87 @@
+"""The vendors' modules over one simulated world."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+from glotouch_backends.flexiv_xense.driver import Clock, SteppedClock
+from glotouch_backends.flexiv_xense.simulated.control_box import ControlBox
+from glotouch_backends.flexiv_xense.simulated.disturbances import Disturber
+from glotouch_backends.flexiv_xense.simulated.vendor_api import GripperLink, PadLink, flexivrdk, xensegripper, xensesdk
+from glotouch_backends.flexiv_xense.simulated.world import SimulatedWorld
+
+ROBOT_SN = "Rizon4-000001"
+GRIPPER_ADDRESS = "000000000001"  # as a network address and as a serial port
+PAD_SNS = ("OG000001", "OG000002")  # left, right
+
+
+@dataclass(frozen=True)
+class SimulatedVendor:
+    """What `driver.vendor.Vendor` asks for, and the world behind it.
+
+    Attributes:
+        flexivrdk, xensesdk, xensegripper: Namespaces with the vendors' names.
+        clock: Sleeping on it advances the world.
+        world, box, gripper, pads: What is behind them.
+    """
+
+    flexivrdk: Any
+    xensesdk: Any
+    xensegripper: Any
+    clock: Clock
+    world: SimulatedWorld
+    box: ControlBox
+    gripper: GripperLink
+    pads: tuple[PadLink, PadLink]
+
+    def referee(self, question: bytes) -> bytes:
+        """Ask the world's referee (or disturber): a pickled (method, arguments) in, the pickled result out."""
+        method, arguments = pickle.loads(question)
+        referee = Disturber(self.world, self.box, self.gripper, self.pads)
+        return pickle.dumps(getattr(referee, method)(*arguments))
+
+
+def bound(cls: type[Any], **values: object) -> Any:
+    """A subclass of a stand-in that knows one world, under the vendor's name."""
+    return type(cls.__name__, (cls,), {"__doc__": cls.__doc__, **values})
+
+
+def modules(box: ControlBox, gripper: GripperLink, pads: tuple[PadLink, PadLink]) -> tuple[Any, Any, Any]:
+    """`flexivrdk`, `xensesdk` and `xensegripper` over these devices."""
+    arm = {name: getattr(flexivrdk, name) for name in flexivrdk.__all__}
+    arm["Robot"] = bound(flexivrdk.Robot, _boxes={box.serial: box})
+    links = {GRIPPER_ADDRESS: gripper}
+    tcp = bound(xensegripper.XenseTCPGripper, _links=links)
+    serial = bound(xensegripper.XenseSerialGripper, _links=links)
+    either = bound(xensegripper.XenseGripper, _tcp=tcp, _serial=serial)
+    inner = SimpleNamespace(XenseGripper=either, XenseTCPGripper=tcp, XenseSerialGripper=serial)
+    sensor = bound(xensesdk.Sensor, _links=dict(zip(PAD_SNS, pads, strict=True)))
+    return (
+        SimpleNamespace(**arm),
+        SimpleNamespace(Sensor=sensor),
+        SimpleNamespace(XenseGripper=either, xense_gripper=inner),
+    )
+
+
+def open_vendor(world_blob: bytes) -> SimulatedVendor:
+    """The vendors' modules over a world of its own in this process.
+
+    Args:
+        world_blob: Pickle of (World, Conditions, seed, options).
+
+    Raises:
+        GlotouchError: The world cannot be built.
+    """
+    world = SimulatedWorld.unpickle(world_blob)
+    return assemble(world, SteppedClock(world.advance))
+
+
+def assemble(world: SimulatedWorld, clock: Clock) -> SimulatedVendor:
+    """The vendors' modules over a world that moves with a clock."""
+    box = ControlBox(ROBOT_SN, world.arm, clock)
+    gripper = GripperLink(world.hand, clock)
+    pads = PadLink(world.hand, clock, right=False, camera=0), PadLink(world.hand, clock, right=True, camera=1)
+    return SimulatedVendor(*modules(box, gripper, pads), clock, world, box, gripper, pads)

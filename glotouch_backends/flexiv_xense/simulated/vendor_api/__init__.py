@@ -1,0 +1,23 @@
+"""TODO door of glotouch_backends/flexiv_xense/simulated/vendor_api."""
+
+from glotouch_backends.flexiv_xense.simulated.vendor_api.flexiv_types import (
+    EPOCH_S,
+    Mode,
+    OperationalStatus,
+    RobotEvent,
+    RobotEvent_Level,
+    ToolParams,
+)
+from glotouch_backends.flexiv_xense.simulated.vendor_api.xensegripper import GripperLink
+from glotouch_backends.flexiv_xense.simulated.vendor_api.xensesdk import PadLink
+
+__all__ = [
+    "EPOCH_S",
+    "GripperLink",
+    "Mode",
+    "OperationalStatus",
+    "PadLink",
+    "RobotEvent",
+    "RobotEvent_Level",
+    "ToolParams",
+]

@@ -1,0 +1,276 @@
+"""The values of the flat `flexivrdk` 1.9 API: enumerations and data structures, with the vendor's names.
+
+Vendor classes hand out copies: a list taken from one can be changed without changing the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from enum import Enum
+
+from glotouch_backends.flexiv_xense.simulated.arm import Load, Sample
+from glotouch_backends.flexiv_xense.simulated.vendor_api.checks import numbers
+from glotouch_backends.mujoco.model import STEP_S, SensorMap
+from glotouch_bt.robot import Array, Pose
+
+EPOCH_S = 1_700_000_000  # the simulated control box was switched on at this time
+
+
+class _Numbered(Enum):
+    """A pybind enumeration: not equal to its number, but convertible to it."""
+
+    def __int__(self) -> int:
+        return int(self.value)
+
+
+class Mode(_Numbered):
+    """Control modes."""
+
+    UNKNOWN = 0
+    IDLE = 1
+    NRT_JOINT_IMPEDANCE = 4
+    NRT_JOINT_POSITION = 6
+    NRT_PLAN_EXECUTION = 7
+    NRT_PRIMITIVE_EXECUTION = 8
+    NRT_CARTESIAN_MOTION_FORCE = 10
+    NRT_SUPER_PRIMITIVE = 11
+
+
+class OperationalStatus(_Numbered):
+    """Why the robot is (not) ready."""
+
+    UNKNOWN = 0
+    READY = 1
+    BOOTING = 2
+    ESTOP_NOT_RELEASED = 3
+    NOT_ENABLED = 4
+    RELEASING_BRAKE = 5
+    MINOR_FAULT = 6
+    CRITICAL_FAULT = 7
+    IN_REDUCED_STATE = 8
+    IN_RECOVERY_STATE = 9
+    IN_MANUAL_MODE = 10
+    IN_AUTO_MODE = 11
+
+
+class CoordType(_Numbered):
+    """Root frames of the force control frame."""
+
+    WORLD = 0
+    TCP = 1
+
+
+class RobotEvent_Level(_Numbered):
+    """How bad an event is."""
+
+    UNKNOWN = 0
+    INFO = 1
+    WARNING = 2
+    ERROR = 3
+    CRITICAL = 4
+
+
+@dataclass(slots=True)
+class RobotEvent:
+    """One line of the event log."""
+
+    level: RobotEvent_Level = RobotEvent_Level.UNKNOWN
+    id: int = 0
+    description: str = ""
+    consequences: str = ""
+    probable_causes: str = ""
+    recommended_actions: str = ""
+    timestamp: datetime = datetime(1970, 1, 1)
+
+    Level = RobotEvent_Level
+
+
+@dataclass(slots=True)
+class RobotInfo:
+    """General information."""
+
+    serial_num: str = ""
+    software_ver: str = ""
+    model_name: str = ""
+    license_type: str = ""
+    DoF: int = 0
+    DoF_m: int = 0
+    DoF_e: int = 0
+    K_x_nom: list[float] = field(default_factory=lambda: [0.0] * 6)
+    K_q_nom: list[float] = field(default_factory=list)
+    q_min: list[float] = field(default_factory=list)
+    q_max: list[float] = field(default_factory=list)
+    dq_max: list[float] = field(default_factory=list)
+    tau_max: list[float] = field(default_factory=list)
+    has_FT_sensor: bool = False
+
+
+def _numbers(name: str, length: int) -> property:
+    """A field of so many numbers: handed out as a copy, refused (TypeError) if it is anything else."""
+
+    def _get(self: ToolParams) -> list[float]:
+        return [*self._values[name]]
+
+    def _put(self: ToolParams, value: Sequence[float]) -> None:
+        self._values[name] = numbers(name, value, length).tolist()
+
+    return property(_get, _put)
+
+
+class ToolParams:
+    """What is bolted to the flange: kg, m and kg m2; `tcp_location` is x y z qw qx qy qz in the flange frame."""
+
+    __slots__ = ("_mass", "_values")
+    CoM = _numbers("CoM", 3)
+    inertia = _numbers("inertia", 6)
+    tcp_location = _numbers("tcp_location", 7)
+
+    def __init__(self) -> None:
+        self._mass = 0.0
+        self._values = {"CoM": [0.0] * 3, "inertia": [0.0] * 6, "tcp_location": [0.0] * 7}
+
+    @property
+    def mass(self) -> float:
+        """Mass, kg."""
+        return self._mass
+
+    @mass.setter
+    def mass(self, value: float) -> None:
+        """TypeError if it is no number."""
+        self._mass = float(numbers("mass", [value])[0])
+
+    def _copy(self) -> ToolParams:
+        """The same values again (not the vendor's: its functions copy by themselves)."""
+        other = ToolParams()
+        other._mass, other._values = self._mass, {k: [*v] for k, v in self._values.items()}
+        return other
+
+
+def seven(pose: Pose) -> list[float]:
+    """A pose as the vendor writes it: x y z qw qx qy qz."""
+    return [*pose.position_m.tolist(), *pose.quat.tolist()]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A sample, and what it takes to read it: MuJoCo's columns, the tool then in use, P in the flange frame."""
+
+    sample: Sample
+    sensors: SensorMap
+    load: Load
+    pose_E_P: Pose
+
+    def flange(self) -> Pose:
+        """The flange in B."""
+        row = self.sample.row
+        return Pose(row[self.sensors.position], row[self.sensors.quat]) @ self.pose_E_P.inverse()
+
+    def tool(self) -> list[float]:
+        """The tool centre point in B."""
+        if _same(self.load.pose_E_T, self.pose_E_P):
+            row = self.sample.row
+            return [*row[self.sensors.position].tolist(), *row[self.sensors.quat].tolist()]
+        return seven(self.flange() @ self.load.pose_E_T)
+
+    def in_tool(self, wrench_S: Array) -> list[float]:
+        """A wrench at the tool centre point, in the tool's axes."""
+        return _list(self.load.in_T @ wrench_S)
+
+    def in_world(self, wrench_S: Array) -> list[float]:
+        """A wrench at the tool centre point, in B's axes."""
+        at_T, turn = self.load.at_T @ wrench_S, self.flange().rotation
+        return [*_list(turn @ at_T[:3]), *_list(turn @ at_T[3:])]
+
+
+def _same(a: Pose, b: Pose) -> bool:
+    return bool((a.position_m == b.position_m).all() and (a.quat == b.quat).all())
+
+
+class RobotStates:
+    """One millisecond of the arm; every value is made when it is asked for. Only what the simulation has is offered."""
+
+    __slots__ = ("_reading",)
+
+    def __init__(self) -> None:
+        self._reading: Reading | None = None
+
+    @classmethod
+    def _of(cls, reading: Reading) -> RobotStates:
+        states = cls()
+        states._reading = reading
+        return states
+
+    @property
+    def timestamp(self) -> tuple[int, int]:
+        """Seconds since the epoch, and nanoseconds since the last full second."""
+        if self._reading is None:
+            return (0, 0)
+        seconds, rest = divmod(self._reading.sample.step, round(1.0 / STEP_S))
+        return EPOCH_S + seconds, rest * round(STEP_S * 1e9)
+
+    @property
+    def q(self) -> list[float]:
+        """Joint positions, link side, rad."""
+        r = self._reading
+        return [] if r is None else _list(r.sample.row[r.sensors.q])
+
+    @property
+    def theta(self) -> list[float]:
+        """Joint positions, motor side; the simulated joints are stiff."""
+        return self.q
+
+    @property
+    def dq(self) -> list[float]:
+        """Joint velocities, link side, rad/s."""
+        r = self._reading
+        return [] if r is None else _list(r.sample.row[r.sensors.dq])
+
+    @property
+    def dtheta(self) -> list[float]:
+        """Joint velocities, motor side."""
+        return self.dq
+
+    @property
+    def flange_pose(self) -> list[float]:
+        """The flange in the world, m and w x y z."""
+        return [0.0] * 7 if self._reading is None else seven(self._reading.flange())
+
+    @property
+    def tcp_pose(self) -> list[float]:
+        """The tool centre point in the world."""
+        return [0.0] * 7 if self._reading is None else self._reading.tool()
+
+    @property
+    def ext_wrench_in_tcp(self) -> list[float]:
+        """What the tool feels at its centre point, in its axes, N and Nm; filtered."""
+        r = self._reading
+        return [0.0] * 6 if r is None else r.in_tool(r.sample.filtered_S)
+
+    @property
+    def ext_wrench_in_tcp_raw(self) -> list[float]:
+        """The same, not filtered."""
+        r = self._reading
+        return [0.0] * 6 if r is None else r.in_tool(r.sample.wrench_S)
+
+    @property
+    def ext_wrench_in_world(self) -> list[float]:
+        """What the tool feels at its centre point, in the world's axes; filtered."""
+        r = self._reading
+        return [0.0] * 6 if r is None else r.in_world(r.sample.filtered_S)
+
+    @property
+    def ext_wrench_in_world_raw(self) -> list[float]:
+        """The same, not filtered."""
+        r = self._reading
+        return [0.0] * 6 if r is None else r.in_world(r.sample.wrench_S)
+
+    @property
+    def ft_sensor_raw(self) -> list[float]:
+        """What the wrist sensor says, at the flange in its axes: neither zeroed nor without the tool's weight."""
+        return [0.0] * 6 if self._reading is None else _list(self._reading.sample.raw_S)
+
+
+def _list(a: Array) -> list[float]:
+    return [*a.tolist()]

@@ -1,0 +1,162 @@
+"""A stand-in for the vendor's `xensesdk` over the simulated pads: Depth (700, 400) in mm, positive indented.
+
+A sensor looks at its gel from behind, its rows running towards the fingertip. So the columns of the LEFT pad run along
++x_P and those of the RIGHT pad along -x_P (ASSUMED: both sensors are mounted alike). Only Depth and TimeStamp are made;
+every other output is None, as what is not available is with the real one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from enum import Enum
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from glotouch_backends.flexiv_xense.driver import Clock
+from glotouch_backends.flexiv_xense.simulated.hand import Hand
+from glotouch_backends.flexiv_xense.simulated.vendor_api.flexiv_types import EPOCH_S
+
+Floats = npt.NDArray[np.floating[Any]]
+SHAPE = (700, 400)
+MM = 1e-3
+CREATE_S, CALIBRATE_S = 0.5, 0.2
+PRESSED_MM = 0.2  # beyond noise and offsets, which the real one keeps as well
+
+
+class PadLink:
+    """One pad on the simulated bus.
+
+    Args:
+        hand: The hand.
+        clock: What blocking calls wait on.
+        right: The pad at -y_P.
+        camera: Its camera's number.
+    """
+
+    def __init__(self, hand: Hand, clock: Clock, *, right: bool, camera: int) -> None:
+        self.hand, self.clock, self.right, self.camera = hand, clock, right, camera
+        self.missing = self.frozen = False
+
+
+class Sensor:
+    """One visuotactile sensor; made by `create`."""
+
+    class OutputType(Enum):
+        """What a sensor can be asked for."""
+
+        Rectify = 1
+        Difference = 2
+        Depth = 3
+        Marker2D = 4
+        Marker3D = 5
+        Marker3DFlow = 6
+        Marker3DInit = 7
+        MarkerUnorder = 8
+        Force = 9
+        ForceNorm = 10
+        Mesh3D = 11
+        Mesh3DFlow = 12
+        Mesh3DInit = 13
+        Marker2DInit = 14
+        Marker2DFlip = 15
+        ForceResultant = 16
+        TimeStamp = 17
+        AugDifference = 18
+        FineDepth = 21
+        Force6DTuned = 22
+        CaptureTimeStamp = 23
+        Raw = 1000
+        Mesh3DNorm = 101
+        Flow = 103
+        ImgFloat = 104
+        ImgMarkerFree = 105
+        ImgMarkerEnhance = 106
+        ImgObjEnhance = 107
+        CoarseDepth = 109
+
+    _links: ClassVar[dict[str, PadLink]] = {}
+
+    def __init__(self, ctx: object = None, engine: object = None) -> None:
+        self._link: PadLink | None = None
+        self._zero: Floats = np.zeros(SHAPE)
+        self._depth: tuple[float, Floats] | None = None
+
+    @classmethod
+    def create(
+        cls,
+        cam_id: int | str | None = None,
+        config_path: str | Path | None = None,
+        *,
+        mac_addr: str | None = None,
+        infer_mode: str | None = None,
+        rectify_size: Sequence[int] | None = None,
+        raw_size: Sequence[int] | None = None,
+        disable_infer: bool | None = None,
+        seeds: Mapping[str, object] | None = None,
+        overrides: Mapping[str, object] | None = None,
+        check_serial: bool = True,
+        hook_modules: str | Sequence[str] | None = None,
+        disable_cache: bool | None = None,
+    ) -> Sensor:
+        """Open a sensor by serial number or camera number."""
+        for serial, link in cls._links.items():
+            if cam_id in (serial, link.camera):
+                link.clock.sleep_until(link.clock.now_s() + CREATE_S)
+                sensor = cls()
+                sensor._link = link
+                return sensor
+        raise ValueError(f"no sensor {cam_id!r}")
+
+    @classmethod
+    def scanSerialNumber(cls) -> dict[str, int]:
+        """Serial numbers and camera numbers of what is plugged in."""
+        return {serial: link.camera for serial, link in cls._links.items()}
+
+    def getCameraID(self) -> int | None:
+        """Its camera's number."""
+        return None if self._link is None else self._link.camera
+
+    def calibrateSensor(self) -> None:
+        """Take the present depth as zero: nothing may touch the pad."""
+        if self._link is not None:
+            link = self._link
+            self._read(link)
+            link.clock.sleep_until(link.clock.now_s() + CALIBRATE_S)
+            found = self._read(link)
+            if found is not None:
+                depth = np.nan_to_num(found[1]) + self._zero
+                self._zero = depth if float(depth.max()) > PRESSED_MM else np.zeros(SHAPE)
+
+    def selectSensorInfo(self, *output_types: Any) -> Any:
+        """One output for one type, a tuple for several, all of the same frame; None for what is not available."""
+        link = self._link
+        found = None if link is None else self._read(link)
+        values: list[Any] = []
+        for kind in output_types:
+            known = self.OutputType[kind] if isinstance(kind, str) else kind
+            if found is None or known not in (self.OutputType.Depth, self.OutputType.TimeStamp):
+                values.append(None)
+            else:
+                values.append(found[1] if known is self.OutputType.Depth else EPOCH_S + found[0])
+        return values[0] if len(values) == 1 else tuple(values)
+
+    def _read(self, link: PadLink) -> tuple[float, Floats] | None:
+        """Stamp and depth (700, 400) mm of the newest frame."""
+        if link.missing:
+            return None
+        if not link.frozen:
+            link.hand.want_frames()
+            frame = link.hand.frame
+            if frame is not None and (self._depth is None or frame.stamp_s != self._depth[0]):
+                depth_m = frame.right_m[:, ::-1] if link.right else frame.left_m
+                times = SHAPE[0] // depth_m.shape[0], SHAPE[1] // depth_m.shape[1]
+                fine = np.repeat(np.repeat((depth_m / MM).astype(np.float32), times[0], axis=0), times[1], axis=1)
+                self._depth = frame.stamp_s, fine - self._zero if self._zero.any() else fine
+        return self._depth
+
+    def release(self) -> None:
+        """Close it."""
+        self._link = None

@@ -1,0 +1,115 @@
+"""The world behind the simulated devices: the MuJoCo backend's, stepped one millisecond at a time."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+from glotouch_backends.flexiv_xense.simulated.arm import Arm
+from glotouch_backends.flexiv_xense.simulated.hand import Hand
+from glotouch_backends.mujoco import HELD_DISTANCE_M, build_world
+from glotouch_backends.mujoco.control import check_sane
+from glotouch_backends.mujoco.model import STEP_S, STEPS
+from glotouch_backends.mujoco.simulation import Trace
+from glotouch_backends.rizon4 import RIZON4_XENSE
+from glotouch_bt.robot import BackendError, Conditions, RobotDescription, World
+
+
+class SimulatedWorld:
+    """One trial's world with the firmware of its devices. Nothing here knows the vendors' API.
+
+    The same seed gives the same world as the MuJoCo backend and sensors with the same noise.
+
+    Args:
+        world, conditions, seed: As for a backend.
+        options: `layout` and `fixed` as for the MuJoCo backend; others are not looked at.
+        description: The robot.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        conditions: Conditions,
+        seed: int,
+        options: Mapping[str, object],
+        description: RobotDescription = RIZON4_XENSE,
+    ) -> None:
+        self.world, self.conditions, self.seed, self.description = world, conditions, seed, description
+        self.truth, self.model, self.data, self.handles = build_world(description, world, conditions, seed, options)
+        self.trace: Trace | None = None
+        self.peak_force_N = 0.0
+        self.arm = Arm(description, conditions, seed, self.model, self.data, self.handles)
+        self.hand = Hand(description, conditions, seed, world, self.truth, self.model, self.data, self.handles)
+        self.steps = 0
+        h = self.handles
+        self._ctrl = np.array(self.data.ctrl)
+        self._arm_ctrl, self._jaw_ctrl = self._ctrl[h.arm_ctrl], self._ctrl[h.jaw_ctrl]
+        self._jaw_rows = np.zeros((STEPS, 2))
+        self._external = np.zeros((STEPS, 4, 6))  # torque, force
+        self._external_now = self.data.cfrc_ext[h.held_bodies]
+        self._samples = np.zeros((STEPS, self.model.nsensordata))
+        self._counted = np.array([1.0, 1.0, 1.0, 0.0])
+
+    @classmethod
+    def unpickle(cls, blob: bytes) -> SimulatedWorld:
+        """From a pickle of (World, Conditions, seed, options), written by our own client."""
+        world, conditions, seed, options = pickle.loads(blob)
+        return cls(world, conditions, seed, options)
+
+    @property
+    def now_s(self) -> float:
+        """Time since the world began."""
+        return self.steps * STEP_S
+
+    def advance(self, stamp_s: float) -> None:
+        """Step until `stamp_s` has come.
+
+        Raises:
+            BackendError: MuJoCo failed; cause chained.
+        """
+        try:
+            for _ in range(round(stamp_s / STEP_S) - self.steps):
+                self._step()
+        except mujoco.FatalError as e:
+            raise BackendError(f"MuJoCo failed at t={self.now_s:.3f} s: {e}") from e
+
+    def _step(self) -> None:
+        """One millisecond."""
+        i = self.steps % STEPS
+        if i == 0:
+            self.arm.carry()
+            self._jaw_rows = self.hand.begin()
+        self.arm.control(self._arm_ctrl)
+        self._jaw_ctrl[:] = self._jaw_rows[i]
+        self.data.ctrl[:] = self._ctrl
+        mujoco.mj_step(self.model, self.data)
+        self.steps += 1
+        row = self.data.sensordata.copy()
+        self._samples[i] = row
+        self._external[i] = self._external_now
+        self.arm.sense(self.steps, row)
+        if i == STEPS - 1:
+            self._after_period()
+
+    def _after_period(self) -> None:
+        """What the MuJoCo backend does once a control period."""
+        check_sane(self.data.warning.number, self._samples, self.data.time)
+        self._note_peak()
+        self.hand.end(self.now_s, self._samples[-1])
+
+    def contact_force_N(self) -> float:
+        """True contact force in the last step, on the hand and on the probe while it is in the hand."""
+        force = (self._counted @ np.asarray(self._external_now))[3:]
+        return math.sqrt(float(force @ force))
+
+    def _note_peak(self) -> None:
+        """Largest true contact force so far, on the hand and on the probe while it is in the hand."""
+        h = self.handles
+        gap = self.data.xpos[h.probe_body] - self._samples[-1, h.sensors.position]
+        self._counted[3] = float(gap @ gap) < HELD_DISTANCE_M**2
+        force = (self._counted @ self._external)[:, 3:]
+        self.peak_force_N = max(self.peak_force_N, float((force * force).sum(axis=1).max()) ** 0.5)

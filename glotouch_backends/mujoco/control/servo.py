@@ -1,0 +1,145 @@
+"""From joint setpoints to servo commands: cubic Hermite between setpoints, feed-forward, and braking to a hold."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from glotouch_backends.mujoco.model import DAMPING_PER_STIFFNESS_S, JOINT_DAMPING, STEPS, STIFFNESS_NM_RAD, Handles
+from glotouch_bt.robot import Array, JointSetpoint, ParamError, RobotDescription
+
+BRAKE_REACH_M = 0.8  # the hand's distance from the axes, to turn a Cartesian deceleration into a joint one
+GREATEST_RAD_S2 = 1e3  # a feed-forward acceleration beyond this is a mistake
+VELOCITY_SLACK = 1.02  # of the implied velocity between setpoints, for rounding
+
+
+def hermite(period_s: float, steps: int) -> tuple[Array, Array]:
+    """Position and velocity bases (steps, 4) on (q0, dq0, q1, dq1), at the START of each of the period's steps.
+
+    Standard cubic Hermite basis; a step's command acts from its start, so the period's end is the next one's start.
+    """
+    s, t = np.arange(steps) / steps, period_s
+    position = np.stack(
+        [2 * s**3 - 3 * s**2 + 1, t * (s**3 - 2 * s**2 + s), -2 * s**3 + 3 * s**2, t * (s**3 - s**2)], axis=1
+    )
+    velocity = np.stack(
+        [(6 * s**2 - 6 * s) / t, 3 * s**2 - 4 * s + 1, (6 * s - 6 * s**2) / t, 3 * s**2 - 2 * s], axis=1
+    )
+    return position, velocity
+
+
+class Servo:
+    """Keeps the last setpoint and turns the next one into one servo command a step.
+
+    MuJoCo's position servo gives kp (ctrl - q) - kv dq; with
+    ctrl = q + ((kv + damping) dq + M ddq) / kp the joints follow q without lag (M includes the armature).
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        handles: Handles,
+        description: RobotDescription,
+        period_s: float,
+        stop_acceleration_m_s2: float,
+    ) -> None:
+        self._model, self._data, self._dof = model, data, handles.arm_dof
+        joints = description.joints
+        n = description.dof
+        lower, upper = np.array([j.lower_rad for j in joints]), np.array([j.upper_rad for j in joints])
+        fastest = np.array([j.velocity_rad_s for j in joints])
+        # Rows: q, dq, ddq, implied velocity. |value - middle| <= half; false for NaN.
+        self._middle = np.stack([0.5 * (lower + upper), np.zeros(n), np.zeros(n), np.zeros(n)])
+        self._half = np.stack(
+            [0.5 * (upper - lower) + 1e-9, fastest, np.full(n, GREATEST_RAD_S2), VELOCITY_SLACK * fastest]
+        )
+        self._names = [j.name for j in joints]
+        kp = np.array(STIFFNESS_NM_RAD)
+        self._per_kp = 1.0 / kp
+        self._lead = DAMPING_PER_STIFFNESS_S + JOINT_DAMPING / kp
+        self._period = period_s
+        self._brake_step = stop_acceleration_m_s2 / BRAKE_REACH_M * period_s
+        along = (np.arange(STEPS) / STEPS)[:, None]
+        # One product gives all commands: position basis on the knots, velocity basis on the led knots, ramped torques.
+        self._basis = np.hstack([*hermite(period_s, STEPS), 1.0 - along, along, np.ones((STEPS, 1))])
+        self._terms = np.zeros((11, n))
+        self._knots: Array = self._terms[:4]  # q0, dq0, q1, dq1
+        self._asked = np.zeros((4, n))
+        self._ddq = np.zeros(n)
+        self._vector, self._product = np.zeros(model.nv), np.zeros(model.nv)
+
+    @property
+    def q(self) -> Array:
+        """(dof,) the setpoint reached at the end of the last period, rad."""
+        return np.asarray(self._knots[2])
+
+    @property
+    def moving(self) -> bool:
+        """True while the setpoint has a velocity."""
+        return bool(self._knots[3].any())
+
+    def reset(self, q: Array) -> None:
+        """Stand at `q` (dof,) from now on, at once."""
+        self._knots[0] = self._knots[2] = q
+        self._knots[1] = self._knots[3] = 0.0
+        self._ddq[:] = 0.0
+
+    def load(self, torque_Nm: Array) -> None:
+        """Constant feed-forward torque (dof,) that carries a payload's weight."""
+        self._terms[10] = torque_Nm * self._per_kp
+
+    def check(self, setpoint: JointSetpoint) -> tuple[Array, Array, Array]:
+        """The setpoint as arrays, if it is sane.
+
+        Raises:
+            ParamError: Wrong shape, not finite, or beyond a joint's position or velocity limit.
+        """
+        asked = self._asked
+        try:
+            asked[0], asked[1], asked[2] = setpoint.q, setpoint.dq, setpoint.ddq
+        except (ValueError, TypeError) as e:
+            raise ParamError("setpoint", setpoint, f"arrays of shape {self.q.shape}") from e
+        np.subtract(asked[0], self.q, out=asked[3])
+        asked[3] /= self._period
+        good = np.abs(asked - self._middle) <= self._half
+        if np.count_nonzero(good) < good.size:
+            row, i = (int(v[0]) for v in np.nonzero(~good))
+            middle, half = self._middle[row, i], self._half[row, i]
+            what, unit = (("q", "rad"), ("dq", "rad/s"), ("ddq", "rad/s2"), ("(q - last q) / period", "rad/s"))[row]
+            rule = f"finite and within {middle - half:.4f} .. {middle + half:.4f} {unit}"
+            raise ParamError(f"setpoint.{what}[{self._names[i]}]", float(asked[row, i]), rule)
+        return asked[0], asked[1], asked[2]
+
+    def _brake(self) -> tuple[Array, Array, Array]:
+        """The next setpoint of a straight, even deceleration to rest (in joint space)."""
+        q, dq = self._knots[2], self._knots[3]
+        fastest = float(np.abs(dq).max())
+        if fastest == 0.0:
+            return q, dq, np.zeros_like(q)
+        slower = dq * max(0.0, 1.0 - self._brake_step / fastest)
+        return q + 0.5 * self._period * (dq + slower), slower, (slower - dq) / self._period
+
+    def plan(self, target: tuple[Array, Array, Array] | None, ctrl: Array) -> None:
+        """Fill ctrl (steps, dof) for the coming period: towards the target, or braking to rest if None."""
+        k, terms = self._knots, self._terms
+        if target is None and not np.count_nonzero(k[3]):
+            if not np.count_nonzero(self._ddq):
+                k[0], k[1] = k[2], 0.0
+                ctrl[:] = k[2] + terms[10]
+                return
+            target = (k[2], k[3], np.zeros_like(k[2]))
+        q, dq, ddq = self._brake() if target is None else target
+        k[0], k[1] = k[2], k[3]
+        k[2], k[3] = q, dq
+        np.multiply(k, self._lead, out=terms[4:8])
+        terms[8] = self._inertia(self._ddq)
+        terms[9] = self._inertia(ddq)
+        np.matmul(self._basis, terms, out=ctrl)
+        self._ddq[:] = ddq
+
+    def _inertia(self, ddq: Array) -> Array:
+        """M ddq / kp, with the present inertia matrix (the armature is in M)."""
+        self._vector[self._dof] = ddq
+        mujoco.mj_mulM(self._model, self._data, self._product, self._vector)
+        return np.asarray(self._product[self._dof] * self._per_kp)

@@ -1,0 +1,67 @@
+"""How far a set of convex hulls departs from the solid it stands for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import trimesh
+from scipy.spatial import ConvexHull, cKDTree
+
+from glotouch_bt.robot import Array
+from glotouch_bt.robot.scene import Mesh
+
+SKIN_M = 0.001
+"""Points deeper inside the solid than this belong to a crack between two hulls, not to the outer skin."""
+
+
+def inside_m(points: Array, hulls: Sequence[Array]) -> Array:
+    """Depth (n,) of each point inside the nearest hull; outside negative, a lower bound of the gap."""
+    depth = np.full(len(points), -np.inf)
+    for hull in hulls:
+        planes = ConvexHull(hull).equations
+        np.maximum(depth, -(points @ planes[:, :3].T + planes[:, 3]).max(axis=1), out=depth)
+    return depth
+
+
+def surface_distance_m(points: Array, mesh: Mesh, samples: int = 200_000) -> Array:
+    """Distance (n,) of points from the mesh's surface: exact to the triangles near the nearest of dense samples."""
+    solid = mesh.as_trimesh()
+    near, triangle = trimesh.sample.sample_surface(solid, samples, seed=0)
+    _, index = cKDTree(near).query(points, k=6)
+    closest = trimesh.triangles.closest_point(
+        solid.triangles[triangle[index].ravel()], np.repeat(points, index.shape[1], axis=0)
+    )
+    gap = np.linalg.norm(closest.reshape(*index.shape, 3) - points[:, None], axis=2)
+    return np.asarray(gap.min(axis=1), dtype=np.float64)
+
+
+def bulge_m(mesh: Mesh, hulls: Sequence[Array], samples: int = 20_000) -> Array:
+    """How far the hulls' union stands out of the solid, at points spread evenly over the union's surface.
+
+    Args:
+        mesh: The solid.
+        hulls: (k_i, 3) vertices of each convex part, in the mesh frame.
+        samples: Points before those hidden inside another hull are dropped.
+
+    Returns:
+        (n,) distances from the true surface in m, n <= samples; 0 where the union lies within the solid (how far it
+        falls short is measured by `inside_m` of points of the true surface).
+    """
+    shells = [trimesh.convex.convex_hull(h) for h in hulls]
+    area = np.array([s.area for s in shells])
+    counts = np.maximum(1, np.rint(samples * area / area.sum())).astype(int)
+    drawn = [
+        trimesh.sample.sample_surface(s, n, seed=i)[0] for i, (s, n) in enumerate(zip(shells, counts, strict=True))
+    ]
+    points, owner = np.concatenate(drawn), np.repeat(np.arange(len(hulls)), counts)
+    hidden = np.zeros(len(points), dtype=bool)
+    for i, hull in enumerate(hulls):
+        others = (owner != i) & ~hidden
+        hidden[others] = inside_m(points[others], [hull]) >= 1e-6
+    found = points[~hidden]
+    distance = surface_distance_m(found, mesh)
+    inside = mesh.as_trimesh().contains(found)
+    # neighbours that abut instead of overlapping leave their common face visible deep inside the solid: not skin
+    skin = ~inside | (distance < SKIN_M)
+    return np.asarray(np.where(inside, 0.0, distance)[skin], dtype=np.float64)

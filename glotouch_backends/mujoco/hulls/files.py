@@ -1,0 +1,120 @@
+"""Where convex parts are kept, and in what form: one small npz a mesh, named by the mesh's digest."""
+
+from __future__ import annotations
+
+import io
+import os
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+import numpy as np
+
+from glotouch_bt.robot import Array
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Convex parts of one mesh.
+
+    Attributes:
+        hulls: (k_i, 3) vertices of each, m.
+        note: What is wrong with them, for people; empty if nothing.
+    """
+
+    hulls: tuple[Array, ...]
+    note: str = ""
+
+
+def package_file(name: str) -> Traversable:
+    """A file of the shipped decompositions (it need not exist)."""
+    return resources.files("glotouch_missions").joinpath("hulls", name)
+
+
+def user_folder() -> Path:
+    """The user's cache of decompositions (XDG base directory specification: a relative path is ignored)."""
+    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    return (base if base.is_absolute() else Path.home() / ".cache") / "glotouch-bt" / "hulls"
+
+
+def encode(key: str, parts: Parts) -> bytes:
+    """The file's bytes: float32 vertices behind one another, their counts, the key and the note. Deterministic."""
+    buffer = io.BytesIO()
+    np.savez_compressed(
+        buffer,
+        vertices=np.concatenate(parts.hulls).astype(np.float32),
+        counts=np.array([len(h) for h in parts.hulls], dtype=np.int32),
+        key=np.array(key),
+        note=np.array(parts.note),
+    )
+    return buffer.getvalue()
+
+
+def decode(content: bytes, key: str) -> Parts | None:
+    """The parts of a file, or None if it is damaged or was made with another key."""
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as data:
+            if str(data["key"]) != key:
+                return None
+            vertices, counts = data["vertices"].astype(np.float64), data["counts"]
+            note = str(data["note"])
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError):
+        return None
+    whole = vertices.ndim == 2 and vertices.shape[1] == 3 and counts.ndim == 1 and len(counts) > 0
+    if not whole or counts.min() < 4 or counts.sum() != len(vertices) or not np.isfinite(vertices).all():
+        return None
+    return Parts(tuple(np.split(vertices, np.cumsum(counts)[:-1])), note)
+
+
+def read_parts(path: Traversable, key: str) -> Parts | None:
+    """The parts kept in a file, or None if there is no such file, it is damaged, or its key differs."""
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    return decode(content, key)
+
+
+def write_parts(path: Path, key: str, parts: Parts, say: Callable[[str], None]) -> Parts:
+    """Keep parts in a file, whole or not at all, and return them as a later reader will see them.
+
+    A folder that cannot be written costs time in the next run, not this one: it is only reported.
+    """
+    content = encode(key, parts)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.write_bytes(content)
+        os.replace(temporary, path)
+    except OSError as e:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        say(f"convex parts cannot be kept in {path.parent} ({e.strerror}); they will be made anew next time")
+    kept = decode(content, key)
+    assert kept is not None
+    return kept
+
+
+@contextmanager
+def locked(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
+    """Let one process at a time make a file; others wait, after `on_wait`. Without file locks nobody waits."""
+    try:
+        import fcntl
+
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lock = path.with_name(f".{path.stem}.lock").open("w")
+    except (ImportError, OSError):
+        yield
+        return
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            on_wait()
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield

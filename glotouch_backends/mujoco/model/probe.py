@@ -1,0 +1,108 @@
+"""The passive probe and the stand it waits in.
+
+The stand is a block with a slot; two rails on its top carry the handle, and the shaft hangs through the slot. The rails
+lie inside the handle's outline, so that closed fingers pass them, and the slot lets the ball pass with room to spare.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import trimesh
+
+from glotouch_backends.mujoco.model.contact import (
+    ENVIRONMENT,
+    GEL_TORSION_M,
+    HOLDER_FRICTION,
+    PAD,
+    PAD_HANDLE_FRICTION,
+    PROBE,
+    ROLLING_M,
+    TIP_FRICTION,
+    set_category,
+    set_friction,
+)
+from glotouch_bt.robot import Holder, ParamError, Pose, Probe
+from glotouch_bt.robot.scene import Mesh
+
+RAIL_HEIGHT_M = 0.003
+BALL_ROOM_M = 0.001  # least room between ball and rail, on each side
+LEDGE_M = 0.0015  # how far a rail reaches under the handle
+HANDLE_COLOUR, STEEL_COLOUR, STAND_COLOUR = (0.15, 0.35, 0.65, 1.0), (0.75, 0.77, 0.80, 1.0), (0.3, 0.32, 0.3, 1.0)
+
+
+def handle_mesh(probe: Probe) -> Mesh:
+    """The handle as a solid, in the probe's body frame: what the pads feel while they hold it."""
+    box = trimesh.creation.box(probe.handle_m)
+    return Mesh("handle", np.array(box.vertices), np.array(box.faces, dtype=np.int64), f"handle {probe.handle_m}")
+
+
+def add_probe(spec: mujoco.MjSpec, probe: Probe, holder: Holder, pose_handle_shaft: Pose, pad_friction: float) -> None:
+    """Add the free body `probe` (frame: handle's centre, z to the tip), standing in its stand, and the stand.
+
+    Site `tip` is the ball's centre; geoms `handle`, `shaft` and `ball`.
+    """
+    pose = holder.pose_B_grasp
+    body = spec.worldbody.add_body(name="probe", pos=pose.position_m, quat=pose.quat)
+    body.add_freejoint(name="probe")
+    hx, hy, hz = (0.5 * s for s in probe.handle_m)
+    handle = body.add_geom(name="handle", type=mujoco.mjtGeom.mjGEOM_BOX, size=(hx, hy, hz), rgba=HANDLE_COLOUR)
+    set_category(handle, PROBE)
+    set_friction(handle, HOLDER_FRICTION, priority=1)
+
+    top, ball = pose_handle_shaft.apply([(0.0, 0.0, hz), (0.0, 0.0, probe.grasp_to_tip_m)])
+    shaft = body.add_geom(name="shaft", type=mujoco.mjtGeom.mjGEOM_CYLINDER, rgba=STEEL_COLOUR)
+    shaft.fromto = (*top, *ball)
+    shaft.size = (0.5 * probe.shaft_diameter_m, 0.0, 0.0)
+    tip = body.add_geom(
+        name="ball", type=mujoco.mjtGeom.mjGEOM_SPHERE, pos=ball, size=(probe.tip_radius_m, 0.0, 0.0), rgba=STEEL_COLOUR
+    )
+    for geom in (shaft, tip):
+        set_category(geom, PROBE)
+        set_friction(geom, TIP_FRICTION, priority=1)
+    body.add_site(name="tip", pos=ball, quat=pose_handle_shaft.quat)
+
+    body.explicitinertial = True
+    body.mass = probe.mass_kg
+    body.ipos = pose_handle_shaft.apply((0.0, 0.0, probe.com_below_grasp_m))
+    # A uniform rod of the whole length about its centre, as thick as the handle (its true make-up is not described).
+    whole = probe.handle_m[2] + probe.length_m
+    across = probe.mass_kg * (whole**2 + probe.handle_m[0] ** 2) / 12
+    body.inertia = (across, across, probe.mass_kg * (probe.handle_m[0] ** 2 + probe.handle_m[1] ** 2) / 12)
+
+    for side in ("left", "right"):
+        pair = spec.add_pair(name=f"grip_{side}", geomname1=f"pad_{side}", geomname2="handle", condim=4)
+        pair.friction = (pad_friction, pad_friction, GEL_TORSION_M, ROLLING_M, ROLLING_M)
+        pair.solref = PAD
+        pair.solreffriction = PAD_HANDLE_FRICTION
+    _add_stand(spec, probe, holder)
+
+
+def _add_stand(spec: mujoco.MjSpec, probe: Probe, holder: Holder) -> None:
+    hx, hy, hz = (0.5 * s for s in probe.handle_m)
+    bx, by, bz = holder.half_m
+    gap = hx - LEDGE_M  # half width of the slot
+    if gap < probe.tip_radius_m + BALL_ROOM_M:
+        least = 2e3 * (probe.tip_radius_m + BALL_ROOM_M + LEDGE_M)
+        raise ParamError(
+            "probe.handle_m[0]", probe.handle_m[0], f">= {least:.0f} mm, or the ball does not pass the stand"
+        )
+    if bx <= hx or by <= hy:
+        raise ParamError("holder.half_m", holder.half_m, "larger than the probe's handle")
+    pose = holder.pose_B_grasp
+    stand = spec.worldbody.add_body(name="holder", pos=pose.position_m, quat=pose.quat)
+    block = hz + RAIL_HEIGHT_M + bz
+    slot_y = by - 0.004
+    across = 0.5 * (bx - gap)
+    boxes = [((s * (gap + across), 0.0, block), (across, by, bz)) for s in (-1.0, 1.0)]
+    boxes += [((0.0, s * (by - 0.002), block), (gap, 0.002, bz)) for s in (-1.0, 1.0)]
+    # Rails end inside the handle's outline: fingers close beside them.
+    rail_x, rail_y = 0.5 * LEDGE_M, min(hy - 0.001, slot_y)
+    boxes += [
+        ((s * (gap + rail_x), 0.0, hz + 0.5 * RAIL_HEIGHT_M), (rail_x, rail_y, 0.5 * RAIL_HEIGHT_M))
+        for s in (-1.0, 1.0)
+    ]
+    for centre, half in boxes:
+        geom = stand.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, pos=np.array(centre), size=half, rgba=STAND_COLOUR)
+        set_category(geom, ENVIRONMENT)
+        set_friction(geom, HOLDER_FRICTION)

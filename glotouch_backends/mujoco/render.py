@@ -1,0 +1,51 @@
+"""Pictures of the simulated world. Needs an OpenGL of some kind (MUJOCO_GL=egl works without a display).
+
+Imported only when a picture is asked for; a mission needs none of this.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from glotouch_backends.mujoco.robot import MujocoRobot
+from glotouch_bt.robot import BackendError, UnknownName
+
+# (look-at point: K or holder or hand, distance m, azimuth deg, elevation deg)
+CAMERAS: dict[str, tuple[str, float, float, float]] = {
+    "overview": ("container", 1.7, 140.0, -25.0),
+    "container": ("container", 0.65, 160.0, -45.0),
+    "above": ("container", 0.75, 180.0, -89.0),
+    "holder": ("holder", 0.45, 120.0, -15.0),
+    "hand": ("hand", 0.5, 120.0, -10.0),
+}
+
+
+def render(robot: MujocoRobot, width: int = 960, height: int = 720, camera: str = "overview") -> npt.NDArray[np.uint8]:
+    """A picture (height, width, 3), RGB, of the world as it is now.
+
+    Raises:
+        UnknownName: No such camera.
+        BackendError: No OpenGL here.
+    """
+    if camera not in CAMERAS:
+        raise UnknownName("camera", camera, CAMERAS)
+    body, distance, azimuth, elevation = CAMERAS[camera]
+    view = mujoco.MjvCamera()
+    view.lookat[:] = robot.data.body(body).xpos
+    if body == "hand":
+        view.lookat[2] -= 0.15
+    view.distance, view.azimuth, view.elevation = distance, azimuth, elevation
+    option = mujoco.MjvOption()
+    option.geomgroup[:] = 1
+    for g in np.flatnonzero(
+        (robot.model.geom_group == 3) & np.isin(robot.model.geom_bodyid, robot.handles.object_bodies)
+    ):
+        robot.model.geom_rgba[g, 3] = 0.0  # hulls and feet: only the true mesh is shown
+    try:
+        with mujoco.Renderer(robot.model, height, width) as renderer:
+            renderer.update_scene(robot.data, view, option)
+            return np.array(renderer.render())
+    except Exception as e:  # every OpenGL platform fails in its own way
+        raise BackendError(f"no picture: OpenGL is not available ({e})") from e

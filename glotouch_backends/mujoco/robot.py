@@ -1,0 +1,293 @@
+"""The simulated robot: one `cycle` is ten steps of MuJoCo and as little Python as possible around them."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+
+from glotouch_backends.mujoco.control import (
+    CHUNK,
+    PAYLOAD_S,
+    Guard,
+    JawReports,
+    Jaws,
+    PendingPayload,
+    PendingTare,
+    Servo,
+    check_sane,
+)
+from glotouch_backends.mujoco.model import STEP_S, STEPS, Handles, handle_mesh
+from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, Tactile, WristSensor, up_in
+from glotouch_backends.mujoco.simulation import Keeper, Trace
+from glotouch_backends.mujoco.truth import Truth
+from glotouch_bt.robot import (
+    Array,
+    BackendError,
+    Command,
+    Conditions,
+    GripperState,
+    Limits,
+    Observation,
+    ParamError,
+    Request,
+    Robot,
+    RobotDescription,
+    Snapshot,
+    Tare,
+    Ticket,
+    World,
+)
+
+HELD_DISTANCE_M = 0.02  # the probe counts as held while its handle is this near the pads' mid-point
+
+
+class MujocoRobot(Robot):
+    """See `Robot`. Made by `MujocoBackend.open`; the truth in it is for the referee only."""
+
+    def __init__(
+        self,
+        description: RobotDescription,
+        limits: Limits,
+        world: World,
+        truth: Truth,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        handles: Handles,
+        conditions: Conditions,
+        seed: int,
+        traced: bool = False,
+    ) -> None:
+        self.description, self.limits, self.period_s = description, limits, STEPS * STEP_S
+        self.world, self.truth = world, truth
+        self.model, self.data, self.handles = model, data, handles
+        s = handles.sensors
+        self._s = s
+        self._aperture = aperture = float(data.qpos[handles.jaw_qpos].sum())
+        self._servo = Servo(model, data, handles, description, self.period_s, limits.stop_acceleration_m_s2)
+        self._servo.reset(np.array(data.qpos[handles.arm_qpos]))
+        self._jaws = Jaws(model, handles, description.gripper, aperture)
+        self._wrist = WristSensor(description, conditions, seed)
+        self._guard = Guard(limits)
+        self._tactile = Tactile(
+            model,
+            data,
+            handles,
+            description.gripper,
+            [
+                (handles.probe_body, handle_mesh(world.probe)),
+                *((b, o.mesh) for b, o in zip(handles.object_bodies, truth.objects, strict=True)),
+            ],
+            conditions,
+            seed,
+        )
+        self._ctrl = np.zeros((STEPS, model.nu))
+        self._arm_ctrl, self._jaw_ctrl = self._ctrl[:, handles.arm_ctrl], self._ctrl[:, handles.jaw_ctrl]
+        self._samples = np.zeros((STEPS, model.nsensordata))
+        self._external = np.zeros((STEPS, 4, 6))  # torque, force
+        # Views of one step each, made once: the loop round mj_step only copies. Memoryviews copy three times faster.
+        rows = [
+            (c.data, s.data, e.data)
+            for c, s, e in zip(self._ctrl, self._samples, self._external.reshape(STEPS, -1), strict=True)
+        ]
+        wrenches = self._samples[:, s.force.start : s.torque.stop]
+        chunks = [slice(i, i + CHUNK) for i in range(0, STEPS, CHUNK)]
+        self._chunks = [(self._ctrl[c], rows[c], wrenches[c]) for c in chunks]
+        self._ctrl_now, self._sensed = memoryview(data.ctrl), memoryview(data.sensordata)
+        self._external_now = memoryview(data.cfrc_ext[handles.held_bodies].reshape(-1))
+        self._counted = np.array([1.0, 1.0, 1.0, 0.0])
+        self._warnings = data.warning.number
+        self._probe_now = data.xpos[handles.probe_body]
+        self._pads_now = data.site_xpos[handles.pads_site], data.site_xmat[handles.pads_site].reshape(3, 3)
+        self._ago_s = (np.arange(1, STEPS + 1, dtype=np.float64) - STEPS) * STEP_S
+        self._jacobian = np.zeros((3, model.nv))
+        self._cycles = 0
+        self._tare: PendingTare | None = None
+        self._payload: PendingPayload | None = None
+        self._payload_load: tuple[float, Array] | None = None
+        self._failed: BackendError | None = None
+        self._closed = False
+        self.peak_force_N = 0.0
+
+        self.trace = Trace(model, data) if traced else None
+        self._keeper = Keeper(model, data)
+
+        self._samples[:] = data.sensordata
+        self._wrist.fill(-self._samples[0, s.force.start : s.torque.stop])
+        self._expected = self._wrist.expected(up_in(self._samples[0, s.quat]))
+        first = GripperState(0.0, aperture, 0.0, False)
+        self._reports = JawReports(conditions, seed, self.period_s, first)
+        self._observation = self._observe(Command())
+
+    def observe(self) -> Observation:
+        """See `Robot`."""
+        return self._observation
+
+    def cycle(self, command: Command) -> Observation:
+        """See `Robot`."""
+        if self._closed:
+            raise BackendError("the robot is closed")
+        if self._failed is not None:
+            raise self._failed
+        stopped = self._guard.tripped
+        target = None
+        if stopped is None:
+            try:
+                if command.gripper is not None:
+                    self._jaws.check(command.gripper)
+                if command.motion is not None:
+                    target = self._servo.check(command.motion)
+            except ParamError:
+                self.hold()
+                raise
+            if command.gripper is not None:
+                self._jaws.set(command.gripper)
+        if self._payload_load is not None:
+            self._servo.load(self._carry())
+        self._servo.plan(target, self._arm_ctrl)
+        self._jaws.plan(self._aperture, self.period_s, self._jaw_ctrl)
+        try:
+            self._advance()
+            check_sane(self._warnings, self._samples, self.data.time)
+        except mujoco.FatalError as e:
+            self._failed = BackendError(f"MuJoCo failed at t={self.data.time:.3f} s: {e}")
+            raise self._failed from e
+        except BackendError as e:
+            self._failed = e
+            raise
+        self._cycles += 1
+        self._observation = self._observe(command)
+        if self._guard.tripped is not None:
+            raise self._guard.stop()
+        return self._observation
+
+    def start(self, request: Request) -> Ticket:
+        """See `Robot`."""
+        if isinstance(request, Tare):
+            if not (math.isfinite(request.duration_s) and request.duration_s > 0):
+                raise ParamError("tare.duration_s", request.duration_s, "finite and positive")
+            if self._tare is not None:
+                self._tare.ticket.error, self._tare.ticket.done = "replaced by a newer tare", True
+            self._tare = PendingTare(request, max(1, round(request.duration_s / self.period_s)))
+            return self._tare.ticket
+        if not (math.isfinite(request.mass_kg) and request.mass_kg >= 0):
+            raise ParamError("payload.mass_kg", request.mass_kg, "finite and not negative")
+        if self._payload is not None:
+            self._payload.ticket.error, self._payload.ticket.done = "replaced by a newer payload", True
+        self._payload = PendingPayload(request, max(1, round(PAYLOAD_S / self.period_s)))
+        return self._payload.ticket
+
+    def hold(self) -> None:
+        """See `Robot`.
+
+        Time passes only in `cycle`, and a cycle without a motion brakes along the path to rest: nothing is left to do.
+        """
+
+    def close(self) -> None:
+        """See `Robot`."""
+        self.hold()
+        self._closed = True
+
+    def snapshot(self) -> Snapshot:
+        """See `Robot`."""
+        if self._failed is not None:
+            raise self._failed
+        return self._keeper.take(self)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """See `Robot`. What `trace` remembers begins anew."""
+        self._keeper.put_back(self, snapshot)
+        if self.trace is not None:
+            self.trace = Trace(self.model, self.data)
+
+    def _advance(self) -> None:
+        """Ten steps, looking at the wrench after each chunk."""
+        model, data, step = self.model, self.data, mujoco.mj_step
+        ctrl_now, sensed, external_now = self._ctrl_now, self._sensed, self._external_now
+        trace = self.trace
+        for controls, rows, wrenches in self._chunks:
+            if trace is not None:
+                trace.add(controls, model.actuator_forcerange)
+            for ctrl, sample, external in rows:
+                ctrl_now[:] = ctrl
+                step(model, data)
+                sample[:] = sensed
+                external[:] = external_now
+            # The sensor gives the force of hand on arm; the hand feels its opposite.
+            if self._guard.tripped is None and self._guard.look(-wrenches - self._expected, data.time):
+                self._stop_here()
+
+    def _stop_here(self) -> None:
+        """Freeze the arm at its present posture, from the next step on; the jaws keep their grip."""
+        q = np.array(self.data.qpos[self.handles.arm_qpos])
+        self._servo.reset(q)
+        self._arm_ctrl[:] = q
+
+    def _carry(self) -> Array:
+        """Joint torques (dof,) that carry the believed payload: J^T of its weight."""
+        mass, com_P = self._payload_load or (0.0, np.zeros(3))
+        h, (origin, rotation) = self.handles, self._pads_now
+        mujoco.mj_jac(self.model, self.data, self._jacobian, None, origin + rotation @ com_P, h.hand_bodies.start)
+        return self._jacobian[2, h.arm_dof] * (mass * GRAVITY_M_S2)
+
+    def _observe(self, command: Command) -> Observation:
+        """The observation of the samples just taken."""
+        s, rows = self._s, self._samples.copy()
+        now_s = self._cycles * self.period_s
+        wrench, quat = rows[:, s.force.start : s.torque.stop], rows[:, s.quat]
+        np.negative(wrench, out=wrench)
+        self._set_payload()
+        up = up_in(quat[-1])
+        wrench = self._wrist.measure(wrench, up)
+        self._add_to_tare(wrench, up)
+        self._expected = self._wrist.expected(up)
+        self._note_peak()
+        last = rows[-1].tolist()
+        jaws, speeds, forces = last[s.jaws], last[s.jaw_speeds], last[s.jaw_forces]
+        self._aperture = jaws[0] + jaws[1]
+        self._tactile.sample(now_s, command.tactile, jaws, forces)
+        gripper = self._reports.report(
+            now_s,
+            self._aperture - self._tactile.shift_m,
+            speeds[0] + speeds[1],
+            max(0.0, -0.5 * (forces[0] + forces[1])),
+        )
+        return Observation(
+            stamp_s=now_s + self._ago_s,
+            q=rows[:, s.q],
+            dq=rows[:, s.dq],
+            position_B_P=rows[:, s.position],
+            quat_B_P=quat,
+            wrench_S=wrench - self._wrist.bias,
+            gripper=gripper,
+            tactile=self._tactile.arrived(now_s, command.tactile),
+        )
+
+    def _note_peak(self) -> None:
+        """Largest true contact force so far, on the hand and on the probe while it is in the hand."""
+        x, y, z = (self._probe_now - self._samples[-1, self._s.position]).tolist()
+        self._counted[3] = x * x + y * y + z * z < HELD_DISTANCE_M**2
+        force = (self._counted @ self._external)[:, 3:]
+        flat = force.ravel()
+        if flat @ flat > self.peak_force_N**2:  # else not one of them can be a new peak
+            self.peak_force_N = max(self.peak_force_N, float((force * force).sum(axis=1).max()) ** 0.5)
+
+    def _set_payload(self) -> None:
+        """Advance a payload request by one period; the block of the period in which it is done is compensated."""
+        if self._payload is None:
+            return
+        self._payload.periods -= 1
+        if self._payload.periods <= 0:
+            request = self._payload.request
+            self._wrist.set_payload(request.mass_kg, request.com_P_m)
+            self._payload_load = (request.mass_kg, request.com_P_m)
+            self._payload.ticket.done = True
+            self._payload = None
+
+    def _add_to_tare(self, measured: Array, up_S: Array) -> None:
+        """Give a block to a tare under way; the block of the period in which it is done is tared."""
+        if self._tare is not None and self._tare.add(measured):
+            self._wrist.tare(self._tare.mean, up_S)
+            self._tare.ticket.done = True
+            self._tare = None

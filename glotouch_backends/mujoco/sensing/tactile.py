@@ -1,0 +1,154 @@
+"""The gel pads in the loop: which objects press on them, how hard, and the frames that arrive.
+
+Only forces on the pads' own geoms count: a finger's back that carries the object leaves the gel untouched.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from glotouch_backends.mujoco.model import Handles
+from glotouch_backends.mujoco.sensing.gel import GelSensor, PairPress
+from glotouch_backends.mujoco.sensing.rays import SurfaceRays
+from glotouch_bt.robot import Conditions, Gripper, Pose, TactileFrame
+from glotouch_bt.robot.scene import Mesh, stream
+
+SAME_DISTANCE_M = 1e-5  # the gel is not solved again while pads and forces stay this near the last solution
+SAME_FORCE_N = 0.5
+
+
+def body_pose(data: mujoco.MjData, body: int) -> Pose:
+    """True pose of a body in B."""
+    return Pose(data.xpos[body], data.xquat[body])
+
+
+class Pads:
+    """Contacts on the two pads, read from the solver at the present step."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, handles: Handles) -> None:
+        self._data, self._geoms = data, handles.pad_geoms
+        self._axes = data.site_xmat[handles.pads_site]
+        self._body_of = model.geom_bodyid
+
+    def touch(self) -> tuple[tuple[float, float], set[int]]:
+        """Normal force on (left, right) pad, N, and the bodies that press on them.
+
+        An elliptic contact's first three constraint rows are its force on the second geom, in the contact's frame.
+        """
+        contact = self._data.contact
+        pairs, address = contact.geom, contact.efc_address
+        left, right = self._geoms
+        if len(pairs) == 0:
+            return (0.0, 0.0), set()
+        mine = np.flatnonzero(((pairs == left) | (pairs == right)).any(axis=1) & (address >= 0))
+        if len(mine) == 0:
+            return (0.0, 0.0), set()
+        pairs = pairs[mine]
+        pad_second = (pairs[:, 1] == left) | (pairs[:, 1] == right)
+        rows = self._data.efc_force[address[mine][:, None] + np.arange(3)]
+        force_B = np.einsum("ni,nij->nj", rows, contact.frame[mine].reshape(-1, 3, 3))
+        along = force_B @ self._axes[1::3]  # on y_P
+        along[~pad_second] *= -1.0  # what the pad feels
+        on_left = np.where(pad_second, pairs[:, 1], pairs[:, 0]) == left
+        other = np.where(pad_second, pairs[:, 0], pairs[:, 1])[rows[:, 0] > 0.0]
+        forces = (max(float(along[on_left].sum()), 0.0), max(-float(along[~on_left].sum()), 0.0))
+        return forces, set(self._body_of[other].tolist())
+
+
+class Tactile:
+    """Samples the pads at the tactile rate; delivers frames late, noisy, with dead taxels.
+
+    Attributes:
+        shift_m: Sum of both pads' gel shifts at the last sample: how much further the jaws of a soft gel would have
+            closed than the simulated ones; part of the reported aperture.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        handles: Handles,
+        gripper: Gripper,
+        surfaces: Sequence[tuple[int, Mesh]],
+        conditions: Conditions,
+        seed: int,
+    ) -> None:
+        self._data = data
+        self._pads = Pads(model, data, handles)
+        self._site = handles.pads_site
+        self._gel = GelSensor(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
+        self._meshes = dict(surfaces)
+        self._rays: dict[int, SurfaceRays] = {}
+        self._c = conditions
+        self._rng = stream(seed, "tactile")
+        fixed = stream(seed, "gel")
+        shape = (2, *gripper.pad_shape)
+        self._offset = fixed.uniform(*conditions.tactile_offset_m, shape)
+        self._dead = fixed.random(shape) < conditions.tactile_dead_fraction
+        self._frames: deque[tuple[float, TactileFrame]] = deque()
+        self._tick = -1
+        self._solved = (np.inf, np.inf, 0.0, 0.0)
+        self._press: PairPress | None = None
+        self._zero = np.zeros(gripper.pad_shape)
+        self.shift_m = 0.0
+
+    def sample(self, now_s: float, wanted: bool, jaws: Sequence[float], jaw_forces: Sequence[float]) -> None:
+        """Called once a period, after its last step: take a frame if one is due.
+
+        Args:
+            now_s: Robot clock.
+            wanted: A frame is asked for; if not, the gel is solved again only when jaws or their forces have changed.
+            jaws, jaw_forces: (left, right) travel m and servo force N now.
+        """
+        tick = int(now_s * self._c.tactile_rate_Hz + 1e-6)
+        if tick == self._tick:
+            return
+        self._tick = tick
+        if not wanted and self._unchanged(jaws, jaw_forces):
+            return
+        self._solved = (jaws[0], jaws[1], jaw_forces[0], jaw_forces[1])
+        forces, bodies = self._pads.touch()
+        if bodies:
+            self._solve(forces, bodies, (jaws[0], jaws[1]))
+        else:
+            self._press, self.shift_m = None, 0.0
+        if wanted:
+            self._frames.append((now_s + self._c.tactile_latency_s, self._frame(now_s)))
+
+    def _unchanged(self, jaws: Sequence[float], jaw_forces: Sequence[float]) -> bool:
+        left, right, left_N, right_N = self._solved
+        return (
+            abs(jaws[0] - left) + abs(jaws[1] - right) < SAME_DISTANCE_M
+            and abs(jaw_forces[0] - left_N) + abs(jaw_forces[1] - right_N) < SAME_FORCE_N
+        )
+
+    def arrived(self, now_s: float, wanted: bool) -> TactileFrame | None:
+        """The newest frame that has arrived since the last call, if asked for."""
+        newest = None
+        while self._frames and self._frames[0][0] <= now_s + 1e-9:
+            newest = self._frames.popleft()[1]
+        return newest if wanted else None
+
+    def _solve(self, forces: tuple[float, float], bodies: set[int], jaws: tuple[float, float]) -> None:
+        data = self._data
+        pose_B_P = Pose.from_matrix(data.site_xpos[self._site], data.site_xmat[self._site].reshape(3, 3))
+        surfaces = []
+        for body in sorted(bodies & self._meshes.keys()):
+            if body not in self._rays:
+                self._rays[body] = SurfaceRays(self._meshes[body])
+            surfaces.append((self._rays[body], body_pose(data, body).inverse() @ pose_B_P))
+        self._press = self._gel.press_pair(surfaces, jaws, forces)
+        self.shift_m = self._press.left_shift_m + self._press.right_shift_m
+
+    def _frame(self, stamp_s: float) -> TactileFrame:
+        p = self._press
+        maps = np.stack([self._zero, self._zero] if p is None else [p.left_m, p.right_m])
+        if self._c.tactile_noise_sd_m > 0.0:
+            maps += self._c.tactile_noise_sd_m * self._rng.standard_normal(maps.shape)
+        maps += self._offset
+        maps[self._dead] = np.nan
+        return TactileFrame(stamp_s, maps[0], maps[1])

@@ -1,0 +1,138 @@
+"""The wrist force sensor: noise, drift, latency, tare, and the controller's imperfect idea of what it carries."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glotouch_backends.mujoco.model import STEP_S, STEPS
+from glotouch_bt.robot import Array, Conditions, RobotDescription
+from glotouch_bt.robot.scene import stream
+
+GRAVITY_M_S2 = 9.81
+BLOCKS = 128  # noise is drawn for this many periods at a time
+
+
+def weight_matrix(mass_kg: float, com_S_m: Array) -> Array:
+    """(6, 3) that maps `up` (B's z axis written in S) to the wrench of a weight hanging on the sensor, in S at S.
+
+    Force -m g up; torque com x force.
+    """
+    x, y, z = com_S_m
+    lever = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(-mass_kg * GRAVITY_M_S2 * np.vstack([np.eye(3), lever]))
+
+
+def up_in(quat_B_S: Array) -> Array:
+    """(3,) B's z axis written in S: the third row of the rotation matrix."""
+    w, x, y, z = quat_B_S.tolist()
+    return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
+
+
+def hand_mass(description: RobotDescription) -> tuple[float, Array]:
+    """Mass kg and centre of mass (3,) in S of all that is bolted beyond the sensor."""
+    g = description.gripper
+    (x, _, z), fingers = g.finger.centre_m, 2 * g.finger_mass_kg
+    centre = g.pose_E_P.apply((x, 0.0, z))
+    mass = g.mass_kg + fingers
+    return mass, (g.mass_kg * np.asarray(g.com_E_m) + fingers * centre) / mass
+
+
+class WristSensor:
+    """Turns the true wrench of each step into what the controller reports.
+
+    reported(t) = true(t - latency) + white noise + random walk - weight model - tare. Before the first tare the report
+    contains the hand's weight; from then on only its change with orientation, as the controller believes it.
+
+    Args:
+        description, conditions, seed: The robot, and what its sensor suffers from.
+        steps: Samples in a block of `measure`; the noise of a sample is the same for any.
+    """
+
+    def __init__(self, description: RobotDescription, conditions: Conditions, seed: int, steps: int = STEPS) -> None:
+        self._steps = steps
+        self._rng = stream(seed, "wrench")
+        draw = stream(seed, "payload")
+        self._mass_factor = 1.0 + conditions.payload_mass_error * float(draw.standard_normal())
+        self._com_error = conditions.payload_com_error_m * draw.standard_normal(3)
+        mass, com = hand_mass(description)
+        self._hand = weight_matrix(mass * self._mass_factor, com + self._com_error)
+        self._P_in_S = description.gripper.pose_E_P
+        self._payload = np.zeros((6, 3))
+        self._bias = np.zeros(6)
+        self._up_at_tare: Array | None = None
+        self._late = round(conditions.wrench_latency_s / STEP_S)
+        self._line = np.zeros((self._late + steps, 6))
+        self._sd = np.array([conditions.force_noise_sd_N] * 3 + [conditions.torque_noise_sd_Nm] * 3)
+        self._walk_sd = conditions.force_drift_N_per_sqrt_min * float(np.sqrt(STEP_S / 60.0))
+        self._walk = np.zeros(3)
+        self._noisy = bool(self._sd.any() or self._walk_sd > 0)
+        self._noise = np.zeros((BLOCKS, steps, 6))
+        self._block = BLOCKS
+        self._measured = np.zeros((steps, 6))
+        self._renew()
+
+    def _renew(self) -> None:
+        """Fold payload, tare and hand into two affine maps of `up`: what is subtracted, and what is expected."""
+        if self._up_at_tare is None:
+            self._offset = (self._payload, np.zeros(6))
+            self._expected = (self._payload + self._hand, np.zeros(6))
+        else:
+            self._offset = (self._payload + self._hand, -self._hand @ self._up_at_tare)
+            self._expected = (self._offset[0], self._offset[1] + self._bias)
+
+    def set_payload(self, mass_kg: float, com_P_m: Array) -> None:
+        """What the controller believes the hand carries, wrong by the condition's errors."""
+        self._payload = weight_matrix(mass_kg * self._mass_factor, self._P_in_S.apply(com_P_m) + self._com_error)
+        self._renew()
+
+    def tare(self, mean: Array, up: Array) -> None:
+        """Subtract `mean` (6,), an average of `measure`, taken at this orientation (see `up_in`), from now on."""
+        change = np.zeros(6) if self._up_at_tare is None else self._hand @ (up - self._up_at_tare)
+        self._bias = mean + change  # `measure` had the change since the last tare taken out; the new one starts here
+        self._up_at_tare = up
+        self._renew()
+
+    def expected(self, up: Array) -> Array:
+        """(6,) what the sensor should read without contact, with `up_in` its orientation: basis of the hard limit."""
+        matrix, constant = self._expected
+        return np.asarray(matrix @ up + constant)
+
+    def fill(self, wrench: Array) -> None:
+        """Start the delay line as if the sensor had read `wrench` (6,) for ever."""
+        self._line[:] = wrench
+
+    def measure(self, true: Array, up: Array) -> Array:
+        """(n, 6) block for a true block (n, 6), before the tare's bias is taken off: what a tare averages.
+
+        `up` (3,) is `up_in` of the sensor's orientation.
+
+        The array is used again by the next call.
+        """
+        late = self._late
+        if late:
+            self._line[:late] = self._line[self._steps : self._steps + late]
+        self._line[late:] = true
+        matrix, constant = self._offset
+        out = self._measured
+        np.subtract(self._line[: self._steps], matrix @ up + constant, out=out)
+        if self._noisy:
+            if self._block == BLOCKS:
+                self._draw()
+            out += self._noise[self._block]
+            self._block += 1
+        return out
+
+    @property
+    def bias(self) -> Array:
+        """(6,) what the last tare subtracts."""
+        return self._bias
+
+    def _draw(self) -> None:
+        n = BLOCKS * self._steps
+        noise = self._rng.standard_normal((n, 9))
+        walk = self._walk + np.cumsum(self._walk_sd * noise[:, 6:], axis=0)
+        self._walk = walk[-1]
+        noise[:, :6] *= self._sd
+        noise[:, :3] += walk
+        self._noise[:] = noise[:, :6].reshape(BLOCKS, self._steps, 6)
+        self._block = 0

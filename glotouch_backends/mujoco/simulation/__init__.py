@@ -1,0 +1,8 @@
+"""TODO door of glotouch_backends/mujoco/simulation."""
+
+from glotouch_backends.mujoco.simulation.disturber import MujocoDisturber
+from glotouch_backends.mujoco.simulation.referee import MujocoReferee, Simulated
+from glotouch_backends.mujoco.simulation.snapshot import Keeper
+from glotouch_backends.mujoco.simulation.trace import Trace
+
+__all__ = ["Keeper", "MujocoDisturber", "MujocoReferee", "Simulated", "Trace"]

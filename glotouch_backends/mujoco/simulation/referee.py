@@ -1,0 +1,100 @@
+"""The truth of the simulated world, for scoring only."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import mujoco
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from glotouch_backends.mujoco.model import Handles
+from glotouch_backends.mujoco.sensing import body_pose
+from glotouch_backends.mujoco.simulation.trace import Trace
+from glotouch_backends.mujoco.truth import Truth
+from glotouch_bt.robot import Array, Pose, World
+from glotouch_bt.robot.simulation import BareSteps, TrueObject
+
+STOWED_M = 0.005  # the handle's centre this near its place in the stand
+STOWED_TILT = 0.996  # cosine of 5 degrees
+
+
+class Simulated(Protocol):
+    """What a simulated robot lets its referee look at."""
+
+    world: World
+    truth: Truth
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    handles: Handles
+    peak_force_N: float
+    trace: Trace | None
+
+
+class MujocoReferee:
+    """See `robot.referee.Referee`."""
+
+    def __init__(self, robot: Simulated) -> None:
+        self._robot = robot
+
+    def objects(self) -> list[TrueObject]:
+        """All objects, now, in the world's order."""
+        r = self._robot
+        touching = self._touching()
+        left, right = r.handles.pad_geoms
+        pads = [touching.get(g, set()) for g in (left, right)]
+        result = []
+        for body, item in zip(r.handles.object_bodies, r.truth.objects, strict=True):
+            pose = body_pose(r.data, body)
+            seen = pose.apply(item.mesh.vertices_m)[:, :2]
+            held = all(body in p for p in pads) and not self._on(body, r.handles.container_body)
+            result.append(TrueObject(item.mesh.name, pose, item.mass_kg, seen[ConvexHull(seen).vertices], held))
+        return result
+
+    def pose_B_K(self) -> Pose:
+        """The true container frame."""
+        return self._robot.truth.pose_B_K
+
+    def tip_B_m(self) -> Array:
+        """(3,) true centre of the ball."""
+        return np.array(self._robot.data.site_xpos[self._robot.handles.tip_site])
+
+    def push_tip(self, force_B_N: Array) -> None:
+        """A force (3,) in B on the probe at the ball's centre, from now on."""
+        r, body = self._robot, self._robot.handles.probe_body
+        lever = self.tip_B_m() - r.data.xipos[body]
+        r.data.xfrc_applied[body] = np.concatenate([force_B_N, np.cross(lever, force_B_N)])
+
+    def probe_in_holder(self) -> bool:
+        """True if the handle is at its place, upright, and nobody touches it."""
+        r = self._robot
+        stowed = r.world.holder.pose_B_grasp
+        now = body_pose(r.data, r.handles.probe_body)
+        near = float(np.linalg.norm(now.position_m - stowed.position_m)) < STOWED_M
+        upright = float(now.rotation[:, 2] @ stowed.rotation[:, 2]) > STOWED_TILT
+        hand = r.handles.hand_bodies
+        return near and upright and not any(self._on(r.handles.probe_body, b) for b in range(hand.start, hand.stop))
+
+    def peak_force_N(self) -> float:
+        """Largest true contact force on the hand and on the probe it holds, so far."""
+        return self._robot.peak_force_N
+
+    def replay_bare_steps(self) -> BareSteps | None:
+        """The run's steps once more; None unless the backend's option `trace` was on."""
+        trace = self._robot.trace
+        return None if trace is None else trace.replay(self._robot.data)
+
+    def _touching(self) -> dict[int, set[int]]:
+        """Bodies in contact with each geom."""
+        r = self._robot
+        result: dict[int, set[int]] = {}
+        for first, second in r.data.contact.geom:
+            result.setdefault(int(first), set()).add(int(r.model.geom_bodyid[second]))
+            result.setdefault(int(second), set()).add(int(r.model.geom_bodyid[first]))
+        return result
+
+    def _on(self, body: int, other: int) -> bool:
+        """True if two bodies are in contact."""
+        r = self._robot
+        bodies = r.model.geom_bodyid[np.asarray(r.data.contact.geom).reshape(-1, 2)]
+        return bool(((bodies == (body, other)).all(axis=1) | (bodies == (other, body)).all(axis=1)).any())

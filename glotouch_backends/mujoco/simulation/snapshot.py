@@ -1,0 +1,167 @@
+"""The whole state of a simulated robot and its world, taken between two cycles and put back to the bit.
+
+MuJoCo's own state vector is not enough: with sleeping islands a step depends on what the last one left in `mjData`
+(who sleeps, positions of what sleeps), and the servo and the payload's feed-forward read the last step's inertia and
+poses. So every array of `mjData` of a fixed size is kept; contacts and constraint rows are made anew by the next step.
+Of the model, what a run changed is kept.
+
+Of the robot's parts everything is kept but what `FIXED` names, so that a new attribute is kept too; one of a kind that
+no checkpoint can hold is found by the tests.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from glotouch_bt.robot import BadInput, SafetyStop, Snapshot
+
+FORMAT = 1
+PARTS = ("_servo", "_jaws", "_wrist", "_guard", "_tactile", "_reports")
+FIXED: Mapping[str, frozenset[str]] = {
+    "MujocoRobot": frozenset(
+        (
+            *("description", "limits", "period_s", "world", "truth", "model", "data", "handles", "trace"),
+            *("_s", "_warnings", "_probe_now", "_pads_now", "_keeper", "_failed", "_closed", *PARTS),
+            # views of the arrays that are kept
+            *("_chunks", "_ctrl_now", "_sensed", "_external_now"),
+        )
+    ),
+    "Servo": frozenset(("_model", "_data", "_dof", "_names")),
+    "Jaws": frozenset(("_gripper",)),
+    "WristSensor": frozenset(("_P_in_S",)),
+    "Guard": frozenset(("_limits", "tripped")),
+    "Tactile": frozenset(("_data", "_pads", "_site", "_gel", "_meshes", "_rays", "_c")),
+    "JawReports": frozenset(("_c",)),
+}
+"""What an opened robot has from its world, conditions, seed and options alone, by class."""
+
+AWAKE = ("nbody_awake", "nparent_awake", "ntree_awake", "nv_awake")
+BULKY = ("bvh_", "mesh_", "tex_", "hfield_", "skin_", "flex", "names", "paths", "text_")
+"""Arrays of the model that no run changes, and that are too large to be compared each time."""
+DRAWN_ONLY = ("bvh_active", "bvh_aabb_dyn")
+
+
+class Keeper:
+    """Takes and puts back the state of one robot.
+
+    Args:
+        model, data: The robot's own, as compiled; what the run changes of the model from now on is part of its state.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        self._model, self._data = model, data
+        self._pristine = copy.copy(model)
+
+    def take(self, robot: object) -> Snapshot:
+        """The state of a robot that has not failed; independent of what the robot does next."""
+        data = self._data
+        stop: SafetyStop | None = vars(robot)["_guard"].tripped
+        return {
+            "backend": "mujoco",
+            "format": FORMAT,
+            "mujoco": mujoco.__version__,
+            "sizes": self._sizes,
+            "time_s": float(data.time),
+            "awake": tuple(int(getattr(data, n)) for n in AWAKE),
+            "data": {n: np.array(getattr(data, n)) for n in self._kept_arrays},
+            "model": {n: np.array(getattr(self._model, n)) for n in self._changed()},
+            "parts": {name: _attributes(part) for name, part in _parts(robot).items()},
+            "tripped": None if stop is None else (stop.quantity, stop.value, stop.limit, stop.stamp_s),
+        }
+
+    def put_back(self, robot: object, snapshot: Snapshot) -> None:
+        """Bring the robot to the state of a snapshot; contacts are known again after the next cycle.
+
+        Raises:
+            BadInput: See `Robot.restore`. Nothing was changed.
+        """
+        self._require_fitting(robot, snapshot)
+        kept: Any = snapshot
+        for name in self._changed():
+            getattr(self._model, name)[...] = getattr(self._pristine, name)
+        for name, array in kept["model"].items():
+            getattr(self._model, name)[...] = array
+        mujoco.mj_resetData(self._model, self._data)
+        for name, array in kept["data"].items():
+            getattr(self._data, name)[...] = array
+        self._data.time = kept["time_s"]
+        for name, count in zip(AWAKE, kept["awake"], strict=True):
+            setattr(self._data, name, count)
+        for name, part in _parts(robot).items():
+            _set_attributes(part, kept["parts"][name])
+        tripped = kept["tripped"]
+        vars(robot)["_guard"].tripped = None if tripped is None else SafetyStop(*tripped)
+
+    def _require_fitting(self, robot: object, snapshot: Snapshot) -> None:
+        given = (snapshot.get("backend"), snapshot.get("format"), snapshot.get("mujoco"))
+        ours = ("mujoco", FORMAT, mujoco.__version__)
+        if given != ours:
+            raise BadInput(
+                f"the kept world is of backend {given[0]}, format {given[1]}, MuJoCo {given[2]}; "
+                f"here it is {ours[0]}, format {ours[1]}, MuJoCo {ours[2]}"
+            )
+        kept: Any = snapshot
+        shapes = {n: a.shape for n, a in kept["data"].items()}
+        if kept["sizes"] != self._sizes or shapes != {n: getattr(self._data, n).shape for n in self._kept_arrays}:
+            raise BadInput("the kept world has other objects or parts than the one this robot was opened with")
+        for name, part in _parts(robot).items():
+            odd = sorted(kept["parts"][name].keys() ^ _names(part))
+            if odd:
+                raise BadInput(f"the kept state of {type(part).__name__} is of another version ({', '.join(odd)})")
+
+    @property
+    def _sizes(self) -> tuple[int, ...]:
+        names = ("nq", "nv", "nu", "nbody", "ngeom", "nsensordata", "nmesh")
+        return tuple(int(getattr(self._model, n)) for n in names)
+
+    @cached_property
+    def _kept_arrays(self) -> tuple[str, ...]:
+        """Names of the arrays of mjData whose size the model fixes; the others live from step to step."""
+        fresh = mujoco.MjData(self._model)
+        return tuple(n for n in _arrays(fresh) if n not in DRAWN_ONLY and _is_view(fresh, n))
+
+    @cached_property
+    def _comparable(self) -> tuple[str, ...]:
+        return tuple(n for n in _arrays(self._model) if not n.startswith(BULKY) and getattr(self._model, n).size)
+
+    def _changed(self) -> list[str]:
+        """Arrays of the model that are not as they were compiled."""
+        now, then = self._model, self._pristine
+        return [n for n in self._comparable if not np.array_equal(getattr(now, n), getattr(then, n))]
+
+
+def _parts(robot: object) -> dict[str, object]:
+    return {"robot": robot, **{n: getattr(robot, n) for n in PARTS}}
+
+
+def _arrays(thing: object) -> list[str]:
+    return [n for n in dir(thing) if not n.startswith("_") and isinstance(getattr(thing, n), np.ndarray)]
+
+
+def _is_view(data: mujoco.MjData, name: str) -> bool:
+    """False for an empty array, and for one made anew at each look (what says which islands there are just now)."""
+    return bool(np.shares_memory(getattr(data, name), getattr(data, name)))
+
+
+def _names(part: object) -> set[str]:
+    return vars(part).keys() - FIXED[type(part).__name__]
+
+
+def _attributes(part: object) -> dict[str, object]:
+    return {n: copy.deepcopy(vars(part)[n]) for n in sorted(_names(part))}
+
+
+def _set_attributes(part: object, kept: Mapping[str, Any]) -> None:
+    for name, value in kept.items():
+        now = vars(part)[name]
+        fits = isinstance(now, np.ndarray) and isinstance(value, np.ndarray) and now.shape == value.shape
+        if fits and now.flags.writeable and now.dtype == value.dtype:
+            now[...] = value  # others may hold views of it
+        else:
+            setattr(part, name, copy.deepcopy(value))

@@ -1,0 +1,197 @@
+"""`bench contact`: a calibration square traced by the probe and by the bare gripper (paper, contact-mode validation).
+
+Both modes run the mission's own sweep and trace. All errors are taken in the arm's base frame B: what the robot
+believes in K is brought there by the registration it was given, so that only touching is judged. The headline is the
+square bolted to the floor; the same free to be pushed is the second table.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from glotouch_bt.bench.contact.plots import plot_errors, plot_traces
+from glotouch_bt.bench.contact.square import TOOLS, Tool, TracedSquare, polygon_distance, traced_square, true_square
+from glotouch_bt.bench.retrieve import cause
+from glotouch_bt.bench.statistics import bootstrap_mean, wilson
+from glotouch_bt.report import RunRecord, read_run
+from glotouch_bt.robot import Array, BadInput, Pose
+from glotouch_bt.run import RunRequest, launch
+
+METRICS = ("centre_error_mm", "contact_std_mm", "contact_rms_mm", "max_contact_mm", "side_error_mm")
+PAPER = {
+    "probe": dict(zip(METRICS, (0.37, 0.84, 0.87, 1.58, 0.95), strict=True)),
+    "gripper": dict(zip(METRICS, (3.15, 4.81, 5.08, 6.93, 5.67), strict=True)),
+}
+MORE = ("yaw_error_deg", "displacement_mm", "turned_deg", "ball_rms_mm", "tip_before_mm", "tip_after_mm")
+COLUMNS = (
+    "tool", "square", "seed", "exit_code", "status", "cause", "contacts", *METRICS, *MORE, "latency_ms",
+    "peak_force_N", "sim_time_s", "wall_time_s", "folder",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What shall be tried.
+
+    Attributes:
+        seeds: Seeds of the trials; each draws the square's pose and every disturbance.
+        conditions: Path or shipped name.
+        per_side: Contacts made for each side of the square.
+        backend: Registered name; it must know the option `fixed`.
+        out: Folder of the campaign; each trial's run folder goes below it.
+    """
+
+    seeds: tuple[int, ...]
+    conditions: str
+    per_side: int
+    backend: str
+    out: Path
+
+    def requests(self) -> list[tuple[Tool, bool, RunRequest]]:
+        """(tool, square bolted down, request) of every trial, seeds outermost."""
+        return [
+            (
+                tool,
+                fixed,
+                RunRequest(
+                    mission=f"contact_{tool}",
+                    backend=self.backend,
+                    seed=seed,
+                    settings={"contacts": str(4 * self.per_side), "fixed": str(fixed).lower()},
+                    conditions=self.conditions,
+                    out=self.out / f"{tool}-{'fixed' if fixed else 'free'}-s{seed}",
+                ),
+            )
+            for seed in self.seeds
+            for fixed in (True, False)
+            for tool in TOOLS
+        ]
+
+
+def run_trial(tool: Tool, fixed: bool, request: RunRequest) -> dict[str, Any]:
+    """One trial in this process, as a row. Whatever goes wrong is a row, never an exception of the campaign."""
+    row: dict[str, Any] = {"tool": tool, "square": "fixed" if fixed else "free", "seed": request.seed}
+    row["folder"] = request.out and request.out.name
+    try:
+        done = launch(request)
+    except BadInput:
+        raise
+    except Exception as e:
+        return row | _fault(e)
+    row |= {k: done.result.get(k) for k in COLUMNS if k in done.result}
+    row |= {"exit_code": done.exit_code, "cause": ""}
+    if done.exit_code != 0:
+        return row | {"cause": cause(done.result)}
+    try:
+        record = read_run(done.folder)
+        return row | score(record, traced_square(record, tool, fixed))
+    except Exception as e:
+        return row | _fault(e)
+
+
+def _fault(e: Exception) -> dict[str, Any]:
+    return {"status": "traceback", "exit_code": -1, "cause": f"traceback {type(e).__name__}: {e}"}
+
+
+def score(record: RunRecord, traced: TracedSquare) -> dict[str, Any]:
+    """The paper's five figures and ours, in mm and degrees."""
+    before, true = true_square(record, "start"), true_square(record)
+    contact = polygon_distance(traced.points_B_m, true.corners_B_m)
+    ball = polygon_distance(traced.tips_B_m, true.corners_B_m) - traced.tip_radius_m
+    calibration = record.of_kind("calibration")
+    row: dict[str, Any] = {
+        "contacts": len(contact),
+        "centre_error_mm": 1e3 * float(np.linalg.norm(traced.centre_B_m - true.centre_B_m)),
+        "contact_std_mm": 1e3 * float(np.std(contact)),
+        "contact_rms_mm": 1e3 * float(np.sqrt(np.mean(contact**2))),
+        "max_contact_mm": 1e3 * float(np.abs(contact).max()),
+        "side_error_mm": 1e3 * float(np.mean(np.abs(traced.side_m - np.sort(true.sides_m)[::-1]))),
+        "yaw_error_deg": abs(_quarter_deg(traced.yaw_rad - true.yaw_rad)),
+        "displacement_mm": 1e3 * float(np.linalg.norm(true.centre_B_m - before.centre_B_m)),
+        "turned_deg": abs(_quarter_deg(true.yaw_rad - before.yaw_rad)),
+    }
+    if calibration:
+        tip = np.array(calibration[-1].data["tip_P_m"])
+        really = true_tip_P_m(record)
+        nominal = np.array([0.0, 0.0, tip[2]])
+        row["ball_rms_mm"] = 1e3 * float(np.sqrt(np.mean(ball**2)))
+        row["tip_before_mm"] = 1e3 * float(np.linalg.norm((nominal - really)[:2]))
+        row["tip_after_mm"] = 1e3 * float(np.linalg.norm((tip - really)[:2]))
+        row["latency_ms"] = 1e3 * float(calibration[-1].data["latency_s"])
+    return row
+
+
+def true_tip_P_m(record: RunRecord) -> Array:
+    """(3,) where the ball really was in P at the end of the run."""
+    hand = Pose(record.samples["position_B_P"][-1], record.samples["quat_B_P"][-1])
+    return hand.inverse().apply(np.array(record.truth["tip_B_m"], dtype=np.float64))
+
+
+def run_campaign(
+    campaign: Campaign, executor: Executor, on_row: Callable[[dict[str, Any], int, int], None] | None = None
+) -> dict[str, Any]:
+    """Run every trial on the executor; writes trials.csv, summary.json and two plots, returns the summary (DESIGN 7).
+
+    Args:
+        campaign: What to try.
+        executor: Any `concurrent.futures` executor.
+        on_row: Called with (row, done, total) after each trial.
+    """
+    requests = campaign.requests()
+    campaign.out.mkdir(parents=True, exist_ok=True)
+    futures = [executor.submit(run_trial, *request) for request in requests]
+    rows: list[dict[str, Any]] = []
+    for future in as_completed(futures):
+        rows.append(future.result())
+        if on_row is not None:
+            on_row(rows[-1], len(rows), len(futures))
+    rows.sort(key=lambda r: (r["square"], r["tool"], r["seed"]))
+    with (campaign.out / "trials.csv").open("w", newline="") as f:
+        table = csv.DictWriter(f, COLUMNS, extrasaction="ignore")
+        table.writeheader()
+        table.writerows(rows)
+    summary = summarise(rows) | {
+        "paper": PAPER,
+        "conditions": campaign.conditions,
+        "seeds": list(campaign.seeds),
+        "contacts_per_side": campaign.per_side,
+        "backend": campaign.backend,
+    }
+    (campaign.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    plot_errors(rows, PAPER, campaign.out / "errors.png")
+    plot_traces(rows, campaign.out)
+    return summary
+
+
+def summarise(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Means with bootstrap intervals over the traced trials of each tool, and how many were traced at all."""
+
+    def of(square: str, tool: Tool) -> dict[str, Any]:
+        group = [r for r in rows if r["square"] == square and r["tool"] == tool]
+        good = [r for r in group if not r["cause"]]
+        found: dict[str, Any] = {"traced": wilson(len(good), len(group))}
+        for name in (*METRICS, *MORE, "peak_force_N", "sim_time_s"):
+            values = [r[name] for r in good if r.get(name) is not None]
+            if values:
+                found[name] = bootstrap_mean(values)
+        return found
+
+    causes = sorted({f"{r['square']} {r['tool']} seed {r['seed']}: {r['cause']}" for r in rows if r["cause"]})
+    return {
+        **{tool: of("fixed", tool) for tool in TOOLS},
+        "free": {tool: of("free", tool) for tool in TOOLS},
+        "not_traced": causes,
+    }
+
+
+def _quarter_deg(angle_rad: float) -> float:
+    """An angle of a square: -45..45 degrees."""
+    return float(np.degrees((angle_rad + np.pi / 4) % (np.pi / 2) - np.pi / 4))

@@ -1,0 +1,125 @@
+"""The operating curve in synthetic signals: false alarms in free motion, and the force that is found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, TypedDict, get_args
+
+import numpy as np
+from scipy.stats import chi2
+
+from glotouch_bt.bench.detection.signals import RATE_HZ, FreeMove, Hand, MoveKind, Wrist
+from glotouch_bt.bench.statistics import Rate, wilson
+from glotouch_bt.perception.touch import GuardParams
+from glotouch_bt.robot import Array, Conditions
+
+Push = Literal["step", "slow"]
+"""step: the whole force from one sample to the next; slow: it grows evenly for `SLOW_S`."""
+SLOW_S, HELD_S = 0.5, 0.3
+"""How long a slow push grows, and how long every push is held after that."""
+PUSH_AFTER_S = 0.5
+
+
+class PerHour(TypedDict):
+    """Events per hour with their exact 95 % Poisson interval."""
+
+    rate: float
+    lo: float
+    hi: float
+    count: int
+    hours: float
+
+
+def per_hour(count: int, hours: float) -> PerHour:
+    """Garwood's interval (Biometrika 28, 1936): half the chi-square quantiles of 2k and 2k + 2 degrees of freedom."""
+    if hours <= 0:
+        return {"rate": float("nan"), "lo": 0.0, "hi": float("inf"), "count": count, "hours": hours}
+    lo = 0.5 * float(chi2.ppf(0.025, 2 * count)) if count else 0.0
+    hi = 0.5 * float(chi2.ppf(0.975, 2 * count + 2))
+    return {"rate": count / hours, "lo": lo / hours, "hi": hi / hours, "count": count, "hours": hours}
+
+
+@dataclass(frozen=True)
+class Pace:
+    """Acceleration and jerk while a guard listens."""
+
+    acceleration_m_s2: float
+    jerk_m_s3: float
+
+
+def draw_move(kind: MoveKind, pace: Pace, rng: np.random.Generator) -> FreeMove:
+    """A move as exploration makes them: sweeps of 50-350 mm at 40-50 mm/s, steps of 10-30, 20-110 mm down."""
+    bearing = rng.uniform(0.0, 2 * np.pi)
+    across = np.array([np.cos(bearing), np.sin(bearing), 0.0])
+    low, high, slowest, fastest = {
+        "sweep": (0.05, 0.35, 0.04, 0.05),
+        "step": (0.01, 0.03, 0.03, 0.05),
+        "down": (0.02, 0.11, 0.015, 0.04),
+    }[kind]
+    direction = np.array([0.0, 0.0, -1.0]) if kind == "down" else across
+    return FreeMove(
+        kind,
+        rng.uniform(low, high),
+        rng.uniform(slowest, fastest),
+        pace.acceleration_m_s2,
+        pace.jerk_m_s3,
+        direction,
+    )
+
+
+def false_alarms(
+    hand: Hand,
+    conditions: Conditions,
+    params: GuardParams,
+    pace: Pace,
+    seeds: Sequence[int],
+    *,
+    hours: float,
+    compensate: bool = True,
+) -> dict[MoveKind, PerHour]:
+    """Contacts reported per hour of listening in free motion, by kind of move; `hours` of each kind over all seeds."""
+    found: dict[MoveKind, PerHour] = {}
+    for kind in get_args(MoveKind):
+        count, heard_s = 0, 0.0
+        for seed in seeds:
+            rng = np.random.default_rng([seed, get_args(MoveKind).index(kind)])
+            wrist = Wrist(hand, conditions, params, rng, compensate)
+            share_s = 0.0
+            while share_s < 3600.0 * hours / len(seeds):
+                onset, listened_s = wrist.listen(draw_move(kind, pace, rng))
+                count += onset is not None
+                share_s += listened_s
+            heard_s += share_s
+        found[kind] = per_hour(count, heard_s / 3600.0)
+    return found
+
+
+def force_of(push: Push, force_N: float, against_B: Array) -> Array:
+    """(n, 3) force on the ball in B, from the start of a move."""
+    before = np.zeros(round(PUSH_AFTER_S * RATE_HZ))
+    growing = np.linspace(0.0, 1.0, round(SLOW_S * RATE_HZ)) if push == "slow" else np.zeros(0)
+    held = np.ones(round(HELD_S * RATE_HZ))
+    return np.asarray(force_N * np.concatenate([before, growing, held])[:, None] * against_B)
+
+
+def found_share(
+    hand: Hand,
+    conditions: Conditions,
+    params: GuardParams,
+    pace: Pace,
+    kind: MoveKind,
+    push: Push,
+    force_N: float,
+    seeds: Sequence[int],
+) -> Rate:
+    """Share of pushes of `force_N` that are found while they last, one a seed; an alarm before the push is a miss."""
+    hits = 0
+    for seed in seeds:
+        rng = np.random.default_rng([seed, 7])
+        drawn = draw_move(kind, pace, rng)
+        long = FreeMove(kind, 0.09, 0.04, drawn.acceleration_m_s2, drawn.jerk_m_s3, drawn.direction_B)
+        force = force_of(push, force_N, -long.direction_B)
+        onset, _ = Wrist(hand, conditions, params, rng).listen(long, force)
+        hits += onset is not None and PUSH_AFTER_S <= onset.detected_s <= len(force) / RATE_HZ
+    return wilson(hits, len(seeds))

@@ -1,0 +1,36 @@
+"""The matchers a study compares, by the names its tables use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from glotouch_bt.perception.recognition import MATCHERS, Ranking, TargetModel
+from glotouch_bt.perception.recognition.paper import PaperParams, paper_matcher
+from glotouch_bt.perception.touch import TouchSet
+from glotouch_bt.robot import BadInput
+
+Method = Callable[[TargetModel, Sequence[TouchSet]], Ranking]
+
+DEFAULT = "likelihood"
+PAPER_TOP1: Mapping[str, float] = {"paper_width": 0.683, "paper_depth": 0.783, "paper_full": 0.900}
+"""The paper's progressive ablation (row Top-1 on its own objects and robot)."""
+
+
+def methods() -> dict[str, Method]:
+    """Every method by name, in the order of the tables: the paper's ablation, then the matchers of `recognition`."""
+    steps = dict(zip(PAPER_TOP1, PaperParams().ablation().values(), strict=True))
+    made: dict[str, Method] = {name: paper_matcher(params) for name, params in steps.items()}
+    return made | {name: matcher for name, matcher in MATCHERS.items() if name != "paper"}
+
+
+def chosen(names: Sequence[str]) -> tuple[str, ...]:
+    """`names` in the order of the tables; all if there are none.
+
+    Raises:
+        BadInput: One is unknown.
+    """
+    known = methods()
+    unknown = [n for n in names if n not in known]
+    if unknown:
+        raise BadInput(f"--methods {','.join(unknown)}: must be among {', '.join(known)}")
+    return tuple(n for n in known if not names or n in names)

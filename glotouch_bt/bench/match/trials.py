@@ -1,0 +1,212 @@
+"""Every decision one recorded layout gives rise to, as rows: present targets, absent ones, strangers; and the pairs."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from glotouch_bt.bench.match.dataset import Layout, Planar, Touched
+from glotouch_bt.bench.match.methods import Method, methods
+from glotouch_bt.perception import target_model
+from glotouch_bt.perception.recognition import Match, PadSpec, Ranking, TargetModel
+from glotouch_bt.robot import Array, BadInput
+from glotouch_bt.robot.scene import Mesh, load_folder
+
+Kind = Literal["present", "absent", "untouched", "stranger"]
+SYMMETRY_STEPS = 72
+SYMMETRIC_M = 0.7e-3
+"""Two yaws of a mesh are one if no vertex is farther than this from the turned mesh's nearest, on average."""
+
+TRIAL_COLUMNS = (
+    "method", "kind", "seed", "target", "candidates", "best", "best_object", "right", "accepted", "p_best", "p_absent",
+    "best_loss", "margin", "evidence", "position_error_mm", "yaw_error_deg", "ms_per_pair", "reasons",
+)  # fmt: skip
+PAIR_COLUMNS = ("method", "seed", "target", "stranger", "candidate", "object", "loss", "probability", "evidence")
+
+
+@dataclass(frozen=True)
+class Decided:
+    """The rows of one layout.
+
+    Attributes:
+        trials: One a decision, `TRIAL_COLUMNS`.
+        pairs: One an (STL, TouchSet) pair of the full box, `PAIR_COLUMNS`.
+    """
+
+    trials: list[dict[str, Any]]
+    pairs: list[dict[str, Any]]
+
+
+@lru_cache(maxsize=4)
+def meshes_of(folder: Path) -> dict[str, Mesh]:
+    """The usable STLs of a folder by name.
+
+    Raises:
+        BadInput: None, or an unusable one.
+    """
+    return {m.name: m for m in load_folder(folder)}
+
+
+def models_of(layout: Layout, folder: Path, names: Sequence[str] = ()) -> dict[str, TargetModel]:
+    """Models of `names` (default: of what stood in the box), for pads like those that felt the layout.
+
+    Raises:
+        BadInput: The folder has no STL of that name.
+    """
+    meshes = meshes_of(folder)
+    missing = [n for n in names or layout.objects if n not in meshes]
+    if missing:
+        raise BadInput(f"{folder}: has no {', '.join(missing)} (it has {', '.join(meshes)})")
+    return {n: target_model(meshes[n], pad_of(layout)) for n in names or layout.objects}
+
+
+def pad_of(layout: Layout) -> PadSpec:
+    """The pads that felt a layout."""
+    for t in layout.touched:
+        for layer in t.touchset.layers:
+            rows, columns = layer.left_m.shape
+            return PadSpec(shape=(rows, columns))
+    return PadSpec()
+
+
+def decide(layout: Layout, objects: Path, strangers: Path | None, names: Sequence[str]) -> Decided:
+    """Every decision of a layout by every method.
+
+    Present: each touched object's STL against all TouchSets. Absent: the same with its own TouchSets taken away.
+    Untouched: the STL of an object that stands in the box and was not squeezed, against all TouchSets. Stranger: that
+    of an object that is not in the box.
+
+    Raises:
+        BadInput: An STL is missing or unusable.
+    """
+    out = Decided([], [])
+    if not layout.touched:
+        return out
+    made = methods()
+    present = models_of(layout, objects)
+    foreign: dict[str, TargetModel] = {}
+    if strangers is not None:
+        known = {m.digest for m in meshes_of(objects).values()}
+        new = [n for n, m in meshes_of(strangers).items() if m.digest not in known]
+        foreign = models_of(layout, strangers, new) if new else {}
+    for name in names:
+        method = made[name]
+        for target, model in present.items():
+            mine = layout.of(target)
+            others = [t for i, t in enumerate(layout.touched) if i not in mine]
+            head = {"method": name, "seed": layout.seed, "target": target}
+            mesh = meshes_of(objects)[target] if mine else None
+            row, ranking = _trial(method, model, layout.touched, target, mesh)
+            out.trials.append(head | {"kind": "present" if mine else "untouched"} | row)
+            out.pairs.extend(_pairs(head | {"stranger": False}, layout, ranking))
+            if mine and others:
+                row, _ = _trial(method, model, others, target)
+                out.trials.append(head | {"kind": "absent"} | row)
+        for target, model in foreign.items():
+            head = {"method": name, "seed": layout.seed, "target": target}
+            row, ranking = _trial(method, model, layout.touched, target)
+            out.trials.append(head | {"kind": "stranger"} | row)
+            out.pairs.extend(_pairs(head | {"stranger": True}, layout, ranking))
+    return out
+
+
+def _trial(
+    method: Method, model: TargetModel, touched: Sequence[Touched], target: str, mesh: Mesh | None = None
+) -> tuple[dict[str, Any], Ranking]:
+    """One decision; `mesh` is the target's if it is among `touched` (a stranger may have the name of an object)."""
+    began = time.perf_counter()
+    ranking = method(model, [t.touchset for t in touched])
+    took = time.perf_counter() - began
+    by_index = {t.touchset.candidate.index: t for t in touched}
+    best = ranking.best
+    found = by_index[best.index]
+    right = mesh is not None and found.name == target
+    row: dict[str, Any] = {
+        "candidates": len(touched), "best": best.index, "best_object": found.name, "right": right,
+        "accepted": bool(ranking.accepted), "p_best": best.probability, "p_absent": ranking.p_absent,
+        "best_loss": best.loss, "evidence": best.evidence, "ms_per_pair": 1e3 * took / len(touched),
+        "reasons": "; ".join(ranking.reasons), "margin": math.nan, "position_error_mm": math.nan,
+        "yaw_error_deg": math.nan,
+    }  # fmt: skip
+    if mesh is not None:
+        row["margin"] = signed_margin(ranking, {i for i, t in by_index.items() if t.name == target})
+        mine = [m for m in ranking.matches if by_index[m.index].name == target]
+        row |= pose_errors(mine[0], by_index[mine[0].index].pose_K_O, mesh)
+    return row, ranking
+
+
+def signed_margin(ranking: Ranking, mine: set[int]) -> float:
+    """Least loss of the wrong candidates less the least of the right ones: positive if the right one leads.
+
+    NaN if there are no wrong ones, or if neither side has a finite loss.
+    """
+    right = min((m.loss for m in ranking.matches if m.index in mine), default=math.inf)
+    wrong = min((m.loss for m in ranking.matches if m.index not in mine), default=math.nan)
+    return math.nan if math.isinf(right) and math.isinf(wrong) else wrong - right
+
+
+def _pairs(head: Mapping[str, Any], layout: Layout, ranking: Ranking) -> list[dict[str, Any]]:
+    names = {t.touchset.candidate.index: t.name for t in layout.touched}
+    return [
+        dict(head)
+        | {"candidate": m.index, "object": names[m.index], "loss": m.loss, "probability": m.probability}
+        | {"evidence": m.evidence}
+        for m in sorted(ranking.matches, key=lambda m: m.index)
+    ]
+
+
+def pose_errors(match: Match, truth: Planar | None, mesh: Mesh) -> dict[str, float]:
+    """Distance of the fitted mesh axis from the true one, and the yaw between them up to the mesh's own symmetry.
+
+    The position is compared at the origin of the mesh's frame, the middle of its bounding box. For a solid of
+    revolution the yaw error is 0 whatever the fit.
+    """
+    if truth is None or not all(math.isfinite(v) for v in match.pose_K_O):
+        return {"position_error_mm": math.nan, "yaw_error_deg": math.nan}
+    x, y, yaw = match.pose_K_O
+    off = (yaw - truth[2] - symmetries_rad(mesh) + math.pi) % (2 * math.pi) - math.pi
+    return {
+        "position_error_mm": 1e3 * math.hypot(x - truth[0], y - truth[1]),
+        "yaw_error_deg": float(np.rad2deg(np.abs(off).min())),
+    }
+
+
+_symmetry: dict[str, Array] = {}
+
+
+def symmetries_rad(mesh: Mesh) -> Array:
+    """Yaws, 0 first, in steps of 5 deg, by which the mesh may be turned about its own middle and look the same."""
+    if mesh.digest not in _symmetry:
+        _symmetry[mesh.digest] = _symmetries(mesh)
+    return _symmetry[mesh.digest]
+
+
+def _symmetries(mesh: Mesh) -> Array:
+    """By the distance of turned surface points from the surface; both are taken about the surface's own middle."""
+    import trimesh
+    from scipy.spatial import cKDTree
+
+    solid = mesh.as_trimesh()
+    points, _ = trimesh.sample.sample_surface_even(solid, 6000, seed=0)
+    points = np.asarray(points, dtype=np.float64)
+    points[:, :2] -= solid.centroid[:2]
+    tree, probe = cKDTree(points), points[::8]
+    spacing = float(np.mean(np.asarray(tree.query(points, k=2)[0])[:, 1]))
+    angles = 2 * math.pi * np.arange(SYMMETRY_STEPS) / SYMMETRY_STEPS
+    gaps = np.zeros(SYMMETRY_STEPS)
+    for k, a in enumerate(angles):
+        turned = probe.copy()
+        turned[:, :2] = probe[:, :2] @ np.array([[math.cos(a), math.sin(a)], [-math.sin(a), math.cos(a)]])
+        gaps[k] = np.mean(tree.query(turned)[0])
+    same = gaps < SYMMETRIC_M + 0.6 * spacing
+    if not same.all():  # a slight turn of anything looks much the same: only the best of its neighbours is a symmetry
+        same &= (gaps <= np.roll(gaps, 1)) & (gaps <= np.roll(gaps, -1))
+    same[0] = True
+    return np.asarray(angles[same])

@@ -1,0 +1,169 @@
+"""Explore a planar world as the skills explore the real one: seek, trace, exclude, until all is found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+from glotouch_bt.bench.planar.drive import drive
+from glotouch_bt.bench.planar.world import PlanarWorld
+from glotouch_bt.perception.search import (
+    Felt,
+    Move,
+    SearchMap,
+    SearchPolicy,
+    TraceParams,
+    admit,
+    elsewhere_m,
+    joins,
+    of_another,
+    part_of,
+    refined,
+    seek,
+    trace,
+    trace_more,
+)
+from glotouch_bt.perception.touch import Candidate
+from glotouch_skills.explore import GuardedSweepParams, OrbitProbeParams, RefineOutlineParams
+
+BUDGET_M = 8.0
+MOST_MOVES = 5000
+"""No exploration needs so many; refused moves cost no travel, so the budget alone would not end it."""
+
+
+@dataclass(frozen=True)
+class Traced:
+    """A candidate, and the planar travel at which it (or the last part of it) was traced."""
+
+    travel_m: float
+    candidate: Candidate
+
+
+@dataclass(frozen=True)
+class Explored:
+    """How an exploration went.
+
+    Attributes:
+        found: Candidates in order.
+        travel_m: Planar length of all the ball's ways.
+        ended: "complete", "exhausted" or "budget".
+        belief: The map at the end.
+        contacts: How many contacts the candidates have.
+        untraced: How many first contacts gave no candidate.
+    """
+
+    found: tuple[Traced, ...]
+    travel_m: float
+    ended: str
+    belief: SearchMap
+    untraced: int
+
+    @property
+    def contacts(self) -> int:
+        """Contacts of all candidates."""
+        return sum(len(t.candidate.contacts) for t in self.found)
+
+
+class _OutOfBudget(Exception):
+    """The travel is spent."""
+
+
+class _Budget:
+    """A world that stops when the travel is spent."""
+
+    def __init__(self, world: PlanarWorld, budget_m: float) -> None:
+        self._world, self._budget_m, self._moves = world, budget_m, 0
+
+    def execute(self, move: Move) -> Felt:
+        """As the world does."""
+        self._moves += 1
+        if self._world.travel_m >= self._budget_m or self._moves > MOST_MOVES:
+            raise _OutOfBudget
+        return self._world.execute(move)
+
+
+def explore(
+    world: PlanarWorld,
+    policy: SearchPolicy,
+    expected: int,
+    *,
+    budget_m: float = BUDGET_M,
+    tracing: TraceParams | None = None,
+    sweep: GuardedSweepParams | None = None,
+    orbit: OrbitProbeParams | None = None,
+) -> Explored:
+    """What the mission's exploration does, with geometry for an arm.
+
+    Args:
+        world: The layout; its travel meter must be at 0.
+        policy: Where to go.
+        expected: How many objects are looked for.
+        budget_m: Travel after which it is broken off.
+        tracing: How outlines are traced (default: as the skill's parameters say).
+        sweep, orbit: Parameters of the skills; their defaults by default.
+    """
+    sweep, orbit = sweep or GuardedSweepParams(), orbit or OrbitProbeParams()
+    tracing = tracing or orbit.rule()
+    belief = SearchMap.blank(world.half_m + world.tip_radius_m - sweep.wall_gap_m, expected)
+    found: dict[int, Traced] = {}
+    candidates: tuple[Candidate, ...] = ()
+    limited, untraced, ended = _Budget(world, budget_m), 0, "complete"
+    try:
+        while not belief.complete:
+            sought = drive(seek(belief, policy, world.tip_K_m, lowered=world.lowered), limited)
+            belief = sought.belief
+            if sought.contact is None:
+                ended = "exhausted"
+                break
+            first, radius = sought.contact, world.tip_radius_m
+            old = part_of(candidates, first, radius)
+            known = () if old is None else old.contacts
+            elsewhere = partial(of_another, candidates) if old is None else None
+            joined = partial(joins, candidates, radius_m=radius) if old is None else None
+            plan = trace(
+                first,
+                world.tip_K_m,
+                radius,
+                tracing,
+                half_extent_m=belief.half_extent_m,
+                known=known,
+                elsewhere=elsewhere,
+                joined=joined,
+            )
+            traced = drive(plan, limited)
+            admitted = admit(belief, candidates, first, traced, orbit.height_m, orbit.exclusion_m, part_of=old)
+            belief, candidates = admitted.belief, admitted.candidates
+            if admitted.index is None:
+                untraced += 1
+                continue
+            found[admitted.index] = Traced(world.travel_m, candidates[admitted.index])
+    except _OutOfBudget:
+        ended = "budget"
+    return Explored(tuple(found[i] for i in sorted(found)), world.travel_m, ended, belief, untraced)
+
+
+def refine_all(
+    world: PlanarWorld, explored: Explored, *, budget_m: float = BUDGET_M, refine: RefineOutlineParams | None = None
+) -> tuple[Traced, ...]:
+    """Go on where an exploration ended: all its candidates as they are after tracing on, in their order.
+
+    The least known comes first, while the travel lasts; those it does not last for stay as they were.
+
+    Args:
+        world: As the exploration left it.
+        explored: How it ended.
+        budget_m: Travel, the exploration's included, after which it is broken off.
+        refine: Parameters of the skill.
+    """
+    tracing, half = (refine or RefineOutlineParams()).rule(), explored.belief.half_extent_m
+    out, limited = list(explored.found), _Budget(world, budget_m)
+    for i, traced in sorted(enumerate(explored.found), key=lambda item: item[1].candidate.quality):
+        known = traced.candidate.contacts
+        more = trace_more(known, world.tip_K_m, world.tip_radius_m, tracing, half_extent_m=half)
+        try:
+            better = refined(traced.candidate, drive(more, limited))
+        except _OutOfBudget:
+            break
+        if better is not None and not elsewhere_m(traced.candidate, better):
+            out[i] = Traced(world.travel_m, better)
+    return tuple(out)

@@ -1,0 +1,326 @@
+"""What a vertical probe feels of a mesh: the places where the ball's centre cannot be at one height.
+
+With the ball (radius r) at height z0 and the shaft (radius s) above it, a place p is forbidden if a point q of the mesh
+
+- is nearer to the ball's centre (p, z0) than r, or
+- lies above z0 and is nearer to the shaft's axis than s.
+
+Both distances come from dense samples of the surface, so that the boundary of the forbidden set is exact to about
+SAMPLE_M^2 / (8 s): a few hundredths of a millimetre. It is then drawn as polygons and turned into a signed distance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+import numpy.typing as npt
+import trimesh
+from contourpy import contour_generator
+from scipy.ndimage import label
+from scipy.spatial import ConvexHull, cKDTree
+
+from glotouch_bt.robot import Array, Probe
+from glotouch_bt.robot.scene import Mesh
+
+SENSING_HEIGHT_M = 0.018
+GRID_M = 0.0005
+SAMPLE_M, THIN_M = 0.0005, 0.0002
+COARSE = 4
+BORDER_M = 0.010
+"""The grid reaches this far beyond the forbidden set; farther out distances are lower bounds."""
+
+
+@dataclass(frozen=True, eq=False)
+class SignedGrid:
+    """A signed distance on a square grid, negative inside; bilinear between the nodes.
+
+    Attributes:
+        origin_m: (2,) the first node.
+        values_m: (nx, ny).
+    """
+
+    origin_m: Array
+    values_m: Array
+
+    def __call__(self, points_m: Array) -> Array:
+        """(n,) signed distance at points (n, 2); beyond the grid the value at its border plus the way to it."""
+        last = np.array(self.values_m.shape) - 1.0
+        at = (points_m - self.origin_m) / GRID_M
+        inside = np.minimum(np.maximum(at, 0.0), last - 1e-9)
+        beyond = np.sqrt(((at - inside) ** 2).sum(axis=1)) * GRID_M
+        cell = inside.astype(np.int64)
+        t, u = (inside - cell).T
+        flat = self.values_m.ravel()
+        wide = self.values_m.shape[1]
+        k = cell[:, 0] * wide + cell[:, 1]
+        low = flat[k] * (1 - u) + flat[k + 1] * u
+        high = flat[k + wide] * (1 - u) + flat[k + wide + 1] * u
+        return np.asarray(low * (1 - t) + high * t + beyond)
+
+    def gradient(self, point_m: Array) -> Array:
+        """(2,) unit vector away from the shape at a point (2,), by central differences over a grid step."""
+        h = GRID_M
+        steps = np.array([[h, 0.0], [-h, 0.0], [0.0, h], [0.0, -h]])
+        v = self(np.asarray(point_m) + steps)
+        g = np.array([v[0] - v[1], v[2] - v[3]])
+        return np.asarray(g / max(float(np.linalg.norm(g)), 1e-12))
+
+    def level(self, value_m: float) -> list[Array]:
+        """Closed polygons (n, 2) of a level, largest first; the first point is repeated at the end."""
+        x, y = (self.origin_m[i] + GRID_M * np.arange(self.values_m.shape[i]) for i in (0, 1))
+        lines = contour_generator(x, y, self.values_m.T).lines(value_m)
+        found = [np.asarray(line, dtype=np.float64) for line in lines if len(line) > 3]
+        return sorted(found, key=lambda p: -abs(area(p)))
+
+
+@dataclass(frozen=True, eq=False)
+class FeltSection:
+    """The felt section of one mesh, in the mesh frame (seen from above).
+
+    Attributes:
+        name: Of the mesh.
+        side: Signed distance of the ball's centre from where it cannot be at sensing height.
+        above: The same for a ball that is lowered from above.
+        outline_m: (n, 2) closed polygon of the largest part: the forbidden set shrunk by the ball's radius.
+        centre_m: (2,) centre of area of the convex hull of all outlines: what "the object's centre" means.
+        hull_m: (k, 2) that hull, anticlockwise.
+        hull_area_m2: Its area.
+        box_size_m, box_yaw_rad: Long and short side of the hull's least rectangle, and direction of the long one.
+        top_m: Highest vertex above the floor.
+        pressed_m: (2,) centre of mass, seen from above: what a push turns the object about.
+        points_m: (n, 3) surface samples at and above the sensing height.
+        tip_radius_m: Of the ball.
+    """
+
+    name: str
+    side: SignedGrid
+    above: SignedGrid
+    outline_m: Array
+    centre_m: Array
+    hull_m: Array
+    hull_area_m2: float
+    box_size_m: tuple[float, float]
+    box_yaw_rad: float
+    top_m: float
+    pressed_m: Array
+    points_m: Array
+    tip_radius_m: float
+
+    @cached_property
+    def reach_m(self) -> float:
+        """Radius about the mesh frame's origin beyond which the ball touches nothing."""
+        return float(np.linalg.norm(np.concatenate(self.side.level(0.0)), axis=1).max())
+
+    @property
+    def elongation(self) -> float:
+        """Long side of the least rectangle over its short one."""
+        return self.box_size_m[0] / self.box_size_m[1]
+
+    def landing_height_m(self, point_m: Array) -> float:
+        """Height of the ball's centre above the floor where it stands on the object, lowered at a point (2,)."""
+        d2 = ((self.points_m[:, :2] - point_m) ** 2).sum(axis=1)
+        under = d2 < self.tip_radius_m**2
+        if not under.any():
+            return SENSING_HEIGHT_M
+        return float(np.max(self.points_m[under, 2] + np.sqrt(self.tip_radius_m**2 - d2[under])))
+
+
+def felt_section(mesh: Mesh, probe: Probe | None = None, height_m: float = SENSING_HEIGHT_M) -> FeltSection:
+    """The section of a mesh that a vertical probe feels with its ball's centre at `height_m`; kept in memory.
+
+    Raises:
+        ValueError: Nothing of the mesh can be felt at that height.
+    """
+    return _section(_Keyed(mesh.digest, mesh), probe or Probe(), height_m)
+
+
+@dataclass(frozen=True)
+class _Keyed:
+    """A mesh that compares by its digest."""
+
+    digest: str
+    mesh: Mesh
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Keyed) and other.digest == self.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+
+@lru_cache(maxsize=64)
+def _section(key: _Keyed, probe: Probe, height_m: float) -> FeltSection:
+    mesh = key.mesh
+    r, s = probe.tip_radius_m, 0.5 * probe.shaft_diameter_m
+    solid = mesh.as_trimesh()
+    points = _surface(solid, height_m - r, height_m - r + probe.length_m)
+    if len(points) == 0:
+        raise ValueError(f"{mesh.name}: nothing of it reaches the probe at {height_m * 1e3:.0f} mm")
+    low = points[:, :2].min(axis=0) - r - BORDER_M
+    high = points[:, :2].max(axis=0) + r + BORDER_M
+    shape = np.ceil((high - low) / GRID_M).astype(np.int64) + 1
+    shape += -shape % COARSE  # whole coarse cells
+    by_ball = cKDTree(points, balanced_tree=False)
+    upper = points[points[:, 2] >= height_m, :2]
+    by_shaft = cKDTree(_thinned(upper), balanced_tree=False) if len(upper) else None
+
+    def gap(places: Array, shaft_m: float) -> Array:
+        """Distance of the probe, its shaft so thick, from the surface, with the ball at places (n, 2)."""
+        ball = by_ball.query(np.column_stack([places, np.full(len(places), height_m)]))[0] - r
+        return np.asarray(ball if by_shaft is None else np.minimum(ball, by_shaft.query(places)[0] - shaft_m))
+
+    side, above = (
+        _signed(solid, low, _near_zero(lambda places, t=t: gap(places, t), low, shape), height_m)  # type: ignore[misc]
+        for t in (s, r)
+    )
+    shrunk = side.level(-r)
+    corners = np.concatenate(shrunk)
+    hull = ConvexHull(corners)
+    polygon = corners[hull.vertices]
+    size, yaw = least_rectangle(polygon)
+    return FeltSection(
+        name=mesh.name,
+        side=side,
+        above=above,
+        outline_m=shrunk[0],
+        centre_m=centre_of_area(polygon),
+        hull_m=polygon,
+        hull_area_m2=float(hull.volume),  # in the plane, scipy's volume is the area
+        box_size_m=size,
+        box_yaw_rad=yaw,
+        top_m=float(mesh.vertices_m[:, 2].max()),
+        pressed_m=np.asarray(solid.center_mass[:2], dtype=np.float64),
+        points_m=points[points[:, 2] >= height_m],
+        tip_radius_m=r,
+    )
+
+
+def _surface(solid: trimesh.Trimesh, low_m: float, high_m: float) -> Array:
+    """(n, 3) surface points at most SAMPLE_M apart between two heights."""
+    triangles = np.asarray(solid.triangles)
+    z = triangles[:, :, 2]
+    near = (z.max(axis=1) >= low_m) & (z.min(axis=1) <= high_m)
+    if not near.any():
+        return np.zeros((0, 3))
+    points = _lattice(triangles[near])
+    return _thinned(points[(points[:, 2] >= low_m) & (points[:, 2] <= high_m)])
+
+
+def _lattice(triangles: Array) -> Array:
+    """(m, 3) points on triangles (n, 3, 3), corners included: rows along each longest edge, SAMPLE_M apart at most."""
+    length = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
+    turn = (np.argmax(length, axis=1)[:, None] + np.arange(3)) % 3
+    a, b, c = np.take_along_axis(triangles, turn[:, :, None], axis=1).transpose(1, 0, 2)
+    longest = length.max(axis=1)
+    height = np.linalg.norm(np.cross(b - a, c - a), axis=1) / np.maximum(longest, 1e-12)
+    rows = np.ceil(height / SAMPLE_M).astype(np.int64) + 1
+    of, row = _counted(rows)
+    t = (row / np.maximum(rows[of] - 1, 1))[:, None]
+    start, end = a[of] + t * (c - a)[of], b[of] + t * (c - b)[of]
+    columns = np.ceil(longest[of] * (1.0 - t[:, 0]) / SAMPLE_M).astype(np.int64) + 1
+    of, column = _counted(columns)
+    u = (column / np.maximum(columns[of] - 1, 1))[:, None]
+    return np.asarray(start[of] + u * (end - start)[of])
+
+
+def _counted(counts: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """For each of `counts` (n,): its index so many times, and a running number from 0 beside it."""
+    of = np.repeat(np.arange(len(counts)), counts)
+    return of, np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
+def _thinned(points: Array) -> Array:
+    """One point of every cube of THIN_M: faces that meet repeat their edges, and walls repeat themselves from above."""
+    cell = np.floor(points / THIN_M).astype(np.int64)
+    cell -= cell.min(axis=0)
+    key = np.ravel_multi_index(tuple(cell.T), tuple(cell.max(axis=0) + 1))
+    return np.asarray(points[np.unique(key, return_index=True)[1]])
+
+
+def _nodes(origin: Array, shape: npt.NDArray[np.int64]) -> Array:
+    """(nx, ny, 2) places of a grid's nodes."""
+    return np.asarray(origin + GRID_M * np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1))
+
+
+def _near_zero(gap: Callable[[Array], Array], origin: Array, shape: npt.NDArray[np.int64]) -> Array:
+    """(nx, ny) values of a distance at the nodes: exact near its zero level, elsewhere of the right sign.
+
+    The value at every fourth node says, as distances do, how far away the zero level is at least.
+    """
+    nodes = _nodes(origin, shape)
+    coarse = nodes[COARSE // 2 :: COARSE, COARSE // 2 :: COARSE]
+    rough = gap(coarse.reshape(-1, 2)).reshape(coarse.shape[:2])
+    field = np.kron(rough, np.ones((COARSE, COARSE)))
+    near = np.abs(field) < 2 * COARSE * GRID_M
+    field[near] = gap(nodes[near])
+    return np.asarray(field)
+
+
+def _signed(solid: trimesh.Trimesh, origin: Array, field: Array, height_m: float) -> SignedGrid:
+    """True signed distance from the gap to the surface (nx, ny), which knows no inside.
+
+    Regions of positive gap that the ball could be in are outside; those within the solid are inside.
+    """
+    parts, count = label(field > 0.0)
+    solidly = np.zeros(count + 1, dtype=np.bool_)
+    deepest = [int(np.argmax(np.where(parts == k, field, -np.inf))) for k in range(1, count + 1)]
+    if deepest:
+        ij = np.column_stack(np.unravel_index(deepest, field.shape))
+        places = np.column_stack([origin + GRID_M * ij, np.full(len(ij), height_m)])
+        solidly[1:] = solid.contains(places)
+    within = solidly[parts]
+    signed = np.where(within, -np.abs(field) - GRID_M, field)
+    # gaps between the two kinds of region are negative everywhere: the only zero level is the boundary
+    grid = SignedGrid(np.asarray(origin), signed)
+    nodes = _nodes(origin, np.array(field.shape)).reshape(-1, 2)
+    distance = _to_polygons(grid.level(0.0), nodes).reshape(field.shape)
+    return SignedGrid(np.asarray(origin), np.where(signed > 0.0, distance, -distance))
+
+
+def _to_polygons(polygons: list[Array], nodes: Array) -> Array:
+    """(n,) distance of nodes (n, 2) from closed polygons whose edges are short: to the edges at the nearest vertex."""
+    vertex = np.concatenate([p[:-1] for p in polygons])
+    before = np.concatenate([np.roll(p[:-1], 1, axis=0) for p in polygons])
+    after = np.concatenate([np.roll(p[:-1], -1, axis=0) for p in polygons])
+    nearest = cKDTree(vertex).query(nodes, k=min(2, len(vertex)))[1].reshape(len(nodes), -1)
+    best = np.full(len(nodes), np.inf)
+    for k in nearest.T:
+        for other in (before[k], after[k]):
+            edge = other - vertex[k]
+            to = nodes - vertex[k]
+            t = np.clip((to * edge).sum(axis=1) / np.maximum((edge**2).sum(axis=1), 1e-18), 0.0, 1.0)
+            best = np.minimum(best, np.linalg.norm(to - t[:, None] * edge, axis=1))
+    return best
+
+
+def area(polygon: Array) -> float:
+    """Signed area of a polygon (n, 2), anticlockwise positive (shoelace formula)."""
+    x, y = polygon.T
+    return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
+def centre_of_area(polygon: Array) -> Array:
+    """(2,) centroid of the area inside a polygon (n, 2)."""
+    x, y = polygon.T
+    cross = x * np.roll(y, -1) - np.roll(x, -1) * y
+    both = polygon + np.roll(polygon, -1, axis=0)
+    return np.asarray((both * cross[:, None]).sum(axis=0) / (3.0 * cross.sum()))
+
+
+def least_rectangle(hull: Array) -> tuple[tuple[float, float], float]:
+    """(long, short) side of the rectangle of least area round a convex polygon, and the long side's direction, rad.
+
+    One side lies along an edge of the polygon (Freeman and Shapira, CACM 18, 1975).
+    """
+    edges = np.roll(hull, -1, axis=0) - hull
+    best = (np.inf, (0.0, 0.0), 0.0)
+    for yaw in np.unique(np.round(np.arctan2(edges[:, 1], edges[:, 0]) % (0.5 * np.pi), 9)):
+        c, s = np.cos(yaw), np.sin(yaw)
+        size = np.ptp(hull @ np.array([[c, -s], [s, c]]), axis=0)
+        if size[0] * size[1] < best[0]:
+            long = int(np.argmax(size))
+            best = (float(size[0] * size[1]), (float(size[long]), float(size[1 - long])), float(yaw + long * np.pi / 2))
+    return best[1], float((best[2] + 0.5 * np.pi) % np.pi - 0.5 * np.pi)

@@ -1,0 +1,172 @@
+"""`bench retrieve`: the whole mission over targets and seeds, every trial counted."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, as_completed
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from glotouch_bt.bench.statistics import bootstrap_mean, wilson
+from glotouch_bt.robot import BadInput
+from glotouch_bt.robot.scene import load_folder
+from glotouch_bt.run import RunRequest, launch
+
+COLUMNS = (
+    "target", "seed", "exit_code", "status", "retrieved", "correct", "cause", "candidates", "contacts", "probe_path_m",
+    "peak_force_N", "sim_time_s", "wall_time_s", "folder",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What shall be tried.
+
+    Attributes:
+        mission: Path or shipped name; it must take a parameter `target`.
+        targets: Names of objects in the folder; every target is tried on every seed.
+        seeds: Seeds of the trials.
+        conditions: Path or shipped name.
+        objects: Folder of STL files instead of the world's.
+        backend: Registered name.
+        out: Folder of the campaign; each trial's run folder goes below it.
+        settings: Further `--set` values, for every trial.
+        resume: Trials whose result is in `out` already are not run again.
+    """
+
+    mission: str
+    targets: tuple[str, ...]
+    seeds: tuple[int, ...]
+    conditions: str
+    objects: Path | None
+    backend: str
+    out: Path
+    settings: Mapping[str, str] = field(default_factory=dict)
+    resume: bool = False
+
+    def requests(self) -> list[tuple[str, RunRequest]]:
+        """(target, request) of every trial, seeds outermost, so that a broken-off campaign covers all targets alike."""
+        return [
+            (
+                target,
+                RunRequest(
+                    mission=self.mission,
+                    backend=self.backend,
+                    seed=seed,
+                    settings={**self.settings, "target": target},
+                    objects=self.objects,
+                    conditions=self.conditions,
+                    out=self.out / f"{target}-s{seed}",
+                ),
+            )
+            for seed in self.seeds
+            for target in self.targets
+        ]
+
+
+def targets_of(folder: Path) -> tuple[str, ...]:
+    """Names of the usable STLs of a folder.
+
+    Raises:
+        BadInput: None, or an unusable one.
+    """
+    return tuple(m.name for m in load_folder(folder))
+
+
+def run_trial(target: str, request: RunRequest, resume: bool = False) -> dict[str, Any]:
+    """One trial in this process, as a row. Whatever goes wrong is a row, never an exception of the campaign."""
+    row: dict[str, Any] = {"target": target, "seed": request.seed, "folder": request.out and request.out.name}
+    if resume and request.out is not None and (request.out / "result.json").is_file():
+        return row | _columns(json.loads((request.out / "result.json").read_text()))
+    try:
+        done = launch(request)
+    except BadInput:
+        raise
+    except Exception as e:
+        return row | {"status": "traceback", "exit_code": -1, "cause": f"traceback {type(e).__name__}: {e}"}
+    return row | _columns(done.result) | {"exit_code": done.exit_code}
+
+
+def _columns(result: Mapping[str, Any]) -> dict[str, Any]:
+    """A result as a row."""
+    code = {"success": 0, "failure": 1}.get(str(result["status"]), 3)
+    found = {"candidates": len(result["candidates"]), "cause": cause(result), "exit_code": code}
+    return {k: result[k] for k in COLUMNS if k in result} | found
+
+
+def cause(result: Mapping[str, Any]) -> str:
+    """Why a trial is no success: the root reason's node and code, `wrong_object`, or empty for a success."""
+    if result["status"] == "success":
+        if result["correct"]:
+            return ""
+        return "wrong_object" if result["retrieved"] else "nothing_in_gripper"
+    chain = result["reason_chain"]
+    if not chain:
+        return str(result["status"])
+    root = chain[-1]
+    return f"{root['node'].rsplit('/', 1)[-1]}: {root['code'] or 'failed'}"
+
+
+def run_campaign(
+    campaign: Campaign, executor: Executor, on_row: Callable[[dict[str, Any], int, int], None] | None = None
+) -> dict[str, Any]:
+    """Run every trial on the executor; writes trials.csv and summary.json, returns the summary (DESIGN 7).
+
+    Args:
+        campaign: What to try.
+        executor: Any `concurrent.futures` executor (processes here, a cluster elsewhere).
+        on_row: Called with (row, done, total) after each trial.
+    """
+    requests = campaign.requests()
+    campaign.out.mkdir(parents=True, exist_ok=True)
+    futures = [executor.submit(run_trial, target, request, campaign.resume) for target, request in requests]
+    rows: list[dict[str, Any]] = []
+    for future in as_completed(futures):
+        rows.append(future.result())
+        if on_row is not None:
+            on_row(rows[-1], len(rows), len(futures))
+    rows.sort(key=lambda r: (r["target"], r["seed"]))
+    with (campaign.out / "trials.csv").open("w", newline="") as f:
+        table = csv.DictWriter(f, COLUMNS, extrasaction="ignore")
+        table.writeheader()
+        table.writerows(rows)
+    summary = summarise(rows) | {
+        "conditions": campaign.conditions,
+        "seeds": list(campaign.seeds),
+        "targets": list(campaign.targets),
+        "mission": campaign.mission,
+        "backend": campaign.backend,
+        "settings": dict(campaign.settings),
+    }
+    (campaign.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    return summary
+
+
+def succeeded(row: Mapping[str, Any]) -> bool:
+    """The mission said success AND the right object really hangs in the gripper."""
+    return row.get("status") == "success" and bool(row.get("correct"))
+
+
+def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Rates with Wilson and means with bootstrap intervals over all rows; failures count."""
+    n = len(rows)
+    wrong = sum(bool(r.get("retrieved")) and not r.get("correct") for r in rows)
+    targets = sorted({r["target"] for r in rows})
+    by_target = {t: [r for r in rows if r["target"] == t] for t in targets}
+    causes = Counter(r["cause"] or "unknown" for r in rows if not succeeded(r))
+    return {
+        "success": wilson(sum(map(succeeded, rows)), n),
+        "wrong_object": wilson(wrong, n),
+        "safety_stops": wilson(sum(r.get("exit_code") == 3 for r in rows), n),
+        "tracebacks": wilson(sum(r.get("status") == "traceback" for r in rows), n),
+        "by_target": {t: wilson(sum(map(succeeded, group)), len(group)) for t, group in by_target.items()},
+        "causes": dict(causes.most_common()),
+        "wall_s": bootstrap_mean([r["wall_time_s"] for r in rows if r.get("wall_time_s") is not None]),
+        "sim_s": bootstrap_mean([r["sim_time_s"] for r in rows if r.get("sim_time_s") is not None]),
+        "peak_force_N": bootstrap_mean([r["peak_force_N"] for r in rows if r.get("peak_force_N") is not None]),
+        "largest_peak_force_N": max((float(r.get("peak_force_N") or 0.0) for r in rows), default=0.0),
+    }

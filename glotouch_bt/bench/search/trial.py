@@ -1,0 +1,289 @@
+"""One trial of `bench search`: the mission in a simulation, or the planar stand-in, as a row of the same columns.
+
+Travel is the planar length of the ball's motion from the start of the first sweep to the end of the exploration:
+sweeps, hops, retreats and the whole tracing. What the tip travels before (floor touch, calibration) is `before_m`; what
+it travels after (touching the tops, putting the probe back) is not counted: nothing is discovered by it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from glotouch_bt.bench.planar import FeltSection, Traced, explore, felt_section, planar_world, refine_all
+from glotouch_bt.bench.search.scoring import Found, TrueLayout, score
+from glotouch_bt.mission import load_mission
+from glotouch_bt.perception.search import search_policy
+from glotouch_bt.report import RunRecord, read_run
+from glotouch_bt.robot import Array, BadInput, Pose, World
+from glotouch_bt.robot.scene import Mesh, load_folder
+from glotouch_bt.run import RunRequest, launch
+
+SWEEP_NODE, TRACE_NODE, REFINE_NODE, PICKUP_NODE = "guarded_sweep", "orbit_probe", "refine_outline", "tool_pickup"
+TOP_NODE = "touch_top"
+STILL_M = 0.0003
+"""The tip must have moved so far for its travel to grow: a standing arm sways by less."""
+EMPTY_ROW: dict[str, Any] = {
+    "ended": "", "discovered_m": [], "false_candidates": 0, "candidates": [], "travel_m": 0.0, "before_m": None,
+    "contacts": 0,
+}  # fmt: skip
+
+
+def mission_trial(request: RunRequest, policy: str, resume: bool = False) -> dict[str, Any]:
+    """Run the mission and score its record. Whatever goes wrong is a row: what was discovered until then counts.
+
+    Args:
+        request: What to run, and where its record goes.
+        policy: For the row.
+        resume: A record that is there already, of the same mission, seed and conditions, is scored instead.
+
+    Raises:
+        BadInput: The request itself is wrong.
+    """
+    row = EMPTY_ROW | {"simulator": request.backend, "policy": policy, "seed": request.seed}
+    try:
+        done = _result_of(request) if resume else None
+        folder = request.out
+        if done is None or folder is None:
+            run = launch(request)
+            done, folder = run.result, run.folder
+        sections = sections_of(request.mission, request.objects)
+        return row | {"ended": _ended(done)} | score_run(read_run(folder), sections)
+    except BadInput:
+        raise
+    except Exception as e:
+        return row | {"ended": f"traceback {type(e).__name__}: {e}"}
+
+
+def recorded_folders(top: Path, conditions: str) -> list[Path]:
+    """Folders of ended, simulated runs below `top` under these conditions, by name; what is no such run is passed over.
+
+    Raises:
+        BadInput: There is none.
+    """
+    out = []
+    for file in sorted(top.rglob("result.json")):
+        try:
+            result = json.loads(file.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue
+        whole = all((file.parent / name).is_file() for name in ("run.mcap", "truth.json"))
+        if whole and isinstance(result, dict) and result.get("conditions") == conditions:
+            out.append(file.parent)
+    if not out:
+        raise BadInput(f"{top}: no recorded run under {conditions!r} conditions with its truth is below this folder")
+    return out
+
+
+def recorded_trial(folder: Path, mission: str, objects: Path | None, policy: str) -> dict[str, Any]:
+    """The row of a run that was recorded before, by any mission that explores.
+
+    Args:
+        folder: Of the run.
+        mission, objects: Whose meshes the sections are cut from.
+        policy: If the run does not say its own.
+    """
+    record = read_run(folder)
+    policy = str((record.run.get("parameters") or {}).get("policy", policy))
+    row = EMPTY_ROW | {"simulator": record.run["backend"], "policy": policy, "seed": int(record.run["seed"])}
+    row["folder"] = str(folder)
+    return row | {"ended": _ended(record.result)} | score_run(record, sections_of(mission, objects))
+
+
+def _result_of(request: RunRequest) -> Mapping[str, Any] | None:
+    """The result of a run of this request that ended, or None."""
+    try:
+        result: Mapping[str, Any] = json.loads(((request.out or Path()) / "result.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    asked = {"mission": request.mission, "backend": request.backend, "seed": request.seed}
+    asked["conditions"] = request.conditions
+    return result if all(result.get(k) == v for k, v in asked.items()) else None
+
+
+def _ended(result: Any) -> str:
+    """The mission's status, or what its root reason says."""
+    if result["status"] == "success":
+        return "complete"
+    chain = result["reason_chain"]
+    return str(chain[-1].get("code") or result["status"]) if chain else str(result["status"])
+
+
+@lru_cache(maxsize=2)
+def sections_of(mission: str, objects: Path | None) -> dict[str, FeltSection]:
+    """Felt sections of a mission's objects, by name."""
+    world, meshes = scene(mission, objects)
+    return {m.name: felt_section(m, world.probe) for m in meshes}
+
+
+@lru_cache(maxsize=2)
+def scene(mission: str, objects: Path | None) -> tuple[World, Sequence[Mesh]]:
+    """The mission's world and its meshes.
+
+    Raises:
+        BadInput: There is no such mission, or a mesh is unusable.
+    """
+    world = load_mission(mission, {}, objects=objects).world
+    return world, load_folder(world.objects.folder, world.objects.names)
+
+
+def score_run(record: RunRecord, sections: dict[str, FeltSection]) -> dict[str, Any]:
+    """What a recorded run discovered at which travel, held against its truth.
+
+    `contact_gap_mm` are the distances of the ball from touching the true felt section where the sweeps were stopped.
+
+    Raises:
+        BadInput: The record has no truth beside it.
+    """
+    pose_B_K = record.pose_B_K
+    if record.truth is None or pose_B_K is None:
+        raise BadInput(f"{record.path}: no truth is written beside this record; only a simulation can be scored")
+    layout = true_layout(record.truth, pose_B_K, sections)
+    way = Way.of(record)
+    heights = {e.data["candidate"]: float(e.data["height_m"]) for e in record.of_kind("top")}
+    # An object traced in parts counts from its last part on; only if that was too far off, from its refinement on.
+    last: dict[int, tuple[float, Any]] = {}
+    final: dict[int, tuple[float, Any]] = {}
+    for e in record.of_kind("candidate"):
+        index = int(e.data["candidate"]["index"])
+        if index not in final or e.data["node"] != TOP_NODE:
+            final[index] = (e.stamp_s, e.data["candidate"])
+        if "displaced_m" in e.data:
+            last[index] = (e.stamp_s, e.data["candidate"])
+    found = [_found(way.travel_m(stamp), c, heights.get(i)) for i, (stamp, c) in sorted(last.items())]
+    measured = [_found(way.travel_m(final[i][0]), final[i][1], heights.get(i)) for i in sorted(last)]
+    row = score(found, layout, measured)
+    row["contacts"] = sum(len(c["contacts"]) for _, c in last.values())
+    row["contact_gap_mm"] = _gaps(record, layout)
+    return row | {"travel_m": way.total_m, "before_m": way.before_m, "start_K_m": way.start_K_m}
+
+
+def _found(travel_m: float, candidate: Any, height_m: float | None) -> Found:
+    contour = candidate["contour"]
+    return Found(travel_m, np.array(contour["centre_K_m"]), contour["kind"], float(contour["yaw_rad"]), height_m)
+
+
+def true_layout(truth: Any, pose_B_K: Pose, sections: dict[str, FeltSection]) -> TrueLayout:
+    """The objects of a truth.json in the container frame the robot was told."""
+    to_K = pose_B_K.inverse()
+
+    def planar(objects: Any) -> Array:
+        poses = [to_K @ Pose(np.array(o["pose_B_O"]["position_m"]), np.array(o["pose_B_O"]["quat"])) for o in objects]
+        return np.array([(p.position_m[0], p.position_m[1], p.yaw_rad) for p in poses]).reshape(-1, 3)
+
+    names = [o["name"] for o in truth["start"]]
+    return TrueLayout(tuple(sections[n] for n in names), planar(truth["start"]), planar(truth["end"]))
+
+
+def _gaps(record: RunRecord, layout: TrueLayout) -> list[float]:
+    """Distance, mm, of the ball from touching the nearest object at the first side contact of a sweep with each.
+
+    Objects are where they stood at the beginning; later contacts find them pushed.
+    """
+    out: dict[int, float] = {}
+    for e in record.of_kind("contact"):
+        contact = e.data["contact"]
+        if e.data.get("node") != SWEEP_NODE or abs(contact["approach_K"][2]) > 0.5:
+            continue
+        tip = np.array(contact["tip_K_m"][:2])
+        gaps = []
+        for section, (x, y, yaw) in zip(layout.sections, layout.before, strict=True):
+            c, s = np.cos(yaw), np.sin(yaw)
+            gaps.append(float(section.side((tip - (x, y))[None] @ np.array([[c, -s], [s, c]]))[0]))
+        nearest = int(np.argmin(np.abs(gaps)))
+        out.setdefault(nearest, round(1e3 * gaps[nearest], 4))
+    return list(out.values())
+
+
+@dataclass(frozen=True)
+class Way:
+    """The tip's planar way in a record.
+
+    Attributes:
+        stamp_s, length_m: (n,) the travel since the probe was picked up at each control cycle.
+        begin_s, end_s: Of the exploration, until all is found.
+        start_K_m: Where the tip was at its beginning.
+    """
+
+    stamp_s: Array
+    length_m: Array
+    begin_s: float
+    end_s: float
+    start_K_m: list[float]
+
+    @classmethod
+    def of(cls, record: RunRecord) -> Way:
+        """Read it from a record; empty if nothing was explored."""
+        ticks = [t for t in record.ticks if t.node.rsplit("/", 1)[-1] in (SWEEP_NODE, TRACE_NODE)]
+        later = [t for t in record.ticks if t.node.rsplit("/", 1)[-1] == REFINE_NODE]
+        held = [e.stamp_s for e in record.of_kind("tool") if e.data.get("held")]
+        pose_B_K = record.pose_B_K
+        if not ticks or not held or pose_B_K is None or "position_B_P" not in record.samples:
+            return cls(np.zeros(1), np.zeros(1), np.inf, np.inf, [])
+        stamps = record.samples["stamp_s"]
+        use = np.nonzero((stamps >= held[0]) & (stamps <= max(t.stamp_s for t in (*ticks[-1:], *later[-1:]))))[0][::10]
+        # the hand keeps pointing down with one yaw, so the tip moves in the plane as the pads' mid-point does
+        p = pose_B_K.inverse().apply(record.samples["position_B_P"][use])[:, :2]
+        length = _travelled(p)
+        begin = ticks[0].stamp_s
+        at = p[int(np.searchsorted(stamps[use], begin).clip(max=len(p) - 1))]
+        return cls(stamps[use], length, begin, ticks[-1].stamp_s, at.tolist())
+
+    def travel_m(self, stamp_s: float) -> float:
+        """Travel from the beginning of the exploration to a time, refining included."""
+        if not np.isfinite(self.begin_s):
+            return 0.0
+        return float(np.interp(stamp_s, self.stamp_s, self.length_m)) - self.before_m
+
+    @property
+    def total_m(self) -> float:
+        """Travel of the whole exploration."""
+        return self.travel_m(self.end_s)
+
+    @property
+    def before_m(self) -> float:
+        """Travel with the probe in the hand before it."""
+        return float(np.interp(self.begin_s, self.stamp_s, self.length_m)) if np.isfinite(self.begin_s) else 0.0
+
+
+def _travelled(places: Array) -> Array:
+    """(n,) length of the way so far along places (n, 2), in steps of at least `STILL_M`."""
+    out = np.zeros(len(places))
+    total, last = 0.0, places[0]
+    for k, p in enumerate(places):
+        step = float(np.hypot(p[0] - last[0], p[1] - last[1]))
+        if step >= STILL_M:
+            total, last = total + step, p
+        out[k] = total
+    return out
+
+
+def planar_trials(
+    mission: str, objects: Path | None, policy: str, seeds: Sequence[int], budget_m: float
+) -> list[dict[str, Any]]:
+    """The same explorations in the plane, one row a seed."""
+    world, meshes = scene(mission, objects)
+    rows = []
+    for seed in seeds:
+        planar = planar_world(world, meshes, seed)
+        row = EMPTY_ROW | {"simulator": "planar", "policy": policy, "seed": seed}
+        explored = explore(planar, search_policy(policy, seed), len(meshes), budget_m=budget_m)
+        layout = TrueLayout(planar.sections, planar.start_poses, planar.poses)
+        found = _planar(explored.found)
+        row |= {"ended": explored.ended, "travel_m": explored.travel_m, "contacts": explored.contacts}
+        scored = score(found, layout)
+        if len(scored["discovered_m"]) < len(meshes):  # else nothing more is discovered by refining
+            measured = _planar(refine_all(planar, explored, budget_m=budget_m))
+            scored = score(found, TrueLayout(planar.sections, planar.start_poses, planar.poses), measured)
+        rows.append(row | scored)
+    return rows
+
+
+def _planar(traced: Sequence[Traced]) -> list[Found]:
+    return [Found(t.travel_m, c.centre_K_m, c.kind, c.yaw_rad) for t in traced for c in [t.candidate.contour]]

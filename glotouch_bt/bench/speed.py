@@ -1,0 +1,346 @@
+"""`bench speed`: what a mission costs beside the physics it causes.
+
+Each seed's mission is run as `glotouch run` runs it (same tree, same record, same report); then the solver steps it
+caused are repeated with nothing round them. Both must end in the same state, bit for bit: the denominator of
+`over_physics` is the very same physics, and nothing but the robot's controls moved the world.
+
+Times are wall times of this process (`time.perf_counter`), missions one after the other: run it alone on a core. The
+same factors by processor time (`time.process_time`) stand beside them: where they differ, the core was shared.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from glotouch_bt.mission import load_mission
+from glotouch_bt.mission.execution import run_mission
+from glotouch_bt.mission.read import load_conditions
+from glotouch_bt.mission.record import Record, Recorder
+from glotouch_bt.robot import BadInput, Command, Observation, Request, Robot, Ticket, load_backend
+from glotouch_bt.run import RunFolder
+
+COLUMNS = (
+    "seed", "status", "sim_s", "wall_s", "bare_s", "steps", "same_end_state", "realtime_factor", "bare_factor",
+    "over_physics", "cpu_s", "bare_cpu_s", "robot_s", "tree_s", "record_s", "open_s", "report_s",
+)  # fmt: skip
+TARGET_REALTIME = 15.0
+"""Least simulated time over wall time. Source: the project's speed requirement."""
+TARGET_OVER_PHYSICS = 2.0
+"""Largest wall time over that of the bare steps. Source: as above."""
+
+
+@dataclass(frozen=True)
+class SpeedStudy:
+    """What shall be measured.
+
+    Attributes:
+        mission: Path or shipped name.
+        settings: Mission parameters.
+        seeds: One mission a seed.
+        conditions: Path or shipped name.
+        objects: Folder of STL files instead of the world's.
+        backend: Registered name; it must know the option `trace` and have a referee.
+        out: Folder of the study; each mission's folder goes below it.
+    """
+
+    mission: str
+    settings: Mapping[str, str]
+    seeds: tuple[int, ...]
+    conditions: str
+    objects: Path | None
+    backend: str
+    out: Path
+
+
+@dataclass
+class Clockwork:
+    """Stopwatches round the parts of a control cycle, s; one entry a cycle, in the order of time.
+
+    Attributes:
+        robot: Inside `Robot.cycle`: physics, sensors, gripper.
+        tree: Between two cycles, without the record: the tree's tick, so skills, motion, touch, matching.
+        record: Inside the record.
+        whole: From one command to the next.
+        leaf: Tree time by leaf: up to an event the one that wrote it, then the one that runs after the tick.
+    """
+
+    robot: list[float] = field(default_factory=list)
+    tree: list[float] = field(default_factory=list)
+    record: list[float] = field(default_factory=list)
+    whole: list[float] = field(default_factory=list)
+    leaf: dict[str, float] = field(default_factory=dict)
+
+
+class TimedRobot(Robot):
+    """A robot that is timed; everything is passed on.
+
+    Args:
+        robot: The robot.
+        clockwork: Filled, together with the `TimedRecord` of the same run.
+    """
+
+    def __init__(self, robot: Robot, clockwork: Clockwork) -> None:
+        self._robot, self._clockwork = robot, clockwork
+        self.description, self.limits, self.period_s = robot.description, robot.limits, robot.period_s
+        self._left = 0.0
+        self._booked = 0.0
+        self.writing = 0.0
+        self.running = ""
+
+    def observe(self) -> Observation:
+        """See `Robot`; the first tick is counted from here."""
+        self._left = time.perf_counter()
+        return self._robot.observe()
+
+    def cycle(self, command: Command) -> Observation:
+        """See `Robot`."""
+        entered = time.perf_counter()
+        self.account(entered)
+        try:
+            return self._robot.cycle(command)
+        finally:
+            self._left = time.perf_counter()
+            self._clockwork.robot.append(self._left - entered)
+
+    def account(self, now: float) -> None:
+        """Book the time since the last cycle to tree and record."""
+        c = self._clockwork
+        outside = now - self._left
+        tree = outside - self.writing
+        c.tree.append(tree)
+        c.record.append(self.writing)
+        c.whole.append(outside + (c.robot[-1] if c.robot else 0.0))
+        self.book(self.running, now)
+        self.writing = self._booked = 0.0
+
+    def book(self, leaf: str, now: float) -> None:
+        """Give a leaf the tree time of this tick that nobody has got yet."""
+        spent = now - self._left - self.writing
+        self._clockwork.leaf[leaf] = self._clockwork.leaf.get(leaf, 0.0) + spent - self._booked
+        self._booked = spent
+
+    def start(self, request: Request) -> Ticket:
+        """See `Robot`."""
+        return self._robot.start(request)
+
+    def hold(self) -> None:
+        """See `Robot`."""
+        self._robot.hold()
+
+    def close(self) -> None:
+        """See `Robot`."""
+        self._robot.close()
+
+
+class TimedRecord:
+    """A record whose writing is booked as such, and that tells the timed robot which leaf runs."""
+
+    def __init__(self, record: Record, robot: TimedRobot) -> None:
+        self._record, self._robot = record, robot
+        self._parents: set[str] = set()
+
+    def block(self, observation: Observation, command: Command) -> None:
+        """See `Record`."""
+        began = time.perf_counter()
+        self._record.block(observation, command)
+        self._robot.writing += time.perf_counter() - began
+
+    def tick(self, stamp_s: float, changes: Sequence[tuple[str, object, object]]) -> None:
+        """See `Record`."""
+        began = time.perf_counter()
+        self._record.tick(stamp_s, changes)
+        self._parents.update(node.rpartition("/")[0] for node, _, _ in changes)
+        for node, _, new in changes:
+            if node not in self._parents and str(getattr(new, "value", new)) != "INVALID":
+                self._robot.running = node.rpartition("/")[2]
+        self._robot.writing += time.perf_counter() - began
+
+    def event(self, kind: str, stamp_s: float, data: Mapping[str, object]) -> None:
+        """See `Record`."""
+        began = time.perf_counter()
+        self._robot.book(str(data.get("node", self._robot.running)), began)
+        self._record.event(kind, stamp_s, data)
+        self._robot.writing += time.perf_counter() - began
+
+    def port(self, stamp_s: float, key: str, value: object) -> None:
+        """See `Record`."""
+        began = time.perf_counter()
+        self._record.port(stamp_s, key, value)
+        self._robot.writing += time.perf_counter() - began
+
+
+@dataclass(frozen=True)
+class SpeedTrial:
+    """One measured mission: its row of the table, and the stopwatches."""
+
+    row: Mapping[str, Any]
+    clockwork: Clockwork
+
+
+def run_trial(study: SpeedStudy, seed: int) -> SpeedTrial:
+    """One mission and the replay of its steps.
+
+    Raises:
+        BadInput: The backend cannot repeat its steps, or the mission cannot be run.
+    """
+    folder = RunFolder(study.out / f"s{seed}")
+    opening = time.perf_counter()
+    mission = load_mission(study.mission, study.settings, objects=study.objects)
+    conditions = load_conditions(study.conditions)
+    backend = load_backend(study.backend)
+    clockwork = Clockwork()
+    with backend.open(mission.world, conditions, seed, {"trace": True}) as robot:
+        referee = backend.referee(robot)
+        if referee is None:
+            raise BadInput(f"backend {study.backend!r} cannot repeat its steps; bench speed needs a simulation")
+        timed = TimedRobot(robot, clockwork)
+        began, cpu = time.perf_counter(), time.process_time()
+        with Recorder(folder.path / "run.mcap", _description(study, seed, mission.world.container)) as recorder:
+            outcome = run_mission(mission, timed, TimedRecord(recorder, timed))
+            timed.account(time.perf_counter())
+            ticked = time.perf_counter()
+        ended, cpu_s = time.perf_counter(), time.process_time() - cpu
+        folder.write_json("result.json", {"mission": mission.name, "seed": seed, "status": outcome.status})
+        report_s = _report_s(folder.path)
+        bare = referee.replay_bare_steps()
+    if bare is None:
+        raise BadInput(f"backend {study.backend!r} kept no trace of its steps")
+    wall_s, sim_s = ended - began, outcome.end_s - outcome.start_s
+    row = {
+        "seed": seed, "status": outcome.status, "sim_s": sim_s, "wall_s": wall_s, "bare_s": bare.wall_s,
+        "steps": bare.steps, "same_end_state": bare.same_end_state, "realtime_factor": sim_s / wall_s,
+        "bare_factor": sim_s / bare.wall_s, "over_physics": wall_s / bare.wall_s, "cpu_s": cpu_s,
+        "bare_cpu_s": bare.cpu_s,
+        "robot_s": sum(clockwork.robot), "tree_s": sum(clockwork.tree),
+        "record_s": sum(clockwork.record) + ended - ticked, "open_s": began - opening, "report_s": report_s,
+    }  # fmt: skip
+    return SpeedTrial(row, clockwork)
+
+
+def _description(study: SpeedStudy, seed: int, container: object) -> dict[str, object]:
+    return {
+        "mission": study.mission,
+        "backend": study.backend,
+        "seed": seed,
+        "conditions": study.conditions,
+        "container": container,
+        "parameters": dict(study.settings),
+    }
+
+
+def _report_s(folder: Path) -> float:
+    """Wall time of the run's report."""
+    from glotouch_bt.report import write_report
+
+    began = time.perf_counter()
+    write_report(folder)
+    return time.perf_counter() - began
+
+
+def run_study(study: SpeedStudy, on_row: Callable[[Mapping[str, Any], int, int], None] | None = None) -> dict[str, Any]:
+    """Every seed one after the other; writes trials.csv and summary.json, returns the summary (DESIGN 7).
+
+    Args:
+        study: What to measure.
+        on_row: Called with (row, done, total) after each mission.
+    """
+    study.out.mkdir(parents=True, exist_ok=True)
+    trials = []
+    for seed in study.seeds:
+        trials.append(run_trial(study, seed))
+        if on_row is not None:
+            on_row(trials[-1].row, len(trials), len(study.seeds))
+    with (study.out / "trials.csv").open("w", newline="") as f:
+        table = csv.DictWriter(f, COLUMNS)
+        table.writeheader()
+        table.writerows({k: round(v, 6) if isinstance(v, float) else v for k, v in t.row.items()} for t in trials)
+    summary = summarise(trials) | {
+        "conditions": study.conditions,
+        "seeds": list(study.seeds),
+        "mission": study.mission,
+        "settings": dict(study.settings),
+        "backend": study.backend,
+    }
+    (study.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    return summary
+
+
+def spread(values: Sequence[float]) -> dict[str, float]:
+    """Median, least and greatest of some trials."""
+    x = np.asarray(values, dtype=np.float64)
+    return {"median": float(np.median(x)), "min": float(x.min()), "max": float(x.max()), "n": len(x)}
+
+
+def quantiles_us(times_s: Sequence[float]) -> dict[str, float]:
+    """p50, p99 and the greatest of many durations, in microseconds."""
+    x = 1e6 * np.asarray(times_s, dtype=np.float64)
+    if x.size == 0:
+        return {"p50": 0.0, "p99": 0.0, "max": 0.0}
+    p50, p99 = np.percentile(x, [50.0, 99.0])
+    return {"p50": round(float(p50), 1), "p99": round(float(p99), 1), "max": round(float(x.max()), 1)}
+
+
+def summarise(trials: Sequence[SpeedTrial]) -> dict[str, Any]:
+    """Factors as median with range over the trials, cycle times over all cycles, and where the time went.
+
+    Keys: realtime_factor, bare_factor (the same of the bare steps), over_physics; control_cycle_us (command to
+    command), robot_cycle_us, tick_us, record_us; breakdown_s, the mean seconds a mission: `physics` (the bare steps),
+    `robot` (the rest of Robot.cycle), `tree` (the tick), `record`, `rest`; then `open` and `report`, which are not part
+    of the wall time; by_cpu, the factors by processor time; leaves_s (tree time by leaf); same_end_state; targets and
+    whether they are met.
+    """
+    rows = [t.row for t in trials]
+
+    def mean(key: str) -> float:
+        return float(np.mean([r[key] for r in rows]))
+
+    def cycles(part: str) -> dict[str, float]:
+        return quantiles_us([v for t in trials for v in getattr(t.clockwork, part)])
+
+    realtime = spread([r["realtime_factor"] for r in rows])
+    over = spread([r["over_physics"] for r in rows])
+    leaves: dict[str, float] = {}
+    for t in trials:
+        for name, seconds in t.clockwork.leaf.items():
+            leaves[name or "start"] = leaves.get(name or "start", 0.0) + seconds / len(trials)
+    parts = {
+        "physics": mean("bare_s"),
+        "robot": mean("robot_s") - mean("bare_s"),
+        "tree": mean("tree_s"),
+        "record": mean("record_s"),
+        "rest": mean("wall_s") - mean("robot_s") - mean("tree_s") - mean("record_s"),
+    }
+    return {
+        "realtime_factor": realtime,
+        "bare_factor": spread([r["bare_factor"] for r in rows]),
+        "over_physics": over,
+        "by_cpu": {
+            "realtime_factor": spread([r["sim_s"] / r["cpu_s"] for r in rows]),
+            "over_physics": spread([r["cpu_s"] / r["bare_cpu_s"] for r in rows]),
+        },
+        "control_cycle_us": cycles("whole"),
+        "robot_cycle_us": cycles("robot"),
+        "tick_us": cycles("tree"),
+        "record_us": cycles("record"),
+        "breakdown_s": parts,
+        "leaves_s": dict(sorted(leaves.items(), key=lambda item: -item[1])),
+        "sim_s": mean("sim_s"),
+        "wall_s": mean("wall_s"),
+        "cpu_s": mean("cpu_s"),
+        "open_s": mean("open_s"),
+        "report_s": mean("report_s"),
+        "same_end_state": all(r["same_end_state"] for r in rows),
+        "succeeded": sum(r["status"] == "success" for r in rows),
+        "targets": {
+            "realtime_factor": {"least": TARGET_REALTIME, "met": realtime["median"] >= TARGET_REALTIME},
+            "over_physics": {"most": TARGET_OVER_PHYSICS, "met": over["median"] <= TARGET_OVER_PHYSICS},
+        },
+    }

@@ -1,0 +1,48 @@
+"""What `glotouch bench faults` prints."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from glotouch_bt.commands.terminal.console import print_table
+from glotouch_bt.validation.faults import VERDICTS
+
+
+def _rate(rate: Mapping[str, Any]) -> str:
+    if not rate["n"]:
+        return "none"
+    return f"{100 * rate['rate']:.1f} % ({100 * rate['lo']:.1f} .. {100 * rate['hi']:.1f}, n = {rate['n']})"
+
+
+def print_faults(summary: Mapping[str, Any], out: Path) -> None:
+    """The matrix by class, then the rates."""
+    rows = []
+    for name, found in summary["by_class"].items():
+        counts = [str(found[v] or "") for v in VERDICTS]
+        rows.append((name, *counts, f"{found['named']} of {found['ended']}" if found["ended"] else ""))
+    print_table("faults", ("class", *VERDICTS, "cause named"), rows)
+    lines = (
+        ("trials", f"{summary['trials']}, and {summary['twins_succeeded']} of {summary['twins']} twins succeeded"),
+        ("hard limit broken", f"{summary['hard_limit_broken']} (largest peak {summary['largest_peak_force_N']:.1f} N)"),
+        ("tracebacks, hangs", f"{summary['tracebacks']}, {summary['hangs']}"),
+        ("wrong object lifted", _rate(summary["wrong_object"])),
+        ("cause named", _rate(summary["named"])),
+        ("recoverable recovered", _rate(summary["recovered"])),
+        ("altered nothing", "; ".join(summary["altered_nothing"]) or "none"),
+    )
+    for name, text in lines:
+        sys.stdout.write(f"{name:22s} {text}\n")
+    sys.stdout.write(f"{out / 'summary.json'}\n")
+
+
+def print_exhaustive(summary: Mapping[str, Any], out: Path) -> None:
+    """How many calls were failed, and which did not end as they must."""
+    sys.stdout.write(f"{summary['mission']} on {summary['backend']} ({summary['unfaulted']} if nothing fails): ")
+    sys.stdout.write(f"{summary['tried']} runs, each with one of {summary['calls']} calls failed: ")
+    sys.stdout.write(f"{len(summary['bad'])} did not end held, with the reason named\n")
+    for bad in summary["bad"][:20]:
+        sys.stdout.write(f"  {bad['fault']} at call {bad['call']}: {bad['what']}\n")
+    sys.stdout.write(f"{out / 'summary.json'}\n")

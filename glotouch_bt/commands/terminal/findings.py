@@ -1,0 +1,69 @@
+"""How findings look: each with its line of the mission, why it matters, and the shortest run that shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from rich.console import Console
+from rich.text import Text
+
+from glotouch_bt.mission.spec import Finding
+
+MOST_STEPS = 8
+_COLOUR = {"error": "bold red", "warning": "bold yellow"}
+
+
+def print_findings(findings: Iterable[Finding], lines: dict[str, list[str]]) -> None:
+    """Findings on stderr, for a person.
+
+    Args:
+        findings: In the order to print.
+        lines: Text of each file, by the name findings give it; what is missing is not quoted.
+    """
+    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    for finding in findings:
+        place, colour = finding.place, _COLOUR[finding.severity]
+        head = Text(f"{place}: ", style="bold")
+        head.append(f"{finding.severity}: ", style=colour).append(finding.what)
+        if finding.hint:
+            head.append("; did you mean ").append(repr(finding.hint), style="bold green").append("?")
+        head.append(f" [{finding.code}]", style="dim")
+        text = lines.get(place.file, [])
+        if 0 < place.line <= len(text):
+            quoted = text[place.line - 1].rstrip()
+            shift = len(quoted) - len(quoted.lstrip())
+            head.append(f"\n  {place.line:5d} | ", style="dim").append(quoted[shift:])
+            head.append("\n        | ", style="dim").append(" " * (place.column - 1 - shift) + "^", style=colour)
+        for word, said in (("why", finding.why), ("path", path_in_words(finding.path)), ("valid", finding.valid)):
+            if said:
+                head.append(f"\n  {word:>5}   ", style="dim").append(said)
+        console.print(head, "", sep="\n")
+
+
+def path_in_words(path: tuple[str, ...]) -> str:
+    """The steps of a run, what went well and came long before left out; empty if it has one step only."""
+    if len(path) < 2:
+        return ""
+    steps: list[str] = []
+    for step in path:
+        same = steps and steps[-1].partition(" ×")[0] == step
+        times = int(steps.pop().partition(" ×")[2] or 1) + 1 if same else 1
+        steps.append(f"{step} ×{times}" if times > 1 else step)
+    odd = [i for i, s in enumerate(steps) if not (s.endswith((" ok", " holds", " has no item")))]
+    first = min(odd, default=len(steps))
+    if first > MOST_STEPS:
+        steps = [steps[0], f"({first - MOST_STEPS // 2 - 1} more ok)", *steps[first - MOST_STEPS // 2 :]]
+    return " > ".join(steps)
+
+
+def texts_of(files: Iterable[str], root: Path) -> dict[str, list[str]]:
+    """Lines of mission files by the name messages give them (`glotouch_missions/...` for shipped ones)."""
+    found: dict[str, list[str]] = {}
+    for name in files:
+        path = root / name.removeprefix("glotouch_missions/") if name.startswith("glotouch_missions/") else Path(name)
+        try:
+            found[name] = path.read_text(encoding="utf-8").splitlines()
+        except (OSError, UnicodeDecodeError):
+            continue
+    return found

@@ -1,0 +1,313 @@
+"""A first visit to a robot: looks first, then asks before everything that moves. Works with any backend.
+
+Each step returns findings: what was measured, whether it is good, and what to do if it is not. Nothing is changed on
+the robot and nothing is written to files: a person decides what to do with the findings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Protocol, TypeVar, runtime_checkable
+
+import numpy as np
+
+from glotouch_bt.commissioning.registration import Registration, touch_walls
+from glotouch_bt.motion import Arm, Motion
+from glotouch_bt.robot import (
+    HOLD,
+    Array,
+    Backend,
+    Command,
+    Conditions,
+    GripperTarget,
+    MotionRefused,
+    Observation,
+    Robot,
+    TactileFrame,
+    Tare,
+    World,
+)
+
+T = TypeVar("T")
+Ask = Callable[[str], bool]
+
+LOOK_S, FRAMES_S = 5.0, 1.5
+GAP_FACTOR = 3.0
+RATE_Hz = 900.0
+BIAS_N = 5.0
+"""A static wrench beyond this after taring calls for the vendor's torque sensor calibration."""
+NOISE_N = 0.3
+TARE_PERIODS = 500
+AGREE_M, AGREE_DEG = 0.005, 0.5
+JAW_N, JAW_M_S, JAW_STEP_M = 5.0, 0.02, 0.005
+PRESSED_M = 1e-4
+
+
+@runtime_checkable
+class Looking(Protocol):
+    """A backend that can connect without enabling or commanding anything."""
+
+    def look(self, world: World, conditions: Conditions, options: Mapping[str, object]) -> Robot:
+        """A robot that can only be observed."""
+        ...
+
+
+@runtime_checkable
+class Informed(Protocol):
+    """A robot that knows what its devices say about themselves."""
+
+    info: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing found; `good` is None if nobody can say."""
+
+    step: str
+    what: str
+    good: bool | None
+    text: str
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+def drive(robot: Robot, motion: Motion[T]) -> T:
+    """Run a motion to its end; the arm holds afterwards."""
+    command = next(motion)
+    try:
+        while True:
+            command = motion.send(robot.cycle(command))
+    except StopIteration as e:
+        result: T = e.value
+        return result
+    finally:
+        robot.hold()
+
+
+def rest(robot: Robot, duration_s: float, command: Command = HOLD) -> list[Observation]:
+    """Observations of a while at rest."""
+    return [robot.cycle(command) for _ in range(round(duration_s / robot.period_s))]
+
+
+def nearly_empty(world: World) -> World:
+    """For simulated robots: the world with one object only, as a container cannot be without."""
+    objects = world.objects
+    names = objects.names or tuple(sorted(p.stem for p in objects.folder.glob("*.stl")))
+    return replace(world, objects=replace(objects, names=names[:1]))
+
+
+def visit(
+    backend: Backend, world: World, conditions: Conditions, options: Mapping[str, object], ask: Ask, *, sure: bool
+) -> Iterator[Finding]:
+    """The whole visit; a generator, so that every finding is told when it is found.
+
+    Args:
+        backend, world, conditions, options: What to open.
+        ask: Puts a yes/no question to the person there.
+        sure: False when nobody is there to be asked what they see (a dry run).
+    """
+    looking = backend.look(world, conditions, options) if isinstance(backend, Looking) else None
+    if looking is not None:
+        with looking:
+            yield from facts(looking)
+            yield from rates(looking)
+            yield from wrist(looking, "as found")
+        if not ask("Everything so far was looking. Enable the arm (brakes are released, it holds still)?"):
+            return
+    with backend.open(world, conditions, 0, options) as robot:
+        if looking is None:
+            yield from facts(robot)
+            yield from rates(robot)
+        drive(robot, _tared(robot))
+        yield from wrist(robot, "tared")
+        yield from place(robot, world)
+        if ask(f"Move the jaws by {JAW_STEP_M * 1e3:.0f} mm and then over their stroke, {JAW_N:g} N? Hands off."):
+            yield from jaws(robot, ask if sure else None)
+        if ask("Read the tactile pads? Nothing may touch them."):
+            yield from pads(robot, ask if sure else None)
+        if ask("Touch three walls and the floor of the EMPTY container with closed jaws, at a few newtons?"):
+            yield from walls(robot, world)
+
+
+def facts(robot: Robot) -> Iterator[Finding]:
+    """What the devices say about themselves."""
+    if isinstance(robot, Informed):
+        for name, value in robot.info.items():
+            yield Finding("facts", name, None, value)
+    yield Finding("facts", "description", None, robot.description.name)
+
+
+def rates(robot: Robot) -> Iterator[Finding]:
+    """Samples a second, gaps between them, and whether the clock runs forward."""
+    seen = rest(robot, LOOK_S)
+    stamps = np.concatenate([o.stamp_s for o in seen])
+    steps = np.diff(stamps)
+    rate = float(1.0 / steps.mean())
+    gap, typical = float(steps.max()), float(np.median(steps))
+    forward = bool((steps > 0.0).all())
+    yield Finding("rates", "clock", forward, "runs forward" if forward else "jumped back", {"samples": len(stamps)})
+    text = f"{rate:.0f} samples a second; guards and onsets are made for 1000"
+    yield Finding("rates", "samples", rate > RATE_Hz, text, {"rate_Hz": rate})
+    text = f"longest gap {gap * 1e3:.1f} ms (usually {typical * 1e3:.1f} ms)"
+    yield Finding("rates", "gaps", gap < max(GAP_FACTOR * typical, robot.period_s), text, {"gap_s": gap})
+
+
+def _tared(robot: Robot) -> Motion[None]:
+    ticket = robot.start(Tare())
+    for _ in range(TARE_PERIODS):
+        yield HOLD
+        if ticket.done:
+            break
+
+
+def wrist(robot: Robot, when: str) -> Iterator[Finding]:
+    """Bias and noise of the wrench at rest."""
+    wrench = np.concatenate([o.wrench_S for o in rest(robot, LOOK_S)])
+    bias, sd = wrench.mean(axis=0), wrench.std(axis=0)
+    size = float(np.linalg.norm(bias[:3]))
+    good = None if when != "tared" else size < BIAS_N
+    advice = "; zero it again with nothing touching, or calibrate the arm's torque sensors" if good is False else ""
+    values = {"bias": bias.round(4).tolist(), "sd": sd.round(5).tolist()}
+    yield Finding("wrist", "bias", good, f"{size:.2f} N {when}{advice}", values)
+    worst = float(sd[:3].max())
+    text = f"{worst:.3f} N standard deviation on the worst axis (missions were measured at 0.05)"
+    yield Finding("wrist", "noise", worst < NOISE_N, text, {"sd_N": worst})
+    wander = float(np.linalg.norm(wrench[-500:, :3].mean(axis=0) - wrench[:500, :3].mean(axis=0)))
+    yield Finding("wrist", "drift", wander < NOISE_N, f"{wander:.3f} N over {LOOK_S:g} s", {"drift_N": wander})
+
+
+def place(robot: Robot, world: World) -> Iterator[Finding]:
+    """Does the arm stand where our kinematics say it stands?"""
+    observation = robot.cycle(HOLD)
+    arm = Arm(robot.description, robot.limits, world, robot.period_s)
+    ours, theirs = arm.kinematics.fk(observation.q[-1]), observation.pose_B_P
+    away = float(np.linalg.norm(ours.position_m - theirs.position_m))
+    turned = float(np.degrees(2.0 * np.arccos(min(1.0, abs(float(ours.quat @ theirs.quat))))))
+    text = f"the tool is {away * 1e3:.2f} mm and {turned:.2f} deg from where its joints put it by our numbers"
+    good = away < AGREE_M and turned < AGREE_DEG
+    advice = "" if good else "; use the arm's own calibrated kinematics, and measure the tool"
+    yield Finding("place", "kinematics", good, text + advice, {"away_m": away, "turned_deg": turned})
+
+
+def jaws(robot: Robot, ask: Ask | None) -> Iterator[Finding]:
+    """Direction and stroke, at low force."""
+    hand = robot.description.gripper
+    first = robot.cycle(HOLD).gripper.aperture_m
+    further = first + JAW_STEP_M <= hand.stroke_m
+    goal = first + JAW_STEP_M if further else first - JAW_STEP_M
+    last = _jaws_to(robot, goal)
+    moved = last - first
+    good = moved * (goal - first) > 0.0 and abs(last - goal) < 1e-3
+    values = {"from_m": first, "to_m": last}
+    yield Finding("jaws", "answer", good, f"told {goal * 1e3:.1f} mm, reports {last * 1e3:.1f} mm", values)
+    if ask is not None:
+        seen = ask(f"Did the jaws {'OPEN' if further else 'CLOSE'}?")
+        advice = "" if seen else ": the gripper's scale is reversed; do not run a mission"
+        yield Finding("jaws", "direction", seen, ("as reported" if seen else "not as reported") + advice)
+        if not seen:
+            return
+    shut, wide = _jaws_to(robot, 0.0), _jaws_to(robot, hand.stroke_m)
+    text = f"{shut * 1e3:.1f} .. {wide * 1e3:.1f} mm of {hand.stroke_m * 1e3:.0f}"
+    good = shut < 2e-3 and wide > hand.stroke_m - 2e-3
+    yield Finding("jaws", "stroke", good, text, {"closed_m": shut, "open_m": wide})
+    if ask is not None:
+        seen = ask("Are the jaws now fully OPEN?")
+        yield Finding("jaws", "open", seen, "as reported" if seen else "reversed: do not run a mission")
+
+
+def _jaws_to(robot: Robot, aperture_m: float) -> float:
+    """Where the jaws are after having been told to go somewhere and come to rest."""
+    command = Command(gripper=GripperTarget(aperture_m, JAW_M_S, JAW_N))
+    for _ in range(round((0.085 / JAW_M_S + 2.0) / robot.period_s)):
+        state = robot.cycle(command).gripper
+        command = HOLD
+        if abs(state.aperture_m - aperture_m) < 3e-4:
+            break
+    return float(np.mean([o.gripper.aperture_m for o in rest(robot, 0.3)]))
+
+
+def pads(robot: Robot, ask: Ask | None) -> Iterator[Finding]:
+    """Rate, noise and dead taxels untouched; then which pad, and which part of it, a press shows on."""
+    frames = _frames(robot)
+    if len(frames) < 2:
+        yield Finding("pads", "frames", False, f"{len(frames)} frames in {FRAMES_S:g} s")
+        return
+    rate = (len(frames) - 1) / (frames[-1].stamp_s - frames[0].stamp_s)
+    yield Finding("pads", "frames", rate > 10.0, f"{rate:.0f} pairs a second", {"rate_Hz": rate})
+    for side in ("left", "right"):
+        maps = np.array([getattr(f, f"{side}_m") for f in frames])
+        alive = ~np.isnan(maps).any(axis=0)
+        dead, seen = 1.0 - float(alive.mean()), maps[:, alive]
+        noise = float(np.median(seen.std(axis=0))) if seen.size else np.nan
+        offset = float(np.median(np.abs(seen))) if seen.size else np.nan
+        text = f"noise {noise * 1e3:.3f} mm, offset {offset * 1e3:.3f} mm, {dead * 100:.1f} % of the taxels dead"
+        good = dead < 0.05 and offset < PRESSED_M
+        yield Finding("pads", side, good, text, {"noise_m": noise, "offset_m": offset, "dead": dead})
+    if ask is None:
+        return
+    words = "Press the LEFT pad (the one at +y of P) with a finger, near its tip, on the side of +x of P. Pressing?"
+    if not ask(words):
+        return
+    pressed = _frames(robot)
+    if pressed:
+        yield _pressed(frames[-1], pressed[-1])
+
+
+def _frames(robot: Robot) -> list[TactileFrame]:
+    seen = rest(robot, FRAMES_S, Command(tactile=True))
+    return [o.tactile for o in seen if o.tactile is not None]
+
+
+def _pressed(before: TactileFrame, now: TactileFrame) -> Finding:
+    """Where a press shows; it should be on the left map, in the lower rows, at high columns."""
+    found = {}
+    for side in ("left", "right"):
+        change: Array = np.nan_to_num(getattr(now, f"{side}_m") - getattr(before, f"{side}_m"))
+        i, j = np.unravel_index(int(change.argmax()), change.shape)
+        found[side] = float(change.max()), int(i) / change.shape[0], int(j) / change.shape[1]
+    side = max(found, key=lambda s: found[s][0])
+    depth, row, column = found[side]
+    if depth < PRESSED_M:
+        return Finding("pads", "press", False, "no press was seen on either pad")
+    wrong = [] if side == "left" else ["the pads are swapped: exchange left_pad and right_pad"]
+    if row < 0.5:
+        wrong.append("rows run towards the flange: mount or number the sensor the other way round")
+    if column < 0.5:
+        wrong.append("columns are mirrored: set mirror to the other pad")
+    text = f"seen on the {side} map, {row * 100:.0f} % down and {column * 100:.0f} % along +x"
+    values = {"side": side, "row": row, "column": column, "depth_m": depth}
+    return Finding("pads", "press", not wrong, "; ".join([text, *wrong]), values)
+
+
+def walls(robot: Robot, world: World) -> Iterator[Finding]:
+    """Where the container is, by touch."""
+    arm = Arm(robot.description, robot.limits, world, robot.period_s)
+    arm.sync(robot.observe())
+    _jaws_to(robot, 0.0)
+    try:
+        found = drive(robot, touch_walls(arm, world, robot.observe))
+    except MotionRefused as e:
+        yield Finding("walls", "touch", False, str(e))
+        return
+    if isinstance(found, str):
+        yield Finding("walls", "touch", False, found)
+        return
+    yield _registered(found)
+
+
+def _registered(found: Registration) -> Finding:
+    x, y, z = (1e3 * found.shift_K_m).tolist()
+    yaw = float(np.degrees(found.yaw_rad))
+    where, turn = found.pose_B_K.position_m.round(4).tolist(), float(np.degrees(found.pose_B_K.yaw_rad))
+    text = (
+        f"the container is {x:+.1f}, {y:+.1f}, {z:+.1f} mm and {yaw:+.2f} deg from where the world file has it "
+        f"(touches agree within {found.residual_m * 1e3:.2f} mm, at most {found.peak_N:.1f} N); "
+        f"pose_B_K: {{position_m: {where}, yaw_deg: {turn:.2f}}}"
+    )
+    values = {"shift_K_m": found.shift_K_m.tolist(), "yaw_deg": yaw, "residual_m": found.residual_m}
+    values |= {"peak_N": found.peak_N, "position_m": where, "pose_yaw_deg": turn}
+    return Finding("walls", "container", found.residual_m < 2e-3, text, values)

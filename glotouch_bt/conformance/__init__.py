@@ -1,0 +1,12 @@
+"""For those who write backends: one suite that every backend must pass. Needs pytest.
+
+from glotouch_bt.testing import RobotConformance
+
+class TestMine(RobotConformance):
+    def make(self) -> Robot: return MyBackend().open(world, Conditions(), 0, {})
+"""
+
+from glotouch_bt.conformance.rig import Rig, Wall
+from glotouch_bt.conformance.suite import RobotConformance
+
+__all__ = ["Rig", "RobotConformance", "Wall"]

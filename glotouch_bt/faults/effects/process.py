@@ -1,0 +1,75 @@
+"""Faults of the process that runs the mission."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+
+from glotouch_bt.faults.effects.base import Cycle, Effect, FaultParams, param
+from glotouch_bt.robot import BadInput, Command, Observation
+
+
+class Unexpected(Effect):
+    """The driver raises what it never said it would."""
+
+    drives = True
+
+    def drive(self, cycle: Cycle, command: Command) -> Observation:
+        """See `Effect`."""
+        self.refuse()
+        return cycle(command)
+
+    def refuse(self) -> None:
+        """See `Effect`."""
+        self.acts.times += 1
+        raise RuntimeError("the driver broke (injected exception)")
+
+
+class HangParams(FaultParams):
+    """Parameters of `hang`."""
+
+    wall_s: float = param(
+        "How long one cycle does not come back, on the wall's clock", unit="s", default=2.0, gt=0.0, le=600.0
+    )
+
+
+class Hang(Effect):
+    """One cycle does not come back for a while."""
+
+    Params = HangParams
+    params: HangParams
+    drives = True
+
+    def begin(self) -> None:
+        """See `Effect`."""
+        self._slept = False
+
+    def drive(self, cycle: Cycle, command: Command) -> Observation:
+        """See `Effect`."""
+        if not self._slept:
+            self._slept = True
+            self.acts.times += 1
+            threading.Event().wait(self.params.wall_s)  # this thread is gone for as long, as in a blocking call
+        return cycle(command)
+
+
+class Kill(Effect):
+    """The process is killed (SIGKILL), as when power fails; only where the process is the mission's own."""
+
+    drives = True
+
+    def prepare(self) -> None:
+        """See `Effect`.
+
+        Raises:
+            BadInput: This process does more than run the mission.
+        """
+        if not self.scene.may_kill:
+            raise BadInput("fault kill: the process does more than run this mission; use `glotouch run --faults`")
+
+    def drive(self, cycle: Cycle, command: Command) -> Observation:
+        """See `Effect`."""
+        self.acts.times += 1
+        os.kill(os.getpid(), signal.SIGKILL)
+        return cycle(command)

@@ -1,0 +1,201 @@
+"""What is surely or probably not meant: two skills at once on one arm, loops that nothing ends, nodes without effect.
+
+None of it needs more than the tree and the sets of its analysis.
+"""
+
+from __future__ import annotations
+
+from glotouch_bt.mission.check.data_flow import Flow
+from glotouch_bt.mission.check.loop_bounds import worst_case
+from glotouch_bt.mission.check.requirements import verdicts
+from glotouch_bt.mission.check.state_sets import EMPTY
+from glotouch_bt.mission.check.state_variables import UNSET
+from glotouch_bt.mission.spec import (
+    ConditionSettings,
+    Findings,
+    ForEachSettings,
+    NodeSpec,
+    Place,
+    RepeatSettings,
+    RetrySettings,
+    TimeoutSettings,
+)
+
+ENDLESS_RUNS = 1_000_000
+CATCHING = {"selector", "succeed", "retry", "fail", "invert"}
+
+
+def check_habits(flow: Flow, findings: Findings, timeout_s: float) -> None:
+    """Report what is probably not meant.
+
+    Args:
+        flow: The analysis; lenient, if there are mistakes, so that what follows from them is not reported.
+        findings: Where it goes.
+        timeout_s: Longest duration of the mission.
+    """
+    _Habits(flow, findings).look(flow.tree, (), timeout_s)
+    runs = worst_case(flow.tree)
+    if runs.fixed > ENDLESS_RUNS:
+        what = f"loops within loops: up to {runs} runs of skills"
+        findings.add(flow.tree.place, "practically_endless", what)
+
+
+class _Habits:
+    def __init__(self, flow: Flow, findings: Findings) -> None:
+        self._flow, self._findings = flow, findings
+        self._read = {w.key for n in flow.tree.walk() for w in n.reads.values()}
+        self._written = {w.key for n in flow.tree.walk() for w in n.writes.values()}
+
+    def look(self, node: NodeSpec, above: tuple[NodeSpec, ...], timeout_s: float) -> None:
+        if node.kind == "parallel":
+            self._at_once(node)
+        elif node.kind == "repeat":
+            self._until(node, above)
+        elif node.kind == "for_each":
+            self._all_or_nothing(node, above)
+            self._gathered(node)
+        elif node.kind == "condition":
+            self._condition(node)
+        elif node.kind == "selector":
+            self._alternatives(node)
+        elif node.kind == "skill":
+            self._renamed(node)
+        self._no_effect(node)
+        if isinstance(node.settings, TimeoutSettings):
+            if node.settings.seconds >= timeout_s:
+                outer = next((n for n in reversed(above) if n.kind == "timeout"), None)
+                whose = f"{outer.name!r} (line {outer.place.line})" if outer is not None else "the mission"
+                what = f"{node.name!r} allows {node.settings.seconds:g} s, {whose} only {timeout_s:g} s"
+                self._findings.add(node.place, "timeout_never", what, node=node.name)
+            timeout_s = min(timeout_s, node.settings.seconds)
+        for child in node.children:
+            self.look(child, (*above, node), timeout_s)
+
+    def _add(self, node: NodeSpec, code: str, what: str, place: Place | None = None) -> None:
+        self._findings.add(place or node.place, code, what, node=node.name)
+
+    def _at_once(self, node: NodeSpec) -> None:
+        for i, child in enumerate(node.children):
+            for other in node.children[:i]:
+                mine, theirs = _users(child), _users(other)
+                for thing in sorted(set(mine) & set(theirs)):
+                    one, two = theirs[thing], mine[thing]
+                    what = f"{two.name!r} and {one.name!r} (line {one.place.line}) both use the {thing} at once"
+                    self._add(two, "arm_shared", what)
+                written = {w.key: (n, w.place) for n in other.walk() for w in n.writes.values()}
+                for below in child.walk():
+                    for wire in below.writes.values():
+                        if wire.key in written:
+                            name = wire.key.rpartition("/")[2]
+                            writer, place = written[wire.key]
+                            what = f"{below.name!r} and {writer.name!r} (line {place.line}) write {name!r} at once"
+                            self._add(below, "written_twice", what, wire.place)
+
+    def _until(self, node: NodeSpec, above: tuple[NodeSpec, ...]) -> None:
+        wire = node.reads.get("until")
+        if wire is None:
+            return
+        outer = next((n for n in reversed(above) if n.kind == "parallel"), node)
+        if any(w.key == wire.key for n in outer.walk() for w in n.writes.values()):
+            return
+        if any(n.kind == "unknown" for n in node.walk()):
+            return
+        name = wire.key.rpartition("/")[2]
+        self._add(
+            node, "until_constant", f"nothing inside {node.name!r} writes {name!r}, which it waits for", wire.place
+        )
+
+    def _all_or_nothing(self, node: NodeSpec, above: tuple[NodeSpec, ...]) -> None:
+        settings = node.settings
+        if not isinstance(settings, ForEachSettings) or "on_failure" in settings.model_fields_set:
+            return
+        if not settings.collect or not node.children or not self._fails(node.children[0]):
+            return
+        if any(n.kind in CATCHING or _goes_on(n) for n in above):
+            return
+        what = f"if one item of {node.name!r} fails, the mission fails with what it gathered"
+        what += "; say on_failure: continue, or on_failure: stop if it is meant"
+        self._add(node, "all_or_nothing", what)
+
+    def _condition(self, node: NodeSpec) -> None:
+        settings = node.settings
+        if not isinstance(settings, ConditionSettings) or "port" not in node.reads:
+            return
+        variables = self._flow.variables
+        for demand in self._flow.demands[id(node)]:
+            found = variables.sets.values(self._flow.judged(demand), demand.variable) & (demand.good | {UNSET})
+            yes, no = verdicts(variables, demand, settings)
+            if found - {UNSET} and not (found & yes and found & no):
+                said = "always holds" if found & yes else "never holds"
+                self._add(node, "constant_condition", f"{node.name!r} {said}")
+            kinds = [variables.kind(demand.key, v) for v in found - {UNSET}]
+            measured = kinds and all(k.data_type is float for k in kinds)
+            if settings.equals is not None and not isinstance(settings.equals, (bool, str)) and measured:
+                what = f"{node.name!r} compares the float {settings.port!r} for being exactly {settings.equals}"
+                self._add(node, "float_equality", what)
+
+    def _alternatives(self, node: NodeSpec) -> None:
+        for child in node.children:
+            idle = not any(n.kind in ("skill", "unknown") for n in child.walk())
+            if idle and self._entered(child) and not self._succeeds(child):
+                self._add(child, "cannot_help", f"{child.name!r} is an alternative that never succeeds")
+
+    def _renamed(self, node: NodeSpec) -> None:
+        for port, wire in node.writes.items():
+            if wire.place != node.place and wire.key not in self._read:
+                name = wire.key.rpartition("/")[2]
+                what = f"nobody reads {name!r}, to which {node.name!r} writes its {port!r}"
+                near = self._findings.nearest(name, (k.rpartition("/")[2] for k in self._read))
+                self._findings.add(wire.place, "unused_key", what, hint=near, node=node.name)
+
+    def _gathered(self, node: NodeSpec) -> None:
+        """What is gathered may be for the record only, unless somebody reads a key of such a name, never written."""
+        for port, wire in node.writes.items():
+            if port in node.reads and wire.key not in self._read:
+                name = wire.key.rpartition("/")[2]
+                missed = {k.rpartition("/")[2] for k in self._read - self._written}
+                if near := self._findings.nearest(name, missed):
+                    what = f"nobody reads {name!r}, in which {node.name!r} gathers, and nobody writes {near!r}"
+                    self._findings.add(wire.place, "unused_key", what, hint=near, node=node.name)
+
+    def _no_effect(self, node: NodeSpec) -> None:
+        why = ""
+        child = node.children[0] if node.children else None
+        if child is None or not self._entered(child):
+            return
+        if isinstance(node.settings, RetrySettings) and node.settings.attempts == 1:
+            why = "one attempt is none again"
+        elif isinstance(node.settings, RepeatSettings) and node.settings.times == 1:
+            why = "one pass is no repetition"
+        elif node.kind in ("retry", "succeed") and not self._fails(child):
+            why = f"{child.name!r} never fails"
+        elif node.kind == "fail" and not self._succeeds(child):
+            why = f"{child.name!r} never succeeds"
+        elif node.kind in ("selector", "parallel") and len(node.children) == 1 and child.kind != "unknown":
+            why = "it has one child"
+        elif node.kind == "timeout" and not any(n.kind in ("skill", "unknown") for n in child.walk()):
+            why = "nothing below it takes time"
+        if why:
+            self._add(node, "no_effect", f"{node.name!r} changes nothing: {why}")
+
+    def _entered(self, node: NodeSpec) -> bool:
+        return self._flow.entered.get(id(node), EMPTY) != EMPTY
+
+    def _fails(self, node: NodeSpec) -> bool:
+        return id(node) in self._flow.left and self._flow.left[id(node)].failure != EMPTY
+
+    def _succeeds(self, node: NodeSpec) -> bool:
+        return id(node) in self._flow.left and self._flow.left[id(node)].success != EMPTY
+
+
+def _users(node: NodeSpec) -> dict[str, NodeSpec]:
+    """What is used in a subtree, and the first skill that does."""
+    found: dict[str, NodeSpec] = {}
+    for below in node.walk():
+        for thing in below.skill_type.USES if below.skill_type is not None else ():
+            found.setdefault(thing, below)
+    return found
+
+
+def _goes_on(node: NodeSpec) -> bool:
+    return isinstance(node.settings, ForEachSettings) and node.settings.on_failure == "continue"

@@ -1,0 +1,8 @@
+"""TODO door of glotouch_bt/mission/checkpoint."""
+
+from glotouch_bt.mission.checkpoint.codec import decode, encode
+from glotouch_bt.mission.checkpoint.store import FILE, CheckpointFile, Row
+from glotouch_bt.mission.checkpoint.world_check import WorldChanged
+from glotouch_bt.mission.checkpoint.writer import Keeper, Keeping, TakenUp, Work
+
+__all__ = ["FILE", "CheckpointFile", "Keeper", "Keeping", "Row", "TakenUp", "Work", "WorldChanged", "decode", "encode"]

@@ -1,0 +1,15 @@
+"""TODO door of glotouch_bt/mission/run."""
+
+from glotouch_bt.mission.execution.control import Control, TimedPauses
+from glotouch_bt.mission.execution.runner import Outcome, default_arm, run_mission
+from glotouch_bt.mission.execution.watchdog import Stuck, deferred_interrupt
+
+__all__ = [
+    "Control",
+    "Outcome",
+    "Stuck",
+    "TimedPauses",
+    "default_arm",
+    "deferred_interrupt",
+    "run_mission",
+]

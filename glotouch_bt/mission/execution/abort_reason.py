@@ -1,0 +1,41 @@
+"""What ends a mission from outside the tree, in words and numbers."""
+
+from __future__ import annotations
+
+from glotouch_bt.mission.checkpoint import WorldChanged
+from glotouch_bt.mission.execution.control import Preempted
+from glotouch_bt.mission.execution.watchdog import SkillHung
+from glotouch_bt.mission.tree import Failure
+from glotouch_bt.robot import BackendError, GuardTripped
+from glotouch_bt.skill import Reason
+
+
+def why_aborted(error: BaseException, node: str) -> Failure:
+    """What was raised at a node, as the end of a mission: a code, words, and the numbers it carries."""
+    if isinstance(error, WorldChanged):
+        return Failure(error.reason.node, str(error), error.reason)
+    if isinstance(error, KeyboardInterrupt):
+        code, text = "interrupted", "stopped by the operator"
+    elif isinstance(error, Preempted):
+        code, text = "preempted", str(error)
+    elif isinstance(error, SkillHung):
+        code, text = "skill_hung", str(error)
+    elif isinstance(error, GuardTripped):
+        code, text = f"guard_{error.guard}", str(error)
+    elif isinstance(error, BackendError):
+        code, text = _snake(type(error).__name__), str(error)
+    else:
+        code, text = "fault", f"{type(error).__name__}: {error}"
+    return Failure(node, text, Reason(code, text, _evidence(error), node=node))
+
+
+def _evidence(error: BaseException) -> dict[str, float | int | str]:
+    """The numbers an error carries."""
+    if not isinstance(error, BackendError):
+        return {}
+    names = ("guard", "quantity", "value", "limit", "stamp_s", "age_s", "max_age_s")
+    return {name: value for name in names if isinstance(value := getattr(error, name, None), (float, int, str))}
+
+
+def _snake(name: str) -> str:
+    return "".join(f"_{c.lower()}" if c.isupper() and i else c.lower() for i, c in enumerate(name))

@@ -1,0 +1,47 @@
+"""TODO door of glotouch_bt/mission/read."""
+
+from glotouch_bt.mission.read.fields import unit_of, validate
+from glotouch_bt.mission.read.library import SkillShelf, find_shipped, shipped, shipped_root, shown
+from glotouch_bt.mission.read.parameters import (
+    Declaration,
+    Parameter,
+    Value,
+    check_used,
+    from_command_line,
+    read_parameters,
+    resolved,
+    substitute,
+)
+from glotouch_bt.mission.read.parse import parse_tree
+from glotouch_bt.mission.read.scope import Reading, Scope
+from glotouch_bt.mission.read.subtrees import entries_of
+from glotouch_bt.mission.read.worlds import WorldFile, load_conditions, load_world, read_world
+from glotouch_bt.mission.read.yaml_source import parse_yaml, read_yaml
+
+__all__ = [
+    "Declaration",
+    "Parameter",
+    "Reading",
+    "Scope",
+    "SkillShelf",
+    "Value",
+    "WorldFile",
+    "check_used",
+    "entries_of",
+    "find_shipped",
+    "from_command_line",
+    "load_conditions",
+    "load_world",
+    "parse_tree",
+    "parse_yaml",
+    "read_parameters",
+    "read_world",
+    "read_yaml",
+    "resolved",
+    "shipped",
+    "shipped_root",
+    "shown",
+    "substitute",
+    "unit_of",
+    "validate",
+]

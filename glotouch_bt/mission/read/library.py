@@ -1,0 +1,89 @@
+"""Where shipped missions, worlds and conditions are, and which skills are installed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from importlib.metadata import EntryPoint, entry_points
+from os.path import isfile
+from pathlib import Path
+
+from glotouch_bt.robot import BadInput, UnknownName
+from glotouch_bt.skill import Skill
+
+SKILL_GROUP = "glotouch_bt.skills"
+
+
+def shipped_root() -> Path:
+    """The folder of shipped missions (a checkout's or the installed package's).
+
+    It stands beside this package; `import missions` may find a folder of that name where the user works instead.
+    """
+    return Path(__file__).resolve().parents[3] / "glotouch_missions"
+
+
+def shipped(kind: str) -> dict[str, Path]:
+    """Shipped files by name; kind is "" (missions), "worlds" or "conditions"."""
+    return {p.stem: p for p in sorted((shipped_root() / kind).glob("*.yaml"))}
+
+
+def find_shipped(kind: str, given: str, what: str) -> Path:
+    """A path as given, or the shipped file of that name.
+
+    Raises:
+        UnknownName: Neither a file nor a shipped name.
+        BadInput: Looks like a path, but no such file.
+    """
+    path = Path(given)
+    if path.suffix in (".yaml", ".yml") or "/" in given:
+        if isfile(path):  # unlike Path.is_file, false for names that no file can have
+            return path
+        if not path.is_absolute() and isfile(inside := shipped_root() / given):
+            return inside
+        raise BadInput(f"{given}: no such {what} file (shipped: {', '.join(shipped(kind))})")
+    found = shipped(kind)
+    if given not in found:
+        raise UnknownName(what, given, found)
+    return found[given]
+
+
+def shown(path: Path) -> str:
+    """How messages and records name a file: shipped ones relative to their root, so that they are alike everywhere."""
+    try:
+        return f"glotouch_missions/{path.resolve().relative_to(shipped_root())}"
+    except ValueError:
+        return str(path)
+
+
+class SkillShelf(Mapping[str, type[Skill]]):
+    """Installed skills by name; a skill's module is imported when first asked for.
+
+    Raises:
+        UnknownName: On looking up a name that nobody registered.
+        BadInput: On looking up a skill whose module cannot be imported here.
+    """
+
+    def __init__(self) -> None:
+        self._points: dict[str, EntryPoint] = {e.name: e for e in entry_points(group=SKILL_GROUP)}
+        self._loaded: dict[str, type[Skill]] = {}
+
+    def __getitem__(self, name: str) -> type[Skill]:
+        if name not in self._points:
+            raise UnknownName("skill", name, self._points)
+        if name not in self._loaded:
+            try:
+                found = self._points[name].load()
+            except (ImportError, AttributeError) as e:
+                raise BadInput(f"skill {name!r} cannot be used here: {e}") from e
+            if not (isinstance(found, type) and issubclass(found, Skill)):
+                raise BadInput(f"entry point {name!r} of {SKILL_GROUP} is not a Skill class")
+            self._loaded[name] = found
+        return self._loaded[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._points
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(sorted(self._points))
+
+    def __len__(self) -> int:
+        return len(self._points)

@@ -1,0 +1,323 @@
+"""Mission parameters: declared with type, unit and range; overridden by `--set name=value`; used as `$name`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from os.path import isdir, isfile
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from glotouch_bt.mission.read.fields import validate
+from glotouch_bt.mission.read.library import shown
+from glotouch_bt.mission.spec import (
+    UNITS,
+    Findings,
+    Map,
+    Node,
+    Place,
+    Scalar,
+    Seq,
+    base_of,
+    convert,
+    measured,
+    plain,
+    units_for,
+)
+from glotouch_bt.robot import BadInput
+from glotouch_bt.robot.scene import load_mesh
+
+Value = bool | int | float | str
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
+
+
+class Declaration(BaseModel):
+    """One parameter as a mission declares it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    type: Literal["int", "float", "str", "bool", "stl"] = Field(description="int, float, str, bool or stl (an object)")
+    default: bool | int | float | str | None = Field(
+        default=None, description="value unless --set gives one; none: required"
+    )
+    range: tuple[float, float] | None = Field(default=None, description="[lowest, highest] valid number")
+    unit: str = Field(default="", description="unit of the number (SI when empty)")
+    description: str = Field(default="", description="for people")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A declared parameter with its value.
+
+    Attributes:
+        name: As used in `$name`.
+        declared: Its declaration.
+        value: The value in its unit; None if unusable (already reported).
+        unit: The declared unit; if none is declared, the SI unit of the value given.
+    """
+
+    name: str
+    declared: Declaration
+    value: Value | None
+    unit: str = ""
+
+
+def read_parameters(
+    node: Node | None,
+    overrides: Mapping[str, Scalar],
+    findings: Findings,
+    folder: Path | None,
+    user: Place | None = None,
+) -> dict[str, Parameter]:
+    """All parameters of a mission, or of a subtree; faults go to `findings`.
+
+    Args:
+        node: Its `parameters` section, or None.
+        overrides: Values given from outside, where they stand; only declared names are looked at.
+        findings: Where faults go.
+        folder: The world's folder of STL files; None leaves stl parameters unchecked.
+        user: The node that uses the subtree; None: a mission, whose user is on the command line.
+    """
+    if node is None or (isinstance(node, Scalar) and node.value is None):
+        return {}
+    if not isinstance(node, Map):
+        findings.add(node.place, "wrong_type", "parameters must be a mapping of name: {type, default, ...}")
+        return {}
+    parameters: dict[str, Parameter] = {}
+    for key, body in node.entries:
+        name = str(key.value)
+        if not NAME.fullmatch(name):
+            findings.add(key.place, "wrong_name", f"parameter name {name!r}", valid="letters, digits and _")
+        if not isinstance(body, Map):
+            findings.add(
+                body.place, "wrong_type", f"parameter {name!r} must be a mapping", valid="type, default, range"
+            )
+            continue
+        declared = validate(Declaration, body, f"parameter {name!r}", findings, where=key.place)
+        if declared is None or not _sound(declared, body, findings):
+            # Keep the name known, so that each use of it does not become another finding.
+            parameters[name] = Parameter(name, Declaration.model_construct(type="str"), None)
+            continue
+        default = body.get("default")
+        given = overrides.get(name, default if isinstance(default, Scalar) else None)
+        if given is None or given.value is None:
+            at, how = key.place, f"give it with --set {name}=..."
+            if user is not None:
+                at, how = user, f"give it with parameters: {{{name}: ...}}"
+            findings.add(at, "missing_parameter", f"parameter {name!r} has no default: {how}")
+            parameters[name] = Parameter(name, declared, None)
+            continue
+        parameters[name] = _valued(name, declared, given, findings, folder)
+    return parameters
+
+
+def _sound(declared: Declaration, body: Map, findings: Findings) -> bool:
+    """What a declaration says makes sense as a whole."""
+    if declared.unit and declared.unit not in UNITS:
+        unit = body.get("unit") or body
+        findings.unknown(unit.place, "wrong_unit", "unit", declared.unit, UNITS)
+        return False
+    if declared.range and declared.range[0] > declared.range[1]:
+        lo, hi = declared.range
+        place = (body.get("range") or body).place
+        findings.add(place, "wrong_value", f"range = [{lo:g}, {hi:g}]: nothing is in it", valid="[lowest, highest]")
+        return False
+    return True
+
+
+def _valued(name: str, declared: Declaration, given: Scalar, findings: Findings, folder: Path | None) -> Parameter:
+    """The parameter with the value given; without one if that gave findings."""
+    lost = Parameter(name, declared, None)
+    if given.poisoned:
+        return lost
+    value, place, unit = given.value, given.place, declared.unit
+    if declared.type in ("int", "float"):
+        found = measured(given)
+        if found.unit and found.unit not in UNITS:
+            findings.unknown(place, "wrong_unit", "unit", found.unit, UNITS)
+            return lost
+        unit = unit or base_of(found.unit)
+        try:
+            value = _converted(found, unit, declared)
+        except ValueError:
+            source = f" (from {given.origin})" if given.origin else ""
+            what = f"{name} is in {unit}, not {found.unit!r}{source}"
+            findings.add(place, "wrong_unit", what, valid=", ".join(units_for(unit)))
+            return lost
+    assert value is not None
+    if fault := _fault(value, declared):
+        findings.add(place, "wrong_value", f"{name} = {value!r}: {fault}", valid=_valid(declared))
+        return lost
+    if declared.type == "float":
+        value = float(value)
+    if declared.type == "stl" and not stl_usable(str(value), folder, place, findings):
+        return lost
+    _check_span(name, given, declared, unit, findings)
+    return Parameter(name, declared, value, unit)
+
+
+def _converted(given: Scalar, unit: str, declared: Declaration) -> Value | None:
+    """The value in the parameter's unit; a whole number stays one.
+
+    Raises:
+        ValueError: It measures something else.
+    """
+    value = given.value
+    if not given.unit or isinstance(value, bool) or not isinstance(value, (int, float)):
+        return value
+    made = convert(value, given.unit, unit)
+    return int(made) if declared.type == "int" and float(made).is_integer() else made
+
+
+def _check_span(name: str, given: Scalar, declared: Declaration, unit: str, findings: Findings) -> None:
+    """Report a parameter that may be given values which the one it is handed on to refuses."""
+    if given.span is None or declared.range is None:
+        return
+    lo, hi = declared.range
+    for end in given.span:
+        if not lo <= convert(end, given.unit, unit) <= hi:
+            said = f"{end:g} {given.unit}".strip()
+            what = f"{given.origin} may be set to {said}, but {name} must be in [{lo:g}, {hi:g}] {unit}".rstrip()
+            findings.add(given.place, "range_too_wide", what)
+
+
+def from_command_line(name: str, given: str | Value, node: Node | None) -> Scalar:
+    """A `--set` value, its text read as the declared type; text that does not fit stays."""
+    body = node.get(name) if isinstance(node, Map) else None
+    kind = body.get("type") if isinstance(body, Map) else None
+    return Scalar(_from_text(given, str(kind.value) if isinstance(kind, Scalar) else ""), Place(f"--set {name}"))
+
+
+def _from_text(given: str | Value, kind: str) -> Value:
+    if kind in ("str", "stl"):
+        return str(given)
+    if not isinstance(given, str):
+        return given
+    text = given.strip()
+    if kind == "bool":
+        return True if text.lower() in _TRUE else False if text.lower() in _FALSE else given
+    try:
+        return int(text) if kind == "int" else float(text) if kind == "float" else given
+    except ValueError:
+        return given
+
+
+def _fault(value: Value, declared: Declaration) -> str:
+    """Why a value does not fit its declaration, or empty."""
+    kinds: dict[str, tuple[type, ...]] = {
+        "int": (int,),
+        "float": (int, float),
+        "str": (str,),
+        "bool": (bool,),
+        "stl": (str,),
+    }
+    fits = isinstance(value, kinds[declared.type]) and isinstance(value, bool) == (declared.type == "bool")
+    if not fits:
+        return "must be " + {"int": "a whole number", "float": "a number", "bool": "true or false"}.get(
+            declared.type, "text"
+        )
+    if isinstance(value, (int, float)) and declared.type in ("int", "float"):
+        if value != value or value in (float("inf"), float("-inf")):
+            return "must be finite"
+        if declared.range and not declared.range[0] <= value <= declared.range[1]:
+            lo, hi = declared.range
+            return f"must be in [{lo:g}, {hi:g}]{' ' + declared.unit if declared.unit else ''}"
+    return ""
+
+
+def _valid(declared: Declaration) -> str:
+    words = declared.type + (f" in {declared.unit}" if declared.unit else "")
+    return words + (f", {declared.range[0]:g} to {declared.range[1]:g}" if declared.range else "")
+
+
+def stl_usable(name: str, folder: Path | None, place: Place, findings: Findings) -> bool:
+    """An object is named by its file in the objects' folder, or is a path to one; it must be a good solid."""
+    if folder is None:
+        return True
+    path = Path(name)
+    if path.suffix.lower() != ".stl":
+        files = {p.stem: p for p in sorted(folder.iterdir()) if p.suffix.lower() == ".stl"} if isdir(folder) else {}
+        if name not in files:
+            findings.unknown(place, "no_such_stl", f"object (in {shown(folder)})", name, files)
+            return False
+        path = files[name]
+    found = path.stat() if isfile(path) else None
+    fault = _fault_of_solid(path, (found.st_mtime_ns, found.st_size) if found else None)
+    if fault:
+        findings.add(place, "unusable_stl", fault)
+    return not fault
+
+
+@lru_cache(maxsize=256)
+def _fault_of_solid(path: Path, stamp: tuple[int, int] | None) -> str:
+    """Why a file is no good solid, or empty; a mission names it in many places. `stamp`: of the file as it is."""
+    try:
+        load_mesh(path)
+    except BadInput as e:
+        return str(e)
+    return ""
+
+
+def substitute(node: Node, parameters: Mapping[str, Parameter], findings: Findings) -> Node:
+    """The node with every `$name` replaced by its parameter's value."""
+    if isinstance(node, Seq):
+        return replace(node, items=tuple(substitute(i, parameters, findings) for i in node.items))
+    if isinstance(node, Map):
+        return replace(node, entries=tuple((k, substitute(v, parameters, findings)) for k, v in node.entries))
+    if not isinstance(node.value, str) or not node.value.startswith("$"):
+        return node
+    name = node.value[1:]
+    found = parameters.get(name)
+    if found is None:
+        findings.unknown(node.place, "unknown_parameter", "mission parameter", name, parameters)
+        return replace(node, poisoned=True)
+    if found.value is None:
+        return replace(node, poisoned=True)
+    return replace(node, value=found.value, unit=found.unit, origin=node.value, span=found.declared.range)
+
+
+def check_used(section: Node | None, tree: Node, findings: Findings) -> None:
+    """Report declared parameters that a tree does not use."""
+    if not isinstance(section, Map):
+        return
+    used: set[str] = set()
+    stack = [tree]
+    while stack:
+        node = stack.pop()
+        if isinstance(node, Seq):
+            stack.extend(node.items)
+        elif isinstance(node, Map):
+            stack.extend(v for _, v in node.entries)
+        elif isinstance(node.value, str) and node.value.startswith("$"):
+            used.add(node.value[1:])
+    for key, _ in section.entries:
+        if key.value not in used:
+            findings.add(key.place, "unused_parameter", f"no node uses the parameter {key.value!r}")
+
+
+def resolved(node: Node | None, parameters: Mapping[str, Parameter]) -> dict[str, object]:
+    """The `parameters` section as plain data with the values in use as defaults."""
+    if not isinstance(node, Map):
+        return {}
+    section = plain(node)
+    for name, parameter in parameters.items():
+        section[name]["default"] = parameter.value
+    return dict(section)
+
+
+__all__ = [
+    "Declaration",
+    "Parameter",
+    "Value",
+    "check_used",
+    "from_command_line",
+    "read_parameters",
+    "resolved",
+    "stl_usable",
+    "substitute",
+]

@@ -1,0 +1,348 @@
+"""A tree as written to checked `NodeSpec`s. Faults are gathered, never raised; a faulty node stays in place."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+
+from glotouch_bt.mission.read.fields import named_by, validate
+from glotouch_bt.mission.read.literals import is_literal, read_literal
+from glotouch_bt.mission.read.parameters import stl_usable, substitute
+from glotouch_bt.mission.read.scope import Scope
+from glotouch_bt.mission.read.subtrees import entries_of, find_subtree, handed_on, open_subtree
+from glotouch_bt.mission.spec import (
+    KINDS,
+    ConditionSettings,
+    Kind,
+    Map,
+    Node,
+    NodeSpec,
+    Place,
+    RepeatSettings,
+    Scalar,
+    Seq,
+    SubtreeSettings,
+    Wire,
+    compared,
+)
+from glotouch_bt.robot import BadInput
+from glotouch_bt.skill import Skill
+
+KEY = re.compile(r"[a-z][a-z0-9_]*")
+MOST_NODES, DEEPEST_NODE = 3000, 100
+BTCPP = {kind.btcpp: name for name, kind in KINDS.items() if kind.btcpp}
+TITLE, CHILD = {"name": ""}, {"name": "", "do": ""}
+
+
+def parse_tree(node: Node, scope: Scope) -> NodeSpec:
+    """Read one node and everything below it."""
+    reading = scope.reading
+    reading.nodes += 1
+    if reading.nodes > MOST_NODES or reading.depth >= DEEPEST_NODE:
+        if reading.nodes <= MOST_NODES + 1:
+            what = f"more than {MOST_NODES} nodes, or nested deeper than {DEEPEST_NODE}"
+            scope.findings.add(node.place, "too_large", f"the tree has {what} (subtrees included)")
+            reading.nodes = MOST_NODES + 1
+        return _lost(node)
+    reading.depth += 1
+    try:
+        return _node(node, scope)
+    finally:
+        reading.depth -= 1
+
+
+def _node(node: Node, scope: Scope) -> NodeSpec:
+    if isinstance(node, Scalar) and isinstance(node.value, str) and not node.poisoned:
+        return _named(node.value, node.place, Scalar(None, node.place), scope)
+    if isinstance(node, Map) and len(node.entries) == 1:
+        key, body = node.entries[0]
+        return _named(str(key.value), key.place, body, scope)
+    if isinstance(node, Seq):
+        return _composite("sequence", node.place, node, scope)
+    if isinstance(node, Map) and node.entries:
+        names = ", ".join(node.keys())
+        what = f"a node has one name, here are {len(node.entries)}: {names} (is the indentation right?)"
+        scope.findings.add(node.entries[1][0].place, "not_a_node", what)
+        key, body = node.entries[0]
+        return _named(str(key.value), key.place, body, scope) if key.value in {*KINDS, *scope.skills} else _lost(node)
+    if not (isinstance(node, Scalar) and node.poisoned):
+        scope.findings.add(node.place, "not_a_node", "not a node", valid="a skill or node name, then its settings")
+    return _lost(node)
+
+
+def _lost(node: Node) -> NodeSpec:
+    return NodeSpec("unknown", "unknown", node.place)
+
+
+def _named(name: str, place: Place, body: Node, scope: Scope) -> NodeSpec:
+    if name in KINDS:
+        kind = KINDS[name]
+        if kind.children == "many":
+            return _composite(name, place, body, scope)
+        if kind.children == "one":
+            return _decorator(name, kind, place, body, scope)
+        return _subtree(place, body, scope) if name == "subtree" else _condition(place, body, scope)
+    known = name
+    if name not in scope.skills:
+        known = scope.findings.unknown(place, "unknown_skill", "skill or node", name, [*KINDS, *scope.skills], BTCPP)
+        if known not in scope.skills:
+            return NodeSpec("unknown", name, place)
+    try:
+        skill = scope.skills[known]
+    except BadInput as e:
+        scope.findings.add(place, "unusable_skill", str(e))
+        return NodeSpec("unknown", name, place)
+    return _skill(known, skill, place, body, scope)
+
+
+def _settings_map(name: str, place: Place, body: Node, scope: Scope) -> Map:
+    """The mapping after a node's name; an empty one if it is missing or wrong (then reported)."""
+    if isinstance(body, Map):
+        return body
+    if not (isinstance(body, Scalar) and (body.value is None or body.poisoned)):
+        scope.findings.add(body.place, "wrong_type", f"{name}: its settings must be a mapping, {name}: {{key: value}}")
+    return Map((), place)
+
+
+def _take(given: Map, *names: str) -> tuple[dict[str, tuple[Place, Node]], Map]:
+    """Split off some keys: ({name: (key place, value)}, the rest)."""
+    taken = {str(k.value): (k.place, v) for k, v in given.entries if k.value in names}
+    return taken, replace(given, entries=tuple((k, v) for k, v in given.entries if k.value not in names))
+
+
+def _title(taken: Mapping[str, tuple[Place, Node]], default: str, scope: Scope) -> str:
+    if "name" not in taken:
+        return default
+    node = taken["name"][1]
+    if isinstance(node, Scalar) and isinstance(node.value, str) and node.value.strip():
+        return node.value.strip()[:80]
+    scope.findings.add(node.place, "wrong_type", "name: must be text")
+    return default
+
+
+def _composite(kind: str, place: Place, body: Node, scope: Scope) -> NodeSpec:
+    if isinstance(body, Seq):
+        taken: dict[str, tuple[Place, Node]] = {"do": (place, body)}
+        rest = Map((), place)
+    else:
+        taken, rest = _take(_settings_map(kind, place, body, scope), "name", "do")
+    settings = validate(KINDS[kind].settings, rest, f"node {kind!r}", scope.findings, where=place, beside=CHILD)
+    children: tuple[NodeSpec, ...] = ()
+    below = taken["do"][1] if "do" in taken else None
+    if isinstance(below, Seq):
+        children = tuple(parse_tree(i, scope) for i in below.items)
+    elif isinstance(below, Map):
+        children = (parse_tree(below, scope),)
+    if not children:
+        scope.findings.add(place, "no_children", f"{kind} has no children", valid=f"{kind}: [node, node, ...]")
+        children = (_lost(body),)
+    return NodeSpec(kind, _title(taken, kind, scope), place, children, settings)
+
+
+def _decorator(name: str, kind: Kind, place: Place, body: Node, scope: Scope) -> NodeSpec:
+    bare = not kind.settings.model_fields  # `succeed: {orbit_probe: ...}` needs no `do`
+    if bare and not (isinstance(body, Map) and ("do" in body or not body.entries)):
+        taken: dict[str, tuple[Place, Node]] = {"do": (place, body)}
+        rest = Map((), place)
+    else:
+        taken, rest = _take(_settings_map(name, place, body, scope), "name", "do")
+    until = rest.get("until") if name == "repeat" else None
+    unit = ""
+    if isinstance(until, Map):
+        plain_until, unit = compared(until, scope.findings)
+        rest = replace(rest, entries=tuple((k, plain_until if v is until else v) for k, v in rest.entries))
+    settings = validate(kind.settings, rest, f"node {name!r}", scope.findings, where=place, beside=CHILD)
+    below = taken["do"][1] if "do" in taken else None
+    if below is None or (isinstance(below, Scalar) and below.value is None):
+        scope.findings.add(place, "no_children", f"{name} has no child", valid="do: a node")
+        children: tuple[NodeSpec, ...] = (_lost(body),)
+    else:
+        children = (parse_tree(below, scope),)
+    spec = NodeSpec(name, _title(taken, name, scope), place, children, settings)
+    if name == "repeat":
+        _check_repeat(spec, rest, unit, scope)
+    elif name == "for_each":
+        _wire_for_each(spec, rest, scope)
+    return spec
+
+
+def _wire(name: str, given: Map, scope: Scope, *, path: tuple[str, ...] | None = None) -> Wire | None:
+    """The key written under a setting, checked to be a key."""
+    node: Node | None = given
+    for step in path or (name,):
+        node = node.get(step) if isinstance(node, Map) else None
+    if not isinstance(node, Scalar) or not isinstance(node.value, str) or node.poisoned:
+        return None
+    return _keyed(name, node.value, node.place, scope)
+
+
+def _keyed(port: str, key: str, place: Place, scope: Scope) -> Wire | None:
+    if not KEY.fullmatch(key):
+        scope.findings.add(place, "wrong_key", f"{key!r} is not a port key", valid="small letters, digits and _")
+        return None
+    return Wire(port, scope.key(key), place)
+
+
+def _check_repeat(spec: NodeSpec, given: Map, unit: str, scope: Scope) -> None:
+    settings = spec.settings
+    if not isinstance(settings, RepeatSettings):
+        return
+    if (settings.times is None) == (settings.until is None):
+        scope.findings.add(spec.place, "wrong_value", "repeat needs either times or until, and not both")
+        return
+    if isinstance(settings.until, str):
+        wire = _wire("until", given, scope)
+    else:
+        wire = _wire("until", given, scope, path=("until", "port"))
+        below = given.get("until")
+        if isinstance(settings.until, ConditionSettings) and isinstance(below, Map):
+            _check_comparison(settings.until, below.place, scope)
+    if wire:
+        spec.reads = {"until": replace(wire, unit=unit)}
+
+
+def _wire_for_each(spec: NodeSpec, given: Map, scope: Scope) -> None:
+    items, item = _wire("items", given, scope), _wire("item", given, scope)
+    reads = {"items": items} if items else {}
+    writes = {"item": item} if item else {}
+    collect = given.get("collect")
+    if isinstance(collect, Map):
+        for key, value in collect.entries:
+            source = _keyed(f"collect.{key.value}", str(key.value), key.place, scope)
+            if source and isinstance(value, Scalar) and isinstance(value.value, str) and not value.poisoned:
+                target = _keyed(f"collect.{key.value}", value.value, value.place, scope)
+                if target:
+                    if target.key in {w.key for w in writes.values()}:
+                        what = f"two things are written to {value.value!r}"
+                        scope.findings.add(target.place, "written_twice", what)
+                    reads[source.port], writes[target.port] = source, target
+    spec.reads, spec.writes = reads, writes
+
+
+def _check_comparison(settings: ConditionSettings, place: Place, scope: Scope) -> None:
+    asked = [n for n in ("equals", "at_least", "at_most", "is_set") if getattr(settings, n) is not None]
+    if len(asked) != 1:
+        found = " and ".join(asked) or "none"
+        what = f"a condition needs exactly one comparison, found {found}"
+        scope.findings.add(place, "wrong_value", what, valid="equals, at_least, at_most, is_set")
+
+
+def _condition(place: Place, body: Node, scope: Scope) -> NodeSpec:
+    taken, rest = _take(_settings_map("condition", place, body, scope), "name")
+    rest, unit = compared(rest, scope.findings)
+    settings = validate(ConditionSettings, rest, "node 'condition'", scope.findings, where=place, beside=TITLE)
+    if settings is not None:
+        _check_comparison(settings, place, scope)
+    default = f"{settings.port}?" if settings is not None else "condition"
+    wire = _wire("port", rest, scope)
+    reads = {"port": replace(wire, unit=unit)} if wire else {}
+    return NodeSpec("condition", _title(taken, default, scope), place, (), settings, reads=reads)
+
+
+def _skill(name: str, skill: type[Skill], place: Place, body: Node, scope: Scope) -> NodeSpec:
+    taken, rest = _take(_settings_map(name, place, body, scope), "name", "in", "out")
+    ports = {p: "out" for p in skill.OUTPUT_PORTS} | {p: "in" for p in skill.INPUT_PORTS} | {"in": "", "out": ""}
+    params = validate(skill.Params, rest, f"skill {name!r}", scope.findings, where=place, beside=TITLE | ports)
+    for key, value in rest.entries if scope.stl_folder is not None else ():
+        field = skill.Params.model_fields.get(str(key.value))
+        if field is not None and named_by(field) == "stl" and isinstance(value, Scalar) and not value.poisoned:
+            stl_usable(str(value.value), scope.stl_folder, value.place, scope.findings)
+    keys = skill.default_keys()
+    reads = {p: Wire(p, scope.key(keys[p]), place) for p in skill.INPUT_PORTS}
+    writes = {p: Wire(p, scope.key(keys[p]), place) for p in skill.OUTPUT_PORTS}
+    constants: dict[str, object] = {}
+    if "in" in taken:
+        given, constants = _literals(skill, taken["in"][1], place, reads, scope)
+        _rewire(name, "in", given, reads, skill, scope)
+    if "out" in taken:
+        _rewire(name, "out", taken["out"][1], writes, skill, scope)
+    return NodeSpec(
+        "skill",
+        _title(taken, name, scope),
+        place,
+        skill=name,
+        skill_type=skill,
+        params=params,
+        reads=reads,
+        writes=writes,
+        constants=constants,
+    )
+
+
+def _literals(
+    skill: type[Skill], given: Node, place: Place, wires: dict[str, Wire], scope: Scope
+) -> tuple[Node, dict[str, object]]:
+    """Values written for input ports: (what is left to wire, the values); each gets a key nobody else can name."""
+    constants: dict[str, object] = {}
+    if not isinstance(given, Map):
+        return given, constants
+    left: list[tuple[Scalar, Node]] = []
+    for key, value in given.entries:
+        port = str(key.value)
+        if port not in wires or not is_literal(value):
+            left.append((key, value))
+            continue
+        scope.reading.constants += 1
+        wires[port] = Wire(port, f"{scope.prefix}{port}@{scope.reading.constants}", value.place)
+        constants[port] = read_literal(value, skill.INPUT_PORTS[port].data_type, port, scope.findings)
+    return replace(given, entries=tuple(left)), constants
+
+
+def _rewire(name: str, direction: str, given: Node, wires: dict[str, Wire], skill: type[Skill], scope: Scope) -> None:
+    if not isinstance(given, Map):
+        scope.findings.add(given.place, "wrong_type", f"{direction}: must be a mapping of port: key")
+        return
+    word = "input" if direction == "in" else "output"
+    for key, value in given.entries:
+        port = str(key.value)
+        if port not in wires:
+            if port in skill.Params.model_fields:
+                what = f"{port!r} of skill {name!r} is a parameter, not a port: it stands outside of {direction}:"
+                scope.findings.add(key.place, "unknown_port", what, valid=", ".join(wires) or "none")
+            elif port in {**skill.INPUT_PORTS, **skill.OUTPUT_PORTS}:
+                where = "out" if direction == "in" else "in"
+                what = f"port {port!r} of skill {name!r} is not an {word} port: it belongs under {where}:"
+                scope.findings.add(key.place, "unknown_port", what, valid=", ".join(wires) or "none")
+            else:
+                scope.findings.unknown(key.place, "unknown_port", f"{word} port of skill {name!r}:", port, wires)
+        elif not isinstance(value, Scalar) or not isinstance(value.value, str):
+            scope.findings.add(value.place, "wrong_key", f"{direction}.{port}: must be the name of a key")
+        elif not value.poisoned and (wire := _keyed(port, value.value, value.place, scope)):
+            wires[port] = wire
+
+
+def _subtree(place: Place, body: Node, scope: Scope) -> NodeSpec:
+    given = _settings_map("subtree", place, body, scope)
+    taken, rest = _take(given, "name")
+    values, rest = handed_on(rest)
+    settings = validate(SubtreeSettings, rest, "node 'subtree'", scope.findings, where=place, beside=TITLE)
+    if settings is None:
+        return NodeSpec("unknown", _title(taken, "subtree", scope), place)
+    file_node = rest.get("file")
+    at = file_node.place if file_node else place
+    found = find_subtree(settings.file, at, scope)
+    if found is None:
+        return NodeSpec("unknown", _title(taken, "subtree", scope), place)
+    path, identity, source = found
+    name = scope.reading.carry(path.stem, identity, source, at)
+    title = _title(taken, name, scope)
+    inner, tree = open_subtree(source, values, scope, at)
+    if tree is None:
+        return NodeSpec("unknown", title, place)
+    ports: dict[str, str] = {}
+    for key, value in entries_of(rest.get("ports")):
+        if isinstance(value, Scalar) and (wire := _keyed(str(key.value), str(value.value), value.place, scope)):
+            ports[str(key.value)] = wire.key
+    # py_trees splits keys at dots, so that none may stand in a key.
+    scope.reading.subtrees += 1
+    prefix = f"{scope.prefix}{re.sub('[^A-Za-z0-9]', '_', name)}@{scope.reading.subtrees}/"
+    child_scope = replace(scope, file=path, prefix=prefix, ports=ports, trail=(*scope.trail, identity))
+    child = parse_tree(substitute(tree, inner, scope.findings), child_scope)
+    used = {w.key for n in child.walk() for w in (*n.reads.values(), *n.writes.values())}
+    for key, _ in entries_of(rest.get("ports")):
+        if str(key.value) in ports and ports[str(key.value)] not in used:
+            own = (k.removeprefix(prefix) for k in used if k.startswith(prefix))
+            names = [k for k in own if "/" not in k and "@" not in k]
+            scope.findings.unknown(key.place, "unknown_port", f"port of subtree {name!r}:", str(key.value), names)
+    return NodeSpec("subtree", title, place, (child,), settings)

@@ -1,0 +1,71 @@
+"""What a tree is read in: known skills, names and keys of the file at hand, and what is counted over all files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from glotouch_bt.mission.spec import Findings, Node, Place
+from glotouch_bt.skill import Skill
+
+
+@dataclass
+class Reading:
+    """What is counted and gathered while one mission is read, its subtrees included.
+
+    Attributes:
+        nodes: How many so far.
+        depth: Of the node being read.
+        subtrees, constants: How many so far; they number keys, alike wherever the text stands.
+        carried: The mission's own `subtrees` section, by name.
+        used: Every subtree that was read, by the name it is carried under.
+        sources: Where each of them came from: a file, or the name it was carried under.
+        renamed: Place of each `file` setting: the name.
+    """
+
+    nodes: int = 0
+    depth: int = 0
+    subtrees: int = 0
+    constants: int = 0
+    carried: Mapping[str, Node] = field(default_factory=dict)
+    used: dict[str, Node] = field(default_factory=dict)
+    sources: dict[str, str] = field(default_factory=dict)
+    renamed: dict[Place, str] = field(default_factory=dict)
+
+    def carry(self, stem: str, source: str, tree: Node, at: Place) -> str:
+        """Note a subtree that a node at `at` uses; the name it is carried under."""
+        name, n = stem, 2
+        while self.sources.get(name, source) != source:
+            name, n = f"{stem}_{n}", n + 1
+        self.sources[name], self.used[name], self.renamed[at] = source, tree, name
+        return name
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What a tree is read in.
+
+    Attributes:
+        skills: Known skills.
+        findings: Where faults go.
+        file: The file being read; subtrees are found relative to it.
+        stl_folder: The world's objects, for stl parameters of subtrees.
+        prefix: Put before private keys ("" in the mission itself).
+        ports: Subtree key -> absolute key; None in the mission itself, where a key is its own name.
+        trail: Files (or names of carried subtrees) being read, outermost first.
+        reading: What is counted on the way.
+    """
+
+    skills: Mapping[str, type[Skill]]
+    findings: Findings
+    file: Path
+    stl_folder: Path | None = None
+    prefix: str = ""
+    ports: Mapping[str, str] = field(default_factory=dict)
+    trail: tuple[str, ...] = ()
+    reading: Reading = field(default_factory=Reading)
+
+    def key(self, name: str) -> str:
+        """The absolute key of a name used in this tree."""
+        return self.ports.get(name, self.prefix + name)

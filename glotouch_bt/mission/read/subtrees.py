@@ -1,0 +1,91 @@
+"""A subtree as another file holds it, or the mission itself: found, read, its parameters given their values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from os.path import isfile
+from pathlib import Path
+
+from glotouch_bt.mission.read.library import shipped_root, shown
+from glotouch_bt.mission.read.parameters import Parameter, check_used, read_parameters
+from glotouch_bt.mission.read.scope import Scope
+from glotouch_bt.mission.read.yaml_source import read_yaml
+from glotouch_bt.mission.spec import Map, Node, Place, Scalar
+from glotouch_bt.robot import BadInput
+
+DEEPEST_SUBTREE = 8
+SUBTREE_KEYS = ("subtree", "description", "parameters", "tree")
+
+
+def handed_on(given: Map) -> tuple[dict[Scalar, Scalar], Map]:
+    """The values of a subtree's parameters, with the units and ranges they came with, by key; the settings, plain."""
+    section = given.get("parameters")
+    if not isinstance(section, Map):
+        return {}, given
+    values = {k: v for k, v in section.entries if isinstance(v, Scalar)}
+    bare = ((k, replace(v, unit="", span=None) if isinstance(v, Scalar) else v) for k, v in section.entries)
+    sound = replace(section, entries=tuple((k, v) for k, v in bare if not (isinstance(v, Scalar) and v.poisoned)))
+    return values, replace(given, entries=tuple((k, sound if v is section else v) for k, v in given.entries))
+
+
+def find_subtree(given: str, at: Place, scope: Scope) -> tuple[Path, str, Node] | None:
+    """A subtree that the mission carries itself, or a file beside the present one, or a shipped file.
+
+    Returns: Its path, what tells it from others, and what stands there; None if that gave a finding.
+    """
+    if given in scope.reading.carried:
+        path, identity = scope.file.parent / given, f"carried {given}"
+    else:
+        beside, shipped = scope.file.parent / given, shipped_root() / given
+        path = shipped if isfile(shipped) and not isfile(beside) else beside
+        identity = str(path.resolve())
+    if identity in (*scope.trail, str(scope.file.resolve())) or len(scope.trail) >= DEEPEST_SUBTREE:
+        scope.findings.add(at, "subtree_loop", f"subtree {given!r} contains itself or is nested too deep")
+        return None
+    if given in scope.reading.carried:
+        return path, identity, scope.reading.carried[given]
+    try:
+        return path, identity, read_yaml(path, shown(path))
+    except (BadInput, ValueError) as e:  # ValueError: a null byte in the name
+        near = scope.findings.nearest(given, _subtrees_near(scope))
+        scope.findings.add(at, "unusable_subtree", f"subtree cannot be read: {e}", hint=near)
+        return None
+
+
+def entries_of(node: Node | None) -> tuple[tuple[Scalar, Node], ...]:
+    """Of a mapping; of anything else none."""
+    return node.entries if isinstance(node, Map) else ()
+
+
+def open_subtree(
+    source: Node, values: Mapping[Scalar, Scalar], scope: Scope, at: Place
+) -> tuple[dict[str, Parameter], Node | None]:
+    """The parameters and the tree of a subtree's file; no tree if it has none."""
+    if not isinstance(source, Map):
+        scope.findings.add(at, "unusable_subtree", "a subtree file must be a mapping", valid=", ".join(SUBTREE_KEYS))
+        return {}, None
+    for key, _ in source.entries:
+        if key.value not in SUBTREE_KEYS:
+            scope.findings.unknown(key.place, "unknown_key", "key of a subtree file:", str(key.value), SUBTREE_KEYS)
+    given = {str(key.value): value for key, value in values.items()}
+    parameters = read_parameters(source.get("parameters"), given, scope.findings, scope.stl_folder, at)
+    for key in values:
+        if key.value not in parameters:
+            scope.findings.unknown(
+                key.place, "unknown_parameter", "parameter of the subtree:", str(key.value), parameters
+            )
+    tree = source.get("tree")
+    if tree is None:
+        scope.findings.add(source.place, "missing_key", "a subtree file needs 'tree'")
+    else:
+        check_used(source.get("parameters"), tree, scope.findings)
+    return parameters, tree
+
+
+def _subtrees_near(scope: Scope) -> list[str]:
+    """What could have been named: the mission's own subtrees, shipped ones, files beside the present one."""
+    here, shipped = scope.file.parent, shipped_root()
+    files = [p.relative_to(here) for folder in (here, here / "subtrees") for p in folder.glob("*.yaml")]
+    files += [p.relative_to(shipped) for p in (shipped / "subtrees").glob("*.yaml")]
+    return [*scope.reading.carried, *(f.as_posix() for f in files)]

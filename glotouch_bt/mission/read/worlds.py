@@ -1,0 +1,219 @@
+"""World and conditions files to their frozen values; every fault with its place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import fields
+from os.path import isdir
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, create_model
+
+from glotouch_bt.mission.read.fields import validate
+from glotouch_bt.mission.read.library import find_shipped, shown
+from glotouch_bt.mission.read.yaml_source import read_yaml
+from glotouch_bt.mission.spec import Findings, Map, MissionFaults, Node, Place, Seq
+from glotouch_bt.robot import Conditions, Container, Holder, ObjectSet, ParamError, Pose, Probe, World
+
+T = TypeVar("T")
+Vec3 = tuple[float, float, float]
+Range = tuple[float, float]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class PoseSection(_Section):
+    """A planar pose: an origin and a turn about z."""
+
+    position_m: Vec3 = Field(description="origin in B")
+    yaw_deg: float = Field(default=0.0, description="turn about z_B")
+
+
+class ContainerSection(_Section):
+    """The open box; see `robot.Container`."""
+
+    pose_B_K: PoseSection
+    interior_m: Vec3
+    wall_m: float = Container.wall_m
+
+
+class ProbeSection(_Section):
+    """The passive probe; see `robot.Probe`."""
+
+    tip_radius_m: float = Probe.tip_radius_m
+    shaft_diameter_m: float = Probe.shaft_diameter_m
+    length_m: float = Probe.length_m
+    handle_m: Vec3 = Probe.handle_m
+    mass_kg: float = Probe.mass_kg
+    com_below_grasp_m: float = Probe.com_below_grasp_m
+
+
+class HolderSection(_Section):
+    """Where the probe stands; the grasp pose points down. See `robot.Holder`."""
+
+    pose_B_grasp: PoseSection
+    half_m: Vec3 = Holder.half_m
+
+
+class ObjectsSection(_Section):
+    """Which STL files are put in; see `robot.ObjectSet`."""
+
+    folder: str = Field(description="folder of STL files, relative to the world's file")
+    names: tuple[str, ...] = ()
+    expected: int | None = Field(
+        default=None, ge=1, le=20, description="how many objects shall be in the folder or the names"
+    )
+    min_gap_m: float = Field(default=ObjectSet.min_gap_m, ge=0, le=1.0)
+    min_wall_gap_m: float = Field(default=ObjectSet.min_wall_gap_m, ge=0, le=1.0)
+
+
+class WorldFile(_Section):
+    """A world as written."""
+
+    world: str = Field(description="its name")
+    description: str = ""
+    container: ContainerSection
+    probe: ProbeSection = ProbeSection()
+    holder: HolderSection
+    objects: ObjectsSection
+
+
+ConditionsFile = create_model(  # type: ignore[call-overload]
+    "ConditionsFile",
+    __base__=_Section,
+    **{f.name: ((str, ...) if f.name == "name" else (float | Range, f.default)) for f in fields(Conditions)},
+)
+
+
+def read_world(node: Node, file: Path, findings: Findings, objects: Path | None = None) -> World | None:
+    """A world from its positioned source; None if that gave findings.
+
+    Args:
+        node: The file's content, or a mission's inline world.
+        file: The file; `objects.folder` is relative to it.
+        findings: Where faults go.
+        objects: A folder to use instead of the file's (then every STL in it).
+    """
+    if not isinstance(node, Map):
+        findings.add(node.place, "wrong_type", "a world must be a mapping", valid=", ".join(WorldFile.model_fields))
+        return None
+    given = validate(WorldFile, node, "the world", findings)
+    if given is None:
+        return None
+
+    def made(section: str, make: Callable[[], T]) -> T | None:
+        try:
+            return make()
+        except ParamError as e:
+            findings.add(_section_place(node, section, e.name), "wrong_value", str(e))
+            return None
+
+    c, h = given.container, given.holder
+    container = made(
+        "container",
+        lambda: Container(
+            pose_B_K=Pose.planar(c.pose_B_K.position_m, math.radians(c.pose_B_K.yaw_deg)),
+            interior_m=c.interior_m,
+            wall_m=c.wall_m,
+        ),
+    )
+    probe = made("probe", lambda: Probe(**given.probe.model_dump()))
+    holder = made(
+        "holder",
+        lambda: Holder(
+            pose_B_grasp=Pose.pointing_down(h.pose_B_grasp.position_m, math.radians(h.pose_B_grasp.yaw_deg)),
+            half_m=h.half_m,
+        ),
+    )
+    section = node.get("objects")
+    chosen = _objects(given.objects, section if isinstance(section, Map) else node, file, findings, objects)
+    if container is None or probe is None or holder is None or chosen is None:
+        return None
+    return World(name=given.world, container=container, probe=probe, holder=holder, objects=chosen)
+
+
+def _objects(
+    given: ObjectsSection, node: Map, file: Path, findings: Findings, override: Path | None
+) -> ObjectSet | None:
+    gap, wall_gap = given.min_gap_m, given.min_wall_gap_m
+    if override is not None:
+        if not _stems(override):
+            findings.add(Place(f"--objects {override}"), "no_objects", "is not a folder with .stl files in it")
+            return None
+        return ObjectSet(folder=override, min_gap_m=gap, min_wall_gap_m=wall_gap)
+    folder = (file.parent / given.folder).resolve()
+    stems = _stems(folder)
+    at = node.get("folder") or node
+    if not stems:
+        findings.add(
+            at.place, "no_objects", f"objects.folder {given.folder!r} ({folder}) is not a folder with .stl files"
+        )
+        return None
+    before = len(findings)
+    written = node.get("names")
+    for i, name in enumerate(given.names):
+        place = written.items[i].place if isinstance(written, Seq) else at.place
+        if name not in stems:
+            findings.unknown(place, "no_such_stl", "object", name, stems)
+        elif name in given.names[:i]:
+            findings.add(place, "wrong_value", f"objects.names: {name!r} stands twice")
+    count = len(given.names or stems)
+    if given.expected is not None and count != given.expected:
+        expected = node.get("expected") or node
+        findings.add(expected.place, "wrong_value", f"objects.expected = {given.expected}, but {count} are chosen")
+    if len(findings) > before:
+        return None
+    return ObjectSet(folder=folder, names=given.names, min_gap_m=gap, min_wall_gap_m=wall_gap)
+
+
+def _stems(folder: Path) -> list[str]:
+    return sorted(p.stem for p in folder.iterdir() if p.suffix.lower() == ".stl") if isdir(folder) else []
+
+
+def _section_place(node: Map, section: str, dotted: str) -> Place:
+    below = node.get(section)
+    last = dotted.rsplit(".", 1)[-1]
+    if isinstance(below, Map):
+        value = below.get(last)
+        return value.place if value is not None else below.place
+    return node.place
+
+
+def load_world(given: str, objects: Path | None = None) -> World:
+    """A world by path or shipped name.
+
+    Raises:
+        BadInput: Unknown, unreadable, or faulty (all faults at once).
+    """
+    path = find_shipped("worlds", given, "world")
+    findings = Findings()
+    world = read_world(read_yaml(path, shown(path)), path, findings, objects)
+    if world is None:
+        raise MissionFaults(findings.sorted())
+    return world
+
+
+def load_conditions(given: str) -> Conditions:
+    """A disturbance profile by path or shipped name; keys are the field names of `robot.Conditions`.
+
+    Raises:
+        BadInput: Unknown, unreadable, or faulty (all faults at once).
+    """
+    path = find_shipped("conditions", given, "conditions")
+    findings = Findings()
+    node = read_yaml(path, shown(path))
+    if isinstance(node, Map):
+        made = validate(ConditionsFile, node, "conditions", findings)
+        if made is not None:
+            try:
+                return Conditions(**made.model_dump())
+            except (ParamError, TypeError) as e:
+                at = node.get(getattr(e, "name", "").rsplit(".", 1)[-1]) or node
+                findings.add(at.place, "wrong_value", str(e))
+    else:
+        findings.add(node.place, "wrong_type", "conditions must be a mapping of field: value")
+    raise MissionFaults(findings.sorted())

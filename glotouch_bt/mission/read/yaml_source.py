@@ -1,0 +1,179 @@
+"""YAML text to plain nodes that remember where they stood. No tags, no anchors, no code; scalars as in YAML 1.2 core.
+
+The event stream is read without recursion, so that no file can exhaust the stack; every limit is checked while reading.
+"""
+
+from __future__ import annotations
+
+import codecs
+import math
+import re
+import stat
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from glotouch_bt.mission.spec import Map, Node, Place, Scalar, Seq
+from glotouch_bt.robot import BadInput
+
+LARGEST_BYTES = 1_000_000
+DEEPEST = 60
+
+_INT = re.compile(r"[-+]?[0-9]{1,18}")
+_FLOAT = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
+_NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+_Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+def read_yaml(path: Path, shown: str | None = None) -> Node:
+    """Read one YAML document from a file.
+
+    Args:
+        path: The file.
+        shown: How messages name the file (default: the path).
+
+    Raises:
+        BadInput: Not readable, over a limit, not YAML, or with anchors, aliases, tags or a key twice; names the place.
+    """
+    shown = shown or str(path)
+    try:
+        if path.is_dir():
+            raise BadInput(f"{shown}: is a folder, not a YAML file")
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode):  # a device or a pipe may have no end, or never begin
+            raise BadInput(f"{shown}: is a device or a pipe, not a YAML file")
+        if found.st_size > LARGEST_BYTES:
+            raise BadInput(f"{shown}: is larger than {LARGEST_BYTES} bytes")
+        data = path.read_bytes()
+    except (OSError, ValueError) as e:
+        raise BadInput(f"{shown}: cannot be read ({getattr(e, 'strerror', None) or e})") from e
+    return parse_yaml(data, shown)
+
+
+def parse_yaml(data: bytes | str, shown: str) -> Node:
+    """Parse one YAML document; errors as in `read_yaml`."""
+    text = _decode(data, shown)
+    loader = _Loader(text)
+    try:
+        return _build(loader, shown)
+    except yaml.reader.ReaderError as e:
+        raise BadInput(f"{_at(text, e.position, shown)}: a character that YAML does not allow ({e.reason})") from e
+    except yaml.MarkedYAMLError as e:
+        mark = e.problem_mark or e.context_mark
+        place = f"{shown}:{mark.line + 1}:{mark.column + 1}" if mark else shown
+        tab = mark is not None and text[mark.index : mark.index + 1] == "\t"
+        what = "a tab; indent with blanks" if tab else e.problem or e.context
+        raise BadInput(f"{place}: not valid YAML: {what}") from e
+    except yaml.YAMLError as e:
+        raise BadInput(f"{shown}: not valid YAML: {e}") from e
+    finally:
+        loader.dispose()
+
+
+def _decode(data: bytes | str, shown: str) -> str:
+    if len(data) > LARGEST_BYTES:
+        raise BadInput(f"{shown}: is larger than {LARGEST_BYTES} bytes")
+    if isinstance(data, str):
+        return data
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as e:
+        line, column = data[: e.start].count(b"\n") + 1, e.start - (data.rfind(b"\n", 0, e.start) + 1) + 1
+        utf16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        found = "but UTF-16" if utf16 else f"(byte 0x{data[e.start]:02x})"
+        raise BadInput(f"{shown}:{line}:{column}: not UTF-8 text {found}") from e
+
+
+def _at(text: str, position: int, shown: str) -> str:
+    before = text[: max(position, 0)]
+    return f"{shown}:{before.count(chr(10)) + 1}:{len(before) - (before.rfind(chr(10)) + 1) + 1}"
+
+
+class _Open:
+    """A collection under construction."""
+
+    def __init__(self, place: Place, is_map: bool) -> None:
+        self.place, self.is_map = place, is_map
+        self.items: list[Node] = []
+        self.seen: dict[str, Place] = {}
+
+    def add(self, node: Node) -> None:
+        if self.is_map and len(self.items) % 2 == 0:
+            self._check_key(node)
+        self.items.append(node)
+
+    def _check_key(self, key: Node) -> None:
+        if not isinstance(key, Scalar) or not isinstance(key.value, str):
+            raise BadInput(f"{key.place}: a key must be a plain word")
+        if key.value == "<<":
+            raise BadInput(f"{key.place}: merge keys (<<) are not allowed")
+        if key.value in self.seen:
+            first = self.seen[key.value]
+            raise BadInput(f"{key.place}: key {key.value!r} stands twice (first at line {first.line})")
+        self.seen[key.value] = key.place
+
+    def close(self) -> Node:
+        if not self.is_map:
+            return Seq(tuple(self.items), self.place)
+        keys = [k for k in self.items[::2] if isinstance(k, Scalar)]
+        return Map(tuple(zip(keys, self.items[1::2], strict=True)), self.place)
+
+
+def _build(loader: Any, shown: str) -> Node:
+    stack: list[_Open] = []
+    root: Node | None = None
+    while True:
+        event = loader.get_event()
+        if event is None or isinstance(event, yaml.StreamEndEvent):
+            break
+        if isinstance(event, (yaml.StreamStartEvent, yaml.DocumentStartEvent, yaml.DocumentEndEvent)):
+            if isinstance(event, yaml.DocumentStartEvent) and root is not None:
+                raise BadInput(f"{_place(event, shown)}: a second document; one document a file")
+            continue
+        _refuse(event, shown)
+        if isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent)):
+            if len(stack) >= DEEPEST:
+                raise BadInput(f"{_place(event, shown)}: nested deeper than {DEEPEST} levels")
+            stack.append(_Open(_place(event, shown), isinstance(event, yaml.MappingStartEvent)))
+            continue
+        node = _scalar(event, shown) if isinstance(event, yaml.ScalarEvent) else stack.pop().close()
+        if stack:
+            stack[-1].add(node)
+        else:
+            root = node
+    if root is None:
+        raise BadInput(f"{shown}: holds no YAML document")
+    return root
+
+
+def _place(event: Any, shown: str) -> Place:
+    return Place(shown, event.start_mark.line + 1, event.start_mark.column + 1)
+
+
+def _refuse(event: Any, shown: str) -> None:
+    place = _place(event, shown)
+    if isinstance(event, yaml.AliasEvent):
+        raise BadInput(f"{place}: aliases (*{event.anchor}) are not allowed; write the value out")
+    if getattr(event, "anchor", None):
+        raise BadInput(f"{place}: anchors (&{event.anchor}) are not allowed; write the value out")
+    if getattr(event, "tag", None):
+        raise BadInput(f"{place}: tags ({event.tag}) are not allowed; only plain values, lists and mappings")
+
+
+def _scalar(event: Any, shown: str) -> Scalar:
+    place, text = _place(event, shown), event.value
+    if event.style not in (None, ""):
+        return Scalar(text, place)
+    if text in ("", "~", "null", "Null", "NULL"):
+        return Scalar(None, place)
+    if text in ("true", "True", "TRUE", "false", "False", "FALSE"):
+        return Scalar(text.lower() == "true", place)
+    if _INT.fullmatch(text):
+        return Scalar(int(text), place)
+    if _FLOAT.fullmatch(text) or _NOT_FINITE.fullmatch(text):
+        number = float("nan") if _NOT_FINITE.fullmatch(text) else float(text)
+        if not math.isfinite(number):
+            raise BadInput(f"{place}: {text[:40]} is not a finite number")
+        return Scalar(number, place)
+    return Scalar(text, place)

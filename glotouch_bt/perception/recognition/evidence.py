@@ -1,0 +1,143 @@
+"""A TouchSet as numbers: which layers count, how wide, what the pads showed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from glotouch_bt.perception.recognition.model import PadSpec, hand_axes, image_feature, pool
+from glotouch_bt.perception.touch import Layer, TouchSet
+from glotouch_bt.robot import Array
+
+THRESHOLD_M, SMALLEST_M2 = 6e-5, 6e-6
+"""Contact is deeper than this (three sd of a nominal taxel) over a connected patch of at least this area."""
+ONE_SIDED = 0.35
+"""Weight of a layer that only one pad felt, against 1 for both."""
+
+
+@dataclass(frozen=True)
+class LayerEvidence:
+    """One layer that carries evidence.
+
+    Attributes:
+        sequence: Its sequence.
+        index: Its place in the sequence.
+        width_m: Rigid width: aperture plus what sank into the gels.
+        weight: 1 if both pads felt it, `ONE_SIDED` if one.
+        upper_only: One pad felt nothing, so the true width in the window is at most `width_m`.
+        yaw_rad: Of the hand in K.
+        along_m: x_P coordinate of the hand's middle, from the contour's centre.
+        height_m: Of the pads' mid-point.
+        images: (left, right) features (35,), or None for a pad that felt nothing.
+        sunk_m: (left, right) indentation of the highest point.
+    """
+
+    sequence: int
+    index: int
+    width_m: float
+    weight: float
+    upper_only: bool
+    yaw_rad: float
+    along_m: float
+    height_m: float
+    images: tuple[Array | None, Array | None]
+    sunk_m: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """All of one TouchSet.
+
+    Attributes:
+        layers: The layers that count.
+        yaw_rad: (K,) yaw of each sequence in K.
+        weight: How much was felt: layers both pads felt, plus the others' weights, which together count at most one.
+    """
+
+    layers: tuple[LayerEvidence, ...]
+    yaw_rad: Array
+    weight: float
+
+
+def read_evidence(touchset: TouchSet, pad: PadSpec) -> Evidence:
+    """Reduce a TouchSet. Layers that are unstable, not finite or felt by neither pad are left out (paper IV-A).
+
+    Raises:
+        ParamError: A depth map has fewer than 7 x 5 taxels.
+    """
+    centre = touchset.candidate.contour.centre_K_m
+    used = [
+        (k, h, layer)
+        for k, sequence in enumerate(touchset.sequences)
+        for h, layer in enumerate(sequence.layers)
+        if _usable(layer)
+    ]
+    tops = contact_tops([d for *_, layer in used for d in (layer.left_m, layer.right_m)], pad)
+    layers = []
+    for i, (k, h, layer) in enumerate(used):
+        sunk = (tops[2 * i], tops[2 * i + 1])
+        felt = sum(s > 0 for s in sunk)
+        if felt == 0:
+            continue
+        left, right = (
+            np.asarray(image_feature(pool(d)), dtype=np.float64) if s > 0 else None
+            for d, s in zip((layer.left_m, layer.right_m), sunk, strict=True)
+        )
+        x, _ = hand_axes(np.asarray(layer.yaw_rad))
+        layers.append(
+            LayerEvidence(
+                k,
+                h,
+                layer.aperture_m + sum(sunk),
+                1.0 if felt == 2 else ONE_SIDED,
+                felt < 2,
+                float(layer.yaw_rad),
+                float(x @ (np.asarray(layer.position_K_m) - centre)),
+                layer.height_m,
+                (left, right),
+                sunk,
+            )
+        )
+    both = sum(e.weight for e in layers if not e.upper_only)
+    one = min(sum(e.weight for e in layers if e.upper_only), 1.0)
+    return Evidence(tuple(layers), np.array([s.yaw_rad for s in touchset.sequences]), both + one)
+
+
+def _usable(layer: Layer) -> bool:
+    numbers = (layer.aperture_m, layer.height_m, layer.yaw_rad, *np.ravel(layer.position_K_m))
+    flat = layer.left_m.ndim == 2 and layer.right_m.ndim == 2
+    return bool(layer.stable and flat and np.shape(layer.position_K_m) == (2,) and all(map(math.isfinite, numbers)))
+
+
+def contact_tops(maps_m: list[Array], pad: PadSpec) -> list[float]:
+    """Indentation of the deepest point of each map's largest patch, 0 without contact; maps (rows, cols) may differ.
+
+    3 x 3 median first, so that one bright taxel does not count; a map with half its taxels dead shows nothing.
+    """
+    out = [0.0] * len(maps_m)
+    shapes = {m.shape for m in maps_m}
+    for shape in shapes:
+        where = [i for i, m in enumerate(maps_m) if m.shape == shape]
+        stack = np.stack([maps_m[i] for i in where]).astype(np.float64)
+        good = np.isfinite(stack)
+        alive = good.mean(axis=(1, 2)) >= 0.5
+        middle = [float(np.median(m[g])) if a else 0.0 for m, g, a in zip(stack, good, alive, strict=True)]
+        filled = np.where(good, stack, np.array(middle)[:, None, None])
+        smooth = ndimage.median_filter(filled, size=(1, 3, 3), mode="nearest")
+        flat = np.zeros((3, 3, 3))
+        flat[1] = [[0, 1, 0], [1, 1, 1], [0, 1, 0]]
+        labels, n = ndimage.label((smooth > THRESHOLD_M) & alive[:, None, None], structure=flat)
+        if n == 0:
+            continue
+        count = np.bincount(labels.ravel(), minlength=n + 1)
+        least = SMALLEST_M2 * shape[0] * shape[1] / (pad.window_m[0] * pad.window_m[1])
+        for i, label in zip(where, labels, strict=True):
+            own = np.unique(label)
+            own = own[(own > 0) & (count[own] >= least)]
+            if len(own):
+                best = own[np.argmax(count[own])]
+                out[i] = float(smooth[where.index(i)][label == best].max())
+    return out

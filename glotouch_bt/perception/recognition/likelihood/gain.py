@@ -1,0 +1,203 @@
+"""Expected information gain of closures, from a few weighted poses of the target and a few other objects.
+
+A closure on candidate c multiplies the odds of c by one ratio r. Under "c is the target" its observation is what the
+STL shows at the true pose, one of the posterior's; under any other hypothesis it is what some object shows. Both are
+summed over as few points, and the entropy of {candidates, none} before and after compared.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from glotouch_bt.perception.recognition.decision import Closure
+from glotouch_bt.perception.recognition.likelihood.background import (
+    FIRST_SCALE_M,
+    WIDTH_SCALE_M,
+    generic_features,
+    image_kernel,
+    mean_squared,
+)
+from glotouch_bt.perception.recognition.likelihood.pair import Pair, Reading
+from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
+from glotouch_bt.perception.recognition.likelihood.scalars import yaw_prior
+from glotouch_bt.perception.recognition.likelihood.volumes import T_PEAK, width_kernel
+from glotouch_bt.perception.recognition.model import POOLED, Array32, TargetModel, hand_axes
+from glotouch_bt.perception.touch import Candidate
+from glotouch_bt.perception.touch.calibration import MEASURED_SD_M
+from glotouch_bt.robot import Array
+
+POSES, OTHERS, SURFACES = 10, 16, 96
+"""Poses of the target, other objects, and background surfaces the sums run over."""
+UNEVEN_M = 4e-4
+"""What neighbouring cells of the width table differ by, mostly."""
+NEAR_M, NEAR_RAD = 0.008, math.radians(20.0)
+"""A closure this near to one already made (height and track; yaw) repeats it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Where the target would lie if it were this candidate.
+
+    Attributes:
+        candidate: The candidate.
+        yaw_index, z0_m, weight: (s,) its likeliest poses: relative yaw of a hand at `first_rad`, in table steps.
+        first_rad: That hand's yaw.
+        felt: (n, 4) closures made: x_K, y_K, height, yaw; widths_m (n,) what they measured.
+    """
+
+    candidate: Candidate
+    yaw_index: Array
+    z0_m: Array
+    weight: Array
+    first_rad: float
+    felt: Array
+    widths_m: Array
+
+
+def predict(model: TargetModel, reading: Reading, pair: Pair, p: LikelihoodParams) -> Prediction:
+    """The likeliest poses of a candidate, by weight."""
+    candidate = reading.touchset.candidate
+    z0 = np.linspace(-p.z0_limit_m, p.z0_limit_m, p.z0_steps) if p.z0_steps > 1 else np.zeros(1)
+    if pair.log_pose is None:
+        log_pose = yaw_prior(model, candidate, pair.first_rad, p)[:, None]
+        z0 = np.zeros(1)
+    else:
+        log_pose = pair.log_pose.astype(np.float64)
+    flat = log_pose.reshape(-1)
+    order = np.argsort(-flat, kind="stable")
+    if pair.log_pose is None and np.ptp(flat) < 1e-6:
+        order = order[:: max(1, len(order) // POSES)]
+    best = order[:POSES]
+    weight = np.exp(flat[best] - flat[best].max())
+    layers = [o.layer for s in reading.sequences for o in s]
+    places = [reading.touchset.sequences[e.sequence].layers[e.index] for e in layers]
+    felt = np.array([[*q.position_K_m, q.height_m, q.yaw_rad] for q in places]).reshape(-1, 4)
+    return Prediction(
+        candidate, best // log_pose.shape[1], z0[best % log_pose.shape[1]], weight / weight.sum(), pair.first_rad,
+        felt, np.array([e.width_m for e in layers]),
+    )  # fmt: skip
+
+
+def expected_gains(
+    model: TargetModel,
+    predictions: Mapping[int, Prediction],
+    shares: Mapping[int, float],
+    p_absent: float,
+    closures: Sequence[Closure],
+    p: LikelihoodParams,
+) -> Array:
+    """(n,) nats, not negative. Shares and `p_absent` sum to 1."""
+    if not closures:
+        return np.zeros(0)
+    rest = np.array([*shares.values(), p_absent])
+    entropy = float(-(rest * np.log(np.maximum(rest, 1e-300))).sum())
+    library = generic_features(model.pad)
+    library = library[:: max(1, len(library) // SURFACES)]
+    others = library[:: max(1, len(library) // OTHERS)][:OTHERS]
+    generic_other = image_kernel(mean_squared(others, library), p).mean(axis=-1)
+    n_other = len(others)
+    quantile = np.tan(np.pi * (((np.arange(n_other) * 7 % n_other) + 0.5) / n_other - 0.5))  # of a Cauchy
+    out = np.zeros(len(closures))
+    for candidate in sorted({c.candidate for c in closures}):
+        q = predictions[candidate]
+        where = [i for i, c in enumerate(closures) if c.candidate == candidate]
+        mine = [closures[i] for i in where]
+        width, sides, novelty = _at(model, q, mine)
+        # Ratios where the target is there (one a pose) and where some other object is (one a surface and quantile).
+        ratio = _width_ratios(width, np.array([_guess(q, c) for c in mine]), quantile, q.weight, p)
+        for side in sides:
+            ratio += _image_ratios(side, library, others, generic_other, q.weight, p)
+        ratio *= p.slope * novelty[:, None]
+        s = width.shape[1]
+        out[where] = _gains(ratio[:, :s], q.weight, ratio[:, s:], shares[candidate], entropy)
+    return out
+
+
+def _width_ratios(width: Array, guess: Array, quantile: Array, weight: Array, p: LikelihoodParams) -> Array:
+    """(n, s + o) tempered log ratios of widths: predicted ones (n, s), then those of other objects."""
+    middle, scale = guess[:, :1], guess[:, 1:]
+    felt = np.isfinite(width)
+    w = np.where(felt, width, 1.0)
+    seen = np.concatenate([w, middle + scale * quantile], axis=1)
+    generic = scale / math.pi / (scale**2 + (seen - middle) ** 2)
+    sd = math.hypot(p.width_sd_m, MEASURED_SD_M, p.width_rough * UNEVEN_M)
+    near = width_kernel((seen[:, :, None] - w[:, None, :]) / sd) * felt[:, None, :]
+    target = (near @ weight) * (T_PEAK / sd)
+    log_ratio = np.log((1 - p.width_outlier) * target / generic + p.width_outlier)
+    return np.asarray(p.temper_width * log_ratio, dtype=np.float64)
+
+
+def _image_ratios(
+    side: Array32, library: Array32, others: Array32, generic_other: Array32, weight: Array, p: LikelihoodParams
+) -> Array:
+    """(n, s + o) tempered log ratios of one pad's images: predicted ones (n, s, 35), then those of other objects."""
+    n, s, size = side.shape
+    flat = side.reshape(-1, size)
+    norm = (side**2).sum(axis=2)
+    inner = np.maximum(norm[:, :, None] + norm[:, None, :] - 2 * side @ side.transpose(0, 2, 1), 0) / np.float32(size)
+    own = image_kernel(inner, p) @ weight / image_kernel(mean_squared(flat, library), p).mean(axis=-1).reshape(n, s)
+    other = (image_kernel(mean_squared(others, flat), p).reshape(len(others), n, s) @ weight).T / generic_other
+    ratio = np.concatenate([own, other], axis=1)
+    return np.asarray(p.temper_image * np.log((1 - p.image_outlier) * ratio + p.image_outlier), dtype=np.float64)
+
+
+def _gains(there: Array, weight: Array, not_there: Array, share: float, entropy: float) -> Array:
+    """(n,) entropy before minus its mean after one observation that concerns one candidate's odds only."""
+    if share <= 0 or share >= 1:
+        return np.zeros(len(there))
+    own = -(share * math.log(share) + (1 - share) * math.log1p(-share))
+    among = (entropy - own) / (1 - share)  # entropy of the others, given that it is not this one
+    odds = math.log(share) - math.log1p(-share)
+
+    def after(log_ratio: Array) -> Array:
+        s = 1 / (1 + np.exp(-np.clip(log_ratio + odds, -60, 60)))
+        h = -(s * np.log(np.maximum(s, 1e-300)) + (1 - s) * np.log(np.maximum(1 - s, 1e-300)))
+        return np.asarray(h + (1 - s) * among)
+
+    mean = share * (after(there) @ weight) + (1 - share) * after(not_there).mean(axis=1)
+    return np.asarray(np.maximum(entropy - mean, 0.0))
+
+
+def _at(model: TargetModel, q: Prediction, closures: Sequence[Closure]) -> tuple[Array, tuple[Array32, Array32], Array]:
+    """Predicted widths (n, s), (left, right) features (n, s, 35), and how new each closure is (n,), 0..1."""
+    n = len(model.phi_rad)
+    yaw = np.array([c.yaw_K_rad for c in closures])
+    height = np.array([c.height_m for c in closures])
+    place = np.array([c.position_K_m for c in closures], dtype=np.float64).reshape(-1, 2)
+    turn = (yaw - q.first_rad) / (2 * np.pi) * n
+    i = np.rint(q.yaw_index[None, :] + turn[:, None]).astype(np.int64) % n
+    x, _ = hand_axes(model.phi_rad[i])
+    centre = model.outline.of(q.candidate.contour.kind).centre_m
+    x_K, _ = hand_axes(yaw)
+    along = ((place - q.candidate.contour.centre_K_m) * x_K).sum(axis=1)[:, None] + x @ centre
+    j = _nearest(model.l_m, along)
+    k = _nearest(model.z_m, height[:, None] + q.z0_m[None, :])
+    table = model.images_by_height
+    left = table[k, j, i]
+    right = table[k, _nearest(model.l_m, -along), (i + n // 2) % n]
+    right = np.ascontiguousarray(right.reshape(*i.shape, *POOLED)[..., ::-1]).reshape(left.shape)
+    novelty = np.ones(len(closures))
+    if len(q.felt):
+        d2 = ((q.felt[None, :, :2] - place[:, None]) ** 2).sum(axis=2) + (q.felt[None, :, 2] - height[:, None]) ** 2
+        turned = (q.felt[None, :, 3] - yaw[:, None] + np.pi / 2) % np.pi - np.pi / 2
+        novelty -= np.exp(-0.5 * d2 / NEAR_M**2 - 0.5 * (turned / NEAR_RAD) ** 2).max(axis=1)
+    return model.width_m[i, j, k].astype(np.float64), (left, right), novelty
+
+
+def _guess(q: Prediction, c: Closure) -> tuple[float, float]:
+    """Where the background expects the width, and how surely: the nearest closure made, or the outline's span."""
+    if len(q.felt):
+        turned = np.abs((q.felt[:, 3] - c.yaw_K_rad + np.pi / 2) % np.pi - np.pi / 2)
+        at = int(np.argmin(np.abs(q.felt[:, 2] - c.height_m) + 0.03 * turned))
+        if turned[at] < math.radians(75.0):
+            return float(q.widths_m[at]), WIDTH_SCALE_M
+    low, high = q.candidate.span_m(c.yaw_K_rad + 0.5 * math.pi)
+    return high - low, FIRST_SCALE_M
+
+
+def _nearest(axis: Array, x: Array) -> Array:
+    return np.asarray(np.clip(np.rint((x - axis[0]) / (axis[1] - axis[0])), 0, len(axis) - 1), dtype=np.int64)

@@ -1,0 +1,203 @@
+"""One STL against one TouchSet: the marginal log ratio target : background, and the posterior of the pose."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from glotouch_bt.perception.recognition.decision import Fit
+from glotouch_bt.perception.recognition.evidence import Evidence, read_evidence
+from glotouch_bt.perception.recognition.likelihood.background import log_generic_images, log_generic_widths
+from glotouch_bt.perception.recognition.likelihood.bands import Residual, log_banded_twin, residual
+from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
+from glotouch_bt.perception.recognition.likelihood.scalars import (
+    contour_ratio,
+    height_ratio,
+    mode_ratio,
+    shift_prior,
+    yaw_prior,
+)
+from glotouch_bt.perception.recognition.likelihood.volumes import (
+    Grid,
+    Observed,
+    image_ratios,
+    log_sum,
+    slid,
+    slide_matrix,
+    turned,
+    width_ratios,
+)
+from glotouch_bt.perception.recognition.model import Array32, PadSpec, TargetModel
+from glotouch_bt.perception.recognition.placement import fitted_pose, unfelt_pose
+from glotouch_bt.perception.touch import TouchSet
+from glotouch_bt.robot import Array
+
+_read: deque[tuple[TouchSet, PadSpec, LikelihoodParams, Reading]] = deque(maxlen=32)
+
+PARALLEL_RAD = math.radians(10.0)
+"""Sequences whose hands differ by less (or by half a turn) are tracks along one axis."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A TouchSet and what the background makes of it; the same for every STL.
+
+    Attributes:
+        touchset: What was felt.
+        evidence: The same, reduced.
+        sequences: Layers that count, with background densities, by sequence; sequences without any are left out.
+    """
+
+    touchset: TouchSet
+    evidence: Evidence
+    sequences: tuple[tuple[Observed, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Evidence of one pair.
+
+    Attributes:
+        index: The candidate's index.
+        log_ratio: log p(TouchSet | target) - log p(TouchSet | just any object), tempered and calibrated.
+        log_twin: log p(TouchSet | a twin) - log p(TouchSet | target), by the widths, calibrated.
+        terms: What it is made of, nats before calibration: mode, height, contour; width and image at the best pose;
+            pose: what is gained or lost by not knowing the pose.
+        log_pose: (72, nz) posterior of (relative yaw of the first sequence, height offset); None if nothing was felt.
+        first_rad: Yaw of the first sequence's hand.
+        bias_m: Best aperture bias.
+        fit, pose_K_O, evidence: As in `Match`.
+    """
+
+    index: int
+    log_ratio: float
+    log_twin: float
+    terms: dict[str, float]
+    log_pose: Array32 | None
+    first_rad: float
+    bias_m: float
+    fit: Fit | None
+    pose_K_O: tuple[float, float, float]
+    evidence: float
+
+
+def read_touchset(touchset: TouchSet, pad: PadSpec, p: LikelihoodParams) -> Reading:
+    """Reduce a TouchSet and weigh it under the background; the last ones read are remembered (by identity)."""
+    for known, spec, q, reading in _read:
+        if known is touchset and spec == pad and q == p:
+            return reading
+    reading = _read_touchset(touchset, pad, p)
+    _read.appendleft((touchset, pad, p, reading))
+    return reading
+
+
+def _read_touchset(touchset: TouchSet, pad: PadSpec, p: LikelihoodParams) -> Reading:
+    e = read_evidence(touchset, pad)
+    images = log_generic_images(e.layers, pad, p)
+    widths = log_generic_widths(e.layers, touchset.candidate, p)
+    seen: dict[int, list[Observed]] = {}
+    for layer, width, image in zip(e.layers, widths, images, strict=True):
+        seen.setdefault(layer.sequence, []).append(Observed(layer, float(width), (float(image[0]), float(image[1]))))
+    return Reading(touchset, e, tuple(tuple(v) for _, v in sorted(seen.items())))
+
+
+def compare(model: TargetModel, reading: Reading, p: LikelihoodParams) -> Pair:
+    """Marginalise over bias, yaw, height offset, and each sequence's shift and turn."""
+    touchset = reading.touchset
+    candidate = touchset.candidate
+    terms = {
+        "mode": mode_ratio(model, candidate),
+        "height": height_ratio(model, candidate, p),
+        "contour": contour_ratio(model, candidate, p),
+    }
+    if not reading.sequences:
+        ratio = p.offset + p.slope * sum(terms.values())
+        return Pair(candidate.index, ratio, 0.0, terms, None, 0.0, 0.0, None, unfelt_pose(touchset), 0.0)
+    zero_sd = max(layer.zero_sd_m for layer in touchset.layers)
+    grid = Grid.of(p, zero_sd)
+    first = reading.sequences[0][0].layer.yaw_rad
+    turns = np.array([seen[0].layer.yaw_rad - first for seen in reading.sequences])
+    parallel = bool(np.abs((turns + np.pi / 2) % np.pi - np.pi / 2).max() < PARALLEL_RAD)
+    common = yaw_prior(model, candidate, first, p)[None, :, None, None] + _log_normal(grid.z0_m, p.z0_sd_m)
+    if parallel:  # tracks share one shift along x_P, but for what each slides
+        common = common + shift_prior(model, candidate, 0.0, grid.shift_m, p)[None, :, :, None]
+    twin = common.astype(np.float32)
+    log_bias = _log_normal(grid.bias_m, zero_sd)
+    joint = (common + log_bias[:, None, None, None]).astype(np.float32)
+    slide = slide_matrix(grid, p)
+    moved = watched_turns(touchset)
+    parts = []
+    for seen, turn in zip(reading.sequences, turns, strict=True):
+        flip = bool(np.cos(turn) < 0)
+        sd = math.hypot(p.turn_sd_rad, moved[seen[0].layer.sequence])
+        widths, twins, offs = width_ratios(model, seen, turn, grid, p)
+        widths, twins = np.float32(p.temper_width) * widths, np.float32(p.temper_width) * twins
+        images = np.float32(p.temper_image) * image_ratios(model, seen, turn, grid, p)
+        volume = np.concatenate([widths, twins]) + images[None]  # the twin's is one more bias
+        if parallel:
+            volume = volume[:, :, ::-1] if flip else volume
+            mean = turned(slid(volume, slide), p, sd)
+        else:
+            volume = volume + shift_prior(model, candidate, turn, grid.shift_m, p)[None, :, :, None].astype(np.float32)
+            mean = turned(log_sum(volume, 2), p, sd)[:, :, None]
+        joint, twin = joint + mean[:-1], twin + mean[-1:]
+        parts.append((widths, images, volume, flip, offs))
+    total = float(log_sum(joint.reshape(1, -1), 1)[0])
+    by_places = float(log_sum(twin.reshape(1, -1), 1)[0]) - total
+    felt: list[Residual] = []
+    b, i, c, z = (int(k) for k in np.unravel_index(int(np.argmax(joint)), joint.shape))
+    shifts = np.zeros(len(touchset.sequences))
+    terms["width"] = terms["image"] = 0.0
+    for seen, (widths, images, volume, flip, offs) in zip(reading.sequences, parts, strict=True):
+        along = volume[b, i, :, z] + (np.log(slide[:, c]) if parallel else 0)
+        d = int(np.argmax(along))
+        d = len(grid.shift_m) - 1 - d if parallel and flip else d
+        shifts[seen[0].layer.sequence] = grid.shift_m[d]
+        terms["width"] += float(widths[b, i, d, z])
+        terms["image"] += float(images[i, d, z])
+        sharp = [(o, *at) for o, at in zip(seen, offs, strict=True) if not o.layer.upper_only]
+        felt += [r for o, off, sd in sharp if (r := residual(off, sd, o.layer.height_m, (i, d, z)))]
+    by_bands = p.temper_width * log_banded_twin(felt, grid.bias_m, log_bias, p)
+    log_twin = p.twin_slope * 0.5 * (by_places + by_bands)
+    terms["pose"] = total - terms["width"] - terms["image"]
+    log_pose = log_sum(joint, (0, 2))
+    yaw = _refined(log_sum(log_pose, 1), i)
+    fit, pose = fitted_pose(
+        model, touchset, reading.evidence, yaw, shifts, float(grid.z0_m[z]), 1.0, float(grid.bias_m[b])
+    )
+    ratio = p.offset + p.slope * sum(terms.values())
+    return Pair(
+        candidate.index, ratio, log_twin, terms, np.asarray(log_pose - total, dtype=np.float32), first,
+        float(grid.bias_m[b]), fit, pose, reading.evidence.weight,
+    )  # fmt: skip
+
+
+def watched_turns(touchset: TouchSet) -> list[float]:
+    """How far the object was seen to turn, rad in all, from its first closure to the end of each sequence.
+
+    The turn of the very first closure is over before that closure feels anything; what nobody watched counts as none.
+    """
+    total, out = 0.0, []
+    for k, sequence in enumerate(touchset.sequences):
+        for layer in sequence.layers[1 if k == 0 else 0 :]:
+            total += abs(layer.turn_rad) if math.isfinite(layer.turn_rad) else 0.0
+        out.append(total)
+    return out
+
+
+def _log_normal(x: Array, sd: float) -> Array:
+    weight = np.exp(-0.5 * (x / sd) ** 2)
+    return np.asarray(np.log(weight / weight.sum()))
+
+
+def _refined(log_profile: Array32, i: int) -> float:
+    """Vertex of the parabola through the greatest value and its neighbours, in table steps."""
+    n = len(log_profile)
+    a, b, c = float(log_profile[i - 1]), float(log_profile[i]), float(log_profile[(i + 1) % n])
+    curve = a - 2 * b + c
+    if not math.isfinite(curve) or curve > -1e-6:
+        return float(i)
+    return i + float(np.clip(0.5 * (a - c) / curve, -0.5, 0.5))

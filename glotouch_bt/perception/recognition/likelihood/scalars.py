@@ -1,0 +1,91 @@
+"""Log ratios target : background of what the probe found: kind of contour, its size, the top. And pose priors."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
+from glotouch_bt.perception.recognition.model import SENSING_M, TargetModel, hand_axes
+from glotouch_bt.perception.touch import Candidate, Contour
+from glotouch_bt.robot import Array
+
+SIZES_M, HEIGHTS_M = (0.020, 0.110), (0.018, 0.115)
+"""Sides and heights of "some object": uniform over these (objects of 4-11 cm, and what is traced of them)."""
+UNFELT_M = 0.003
+"""A candidate not higher than this above where its sides were touched: its top was not felt."""
+TAIL = 3.0
+"""Degrees of freedom of a contour's side: a trace errs by more than its scatter now and then."""
+
+
+def mode_ratio(model: TargetModel, candidate: Candidate) -> float:
+    """log P(kind | traces of the STL) - log 1/2."""
+    box = model.outline.p_box
+    return math.log(2 * (box if candidate.contour.kind == "box" else 1 - box))
+
+
+def height_ratio(model: TargetModel, candidate: Candidate, p: LikelihoodParams) -> float:
+    """The top found: the model's, or a lower place taken for it; a top that was not felt only bounds it from below."""
+    low, high = HEIGHTS_M
+    if candidate.height_m < SENSING_M + UNFELT_M:
+        return 0.0
+    z = (candidate.height_m - model.height_m) / p.height_sd_m
+    top = _student(z) / p.height_sd_m
+    span = max(model.height_m - SENSING_M, 5e-3)
+    lower = 1 / span if SENSING_M <= candidate.height_m <= model.height_m else 0.0
+    density = (1 - p.height_lower - 0.01) * top + p.height_lower * lower + 0.01 / (high - low)
+    return math.log(density * (high - low))
+
+
+def contour_ratio(model: TargetModel, candidate: Candidate, p: LikelihoodParams) -> float:
+    """Sides of the contour against the model's own traces, fitted as the same kind."""
+    contour = candidate.contour
+    traced = model.outline.of(contour.kind)
+    one = contour.family == "circle"
+    low, high = SIZES_M
+    good = other = 1.0
+    for i in range(1 if one else 2):
+        sd = math.sqrt(p.contour_sd_m**2 + traced.size_sd_m[i] ** 2 + _size_variance_m2(contour, i))
+        good *= _student((contour.size_m[i] - traced.size_m[i]) / sd) / sd
+        other /= high - low
+    return math.log((1 - p.contour_outlier) * good / other + p.contour_outlier)
+
+
+def shift_prior(
+    model: TargetModel, candidate: Candidate, turn_rad: float, shift_m: Array, p: LikelihoodParams
+) -> Array:
+    """(72, nd) log prior: the contour's centre is where the model's traces, fitted alike, have theirs."""
+    traced = model.outline.of(candidate.contour.kind)
+    x, _ = hand_axes(model.phi_rad + turn_rad)
+    off = shift_m[None, :] - (x @ traced.centre_m)[:, None]
+    weight = np.exp(-0.5 * off**2 / (p.shift_sd_m**2 + traced.centre_sd_m**2)) + 1e-9
+    weight /= weight.sum(axis=1, keepdims=True)
+    return np.asarray(np.log(0.9 * weight + 0.1 / len(shift_m)))
+
+
+def yaw_prior(model: TargetModel, candidate: Candidate, first_rad: float, p: LikelihoodParams) -> Array:
+    """(72,) log prior of the relative yaw of a hand at `first_rad`: a box's contour lies along the model's."""
+    n = len(model.phi_rad)
+    contour, o = candidate.contour, model.outline.as_box
+    if contour.kind != "box":
+        return np.full(n, -math.log(n))
+    off = first_rad - model.phi_rad + o.yaw_rad - contour.yaw_rad
+    off = (off + np.pi / 2) % np.pi - np.pi / 2
+    slender = min(o.size_m[0] / o.size_m[1], contour.size_m[0] / max(contour.size_m[1], 1e-3)) - 1
+    trust = 0.9 * float(np.clip(slender / 0.2, 0, 1))
+    weight = np.exp(-0.5 * off**2 / (p.yaw_sd_rad**2 + o.yaw_sd_rad**2)) + 1e-9
+    return np.asarray(np.log(trust * weight / weight.sum() + (1 - trust) / n))
+
+
+def _student(z: float) -> float:
+    """Density of Student's t with `TAIL` degrees of freedom."""
+    c = math.gamma(0.5 * (TAIL + 1)) / (math.sqrt(TAIL * math.pi) * math.gamma(0.5 * TAIL))
+    return float(c * (1 + z * z / TAIL) ** (-0.5 * (TAIL + 1)))
+
+
+def _size_variance_m2(contour: Contour, side: int) -> float:
+    """Variance of a whole side from the fit's covariance of the half; 0 where the fit does not tell."""
+    at = {"circle": 2, "rectangle": 3 + side}.get(contour.family or "", len(contour.covariance))
+    variance = 4.0 * float(contour.covariance[at, at]) if at < len(contour.covariance) else 0.0
+    return variance if math.isfinite(variance) else 0.0

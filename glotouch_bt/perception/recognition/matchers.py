@@ -1,0 +1,34 @@
+"""The matchers by name: each ranks the TouchSets of all candidates against one target. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Protocol
+
+from glotouch_bt.perception.recognition.decision import Ranking
+from glotouch_bt.perception.recognition.likelihood import believe, ranked
+from glotouch_bt.perception.recognition.model import TargetModel
+from glotouch_bt.perception.recognition.paper import paper_matcher
+from glotouch_bt.perception.touch import TouchSet
+
+DEFAULT_MATCHER = "likelihood"
+
+
+class Matcher(Protocol):
+    """What ranks candidates. Deterministic."""
+
+    def __call__(self, model: TargetModel, touchsets: Sequence[TouchSet], /) -> Ranking:
+        """Rank; the probabilities and `p_absent` sum to 1.
+
+        Raises:
+            ParamError: No TouchSet at all, or two of the same candidate.
+        """
+        ...
+
+
+def _likelihood(model: TargetModel, touchsets: Sequence[TouchSet]) -> Ranking:
+    return ranked(believe(model, touchsets))
+
+
+MATCHERS: Mapping[str, Matcher] = MappingProxyType({"likelihood": _likelihood, "paper": paper_matcher()})

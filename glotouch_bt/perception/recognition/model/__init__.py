@@ -1,0 +1,47 @@
+"""TODO door of glotouch_bt/perception/recognition/model."""
+
+from glotouch_bt.perception.recognition.model.outline import (
+    SENSING_M,
+    TIP_RADIUS_M,
+    first_hit,
+    minimum_rectangle,
+    traced_tips,
+)
+from glotouch_bt.perception.recognition.model.pads import (
+    FINE,
+    POOLED,
+    Array32,
+    PadSpec,
+    Patch,
+    gel_shift,
+    image_feature,
+    patch_of,
+    pool,
+)
+from glotouch_bt.perception.recognition.model.parts import VERSION, from_parts, to_parts
+from glotouch_bt.perception.recognition.model.raster import hand_axes, mirrored
+from glotouch_bt.perception.recognition.model.target import STRIDE, TargetModel
+
+__all__ = [
+    "FINE",
+    "POOLED",
+    "SENSING_M",
+    "STRIDE",
+    "TIP_RADIUS_M",
+    "VERSION",
+    "Array32",
+    "PadSpec",
+    "Patch",
+    "TargetModel",
+    "first_hit",
+    "from_parts",
+    "gel_shift",
+    "hand_axes",
+    "image_feature",
+    "minimum_rectangle",
+    "mirrored",
+    "patch_of",
+    "pool",
+    "to_parts",
+    "traced_tips",
+]

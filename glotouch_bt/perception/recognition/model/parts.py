@@ -1,0 +1,87 @@
+"""A TargetModel as plain numbers and arrays, and back: for whoever keeps models between runs. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from glotouch_bt.perception.recognition.model.outline import KindFit, Outline
+from glotouch_bt.perception.recognition.model.pads import Array32, PadSpec
+from glotouch_bt.perception.recognition.model.target import TargetModel
+from glotouch_bt.robot import ParamError
+
+VERSION = 1
+"""Of what the tables hold; counts up whenever a table's meaning or its computation changes."""
+_NUMBERS = ("height_m", "rho", "rho_sd", "normal_dispersion", "anisotropy")
+
+
+def to_parts(model: TargetModel) -> tuple[dict[str, Any], dict[str, Array32]]:
+    """Facts that JSON can hold, and the tables by name (image tables are built if they are not yet)."""
+    facts = {
+        "version": VERSION,
+        "digest": model.digest,
+        "pad": asdict(model.pad),
+        "phi_rad": model.phi_rad.tolist(),
+        "l_m": model.l_m.tolist(),
+        "z_m": model.z_m.tolist(),
+        "centre_m": model.centre_m.tolist(),
+        "outline": {
+            "as_round": _fit_facts(model.outline.as_round),
+            "as_box": _fit_facts(model.outline.as_box),
+            "p_box": model.outline.p_box,
+        },
+        **{name: getattr(model, name) for name in _NUMBERS},
+    }
+    arrays = {
+        "reach_m": model.reach_m,
+        "fine_m": model.fine_m,
+        "images": model.images_by_height,
+        "image_norms": model.image_norms,
+    }
+    return facts, arrays
+
+
+def from_parts(name: str, facts: Mapping[str, Any], arrays: Mapping[str, Array32]) -> TargetModel:
+    """The model again.
+
+    Raises:
+        ParamError: Another version, or facts or tables that do not fit together.
+    """
+    if facts.get("version") != VERSION:
+        raise ParamError("model version", facts.get("version"), f"{VERSION}")
+    try:
+        given: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in facts["pad"].items()}
+        pad = PadSpec(**given)
+        phi, l, z = (np.array(facts[k], dtype=np.float64) for k in ("phi_rad", "l_m", "z_m"))
+        shape = (len(phi), len(l), len(z))
+        expected = {"reach_m": shape, "images": (*shape[::-1], 35), "image_norms": shape[::-1]}
+        for key, s in expected.items():
+            if arrays[key].shape != s:
+                raise ParamError(f"table {key}", arrays[key].shape, f"{s}")
+        o = facts["outline"]
+        outline = Outline(_fit(o["as_round"]), _fit(o["as_box"]), float(o["p_box"]))
+        numbers = {k: float(facts[k]) for k in _NUMBERS}
+        lazy = {"images": arrays["images"], "image_norms": arrays["image_norms"]}
+        return TargetModel(
+            name=name, digest=str(facts["digest"]), pad=pad, phi_rad=phi, l_m=l, z_m=z, reach_m=arrays["reach_m"],
+            fine_m=arrays["fine_m"], outline=outline, centre_m=np.array(facts["centre_m"], dtype=np.float64),
+            **numbers, _lazy=lazy,
+        )  # fmt: skip
+    except (KeyError, TypeError, ValueError) as e:
+        raise ParamError("model parts", type(e).__name__, "complete") from e
+
+
+def _fit_facts(fit: KindFit) -> dict[str, Any]:
+    return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in asdict(fit).items()}
+
+
+def _fit(facts: Mapping[str, Any]) -> KindFit:
+    return KindFit(
+        np.array(facts["centre_m"], dtype=np.float64), float(facts["centre_sd_m"]),
+        (float(facts["size_m"][0]), float(facts["size_m"][1])),
+        (float(facts["size_sd_m"][0]), float(facts["size_sd_m"][1])),
+        float(facts["yaw_rad"]), float(facts["yaw_sd_rad"]),
+    )  # fmt: skip

@@ -1,0 +1,62 @@
+"""Side images of a solid: how far it reaches towards a pad, seen from every yaw.
+
+`reach[i, j, h]` at relative yaw phi_i is the largest y of the surface on the line (x = l_j, z = z_h), written in the
+frame with x axis (cos phi, sin phi) and y axis (sin phi, -cos phi): the planar part of the pads' frame P for a hand
+turned by phi against the mesh. The left pad (at +y_P) feels this image; the right pad that of phi + 180 deg with l
+reversed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+from scipy import ndimage
+
+from glotouch_bt.perception.recognition.model.outline import first_hit
+from glotouch_bt.perception.recognition.model.pads import FINE, Array32
+from glotouch_bt.robot import Array, ParamError
+
+
+def hand_axes(phi_rad: Array) -> tuple[Array, Array]:
+    """x_P and y_P, each (..., 2), of a down-pointing hand at yaw `phi_rad` (see `Pose.pointing_down`)."""
+    c, s = np.cos(phi_rad), np.sin(phi_rad)
+    return np.stack([c, s], axis=-1), np.stack([s, -c], axis=-1)
+
+
+def side_images(solid: trimesh.Trimesh, phi_rad: Array, l_m: Array, z_m: Array) -> Array32:
+    """Cast one ray a cell from outside along -y_P.
+
+    Args:
+        solid: Watertight mesh; its z axis up.
+        phi_rad: (n,) relative yaws.
+        l_m: (nl,) coordinates along x_P.
+        z_m: (nz,) heights.
+
+    Returns:
+        (n, nl, nz) reach in metres; -inf where the line meets nothing.
+
+    Raises:
+        ParamError: An empty grid.
+    """
+    if min(len(phi_rad), len(l_m), len(z_m)) == 0:
+        raise ParamError("raster grid", (len(phi_rad), len(l_m), len(z_m)), "not empty")
+    far = float(np.abs(solid.vertices[:, :2]).max()) * 1.5 + 0.01
+    x, y = hand_axes(phi_rad)
+    o = np.zeros((len(phi_rad), len(l_m), len(z_m), 3))
+    o[..., :2] = x[:, None, None, :] * l_m[None, :, None, None] + far * y[:, None, None, :]
+    o[..., 2] = z_m
+    d = np.zeros_like(o)
+    d[..., :2] = -y[:, None, None, :]
+    reach = far - first_hit(solid, o.reshape(-1, 3), d.reshape(-1, 3))
+    return np.asarray(reach.reshape(len(phi_rad), len(l_m), len(z_m)), dtype=np.float32)
+
+
+def window_max(reach: Array32) -> Array32:
+    """Largest reach in the pad's window (15 columns x 21 rows) round each cell: separable running maximum."""
+    a = ndimage.maximum_filter1d(reach, FINE[1], axis=1, mode="constant", cval=-np.inf)
+    return np.asarray(ndimage.maximum_filter1d(a, FINE[0], axis=2, mode="constant", cval=-np.inf), dtype=np.float32)
+
+
+def mirrored(table: Array32) -> Array32:
+    """The same table as the RIGHT pad sees it: yaw + 180 deg, l reversed. Needs an even count of yaws."""
+    return np.roll(table, -(table.shape[0] // 2), axis=0)[:, ::-1]

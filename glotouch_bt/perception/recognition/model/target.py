@@ -1,0 +1,179 @@
+"""What the pads would feel of a target, from its STL alone: support widths, pad images, contour, nonplanarity.
+
+Everything is tabulated once per (mesh, pad) over relative yaw phi (hand against mesh), shift l along x_P from the
+middle of the mesh's footprint, and height z of the pads' mid-point above the floor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from glotouch_bt.perception.recognition.model.outline import Outline, minimum_rectangle, traced_outline
+from glotouch_bt.perception.recognition.model.pads import FINE, Array32, PadSpec, image_feature
+from glotouch_bt.perception.recognition.model.raster import mirrored, side_images, window_max
+from glotouch_bt.perception.recognition.synthetic import pooled_images, simulated_statistics
+from glotouch_bt.robot import Array
+from glotouch_bt.robot.scene import Mesh
+
+YAWS = 72
+STRIDE = 2
+"""Table cells are two raster cells apart: 2.3 mm along x_P, 2.7 mm in height."""
+UNEVEN_M = 2e-3
+"""Neighbouring widths that differ by more are told apart by the pose, not by noise."""
+_CACHE_SIZE = 64
+_cache: dict[tuple[str, PadSpec], TargetModel] = {}
+
+
+@dataclass(frozen=True, eq=False)
+class TargetModel:
+    """Tables of one mesh for one pad. Build with `from_mesh`.
+
+    Attributes:
+        name: The mesh's name, for people only.
+        digest: The mesh's content hash.
+        pad: The pad.
+        phi_rad: (72,) relative yaws, from 0, evenly over the full turn.
+        l_m: (nl,) table shifts, symmetric about 0.
+        z_m: (nz,) table heights of the pads' mid-point.
+        reach_m: (72, nl, nz) largest coordinate along y_P inside the left pad's window; NaN where it is empty.
+        fine_m: (72, fl, fz) side images the tables come from (see `raster`); -inf where empty.
+        outline: What tracing it would report, about `centre_m`.
+        centre_m: (2,) middle of the smallest rectangle round the footprint, in the mesh's frame O.
+        height_m: Top above the floor; what touching it from above finds.
+        rho: Nonplanarity predicted for a 10 N touch, median over simulated touches (the paper's rho_M).
+        rho_sd: Its spread over touches (half the 16-84 % range).
+        normal_dispersion: 1 - |mean normal| over touched patches, mean over touches (the paper's d_M).
+        anisotropy: 1 - short / long of the smallest rectangle round the footprint (the paper's a_M).
+    """
+
+    name: str
+    digest: str
+    pad: PadSpec
+    phi_rad: Array
+    l_m: Array
+    z_m: Array
+    reach_m: Array32
+    fine_m: Array32
+    outline: Outline
+    centre_m: Array
+    height_m: float
+    rho: float
+    rho_sd: float
+    normal_dispersion: float
+    anisotropy: float
+    _lazy: dict[str, Array32] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def from_mesh(cls, mesh: Mesh, pad: PadSpec | None = None) -> TargetModel:
+        """Build (about 0.3 s) or fetch from the in-memory cache, keyed by content and pad."""
+        pad = pad or PadSpec()
+        key = (mesh.digest, pad)
+        if key not in _cache:
+            while len(_cache) >= _CACHE_SIZE:
+                del _cache[next(iter(_cache))]
+            _cache[key] = _build(mesh, pad)
+        return _cache[key]
+
+    @cached_property
+    def width_m(self) -> Array32:
+        """(72, nl, nz) support width W(l, z; phi), eq. (finite_window_width); NaN where a window is empty."""
+        return self.reach_m + mirrored(self.reach_m)
+
+    @cached_property
+    def unevenness_m(self) -> Array32:
+        """(72, nl, nz) RMS change of `width_m` to the six cells beside, at most 2 mm."""
+        w, most = self.width_m, np.float32(UNEVEN_M**2)
+        total = np.zeros_like(w)
+        for axis, wraps in ((0, True), (1, False), (2, False)):
+            step = np.diff(w, axis=axis, append=w[:1] if wraps else np.take(w, [-1], axis=axis)) ** 2
+            step = np.fmin(step, most)  # beside an empty window, the most
+            total += step + np.roll(step, 1, axis=axis)
+        return np.asarray(np.sqrt(total / 6))
+
+    @property
+    def narrowest_m(self) -> float:
+        """Least support width at the middle of the footprint, over all yaws and heights."""
+        through = self.width_m[:, len(self.l_m) // 2]
+        return float(np.nanmin(through)) if np.isfinite(through).any() else float("inf")
+
+    @cached_property
+    def middle_m(self) -> Array32:
+        """(72, nl, nz) y_P of the point halfway between the supports, where jaws that centre it have their middle."""
+        return np.float32(0.5) * (self.reach_m - mirrored(self.reach_m))
+
+    @property
+    def images(self) -> Array32:
+        """(72, nl, nz, 35) image features the LEFT pad shows at `pad.force_N`; built at first use (0.4 s)."""
+        if "images" not in self._lazy:
+            features = image_feature(pooled_images(self.fine_m, STRIDE, self.pad))
+            self._lazy["images"] = np.ascontiguousarray(features.transpose(2, 1, 0, 3), dtype=np.float32)
+        return self._lazy["images"].transpose(2, 1, 0, 3)
+
+    @property
+    def images_by_height(self) -> Array32:
+        """The same as stored, (nz, nl, 72, 35): what lies under a few shifts at one height is one piece of memory."""
+        return self.images.transpose(2, 1, 0, 3)
+
+    @property
+    def image_norms(self) -> Array32:
+        """(nz, nl, 72) squared norm of each image feature."""
+        if "image_norms" not in self._lazy:
+            table = self.images_by_height
+            self._lazy["image_norms"] = np.asarray(np.einsum("...i,...i->...", table, table))
+        return self._lazy["image_norms"]
+
+    def width_at(self, l_m: float, z_m: float, phi_rad: float) -> float:
+        """One support width by linear interpolation of the table; NaN outside it."""
+        n = len(self.phi_rad)
+        at = (phi_rad / (2 * np.pi) * n) % n
+        i, f = int(at), at % 1.0
+        total = 0.0
+        for j, w in ((i % n, 1 - f), ((i + 1) % n, f)):
+            a, wl = _bracket(self.l_m, l_m)
+            b, wz = _bracket(self.z_m, z_m)
+            if a < 0 or b < 0:
+                return float("nan")
+            t = self.width_m[j, a : a + 2, b : b + 2]
+            total += w * float(np.array([1 - wl, wl]) @ t.astype(np.float64) @ np.array([1 - wz, wz]))
+        return total
+
+
+def _bracket(grid: Array, x: float) -> tuple[int, float]:
+    t = (x - grid[0]) / (grid[1] - grid[0])
+    i = int(np.floor(t))
+    if i < 0 or i > len(grid) - 1 or (i == len(grid) - 1 and t > i):
+        return -1, 0.0
+    i = min(i, len(grid) - 2)
+    return i, float(t - i)
+
+
+def _build(mesh: Mesh, pad: PadSpec) -> TargetModel:
+    solid = mesh.as_trimesh()
+    long, short, _, middle = minimum_rectangle(mesh.vertices_m[:, :2])
+    solid.apply_translation([-middle[0], -middle[1], 0.0])
+    outline = traced_outline(solid)
+    top = float(mesh.vertices_m[:, 2].max())
+    step_l, step_z = pad.window_m[0] / FINE[1], pad.window_m[1] / FINE[0]
+    radius = float(np.hypot(*np.abs(solid.vertices[:, :2]).max(axis=0)))
+    n = int(np.ceil((radius + 0.5 * pad.window_m[0]) / (STRIDE * step_l))) * STRIDE + FINE[1] // 2
+    fine_l = np.asarray(np.arange(-n, n + 1) * step_l, dtype=np.float64)
+    # Heights: pad centres from 8 mm to 8 mm above the top; the raster reaches half a window farther on both sides.
+    centres = np.asarray(np.arange(0.008, top + 0.008, STRIDE * step_z), dtype=np.float64)
+    half = FINE[0] // 2
+    rows = np.arange(STRIDE * (len(centres) - 1) + 1 + 2 * half) - half
+    fine_z = np.asarray(centres[0] + rows * step_z, dtype=np.float64)
+    phi = np.asarray(np.arange(YAWS) * (2 * np.pi / YAWS), dtype=np.float64)
+    fine = side_images(solid, phi, fine_l, fine_z)
+    h = FINE[1] // 2
+    reach = window_max(fine)[:, h:-h:STRIDE, half:-half:STRIDE]
+    reach = np.where(np.isfinite(reach), reach, np.nan).astype(np.float32)
+    rho, rho_sd, dispersion = simulated_statistics(fine, STRIDE, pad)
+    for a in (reach, fine):
+        a.setflags(write=False)
+    return TargetModel(
+        mesh.name, mesh.digest, pad, phi, fine_l[h:-h:STRIDE], centres, reach, fine, outline, middle, top, rho, rho_sd,
+        dispersion, 1.0 - short / long,
+    )  # fmt: skip

@@ -1,0 +1,148 @@
+"""Support widths of the target at every hypothesis: eq. (finite_window_width), with scale.
+
+A solid of scale s in a window of fixed size is the unscaled solid in a window of 1/s that size, times s. The window is
+a whole, odd number of raster cells, so its sides are exact at s = 1 and within one cell (1.2 x 1.4 mm) elsewhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from glotouch_bt.perception.recognition.model import FINE, STRIDE, Array32, PadSpec, TargetModel, mirrored
+from glotouch_bt.perception.recognition.paper.params import PaperParams
+from glotouch_bt.robot import Array
+
+Index = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+_CACHE_SIZE = 32
+_cache: dict[tuple[str, PadSpec, tuple[float, ...]], tuple[WidthTable, ...]] = {}
+
+
+@dataclass(frozen=True, eq=False)
+class WidthTable:
+    """Widths of the model at one scale.
+
+    Attributes:
+        scale: s.
+        l_m, z_m: (nl,), (nz,) coordinates of the SCALED model: along the window from the footprint's middle; height.
+        width_m: (yaws, nl, nz); where a pad's window is empty, the largest of the neighbours, for interpolation.
+        supported: (yaws, nl, nz) no window is empty.
+        middle_m: (yaws, nl, nz) closing-direction coordinate halfway between the two supports.
+    """
+
+    scale: float
+    l_m: Array
+    z_m: Array
+    width_m: Array32
+    supported: Mask
+    middle_m: Array32
+
+
+def width_tables(model: TargetModel, scales: tuple[float, ...]) -> tuple[WidthTable, ...]:
+    """One table a scale, kept in memory by the mesh's content."""
+    key = (model.digest, model.pad, scales)
+    if key not in _cache:
+        while len(_cache) >= _CACHE_SIZE:
+            del _cache[next(iter(_cache))]
+        _cache[key] = tuple(_table(model, s) for s in scales)
+    return _cache[key]
+
+
+def _table(model: TargetModel, scale: float) -> WidthTable:
+    rows, cols = (_odd(n / scale) for n in FINE)
+    edge_z, edge_l = (n // 2 for n in FINE)
+    reach = ndimage.maximum_filter1d(model.fine_m, cols, axis=1, mode="constant", cval=-np.inf)
+    reach = ndimage.maximum_filter1d(reach, rows, axis=2, mode="constant", cval=-np.inf)
+    reach = reach[:, edge_l:-edge_l:STRIDE, edge_z:-edge_z:STRIDE]
+    reach = np.where(np.isfinite(reach), reach, np.nan).astype(np.float32) * np.float32(scale)
+    other = mirrored(reach)
+    width, middle = reach + other, np.float32(0.5) * (reach - other)
+    supported = np.isfinite(width)
+    near = ndimage.maximum_filter(np.where(supported, width, np.float32(0)), size=(1, 3, 3), mode="constant")
+    width = np.where(supported, width, near)
+    for a in (width, supported, middle):
+        a.setflags(write=False)
+    return WidthTable(scale, model.l_m * scale, model.z_m * scale, width, supported, middle)
+
+
+def _odd(x: float) -> int:
+    return 2 * int(np.floor(0.5 * x)) + 1
+
+
+@dataclass(frozen=True)
+class Hypotheses:
+    """The grid of nuisance poses, flattened to N = scales x yaws x shifts x heights (in this order, C).
+
+    Attributes:
+        scale, shift_m, z0_m: (ns,), (nd,), (nz,) values.
+        yaws: Count of relative yaws over the full turn; half of them are the scan's reflections.
+    """
+
+    scale: Array
+    yaws: int
+    shift_m: Array
+    z0_m: Array
+
+    @classmethod
+    def of(cls, model: TargetModel, p: PaperParams) -> Hypotheses:
+        """What `p` asks for."""
+        return cls(np.array(p.scales), len(model.phi_rad), span(p.shift_m, p.shift_steps), span(p.z0_m, p.z0_steps))
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """(scales, yaws, shifts, heights)."""
+        return len(self.scale), self.yaws, len(self.shift_m), len(self.z0_m)
+
+    @property
+    def scale_of_each(self) -> Array32:
+        """(N,) scale of every hypothesis."""
+        return np.repeat(self.scale, int(np.prod(self.shape[1:]))).astype(np.float32)
+
+    @property
+    def off_centre(self) -> Array32:
+        """(N,) (delta / largest)^2 + (z_0 / largest)^2, from 0 to 2."""
+        d, z = (np.square(v / max(float(np.abs(v).max()), 1e-9)) for v in (self.shift_m, self.z0_m))
+        one = (d[:, None] + z[None, :]).reshape(-1).astype(np.float32)
+        return np.tile(one, len(self.scale) * self.yaws)
+
+
+def span(limit: float, n: int) -> Array:
+    """n values evenly over +-limit; zero if n is 1."""
+    return np.linspace(-limit, limit, n) if n > 1 else np.zeros(1)
+
+
+def predicted_widths(tables: tuple[WidthTable, ...], along_m: float, height_m: Array, grid: Hypotheses) -> Array32:
+    """(H, N) widths W(a + delta, z + z_0; s, theta) of one sequence at every hypothesis; NaN without support.
+
+    Widths are interpolated; whether there is support is what the nearest table cell says.
+
+    Args:
+        tables: One a scale of `grid`.
+        along_m: a_k.
+        height_m: (H,) layer heights.
+        grid: The hypotheses.
+    """
+    _, yaws, nd, nz = grid.shape
+    layers = len(height_m)
+    out = np.zeros((layers, *grid.shape), dtype=np.float32)
+    heights = (height_m[:, None] + grid.z0_m[None, :]).reshape(-1)
+    for n, t in enumerate(tables):
+        i, f, nearest_l = _positions(t.l_m, along_m + grid.shift_m)
+        j, g, nearest_z = _positions(t.z_m, heights)
+        columns = t.width_m[:, i] * (1 - f)[:, None] + t.width_m[:, i + 1] * f[:, None]  # (yaws, nd, table heights)
+        w = columns[:, :, j] * (1 - g) + columns[:, :, j + 1] * g
+        w[~t.supported[:, nearest_l][:, :, nearest_z]] = np.nan
+        out[:, n] = w.reshape(yaws, nd, layers, nz).transpose(2, 0, 1, 3)
+    return out.reshape(layers, -1)
+
+
+def _positions(axis: Array, x: Array) -> tuple[Index, Array32, Index]:
+    """Cell and fraction for linear interpolation, and nearest cell; the fraction is NaN outside the axis."""
+    t = (x - axis[0]) / (axis[1] - axis[0])
+    i = np.clip(np.floor(t).astype(np.int64), 0, len(axis) - 2)
+    f = np.where((t >= -0.5) & (t <= len(axis) - 0.5), np.clip(t - i, 0, 1), np.nan)
+    return i, f.astype(np.float32), np.clip(np.rint(t).astype(np.int64), 0, len(axis) - 1)

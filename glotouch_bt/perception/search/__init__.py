@@ -1,0 +1,63 @@
+"""Where to probe next. Pure: a map in, moves out."""
+
+from glotouch_bt.perception.search.candidates import Admitted, admit, elsewhere_m, joins, of_another, part_of, refined
+from glotouch_bt.perception.search.map import Exclusion, SearchMap
+from glotouch_bt.perception.search.moves import Felt, Move, MoveKind, Plan, T
+from glotouch_bt.perception.search.policies import (
+    PAPER_PASSES,
+    POLICIES,
+    ExpectationParams,
+    ExpectedFind,
+    NearestFrontier,
+    SearchPolicy,
+    Stretch,
+    search_policy,
+)
+from glotouch_bt.perception.search.ring import outline_of, trace_ring, with_second_ring
+from glotouch_bt.perception.search.routes import Routes, segment_is_free
+from glotouch_bt.perception.search.seeking import Sought, seek
+from glotouch_bt.perception.search.top import BallMove, Met, Top, TopPlan, TopRule, rounds, top_plan
+from glotouch_bt.perception.search.tracing import Trace, TraceParams, trace, trace_more
+
+__all__ = [
+    "PAPER_PASSES",
+    "POLICIES",
+    "Admitted",
+    "BallMove",
+    "Exclusion",
+    "ExpectationParams",
+    "ExpectedFind",
+    "Felt",
+    "Met",
+    "Move",
+    "MoveKind",
+    "NearestFrontier",
+    "Plan",
+    "Routes",
+    "SearchMap",
+    "SearchPolicy",
+    "Sought",
+    "Stretch",
+    "T",
+    "Top",
+    "TopPlan",
+    "TopRule",
+    "Trace",
+    "TraceParams",
+    "admit",
+    "elsewhere_m",
+    "joins",
+    "of_another",
+    "outline_of",
+    "part_of",
+    "refined",
+    "rounds",
+    "search_policy",
+    "seek",
+    "segment_is_free",
+    "top_plan",
+    "trace",
+    "trace_more",
+    "trace_ring",
+    "with_second_ring",
+]

@@ -1,0 +1,17 @@
+"""TODO door of glotouch_bt/perception/search/policies."""
+
+from glotouch_bt.perception.search.policies.expectation import ExpectationParams, ExpectedFind
+from glotouch_bt.perception.search.policies.frontier import PAPER_PASSES, NearestFrontier
+from glotouch_bt.perception.search.policies.policy import SearchPolicy, Stretch
+from glotouch_bt.perception.search.policies.registry import POLICIES, search_policy
+
+__all__ = [
+    "PAPER_PASSES",
+    "POLICIES",
+    "ExpectationParams",
+    "ExpectedFind",
+    "NearestFrontier",
+    "SearchPolicy",
+    "Stretch",
+    "search_policy",
+]

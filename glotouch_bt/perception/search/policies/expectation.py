@@ -1,0 +1,226 @@
+"""Where to sweep next: the way on which most of the objects still hidden are expected soonest.
+
+The belief is a weight for every place and size an unseen object may have: discs on a grid, of a few radii. A disc that
+a swept path would have touched, or that overlaps a traced object, is ruled out; one nearer to a wall or to an object
+than objects usually stand is unlikely, not impossible. A way finds what lies within its swath. The way chosen maximises
+the weight found, each find discounted by the travel up to it (a usual surrogate of expected search time; Stone, Theory
+of Optimal Search, 1975), over sequences of straight legs between the nodes of a lattice, by beam search; only its first
+leg is gone before the question is asked anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from glotouch_bt.perception.search.map import Exclusion, Mask, SearchMap
+from glotouch_bt.perception.search.policies.frontier import NearestFrontier
+from glotouch_bt.perception.search.policies.policy import Stretch
+from glotouch_bt.perception.search.routes import Routes, segment_is_free
+from glotouch_bt.perception.touch import signed_distance
+from glotouch_bt.robot import Array
+
+Indices = npt.NDArray[np.int64]
+SAMPLE_M = 0.008
+"""Legs are checked against envelopes this often."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExpectationParams:
+    """Lengths in metres.
+
+    Attributes:
+        radii_m: Half mean widths of the objects expected, about equally likely: 4-11 cm long things.
+        grid_m: Spacing of the places.
+        node_m: Spacing of the lattice of ways.
+        leg_m: Longest single leg of the lattice.
+        tip_radius_m: Of the ball.
+        touch: A disc counts as ruled out when the path came within this part of its radius plus the ball's.
+        gap_m: Objects usually stand this far from walls and from each other ...
+        gap_weight: ... and nearer only with this weight.
+        wall_m: The tip's centre keeps so far from the walls.
+        discount_m: A find after this much more travel is worth 1/e.
+        depth, width: Legs looked ahead, and ways kept.
+        left: When less than this part of the weight is left, the frontier search sweeps up what was missed.
+    """
+
+    radii_m: tuple[float, ...] = (0.020, 0.028, 0.038)
+    grid_m: float = 0.0125
+    node_m: float = 0.034
+    leg_m: float = 0.13
+    tip_radius_m: float = 0.006
+    touch: float = 0.85
+    gap_m: float = 0.030
+    gap_weight: float = 0.05
+    wall_m: float = 0.012
+    discount_m: float = 0.25
+    depth: int = 5
+    width: int = 16
+    left: float = 0.004
+
+
+@dataclass(frozen=True)
+class _Lattice:
+    """Places, nodes, legs, and what each leg's swath holds.
+
+    Attributes:
+        centre, radius, prior: (h, 2), (h,), (h,) of every place-and-size.
+        nodes: (n, 2).
+        ends: (l, 2) from and to node of every leg, each way.
+        length: (l,).
+        swath: (l, h) float32, 1 where the leg touches the disc.
+        first: (n + 1,) legs of node i are first[i]..first[i + 1].
+        samples, owner: points along all legs (s, 2) and the leg of each (s,).
+    """
+
+    centre: Array
+    radius: Array
+    prior: Array
+    nodes: Array
+    ends: Indices
+    length: Array
+    swath: npt.NDArray[np.float32]
+    first: Indices
+    samples: Array
+    owner: Indices
+
+
+def touched(centre: Array, reach: Array, a: Array, b: Array) -> Mask:
+    """(l, h): segments a-b (l, 2) come within reach (h,) of centre (h, 2)."""
+    ab = b - a
+    square = np.maximum((ab * ab).sum(axis=1), 1e-12)
+    t = ((centre[None] - a[:, None]) * ab[:, None]).sum(axis=2) / square[:, None]
+    nearest = a[:, None] + np.clip(t, 0.0, 1.0)[..., None] * ab[:, None]
+    return np.asarray(((centre[None] - nearest) ** 2).sum(axis=2) < reach[None] ** 2)
+
+
+@lru_cache(maxsize=4)
+def _lattice(half: tuple[float, float], p: ExpectationParams) -> _Lattice:
+    inner = np.array(half) + p.wall_m
+    axes = [np.linspace(-h, h, max(round(2 * h / p.grid_m) + 1, 2)) for h in inner]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    centre = np.concatenate([grid] * len(p.radii_m))
+    radius = np.repeat(np.array(p.radii_m), len(grid))
+    room = (inner - np.abs(centre)).min(axis=1) - radius
+    prior = np.where(room >= p.gap_m, 1.0, p.gap_weight) * (room >= 0)
+    keep = prior > 0
+    centre, radius, prior = centre[keep], radius[keep], prior[keep]
+    for r in p.radii_m:  # every size as likely
+        prior[radius == r] /= max(prior[radius == r].sum(), 1e-9) * len(p.radii_m)
+    node_axes = [np.linspace(-h, h, max(round(2 * h / p.node_m) + 1, 2)) for h in half]
+    nodes = np.stack(np.meshgrid(*node_axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    distance = np.linalg.norm(nodes[:, None] - nodes[None], axis=2)
+    start, end = np.nonzero((distance > 0) & (distance <= p.leg_m))
+    swath = np.concatenate([
+        touched(centre, p.touch * (radius + p.tip_radius_m), nodes[start[i : i + 256]], nodes[end[i : i + 256]])
+        for i in range(0, len(start), 256)
+    ]).astype(np.float32)  # fmt: skip
+    first = np.searchsorted(start, np.arange(len(nodes) + 1))
+    length = distance[start, end]
+    count = np.maximum(np.ceil(length / SAMPLE_M).astype(int) + 1, 2)
+    owner = np.repeat(np.arange(len(start)), count)
+    t = np.concatenate([np.linspace(0, 1, c) for c in count])[:, None]
+    samples = (1 - t) * nodes[start][owner] + t * nodes[end][owner]
+    ends = np.column_stack([start, end])
+    return _Lattice(centre, radius, prior, nodes, ends, length, swath, np.asarray(first), samples, owner)
+
+
+@lru_cache(maxsize=8)
+def _free_legs(half: tuple[float, float], p: ExpectationParams, exclusions: tuple[Exclusion, ...]) -> Mask:
+    lattice = _lattice(half, p)
+    free = np.ones(len(lattice.ends), dtype=np.bool_)
+    for e in exclusions:
+        free[lattice.owner[e.clearance(lattice.samples) < 0.0]] = False
+    return free
+
+
+class ExpectedFind:
+    """See the module. Stateless; takes some 20 ms a question, the first one half a second.
+
+    Args:
+        params: See `ExpectationParams`.
+    """
+
+    def __init__(self, params: ExpectationParams | None = None) -> None:
+        self.params = params or ExpectationParams()
+        self._rest = NearestFrontier(passes=((1.0, 0.0), (0.6, 0.0)))
+
+    def weights(self, belief: SearchMap) -> tuple[Array, Array, Array]:
+        """Centres (h, 2), radii (h,) and weights (h,) of what may still be hidden; they sum to 1 before any search."""
+        p = self.params
+        lattice = _lattice(_half(belief), p)
+        weight = lattice.prior.copy()
+        weight[belief.path_distance(lattice.centre) < p.touch * (lattice.radius + p.tip_radius_m)] = 0.0
+        for e in belief.exclusions:
+            gap = signed_distance(e.contour, lattice.centre) - lattice.radius
+            weight *= np.where(gap < 0.0, 0.0, np.where(gap < p.gap_m, p.gap_weight, 1.0))
+        if len(belief.dropped):
+            near = np.linalg.norm(lattice.centre[:, None] - belief.dropped[None], axis=2).min(axis=1)
+            weight[near < p.tip_radius_m] = 0.0
+        return lattice.centre, lattice.radius, weight
+
+    def next_stretch(self, belief: SearchMap, tip_K_m: Array) -> Stretch | None:
+        """See `SearchPolicy`."""
+        tip = np.asarray(tip_K_m, dtype=np.float64)[:2]
+        _, _, weight = self.weights(belief)
+        if weight.sum() > self.params.left:
+            node = self._first_node(belief, tip, weight.astype(np.float32))
+            if node is not None:
+                if segment_is_free(belief, tip, node):
+                    return Stretch(node[None, :])
+                way = Routes(belief, tip).to(node)
+                if way is not None:
+                    return Stretch(way)
+        return self._rest.next_stretch(belief, tip)
+
+    def _first_node(self, belief: SearchMap, tip: Array, weight: npt.NDArray[np.float32]) -> Array | None:
+        """End of the best way's first leg, or None if no way finds anything."""
+        p, half = self.params, _half(belief)
+        lattice = _lattice(half, p)
+        free = _free_legs(half, p, belief.exclusions)
+        reach = p.touch * (lattice.radius + p.tip_radius_m)
+        lengths = Routes(belief, tip).lengths(lattice.nodes)
+        straight = np.linalg.norm(lattice.nodes - tip, axis=1)
+        # a first leg beyond the lattice's longest is for coming out of places where all near is known
+        near = np.argsort(np.where(np.isfinite(lengths), lengths, 9.0), kind="stable")[: 4 * p.width + 16]
+        near = near[
+            np.isfinite(lengths[near]) & (straight[near] > 1e-3) & ~belief.inside_exclusion(lattice.nodes[near])
+        ]
+        if len(near) == 0:
+            return None
+        swath = touched(lattice.centre, reach, np.broadcast_to(tip, (len(near), 2)), lattice.nodes[near])
+        left = weight[None] * ~swath
+        mass = weight.sum() - left.sum(axis=1)
+        length = lengths[near]
+        score = mass * np.exp(-0.5 * length / p.discount_m)
+        node, root = near.copy(), near.copy()
+        best_score, best_root = float(np.max(score)), int(root[int(np.argmax(score))])
+        for _ in range(p.depth - 1):
+            kept = np.argsort(-score, kind="stable")[: p.width]
+            parent, leg = [], []
+            for i in kept:
+                legs = np.arange(lattice.first[node[i]], lattice.first[node[i] + 1])
+                legs = legs[free[legs]]
+                parent.append(np.full(len(legs), i))
+                leg.append(legs)
+            parents, legs = np.concatenate(parent), np.concatenate(leg)
+            if len(legs) == 0:
+                break
+            gained = np.concatenate([lattice.swath[ls] @ left[i] for i, ls in zip(kept, leg, strict=True)])
+            middle = length[parents] + 0.5 * lattice.length[legs]
+            score = score[parents] + gained * np.exp(-middle / p.discount_m)
+            top = np.argsort(-score, kind="stable")[: 3 * p.width]
+            parents, legs, score = parents[top], legs[top], score[top]
+            left = left[parents] * (1.0 - lattice.swath[legs])
+            length = length[parents] + lattice.length[legs]
+            root, node = root[parents], lattice.ends[legs, 1]
+            if float(score[0]) > best_score:
+                best_score, best_root = float(score[0]), int(root[0])
+        return lattice.nodes[best_root] if best_score > 1e-6 else None
+
+
+def _half(belief: SearchMap) -> tuple[float, float]:
+    return float(belief.half_extent_m[0]), float(belief.half_extent_m[1])

@@ -1,0 +1,364 @@
+"""Round an object: where the next probe says most for the way it costs, and when enough is known (paper III-D)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from glotouch_bt.perception.search.moves import Move, Plan
+from glotouch_bt.perception.search.tracing.trace_params import TraceParams
+from glotouch_bt.perception.search.tracing.trace_state import BEARINGS, Trace, TraceState, all_bearings, unit
+from glotouch_bt.perception.touch import Contact
+from glotouch_bt.perception.touch.outline import OutlineBelief, wrapped
+from glotouch_bt.robot import Array
+
+LEAST_MORE = 3
+"""Contacts made of an object that was thought to be known."""
+BESIDE_RAD = np.deg2rad(10.0)
+"""The ball is not sent nearer than this to the bearing of something else beside the object."""
+OUTWARDS_M = (0.0, 0.012, 0.024)
+"""Where the ball lands on what nothing predicted, it is brought down so much farther out, and finds a limb's end."""
+OWN_M = 0.030
+"""What is met beside a lone contact, this near to it, is the same thing: objects stand so far apart."""
+LOST = 2
+"""After so many misses in a row round a lone contact, what is ahead of it is not what was touched."""
+INSIDE_M = 0.004
+"""A probe that came this near to the object's supposed middle has passed through: nothing is there."""
+
+
+def trace(
+    first: Contact,
+    tip_K_m: Array,
+    tip_radius_m: float,
+    params: TraceParams | None = None,
+    *,
+    round_tip: bool = True,
+    half_extent_m: Array | None = None,
+    known: tuple[Contact, ...] = (),
+    elsewhere: Callable[[Contact], bool] | None = None,
+    joined: Callable[[tuple[Contact, ...]], bool] | None = None,
+) -> Plan[Trace]:
+    """Trace the outline of what was touched. The ball ends beside it, at sensing height.
+
+    Args:
+        first: The contact that found it; the ball may have been retreated from it.
+        tip_K_m: (2,) where the ball is.
+        tip_radius_m: Its radius; of another section, that of a disc about as large.
+        params: See `TraceParams`.
+        round_tip: The section is a disc: outlines are fitted to its centres. Else to the contacts' points.
+        half_extent_m: (2,) the ball's centre keeps within |x|, |y| of it in K; None: no walls near.
+        known: Contacts with the same object made before, where it stands now.
+        elsewhere: Whether a contact is with another object that is known already; None: none is.
+        joined: Whether these contacts show that it is an object known already; None: they never do.
+    """
+    p = params or TraceParams()
+    s = TraceState.begin([*_still(known), first], tip_K_m, tip_radius_m, round_tip, half_extent_m)
+    s.given = len(known)
+    yield from _retreat(s, p)
+    return (yield from _until_known(s, p, elsewhere, joined))
+
+
+def trace_more(
+    known: tuple[Contact, ...],
+    tip_K_m: Array,
+    tip_radius_m: float,
+    params: TraceParams | None = None,
+    *,
+    round_tip: bool = True,
+    half_extent_m: Array | None = None,
+) -> Plan[Trace]:
+    """Go on tracing what was traced before, from above: come down where the outline is least certain.
+
+    Args:
+        known: Its contacts, where it stands now.
+        tip_K_m, tip_radius_m, params, round_tip, half_extent_m: As for `trace`; the ball may be raised.
+    """
+    p = params or TraceParams()
+    s = TraceState.begin(_still(known), tip_K_m, tip_radius_m, round_tip, half_extent_m)
+    s.known = s.given = len(known)
+    outline = s.outline()
+    bearings = all_bearings()
+    distance, sd = s.ring(outline, bearings, p)
+    within = np.all(np.abs(_beside(outline, bearings, distance, sd, p)) <= s.half, axis=1)
+    for i in _apart(np.where(within, sd, -1.0), p.misses):
+        if not (yield from _come_down(outline, s, p, float(bearings[i]))):
+            continue
+        felt = yield Move("probe", outline.centre_K_m + INSIDE_M * unit(s.tip - outline.centre_K_m))
+        s.felt(felt)
+        if felt.contact is not None and s.belongs(outline, felt.contact, p):
+            s.add(felt.contact, outline, p)
+            yield from _retreat(s, p)
+            return (yield from _until_known(s, p))
+    return replace(s.trace(outline, "it was not met again"), missing=True)
+
+
+def _still(contacts: tuple[Contact, ...]) -> list[Contact]:
+    """They are where the object stands now: the pushes they made are in their places."""
+    return [replace(c, pushed_K_m=np.zeros(2)) for c in contacts]
+
+
+def _apart(worth: Array, n: int) -> list[int]:
+    """Indices of up to n bearings of the most worth, none next to another; those below zero left out."""
+    chosen: list[int] = []
+    for i in np.argsort(-worth, kind="stable"):
+        gaps = [min(abs(int(i) - j), BEARINGS - abs(int(i) - j)) for j in chosen]
+        if worth[i] >= 0 and all(g >= BEARINGS // 12 for g in gaps):
+            chosen.append(int(i))
+        if len(chosen) == n:
+            break
+    return chosen
+
+
+def _until_known(
+    s: TraceState,
+    p: TraceParams,
+    elsewhere: Callable[[Contact], bool] | None = None,
+    joined: Callable[[tuple[Contact, ...]], bool] | None = None,
+) -> Plan[Trace]:
+    """Probe on until enough is known, from beside the object.
+
+    Once a contact was odd, each one asks whether the object moved without being felt to: three are needed to tell.
+    """
+    outline, missed, ended, about = s.outline(), 0, "", False
+    while not ended:
+        ended = _enough(outline, s, p)
+        if not ended and joined is not None and len(s.raw) >= p.least_contacts and joined(s.present()):
+            ended = "it is an object that is known"
+        if ended:
+            break
+        aim, beside = _choose(outline, s, p), False
+        if (aim is None or missed == LOST) and not about and s.lone(OWN_M):
+            about, bearing = True, s.bearing(outline)
+            found = yield from _feel_about(s, p)
+            beside = found is not None and s.near(found, OWN_M)
+        elif aim is None:
+            ended = "no side is left that can be reached"
+            break
+        else:
+            bearing, s.side = aim.bearing, s.side or aim.side
+            found = yield from _probe_at(outline, s, p, aim)
+        if found is None:
+            missed += 1
+            s.blocked.append(bearing)
+        elif not (elsewhere is not None and elsewhere(found)) and (beside or s.belongs(outline, found, p)):
+            if s.is_new(found, p):
+                missed = 0
+            else:
+                missed += 1
+                s.blocked.append(bearing)
+            s.add(found, outline, p)
+            yield from _retreat(s, p)
+            if s.begin_anew(p):
+                missed = 0
+        else:
+            missed += 1
+            s.strays.append(found)
+            s.blocked.append(bearing)
+            s.felt((yield Move("retreat", s.tip + p.clearance_m * unit(found.reaction_K[:2]))))
+        if missed > p.misses:
+            ended = f"{missed} probes in a row told nothing"
+        outline = s.outline()
+        if s.keep_one(outline, p):
+            outline, missed, ended = s.outline(), 0, ""
+    return s.trace(outline, ended)
+
+
+def _retreat(s: TraceState, p: TraceParams) -> Plan[None]:
+    """Away from the last contact until the clearance is reached, along what the force, rather than the approach, says
+    is outwards (they differ for a graze)."""
+    last = s.raw[-1]
+    out = unit(2.0 * last.reaction_K[:2] - last.approach_K[:2])
+    way = p.clearance_m - float((s.tip - last.tip_K_m[:2]) @ out)
+    if way > 5e-4:
+        s.felt((yield Move("retreat", s.tip + way * out)))
+
+
+def _enough(outline: OutlineBelief, s: TraceState, p: TraceParams) -> str:
+    n = len(s.raw)
+    if n >= p.most_contacts and (s.known or n >= s.given + LEAST_MORE):
+        return f"{n} contacts"
+    if (
+        n < p.least_contacts
+        or max(outline.contour.size_m) < p.smallest_m
+        or (s.known and s.odd >= 0 and n < s.odd + p.settling)
+    ):
+        return ""
+    _, sd = s.ring(outline, all_bearings(), p)
+    centre_sd = np.sqrt(outline.centre_sd_m**2 + np.diag(s.shift_covariance(p)))
+    if np.max(centre_sd) <= p.centre_sd_m and float(np.max(sd)) <= p.radial_sd_m:
+        return "the outline is known"
+    return ""
+
+
+class _Aim(NamedTuple):
+    """A bearing to be probed, rad; which way round (+1 counter-clockwise); whether it is reached over the top."""
+
+    bearing: float
+    side: float
+    over: bool
+
+
+def _choose(outline: OutlineBelief, s: TraceState, p: TraceParams) -> _Aim | None:
+    """The bearing with the most uncertainty for the way to it; None if none can be reached."""
+    bearings = all_bearings()
+    distance, sd = s.ring(outline, bearings, p)
+    here = s.bearing(outline)
+    walled = np.any(np.abs(_beside(outline, bearings, distance, sd, p)) > s.half, axis=1)
+    over_m = np.where(walled, np.inf, p.hop_m)
+    best, worth = None, 0.0
+    step = 2 * np.pi / BEARINGS
+    for side in (1.0, -1.0):
+        turn = wrapped(side * (bearings - here)) % (2 * np.pi)
+        order = np.argsort(turn, kind="stable")
+        way = np.zeros(BEARINGS)
+        way[order] = np.cumsum((distance + p.clearance_m)[order] * step)
+        barred = (way > p.step_m) | (turn > np.pi) | (turn > _barred(outline, s, p, here, side)) | s.raised
+        over = barred & np.isfinite(over_m)
+        gain = sd**p.keen / (np.where(barred, over_m, way) + p.way_m)
+        if side == -s.side:
+            gain *= p.back
+        if s.blocked:
+            near = np.min(np.abs(wrapped(bearings[:, None] - np.array(s.blocked)[None, :])), axis=1)
+            gain[near < np.deg2rad(12.0)] = 0.0
+        i = int(np.argmax(gain))
+        if gain[i] > worth:
+            best, worth = _Aim(float(bearings[i]), side, bool(over[i])), float(gain[i])
+    return best
+
+
+def _barred(outline: OutlineBelief, s: TraceState, p: TraceParams, here: float, side: float) -> float:
+    """How far, rad, the way round is free of what is not the object: strays beside it stand in the way."""
+    off = np.array([c.tip_K_m[:2] for c in s.strays]).reshape(-1, 2) - outline.centre_K_m
+    at = np.arctan2(off[:, 1], off[:, 0])
+    beside = np.hypot(off[:, 0], off[:, 1]) < s.passing(outline, at, p) + s.radius
+    turns = wrapped(side * (at[beside] - here)) % (2 * np.pi)
+    return float(np.min(turns - BESIDE_RAD, initial=2 * np.pi))
+
+
+def _probe_at(outline: OutlineBelief, s: TraceState, p: TraceParams, aim: _Aim) -> Plan[Contact | None]:
+    """To the bearing aimed at, and inwards. A touch on the way round is as good as the one that was meant.
+
+    Where the way round is too uncertain to be planned, the ball goes on along the surface it touched last.
+    """
+    if aim.over:
+        if not (yield from _come_down(outline, s, p, aim.bearing)):
+            return None
+    else:
+        beside = float(np.linalg.norm(s.tip - s.raw[-1].tip_K_m[:2])) < 3.0 * p.clearance_m
+        if beside and _doubt(outline, s, p, aim.bearing, aim.side) > p.doubt_m:
+            return (yield from _along(s, p, aim.side))
+        for waypoint in _way_round(outline, s, p, aim.bearing, aim.side):
+            felt = yield Move("step", waypoint)
+            s.felt(felt)
+            if felt.refused:
+                return None
+            if felt.contact is not None:
+                return felt.contact
+    distance, sd = (float(v[0]) for v in s.ring(outline, np.array([aim.bearing]), p))
+    inner = max(distance - p.reach_sds * sd - 0.003, INSIDE_M)
+    u = np.array([np.cos(aim.bearing), np.sin(aim.bearing)])
+    felt = yield Move("probe", outline.centre_K_m + inner * u)
+    s.felt(felt)
+    return felt.contact
+
+
+def _come_down(outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: float) -> Plan[bool]:
+    """Over the top to beside `bearing`, or farther out where the ball lands on the object. Whether it is down."""
+    at = np.array([bearing])
+    distance, sd = s.ring(outline, at, p)
+    for farther in OUTWARDS_M:
+        place = _beside(outline, at, distance + farther, sd, p)[0]
+        if np.any(np.abs(place) > s.half):
+            return False
+        felt = yield Move("hop", place)
+        s.felt(felt)
+        if felt.refused:
+            return False
+        s.raised = felt.contact is not None
+        if not s.raised:
+            return True
+    return False
+
+
+def _beside(outline: OutlineBelief, bearings: Array, distance: Array, sd: Array, p: TraceParams) -> Array:
+    """(n, 2) places to come down at, clear of what is predicted at these distances from the outline's middle."""
+    ring = distance + p.clearance_m + np.minimum(2.0 * sd, p.widest_margin_m)
+    return np.asarray(outline.centre_K_m + ring[:, None] * np.column_stack([np.cos(bearings), np.sin(bearings)]))
+
+
+def _doubt(outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: float, side: float) -> float:
+    """Largest standard deviation of the outline on the way round to `bearing`."""
+    _, sd = s.ring(outline, _angles(outline, s, bearing, side), p)
+    return float(np.max(sd))
+
+
+def _along(s: TraceState, p: TraceParams, side: float) -> Plan[Contact | None]:
+    """A step along the tangent of the last contact, and inwards from there."""
+    last = s.raw[-1]
+    normal = unit(2.0 * last.reaction_K[:2] - last.approach_K[:2])
+    goal = np.clip(s.tip + p.along_m * side * np.array([-normal[1], normal[0]]), -s.half, s.half)
+    for move in (Move("step", goal), Move("probe", goal - (p.clearance_m + p.along_reach_m) * normal)):
+        felt = yield move
+        s.felt(felt)
+        if felt.refused or felt.contact is not None:
+            return felt.contact
+    return None
+
+
+def _feel_about(s: TraceState, p: TraceParams) -> Plan[Contact | None]:
+    """Along the surface to either side of the last contact, the side away from the way round so far first.
+
+    What was touched at its end, a limb say, is not ahead of the contact, where every outline would have it.
+    """
+    last = s.raw[-1]
+    beside = last.tip_K_m[:2] + p.clearance_m * unit(2.0 * last.reaction_K[:2] - last.approach_K[:2])
+    for side in (-(s.side or 1.0), s.side or 1.0):
+        felt = yield Move("step", np.clip(beside, -s.half, s.half))
+        s.felt(felt)
+        if felt.refused or felt.contact is not None:
+            return felt.contact
+        found = yield from _along(s, p, side)
+        if found is not None:
+            return found
+    return None
+
+
+def _angles(outline: OutlineBelief, s: TraceState, bearing: float, side: float) -> Array:
+    """(k,) bearings on the way round from where the ball is, this left out, to `bearing`."""
+    here = s.bearing(outline)
+    turn = float(wrapped(np.array(side * (bearing - here))) % (2 * np.pi))
+    n = max(int(np.ceil(turn / np.deg2rad(5.0))), 1)
+    return np.asarray(here + side * np.linspace(0.0, turn, n + 1)[1:])
+
+
+def _way_round(outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: float, side: float) -> Array:
+    """(k, 2) waypoints outside the predicted outline, from where the ball is to `bearing`, pulled tight."""
+    angles = _angles(outline, s, bearing, side)
+    ring = s.passing(outline, angles, p)
+    points = outline.centre_K_m + ring[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    points = np.clip(points, -s.half, s.half)
+    return _tight(s, points, outline, p)
+
+
+def _tight(s: TraceState, points: Array, outline: OutlineBelief, p: TraceParams) -> Array:
+    """Leave out what can be cut without coming nearer to the predicted outline than the clearance."""
+    kept: list[Array] = []
+    here, i = s.tip, 0
+    while i < len(points):
+        j = len(points) - 1
+        while j > i and not _clear(s, here, points[j], outline, p):
+            j -= 1
+        here = points[j]
+        kept.append(here)
+        i = j + 1
+    return np.array(kept)
+
+
+def _clear(s: TraceState, a: Array, b: Array, outline: OutlineBelief, p: TraceParams) -> bool:
+    t = np.linspace(0.0, 1.0, 12)[1:-1, None]
+    d = (1 - t) * a + t * b - outline.centre_K_m
+    least = s.passing(outline, np.arctan2(d[:, 1], d[:, 0]), p, 0.7, 0.5)
+    return bool(np.all(np.hypot(d[:, 0], d[:, 1]) >= least))

@@ -1,0 +1,175 @@
+"""The contact guard: the soft rule that ends a guarded move (paper III-A); `hard_stop` is the rule beside it.
+
+Signal: LPF(wrench - baseline - inertia of what is carried), fused to a force at the tip. The rule needs the force that
+opposes the motion AND the total force (or the moment) above their thresholds for N samples running.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from glotouch_bt.perception.touch.detection.baseline import Baseline
+from glotouch_bt.perception.touch.detection.filtering import LowPass
+from glotouch_bt.perception.touch.detection.fusion import TipFusion
+from glotouch_bt.perception.touch.detection.guard_params import GuardParams
+from glotouch_bt.perception.touch.detection.onset import onset_index
+from glotouch_bt.robot import Array, Observation, ParamError, Pose, frozen_array, quat_to_matrix
+
+HISTORY_BLOCKS = 10
+"""Blocks kept for dating an onset: 100 ms at 100 Hz, of which the last third may belong to the contact."""
+DRIFT_S = 2.0
+"""While a paused motion stands, what changes over this time or slower is the sensor's drift (harsh CONDITIONS: 0.02 N
+in it), what changes faster is a push."""
+
+
+@dataclass(frozen=True)
+class Onset:
+    """The beginning of a contact.
+
+    Attributes:
+        stamp_s: Robot clock when the contact began (sensor latency removed).
+        position_B_P: (3,) pads' mid-point in B then.
+        quat_B_P: (4,) its orientation then.
+        force_B: (3,) filtered force on the tip when the guard tripped, in B.
+        peak_N: Largest unfiltered tip force seen up to the end of that block.
+        detected_s: Robot clock of the sample at which the guard tripped.
+    """
+
+    stamp_s: float
+    position_B_P: Array
+    quat_B_P: Array
+    force_B: Array
+    peak_N: float
+    detected_s: float
+
+
+class ContactGuard:
+    """Listens for a contact at the tip during one guarded move; call it with every observation, in order.
+
+    The hand keeps its orientation during a guarded move; the newest one of each block is used.
+
+    Args:
+        baseline: The wrench that means "nothing touched", taken at rest just before the move.
+        approach_B: (3,) direction of the motion in B, or None: a force in any direction counts (arcs).
+        tip_P_m: (3,) the tip in P.
+        pose_E_P: P in E (S = E).
+        params: Thresholds.
+        inertial: Gives the (n, 6) wrench in S that the hand's own acceleration causes in a block's n samples, as
+            `inertia.MeasuredInertia` does; None: the hand is not accelerated, or too little to matter.
+
+    Raises:
+        ParamError: An approach of no length or a wrong shape.
+    """
+
+    def __init__(
+        self,
+        baseline: Baseline,
+        approach_B: Array | None,
+        tip_P_m: Array,
+        pose_E_P: Pose,
+        params: GuardParams,
+        inertial: Callable[[Observation], Array] | None = None,
+    ) -> None:
+        self.params = params
+        self._inertial = inertial
+        self._baseline = baseline
+        self._zero = baseline.median
+        self._fusion = TipFusion.for_tip(tip_P_m, pose_E_P, baseline.sd)
+        self._R_P_E = pose_E_P.rotation.T
+        self._low_pass = LowPass(6, params.cutoff_Hz, params.rate_Hz)
+        self._gain = self._fusion.gain
+        self._sigmas = params.sigmas * math.sqrt(self._low_pass.noise_gain**2 + baseline.median_variance)
+        self._R_B_S: Array = np.eye(3)
+        self._history: deque[tuple[Observation, Array]] = deque(maxlen=HISTORY_BLOCKS)
+        self._approach_B: Array | None = None
+        if approach_B is not None:
+            a = frozen_array("approach_B", approach_B, (3,))
+            norm = float(np.linalg.norm(a))
+            if norm < 1e-9:
+                raise ParamError("approach_B", a.tolist(), "a direction of some length, or None")
+            self._approach_B = a / norm
+        self._above = np.zeros(params.consecutive - 1, dtype=np.int64)
+        self._onset: Onset | None = None
+
+    def __call__(self, observation: Observation) -> Onset | None:
+        """The onset once the soft rule has tripped (the same one ever after), else None."""
+        if self._onset is not None:
+            return self._onset
+        residual = observation.wrench_S - self._zero
+        if self._inertial is not None:
+            residual -= self._inertial(observation)
+        smooth = self._low_pass(residual)
+        self._history.append((observation, residual))
+        force = smooth @ self._gain.T
+        self._R_B_S = quat_to_matrix(observation.quat_B_P[-1]) @ self._R_P_E
+        above = self._soft_rule(force, smooth[:, 3:])
+        if above is None:
+            if not np.count_nonzero(self._above):
+                return None
+            above = np.zeros(len(force), dtype=np.int64)
+        carried = np.concatenate([self._above, above])
+        n = self.params.consecutive
+        self._above = carried[len(carried) - n + 1 :]
+        if not above.any():
+            return None
+        tripped = np.nonzero(np.convolve(carried, np.ones(n, np.int64), "valid") == n)[0]
+        if len(tripped):
+            self._onset = self._date(observation, int(tripped[0]), force[tripped[0]])
+        return self._onset
+
+    def standing(self, observation: Observation) -> Onset | None:
+        """As a call, while the hand stands still in a pause: the zero follows the sensor's drift meanwhile."""
+        onset = self(observation)
+        if onset is None:
+            share = len(observation.stamp_s) / (DRIFT_S * self.params.rate_Hz)
+            self._zero = self._zero + share * self._history[-1][1].mean(axis=0)
+        return onset
+
+    def _soft_rule(self, force_S: Array, moment_S: Array) -> npt.NDArray[np.int64] | None:
+        """(n,) 1 where a sample fulfils the soft rule; None if surely none does, told as early as it is clear."""
+        p, opposing = self.params, None
+        if self._approach_B is not None:
+            approach_S = self._approach_B @ self._R_B_S
+            against = force_S @ approach_S
+            if not np.count_nonzero(against < -p.directional_N):
+                return None
+            opposing = against < -max(p.directional_N, self._sigmas * self._fusion.sd_along(approach_S))
+            if not np.count_nonzero(opposing):
+                return None
+        square = (force_S * force_S).sum(axis=1)
+        if opposing is None and not np.count_nonzero(square > p.total_N**2):
+            return None
+        # sigma along each sample's own direction times its norm: compares without dividing by a norm that may be zero
+        variance = ((force_S @ self._fusion.covariance) * force_S).sum(axis=1)
+        strong = (square > p.total_N**2) & (square * square > self._sigmas**2 * variance)
+        if opposing is None:
+            return np.asarray(strong, dtype=np.int64)
+        moment = (moment_S * moment_S).sum(axis=1) > p.moment_Nm**2
+        return np.asarray(opposing & (strong | moment), dtype=np.int64)
+
+    def _date(self, o: Observation, trip: int, force_S: Array) -> Onset:
+        stamps = np.concatenate([b.stamp_s for b, _ in self._history])
+        positions = np.concatenate([b.position_B_P for b, _ in self._history])
+        quats = np.concatenate([b.quat_B_P for b, _ in self._history])
+        raw = self._fusion(np.concatenate([r for _, r in self._history]))
+        direction = force_S / np.linalg.norm(force_S)
+        if self._approach_B is not None:
+            direction = -(self._approach_B @ self._R_B_S)
+        at = onset_index(raw @ direction, len(stamps) - len(o.stamp_s) + trip, self._fusion.sd_along(direction))
+        stamp = float(np.interp(at, np.arange(len(stamps)), stamps)) - self.params.latency_s
+        stamp = max(stamp, float(stamps[0]))
+        position = np.array([np.interp(stamp, stamps, positions[:, i]) for i in range(3)])
+        return Onset(
+            stamp_s=stamp,
+            position_B_P=position,
+            quat_B_P=quats[int(np.argmin(np.abs(stamps - stamp)))].copy(),
+            force_B=self._R_B_S @ force_S,
+            peak_N=float(np.sqrt(np.max(np.sum(raw**2, axis=1)))),
+            detected_s=float(o.stamp_s[trip]),
+        )

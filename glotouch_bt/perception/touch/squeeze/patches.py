@@ -1,0 +1,87 @@
+"""What one depth map says: contact mask, support patches, relative nonplanarity, evidence weight (paper IV-A)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from glotouch_bt.perception.touch.values import Layer
+from glotouch_bt.robot import Array
+
+THRESHOLD_M = 8e-5
+"""Indentation that is contact: four standard deviations of a taxel in the nominal conditions (0.02 mm)."""
+MIN_TAXELS = 12
+"""A smaller patch supports no plane: three parameters and dead taxels."""
+BILATERAL, UNILATERAL, INVALID = 1.0, 0.4, 0.0
+"""Evidence weight of a layer with both pads, one pad, no pad in contact. The paper orders them and gives no numbers."""
+
+
+@dataclass(frozen=True)
+class PatchStats:
+    """One pad's contact.
+
+    Attributes:
+        valid: At least one support patch is large enough.
+        mask: (rows, cols) taxels of the valid patches, bool.
+        patches: How many valid patches.
+        area_fraction: Valid patches' area over the area of all living taxels.
+        valid_fraction: Taxels of valid patches over all taxels above the threshold; 0 without contact.
+        rho: Relative nonplanarity RMS(D - plane) / q90(D) of the largest patch; NaN if not valid.
+        depth_q90_m: 90th percentile of the indentation over the valid patches; 0 without contact.
+    """
+
+    valid: bool
+    mask: np.typing.NDArray[np.bool_]
+    patches: int
+    area_fraction: float
+    valid_fraction: float
+    rho: float
+    depth_q90_m: float
+
+
+def patch_statistics(depth_m: Array, *, threshold_m: float = THRESHOLD_M, min_taxels: int = MIN_TAXELS) -> PatchStats:
+    """Statistics of one depth map (rows, cols), m, positive indented, NaN dead (eq. relative_nonplanarity)."""
+    depth = np.asarray(depth_m, dtype=np.float64)
+    alive = np.isfinite(depth)
+    touched = alive & (np.nan_to_num(depth, nan=0.0) > threshold_m)
+    # A dead taxel must not cut a patch in two: bridge it for the labelling only.
+    bridged = touched | (~alive & ndimage.binary_dilation(touched))
+    labels, count = ndimage.label(bridged)
+    sizes = np.bincount(labels[touched], minlength=count + 1)
+    sizes[0] = 0
+    large = sizes >= min_taxels
+    mask = touched & large[labels]
+    if not mask.any():
+        return PatchStats(False, mask, 0, 0.0, 0.0, float("nan"), 0.0)
+    largest = touched & (labels == int(np.argmax(sizes)))
+    return PatchStats(
+        valid=True,
+        mask=mask,
+        patches=int(np.count_nonzero(large)),
+        area_fraction=float(mask.sum() / max(int(alive.sum()), 1)),
+        valid_fraction=float(mask.sum() / touched.sum()),
+        rho=relative_nonplanarity(depth, largest),
+        depth_q90_m=float(np.quantile(depth[mask], 0.9)),
+    )
+
+
+def relative_nonplanarity(depth_m: Array, mask: np.typing.NDArray[np.bool_]) -> float:
+    """RMS of the residual to the least-squares plane over the 90th percentile of the depth, on the mask's taxels."""
+    rows, cols = np.nonzero(mask)
+    values = depth_m[mask]
+    q90 = float(np.quantile(values, 0.9))
+    if len(values) < 3 or q90 <= 0:
+        return float("nan")
+    basis = np.column_stack([rows - rows.mean(), cols - cols.mean(), np.ones(len(rows))])
+    plane = basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
+    return float(np.sqrt(np.mean((values - plane) ** 2)) / q90)
+
+
+def evidence_weight(layer: Layer) -> float:
+    """Bilateral contact counts fully, unilateral less, and an unstable layer or one without contact not at all."""
+    if not layer.stable:
+        return INVALID
+    sides = sum(patch_statistics(d).valid for d in (layer.left_m, layer.right_m))
+    return (INVALID, UNILATERAL, BILATERAL)[sides]

@@ -1,0 +1,166 @@
+"""From a closing pair of jaws to one evidence layer (paper IV-A): aperture plateau, temporal median."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from glotouch_bt.perception.touch.squeeze.object_motion import Yielding
+from glotouch_bt.perception.touch.values import Layer
+from glotouch_bt.robot import Array, Observation, ParamError, TactileFrame
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlateauParams:
+    """When a closure counts.
+
+    Attributes:
+        duration_s: The plateau must have lasted this long. Source: six periods of a 60 Hz tactile sensor.
+        tolerance_m: Largest drift of the aperture over it: difference of the means of its two halves, above what its
+            own scatter explains. Source: a quarter of a millimetre is the aperture's noise (harsh) with a margin.
+        force_fraction: Part of the commanded jaw force that must be reached; an empty closure never reaches it.
+        arm_m: Largest movement of the pads' mid-point over the plateau. Source: half a pad pixel.
+        empty_m: A smaller aperture is jaws that met each other. Source: aperture bias of the harsh conditions.
+    """
+
+    duration_s: float = 0.1
+    tolerance_m: float = 0.00025
+    force_fraction: float = 0.7
+    arm_m: float = 0.0005
+    empty_m: float = 0.003
+
+    def __post_init__(self) -> None:
+        for name in ("duration_s", "tolerance_m", "force_fraction", "arm_m", "empty_m"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0):
+                raise ParamError(name, value, "finite and positive")
+
+
+@dataclass(frozen=True)
+class Plateau:
+    """The end of a closure.
+
+    Attributes:
+        stable: All of the plateau's conditions hold.
+        aperture_m: Median aperture over it.
+        force_N: Median jaw force over it.
+        start_s: Robot clock at its beginning.
+        why_not: Which condition fails, for the journal; "" if stable.
+    """
+
+    stable: bool
+    aperture_m: float
+    force_N: float
+    start_s: float
+    why_not: str
+
+
+def find_plateau(blocks: Sequence[Observation], force_N: float, params: PlateauParams | None = None) -> Plateau:
+    """Judge the last `duration_s` of a closure commanded with jaw force `force_N`.
+
+    Raises:
+        ParamError: No blocks.
+    """
+    p = params or PlateauParams()
+    if not blocks:
+        raise ParamError("blocks", 0, "at least one observation")
+    end = blocks[-1].now_s
+    window = [b for b in blocks if b.now_s > end - p.duration_s + 1e-9]
+    aperture = np.array([b.gripper.aperture_m for b in window])
+    force = np.array([b.gripper.force_N for b in window])
+    start = float(window[0].stamp_s[0])
+    half = len(aperture) // 2
+    drift = scatter = 0.0
+    if half:
+        drift = abs(float(np.mean(aperture[half:]) - np.mean(aperture[:half])))
+        scatter = 2.0 * float(np.std(np.diff(aperture))) / np.sqrt(len(aperture))
+    positions = np.concatenate([b.position_B_P for b in window])
+    moved = float(np.max(np.linalg.norm(positions - positions[-1], axis=1)))
+    felt = float(np.median(force))
+    opening = float(np.median(aperture))
+    first = float(blocks[0].stamp_s[0])
+    if end - first < 0.8 * p.duration_s:
+        why = f"watched for {end - first:.3f} s only"
+    elif drift > p.tolerance_m + scatter:
+        why = f"aperture still drifts by {1e3 * drift:.2f} mm"
+    elif felt < p.force_fraction * force_N:
+        why = f"jaw force {felt:.1f} N of {force_N:.1f} N"
+    elif opening < p.empty_m:
+        why = f"jaws met at {1e3 * opening:.1f} mm"
+    elif moved > p.arm_m:
+        why = f"the arm moved {1e3 * moved:.2f} mm"
+    else:
+        why = ""
+    return Plateau(not why, opening, felt, start, why)
+
+
+def temporal_median(frames: Sequence[TactileFrame], shape: tuple[int, int]) -> tuple[Array, Array]:
+    """Taxel-wise median over time of left and right maps, (rows, cols), m; NaN where no frame delivered the taxel.
+
+    No frame at all gives maps of NaN.
+
+    Raises:
+        ParamError: A frame of another shape.
+    """
+    for f in frames:
+        if f.left_m.shape != shape or f.right_m.shape != shape:
+            raise ParamError("frames", (f.left_m.shape, f.right_m.shape), f"maps of shape {shape}")
+    if not frames:
+        return np.full(shape, np.nan), np.full(shape, np.nan)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # an all-NaN taxel stays NaN; that is meant
+        left, right = (
+            np.nanmedian(np.stack(m), axis=0) for m in zip(*((f.left_m, f.right_m) for f in frames), strict=True)
+        )
+    return np.asarray(left), np.asarray(right)
+
+
+def make_layer(
+    blocks: Sequence[Observation],
+    *,
+    height_m: float,
+    position_K_m: Array,
+    yaw_rad: float,
+    force_N: float,
+    pad_shape: tuple[int, int],
+    params: PlateauParams | None = None,
+    yielding: Yielding | None = None,
+) -> Layer:
+    """One closure as a `Layer`: aperture and force on the plateau, median maps of the frames TAKEN during it.
+
+    Args:
+        blocks: Observations of the closure, oldest first, tactile frames asked for.
+        height_m: Pads' mid-point above the floor.
+        position_K_m: (2,) pads' mid-point in K.
+        yaw_rad: Direction of x_P in K.
+        force_N: Commanded jaw force.
+        pad_shape: (rows, cols) of the maps.
+        params: Plateau conditions.
+        yielding: What the closure did to the object, if it was watched.
+
+    Raises:
+        ParamError: No blocks, or maps of another shape.
+    """
+    plateau = find_plateau(blocks, force_N, params)
+    frames = [b.tactile for b in blocks if b.tactile is not None]
+    # Frames arrive late: keep those taken on the plateau, or the newest if none was.
+    on_plateau = [f for f in frames if f.stamp_s >= plateau.start_s] or frames[-1:]
+    left, right = temporal_median(on_plateau, pad_shape)
+    return Layer(
+        height_m=height_m,
+        aperture_m=plateau.aperture_m,
+        position_K_m=np.asarray(position_K_m, dtype=np.float64)[:2],
+        yaw_rad=yaw_rad,
+        left_m=left,
+        right_m=right,
+        force_N=plateau.force_N,
+        stable=plateau.stable,
+        why_not=plateau.why_not,
+        slide_m=math.nan if yielding is None else yielding.slide_m,
+        turn_rad=math.nan if yielding is None else yielding.turn_rad,
+        gave_m=math.nan if yielding is None else yielding.gave_m,
+    )

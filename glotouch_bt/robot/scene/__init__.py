@@ -1,0 +1,22 @@
+"""TODO door of glotouch_bt/robot/scene."""
+
+from glotouch_bt.robot.scene.conditions import Conditions
+from glotouch_bt.robot.scene.meshes import Mesh, load_folder, load_mesh
+from glotouch_bt.robot.scene.placement import Placement, draw_layout
+from glotouch_bt.robot.scene.streams import stream
+from glotouch_bt.robot.scene.world import Container, Holder, ObjectSet, Probe, World
+
+__all__ = [
+    "Conditions",
+    "Container",
+    "Holder",
+    "Mesh",
+    "ObjectSet",
+    "Placement",
+    "Probe",
+    "World",
+    "draw_layout",
+    "load_folder",
+    "load_mesh",
+    "stream",
+]

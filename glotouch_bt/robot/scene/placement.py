@@ -1,0 +1,147 @@
+"""Random layouts: upright objects in the container, at a uniform position and yaw, none too near another or a wall.
+
+Rejection sampling, one object after another (largest first), restarted when it has painted itself into a corner.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from glotouch_bt.robot.errors import BadInput
+from glotouch_bt.robot.geometry import Array
+from glotouch_bt.robot.scene.meshes import Mesh
+from glotouch_bt.robot.scene.streams import stream
+from glotouch_bt.robot.scene.world import World
+
+TRIES_PER_OBJECT = 400
+RESTARTS = 60
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where one object stands: its mesh frame's origin on the floor, and yaw about z, in K."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+
+def outline(mesh: Mesh) -> Array:
+    """Convex outline (n, 2) of the whole mesh seen from above, anticlockwise, in the mesh frame, m."""
+    xy = np.asarray(mesh.vertices_m)[:, :2]
+    return np.asarray(xy[ConvexHull(xy).vertices], dtype=np.float64)
+
+
+def transformed(outline_m: Array, place: Placement) -> Array:
+    """The outline (n, 2) as placed."""
+    c, s = np.cos(place.yaw_rad), np.sin(place.yaw_rad)
+    return np.asarray(outline_m @ np.array([[c, s], [-s, c]]) + (place.x_m, place.y_m))
+
+
+def _points_to_edges(points: Array, polygon: Array) -> float:
+    """Least distance from points (n, 2) to the closed boundary of polygon (m, 2)."""
+    a = polygon
+    ab = np.roll(polygon, -1, axis=0) - a
+    ap = points[:, None, :] - a[None, :, :]
+    t = np.clip((ap * ab).sum(-1) / np.maximum((ab * ab).sum(-1), 1e-18), 0.0, 1.0)
+    return float(np.linalg.norm(ap - t[..., None] * ab, axis=-1).min())
+
+
+def gap(first: Array, second: Array) -> float:
+    """Distance between two convex polygons (n, 2), anticlockwise; 0 if they overlap.
+
+    Two disjoint convex polygons are separated along the normal of an edge of one of them, and the nearest points
+    include a vertex of one (Ericson, Real-Time Collision Detection, 5.4 and 9.1).
+    """
+    separated = False
+    for a, b in ((first, second), (second, first)):
+        edge = np.roll(a, -1, axis=0) - a
+        normal = np.stack([edge[:, 1], -edge[:, 0]], axis=1)
+        if (((b[None] - a[:, None]) * normal[:, None]).sum(-1).min(axis=1) > 0.0).any():
+            separated = True
+            break
+    if not separated:
+        return 0.0
+    return min(_points_to_edges(first, second), _points_to_edges(second, first))
+
+
+def _place_all(
+    outlines: Sequence[Array], half: Array, min_gap_m: float, min_wall_gap_m: float, rng: np.random.Generator
+) -> list[Placement] | int:
+    """One attempt at all outlines in the given order; the index that found no room if it fails."""
+    done: list[Placement] = []
+    polygons: list[Array] = []
+    room = half - min_wall_gap_m
+    for i, shape in enumerate(outlines):
+        reach = float(np.linalg.norm(shape, axis=1).max())
+        for _ in range(TRIES_PER_OBJECT):
+            x, y = rng.uniform(-half - reach, half + reach)
+            place = Placement(float(x), float(y), float(rng.uniform(-np.pi, np.pi)))
+            polygon = transformed(shape, place)
+            if (np.abs(polygon) > room).any():
+                continue
+            if all(gap(polygon, other) >= min_gap_m for other in polygons):
+                done.append(place)
+                polygons.append(polygon)
+                break
+        else:
+            return i
+    return done
+
+
+def place_objects(
+    meshes: Sequence[Mesh],
+    interior_m: tuple[float, float],
+    min_gap_m: float,
+    min_wall_gap_m: float,
+    rng: np.random.Generator,
+) -> list[Placement]:
+    """A random layout in K, in the order of `meshes`.
+
+    Args:
+        meshes: What to place.
+        interior_m: Interior size along x_K and y_K.
+        min_gap_m: Least distance between the convex outlines of two objects.
+        min_wall_gap_m: Least distance between an outline and a wall.
+        rng: Source of all draws.
+
+    Raises:
+        BadInput: They do not fit (or only by unlikely luck); says which object and how much room there is.
+    """
+    outlines = [outline(m) for m in meshes]
+    half = 0.5 * np.array(interior_m)
+    areas = [ConvexHull(o).volume for o in outlines]  # in the plane, scipy's volume is the area
+    order = sorted(range(len(meshes)), key=lambda i: (-areas[i], i))
+    failed = 0
+    for _ in range(RESTARTS):
+        result = _place_all([outlines[i] for i in order], half, min_gap_m, min_wall_gap_m, rng)
+        if isinstance(result, list):
+            places: list[Placement] = [result[0]] * len(meshes) if result else []
+            for i, place in zip(order, result, strict=True):
+                places[i] = place
+            return places
+        failed = max(failed, result)
+    name = meshes[order[failed]].name
+    raise BadInput(
+        f"{len(meshes)} objects do not fit into the container: no room found for {name!r} after {RESTARTS} layouts "
+        f"(outlines cover {sum(areas) * 1e4:.0f} of {interior_m[0] * interior_m[1] * 1e4:.0f} cm2, gaps of "
+        f"{min_gap_m * 1e3:.0f} mm between objects and {min_wall_gap_m * 1e3:.0f} mm to walls asked); "
+        "use fewer or smaller objects, smaller gaps or a larger container"
+    )
+
+
+def draw_layout(meshes: Sequence[Mesh], world: World, seed: int) -> list[Placement]:
+    """The layout of a trial: every simulator that asks with the same seed places the same objects alike.
+
+    Raises:
+        BadInput: As `place_objects`.
+    """
+    objects = world.objects
+    interior = world.container.interior_m
+    return place_objects(
+        meshes, (interior[0], interior[1]), objects.min_gap_m, objects.min_wall_gap_m, stream(seed, "layout")
+    )

@@ -1,0 +1,89 @@
+"""Typed input and output ports of a skill, as descriptors over py_trees' ports."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Generic, TypeVar, cast, overload
+
+if TYPE_CHECKING:
+    from glotouch_bt.skill.skill import Skill
+
+T = TypeVar("T")
+
+
+class Port(Generic[T]):
+    """Base of input and output ports: a typed, described attribute of a skill that lives on the blackboard."""
+
+    def __init__(
+        self, data_type: type[T], description: str, *, key: str | None = None, element: type | None = None
+    ) -> None:
+        """`element`: type of the items, when the data type is a tuple (checked through for_each)."""
+        self.data_type, self.description, self._key, self.element = data_type, description, key, element
+        self.name = ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    @property
+    def key(self) -> str:
+        """Blackboard key this port is wired to unless the mission says otherwise."""
+        return self._key or self.name
+
+
+class In(Port[T]):
+    """An input port: read as an attribute. `required=False` gives None when nobody wrote it."""
+
+    def __init__(
+        self,
+        data_type: type[T],
+        description: str,
+        *,
+        key: str | None = None,
+        element: type | None = None,
+        required: bool = True,
+    ) -> None:
+        super().__init__(data_type, description, key=key, element=element)
+        self.required = required
+
+    @overload
+    def __get__(self, obj: None, owner: type) -> In[T]: ...
+    @overload
+    def __get__(self, obj: Skill, owner: type) -> T: ...
+    def __get__(self, obj: Skill | None, owner: type) -> In[T] | T:
+        if obj is None:
+            return self
+        if not self.required and not obj.blackboard_client.exists(self.name):
+            return cast(T, None)
+        return cast(T, obj.get_input(self.name))
+
+
+class Out(Port[T]):
+    """An output port: written as an attribute. `always=True` promises that it is written even when the skill fails.
+
+    `on_success`, `on_failure`: the value it then has, where the outcome says it all; `glotouch check` counts on it.
+    """
+
+    def __init__(
+        self,
+        data_type: type[T],
+        description: str,
+        *,
+        key: str | None = None,
+        element: type | None = None,
+        always: bool = False,
+        on_success: T | None = None,
+        on_failure: T | None = None,
+    ) -> None:
+        super().__init__(data_type, description, key=key, element=element)
+        self.always, self.on_success, self.on_failure = always, on_success, on_failure
+
+    @overload
+    def __get__(self, obj: None, owner: type) -> Out[T]: ...
+    @overload
+    def __get__(self, obj: Skill, owner: type) -> T: ...
+    def __get__(self, obj: Skill | None, owner: type) -> Out[T] | T:
+        if obj is None:
+            return self
+        return cast(T, obj.get_last_output(self.name))
+
+    def __set__(self, obj: Skill, value: T) -> None:
+        obj.write_port(self.name, value)

@@ -1,0 +1,195 @@
+"""What a skill is: a py_trees leaf with typed ports whose body is a generator of commands.
+
+    class Approach(Skill):
+        "Advance until touch. SUCCESS: touched. FAILURE no_touch: the travel ran out."
+
+        class Params(SkillParams):
+            travel_m: float = param("Longest free travel", unit="m", default=0.05, ge=0.0, le=0.3)
+
+        start = In(Contact, "where to start")
+        contact = Out(Contact, "first touch, in K")
+
+        def run(self) -> SkillRun:
+            observation = yield HOLD                    # one yield = one control period
+            result = yield from self.context.arm.guarded_line(...)
+            if result.stop is None:
+                raise SkillFailed("no_touch", f"no touch in {self.params.travel_m} m", advice="sweep lower")
+            self.contact = ...
+
+`run` returns: SUCCESS. `SkillFailed` or `MotionRefused`: FAILURE with its reason. Anything else reaches the runner,
+which holds the arm. A preempted skill's generator is closed (its `finally` blocks run) and the arm is held; since it
+brakes past its last setpoint, the next skill first waits for it to stand and takes up the setpoint from there.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Generator, Mapping
+from types import MappingProxyType
+from typing import Any, ClassVar, Literal
+
+import py_trees
+from py_trees.common import Status
+from py_trees.ports import PortInformation, PortsMixin
+
+from glotouch_bt.robot import HOLD, Command, MotionRefused, Observation
+from glotouch_bt.skill.context import Context, SkillRun, come_to_rest
+from glotouch_bt.skill.failures import GENERAL_FAILURES, Reason, SkillFailed, UndeclaredFailure
+from glotouch_bt.skill.params import SkillParams
+from glotouch_bt.skill.ports import In, Out, Port
+
+NOTHING: Mapping[str, Any] = MappingProxyType({})
+UNCHANGED = "unchanged"
+"""In `AFTER_FAILURE`: the resource may be in the state in which the skill found it."""
+
+
+class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: ignore[call-arg]
+    """Base class of every skill; see the module's text. Subclass names are not used: entry points name skills.
+
+    What a skill promises about things that are no ports, for `glotouch check`; left out, it promises and asks nothing.
+    A resource is a name, `hand` above all, whose states are names too: a mission begins with the hand `empty`. A state
+    says what skills did on purpose. What was lost against their will is a fault: the next skill that needs it notices.
+
+    Attributes:
+        NEEDS: States of resources in which it may start.
+        LEAVES: Their states after SUCCESS; of those not named, what they were.
+        AFTER_FAILURE: What they may be after FAILURE (`UNCHANGED`: what they were); of those not named, what they were
+            or what they are after SUCCESS.
+        PUT_BACK_WITH: Of what it leaves, what should not outlast a mission unsaid, and the skill that puts it back.
+        USES: What it has for itself while it runs: no two skills that use the same may run at once.
+        FAILURES: Codes it may fail with, each in a few words (beside `GENERAL_FAILURES`).
+        PAUSE: What a pause does to it: `hold` (a motion stops where it is along its path, and its guard goes on
+            listening), `retreat` (the same, and a guarded motion also backs off a few millimetres the way it came),
+            `finish` (the present motion is made to its end). What stands under `arm.feed.finishing()`, as all that
+            moves the jaws, is finished in any case. A skill never notices: timeouts and durations do not run.
+        LONGEST_S: Longest duration of one run on the mission's clock: a skill that yields for ever ends with FAILURE
+            `skill_timeout`.
+    """
+
+    NEEDS: ClassVar[Mapping[str, frozenset[str]]] = NOTHING
+    LEAVES: ClassVar[Mapping[str, str]] = NOTHING
+    AFTER_FAILURE: ClassVar[Mapping[str, frozenset[str]]] = NOTHING
+    PUT_BACK_WITH: ClassVar[Mapping[str, str]] = NOTHING
+    USES: ClassVar[frozenset[str]] = frozenset()
+    FAILURES: ClassVar[Mapping[str, str]] = NOTHING
+    PAUSE: ClassVar[Literal["hold", "retreat", "finish"]] = "hold"
+    LONGEST_S: ClassVar[float] = 900.0
+
+    Params: ClassVar[type[SkillParams]] = SkillParams
+    INPUT_PORTS: ClassVar[dict[str, PortInformation]] = {}
+    OUTPUT_PORTS: ClassVar[dict[str, PortInformation]] = {}
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        ports = {n: p for c in reversed(cls.__mro__) for n, p in vars(c).items() if isinstance(p, Port)}
+        cls.INPUT_PORTS = {
+            n: PortInformation(p.data_type, required=p.required, description=p.description)
+            for n, p in ports.items()
+            if isinstance(p, In)
+        }
+        cls.OUTPUT_PORTS = {
+            n: PortInformation(p.data_type, description=p.description) for n, p in ports.items() if isinstance(p, Out)
+        }
+        kwargs.setdefault("register", False)
+        super().__init_subclass__(**kwargs)
+
+    def __init__(self, name: str, params: SkillParams, context: Context) -> None:
+        super().__init__(name)
+        self.params = params
+        self.context = context
+        self.reason: Reason | None = None
+        self._run: SkillRun | None = None
+
+    @classmethod
+    def default_keys(cls) -> dict[str, str]:
+        """Blackboard key of each port where a mission does not rewire it."""
+        return {n: getattr(cls, n).key for n in (*cls.INPUT_PORTS, *cls.OUTPUT_PORTS)}
+
+    def run(self) -> SkillRun:
+        """The skill's body; see the module's text."""
+        raise NotImplementedError(f"{type(self).__name__} has no run()")
+
+    def write_port(self, name: str, value: object) -> None:
+        """Write an output port (the public door to py_trees' protected setter)."""
+        self._set_output(name, value)
+
+    def event(self, kind: str, **data: object) -> None:
+        """Record an event of this skill at the robot's present time."""
+        self.context.journal.event(kind, self.context.observation.now_s, {"node": self.name, **data})
+
+    def remember(self) -> object:
+        """What this skill knows from one run to the next beyond its ports, for a checkpoint; None: nothing.
+
+        Plain values, arrays and dataclasses (`mission.values`). Override together with `recall`.
+        """
+        return None
+
+    def recall(self, remembered: Any) -> None:
+        """Take up what `remember` gave, in a new process."""
+
+    def initialise(self) -> None:
+        """Start the body; its first command comes with the first update."""
+        self.reason = None
+        self._run = self._body()
+        self._started = False
+        self._begun_s = self.context.mission_s
+
+    def _body(self) -> SkillRun:
+        if self.context.preempted:
+            yield from come_to_rest(self.context)
+        body: Generator[Command, Observation, object] = self.run()
+        returned = yield from body
+        if returned is not None:  # a status, most likely: it would pass as success
+            raise TypeError(f"run() returned {returned!r}; it returns nothing, and raises SkillFailed to fail")
+
+    def update(self) -> Status:
+        """Hand the newest observation to the body, take its next command."""
+        assert self._run is not None
+        if self.context.mission_s - self._begun_s > self.LONGEST_S:
+            return self._too_long()
+        try:
+            if self._started:
+                command = self._run.send(self.context.observation)
+            else:
+                self._started = True
+                command = next(self._run)
+        except StopIteration:
+            return Status.SUCCESS
+        except SkillFailed as e:
+            return self._fail(e.reason)
+        except MotionRefused as e:
+            return self._fail(Reason("motion_refused", str(e), advice="move the target or clear the way"))
+        if not isinstance(command, Command):
+            raise TypeError(f"run() yielded {command!r}; it yields a Command, such as HOLD")
+        self.context.command = command
+        return Status.RUNNING
+
+    def _too_long(self) -> Status:
+        self.context.preempted = True  # it may be broken off in a motion
+        message = f"it took longer than {self.LONGEST_S:g} s, the longest a {type(self).__name__} may take"
+        evidence = {"limit_s": self.LONGEST_S, "since_s": self._begun_s}
+        return self._fail(Reason("skill_timeout", message, evidence, "it hangs, or its task is larger than foreseen"))
+
+    @classmethod
+    def failure_codes(cls) -> dict[str, str]:
+        """Every code it may fail with, each in a few words."""
+        return {**cls.FAILURES, **GENERAL_FAILURES}
+
+    def _fail(self, reason: Reason) -> Status:
+        if self.FAILURES and reason.code not in self.failure_codes():
+            warnings.warn(f"{type(self).__name__} does not declare {reason.code!r}", UndeclaredFailure, stacklevel=2)
+        self.reason = dataclasses.replace(reason, node=self.name)
+        self.feedback_message = reason.message
+        return Status.FAILURE
+
+    def terminate(self, new_status: Status) -> None:
+        """Close the body; a preempted skill leaves the arm holding."""
+        preempted = self._run is not None and new_status is Status.INVALID
+        try:
+            if self._run is not None:
+                self._run.close()
+        finally:
+            self._run = None
+            if new_status is Status.INVALID:
+                self.context.command = HOLD
+                self.context.preempted |= preempted

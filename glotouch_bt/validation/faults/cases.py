@@ -1,0 +1,129 @@
+"""What `bench faults` tries: each class of fault with its parameters, how long it lasts, and where it can act."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from glotouch_bt.faults import CATALOGUE, FaultPlan, FaultSpec, Lasting, Repeat, When
+from glotouch_bt.mission.spec import Place
+from glotouch_bt.robot import BadInput, UnknownName
+
+SKILLS = ("tool_pickup", "guarded_sweep", "orbit_probe", "touch_top", "tool_return", "squeeze", "grasp", "lift")
+_PROBING = ("guarded_sweep", "orbit_probe", "touch_top")
+_JAWS = ("tool_pickup", "tool_return", "squeeze", "grasp")
+_AMONG_OBJECTS = ("guarded_sweep", "orbit_probe", "touch_top", "squeeze", "grasp")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One class of fault as it is tried.
+
+    Attributes:
+        fault: Name in the catalogue; also the case's.
+        given: Parameters beside their defaults.
+        lasting: How long it lasts.
+        skills: Where it can act at all.
+        warm_up_s: The trial runs for at least so long before the fault begins.
+    """
+
+    fault: str
+    given: Mapping[str, Any] = field(default_factory=dict)
+    lasting: Lasting = field(default_factory=lambda: Lasting(duration_s=2.0))
+    skills: tuple[str, ...] = SKILLS
+    warm_up_s: float = 0.5
+
+    @property
+    def recoverable(self) -> bool:
+        """A mission can still reach its goal."""
+        return CATALOGUE[self.fault].recoverable
+
+    def plan(self, skill: str, after_s: float) -> FaultPlan:
+        """The plan of one trial: once, in the skill's first run, so long after it began."""
+        kind = CATALOGUE[self.fault]
+        spec = FaultSpec(
+            self.fault,
+            kind,
+            kind.effect.Params(**self.given),
+            When(node=skill, after_s=after_s),
+            self.lasting,
+            Repeat(),
+            Place("bench faults"),
+        )
+        return FaultPlan(f"{self.fault} in {skill}", (spec,))
+
+
+def _s(seconds: float) -> Lasting:
+    return Lasting(duration_s=seconds)
+
+
+LEARNING_S = 8.0
+"""Supervision learns in 5 s what the sensor's noise is; a trial that goes on from a checkpoint learns it anew."""
+EVER = Lasting(until="ever")
+_NODE = Lasting(until="node")  # what changes the world may wait for room as long as the skill runs; it is never undone
+CASES: tuple[Case, ...] = (
+    Case("wrench_off", warm_up_s=LEARNING_S),
+    Case("wrench_stuck", warm_up_s=LEARNING_S),
+    Case("wrench_garbage", lasting=_s(0.2)),
+    Case("wrench_bias", {"force_N": (2.0, 1.0, 3.0)}, EVER),
+    Case("wrench_drift", lasting=_s(10.0)),
+    Case("wrench_scale"),
+    Case("wrench_noise"),
+    Case("wrench_delay"),
+    Case("wrench_intermittent"),
+    Case("wrench_saturation", {"force_N": 0.5, "torque_Nm": 0.05}, _s(6.0)),
+    Case("wrench_sign_flip"),
+    Case("following_error", {"offset_rad": 0.03}),
+    Case("lost_cycle"),
+    Case("slow_cycle", {"periods": 2, "share": 0.02}),
+    Case("stale_data", lasting=_s(0.3)),
+    Case("robot_fault"),
+    Case("exception"),
+    Case("stale_tare", lasting=EVER, skills=("tool_pickup", "tool_return")),
+    Case("touch_dead", lasting=EVER, skills=("squeeze",)),
+    Case("touch_frozen", lasting=EVER, skills=("squeeze",)),
+    Case("touch_dropped", lasting=_s(5.0), skills=("squeeze",)),
+    Case("touch_swapped", lasting=EVER, skills=("squeeze",)),
+    Case("gel_offset", lasting=EVER, skills=("squeeze",)),
+    Case("grip_stall", lasting=_NODE, skills=_JAWS),
+    Case("grip_short", lasting=_NODE, skills=_JAWS),
+    Case("grip_slip", lasting=EVER, skills=("tool_pickup", "grasp")),
+    Case("grip_drop", lasting=_s(1.0), skills=(*_PROBING, "tool_return", "lift")),
+    Case("object_shoved", lasting=_NODE, skills=_AMONG_OBJECTS),
+    Case("object_toppled", lasting=_NODE, skills=_AMONG_OBJECTS),
+    Case("object_removed", lasting=_NODE, skills=_AMONG_OBJECTS),
+    Case("wrong_scale_stl", lasting=EVER, skills=("tool_pickup",)),
+    Case("container_offset", lasting=_NODE, skills=_AMONG_OBJECTS),
+)
+
+
+def chosen_cases(names: Iterable[str]) -> tuple[Case, ...]:
+    """The cases of these names; all of them if there is no name.
+
+    Raises:
+        UnknownName: One is not tried by this bench.
+    """
+    known = {c.fault: c for c in CASES}
+    wanted = tuple(names)
+    for name in wanted:
+        if name not in known:
+            raise UnknownName("class of faults", name, known)
+    return tuple(known[n] for n in wanted) if wanted else CASES
+
+
+def chosen_skills(names: Iterable[str], cases: Sequence[Case]) -> tuple[str, ...]:
+    """The skills to break; all of them if there is no name.
+
+    Raises:
+        UnknownName: One is not broken by this bench.
+        BadInput: None of the cases acts in any of them.
+    """
+    wanted = tuple(names) or SKILLS
+    for name in wanted:
+        if name not in SKILLS:
+            raise UnknownName("skill that is broken here", name, SKILLS)
+    if not any(name in case.skills for case in cases for name in wanted):
+        acts = sorted({name for case in cases for name in case.skills})
+        raise BadInput(f"--skill {', '.join(wanted)}: no chosen fault acts there (they act in {', '.join(acts)})")
+    return wanted

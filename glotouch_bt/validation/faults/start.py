@@ -1,0 +1,55 @@
+"""A faulted trial goes on from a checkpoint of its unfaulted twin: what they have in common is run once.
+
+The checkpoint holds tree, ports and world, so that the trial is the twin, tick by tick, until the fault begins.
+"""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+from glotouch_bt.faults import FaultPlan
+from glotouch_bt.mission.checkpoint import FILE, CheckpointFile, Row
+from glotouch_bt.run import GoingOn, copy_run, find, installed_versions
+from glotouch_bt.validation.faults.rejoin import watched
+
+
+def _first(rows: list[Row], node: str) -> tuple[str, Row, int] | None:
+    """(path, the checkpoint before it began, its place among the rows)."""
+    for i, row in enumerate(rows[1:]):
+        for path in row.begun:
+            if path.rsplit("/", 1)[-1] == node:
+                return path, rows[i], i
+    return None
+
+
+def start_from(twin: Path, out: Path, plan: FaultPlan, warm_up_s: float) -> GoingOn | None:
+    """A copy of the twin's run in `out`, to go on with shortly before a fault; None if its node never ran.
+
+    Args:
+        twin: The folder of the unfaulted run.
+        out: Folder of the trial; what is in it is removed.
+        plan: Of one fault, in the first run of a node.
+        warm_up_s: The trial runs for at least so long before the fault begins, if the mission does.
+
+    Raises:
+        BadInput: The twin's checkpoints cannot be used.
+    """
+    (spec,) = plan.faults
+    file = CheckpointFile(twin / FILE)
+    try:
+        rows = file.rows()
+    finally:
+        file.close()
+    found = _first(rows, str(spec.when.node))
+    if found is None:
+        return None
+    path, before, index = found
+    begins_s = before.stamp_s + spec.when.after_s
+    soon = [r for r in rows[: index + 1] if r.stamp_s <= begins_s - warm_up_s] or rows[:1]
+    shutil.rmtree(out, ignore_errors=True)
+    copy_run(twin, out)
+    going_on = find(out, path, installed_versions())
+    going_on.file.close()
+    return replace(going_on, file=watched(out, twin, plan, begins_s), row=soon[-1], start="")

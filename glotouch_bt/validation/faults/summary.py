@@ -1,0 +1,90 @@
+"""The figures of `bench faults`: the matrix, and the rates that are asked for."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from glotouch_bt.bench import bootstrap_mean, wilson
+from glotouch_bt.faults import CATALOGUE
+from glotouch_bt.validation.faults.trial import VERDICTS
+
+Row = Mapping[str, Any]
+
+
+def summarise(rows: Sequence[Row]) -> dict[str, Any]:
+    """Rates with Wilson intervals over the trials in which something was really altered.
+
+    recovered: of faults a mission can recover from, on seeds whose twin succeeds. named: of trials that did not reach
+    the goal. What altered nothing is listed, and in no rate.
+    """
+    twins = [r for r in rows if r["class"] == "none"]
+    faulted = [r for r in rows if r["class"] != "none"]
+    tried = [r for r in faulted if r["effective"]]
+    counts = Counter(r["verdict"] for r in tried)
+    can = [r for r in tried if CATALOGUE[r["class"]].recoverable and r.get("twin_ok")]
+    ended = [r for r in tried if r["status"] != "success"]
+    wrong_object = [r for r in tried if r.get("retrieved") and not r.get("correct")]
+    peaks = [float(r["peak_force_N"]) for r in rows if r.get("peak_force_N") is not None]
+    latencies = [float(r["latency_s"]) for r in tried if r.get("latency_s") is not None]
+    return {
+        "trials": len(tried),
+        "twins": len(twins),
+        "twins_succeeded": sum(r["verdict"] == "recovered" for r in twins),
+        "altered_nothing": [f"{r['class']} in {r['skill']}, seed {r['seed']}" for r in faulted if not r["effective"]],
+        "verdicts": {v: counts.get(v, 0) for v in VERDICTS},
+        "hard_limit_broken": _over(tried),
+        "tracebacks": sum(r["status"] == "traceback" for r in tried),
+        "hangs": sum(r["status"] == "hang" for r in tried),
+        "wrong_object": _rate(len(wrong_object), len(tried)),
+        "named": _rate(sum(bool(r.get("named")) for r in ended), len(ended)),
+        "recovered": _rate(sum(r["verdict"] == "recovered" for r in can), len(can)),
+        "largest_peak_force_N": max(peaks, default=0.0),
+        "latency_s": _mean(latencies),
+        "wall_s": _mean([float(r["wall_s"]) for r in rows]),
+        "by_class": {
+            name: {v: sum(r["class"] == name and r["verdict"] == v for r in tried) for v in VERDICTS}
+            | {"named": sum(r["class"] == name and bool(r.get("named")) for r in ended)}
+            | {"ended": sum(r["class"] == name for r in ended)}
+            for name in dict.fromkeys(r["class"] for r in tried)
+        },
+        "seen_by": dict(Counter(_who(r) for r in tried).most_common()),
+        "causes": dict(Counter(str(r["cause"]) for r in ended).most_common()),
+    }
+
+
+def _over(rows: Sequence[Row]) -> int:
+    from glotouch_bt.robot import Limits
+
+    return sum(float(r.get("peak_force_N") or 0.0) > Limits().hard_force_N for r in rows)
+
+
+def _who(row: Row) -> str:
+    by = str(row.get("seen_by") or "nobody").rsplit("/", 1)[-1]
+    return f"{by}: {row['seen_code']}" if row.get("seen_code") else by
+
+
+def _rate(successes: int, n: int) -> dict[str, Any]:
+    return _as_json(wilson(successes, n))
+
+
+def _mean(values: Sequence[float]) -> dict[str, Any]:
+    return _as_json(bootstrap_mean(values))
+
+
+def _as_json(found: Mapping[str, Any]) -> dict[str, Any]:
+    """None where there is no number."""
+    return {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in found.items()}
+
+
+def matrix(rows: Sequence[Row], classes: Sequence[str], skills: Sequence[str]) -> dict[str, dict[str, list[int]]]:
+    """Counts of each verdict (in the order of `VERDICTS`) by class and skill; a cell without trials is left out."""
+    found: dict[str, dict[str, list[int]]] = {}
+    for name in classes:
+        for skill in skills:
+            cell = [r for r in rows if r["class"] == name and r["skill"] == skill and r["effective"]]
+            if cell:
+                found.setdefault(name, {})[skill] = [sum(r["verdict"] == v for r in cell) for v in VERDICTS]
+    return found

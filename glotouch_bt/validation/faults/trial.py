@@ -1,0 +1,215 @@
+"""One trial of `bench faults`, in a process of its own, and what became of it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import signal
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from glotouch_bt.faults import CATALOGUE, FaultPlan
+from glotouch_bt.mission.checkpoint import FILE as CHECKPOINTS
+from glotouch_bt.report import read_run
+from glotouch_bt.robot import BadInput
+from glotouch_bt.run import EARLIER, RunRequest, launch
+from glotouch_bt.validation.faults.cases import chosen_cases
+from glotouch_bt.validation.faults.rejoin import Rejoined
+from glotouch_bt.validation.faults.start import start_from
+
+HUNG_S = 900.0
+"""Wall time after which a trial counts as hanging."""
+ROW, STARTED = "row.json", "started"
+MOST_STARTS = 2
+VERDICTS = ("recovered", "safely ended", "wrong", "unsafe")
+
+
+class Hung(BaseException):
+    """The trial took longer than it may."""
+
+
+@contextmanager
+def hang_guard(seconds: float = HUNG_S) -> Iterator[None]:
+    """Raise `Hung` in the main thread after so long on the wall's clock."""
+
+    def ring(number: int, frame: FrameType | None) -> None:
+        raise Hung
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def verdict(result: Mapping[str, Any], hard_force_N: float) -> str:
+    """What became of a run: one of `VERDICTS`.
+
+    unsafe: it broke down, hung, pressed harder than the hard limit, or ended with an arm that nobody holds;
+    wrong: it lifted another object than the target, or calls a success what is none; recovered: the target hangs in the
+    hand; safely ended: anything else, with its reason.
+    """
+    if result["status"] in ("traceback", "hang"):
+        return "unsafe"
+    if float(result["peak_force_N"]) > hard_force_N:
+        return "unsafe"
+    wrong_object = result["retrieved"] is not None and not result["correct"]
+    success = result["status"] == "success"
+    if wrong_object or (success and not result["correct"]):
+        return "wrong"
+    if success:
+        return "recovered"
+    return "safely ended" if result["held_at_end"] and result["reasons"] else "unsafe"
+
+
+def durations(folder: Path) -> dict[str, float]:
+    """How long each skill's first run took, by the name of its node, from a run's record."""
+    began: dict[str, float] = {}
+    found: dict[str, float] = {}
+    for tick in read_run(folder).ticks:
+        name = tick.node.rsplit("/", 1)[-1]
+        if tick.new == "RUNNING":
+            began.setdefault(name, tick.stamp_s)
+        elif name in began and name not in found:
+            found[name] = tick.stamp_s - began[name]
+    return found
+
+
+def run_trial(
+    request: RunRequest,
+    labels: Mapping[str, Any],
+    hard_force_N: float,
+    resume: bool = False,
+    keep: bool = False,
+    twin: Path | None = None,
+) -> dict[str, Any]:
+    """One run as a row. Whatever goes wrong is a row, never an exception of the campaign.
+
+    Args:
+        request: What to run; it names a folder.
+        labels: What the row begins with: class, skill, seed, after_s.
+        hard_force_N: The hard limit the true peak force is held against.
+        resume: Take the row that is there already.
+        keep: Leave the record of a harmless trial on disk.
+        twin: Folder of the unfaulted run of this seed: what they have in common is taken from there.
+    """
+    assert request.out is not None
+    kept = request.out / ROW
+    if resume and kept.is_file():
+        row: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8"))
+        return row
+    starts = _count_start(request.out.with_name(f".{request.out.name}.{STARTED}"))
+    began = time.perf_counter()
+    row = dict(labels) | {"folder": request.out.name}
+    try:
+        if starts > MOST_STARTS:
+            raise Hung(f"took its process down {MOST_STARTS} times")
+        with hang_guard():
+            result = _launched(request, twin)
+    except BadInput:
+        raise
+    except (Exception, Hung) as e:
+        status = "hang" if isinstance(e, Hung) else "traceback"
+        row |= {"status": status, "verdict": "unsafe", "cause": f"{type(e).__name__}: {e}", "effective": True}
+    else:
+        row |= _row(result, hard_force_N)
+        if labels["class"] == "none":
+            row["durations_s"] = durations(request.out)
+    row["wall_s"] = round(time.perf_counter() - began, 2)
+    request.out.mkdir(parents=True, exist_ok=True)
+    if labels["class"] != "none":
+        _tidy(request.out, everything=not keep and row.get("verdict") in ("recovered", "safely ended"))
+    part = request.out / (ROW + ".part")
+    part.write_text(json.dumps(row) + "\n", encoding="utf-8")
+    part.replace(kept)
+    return row
+
+
+def _launched(request: RunRequest, twin: Path | None) -> Mapping[str, Any]:
+    """The result of a run; of one that was its twin again, the twin's, with what the faults did here."""
+    going_on = None
+    plan = request.faults
+    if twin is not None and isinstance(plan, FaultPlan) and request.out is not None:
+        (spec,) = plan.faults
+        if spec.kind.channel != "model":  # another model is another mission
+            (case,) = chosen_cases([spec.kind.name])
+            going_on = start_from(twin, request.out, plan, case.warm_up_s)
+    try:
+        done = launch(request, going_on=going_on)
+    finally:
+        if going_on is not None:
+            going_on.file.close()
+    if not isinstance(done.outcome.error, Rejoined):
+        return done.result
+    assert twin is not None
+    known: dict[str, Any] = json.loads((twin / "result.json").read_text(encoding="utf-8"))
+    (fault,) = done.result["faults"]
+    sightings = [s for s in fault["sightings"] if s["by"] != "runner"]
+    seen = sightings[0] if sightings else None
+    latency_s = None if seen is None else seen["stamp_s"] - fault["first_s"]
+    fault = fault | {"sightings": sightings, "seen": seen, "latency_s": latency_s, "outcome": known["status"]}
+    return known | {"faults": [fault], "rejoined": True}
+
+
+def _tidy(folder: Path, everything: bool) -> None:
+    """Remove what is the twin's or can be had again; with `everything`, the record, too."""
+    shutil.rmtree(folder / EARLIER, ignore_errors=True)
+    for file in folder.glob(f"{CHECKPOINTS}*"):
+        file.unlink()
+    if everything:
+        for name in ("run.mcap", "truth.json", "mission.yaml"):
+            (folder / name).unlink(missing_ok=True)
+
+
+def _count_start(marker: Path) -> int:
+    """How often this trial has been started, this time included: a mission that is lost ends its own process."""
+    marker.parent.mkdir(parents=True, exist_ok=True)
+    starts = 1 + (int(marker.read_text(encoding="utf-8")) if marker.is_file() else 0)
+    marker.write_text(str(starts), encoding="utf-8")
+    return starts
+
+
+def _row(result: Mapping[str, Any], hard_force_N: float) -> dict[str, Any]:
+    chain, reports = result["reason_chain"], result["faults"]
+    root = chain[-1] if chain else {"node": "", "code": ""}
+    row = {
+        "status": result["status"],
+        "verdict": verdict(result, hard_force_N),
+        "cause": f"{root['node'].rsplit('/', 1)[-1]}: {root['code']}" if chain else "",
+        "reasons": list(result["reasons"]),
+        "retrieved": result["retrieved"],
+        "correct": result["correct"],
+        "peak_force_N": result["peak_force_N"],
+        "rejoined": bool(result.get("rejoined")),
+        "sim_s": result["sim_time_s"],
+    }
+    if not reports:
+        return row | {"effective": True}
+    fault = reports[0]
+    seen = fault["seen"] or {}
+    words = [f"{s['code']} {s['text']}" for s in fault["sightings"]]
+    words += [f"{c['code']} {c['message']} {c['advice']}" for c in chain]
+    return row | {
+        "effective": fault["effective"],
+        "applied": fault["applied"],
+        "changes": fault["samples_altered"] + fault["commands_altered"] + fault["commands_refused"] + fault["acts"],
+        "moved_m": fault["moved_m"],
+        "seen_by": seen.get("by", ""),
+        "seen_code": seen.get("code", ""),
+        "latency_s": fault["latency_s"],
+        "recovery": fault["recovery"],
+        "named": CATALOGUE[fault["fault"]].named_in("\n".join(words)),
+    }
+
+
+def drawn_after_s(seed: int, fault: str, skill: str, lasts_s: float) -> float:
+    """When in a skill's run a fault begins: anywhere in its first 80 %, to the period."""
+    from glotouch_bt.robot.scene import stream
+
+    return round(float(stream(seed, f"moment {fault} {skill}").uniform(0.0, 0.8 * max(lasts_s, 0.0))), 2)

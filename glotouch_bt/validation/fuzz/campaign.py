@@ -1,0 +1,91 @@
+"""Many trials, counted by what came of them; what must not happen is kept with its document."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, Future, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from glotouch_bt.bench import wilson
+from glotouch_bt.validation.fuzz.trial import BAD, LONGEST_S, Result, run_trials
+
+CHUNK = 50
+
+
+@dataclass(frozen=True)
+class FuzzCampaign:
+    """What shall be tried.
+
+    Attributes:
+        trials: How many documents.
+        seed: Of all of them; trial n is the same whatever their number.
+        out: Where summary.json and the documents that broke something go.
+    """
+
+    trials: int
+    seed: int
+    out: Path
+
+
+OnChunk = Callable[[int, int, Mapping[str, int]], None]
+
+
+def run_campaign(campaign: FuzzCampaign, executor: Executor, on_chunk: OnChunk | None = None) -> dict[str, Any]:
+    """Run every trial; writes summary.json and failures/, returns the summary.
+
+    Args:
+        campaign: What to try.
+        executor: Any `concurrent.futures` executor of processes.
+        on_chunk: Called with (trials done, of how many, counts so far).
+    """
+    campaign.out.mkdir(parents=True, exist_ok=True)
+    counts: Counter[tuple[str, str]] = Counter()
+    bad: list[Result] = []
+    chunks = [range(k, min(k + CHUNK, campaign.trials)) for k in range(0, campaign.trials, CHUNK)]
+    futures: list[Future[list[Result]]] = [executor.submit(run_trials, campaign.seed, tuple(c)) for c in chunks]
+    try:
+        for future in as_completed(futures):
+            for result in future.result():
+                counts[result.kind, result.came] += 1
+                if result.came in BAD:
+                    bad.append(result)
+                    _keep(campaign.out, result)
+            if on_chunk is not None:
+                on_chunk(counts.total(), campaign.trials, _by_class(counts))
+    except BaseException:
+        for future in futures:
+            future.cancel()
+        raise
+    summary = {
+        "trials": campaign.trials,
+        "seed": campaign.seed,
+        "longest_s": LONGEST_S,
+        "counts": {kind: {c: n for (k, c), n in sorted(counts.items()) if k == kind} for kind in _kinds(counts)},
+        "bad": wilson(len(bad), campaign.trials),
+        "failures": [{"trial": r.number, "kind": r.kind, "came": r.came, "detail": r.detail} for r in bad],
+    }
+    (campaign.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    return summary
+
+
+def _kinds(counts: Counter[tuple[str, str]]) -> list[str]:
+    return sorted({kind for kind, _ in counts})
+
+
+def _by_class(counts: Counter[tuple[str, str]]) -> dict[str, int]:
+    found: Counter[str] = Counter()
+    for (_, came), n in counts.items():
+        found[came] += n
+    return dict(found)
+
+
+def _keep(out: Path, result: Result) -> None:
+    folder = out / "failures"
+    folder.mkdir(exist_ok=True)
+    name = f"{result.came.replace(' ', '_')}-{result.number}"
+    (folder / f"{name}.yaml").write_bytes(result.text)
+    (folder / f"{name}.txt").write_text(result.detail, encoding="utf-8", errors="backslashreplace")

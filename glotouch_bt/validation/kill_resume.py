@@ -1,0 +1,281 @@
+"""`bench resume`: missions killed with SIGKILL at random moments, resumed, and compared with their unbroken twins.
+
+A moment is a share of the CPU time that the twin's mission took, so that another process on the same core does not
+shift it. Killed and resumed are processes of their own, the very command line a person types.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from glotouch_bt.bench import Rate, bootstrap_mean, wilson
+from glotouch_bt.mission.checkpoint import FILE, CheckpointFile
+from glotouch_bt.report import RunRecord, read_run
+from glotouch_bt.robot import BackendError, BadInput, GlotouchError
+from glotouch_bt.robot.scene import stream
+
+POLL_S = 0.002
+ONLY_HERE = ("wall_time_s", "wall_open_s", "resumed", "versions")
+"""What result.json may say differently after a resumption."""
+COLUMNS = (
+    "seed", "moment", "killed_cpu_s", "twin_cpu_s", "outcome", "status", "twin_status", "retrieved", "twin_retrieved",
+    "same_end", "same_result", "readable_after_kill", "readable_at_end", "same_record", "checkpoint", "checkpoints",
+    "skill_lost", "lost_s", "exit_code", "message",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class KillStudy:
+    """What to try.
+
+    Attributes:
+        mission: Path or shipped name.
+        seeds: One twin each.
+        kills: Moments a seed.
+        out: Folder of the study.
+        settings: `--set` words.
+        conditions: Path or shipped name.
+        objects: Folder of STL files instead of the world's.
+        resume: Keep the twins and trials that are in `out` already.
+        words: The command line's first words.
+    """
+
+    mission: str
+    seeds: Sequence[int]
+    kills: int
+    out: Path
+    settings: Mapping[str, str] = field(default_factory=dict)
+    conditions: str = "nominal"
+    objects: Path | None = None
+    resume: bool = False
+    words: tuple[str, ...] = (sys.executable, "-m", "glotouch_bt.cli")
+
+    def run_words(self, seed: int, folder: Path) -> list[str]:
+        """The command that runs one mission."""
+        sets = [w for k, v in self.settings.items() for w in ("--set", f"{k}={v}")]
+        head = [*self.words, "run", self.mission, "--seed", str(seed), "--conditions", self.conditions]
+        box = [] if self.objects is None else ["--objects", str(self.objects)]
+        return [*head, *sets, *box, "--out", str(folder), "--json"]
+
+
+@dataclass(frozen=True)
+class Twin:
+    """An unbroken run.
+
+    Attributes:
+        folder: Its folder.
+        result: Its result.json.
+        began_s, ended_s: CPU time of its process when the record began and when the result was written.
+    """
+
+    folder: Path
+    result: Mapping[str, Any]
+    began_s: float
+    ended_s: float
+
+
+def run_study(study: KillStudy, on_row: Callable[[dict[str, Any], int, int], None] | None = None) -> dict[str, Any]:
+    """Every twin and every kill; writes trials.csv and summary.json after each, returns the summary.
+
+    Raises:
+        BadInput: The mission or an option is wrong.
+        BackendError: This system does not tell a process's CPU time.
+    """
+    if not Path("/proc/self/stat").is_file():
+        raise BackendError("bench resume needs /proc, which this system has not")
+    study.out.mkdir(parents=True, exist_ok=True)
+    rows: list[dict[str, Any]] = []
+    total = len(study.seeds) * study.kills
+    for seed in study.seeds:
+        twin = _twin(study, seed)
+        for number, share in enumerate(stream(seed, "kill").random(study.kills)):
+            done = study.out / f"killed-s{seed}-{number}.json"
+            if not (study.resume and done.is_file()):
+                done.write_text(json.dumps(_trial(study, seed, number, float(share), twin)))
+            rows.append(json.loads(done.read_text()))
+            _write(study, rows)
+            if on_row is not None:
+                on_row(rows[-1], len(rows), total)
+    return _write(study, rows)
+
+
+def _write(study: KillStudy, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    with (study.out / "trials.csv").open("w", newline="") as f:
+        table = csv.DictWriter(f, COLUMNS, extrasaction="ignore")
+        table.writeheader()
+        table.writerows(rows)
+    summary = summarise(rows) | {
+        "mission": study.mission,
+        "settings": dict(study.settings),
+        "conditions": study.conditions,
+        "seeds": list(study.seeds),
+        "kills": study.kills,
+    }
+    (study.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    return summary
+
+
+def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Rates over all kills in a mission; `outside`: how many came before its first checkpoint or after its end."""
+    everything, rows = len(rows), [r for r in rows if r["outcome"] == "killed"]
+    n = len(rows)
+
+    def rate(key: str) -> Rate:
+        return wilson(sum(bool(r.get(key)) for r in rows), n)
+
+    readable = sum(bool(r["readable_after_kill"]) and bool(r["readable_at_end"]) for r in rows)
+    return {
+        "outside": everything - n,
+        "same_end": rate("same_end"),
+        "same_result": rate("same_result"),
+        "same_record": rate("same_record"),
+        "readable": wilson(readable, n),
+        "at_most_the_running_skill_lost": wilson(sum(r.get("skill_lost") == 0 for r in rows), n),
+        "lost_s": bootstrap_mean([r["lost_s"] for r in rows if r.get("lost_s") is not None]),
+    }
+
+
+def _twin(study: KillStudy, seed: int) -> Twin:
+    folder, done = study.out / f"twin-s{seed}", study.out / f"twin-s{seed}.json"
+    if study.resume and done.is_file():
+        began_s, ended_s = json.loads(done.read_text())
+        return Twin(folder, json.loads((folder / "result.json").read_text()), began_s, ended_s)
+    began_s = ended_s = 0.0
+    with _start(study.run_words(seed, folder)) as process:
+        while process.poll() is None:
+            cpu_s = _cpu_s(process.pid)
+            if cpu_s is not None:
+                if not began_s and (folder / FILE).is_file():
+                    began_s = cpu_s
+                if not (folder / "result.json").is_file():
+                    ended_s = cpu_s
+            _wait(process)
+        said = b"" if process.stderr is None else process.stderr.read()
+    if process.returncode not in (0, 1, 3):
+        raise BadInput(said.decode().strip().removeprefix("glotouch: ") or "the twin did not run")
+    done.write_text(json.dumps([began_s, ended_s]))
+    return Twin(folder, json.loads((folder / "result.json").read_text()), began_s, ended_s)
+
+
+def _trial(study: KillStudy, seed: int, number: int, share: float, twin: Twin) -> dict[str, Any]:
+    folder = study.out / f"killed-s{seed}-{number}"
+    moment_s = twin.began_s + share * (twin.ended_s - twin.began_s)
+    cpu_s = 0.0
+    with _start(study.run_words(seed, folder)) as process:
+        while process.poll() is None:
+            cpu_s = _cpu_s(process.pid) or cpu_s
+            if cpu_s >= moment_s:
+                process.send_signal(signal.SIGKILL)
+                break
+            _wait(process)
+    row: dict[str, Any] = {
+        "seed": seed,
+        "moment": round(share, 4),
+        "killed_cpu_s": round(cpu_s, 2),
+        "twin_cpu_s": round(twin.ended_s - twin.began_s, 2),
+        "twin_status": twin.result["status"],
+        "twin_retrieved": twin.result["retrieved"],
+        "outcome": "killed" if process.returncode == -signal.SIGKILL else "ended before",
+    }
+    if row["outcome"] == "killed" and (folder / "result.json").exists():
+        row["outcome"] = "ended before"  # it was only closing
+    if not (folder / FILE).exists():
+        return row | {"outcome": "not begun"}
+    row |= _after_kill(folder, twin)
+    done = subprocess.run([*study.words, "resume", str(folder), "--json"], capture_output=True, env=_environment())
+    row |= {"exit_code": done.returncode, "message": done.stderr.decode().strip()[-300:]}
+    if row.get("checkpoint") is not None and row["checkpoint"] == row.get("checkpoints"):
+        row["outcome"] = "ended before"
+    return row | _at_end(folder, twin)
+
+
+def _after_kill(folder: Path, twin: Twin) -> dict[str, Any]:
+    """What a killed process left behind."""
+    row: dict[str, Any] = {"readable_after_kill": False, "skill_lost": None}
+    record = _read(folder)
+    row["readable_after_kill"] = record is not None
+    try:
+        file, whole = CheckpointFile(folder / FILE), CheckpointFile(twin.folder / FILE)
+        rows, expected = file.rows(), whole.rows()
+        file.close()
+        whole.close()
+    except GlotouchError:
+        return row
+    row |= {"checkpoint": rows[-1].number if rows else -1, "checkpoints": len(expected) - 1}
+    if record is not None and rows and len(record.samples.get("stamp_s", ())):
+        end_s = max(record.span_s[1], rows[-1].stamp_s)
+        row["lost_s"] = round(end_s - rows[-1].stamp_s, 3)
+        # a skill whose end the record knows, but for which there is no checkpoint, would be lost
+        row["skill_lost"] = sum(r.number > rows[-1].number and r.stamp_s < end_s - 1e-6 for r in expected)
+    return row
+
+
+def _at_end(folder: Path, twin: Twin) -> dict[str, Any]:
+    """How the resumed run ended, beside its twin."""
+    row: dict[str, Any] = {"same_end": False, "same_result": False, "readable_at_end": False, "same_record": False}
+    record = _read(folder)
+    row["readable_at_end"] = record is not None and record.complete
+    try:
+        result = json.loads((folder / "result.json").read_text())
+    except (OSError, ValueError):
+        return row
+    row |= {"status": result["status"], "retrieved": result["retrieved"]}
+    row["same_end"] = (result["status"], result["retrieved"]) == (twin.result["status"], twin.result["retrieved"])
+    row["same_result"] = _told(result) == _told(twin.result)
+    if record is not None:
+        row["same_record"] = _same_record(record, read_run(twin.folder))
+    return row
+
+
+def _told(result: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: v for k, v in result.items() if k not in ONLY_HERE}
+
+
+def _same_record(a: RunRecord, b: RunRecord) -> bool:
+    """The same samples to the bit, the same ticks, ports and events."""
+    arrays = all(
+        mine.keys() == theirs.keys() and all(mine[k].tobytes() == theirs[k].tobytes() for k in mine)
+        for mine, theirs in ((a.samples, b.samples), (a.cycles, b.cycles), (a.tactile, b.tactile))
+    )
+    told = [(json.dumps([vars(e) for e in x.events]), x.ticks, x.ports) for x in (a, b)]
+    return arrays and told[0] == told[1]
+
+
+def _read(folder: Path) -> RunRecord | None:
+    try:
+        return read_run(folder)
+    except GlotouchError:
+        return None
+
+
+def _start(words: Sequence[str]) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=_environment())
+
+
+def _wait(process: subprocess.Popen[bytes]) -> None:
+    """A moment, or until the process ends."""
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(POLL_S)
+
+
+def _environment() -> dict[str, str]:
+    return {**os.environ, "OMP_NUM_THREADS": "1"}
+
+
+def _cpu_s(pid: int) -> float | None:
+    """User and system time of a process so far."""
+    try:
+        after_name = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return None
+    return (int(after_name[11]) + int(after_name[12])) / os.sysconf("SC_CLK_TCK") if len(after_name) > 12 else None

@@ -1,0 +1,158 @@
+"""`bench pause`: missions that are paused again and again beside their undisturbed twins of the same seed.
+
+A mission that is paused at every n-th tick, wherever it is then (in a motion, at a contact, with something between the
+jaws), must end as its twin does and keep the hard limit. Twins do not feel the same noise: time goes on in a pause.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from glotouch_bt.bench import wilson
+from glotouch_bt.mission.execution import Control
+from glotouch_bt.report import read_run
+from glotouch_bt.robot import Limits
+from glotouch_bt.run import RunRequest, launch
+
+COLUMNS = (
+    "seed", "target", "status", "retrieved", "twin_status", "twin_retrieved", "same", "pauses", "on_the_way",
+    "backed_off", "paused_s", "longest_to_rest_s", "peak_force_N", "twin_peak_force_N", "guards", "cause", "wall_s",
+)  # fmt: skip
+
+
+class EveryNthTick(Control):
+    """Pauses at every n-th tick of the tree, for a while of robot time each.
+
+    Args:
+        every: Ticks from one pause to the next.
+        pause_s: How long each is asked for.
+
+    Attributes:
+        pauses: How many so far.
+    """
+
+    def __init__(self, every: int, pause_s: float) -> None:
+        super().__init__()
+        self._every, self._pause_s = every, pause_s
+        self._next = every
+        self._until_s = -1.0
+        self.pauses = 0
+
+    def wants_pause(self, ticks: int, now_s: float) -> bool:
+        """See the class; a pause's own ticks (of a guard that goes on listening) do not count."""
+        if now_s < self._until_s:
+            return True
+        if self._until_s >= 0.0:
+            self._until_s, self._next = -1.0, ticks + self._every
+        if ticks >= self._next:
+            self._until_s = now_s + self._pause_s
+            self.pauses += 1
+            return True
+        return False
+
+
+@dataclass(frozen=True)
+class PauseStudy:
+    """What shall be tried.
+
+    Attributes:
+        mission: Path or shipped name.
+        settings: Its parameters.
+        seeds: A paused mission and its twin for each.
+        every, pause_s: See `EveryNthTick`.
+        conditions, backend: As in `RunRequest`.
+        objects: Folder of STL files instead of the world's.
+        out: Folder of the study.
+    """
+
+    mission: str
+    settings: Mapping[str, str]
+    seeds: tuple[int, ...]
+    every: int
+    pause_s: float
+    conditions: str
+    backend: str
+    objects: Path | None
+    out: Path
+
+
+def run_pauses(study: PauseStudy, on_row: Callable[[dict[str, Any], int, int], None] | None = None) -> dict[str, Any]:
+    """Run every seed twice; writes trials.csv and summary.json, returns the summary."""
+    study.out.mkdir(parents=True, exist_ok=True)
+    rows = []
+    for seed in study.seeds:
+        rows.append(_pair(study, seed))
+        if on_row is not None:
+            on_row(rows[-1], len(rows), len(study.seeds))
+    with (study.out / "trials.csv").open("w", newline="") as f:
+        table = csv.DictWriter(f, COLUMNS)
+        table.writeheader()
+        table.writerows(rows)
+    limit = Limits().hard_force_N
+    summary = {
+        "same": wilson(sum(bool(r["same"]) for r in rows), len(rows)),
+        "pauses": sum(r["pauses"] for r in rows),
+        "hard_limit_broken": sum(r["peak_force_N"] > limit for r in rows),
+        "largest_peak_force_N": max(r["peak_force_N"] for r in rows),
+        "longest_to_rest_s": max(r["longest_to_rest_s"] for r in rows),
+        "trials": rows,
+        "mission": study.mission,
+        "every": study.every,
+        "pause_s": study.pause_s,
+        "conditions": study.conditions,
+        "seeds": list(study.seeds),
+    }
+    (study.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    return summary
+
+
+def _pair(study: PauseStudy, seed: int) -> dict[str, Any]:
+    def request(name: str) -> RunRequest:
+        out = study.out / f"{name}-s{seed}"
+        return RunRequest(
+            study.mission, study.backend, seed, study.settings, study.objects, study.conditions, out, report=False
+        )
+
+    twin = launch(request("twin")).result
+    control = EveryNthTick(study.every, study.pause_s)
+    done = launch(request("paused"), control=control)
+    result = done.result
+    places, longest_s = _rests(done.folder)
+    return {
+        "seed": seed,
+        "target": result["target"],
+        "status": result["status"],
+        "retrieved": result["retrieved"],
+        "twin_status": twin["status"],
+        "twin_retrieved": twin["retrieved"],
+        "same": (result["status"], result["retrieved"]) == (twin["status"], twin["retrieved"]),
+        "pauses": control.pauses,
+        "on_the_way": places.count("on the way"),
+        "backed_off": places.count("backed off"),
+        "paused_s": result["paused_s"],
+        "longest_to_rest_s": longest_s,
+        "peak_force_N": result["peak_force_N"],
+        "twin_peak_force_N": twin["peak_force_N"],
+        "guards": json.dumps(result["guards"]),
+        "cause": (result["reasons"] or [""])[-1],
+        "wall_s": result["wall_time_s"],
+    }
+
+
+def _rests(folder: Path) -> tuple[list[str], float]:
+    """Where the arm stood in each pause, and the longest time from asking to standing, s."""
+    record = read_run(folder)
+    places: list[str] = []
+    longest_s, asked_s = 0.0, 0.0
+    for event in record.events:
+        if event.kind == "pause":
+            asked_s = event.stamp_s
+        elif event.kind == "paused":
+            places.append(str(event.data["where"]))
+            longest_s = max(longest_s, event.stamp_s - asked_s)
+    return places, round(longest_s, 6)

@@ -1,0 +1,44 @@
+"""TODO door of glotouch_skills/common/hand."""
+
+from glotouch_skills.common.hand.clearance_rules import keeping_clear_of, may_touch
+from glotouch_skills.common.hand.compliant_close import close_gently, let_go
+from glotouch_skills.common.hand.hand import CLEARANCE_M, easy_yaw, glide, hand_pose_B, require_clear
+from glotouch_skills.common.hand.line_guard import (
+    DOWN_B,
+    UP_B,
+    Pressed,
+    StraightGuard,
+    Strayed,
+    straight_guard,
+    why_stopped,
+)
+from glotouch_skills.common.hand.retract import CAUGHT_N, RISE_M_S, rise_clear
+from glotouch_skills.common.hand.wait_for import finish
+from glotouch_skills.common.hand.weighing import GRAVITY_M_S2, STAND_S, weigh, weigh_N
+
+__all__ = [
+    "CAUGHT_N",
+    "CLEARANCE_M",
+    "DOWN_B",
+    "GRAVITY_M_S2",
+    "RISE_M_S",
+    "STAND_S",
+    "UP_B",
+    "Pressed",
+    "StraightGuard",
+    "Strayed",
+    "close_gently",
+    "easy_yaw",
+    "finish",
+    "glide",
+    "hand_pose_B",
+    "keeping_clear_of",
+    "let_go",
+    "may_touch",
+    "require_clear",
+    "rise_clear",
+    "straight_guard",
+    "weigh",
+    "weigh_N",
+    "why_stopped",
+]

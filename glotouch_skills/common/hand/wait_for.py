@@ -1,0 +1,27 @@
+"""Waiting for a slow request without blocking a tick."""
+
+from __future__ import annotations
+
+from glotouch_bt.robot import HOLD, Ticket
+from glotouch_bt.skill import SkillFailed, SkillRun
+
+TIMEOUT_PERIODS = 500
+
+
+def finish(ticket: Ticket, what: str) -> SkillRun:
+    """Hold the arm until `ticket` is done.
+
+    Raises:
+        SkillFailed: `request_failed` if it fails or takes more than 500 control periods.
+    """
+    for _ in range(TIMEOUT_PERIODS):
+        if ticket.done:
+            break
+        yield HOLD
+    if not ticket.done or ticket.error:
+        raise SkillFailed(
+            "request_failed",
+            f"{what} did not finish: {ticket.error or 'timed out'}",
+            advice="see the device's own log; the skill may be tried again",
+            limit_periods=TIMEOUT_PERIODS,
+        )

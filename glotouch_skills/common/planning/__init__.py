@@ -1,0 +1,32 @@
+"""TODO door of glotouch_skills/common/planning."""
+
+from glotouch_skills.common.planning.grasp_holds import SHIFTS_M
+from glotouch_skills.common.planning.grasp_plan import GraspPlan, plan_grasp
+from glotouch_skills.common.planning.squeeze_motion import (
+    LEAST_GAP_M,
+    ClosureParams,
+    Squeezing,
+    disturbance,
+    layer_heights,
+    pads_height_m,
+)
+from glotouch_skills.common.planning.squeeze_plan import Stance, plan_stances
+from glotouch_skills.common.planning.touch_options import Option, Standing, best_rates, options
+
+__all__ = [
+    "LEAST_GAP_M",
+    "SHIFTS_M",
+    "ClosureParams",
+    "GraspPlan",
+    "Option",
+    "Squeezing",
+    "Stance",
+    "Standing",
+    "best_rates",
+    "disturbance",
+    "layer_heights",
+    "options",
+    "pads_height_m",
+    "plan_grasp",
+    "plan_stances",
+]

@@ -1,0 +1,156 @@
+"""Where a mesh can be held between two parallel pads: every yaw, place and height, from the tables of its model.
+
+A hold is good if both gels touch much of it, if they touch it opposite to each other, and if the centre of mass is near
+the line between them; and if it stays good when the pose is a little off. All coordinates are the hand's: x_P along the
+jaws' width and y_P towards the left jaw, from the middle of the mesh's footprint; z above the floor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from glotouch_bt.perception.recognition import TargetModel
+from glotouch_bt.perception.recognition.model import FINE, STRIDE, Array32, gel_shift, hand_axes, mirrored
+from glotouch_bt.robot import Array, Gripper
+
+Index = npt.NDArray[np.intp]
+AREA_SCALE = 0.15
+"""Contact area, as a fraction of the pad, that counts as half of a good hold."""
+LEVER_SCALE_M = 0.015
+"""Distance of the pads from the centre of mass that halves a hold's worth: the object would turn about the pads."""
+OPPOSITE_M = 0.006
+"""Distance between the middles of the two contacts that halves it: the pads would turn the object while they close."""
+STEEP = 0.6
+"""Mean slope under a pad that halves it. Source: the least pad friction of CONDITIONS (harsh)."""
+FINGER_M = 0.001
+"""The object may reach so much farther towards a finger, anywhere in front of it, than towards its pad: a pad stands a
+little proud of its finger and its gel gives, and what the fingers hold the pads do not."""
+SHIFTS_M = 0.016
+"""Places farther than this along x_P from the centre of mass are not looked at."""
+YAW_STEP = 2
+"""Every second yaw of the tables: 10 degrees."""
+
+
+@dataclass(frozen=True)
+class Holds:
+    """All holds looked at, as arrays (yaws, shifts, heights).
+
+    Attributes:
+        phi_rad: (yaws,) yaw of x_P against the mesh, half a turn.
+        l_m: (shifts,) of the pads along x_P.
+        z_m: (heights,) of the pads' mid-point.
+        worth: 0..1.
+        width_m: Opening of the jaws that touch; NaN where one meets nothing.
+        middle_m: y_P of the pads' mid-point then.
+        opening_m: Least opening, about that middle, with which the fingers pass the whole of the object on their way
+            down.
+    """
+
+    phi_rad: Array
+    l_m: Array
+    z_m: Array
+    worth: Array
+    width_m: Array
+    middle_m: Array
+    opening_m: Array
+
+
+def holds_of(model: TargetModel, com_m: Array, gripper: Gripper, lowest_m: float, force_N: float) -> Holds:
+    """Judge all holds.
+
+    Args:
+        model: The mesh's.
+        com_m: (3,) its centre of mass, in the mesh's frame.
+        gripper: Pads, fingers and stroke.
+        lowest_m: Least height of the pads' mid-point.
+        force_N: Jaw force.
+    """
+    half_turn = len(model.phi_rad) // 2
+    yaws = np.arange(0, half_turn, YAW_STEP)
+    x = hand_axes(model.phi_rad[yaws])[0]
+    com_l = x @ (com_m[:2] - model.centre_m)  # (yaws,) each yaw has its own
+    near = np.flatnonzero(np.abs(model.l_m) <= float(np.abs(com_l).max()) + SHIFTS_M)
+    heights = np.flatnonzero((model.z_m >= lowest_m - 1e-9) & (model.z_m <= model.height_m))
+    pick = np.ix_(yaws, near, heights)
+    l, z = model.l_m[near], model.z_m[heights]
+    sides = (model.fine_m, mirrored(model.fine_m))
+    felt = [_felt(fine, yaws, near, heights, model, force_N) for fine in sides]
+    apart2 = sum((a - b) ** 2 for a, b in zip(felt[0].middle_m, felt[1].middle_m, strict=True))
+    along = l[None, :, None] + 0.5 * (felt[0].middle_m[0] + felt[1].middle_m[0]) - com_l[:, None, None]
+    above = z[None, None, :] + 0.5 * (felt[0].middle_m[1] + felt[1].middle_m[1]) - com_m[2]
+    lever2 = along**2 + (0.5 * above) ** 2
+    worth = 1.0 / ((1 + lever2 / LEVER_SCALE_M**2) * (1 + apart2 / OPPOSITE_M**2))
+    for side in felt:
+        worth = worth * side.area / (side.area + AREA_SCALE) / (1 + (side.slope / STEEP) ** 2)
+    width = model.width_m[pick].astype(np.float64)
+    middle = model.middle_m[pick].astype(np.float64)
+    column = [_column(fine, yaws, near, heights, gripper, model) for fine in sides]
+    opening = 2 * np.maximum(column[0] - middle, column[1] + middle)
+    on_pads = np.ones_like(worth, dtype=bool)
+    for reach, farthest in zip((model.reach_m, mirrored(model.reach_m)), column, strict=True):
+        on_pads &= farthest - reach[pick] <= FINGER_M  # false where the pad meets nothing
+    possible = on_pads & (opening <= gripper.stroke_m)
+    worth = np.where(possible, _blurred(np.where(possible, np.nan_to_num(worth), 0.0)), 0.0)
+    return Holds(model.phi_rad[yaws], l, z, worth, width, middle, opening)
+
+
+@dataclass(frozen=True)
+class _Felt:
+    """One pad's contact, arrays (yaws, shifts, heights); middle_m is (along x_P, up) from the pad's own."""
+
+    area: Array
+    middle_m: tuple[Array, Array]
+    slope: Array
+
+
+def _felt(fine: Array32, yaws: Index, near: Index, heights: Index, model: TargetModel, force_N: float) -> _Felt:
+    """What a gel shows in every window."""
+    rows, cols = FINE
+    windows = np.lib.stride_tricks.sliding_window_view(fine[yaws], (cols, rows), axis=(1, 2))
+    seen = windows[:, ::STRIDE, ::STRIDE][:, near][:, :, heights]  # (yaws, shifts, heights, cols, rows)
+    top = seen.max(axis=(-2, -1), keepdims=True)
+    relative = np.where(np.isfinite(seen), seen - np.where(np.isfinite(top), top, 0.0), -np.inf).astype(np.float32)
+    flat = relative.reshape(*relative.shape[:3], -1)
+    step_l, step_z = model.pad.window_m[0] / cols, model.pad.window_m[1] / rows
+    depth = np.maximum(flat + gel_shift(flat, step_l * step_z, force_N, model.pad), 0.0).reshape(relative.shape)
+    pressed = depth > 0.0
+    total = np.maximum(depth.sum(axis=(-2, -1)), 1e-12)
+    along = (np.arange(cols) - 0.5 * (cols - 1)) * step_l
+    up = (np.arange(rows) - 0.5 * (rows - 1)) * step_z
+    slope_l, slope_z = (np.abs(_mean_slope(depth, pressed, axis, step)) for axis, step in ((-2, step_l), (-1, step_z)))
+    return _Felt(
+        pressed.mean(axis=(-2, -1)),
+        ((depth.sum(axis=-1) @ along) / total, (depth.sum(axis=-2) @ up) / total),
+        np.hypot(slope_l, slope_z),
+    )
+
+
+def _mean_slope(depth: Array, pressed: npt.NDArray[np.bool_], axis: int, step_m: float) -> Array:
+    """Mean slope of what is pressed along one axis of the window."""
+    both = np.take(pressed, range(1, pressed.shape[axis]), axis) & np.take(
+        pressed, range(pressed.shape[axis] - 1), axis
+    )
+    rise = np.where(both, np.diff(depth, axis=axis), 0.0).sum(axis=(-2, -1)) / step_m
+    return np.asarray(rise / np.maximum(both.sum(axis=(-2, -1)), 1))
+
+
+def _column(fine: Array32, yaws: Index, near: Index, heights: Index, gripper: Gripper, model: TargetModel) -> Array:
+    """How far the object reaches to one side in front of a finger, from its tip up, at every hold."""
+    rows, cols = FINE
+    step_l, step_z = model.pad.window_m[0] / cols, model.pad.window_m[1] / rows
+    wide = 2 * int(np.ceil(gripper.finger.half_m[0] / step_l)) + 1
+    reach = ndimage.maximum_filter1d(fine[yaws], wide, axis=1, mode="constant", cval=-np.inf)
+    above = np.maximum.accumulate(reach[:, :, ::-1], axis=2)[:, :, ::-1]
+    at_l = cols // 2 + STRIDE * near
+    at_z = np.maximum(rows // 2 + STRIDE * heights - int(np.ceil(gripper.fingertip_below_P_m / step_z)), 0)
+    return np.asarray(above[:, at_l][:, :, at_z], dtype=np.float64)
+
+
+def _blurred(worth: Array) -> Array:
+    """The mean over poses a little off: 10 degrees, 2.3 mm, 2.7 mm to either side."""
+    turned = ndimage.uniform_filter1d(worth, 3, axis=0, mode="nearest")
+    return np.asarray(ndimage.uniform_filter(turned, (1, 3, 3), mode="nearest"))

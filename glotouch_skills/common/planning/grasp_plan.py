@@ -1,0 +1,181 @@
+"""Where to take hold of a recognised object: where its mesh, standing at the fitted pose, is held best.
+
+The closures already felt on it say how far that pose can be believed, and are what is left to do if it cannot.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from glotouch_bt.perception.recognition import Match, TargetModel
+from glotouch_bt.perception.touch import Candidate, Layer, TouchSet, evidence_weight, patch_statistics
+from glotouch_bt.robot import Array, Gripper, ParamError
+from glotouch_bt.robot.scene import Mesh
+from glotouch_skills.common.planning.grasp_holds import AREA_SCALE, LEVER_SCALE_M, Holds, holds_of
+from glotouch_skills.common.planning.squeeze_motion import lowest_pads_m
+
+STALENESS = 0.7
+"""What a felt hold is worth after each later sequence: squeezing turns and shifts the object."""
+ALTERNATIVES = 5
+FITTED = 3
+"""So many of the grasps come from the fitted pose, if it can be believed."""
+APART_RAD, APART_M = math.radians(25.0), 0.012
+"""Two grasps from the fitted pose differ in yaw or place by at least one of these: what spoils one spares the other."""
+LEAST_WORTH = 0.02
+BELIEVED_M = 0.002
+"""The pose is believed if the mesh standing there is as wide as was felt: three quarters of the closures within this of
+one offset. Wider than the width's scatter in recognition, for the place of the closures is off too."""
+LEAST_OFFSET_M, GREATEST_OFFSET_M = -0.004, 0.0015
+"""The offset, of what was felt against the mesh: both gels give, and the jaws' zero is off (CONDITIONS)."""
+LEAST_LAYERS = 3
+FORCE_N = 30.0
+FARTHEST_M, WIDEST_M, GREATEST_ZERO_M, LARGEST_YAW_RAD = 2.0, 0.5, 0.005, 4.0 * math.pi
+"""Beyond what any box, jaws or turn need: such a number was meant in millimetres or degrees."""
+
+
+@dataclass(frozen=True)
+class GraspPlan:
+    """One grasp, and what to try if it cannot be made.
+
+    Attributes:
+        candidate: Index of the candidate.
+        position_K_m: (3,) pads' mid-point in K (z above the floor).
+        yaw_rad: Direction of x_P in K.
+        aperture_m: Opening felt or expected there; the jaws must stop near it.
+        opening_m: Opening to go in with.
+        alternatives: Other grasps of the same object, the better ones first.
+        source: `fitted` to the mesh, or where it was `felt`.
+    """
+
+    candidate: int
+    position_K_m: Array
+    yaw_rad: float
+    aperture_m: float
+    opening_m: float
+    alternatives: tuple[GraspPlan, ...] = ()
+    source: str = "felt"
+
+    def __post_init__(self) -> None:
+        position_K_m = np.asarray(self.position_K_m)
+        if position_K_m.shape != (3,) or not (np.abs(position_K_m) <= FARTHEST_M).all():
+            raise ParamError("position_K_m", position_K_m.tolist(), f"[x, y, z] in metres, up to {FARTHEST_M:g} each")
+        if not abs(self.yaw_rad) <= LARGEST_YAW_RAD:
+            raise ParamError("yaw_rad", self.yaw_rad, f"radians, up to {LARGEST_YAW_RAD:.4g} either way")
+        for name in ("aperture_m", "opening_m"):  # of closed jaws, too, whose zero is a little off
+            if not -GREATEST_ZERO_M <= getattr(self, name) <= WIDEST_M:
+                raise ParamError(name, getattr(self, name), f"in metres, {-GREATEST_ZERO_M:g} to {WIDEST_M:g}")
+
+
+def plan_grasp(
+    touchset: TouchSet, match: Match, mesh: Mesh, model: TargetModel, gripper: Gripper, side_gap_m: float = 0.010
+) -> GraspPlan:
+    """The best grasp and the next ones.
+
+    Args:
+        touchset: What was felt of the object.
+        match: Its fit to the target.
+        mesh: The target.
+        model: The target's tables.
+        gripper: The hand.
+        side_gap_m: Open jaw to the object, each side.
+    """
+    com = np.asarray(mesh.as_trimesh().center_mass)
+    fitted: list[GraspPlan] = []
+    if match.fit is not None and misfit_m(touchset, match, model) <= BELIEVED_M:
+        holds = holds_of(model, com, gripper, lowest_pads_m(model.height_m, gripper), FORCE_N)
+        fitted = _fitted(touchset.candidate.index, match, model, holds, side_gap_m)
+    felt = _felt(touchset, _placed(com, match), side_gap_m)
+    plans = [*fitted, *felt][: 1 + ALTERNATIVES]
+    return replace(plans[0], alternatives=tuple(plans[1:]))
+
+
+def misfit_m(touchset: TouchSet, match: Match, model: TargetModel) -> float:
+    """How far the widths felt are from those of the mesh at the fitted pose; infinite if few were or all are off."""
+    theta = match.pose_K_O[2]
+    middle = _placed(np.array([*model.centre_m, 0.0]), match)[:2]
+    off = []
+    for layer in touchset.layers:
+        if evidence_weight(layer) < 1.0:
+            continue
+        along = float(np.array([np.cos(layer.yaw_rad), np.sin(layer.yaw_rad)]) @ (layer.position_K_m - middle))
+        off.append(layer.aperture_m - model.width_at(along, layer.height_m, layer.yaw_rad - theta))
+    off = [d for d in off if math.isfinite(d)]
+    if len(off) < LEAST_LAYERS:
+        return math.inf
+    offset = float(np.median(off))
+    if not LEAST_OFFSET_M <= offset <= GREATEST_OFFSET_M:
+        return math.inf
+    return float(np.quantile(np.abs(np.array(off) - offset), 0.75))
+
+
+def _placed(point_O_m: Array, match: Match) -> Array:
+    """A point (3,) of the mesh in K."""
+    x, y, theta = match.pose_K_O
+    c, s = math.cos(theta), math.sin(theta)
+    return np.array([x + c * point_O_m[0] - s * point_O_m[1], y + s * point_O_m[0] + c * point_O_m[1], point_O_m[2]])
+
+
+def _fitted(index: int, match: Match, model: TargetModel, holds: Holds, side_gap_m: float) -> list[GraspPlan]:
+    """The best holds of the mesh, each a little apart from the others."""
+    middle = _placed(np.array([*model.centre_m, 0.0]), match)
+    chosen: list[GraspPlan] = []
+    for flat in np.argsort(-holds.worth, axis=None, kind="stable")[:2000].tolist():
+        i, j, k = np.unravel_index(flat, holds.worth.shape)
+        if holds.worth[i, j, k] < LEAST_WORTH or len(chosen) == FITTED:
+            break
+        yaw = match.pose_K_O[2] + float(holds.phi_rad[i])
+        c, s = math.cos(yaw), math.sin(yaw)
+        across = float(holds.middle_m[i, j, k])
+        place = middle + np.array([c * holds.l_m[j] + s * across, s * holds.l_m[j] - c * across, float(holds.z_m[k])])
+        if any(_near(place, yaw, other) for other in chosen):
+            continue
+        chosen.append(
+            GraspPlan(
+                candidate=index,
+                position_K_m=place,
+                yaw_rad=math.remainder(yaw, 2 * math.pi),
+                aperture_m=float(holds.width_m[i, j, k]),
+                opening_m=float(holds.opening_m[i, j, k]) + 2 * side_gap_m,
+                source="fitted",
+            )
+        )
+    return chosen
+
+
+def _near(place_K_m: Array, yaw_rad: float, other: GraspPlan) -> bool:
+    turned = abs(math.remainder(yaw_rad - other.yaw_rad, math.pi))
+    return turned < APART_RAD and float(np.linalg.norm(place_K_m - other.position_K_m)) < APART_M
+
+
+def _felt(touchset: TouchSet, com_K: Array, side_gap_m: float) -> list[GraspPlan]:
+    """The closures felt: large two-sided contact, near the centre of mass, felt late. Each was reached once."""
+
+    def worth(layer: Layer, later: int) -> float:
+        areas = [patch_statistics(d).area_fraction for d in (layer.left_m, layer.right_m)]
+        hold = math.prod([a / (a + AREA_SCALE) for a in areas])
+        across = np.array([np.cos(layer.yaw_rad), np.sin(layer.yaw_rad)])
+        lever = math.hypot(across @ (com_K[:2] - layer.position_K_m), 0.5 * (com_K[2] - layer.height_m))
+        return float(layer.stable) * hold * STALENESS**later / (1.0 + (lever / LEVER_SCALE_M) ** 2)
+
+    count = len(touchset.sequences)
+    rated = [(worth(layer, count - 1 - k), layer) for k, q in enumerate(touchset.sequences) for layer in q.layers]
+    rated.sort(key=lambda r: -r[0])
+    return [
+        GraspPlan(
+            candidate=touchset.candidate.index,
+            position_K_m=np.array([*layer.position_K_m, layer.height_m]),
+            yaw_rad=layer.yaw_rad,
+            aperture_m=layer.aperture_m,
+            opening_m=_extent(touchset.candidate, layer) + 2 * side_gap_m,
+        )
+        for _, layer in rated[: 1 + ALTERNATIVES]
+    ]
+
+
+def _extent(candidate: Candidate, layer: Layer) -> float:
+    """How wide the object was traced across the layer's closing direction, or felt there if that is wider."""
+    low, high = candidate.span_m(layer.yaw_rad + 0.5 * np.pi)
+    return max(high - low, layer.aperture_m)

@@ -1,0 +1,184 @@
+"""The moves every squeeze is made of: down over a candidate with open jaws, one closure, up again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from glotouch_bt.motion import Motion
+from glotouch_bt.perception.touch import Candidate, Layer, Yielding, make_layer, watch_yielding
+from glotouch_bt.perception.touch.calibration import JawZero
+from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose
+from glotouch_bt.skill import Context, SkillParams, param
+from glotouch_skills.common.hand import close_gently, glide, hand_pose_B, let_go
+from glotouch_skills.common.planning.squeeze_plan import Stance
+
+HAND_CLEARANCE_M = 0.005
+"""Fingertips stay this far above the floor, and the hand's body this far above a candidate's top."""
+LEAST_GAP_M = 0.003
+"""Two closures nearer to each other than this are one."""
+OVER_TOP_M = 0.02
+"""From so far above a candidate's top the hand goes down carefully."""
+HASTE = 3.0
+"""Speed above that place against the careful one."""
+OPENING_M_S = 0.2
+
+
+class ClosureParams(SkillParams):
+    """What all squeezing skills take.
+
+    The descent is slow for the worst it may meet: both fingertips flat on a rigid foot. At 15 mm/s that was 26 N before
+    the first sample could show it and 34 N 10 ms later (simulated; it goes with the speed); the hard limit is 30 N.
+    """
+
+    force_N: float = param("Closing force of one jaw", unit="N", default=10.0, gt=0.0, le=10.0)
+    closing_speed_m_s: float = param("Closing speed", unit="m/s", default=0.03, gt=0.0, le=0.2)
+    layers: int = param("Closures per sequence", default=4, ge=1, le=10)
+    layer_gap_m: float = param("Least distance between two layers", unit="m", default=0.012, ge=0.002, le=0.05)
+    side_gap_m: float = param("Open jaw to the contour, each side", unit="m", default=0.010, ge=0.004, le=0.03)
+    travel_speed_m_s: float = param("Speed of the empty hand", unit="m/s", default=0.25, gt=0.0, le=0.25)
+    descent_speed_m_s: float = param("Speed down beside the object", unit="m/s", default=0.010, gt=0.0, le=0.04)
+    headroom_m: float = param("Fingertips above the floor on the way", unit="m", default=0.13, ge=0.05, le=0.25)
+    settle_s: float = param("How long the plateau is watched", unit="s", default=0.15, ge=0.05, le=1.0)
+    top_overlap_m: float = param(
+        "Pad centre of the highest layer below the top", unit="m", default=0.008, ge=0.0, le=0.03
+    )
+
+
+def body_bottom_m(gripper: Gripper) -> float:
+    """How far the gripper's body reaches below the flange."""
+    return max(b.centre_m[2] + b.half_m[2] for b in gripper.body)
+
+
+def lowest_pads_m(height_m: float, gripper: Gripper) -> float:
+    """Least height of the pads' mid-point over an object of a height: fingertips over the floor, body over its top."""
+    body_above_P = gripper.pose_E_P.position_m[2] - body_bottom_m(gripper)
+    return float(max(gripper.fingertip_below_P_m, height_m - body_above_P) + HAND_CLEARANCE_M)
+
+
+def layer_heights(candidate: Candidate, gripper: Gripper, p: ClosureParams) -> Array:
+    """Pad-centre heights above the floor, lowest first.
+
+    A low object is squeezed up to where only the lower half of the pads still feels it: one layer a sequence would
+    leave no spare.
+    """
+    lowest = lowest_pads_m(candidate.height_m, gripper)
+    highest = max(candidate.height_m - p.top_overlap_m, min(lowest + p.layer_gap_m, candidate.height_m), lowest)
+    least = 1 if highest - lowest < LEAST_GAP_M else min(2, p.layers)
+    count = int(np.clip(np.floor((highest - lowest) / p.layer_gap_m) + 1, least, p.layers))
+    return np.linspace(lowest, highest, count)
+
+
+class Squeezing:
+    """One hand over one candidate.
+
+    Args:
+        context: Of the skill.
+        candidate: What is squeezed.
+        at: Where the open hand stands.
+        params: How.
+        zero: What the jaws report too much; taken off every aperture.
+
+    Attributes:
+        yaw_K_rad: Direction of x_P the hand really takes (`at`'s or its half turn).
+    """
+
+    def __init__(
+        self, context: Context, candidate: Candidate, at: Stance, params: ClosureParams, zero: JawZero | None = None
+    ) -> None:
+        self.candidate, self.at = candidate, at
+        self._zero = zero or JawZero()
+        self._context, self._p = context, params
+        arm, container = context.arm, context.world.container
+        self.yaw_K_rad = hand_pose_B(arm, container, np.zeros(3), at.yaw_K_rad).yaw_rad - container.pose_B_K.yaw_rad
+
+    def go_down(self, height_m: float) -> Motion[None]:
+        """Over the candidate with open jaws, and down to `height_m`.
+
+        Raises:
+            MotionRefused: No way there, or the fingers met something; the hand is high again.
+        """
+        arm, p = self._context.arm, self._p
+        tips = arm.description.gripper.fingertip_below_P_m
+        above = self._pose(p.headroom_m + tips)
+        yield from arm.jaws(self.at.opening_m, speed_m_s=OPENING_M_S)
+        travel_z = max(float(arm.pose_B_P.position_m[2]), float(above.position_m[2]))
+        yield from arm.transit(above, height_B_m=travel_z, speed_m_s=p.travel_speed_m_s)
+        near = min(self.candidate.height_m + OVER_TOP_M, p.headroom_m) + tips
+        yield from glide(self._context, self._pose(near), HASTE * p.descent_speed_m_s)
+        if not (yield from self.move_to(height_m)):
+            height = pads_height_m(self._context)
+            yield from self.rise()
+            raise MotionRefused("squeeze", f"the fingers met something {height * 1e3:.0f} mm above the floor")
+
+    def move_to(self, height_m: float) -> Motion[bool]:
+        """Up or down beside the object, jaws open; False if the fingers met something."""
+        return (yield from glide(self._context, self._pose(height_m), self._p.descent_speed_m_s))
+
+    def close(self) -> Motion[tuple[Layer, Yielding]]:
+        """One closure where the hand is; the jaws are open again afterwards, and a pause comes then.
+
+        Raises:
+            MotionRefused: The hand was pressed too hard; the jaws are open.
+        """
+        with self._context.arm.feed.finishing():
+            return (yield from self._close())
+
+    def _close(self) -> Motion[tuple[Layer, Yielding]]:
+        p, arm = self._p, self._context.arm
+        gripper = arm.description.gripper
+        closing: list[Observation] = []
+        yield from close_gently(arm, p.closing_speed_m_s, p.force_N, tactile=True, seen_by=closing.append)
+        command = Command(gripper=GripperTarget(0.0, p.closing_speed_m_s, p.force_N), tactile=True)
+        blocks: list[Observation] = []
+        for _ in range(round(p.settle_s / arm.period_s)):
+            blocks.append((yield command))  # noqa: PERF401 (a comprehension cannot yield)
+        contour = self.candidate.contour
+        x_P = np.array([np.cos(self.yaw_K_rad), np.sin(self.yaw_K_rad)])
+        middle = float(x_P @ (contour.centre_K_m - self.at.position_K_m))
+        half_diagonal = 0.5 * float(np.hypot(*contour.size_m)) if contour.family != "circle" else contour.radius_m
+        yielding = watch_yielding([*closing, *blocks], gripper.pad_window_m[0], middle, half_diagonal)
+        measured = self._context.world.container.pose_B_K.inverse().apply(blocks[-1].pose_B_P.position_m)
+        layer = make_layer(
+            blocks,
+            height_m=float(measured[2]),
+            position_K_m=measured[:2],
+            yaw_rad=self.yaw_K_rad,
+            force_N=p.force_N,
+            pad_shape=gripper.pad_shape,
+            yielding=yielding,
+        )
+        yield from let_go(arm, self.at.opening_m)
+        true_m = layer.aperture_m - self._zero.error_m
+        return replace(layer, aperture_m=true_m, zero_sd_m=self._zero.sd_m), yielding
+
+    def rise(self) -> Motion[None]:
+        """Straight up to travelling height."""
+        arm = self._context.arm
+        above = self._pose(self._p.headroom_m + arm.description.gripper.fingertip_below_P_m)
+        yield from arm.line(above, self._p.travel_speed_m_s, check=False)
+
+    def _pose(self, height_m: float) -> Pose:
+        position = np.array([*self.at.position_K_m, height_m])
+        return hand_pose_B(self._context.arm, self._context.world.container, position, self.yaw_K_rad)
+
+
+def disturbance(candidate: Candidate, layer: Layer, yielding: Yielding) -> dict[str, object] | None:
+    """Data of an `object_moved` event, or None: no closure drags, turns or topples an object silently."""
+    lost = yielding.felt and not layer.stable
+    if not (yielding.moved or lost):
+        return None
+    return {
+        "candidate": candidate.index,
+        "height_m": layer.height_m,
+        "slide_m": layer.slide_m,
+        "turn_rad": layer.turn_rad,
+        "gave_m": layer.gave_m,
+        "lost": layer.why_not if lost else "",
+    }
+
+
+def pads_height_m(context: Context) -> float:
+    """Pads' mid-point above the container floor, as commanded."""
+    return float(context.world.container.pose_B_K.inverse().apply(context.arm.pose_B_P.position_m)[2])

@@ -1,0 +1,143 @@
+"""Which closures could be made next, and what each costs in time: the choices of adaptive touching."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from glotouch_bt.perception.recognition import Closure
+from glotouch_bt.perception.touch import Candidate, TouchSet
+from glotouch_bt.robot import Array, Gripper
+from glotouch_skills.common.planning.squeeze_motion import HASTE, OVER_TOP_M, ClosureParams, layer_heights
+from glotouch_skills.common.planning.squeeze_plan import Stance, schemes, stance
+
+YAWS_RAD = np.deg2rad(np.arange(0.0, 180.0, 30.0))
+"""Jaw directions over a candidate without tracks; parallel jaws look the same after half a turn."""
+SAME_M, SAME_RAD = 0.004, np.deg2rad(8.0)
+"""Nearer than this to a closure already made, another one tells nothing new."""
+CLOSURE_S, TURN_S, STOP_S = 1.6, 1.5, 0.6
+"""Robot time of one closure with opening again, of turning the hand over a candidate, and of each start and stop."""
+
+
+@dataclass(frozen=True)
+class Option:
+    """One closure that could be made next.
+
+    Attributes:
+        at: Where the open hand stands.
+        closure: The closure.
+        seconds: Robot time until it is done, from where the hand is now.
+        after: Closures that the same stance then offers for `more_s` each.
+        more_s: Robot time of one of `after`.
+    """
+
+    at: Stance
+    closure: Closure
+    seconds: float
+    after: tuple[Closure, ...] = ()
+    more_s: float = CLOSURE_S
+
+
+@dataclass(frozen=True)
+class Standing:
+    """The open hand, down beside a candidate.
+
+    Attributes:
+        candidate: Index.
+        at: Its stance.
+        height_m: Of the pads.
+    """
+
+    candidate: int
+    at: Stance
+    height_m: float
+
+
+def stances_over(candidate: Candidate, gripper: Gripper, side_gap_m: float) -> list[Stance]:
+    """Every stance worth thinking of: half a circle of yaws, and along the tracks of what is long.
+
+    A candidate that is neither a circle nor a rectangle gets both.
+    """
+    contour = candidate.contour
+    places = [(0.0, float(contour.yaw_rad + y)) for y in YAWS_RAD]
+    if contour.kind == "box":
+        tracks, *_ = schemes(candidate, gripper)
+        places += [alternatives[0] for alternatives in tracks if abs(alternatives[0][0]) > SAME_M]
+    found = (stance(candidate, along, yaw, side_gap_m, gripper.stroke_m) for along, yaw in places)
+    return [s for s in found if s is not None]
+
+
+def options(
+    touchsets: Sequence[TouchSet], standing: Standing | None, hand_K_m: Array, gripper: Gripper, p: ClosureParams
+) -> list[Option]:
+    """All closures that could come next and are not yet made.
+
+    A new stance begins with its lowest closure, which centres the candidate where it cannot topple; higher ones follow
+    without rising, in any choice of heights but upwards.
+
+    Args:
+        touchsets: What was felt; one a candidate.
+        standing: Where the open hand is down, or None if it is high.
+        hand_K_m: (3,) pads' mid-point.
+        gripper: Of the robot.
+        p: How closures are made.
+    """
+    out: list[Option] = []
+    for touchset in touchsets:
+        candidate = touchset.candidate
+        heights = layer_heights(candidate, gripper, p)
+        here = standing if standing is not None and standing.candidate == candidate.index else None
+        if here is not None:
+            for z in heights[heights > here.height_m + SAME_M]:
+                seconds = CLOSURE_S + STOP_S + (z - here.height_m) / p.descent_speed_m_s
+                out.append(Option(here.at, _closure(candidate, here.at, float(z)), float(seconds)))
+        for at in stances_over(candidate, gripper, p.side_gap_m):
+            if _used(touchset, at):
+                continue
+            lowest, *higher = (_closure(candidate, at, float(z)) for z in heights)
+            seconds = _travel_s(candidate, at, float(heights[0]), hand_K_m, p) + CLOSURE_S
+            gap = float(np.ptp(heights)) / max(len(heights) - 1, 1)
+            more = CLOSURE_S + STOP_S + gap / p.descent_speed_m_s
+            out.append(Option(at, lowest, seconds, tuple(higher), more))
+    return out
+
+
+def best_rates(options: Sequence[Option], gains: Sequence[Array]) -> Array:
+    """(n,) expected nats per second of each option: alone, or with the best closure that the same stance offers next.
+
+    Args:
+        options: The choices.
+        gains: For each, the gain of its closure and then of those in `after`.
+    """
+    rates = []
+    for option, gain in zip(options, gains, strict=True):
+        alone = gain[0] / option.seconds
+        both = (gain[0] + max(gain[1:], default=0.0)) / (option.seconds + option.more_s)
+        rates.append(max(alone, both) if len(gain) > 1 else alone)
+    return np.array(rates)
+
+
+def _closure(candidate: Candidate, at: Stance, height_m: float) -> Closure:
+    return Closure(candidate.index, at.yaw_K_rad, height_m, at.position_K_m)
+
+
+def _used(touchset: TouchSet, at: Stance) -> bool:
+    """A sequence was taken there, or half a turn from there."""
+    for s in touchset.sequences:
+        turn = (s.yaw_rad - at.yaw_K_rad + 0.5 * np.pi) % np.pi - 0.5 * np.pi
+        if abs(turn) < SAME_RAD and float(np.linalg.norm(s.position_K_m - at.position_K_m)) < SAME_M:
+            return True
+    return False
+
+
+def _travel_s(candidate: Candidate, at: Stance, height_m: float, hand_K_m: Array, p: ClosureParams) -> float:
+    """Up, across and down to `height_m` beside the candidate."""
+    high = p.headroom_m
+    across = float(np.linalg.norm(at.position_K_m - hand_K_m[:2]))
+    up = max(high - float(hand_K_m[2]), 0.0)
+    careful = max(min(candidate.height_m + OVER_TOP_M, high) - height_m, 0.0)
+    quick = max(high - candidate.height_m - OVER_TOP_M, 0.0)
+    way = (up + across) / p.travel_speed_m_s + quick / (HASTE * p.descent_speed_m_s) + careful / p.descent_speed_m_s
+    return way + TURN_S + 4 * STOP_S

@@ -1,0 +1,197 @@
+"""Touching with the held probe: the guarded moves that several skills share. All positions are ball centres in K."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from glotouch_bt.motion import Motion, MoveResult
+from glotouch_bt.perception.touch import (
+    Baseline,
+    Carried,
+    Contact,
+    ContactGuard,
+    GuardParams,
+    HardStop,
+    HardTrip,
+    MeasuredInertia,
+    Onset,
+    fit_baseline,
+    pushed,
+    settled,
+)
+from glotouch_bt.robot import Array, MotionRefused, Observation, Pose
+from glotouch_bt.skill import Context, SkillFailed
+from glotouch_skills.common.probe.held_tool import HeldTool
+
+REST_S, LONGEST_REST_S = 0.12, 0.6
+"""The wrench and the twist must have been steady for so long before a guard listens; waited for at most so long."""
+LISTENING_ACCELERATION_M_S2, LISTENING_JERK_M_S3 = 0.5, 20.0
+"""Limits while a guard listens. With its inertia taken out, the hand leaves below 0.05 N at the tip (simulation)."""
+
+
+@dataclass(frozen=True)
+class Probed:
+    """Outcome of one guarded move of the tip.
+
+    Attributes:
+        contact: What stopped it, or None if it ran its whole way.
+        path_K_m: (n, 3) where the tip's centre has been, one row a control period.
+    """
+
+    contact: Contact | None
+    path_K_m: Array
+
+
+class Prober:
+    """Moves the ball of the held probe about, listening at the wrist.
+
+    Args:
+        context: The skill's context.
+        tool: The held probe.
+        guard: Contact thresholds; the sensor's latency is the tool's, where it may have been measured.
+        carried: What hangs below the wrist; by default the described hand, and the world's probe if it is held.
+
+    Attributes:
+        resting_up_N: Force straight up on the wrist at each rest so far.
+    """
+
+    def __init__(
+        self,
+        context: Context,
+        tool: HeldTool,
+        guard: GuardParams,
+        *,
+        carried: Carried | None = None,
+    ) -> None:
+        self._context, self._tool = context, tool
+        self._guard = replace(guard, latency_s=tool.latency_s)
+        self._world = context.world
+        self._pose_K_B = context.world.container.pose_B_K.inverse()
+        probe = context.world.probe if context.arm.scene.holding_tool else None
+        self._carried = carried or Carried.hand(context.arm.description.gripper, probe)
+        self._rested: tuple[float, Baseline] | None = None
+        self.resting_up_N: list[float] = []
+
+    @property
+    def tip_K_m(self) -> Array:
+        """(3,) where the ball's centre is commanded to be."""
+        return self._tool.tip_K_m(self._world, self._context.arm.pose_B_P)
+
+    def rest(self) -> Motion[Baseline]:
+        """Hold still until wrench and twist have settled, at most `LONGEST_REST_S`; the wrench of "nothing touched".
+
+        If no time has passed since the last rest, that one stands.
+        """
+        if self._rested is not None and self._rested[0] == self._context.observation.now_s:
+            return self._rested[1]
+        period_s = self._context.arm.period_s
+        window: deque[Observation] = deque(maxlen=round(REST_S / period_s))
+        for _ in range(round(LONGEST_REST_S / period_s)):
+            (seen,) = yield from self._context.arm.hold(period_s)
+            if window and seen.stamp_s[0] - window[-1].now_s > period_s:
+                window.clear()  # a pause: what was sensed before it is old
+            window.append(seen)
+            if len(window) == window.maxlen and settled(list(window)):
+                break
+        inertia = self._inertia()  # where there is none, what measuring it adds in noise
+        baseline = fit_baseline(np.concatenate([o.wrench_S - inertia(o) for o in window]))
+        self._rested = (window[-1].now_s, baseline)
+        self.resting_up_N.append(float((self._context.arm.pose_B_P.rotation @ baseline.median[:3])[2]))
+        return baseline
+
+    def move(self, tip_K_m: Array, speed_m_s: float, *, any_direction: bool = False) -> Motion[Probed]:
+        """Straight guarded move of the ball to `tip_K_m` (3,).
+
+        Stops at the first contact that opposes the motion, or, with `any_direction`, at any (a graze too).
+
+        Raises:
+            SkillFailed: `hard_contact`: the wrench passed a hard limit on the way; the arm stands.
+            MotionRefused: The way is not clear.
+        """
+        step = np.asarray(tip_K_m, dtype=np.float64) - self.tip_K_m
+        length = float(np.linalg.norm(step))
+        if length < 1e-4:
+            return Probed(None, self.tip_K_m[None, :])
+        step_B = self._world.container.pose_B_K.rotation @ step
+        guard = yield from self._listen(step_B / length, any_direction)
+        result = yield from self._context.arm.shift(
+            step_B,
+            speed_m_s,
+            acceleration_m_s2=LISTENING_ACCELERATION_M_S2,
+            jerk_m_s3=LISTENING_JERK_M_S3,
+            guard=guard,
+        )
+        return self._outcome(result, step / length)
+
+    def retreat(self, direction_K: Array, distance_m: float, speed_m_s: float) -> Motion[None]:
+        """Unguarded move away from a contact along `direction_K` (3,), then rest until the wrench has settled."""
+        step_B = self._world.container.pose_B_K.rotation @ (np.asarray(direction_K) * distance_m)
+        yield from self._context.arm.shift(step_B, speed_m_s)
+        yield from self.rest()
+
+    def hop(self, tip_K_m: Array, height_K_m: float, speed_m_s: float) -> Motion[None]:
+        """Straight up until the ball's centre is at `height_K_m`, then across to above `tip_K_m`; unguarded."""
+        tip = self.tip_K_m
+        for goal in (np.array([tip[0], tip[1], height_K_m]), np.array([tip_K_m[0], tip_K_m[1], height_K_m])):
+            if np.linalg.norm(goal - self.tip_K_m) > 1e-4:
+                yield from self._context.arm.line(self._tool.pose_B_P(self._world, goal), speed_m_s)
+
+    def _listen(self, direction_B: Array, any_direction: bool) -> Motion[_Listener]:
+        baseline = yield from self.rest()
+        arm, params = self._context.arm, self._guard
+        gripper = arm.description.gripper
+        inertial = self._inertia()
+        approach_B = None if any_direction else direction_B
+        soft = ContactGuard(baseline, approach_B, self._tool.tip_P_m, gripper.pose_E_P, params, inertial)
+        return _Listener(HardStop(baseline, params), soft)
+
+    def _inertia(self) -> MeasuredInertia:
+        gripper = self._context.arm.description.gripper
+        return MeasuredInertia(self._carried, gripper.pose_E_P, self._guard.latency_s)
+
+    def _outcome(self, result: MoveResult, approach_K: Array) -> Probed:
+        poses = result.path_B_m + self._context.arm.pose_B_P.rotation @ self._tool.tip_P_m
+        path_K = self._pose_K_B.apply(poses)
+        stop = result.stop
+        if stop is None:
+            return Probed(None, path_K)
+        if isinstance(stop, HardTrip):
+            raise SkillFailed(
+                "hard_contact",
+                f"{stop.quantity} {stop.value:.1f} passed its limit {stop.limit:.1f} during a guarded move",
+                advice="something hard or heavy is in the way; go slower",
+                quantity=stop.quantity,
+                value=stop.value,
+                limit=stop.limit,
+            )
+        if not isinstance(stop, Onset):
+            raise MotionRefused("guarded move", f"the guard answered {stop!r}, not an onset")
+        return Probed(self._contact(stop, approach_K, path_K[-1]), path_K)
+
+    def _contact(self, onset: Onset, approach_K: Array, end_K_m: Array) -> Contact:
+        pose = Pose(onset.position_B_P, onset.quat_B_P)
+        tip_K = self._tool.tip_K_m(self._world, pose)
+        force_K = self._pose_K_B.rotation @ onset.force_B
+        norm = float(np.linalg.norm(force_K))
+        reaction = force_K / norm if norm > 1e-6 else -approach_K
+        point = self._tool.contact_point_K_m(self._world, pose, approach_K, reaction)
+        return Contact(
+            onset.stamp_s, tip_K, approach_K, reaction, point, norm, pushed(end_K_m[:2] - tip_K[:2], reaction[:2])
+        )
+
+
+class _Listener:
+    """Both rules on the same samples; what passes a hard limit is no touch, whatever the soft rule says."""
+
+    def __init__(self, hard: HardStop, soft: ContactGuard) -> None:
+        self._hard, self._soft = hard, soft
+
+    def __call__(self, observation: Observation) -> HardTrip | Onset | None:
+        return self._hard(observation) or self._soft(observation)
+
+    def standing(self, observation: Observation) -> HardTrip | Onset | None:
+        """While a paused motion stands."""
+        return self._hard(observation) or self._soft.standing(observation)

@@ -1,0 +1,167 @@
+"""Execute an exploration plan (`perception.search`) with the arm: each move is a guarded move of the ball."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from glotouch_bt.motion import Motion
+from glotouch_bt.perception.search import Felt, Move, Plan, T
+from glotouch_bt.perception.touch import Contact, GuardParams
+from glotouch_bt.robot import Array, MotionRefused
+from glotouch_bt.skill import Context, SkillFailed
+from glotouch_skills.common.hand import GRAVITY_M_S2, rise_clear, weigh_N
+from glotouch_skills.common.probe.guarded_probe import Prober
+from glotouch_skills.common.probe.held_tool import HeldTool
+
+AT_HEIGHT_M = 0.004
+"""The ball counts as lowered within this of the sensing height."""
+HELD_TOLERANCE_M = 0.004
+"""The tool is still held if the jaws are this near to where they closed on it: as for taking it."""
+LIGHTER = 0.5
+"""A share of the probe's weight that is missing all at once: it is weighed in free air."""
+OFF_TOP_M = 0.006
+"""The ball is raised so far off what it landed on."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExploringSpeeds:
+    """Speeds of each kind of move, m/s; heights of the ball's centre above the floor, m."""
+
+    sweep_m_s: float = 0.04
+    step_m_s: float = 0.05
+    probe_m_s: float = 0.03
+    travel_m_s: float = 0.10
+    lower_m_s: float = 0.02
+    height_m: float = 0.018
+    headroom_m: float = 0.13
+
+
+class Explorer:
+    """Moves the ball as a plan asks.
+
+    Args:
+        context: The skill's context.
+        tool: The held probe.
+        speeds: How fast and how high.
+        journal: Called with (kind, data) of every event: "contact", "sweep" (the path at sensing height), "note".
+    """
+
+    def __init__(self, context: Context, tool: HeldTool, speeds: ExploringSpeeds, journal: Callable[..., None]) -> None:
+        self._prober = Prober(context, tool, GuardParams())
+        self._arm, self._tool, self._speeds, self._journal = context.arm, tool, speeds, journal
+        probe = context.world.probe
+        self._weight_N = probe.mass_kg * GRAVITY_M_S2 if context.arm.scene.holding_tool else math.inf
+
+    @property
+    def lowered(self) -> bool:
+        """The ball is at sensing height."""
+        return abs(float(self._prober.tip_K_m[2]) - self._height_m) < AT_HEIGHT_M
+
+    @property
+    def tip_K_m(self) -> Array:
+        """(2,) where the ball is."""
+        return self._prober.tip_K_m[:2]
+
+    @property
+    def _height_m(self) -> float:
+        return self._tool.floor_z_K_m + self._speeds.height_m
+
+    def run(self, plan: Plan[T]) -> Motion[T]:
+        """All of a plan; what the plan returns.
+
+        Raises:
+            SkillFailed: `tool_lost`, `hard_contact`.
+        """
+        try:
+            move = next(plan)
+            while True:
+                move = plan.send((yield from self._make(move)))
+        except StopIteration as end:
+            result: T = end.value
+            return result
+
+    def _make(self, move: Move) -> Motion[Felt]:
+        self._require_tool()
+        yield from self._require_weight()
+        try:
+            if move.kind == "hop":
+                contact, path = yield from self._hop(move.goal_K_m)
+            elif move.kind == "retreat":
+                contact, path = yield from self._retreat(move.goal_K_m)
+            else:
+                contact, path = yield from self._go(move)
+        except MotionRefused as refusal:
+            self._journal("note", text=f"{move.kind} refused: {refusal}")
+            return Felt(self.tip_K_m, np.zeros((0, 2)), refused=str(refusal))
+        if len(path):
+            self._journal("sweep", path_K_m=path)
+        if contact is not None:
+            self._journal("contact", contact=contact)
+        return Felt(self.tip_K_m, path[:, :2], contact)
+
+    def _require_tool(self) -> None:
+        """The jaws must be as far apart as when they took the tool; without it nothing would ever be touched."""
+        apart, taken = self._arm.aperture_m, self._tool.aperture_m
+        if abs(apart - taken) > HELD_TOLERANCE_M:
+            raise SkillFailed(
+                "tool_lost",
+                f"the jaws are {apart * 1e3:.1f} mm apart, with the tool in them they were {taken * 1e3:.1f}",
+                advice="the tool lies in the container or beside it; take it out by hand",
+                aperture_m=apart,
+            )
+
+    def _require_weight(self) -> Motion[None]:
+        """The resting wrist must not become lighter at once by as much as the probe weighs, nor stay so in free air.
+
+        From one rest to the next, for a tare drifts farther than that in minutes.
+        """
+        rests = self._prober.resting_up_N
+        steps = [(b - a, a) for a, b in pairwise(rests)]
+        del rests[:-1]
+        step_N, before_N = max(steps, default=(0.0, 0.0))
+        if not step_N > LIGHTER * self._weight_N:
+            return
+        tip = self._prober.tip_K_m
+        yield from rise_clear(self._arm)
+        missing_N = -(yield from weigh_N(self._arm)) - before_N
+        if missing_N > LIGHTER * self._weight_N:
+            raise SkillFailed(
+                "tool_lost",
+                f"the hand is lighter by {missing_N:.2f} N than a moment ago, the probe weighs {self._weight_N:.2f} N",
+                advice="look with tool_check",
+                missing_N=missing_N,
+                weight_N=self._weight_N,
+            )
+        self._journal("note", text=f"the wrist became lighter on a contact; in free air {missing_N:.2f} N are missing")
+        yield from self._prober.move(tip, self._speeds.lower_m_s)
+
+    def _go(self, move: Move) -> Motion[tuple[Contact | None, Array]]:
+        s = self._speeds
+        speed = {"sweep": s.sweep_m_s, "step": s.step_m_s, "probe": s.probe_m_s}[move.kind]
+        goal = np.array([*move.goal_K_m, self._height_m])
+        probed = yield from self._prober.move(goal, speed, any_direction=move.kind == "step")
+        return probed.contact, probed.path_K_m
+
+    def _retreat(self, goal_K_m: Array) -> Motion[tuple[None, Array]]:
+        before = self._prober.tip_K_m
+        way = goal_K_m - before[:2]
+        length = float(np.linalg.norm(way))
+        if length > 1e-4:
+            yield from self._prober.retreat(np.array([*(way / length), 0.0]), length, self._speeds.step_m_s)
+        return None, np.array([before, self._prober.tip_K_m])
+
+    def _hop(self, goal_K_m: Array) -> Motion[tuple[Contact | None, Array]]:
+        s, tip = self._speeds, self._prober.tip_K_m
+        if np.linalg.norm(goal_K_m - tip[:2]) > 0.002:
+            above = max(float(tip[2]), self._tool.floor_z_K_m + s.headroom_m)
+            yield from self._prober.hop(np.array([*goal_K_m, 0.0]), above, s.travel_m_s)
+        probed = yield from self._prober.move(np.array([*goal_K_m, self._height_m]), s.lower_m_s)
+        if probed.contact is not None:
+            yield from self._prober.retreat(np.array([0.0, 0.0, 1.0]), OFF_TOP_M, s.step_m_s)
+            return probed.contact, np.zeros((0, 3))
+        return None, probed.path_K_m[-1:]

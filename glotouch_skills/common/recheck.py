@@ -1,0 +1,233 @@
+"""Before a broken-off mission goes on in a world that nobody held still: is what it believes of it still so?"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from glotouch_bt.motion import Motion, finger_outline_half_m
+from glotouch_bt.perception.touch import Candidate, GuardParams, signed_distance
+from glotouch_bt.perception.touch.detection import Polygon
+from glotouch_bt.robot import Array, MotionRefused, SetPayload, Tare
+from glotouch_bt.skill import In, Skill, SkillFailed, SkillParams, SkillRun, come_to_rest, param
+from glotouch_skills.common.hand import finish, rise_clear
+from glotouch_skills.common.probe import HELD_TOLERANCE_M, HeldTool, Prober, feel_floor
+
+GRIPPING_N = 1.0
+DIRECTIONS = 24
+BEFORE_M, BEYOND_M = 0.012, 0.008
+"""A candidate is approached from so far outside its outline to so far inside."""
+ROOM_M = 0.006
+"""Room that the tool keeps from everything else where it is lowered."""
+
+
+class RecheckParams(SkillParams):
+    """Parameters of `recheck`."""
+
+    speed_m_s: float = param("Speed above everything", unit="m/s", default=0.10, gt=0.0, le=0.15)
+    touch_m_s: float = param("Speed towards a candidate", unit="m/s", default=0.03, gt=0.0, le=0.08)
+    height_m: float = param("Touching height above the floor", unit="m", default=0.018, ge=0.009, le=0.06)
+    moved_m: float = param("A candidate may have moved so far", unit="m", default=0.006, gt=0.0, le=0.02)
+    slip_m: float = param("The floor may be felt so far from where it was", unit="m", default=0.002, gt=0.0, le=0.005)
+    headroom_m: float = param("Tool's height above the floor on the way", unit="m", default=0.13, ge=0.05, le=0.2)
+    may_be_gone: bool = param("The probe may have been put back meanwhile", default=False)
+    touch: bool = param("Touch one of the candidates", default=True)
+    corner_gap_m: float = param("Ball centre to each wall where the floor is felt", unit="m", default=0.014, ge=0.008)
+
+
+class Recheck(Skill):
+    """Come to rest, rise, tell the controller what is in the hand, zero the wrist; then look, by touch.
+
+    With the probe in the hand: the jaws must be as far apart as they were, and the floor be felt where it was. If
+    candidates are known, the one that is easiest to reach is touched from its side. An object in the hand is left as
+    it is: jaws that hold nothing more are noticed.
+
+    SUCCESS: what could be looked at is as it was.
+    FAILURE `tool_lost`: the probe is not in the jaws any more, or meets no floor.
+    FAILURE `tool_slipped`: the floor is felt elsewhere.
+    FAILURE `object_lost`: the jaws held an object and hold nothing now.
+    FAILURE `candidate_moved`: nothing, or something else, was met where a candidate was traced.
+    FAILURE `hard_contact`: the wrench passed a hard limit.
+    FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
+    FAILURE `not_at_rest`: the arm does not come to rest.
+    FAILURE `motion_refused`: the hand cannot rise.
+    """
+
+    Params = RecheckParams
+    params: RecheckParams
+
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "tool_lost": "the probe is not in the jaws any more",
+        "tool_slipped": "the floor is felt elsewhere with it",
+        "object_lost": "the jaws held an object and hold nothing now",
+        "candidate_moved": "a candidate is not where it was traced",
+        "hard_contact": "the wrench passed a hard limit",
+        "request_failed": "the sensor could not be zeroed, or the payload not be set",
+        "not_at_rest": "the arm does not come to rest",
+        "motion_refused": "the hand cannot rise",
+    }
+
+    tool = In(HeldTool, "the probe as it was taken", required=False)
+    candidates = In(tuple, "what was traced", element=Candidate, required=False)
+    grip_m = In(float, "aperture with an object in the jaws", required=False)
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        arm, context = self.context.arm, self.context
+        held_m: float | None = self.grip_m
+        yield from come_to_rest(context)
+        if self.params.may_be_gone and self.tool is not None and not self._as_wide_as(self.tool):
+            arm.scene.hold_tool(False)
+        found: dict[str, object] = {"probe": arm.scene.holding_tool}
+        if arm.scene.holding_tool and self.tool is not None:
+            self._require_tool(self.tool)
+            yield from self._ready(held=True)
+            found["floor_z_K_m"] = yield from self._floor(self.tool)
+            found["candidate"] = yield from self._touch_one(self.tool, self.tool.tip_radius_m)
+        elif held_m is not None and context.observation.gripper.force_N > GRIPPING_N:
+            found["object"] = True
+        elif held_m is not None:
+            raise SkillFailed(
+                "object_lost",
+                f"the jaws held something {held_m * 1e3:.1f} mm wide and hold nothing now",
+                advice="start again where the object is sought or squeezed: resume --from NODE",
+                aperture_m=context.observation.gripper.aperture_m,
+            )
+        else:
+            yield from self._ready(held=False)
+            found["candidate"] = yield from self._touch_with_fingers()
+        self.event("recheck", **found)
+
+    def _as_wide_as(self, tool: HeldTool) -> bool:
+        return abs(self.context.arm.aperture_m - tool.aperture_m) <= HELD_TOLERANCE_M
+
+    def _require_tool(self, tool: HeldTool) -> None:
+        apart = self.context.arm.aperture_m
+        if not self._as_wide_as(tool):
+            raise SkillFailed(
+                "tool_lost",
+                f"the jaws are {apart * 1e3:.1f} mm apart, with the probe they were {tool.aperture_m * 1e3:.1f}",
+                advice="put the probe into its holder, then resume --from tool_pickup",
+                aperture_m=apart,
+            )
+
+    def _ready(self, *, held: bool) -> SkillRun:
+        """High, with the payload known and the wrist zeroed: a controller that was restarted knows neither."""
+        arm, probe = self.context.arm, self.context.world.probe
+        yield from rise_clear(arm, self.params.speed_m_s)
+        mass, below = (probe.mass_kg, probe.com_below_grasp_m) if held else (0.0, 0.0)
+        yield from finish(self.context.requests.start(SetPayload(mass, np.array([0.0, 0.0, below]))), "payload")
+        yield from arm.hold(0.2)
+        yield from finish(self.context.requests.start(Tare()), "tare")
+
+    def _floor(self, tool: HeldTool) -> Motion[float]:
+        p = self.params
+        floor_m = yield from feel_floor(self.context, tool, p.corner_gap_m, p.speed_m_s)
+        if floor_m is None:
+            raise SkillFailed(
+                "tool_lost",
+                "nothing was met where the floor is",
+                advice="put the probe into its holder, then resume --from tool_pickup",
+            )
+        off = floor_m - tool.floor_z_K_m
+        if abs(off) > p.slip_m:
+            raise SkillFailed(
+                "tool_slipped",
+                f"the floor was felt {off * 1e3:.1f} mm from where it was: the probe slipped, or the box was moved",
+                advice="put the probe into its holder, then resume --from tool_pickup",
+                off_m=off,
+            )
+        yield from rise_clear(self.context.arm, p.speed_m_s)
+        return floor_m
+
+    def _touch_with_fingers(self) -> Motion[int | None]:
+        """As with the probe, with the closed fingers."""
+        if not (self.candidates and self.params.touch):
+            return None
+        arm = self.context.arm
+        state = yield from arm.jaws(0.0)
+        gripper = arm.description.gripper
+        half = finger_outline_half_m(gripper, state.aperture_m)
+        radius = float(np.hypot(*half))
+        fingers = HeldTool(
+            tip_P_m=np.array([gripper.finger.centre_m[0], 0.0, gripper.fingertip_below_P_m]),
+            tip_radius_m=radius,
+            shaft_radius_m=radius,
+            aperture_m=state.aperture_m,
+            yaw_B_rad=arm.pose_B_P.yaw_rad,
+            section=Polygon.rectangle(*half),
+        )
+        return (yield from self._touch_one(fingers, float(np.min(half))))
+
+    def _touch_one(self, tool: HeldTool, least_m: float) -> Motion[int | None]:
+        """Touch a candidate from its side; its index, or None: none is known, or none can be reached.
+
+        `least_m`: the tool reaches at least so far from its middle.
+        """
+        p = self.params
+        for candidate, start, goal in self._ways(tool, least_m):
+            prober = Prober(self.context, tool, GuardParams())
+            try:
+                yield from prober.hop(np.array([*start, 0.0]), tool.floor_z_K_m + p.headroom_m, p.speed_m_s)
+                z = tool.floor_z_K_m + p.height_m
+                lowered = yield from prober.move(np.array([*start, z]), p.touch_m_s)
+                met = lowered.contact
+                if met is None:
+                    met = (yield from prober.move(np.array([*goal, z]), p.touch_m_s, any_direction=True)).contact
+            except MotionRefused as refusal:
+                self.event("note", text=f"candidate {candidate.index} was not touched: {refusal}")
+                yield from rise_clear(self.context.arm, p.speed_m_s)
+                continue
+            yield from rise_clear(self.context.arm, p.speed_m_s)
+            self._judge(candidate, None if met is None else met.point_K_m)
+            return candidate.index
+        return None
+
+    def _judge(self, candidate: Candidate, point_K_m: Array | None) -> None:
+        off: float | None = None
+        if point_K_m is not None:
+            off = float(signed_distance(candidate.contour, point_K_m[None])[0])
+            if abs(off) <= self.params.moved_m:
+                return
+        how = "nothing was met there" if off is None else f"something was met {off * 1e3:.1f} mm from its outline"
+        raise SkillFailed(
+            "candidate_moved",
+            f"candidate {candidate.index} is not where it was traced: {how}",
+            advice="what was found is not to be trusted any more: resume --from guarded_sweep, or run it again",
+            candidate=candidate.index,
+        )
+
+    def _ways(self, tool: HeldTool, least_m: float) -> list[tuple[Candidate, Array, Array]]:
+        """(candidate, where to be lowered, where to go) with the most room first; places (2,) in K."""
+        p = self.params
+        known: tuple[Candidate, ...] = (self.candidates or ()) if p.touch else ()
+        half = 0.5 * np.array(self.context.world.container.interior_m[:2]) - tool.tip_radius_m - ROOM_M
+        ways: list[tuple[float, int, Candidate, Array, Array]] = []
+        for candidate in known:
+            others = [c.contour for c in known if c is not candidate]
+            for i in range(DIRECTIONS):
+                angle = 2.0 * np.pi * i / DIRECTIONS
+                out = np.array([np.cos(angle), np.sin(angle)])
+                edge = candidate.contour.centre_K_m + out * _reach_m(candidate, out)
+                start = edge + out * (tool.tip_radius_m + BEFORE_M)
+                if (np.abs(start) > half).any():
+                    continue
+                room = min((float(signed_distance(c, start[None])[0]) for c in others), default=np.inf)
+                room = min(room - tool.tip_radius_m, float((half - np.abs(start)).min()) + ROOM_M)
+                if room >= ROOM_M:
+                    goal = edge + out * (least_m - BEYOND_M)
+                    ways.append((-room, len(ways), candidate, start, goal))
+        return [(c, start, goal) for _, _, c, start, goal in sorted(ways, key=lambda w: w[:2])][: 2 * len(known)]
+
+
+def _reach_m(candidate: Candidate, out: Array) -> float:
+    """How far from its centre the outline ends in the direction `out` (2,): bisection on the signed distance."""
+    contour = candidate.contour
+    near, far = 0.0, contour.radius_m + 0.02
+    for _ in range(30):
+        middle = 0.5 * (near + far)
+        inside = float(signed_distance(contour, (contour.centre_K_m + middle * out)[None])[0]) < 0.0
+        near, far = (middle, far) if inside else (near, middle)
+    return near

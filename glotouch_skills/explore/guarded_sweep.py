@@ -1,0 +1,83 @@
+"""Sweep the container with the probe until something is touched."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from glotouch_bt.perception.search import SearchMap, search_policy, seek
+from glotouch_bt.perception.touch import Contact
+from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_skills.common.probe import Explorer, ExploringSpeeds, HeldTool
+
+
+class GuardedSweepParams(SkillParams):
+    """Parameters of `guarded_sweep`."""
+
+    expected_objects: int = param("How many objects the container holds", default=5, ge=1, le=20)
+    policy: Literal["expected_find", "nearest_frontier", "random_descent"] = param(
+        "Where to go next: the most expected finds for the way, or one of the paper's two", default="expected_find"
+    )
+    height_m: float = param("Ball centre above the floor while sweeping", unit="m", default=0.018, ge=0.009, le=0.06)
+    speed_m_s: float = param("Sweeping speed", unit="m/s", default=0.04, gt=0.0, le=0.08)
+    travel_speed_m_s: float = param("Speed above the objects", unit="m/s", default=0.10, gt=0.0, le=0.15)
+    headroom_m: float = param(
+        "Ball's height above the floor when crossing objects", unit="m", default=0.13, ge=0.02, le=0.2
+    )
+    wall_gap_m: float = param("Ball centre kept from the walls", unit="m", default=0.012, ge=0.008, le=0.05)
+
+
+class GuardedSweep(Skill):
+    """Sweep, as the policy says, until an object that is not traced yet is touched; retreat from it.
+
+    SUCCESS: something was touched; `contact` says where, the probe has retreated from it.
+    FAILURE `search_exhausted`: nothing is left to explore, or to reach.
+    FAILURE `hard_contact`: the wrench passed a hard limit on the way.
+    FAILURE `tool_lost`: the jaws are not as far apart as when they took the tool.
+    """
+
+    PAUSE = "retreat"
+    Params = GuardedSweepParams
+    params: GuardedSweepParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "search_exhausted": "nothing is left to explore, or to reach",
+        "hard_contact": "the wrench passed a hard limit on the way",
+        "tool_lost": "the jaws are not as far apart as when they took the tool",
+        "motion_refused": "the way is not clear",
+    }
+
+    tool = In(HeldTool, "the held probe")
+    previous = In(SearchMap, "what has been explored so far", key="map", required=False)
+    map = Out(SearchMap, "what has been explored now")
+    contact = Out(Contact, "the contact that ended the sweep")
+    exhausted = Out(bool, "nothing is left to explore, or to reach", always=True, on_success=False)
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        self.exhausted = False
+        p, tool = self.params, self.tool
+        speeds = ExploringSpeeds(
+            sweep_m_s=p.speed_m_s, travel_m_s=p.travel_speed_m_s, height_m=p.height_m, headroom_m=p.headroom_m
+        )
+        explorer = Explorer(self.context, tool, speeds, self.event)
+        belief = self.previous or self._blank_map()
+        plan = seek(belief, search_policy(p.policy), explorer.tip_K_m, lowered=explorer.lowered)
+        sought = yield from explorer.run(plan)
+        self.map = sought.belief
+        if sought.contact is None:
+            self.exhausted = True
+            raise SkillFailed(
+                "search_exhausted",
+                f"nothing unexplored is left; {belief.found} of {p.expected_objects} objects were found",
+                advice="check expected_objects; a lower height_m meets flatter objects",
+                found=belief.found,
+            )
+        self.contact = sought.contact
+
+    def _blank_map(self) -> SearchMap:
+        half = 0.5 * np.array(self.context.world.container.interior_m[:2]) - self.params.wall_gap_m
+        return SearchMap.blank(half, expected=self.params.expected_objects)

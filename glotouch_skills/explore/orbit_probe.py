@@ -1,0 +1,125 @@
+"""Trace a touched object: probe it from where most is learnt, until its outline is known."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+
+from glotouch_bt.perception.search import Move, Plan, SearchMap, admit, joins, of_another, part_of, trace
+from glotouch_bt.perception.touch import Candidate, Contact
+from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillRun, param
+from glotouch_skills.common.probe import Explorer, HeldTool, TracingParams
+
+NEAR_M = 0.015
+"""Farther than this from the first contact the ball goes back to it from above: a trace that was broken off may have
+left it on the object's other side."""
+
+
+class OrbitProbeParams(TracingParams):
+    """Parameters of `orbit_probe`: a coarse outline, so that the next object is found soon."""
+
+    centre_sd_m: float = param(
+        "Enough is known when the centre's standard deviation is below this", unit="m", default=0.006, gt=0.0, le=0.02
+    )
+    radial_sd_m: float = param(
+        "... and the outline's, in every direction, below this", unit="m", default=0.0225, gt=0.0, le=0.03
+    )
+    least_contacts: int = param("Fewest contacts, whatever the covariance says", default=4, ge=3, le=60)
+    most_contacts: int = param("Most contacts", default=9, ge=3, le=60)
+    exclusion_m: float = param("Margin round a traced object that the search keeps out of", unit="m", default=0.010,
+                               ge=0.0, le=0.05)  # fmt: skip
+
+
+class OrbitProbe(Skill):
+    """From one contact to a candidate: centre, outline, how far it was pushed. Its height is touched by `touch_top`.
+
+    Contacts are made where the outline is least known for the way there, until the fit's covariance is small enough.
+    A contact that cannot belong to the object is set aside. The defaults give a coarse outline, so that the next object
+    is found soon; `refine_outline` makes it exact once all are found.
+
+    SUCCESS: `candidates` has a new one, or knows one better that was traced in part; the map keeps out of its envelope.
+    FAILURE `known_object`: the contact belongs to an object traced before; its place is dropped from the search.
+    FAILURE `not_traced`: too few contacts were made to fit an outline.
+    FAILURE `hard_contact`: the wrench passed a hard limit on the way.
+    FAILURE `tool_lost`: the jaws are not as far apart as when they took the tool.
+    """
+
+    PAUSE = "retreat"
+    Params = OrbitProbeParams
+    params: OrbitProbeParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "known_object": "the contact belongs to an object traced before",
+        "not_traced": "too few contacts were made to fit an outline",
+        "hard_contact": "the wrench passed a hard limit on the way",
+        "tool_lost": "the jaws are not as far apart as when they took the tool",
+        "motion_refused": "the way is not clear",
+    }
+
+    tool = In(HeldTool, "the held probe")
+    contact = In(Contact, "first contact with the object")
+    previous_map = In(SearchMap, "the search map", key="map")
+    previous = In(tuple, "candidates so far", key="candidates", required=False)
+    map = Out(SearchMap, "the search map with the object excluded")
+    candidates = Out(tuple, "candidates, the new one last", element=Candidate)
+    found = Out(int, "how many objects are traced")
+    complete = Out(bool, "all expected objects are traced")
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        p, belief, first = self.params, self.previous_map, self.contact
+        known: tuple[Candidate, ...] = self.previous or ()
+        self.candidates, self.found, self.complete = known, len(known), belief.complete
+        if belief.knows(first):
+            self.map = belief.with_dropped(first.point_K_m)
+            raise SkillFailed(
+                "known_object",
+                "the contact lies on an object that is traced already",
+                advice="sweep on: its place is dropped from the search",
+                x_K_m=float(first.point_K_m[0]),
+                y_K_m=float(first.point_K_m[1]),
+            )
+        explorer = Explorer(self.context, self.tool, p.speeds(), self.event)
+        if float(np.linalg.norm(explorer.tip_K_m - first.tip_K_m[:2])) > NEAR_M:
+            yield from explorer.run(_back_to(first, p.clearance_m))
+        radius = self.tool.tip_radius_m if self.tool.round else 0.0
+        old = part_of(known, first, radius)
+        plan = trace(
+            first,
+            explorer.tip_K_m,
+            self.tool.tip_radius_m,
+            p.rule(),
+            round_tip=self.tool.round,
+            half_extent_m=belief.half_extent_m,
+            known=() if old is None else old.contacts,
+            elsewhere=partial(of_another, known) if old is None else None,
+            joined=partial(joins, known, radius_m=radius) if old is None else None,
+        )
+        traced = yield from explorer.run(plan)
+        admitted = admit(belief, known, first, traced, p.height_m, p.exclusion_m, part_of=old)
+        self.map = admitted.belief
+        if admitted.index is None:
+            raise SkillFailed(
+                "not_traced",
+                f"{len(traced.contacts)} contacts: no outline fits; {traced.ended}",
+                advice="raise the sensing height if the object is flat",
+                contacts=len(traced.contacts),
+            )
+        self.event(
+            "candidate",
+            candidate=admitted.candidates[admitted.index],
+            displaced_m=float(np.linalg.norm(traced.displaced_K_m)),
+            ended=traced.ended,
+            moves=traced.moves,
+        )
+        self.candidates = admitted.candidates
+        self.found, self.complete = len(admitted.candidates), admitted.belief.complete
+
+
+def _back_to(first: Contact, clearance_m: float) -> Plan[None]:
+    """Over the object, and down again beside its first contact."""
+    yield Move("hop", first.tip_K_m[:2] - clearance_m * first.approach_K[:2])

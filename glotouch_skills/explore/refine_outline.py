@@ -1,0 +1,85 @@
+"""Trace on what was traced in haste: from above, where its outline is least certain, until it is known well."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from glotouch_bt.perception.search import TraceParams, elsewhere_m, refined, trace_more
+from glotouch_bt.perception.touch import Candidate
+from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillRun, param
+from glotouch_skills.common.probe import Explorer, HeldTool, TracingParams
+
+GAP_M = (0.004, 0.020)
+"""So far from every contact the outline begins to be, and is fully, what no family of outlines may have thought of:
+with contacts all round even their hull has the object's centre, where a limb was missed no family has."""
+
+
+class RefineOutlineParams(TracingParams):
+    """Parameters of `refine_outline`; contacts it had before count."""
+
+    wall_gap_m: float = param("Ball centre kept from the walls", unit="m", default=0.012, ge=0.008, le=0.05)
+    hop_m: float = param("A way over the top counts as so much travel", unit="m", default=0.1, ge=0.02, le=1.0)
+
+    def rule(self) -> TraceParams:
+        """As the plans take them: the gaps between contacts are closed, also on the far side."""
+        return replace(super().rule(), hop_m=self.hop_m, keen=2.0, odd_near_m=GAP_M[0], odd_far_m=GAP_M[1])
+
+
+class RefineOutline(Skill):
+    """From a candidate known well enough to find it again to one known well enough to squeeze and to grasp.
+
+    SUCCESS: `refined` is the candidate with what its new contacts say. An outline known well already is left as it is.
+    FAILURE `not_met`: nothing was touched where it should stand, or the trace ended on another object; `refined` is the
+    candidate as it was.
+    FAILURE `hard_contact`, `tool_lost`: as for `orbit_probe`.
+    """
+
+    PAUSE = "retreat"
+    Params = RefineOutlineParams
+    params: RefineOutlineParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "not_met": "nothing was touched where it should stand, or the trace ended on another object",
+        "hard_contact": "the wrench passed a hard limit on the way",
+        "tool_lost": "the jaws are not as far apart as when they took the tool",
+        "motion_refused": "the way is not clear",
+    }
+
+    tool = In(HeldTool, "the held probe")
+    candidate = In(Candidate, "the object as traced so far")
+    refined = Out(Candidate, "the object as traced now", key="candidate", always=True)
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        p, tool, before = self.params, self.tool, self.candidate
+        self.refined = before
+        explorer = Explorer(self.context, tool, p.speeds(), self.event)
+        half = 0.5 * np.array(self.context.world.container.interior_m[:2]) - p.wall_gap_m
+        plan = trace_more(
+            before.contacts, explorer.tip_K_m, tool.tip_radius_m, p.rule(), round_tip=tool.round, half_extent_m=half
+        )
+        traced = yield from explorer.run(plan)
+        better = refined(before, traced)
+        if better is None:
+            if traced.missing:
+                raise SkillFailed(
+                    "not_met",
+                    f"candidate {before.index} was not met again where it had been traced",
+                    advice="it was pushed away, or is gone",
+                )
+            return
+        if off_m := elsewhere_m(before, better):
+            raise SkillFailed(
+                "not_met",
+                f"candidate {before.index} was lost among others: what was traced stands {off_m * 1e3:.0f} mm away",
+                advice="it stands too near to them to be traced from the side",
+                off_m=off_m,
+            )
+        self.refined = better
+        moved = float(np.linalg.norm(traced.displaced_K_m))
+        self.event("candidate", candidate=self.refined, moved_m=moved, ended=traced.ended, moves=traced.moves)

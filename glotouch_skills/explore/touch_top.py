@@ -1,0 +1,132 @@
+"""Touch the top of a traced object: how high is it?"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from glotouch_bt.motion import Motion
+from glotouch_bt.perception.search import BallMove, Met, Top, TopPlan, TopRule, rounds, top_plan
+from glotouch_bt.perception.touch import Candidate, GuardParams
+from glotouch_bt.robot import Array, MotionRefused
+from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_skills.common.probe import HeldTool, Prober
+
+RIM_PLACES, RIM_INSET_M = 4, 0.003
+"""Where a hollow object is touched: so far inside of so many places of its rim, a quarter of the way round apart."""
+
+
+class TouchTopParams(SkillParams):
+    """Parameters of `touch_top`."""
+
+    down_speed_m_s: float = param("Speed down onto the top", unit="m/s", default=0.02, gt=0.0, le=0.06)
+    pass_speed_m_s: float = param("Speed of the passes above it", unit="m/s", default=0.04, gt=0.0, le=0.06)
+    feel_speed_m_s: float = param("Speed of those that are likely to meet something", unit="m/s", default=0.02, gt=0.0,
+                                  le=0.06)  # fmt: skip
+    travel_speed_m_s: float = param("Speed above all objects", unit="m/s", default=0.10, gt=0.0, le=0.15)
+    clearance_m: float = param("Passes go so far above what is known", unit="m", default=0.0008, ge=0.0003, le=0.01)
+    inset_m: float = param("Passes keep so far inside the outline", unit="m", default=0.010, ge=0.0, le=0.03)
+    reach_m: float = param("No place is farther from the passes", unit="m", default=0.014, ge=0.003, le=0.05)
+    headroom_m: float = param("Ball's height above the floor when crossing an object", unit="m", default=0.13,
+                              ge=0.02, le=0.2)  # fmt: skip
+
+
+class TouchTop(Skill):
+    """From a traced candidate to its height: touch down in the middle, pass above it, touch whatever is higher.
+
+    SUCCESS: `measured` is the candidate with the height of the highest place found.
+    FAILURE `no_top`: nothing was met above where its sides had been touched: it is gone, or was moved. `measured` is
+    the candidate, at least as high as that.
+    FAILURE `motion_refused`: the ball cannot be brought above it; `measured` as for `no_top`.
+    """
+
+    PAUSE = "retreat"
+    Params = TouchTopParams
+    params: TouchTopParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "no_top": "nothing was met above where its sides had been touched",
+        "hard_contact": "the wrench passed a hard limit on the way",
+        "motion_refused": "the ball cannot be brought above it",
+    }
+
+    tool = In(HeldTool, "the held probe")
+    candidate = In(Candidate, "the object, as traced")
+    measured = Out(Candidate, "the same with its height", always=True)
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        candidate, tool = self.candidate, self.tool
+        touched_m = float(np.median([c.tip_K_m[2] for c in candidate.contacts])) - tool.floor_z_K_m
+        self.measured = replace(candidate, height_m=max(candidate.height_m, touched_m))
+        top = yield from self._drive(Prober(self.context, tool, GuardParams()), self._plan(candidate, touched_m))
+        if top.ball_K_m is None:
+            raise SkillFailed(
+                "no_top",
+                f"nothing higher than {touched_m * 1e3:.0f} mm was met where candidate {candidate.index} was traced",
+                advice="trace it again: it was moved or is gone",
+                sides_m=touched_m,
+            )
+        height = float(top.ball_K_m[2]) - tool.tip_radius_m - tool.floor_z_K_m
+        self.measured = replace(candidate, height_m=height)
+        self.event("candidate", candidate=self.measured)  # the last word on this candidate: now with its height
+        self.event("top", candidate=candidate.index, height_m=height, touches=top.touches, passed=top.passed)
+
+    def _plan(self, candidate: Candidate, touched_m: float) -> TopPlan:
+        p, tool = self.params, self.tool
+        rule = TopRule(clearance_m=p.clearance_m, inset_m=p.inset_m, reach_m=p.reach_m)
+        points = np.array([c.point_K_m for c in candidate.contacts])
+        floor = tool.floor_z_K_m
+        return top_plan(
+            candidate.contour.centre_K_m,
+            rounds(points, candidate.contour.centre_K_m, rule),
+            self._rim(candidate, points),
+            floor + touched_m + tool.tip_radius_m,
+            floor + p.headroom_m,
+            rule,
+        )
+
+    def _rim(self, candidate: Candidate, points: Array) -> Array:
+        every = max(len(points) // RIM_PLACES, 1)
+        rim = points[::every][:RIM_PLACES]
+        inwards = candidate.contour.centre_K_m - rim
+        far = np.maximum(np.linalg.norm(inwards, axis=1, keepdims=True), 1e-9)
+        return np.asarray(rim + RIM_INSET_M * inwards / far)
+
+    def _drive(self, prober: Prober, plan: TopPlan) -> Motion[Top]:
+        """Make the plan's moves until it ends."""
+        move = next(plan)
+        while True:
+            met = yield from self._make(prober, move)
+            try:
+                move = plan.send(met)
+            except StopIteration as end:
+                return end.value  # type: ignore[no-any-return]
+
+    def _make(self, prober: Prober, move: BallMove) -> Motion[Met]:
+        p = self.params
+        goal, tip = move.goal_K_m, prober.tip_K_m
+        try:
+            if move.kind == "over":
+                yield from prober.hop(goal, float(goal[2]), p.travel_speed_m_s)
+            elif move.kind in ("lift", "back"):
+                way = goal - tip
+                length = float(np.linalg.norm(way))
+                if length > 1e-4:
+                    yield from prober.retreat(way / length, length, p.travel_speed_m_s)
+            else:
+                speed = {"down": p.down_speed_m_s, "feel": p.feel_speed_m_s, "pass": p.pass_speed_m_s}[move.kind]
+                probed = yield from prober.move(goal, speed, any_direction=move.kind != "down")
+                if probed.contact is not None:
+                    self.event("contact", contact=probed.contact)
+                    return Met(prober.tip_K_m, probed.contact.tip_K_m)
+        except MotionRefused as refusal:
+            if move.kind not in ("pass", "feel"):
+                raise
+            self.event("note", text=f"a pass above candidate {self.candidate.index} was left out: {refusal}")
+            return Met(prober.tip_K_m, refused=True)
+        return Met(prober.tip_K_m)

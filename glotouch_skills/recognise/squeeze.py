@@ -1,0 +1,135 @@
+"""Squeeze a candidate between the tactile jaws at several heights, in three sequences."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from glotouch_bt.motion import Motion
+from glotouch_bt.perception.touch import Candidate, Layer, TouchSequence, TouchSet
+from glotouch_bt.perception.touch.calibration import JawZero
+from glotouch_bt.robot import Array, MotionRefused
+from glotouch_bt.skill import UNCHANGED, In, Out, Skill, SkillFailed, SkillRun
+from glotouch_skills.common.hand import keeping_clear_of
+from glotouch_skills.common.planning import (
+    LEAST_GAP_M,
+    ClosureParams,
+    Squeezing,
+    Stance,
+    disturbance,
+    layer_heights,
+    plan_stances,
+)
+
+
+class SqueezeParams(ClosureParams):
+    """Parameters of `squeeze`."""
+
+
+class Squeeze(Skill):
+    """Force-limited closures on one candidate.
+
+    A round candidate is squeezed at three yaws, 60 degrees apart; a box-like one on three parallel tracks across
+    its short side. Layers go from low to high: the first closure centres the object where it cannot topple.
+
+    SUCCESS: at least one stable layer; `touchset` holds all of them.
+    FAILURE `nothing_felt`: no closure reached a plateau on anything.
+    FAILURE `no_squeeze`: the object does not fit between the open jaws, or its neighbours leave the fingers no room.
+    """
+
+    Params = SqueezeParams
+    params: SqueezeParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
+    LEAVES: ClassVar = {"hand": "empty"}
+    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "nothing_felt": "no closure reached a plateau on anything",
+        "no_squeeze": "it does not fit between the open jaws, or its neighbours leave the fingers no room",
+        "motion_refused": "the hand cannot be brought over it",
+    }
+
+    candidate = In(Candidate, "what to squeeze")
+    known = In(tuple, "all candidates, to keep clear of", key="candidates", element=Candidate, required=False)
+    jaw_zero = In(JawZero, "what the jaws report too much", required=False)
+    touchset = Out(TouchSet, "what was felt")
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        candidate = self.candidate
+        arm = self.context.arm
+        others = tuple(c for c in (self.known or ()) if c.index != candidate.index)
+        sequences: list[TouchSequence] = []
+        refusals: list[str]
+        with keeping_clear_of(arm, others):
+            heights = layer_heights(candidate, arm.description.gripper, self.params)
+            container = self.context.world.container
+            stances, refusals = yield from plan_stances(
+                candidate, arm, container, float(heights[0]), (self.params.side_gap_m, 0.5 * self.params.side_gap_m)
+            )
+            for at in stances:
+                try:
+                    sequences.append((yield from self._sequence(candidate, at, heights)))
+                except MotionRefused as refusal:
+                    refusals.append(str(refusal))
+        touchset = TouchSet(candidate, tuple(sequences))
+        stable = sum(layer.stable for layer in touchset.layers)
+        self.event("touchset", touchset=touchset, refusals=refusals)
+        if not sequences:
+            raise SkillFailed(
+                "no_squeeze",
+                f"no squeeze of candidate {candidate.index} is possible: {'; '.join(refusals[:3])}",
+                advice="neighbours or walls leave the jaws no room; take away what stands beside it, or trace it again",
+                refusals=len(refusals),
+            )
+        if stable == 0:
+            raise SkillFailed(
+                "nothing_felt",
+                f"no closure on candidate {candidate.index} reached a plateau",
+                advice="the object may have moved away; trace it again",
+                closures=len(touchset.layers),
+            )
+        self.touchset = touchset
+
+    def _sequence(self, candidate: Candidate, at: Stance, heights: Array) -> Motion[TouchSequence]:
+        """Open over the candidate, close at each height from below, rise.
+
+        A height that gives no layer is tried once more a little beside it. What fails there too slopes or stands free,
+        and does so higher up: the sequence ends.
+        """
+        hand = Squeezing(self.context, candidate, at, self.params, self.jaw_zero)
+        layers: list[Layer] = []
+        yield from hand.go_down(float(heights[0]))
+        for height, elsewhere in zip(heights.tolist(), _elsewhere(heights), strict=True):
+            tried = [(yield from self._layer(hand, height))]
+            if tried[0] is None or not tried[0].stable:
+                tried.append((yield from self._layer(hand, elsewhere)))
+            layers += [layer for layer in tried if layer is not None]
+            if tried[-1] is None:
+                break
+        yield from hand.rise()
+        layers.sort(key=lambda layer: layer.height_m)
+        return TouchSequence(np.asarray(at.position_K_m), hand.yaw_K_rad, tuple(layers))
+
+    def _layer(self, hand: Squeezing, height_m: float) -> Motion[Layer | None]:
+        """One closure; None if it could not be made."""
+        if not (yield from hand.move_to(height_m)):
+            return None  # caught under something that sticks out
+        try:
+            layer, yielding = yield from hand.close()
+        except MotionRefused as refusal:
+            self.event("note", text=f"a closure {height_m * 1e3:.0f} mm above the floor was given up: {refusal}")
+            return None
+        if (moved := disturbance(hand.candidate, layer, yielding)) is not None:
+            self.event("object_moved", **moved)
+        return layer
+
+
+def _elsewhere(heights: Array) -> list[float]:
+    """For each height another one to try: half way to the next, of the highest half way to the one before."""
+    if len(heights) == 1:
+        return [float(heights[0]) + LEAST_GAP_M]
+    gaps = np.diff(heights)
+    return [*(heights[:-1] + 0.5 * gaps).tolist(), float(heights[-1] - 0.5 * gaps[-1])]

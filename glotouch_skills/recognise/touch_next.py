@@ -1,0 +1,325 @@
+"""Touch where it tells most, until it is known which candidate is the target: one closure a call."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from glotouch_bt.motion import Motion
+from glotouch_bt.perception import target_model
+from glotouch_bt.perception.recognition import Belief, PadSpec, TargetModel, believe, expected_gain
+from glotouch_bt.perception.touch import Candidate, Layer, TouchSequence, TouchSet
+from glotouch_bt.perception.touch.calibration import JawZero
+from glotouch_bt.robot import HOLD, Array, MotionRefused, ParamError
+from glotouch_bt.skill import UNCHANGED, Context, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_skills.common.hand import CLEARANCE_M, hand_pose_B, keeping_clear_of, require_clear
+from glotouch_skills.common.planning import (
+    ClosureParams,
+    Option,
+    Squeezing,
+    Standing,
+    best_rates,
+    disturbance,
+    options,
+    pads_height_m,
+)
+from glotouch_skills.recognise.match import load_target
+
+MOST_IN_VAIN = 4
+"""Closures without a plateau, after which a candidate is left alone: it is not where it was traced."""
+
+STILL_THERE_M = 0.003
+"""A hand that stood beside a candidate before a break still does if it is this near."""
+
+
+class TouchNextParams(ClosureParams):
+    """Parameters of `touch_next`."""
+
+    target: str = param("The object to find: an STL file, or the name of one in the world's object folder", names="stl")
+    confidence: float = param("Probability that is enough", default=0.95, gt=0.5, lt=1.0)
+    least_gain_nats: float = param("Expected gain below which no closure is worth it", default=0.005, ge=0.0)
+
+
+class TouchNext(Skill):
+    """Make the closure, of all candidates, yaws and heights, that is expected to tell most in its time.
+
+    Repeat it until `decided`. SUCCESS: one closure was tried, or `decided` is now true: one candidate, or none of them,
+    is the target with the wanted confidence, or nothing more can be learned; the hand is then high again. `match` says
+    which.
+    FAILURE `no_candidates`: there is nothing to touch.
+    FAILURE `too_low`: the target is lower than the probe and the pads reach.
+    """
+
+    Params = TouchNextParams
+    params: TouchNextParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
+    LEAVES: ClassVar = {"hand": "empty"}
+    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "no_candidates": "there is nothing to touch",
+        "too_low": "the target is lower than the probe and the pads reach",
+        "motion_refused": "the hand cannot rise",
+    }
+
+    candidates = In(tuple, "what may be touched", element=Candidate)
+    felt = In(tuple, "what was felt so far", key="touchsets", element=TouchSet, required=False)
+    rejected = In(tuple, "indices of candidates to be left alone", required=False)
+    jaw_zero = In(JawZero, "what the jaws report too much", required=False)
+    touchsets = Out(tuple, "what was felt, one TouchSet per candidate", element=TouchSet)
+    decided = Out(bool, "no further closure is wanted")
+
+    def __init__(self, name: str, params: SkillParams, context: Context) -> None:
+        super().__init__(name, params, context)
+        self._model: TargetModel | None = None
+        self._down: Squeezing | None = None
+        self._refused: set[tuple[int, int, int, int]] = set()
+        self._hopeless: frozenset[int] = frozenset()
+        self._stood_B_m: Array | None = None
+
+    def remember(self) -> object:
+        """See `Skill`: what was refused, and over which candidate the hand stands, down beside it."""
+        down = None
+        if self._down is not None:
+            down = (self._down.candidate, self._down.at, self.context.arm.pose_B_P.position_m)
+        return {"refused": tuple(sorted(self._refused)), "down": down}
+
+    def recall(self, remembered: Any) -> None:
+        """See `Skill`. The hand counts as down only if it is still there when the skill begins."""
+        self._refused = set(remembered["refused"])
+        if remembered["down"] is not None:
+            candidate, at, self._stood_B_m = remembered["down"]
+            self._down = Squeezing(self.context, candidate, at, self.params, self.jaw_zero)
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        candidates: tuple[Candidate, ...] = self.candidates
+        wanted = [c for c in candidates if c.index not in (self.rejected or ())]
+        if not wanted:
+            raise SkillFailed(
+                "no_candidates",
+                "there is no candidate to touch",
+                advice="explore first; candidates that were put back are not touched again",
+                candidates=len(candidates),
+            )
+        touchsets: tuple[TouchSet, ...] = self.felt or ()
+        if {t.candidate.index for t in touchsets} != {c.index for c in wanted}:
+            felt = {t.candidate.index: t for t in touchsets}
+            touchsets = tuple(felt.get(c.index, TouchSet(c, ())) for c in wanted)
+            self._refused.clear()
+            self._down = None
+        down, self._down = self._down, None  # if this is broken off, nobody knows where the hand stands
+        stood, self._stood_B_m = self._stood_B_m, None
+        if stood is not None and np.linalg.norm(self.context.arm.pose_B_P.position_m - stood) > STILL_THERE_M:
+            down = None
+        self.touchsets, self.decided = touchsets, False
+        yield HOLD  # thinking takes longer than a control period; on hardware the arm holds meanwhile
+        belief = believe(self._target_model(), touchsets)
+        self._hopeless = frozenset(t.candidate.index for t in touchsets if _in_vain(t) >= MOST_IN_VAIN)
+        why = self._enough(belief)
+        chosen = None if why else self._choose(belief, down)
+        if chosen is None:
+            yield from self._end(belief, down, why or "no closure is expected to tell more")
+            return
+        try:
+            down, layer = yield from self._touch(candidates, chosen, down)
+        except MotionRefused as refusal:
+            self._refused.add(_key(chosen))
+            self.event("note", text=f"a closure on candidate {chosen.closure.candidate} was not made: {refusal}")
+            return
+        self._down = down
+        self.touchsets = touchsets = tuple(
+            _with_layer(t, down, layer) if t.candidate.index == chosen.closure.candidate else t for t in touchsets
+        )
+        self.event(
+            "closure",
+            number=sum(len(t.layers) for t in touchsets),
+            chosen=chosen.closure,
+            seconds=chosen.seconds,
+            stable=layer.stable,
+            probability={m.index: m.probability for m in belief.ranking.matches},
+            p_absent=belief.ranking.p_absent,
+        )
+
+    def _target_model(self) -> TargetModel:
+        """Kept on disk and in memory.
+
+        Raises:
+            SkillFailed: `too_low`.
+        """
+        if self._model is None:
+            gripper = self.context.arm.description.gripper
+            mesh = load_target(self.params.target, self.context.world.objects.folder)
+            pads = PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
+            try:
+                self._model = target_model(mesh, pads)
+            except ParamError as e:
+                raise SkillFailed("too_low", f"{mesh.name} cannot be felt: {e}", advice="sweep lower") from e
+        return self._model
+
+    def _enough(self, belief: Belief) -> str:
+        """Why no further closure is wanted, or empty.
+
+        That none of them is the target is believed once each was felt, and the likeliest as often as would be needed to
+        take it: contours and single closures do not send the robot home.
+        """
+        ranking = belief.ranking
+        best = max(ranking.matches, key=lambda m: m.probability)
+        if best.probability >= self.params.confidence and ranking.accepted:
+            return f"candidate {best.index} is the target (probability {best.probability:.3f})"
+        if ranking.p_absent >= self.params.confidence and not self._wanted(belief):
+            return f"none of them is the target (probability {ranking.p_absent:.3f})"
+        return ""
+
+    def _choose(self, belief: Belief, down: Squeezing | None) -> Option | None:
+        """The most telling closure for its time that can be made; None if none tells enough."""
+        p, arm = self.params, self.context.arm
+        pose_K_P = self.context.world.container.pose_B_K.inverse() @ arm.pose_B_P
+        standing = None
+        if down is not None:
+            standing = Standing(down.candidate.index, down.at, float(pose_K_P.position_m[2]))
+        found = options(belief.touchsets, standing, pose_K_P.position_m, arm.description.gripper, p)
+        found = [o for o in found if _key(o) not in self._refused and o.closure.candidate not in self._hopeless]
+        if not found:
+            return None
+        closures = [c for o in found for c in (o.closure, *o.after)]
+        gains = np.split(expected_gain(belief, closures), np.cumsum([1 + len(o.after) for o in found])[:-1])
+        rates = best_rates(found, gains)
+        worth = np.array([g.max() for g in gains]) >= p.least_gain_nats
+        quick = np.array([1.0 / o.seconds for o in found])
+        for score in (
+            quick * [o.closure.candidate in self._wanted(belief) for o in found],
+            rates * worth,
+            quick * [o.closure.candidate in _short_of_evidence(belief) for o in found],
+        ):
+            option = self._first(belief, found, gains, score, down)
+            if option is not None:
+                return option
+        return None
+
+    def _first(
+        self, belief: Belief, found: list[Option], gains: list[Array], score: Array, down: Squeezing | None
+    ) -> Option | None:
+        """The option of the highest positive score that has room."""
+        for i in np.argsort(-score, kind="stable").tolist():
+            if score[i] <= 0.0:
+                break
+            option: Option = found[i]
+            if _key(option) in self._refused:
+                continue
+            if self._has_room(belief, option, down):
+                return replace(option, closure=replace(option.closure, gain_nats=float(gains[i][0])))
+            self._refused.add(_key(option))
+        return None
+
+    def _wanted(self, belief: Belief) -> set[int]:
+        """Candidates to be touched whatever it tells, for a decision that is only short of evidence; mostly none."""
+        ranking, confidence = belief.ranking, self.params.confidence
+        if max(m.probability for m in ranking.matches) >= confidence:
+            return _short_of_evidence(belief)
+        if ranking.p_absent >= confidence:
+            unfelt = {t.candidate.index for t in belief.touchsets if not any(layer.stable for layer in t.layers)}
+            return (unfelt or _short_of_evidence(belief)) - self._hopeless
+        return set()
+
+    def _has_room(self, belief: Belief, option: Option, down: Squeezing | None) -> bool:
+        """The open hand fits beside the neighbours; where it stands already it does."""
+        if down is not None and option.at is down.at:
+            return True
+        arm = self.context.arm
+        z = option.closure.height_m
+        pose = hand_pose_B(
+            arm, self.context.world.container, np.array([*option.at.position_K_m, z]), option.at.yaw_K_rad
+        )
+        others = [t.candidate for t in belief.touchsets if t.candidate.index != option.closure.candidate]
+        with keeping_clear_of(arm, others):
+            try:
+                require_clear(arm, pose, option.at.opening_m, CLEARANCE_M)
+            except MotionRefused:
+                return False
+        return True
+
+    def _touch(
+        self, candidates: tuple[Candidate, ...], chosen: Option, down: Squeezing | None
+    ) -> Motion[tuple[Squeezing, Layer]]:
+        """Go there and close.
+
+        Raises:
+            MotionRefused: It could not be made; the hand is high.
+        """
+        index = chosen.closure.candidate
+        hand = down
+        if hand is None or hand.at is not chosen.at:
+            yield from self._rise(down)
+            (candidate,) = (c for c in candidates if c.index == index)
+            hand = Squeezing(self.context, candidate, chosen.at, self.params, self.jaw_zero)
+        with keeping_clear_of(self.context.arm, [c for c in candidates if c.index != index]):
+            if hand is not down:
+                yield from hand.go_down(chosen.closure.height_m)
+            elif not (yield from hand.move_to(chosen.closure.height_m)):
+                yield from hand.rise()
+                raise MotionRefused("squeeze", "the open hand is caught under something")
+            try:
+                layer, yielding = yield from hand.close()
+            except MotionRefused:
+                yield from hand.rise()
+                raise
+        if (moved := disturbance(hand.candidate, layer, yielding)) is not None:
+            self.event("object_moved", **moved)
+        return hand, layer
+
+    def _rise(self, down: Squeezing | None) -> Motion[None]:
+        """Straight up, if the hand is low (after a preemption nobody knows over what)."""
+        if down is not None:
+            yield from down.rise()
+            return
+        arm = self.context.arm
+        lift = self.params.headroom_m + arm.description.gripper.fingertip_below_P_m - pads_height_m(self.context)
+        if lift > 0.0:
+            yield from arm.shift([0.0, 0.0, lift], self.params.travel_speed_m_s, check=False, what="rise")
+
+    def _end(self, belief: Belief, down: Squeezing | None, why: str) -> Motion[None]:
+        yield from self._rise(down)
+        for touchset in belief.touchsets:
+            if touchset.sequences:
+                self.event("touchset", touchset=touchset, refusals=[])
+        self.event(
+            "decided",
+            why=why,
+            closures=sum(len(t.layers) for t in belief.touchsets),
+            stances=sum(len(t.sequences) for t in belief.touchsets),
+            candidates=sum(bool(t.layers) for t in belief.touchsets),
+            ranking=belief.ranking,
+        )
+        self.decided = True
+
+
+def _with_layer(touchset: TouchSet, hand: Squeezing, layer: Layer) -> TouchSet:
+    """With one more layer: in the sequence of the hand's stance, or in a new one."""
+    last = touchset.sequences[-1] if touchset.sequences else None
+    if last is not None and last.position_K_m is hand.at.position_K_m:
+        return replace(touchset, sequences=(*touchset.sequences[:-1], replace(last, layers=(*last.layers, layer))))
+    begun = TouchSequence(hand.at.position_K_m, hand.yaw_K_rad, (layer,))
+    return replace(touchset, sequences=(*touchset.sequences, begun))
+
+
+def _short_of_evidence(belief: Belief) -> set[int]:
+    """The likeliest candidate, if it was not felt by both pads as often as a decision needs."""
+    best = max(belief.ranking.matches, key=lambda m: m.probability)
+    return {best.index} if best.evidence < belief.params.evidence else set()
+
+
+def _in_vain(touchset: TouchSet) -> int:
+    """Closures without a plateau, if there was never one with."""
+    return 0 if any(layer.stable for layer in touchset.layers) else len(touchset.layers)
+
+
+def _key(option: Option) -> tuple[int, int, int, int]:
+    """Candidate, yaw in degrees, height and place along the jaws' width in mm: for what was refused."""
+    at = option.at
+    along = float(at.position_K_m @ [np.cos(at.yaw_K_rad), np.sin(at.yaw_K_rad)])
+    c = option.closure
+    return c.candidate, round(np.rad2deg(at.yaw_K_rad)), round(1e3 * c.height_m), round(1e3 * along)

@@ -1,0 +1,134 @@
+"""Take hold of the chosen object."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from glotouch_bt.motion import Motion
+from glotouch_bt.perception.touch import Candidate
+from glotouch_bt.robot import MotionRefused, Pose
+from glotouch_bt.skill import UNCHANGED, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_skills.common.hand import CLEARANCE_M, close_gently, glide, hand_pose_B, keeping_clear_of, require_clear
+from glotouch_skills.common.planning import GraspPlan
+
+
+class GraspParams(SkillParams):
+    """Parameters of `grasp`."""
+
+    force_N: float = param("Jaw force", unit="N", default=30.0, gt=0.0, le=30.0)
+    closing_speed_m_s: float = param("Closing speed", unit="m/s", default=0.03, gt=0.0, le=0.2)
+    travel_speed_m_s: float = param("Speed above the objects", unit="m/s", default=0.25, gt=0.0, le=0.25)
+    descent_speed_m_s: float = param("Speed down beside the object", unit="m/s", default=0.010, gt=0.0, le=0.04)
+    headroom_m: float = param("Fingertips above the floor on the way", unit="m", default=0.14, ge=0.05, le=0.25)
+    side_gap_m: float = param("Least gap between open jaw and object", unit="m", default=0.005, ge=0.001, le=0.03)
+    least_aperture_m: float = param("Closed farther than this: nothing held", unit="m", default=0.003, ge=0.0)
+
+
+class Grasp(Skill):
+    """Go down over the object with open jaws and close on it with limited force; try the plan's alternatives in turn.
+
+    Grasps of the plan that were made before (and did not last) come last.
+
+    SUCCESS: the jaws stopped on something; `grip_m` is their aperture, `made` the grasp.
+    FAILURE `no_grasp`: no grasp of the plan could be made: no room, the fingers stood on something on the way down,
+    or the jaws closed on nothing. The hand has risen again, jaws open.
+    """
+
+    Params = GraspParams
+    params: GraspParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
+    LEAVES: ClassVar = {"hand": "object"}
+    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {"no_grasp": "no grasp of the plan could be made; the hand has risen, jaws open"}
+
+    plan = In(GraspPlan, "where and how wide")
+    known = In(tuple, "all candidates, to keep clear of", key="candidates", element=Candidate, required=False)
+    before = In(tuple, "grasps made before", key="tried", required=False)
+    grip_m = Out(float, "aperture of the closed jaws, m")
+    made = Out(GraspPlan, "the grasp that was made")
+    tried = Out(tuple, "grasps made so far", element=GraspPlan)
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        plan = self.plan
+        others = tuple(c for c in (self.known or ()) if c.index != plan.candidate)
+        made: tuple[GraspPlan, ...] = self.before or ()
+        options = sorted((plan, *plan.alternatives), key=lambda option: any(_same(option, m) for m in made))
+        tried: list[str] = []
+        with keeping_clear_of(self.context.arm, others):
+            for option in options:
+                try:
+                    self.grip_m = yield from self._attempt(option)
+                    self.made, self.tried = option, (*made, option)
+                    return
+                except MotionRefused as refusal:
+                    tried.append(str(refusal))
+                    self.event("note", text=f"a grasp was given up: {refusal}")
+        raise SkillFailed(
+            "no_grasp",
+            f"none of {len(tried)} grasps could be made; the last: {tried[-1]}",
+            advice="the object or a neighbour was moved; squeeze it again",
+            grasps=len(tried),
+        )
+
+    def _attempt(self, plan: GraspPlan) -> Motion[float]:
+        """One grasp; the aperture of the closed jaws.
+
+        Raises:
+            MotionRefused: It could not be made; the hand is above the objects with open jaws.
+        """
+        arm, p = self.context.arm, self.params
+        container = self.context.world.container
+        goal = hand_pose_B(arm, container, plan.position_K_m, plan.yaw_rad)
+        high = np.array([*plan.position_K_m[:2], p.headroom_m + arm.description.gripper.fingertip_below_P_m])
+        above = Pose(container.pose_B_K.apply(high), goal.quat)
+        opening = self._opening(goal, plan)
+        yield from arm.jaws(opening, speed_m_s=0.2)
+        travel_z = max(float(arm.pose_B_P.position_m[2]), float(above.position_m[2]))
+        yield from arm.transit(above, height_B_m=travel_z, speed_m_s=p.travel_speed_m_s)
+        if not (yield from glide(self.context, goal, p.descent_speed_m_s)):
+            yield from arm.line(above, p.travel_speed_m_s, check=False)
+            raise MotionRefused("grasp", "the fingers stood on something on the way down")
+        try:
+            state = yield from close_gently(arm, p.closing_speed_m_s, p.force_N)
+        except MotionRefused:
+            yield from arm.line(above, p.travel_speed_m_s, check=False)
+            raise
+        yield from arm.hold(0.1)
+        self.event("grasp", aperture_m=state.aperture_m, expected_m=plan.aperture_m, force_N=state.force_N)
+        if state.aperture_m < p.least_aperture_m:
+            yield from arm.jaws(opening, speed_m_s=0.2)
+            yield from arm.line(above, p.travel_speed_m_s, check=False)
+            raise MotionRefused(
+                "grasp",
+                f"the jaws closed to {state.aperture_m * 1e3:.1f} mm, {plan.aperture_m * 1e3:.1f} mm were expected",
+            )
+        return state.aperture_m
+
+    def _opening(self, goal: Pose, plan: GraspPlan) -> float:
+        """The plan's opening, or a narrower one where neighbours leave no room for it.
+
+        Raises:
+            MotionRefused: Not even the narrowest has room.
+        """
+        stroke = self.context.arm.description.gripper.stroke_m
+        widest = min(plan.opening_m, stroke)
+        narrowest = min(max(plan.aperture_m + 2 * self.params.side_gap_m, widest - 0.012), widest)
+        for opening in (widest, 0.5 * (widest + narrowest)):
+            try:
+                require_clear(self.context.arm, goal, opening, CLEARANCE_M)
+            except MotionRefused:
+                continue
+            return opening
+        require_clear(self.context.arm, goal, narrowest)
+        return narrowest
+
+
+def _same(one: GraspPlan, other: GraspPlan) -> bool:
+    """Both take the same object at the same place."""
+    alike = (one.candidate, one.yaw_rad) == (other.candidate, other.yaw_rad)
+    return alike and bool((one.position_K_m == other.position_K_m).all())

@@ -1,0 +1,86 @@
+"""Is what was lifted held as it was taken? Weight, opening and both gels are asked; two of three must say so."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from glotouch_bt.perception.touch import patch_statistics
+from glotouch_bt.robot import TactileFrame
+from glotouch_bt.skill import UNCHANGED, In, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_skills.common.hand import weigh_N
+
+
+class HoldCheckParams(SkillParams):
+    """Parameters of `hold_check`."""
+
+    look_s: float = param("How long gels and jaws are watched", unit="s", default=0.2, ge=0.05, le=2.0)
+    weight_kept: float = param("Least share of the weight felt when it was lifted", default=0.6, gt=0.0, le=1.0)
+    slip_m: float = param("The jaws may have moved so far since they closed", unit="m", default=0.004, gt=0.0, le=0.02)
+
+
+class HoldCheck(Skill):
+    """Stand still with what was lifted and look whether it is held as it was taken.
+
+    Its weight must be what it was, the jaws as far apart as when they closed, and gels must be touched. One of the
+    three may err (a drifting wrist, a stuck report, a frozen image): two decide. Jaws that moved far are a slip
+    whatever the others say: it hangs by another place now.
+
+    SUCCESS: it is held.
+    FAILURE `lost`: it is not in the hand any more.
+    FAILURE `slipped`: it hangs in the jaws, but by another place than it was taken.
+    """
+
+    Params = HoldCheckParams
+    params: HoldCheckParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"object"})}
+    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "lost": "it is not in the hand any more",
+        "slipped": "it hangs in the jaws by another place than it was taken",
+    }
+
+    grip_m = In(float, "aperture when the jaws had closed, m")
+    before_N = In(float, "weight when it was lifted, N", key="weight")
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        arm, p = self.context.arm, self.params
+        blocks = yield from arm.hold(p.look_s, tactile=True)
+        weight = yield from weigh_N(arm)
+        apart = float(np.median([b.gripper.aperture_m for b in blocks]))
+        frames = [b.tactile for b in blocks if b.tactile is not None]
+        touched = _touched(frames[-1]) if frames else None
+        moved = apart - self.grip_m
+        self.event(
+            "hold", weight_N=weight, aperture_m=apart, moved_m=moved, gels_touched=-1 if touched is None else touched
+        )
+        heavy = weight >= p.weight_kept * self.before_N
+        steady = abs(moved) <= p.slip_m
+        against = [not heavy, not steady, touched == 0]
+        if sum(against) >= 2:
+            raise SkillFailed(
+                "lost",
+                f"{weight:.2f} N of {self.before_N:.2f} N hang in the hand, the jaws moved by {moved * 1e3:.1f} mm, "
+                f"{'unknown' if touched is None else touched} of 2 gels are touched",
+                advice="grasp nearer to the centre of mass, or harder",
+                weight_N=weight,
+                moved_m=moved,
+                gels_touched=-1 if touched is None else touched,
+            )
+        if not steady:
+            raise SkillFailed(
+                "slipped",
+                f"the jaws moved by {moved * 1e3:.1f} mm while it was lifted ({p.slip_m * 1e3:g} mm are allowed)",
+                advice="grasp it elsewhere",
+                moved_m=moved,
+                slip_limit_m=p.slip_m,
+            )
+
+
+def _touched(frame: TactileFrame) -> int:
+    """How many of the two gels something presses on."""
+    return sum(patch_statistics(d).valid for d in (frame.left_m, frame.right_m))

@@ -1,0 +1,59 @@
+"""Lift what is held and make sure that it came along."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_skills.common.hand import weigh_N
+
+
+class LiftParams(SkillParams):
+    """Parameters of `lift`."""
+
+    height_m: float = param("How far to lift", unit="m", default=0.15, gt=0.0, le=0.3)
+    speed_m_s: float = param("Lifting speed", unit="m/s", default=0.06, gt=0.0, le=0.2)
+    least_weight_N: float = param("Less weight than this in the hand: nothing lifted", unit="N", default=0.3, ge=0.0)
+    least_aperture_m: float = param("Closed farther than this: it was lost", unit="m", default=0.003, ge=0.0)
+
+
+class Lift(Skill):
+    """Raise the hand and check weight and aperture at the top.
+
+    SUCCESS: something with weight hangs in the closed jaws; the arm holds it up.
+    FAILURE `lost`: the jaws are empty at the top.
+    """
+
+    Params = LiftParams
+    params: LiftParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"object"})}
+    # `lost` is a verdict by weight and aperture: something light may still be between the pads.
+    AFTER_FAILURE: ClassVar = {"hand": frozenset({"object", "empty"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "lost": "the jaws are empty at the top",
+        "motion_refused": "the arm cannot be raised so far",
+    }
+
+    grip_m = In(float, "aperture of the closed jaws")
+    weight_N = Out(float, "weight in the hand, N", key="weight")
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        arm, p = self.context.arm, self.params
+        yield from arm.shift(np.array([0.0, 0.0, p.height_m]), p.speed_m_s, check=False)
+        weight = yield from weigh_N(arm)
+        state = self.context.observation.gripper
+        self.event("lift", weight_N=weight, aperture_m=state.aperture_m)
+        if weight < p.least_weight_N or state.aperture_m < p.least_aperture_m:
+            raise SkillFailed(
+                "lost",
+                f"{weight:.2f} N hang in the hand and the jaws are {state.aperture_m * 1e3:.1f} mm apart",
+                advice="grasp nearer to the centre of mass, or harder",
+                weight_N=weight,
+                aperture_m=state.aperture_m,
+            )
+        self.weight_N = weight

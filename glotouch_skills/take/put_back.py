@@ -1,0 +1,103 @@
+"""Set down what is in the hand where it was taken."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from glotouch_bt.motion import JawWatch
+from glotouch_bt.perception.touch import Candidate
+from glotouch_bt.robot import Pose
+from glotouch_bt.skill import UNCHANGED, In, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_skills.common.hand import glide, hand_pose_B, keeping_clear_of, let_go, rise_clear
+from glotouch_skills.common.planning import GraspPlan
+
+OVER_M = 0.03
+"""From so far above its place it is lowered carefully."""
+REST_S = 1.5
+"""Jaws that lost what they held close; after so long they stand."""
+SHORT_M = 0.0015
+"""So far above its place it is let go: what is pressed on the floor by a stiff arm is pressed hard."""
+
+
+class PutBackParams(SkillParams):
+    """Parameters of `put_back`."""
+
+    speed_m_s: float = param("Speed high above the objects", unit="m/s", default=0.10, gt=0.0, le=0.25)
+    approach_speed_m_s: float = param("Speed of going down to just above its place", unit="m/s", default=0.02, gt=0.0,
+                                      le=0.10)  # fmt: skip
+    lower_speed_m_s: float = param("Speed of setting down", unit="m/s", default=0.008, gt=0.0, le=0.04)
+    drop_m: float = param("It may stand so far above its place when it is let go", unit="m", default=0.015, ge=0.0,
+                          le=0.05)  # fmt: skip
+    least_aperture_m: float = param("Closed farther than this: nothing held", unit="m", default=0.003, ge=0.0)
+
+
+class PutBack(Skill):
+    """Rise, lower what is in the hand to where it was taken, open gently, rise again. Empty jaws only open.
+
+    It is let go of when it stands: just above where it was taken, or where it meets something on the way down.
+
+    SUCCESS: the jaws are open and high.
+    FAILURE `in_the_way`: it met something high above its place; it is still held, and high.
+    FAILURE `motion_refused`: the place cannot be reached; it is still held, or the jaws were caught.
+    """
+
+    Params = PutBackParams
+    params: PutBackParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"object", "empty"})}
+    LEAVES: ClassVar = {"hand": "empty"}
+    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "in_the_way": "it met something high above its place and is still held",
+        "motion_refused": "the place cannot be reached",
+    }
+
+    made = In(GraspPlan, "how it was taken", required=False)
+    known = In(tuple, "all candidates, to keep clear of", key="candidates", element=Candidate, required=False)
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        arm, p, made = self.context.arm, self.params, self.made
+        yield from rise_clear(arm, p.speed_m_s)
+        yield from self._let_jaws_rest()
+        apart = arm.aperture_m
+        opening = min(max(apart, 0.0) + 0.02, arm.description.gripper.stroke_m)
+        if apart < p.least_aperture_m or made is None:
+            yield from arm.jaws(opening)
+            return
+        opening = min(max(made.opening_m, opening), arm.description.gripper.stroke_m)
+        container = self.context.world.container
+        place = hand_pose_B(arm, container, made.position_K_m + np.array([0.0, 0.0, SHORT_M]), made.yaw_rad)
+        high = float(arm.pose_B_P.position_m[2])
+        over = Pose(np.array([*place.position_m[:2], high]), place.quat)
+        near = Pose(place.position_m + np.array([0.0, 0.0, OVER_M]), place.quat)
+        others = [c for c in self.known or () if c.index != made.candidate]
+        with keeping_clear_of(arm, others):
+            if np.linalg.norm(over.position_m - arm.pose_B_P.position_m) > 1e-3:
+                yield from arm.line(over, p.speed_m_s, what="put back")
+            reached = yield from glide(self.context, near, p.approach_speed_m_s)
+            reached = reached and (yield from glide(self.context, place, p.lower_speed_m_s))
+        above = float(arm.pose_B_P.position_m[2] - place.position_m[2])
+        if not reached and above > p.drop_m:
+            yield from rise_clear(arm, p.speed_m_s)
+            raise SkillFailed(
+                "in_the_way",
+                f"it met something {above * 1e3:.0f} mm above its place and is still held",
+                advice="something else stands there now; set it down by hand",
+                above_m=above,
+            )
+        yield from let_go(arm, opening)
+        yield from rise_clear(arm, p.speed_m_s)
+        self.event("put_back", candidate=made.candidate, above_m=above)
+
+    def _let_jaws_rest(self) -> SkillRun:
+        """Jaws that are still closing would be taken for jaws that hold something."""
+        arm = self.context.arm
+        watch = JawWatch(arm.period_s)
+        for _ in range(round(REST_S / arm.period_s)):
+            (seen,) = yield from arm.hold(arm.period_s)
+            if watch.still(seen.now_s, seen.gripper):
+                return

@@ -1,0 +1,77 @@
+"""Touch with the fingers themselves: the closed hand as a tool with the fingers' outline as its section."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from glotouch_bt.motion import finger_outline_half_m
+from glotouch_bt.perception.touch.detection import Polygon
+from glotouch_bt.robot import Pose, SetPayload, Tare
+from glotouch_bt.skill import Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_skills.common.hand import easy_yaw, finish
+from glotouch_skills.common.probe import HeldTool, corner_place
+
+TRAVEL_M_S = 0.1
+
+
+class BareHandParams(SkillParams):
+    """Parameters of `bare_hand`."""
+
+    aperture_m: float = param("Opening of the jaws while touching", unit="m", default=0.0, ge=0.0, le=0.085)
+    yaw_deg: float = param("Direction of the fingers' width in B", unit="deg", default=0.0, ge=-180.0, le=180.0)
+    corner_gap_m: float = param(
+        "The hand is brought over the corner by the holder, so far from both walls, where it can be lowered",
+        unit="m", default=0.026, ge=0.02, le=0.05,
+    )  # fmt: skip
+
+
+class BareHand(Skill):
+    """Close the empty jaws, go over an empty corner, turn to the yaw kept while touching, zero the wrist sensor.
+
+    SUCCESS: `tool` is the hand: it touches with the outline of its fingers.
+    FAILURE `probe_held`: the probe is in the jaws.
+    FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
+    FAILURE `motion_refused`: the hand cannot be turned there.
+    """
+
+    Params = BareHandParams
+    params: BareHandParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
+    LEAVES: ClassVar = {"hand": "fingers"}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "probe_held": "the probe is in the jaws",
+        "request_failed": "the sensor could not be zeroed, or the payload not be set",
+        "motion_refused": "the hand cannot be turned there",
+    }
+
+    tool = Out(HeldTool, "the fingers as a tool")
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        arm = self.context.arm
+        if arm.scene.holding_tool:
+            raise SkillFailed("probe_held", "the probe is in the jaws", advice="return it first with tool_return")
+        state = yield from arm.jaws(self.params.aperture_m)
+        here = arm.pose_B_P
+        yaw = easy_yaw(arm, np.deg2rad(self.params.yaw_deg))
+        container = self.context.world.container.pose_B_K
+        over = container.apply(np.array([*corner_place(self.context.world, self.params.corner_gap_m), 0.0]))
+        yield from arm.line(Pose.pointing_down((*over[:2], here.position_m[2]), yaw), TRAVEL_M_S)
+        yield from finish(self.context.requests.start(SetPayload(0.0, np.zeros(3))), "payload")
+        yield from arm.hold(0.2)
+        yield from finish(self.context.requests.start(Tare()), "tare")
+        gripper = arm.description.gripper
+        half = finger_outline_half_m(gripper, state.aperture_m)
+        self.tool = HeldTool(
+            tip_P_m=np.array([gripper.finger.centre_m[0], 0.0, gripper.fingertip_below_P_m]),
+            tip_radius_m=float(np.sqrt(4.0 * half[0] * half[1] / np.pi)),
+            shaft_radius_m=float(np.sqrt(4.0 * half[0] * half[1] / np.pi)),
+            aperture_m=state.aperture_m,
+            yaw_B_rad=yaw,
+            section=Polygon.rectangle(*half),
+        )
+        self.event("tool", held=True, section_half_m=half)

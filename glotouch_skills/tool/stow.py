@@ -1,0 +1,82 @@
+"""Whatever happened: rise clear of everything and put the probe away if it is held."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from glotouch_bt.motion import Motion
+from glotouch_bt.robot import Probe
+from glotouch_bt.skill import UNCHANGED, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_skills.common.hand import GRAVITY_M_S2, RISE_M_S, rise_clear, weigh_N
+from glotouch_skills.common.probe import HELD_TOLERANCE_M, nothing_in_hand, return_probe
+
+LEAST_HELD_M, LEAST_HELD_N = 0.003, 1.0
+"""Jaws farther apart than this that still press hold something."""
+
+
+class StowParams(SkillParams):
+    """Parameters of `stow`."""
+
+    rise_speed_m_s: float = param("Speed of rising", unit="m/s", default=RISE_M_S, gt=0.0, le=0.15)
+    speed_m_s: float = param("Speed with the probe in the hand", unit="m/s", default=0.10, gt=0.0, le=0.15)
+    insert_speed_m_s: float = param("Speed into the holder", unit="m/s", default=0.02, gt=0.0, le=0.1)
+
+
+class Stow(Skill):
+    """Rise clear of the container, return a held probe to its holder, and hold. For endings, and for going on without.
+
+    It asks for no port, and may start with anything in the hand. If jaws and weight say that the probe was lost, the
+    hand is empty from now on; an object in the jaws is kept, for it must not fall from here.
+
+    SUCCESS: the hand is high and empty, the wrist zeroed.
+    FAILURE `object_held`: the hand is high; the jaws hold something that is not the probe, and keep it.
+    FAILURE `tool_lost`: the probe was dropped on its way into the holder; the hand is empty and above it.
+    FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
+    FAILURE `motion_refused`: the hand cannot rise, or the holder not be reached.
+    """
+
+    Params = StowParams
+    params: StowParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers", "untared", "probe", "object"})}
+    LEAVES: ClassVar = {"hand": "empty"}
+    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "untared"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "tool_lost": "the probe was dropped on its way into the holder",
+        "object_held": "the jaws hold something that is not the probe, and keep it",
+        "request_failed": "the sensor could not be zeroed, or the payload not be set",
+        "motion_refused": "the hand cannot rise, or the holder not be reached",
+    }
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        arm, p = self.context.arm, self.params
+        yield from rise_clear(arm, p.rise_speed_m_s)
+        apart, pressed, probe = arm.aperture_m, self.context.observation.gripper.force_N, self.context.world.probe
+        handle_wide = abs(apart - probe.handle_m[1]) <= HELD_TOLERANCE_M
+        if arm.scene.holding_tool and (handle_wide or (yield from self._weighs(probe))):
+            yield from return_probe(
+                self.context,
+                arm.pose_B_P.yaw_rad,
+                apart,
+                speed_m_s=p.speed_m_s,
+                insert_speed_m_s=p.insert_speed_m_s,
+            )
+            self.event("tool", held=False)
+            return
+        if not arm.scene.holding_tool and apart > LEAST_HELD_M and pressed > LEAST_HELD_N:
+            raise SkillFailed(
+                "object_held",
+                f"the jaws are {apart * 1e3:.1f} mm apart and press with {pressed:.0f} N: they keep what they hold",
+                advice="take it out of the jaws by hand",
+                aperture_m=apart,
+                force_N=pressed,
+            )
+        arm.scene.hold_tool(False)
+        yield from nothing_in_hand(self.context)
+
+    def _weighs(self, probe: Probe) -> Motion[bool]:
+        """True if the wrist, zeroed with the probe in the hand, does not miss its weight."""
+        missing_N = -(yield from weigh_N(self.context.arm))
+        return missing_N < 0.5 * probe.mass_kg * GRAVITY_M_S2

@@ -1,0 +1,44 @@
+"""Zero the wrist sensor again."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from glotouch_bt.robot import Tare as TareRequest
+from glotouch_bt.skill import Skill, SkillParams, SkillRun, param
+from glotouch_skills.common.hand import RISE_M_S, finish, rise_clear
+
+
+class TareParams(SkillParams):
+    """Parameters of `tare`."""
+
+    settle_s: float = param("Stands still so long first", unit="s", default=0.2, ge=0.0, le=2.0)
+    speed_m_s: float = param("Speed of rising to free air", unit="m/s", default=RISE_M_S, gt=0.0, le=0.15)
+
+
+class Tare(Skill):
+    """Rise to free air if need be, stand still, zero the wrist sensor with what the controller knows is in the hand.
+
+    SUCCESS: the sensor reads nothing now.
+    FAILURE `request_failed`: the sensor could not be zeroed.
+    FAILURE `motion_refused`: the hand cannot rise.
+    """
+
+    Params = TareParams
+    params: TareParams
+
+    # An object in the hand, whose weight the controller does not know, would be zeroed away.
+    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers", "probe"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "request_failed": "the sensor could not be zeroed",
+        "motion_refused": "the hand cannot rise",
+    }
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        arm = self.context.arm
+        yield from rise_clear(arm, self.params.speed_m_s)
+        yield from arm.hold(self.params.settle_s)
+        yield from finish(self.context.requests.start(TareRequest()), "tare")
+        self.event("tare")

@@ -1,0 +1,207 @@
+"""Find out where the ball is in the hand, and how late the wrist sensor reports, by touching the container's walls."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+
+from glotouch_bt.motion import Motion
+from glotouch_bt.perception.touch import GuardParams
+from glotouch_bt.perception.touch.calibration import TipCalibration, WallTouch, solve_tip, wrench_delay
+from glotouch_bt.robot import Array, MotionRefused, Observation
+from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_skills.common.hand import may_touch
+from glotouch_skills.common.probe import HeldTool, Prober, corner_place, corner_walls, quiet_corner
+
+NEAR_M = 0.012
+"""So near to its corner in the plane the ball is taken straight there, else over the walls."""
+LOW_M = 0.020
+"""Ball centre above the floor where it starts to rise."""
+TOUCH_SD_M = 3e-5
+"""Standard deviation of one touch: an onset is dated to a millisecond or two, and the handle gives a little."""
+LARGEST_RESIDUAL_M = 4e-4
+"""Touches that disagree by more were not of these walls, or the probe slipped in the jaws between them."""
+RISE_ACCELERATION_M_S2, RISE_JERK_M_S3 = 1.0, 20.0
+"""How the hand is shaken to be heard in the wrist: the robot-wide limits."""
+RATE_HZ = 1000.0
+"""Samples are laid on a grid of this rate: some may be missing."""
+
+
+class ToolCalibrateParams(SkillParams):
+    """Parameters of `tool_calibrate`.
+
+    Ball centre to wall and height leave the ball room to be centimetres from where it is believed to be, and keep the
+    shaft of a tilted probe off the wall's upper edge.
+    """
+
+    gap_m: float = param("Ball centre to each wall of the corner where it turns", unit="m", default=0.018, ge=0.012,
+                         le=0.05)  # fmt: skip
+    below_edge_m: float = param("Ball centre below the walls' upper edge", unit="m", default=0.020, ge=0.010, le=0.06)
+    turn_deg: float = param("The hand is turned so far either way", unit="deg", default=90.0, ge=20.0, le=90.0)
+    speed_m_s: float = param("Speed towards the walls", unit="m/s", default=0.015, gt=0.0, le=0.03)
+    travel_speed_m_s: float = param("Speed between touches", unit="m/s", default=0.10, gt=0.0, le=0.15)
+    search_m: float = param("The walls are looked for so far past their place", unit="m", default=0.010, ge=0.001,
+                            le=0.02)  # fmt: skip
+
+
+class ToolCalibrate(Skill):
+    """Touch the two walls of the corner nearest to the holder with the hand straight and turned to either side.
+
+    How far apart the ball seems to be from the same wall at different yaws is how far it is from where it should hang;
+    the walls' own places cancel. Rising to the touching height shakes the hand: the delay of the wrist's force behind
+    the hand's acceleration is the sensor's latency.
+
+    SUCCESS: `tool` says where the ball is in the hand, how well that is known, and the sensor's latency.
+    FAILURE `no_wall`: the ball met nothing where a wall should be.
+    FAILURE `slipped`: the touches agree with no one place of the ball in the hand.
+    FAILURE `motion_refused`: the corner cannot be reached, or the hand not be turned there.
+    """
+
+    PAUSE = "retreat"
+    Params = ToolCalibrateParams
+    params: ToolCalibrateParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"probe"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "no_wall": "the ball met nothing where a wall should be",
+        "slipped": "the touches agree with no one place of the ball in the hand",
+        "hard_contact": "the wrench passed a hard limit on the way",
+        "motion_refused": "the corner cannot be reached, or the hand not be turned there",
+    }
+
+    before = In(HeldTool, "the probe in the jaws", key="tool")
+    tool = Out(HeldTool, "the probe, measured")
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        world, given = self.context.world, self.before
+        height = given.floor_z_K_m + world.container.interior_m[2] - self.params.below_edge_m
+        place = np.array([*corner_place(world, self.params.gap_m), height])
+        yield from self._enter(given, place)
+        latency, latency_sd = yield from self._rise(given, place)
+        listening = dataclasses.replace(given, latency_s=latency)
+        touches: list[WallTouch] = []
+        turned = 0
+        with may_touch(self.context.arm, "tool", *corner_walls(world)):
+            for share in (0.0, 1.0, -1.0):
+                yaw = given.yaw_B_rad + share * np.deg2rad(self.params.turn_deg)
+                try:
+                    yield from self._turn(listening, place, yaw)
+                except MotionRefused as refusal:
+                    self.event("note", text=f"the hand is not turned there: {refusal}")
+                    continue
+                turned += 1
+                touches += yield from self._touch_walls(dataclasses.replace(listening, yaw_B_rad=yaw), place)
+            yield from self._turn(listening, place, given.yaw_B_rad)
+        if turned < 2:
+            raise MotionRefused("calibration", "the hand cannot be turned at that corner")
+        found = solve_tip(touches, given.tip_radius_m, touch_sd_m=TOUCH_SD_M, late_sd_s=latency_sd)
+        self.tool = self._measured(listening, found)
+
+    def _enter(self, tool: HeldTool, place: Array) -> Motion[None]:
+        """To just above the floor of the corner, from wherever the ball hangs."""
+        world, p = self.context.world, self.params
+        prober = Prober(self.context, tool, GuardParams(latency_s=tool.latency_s))
+        if np.linalg.norm(prober.tip_K_m[:2] - place[:2]) > NEAR_M:
+            high = max(world.container.interior_m[2] + 0.06, float(prober.tip_K_m[2]))
+            yield from prober.hop(place, high, p.travel_speed_m_s)
+        low = np.array([*place[:2], tool.floor_z_K_m + LOW_M])
+        yield from self.context.arm.line(tool.pose_B_P(world, low), p.travel_speed_m_s)
+
+    def _rise(self, tool: HeldTool, place: Array) -> Motion[tuple[float, float]]:
+        """Up to the touching height; the wrist sensor's latency and its standard deviation, s. Pauses come later."""
+        with self.context.arm.feed.finishing():
+            return (yield from self._measured_rise(tool, place))
+
+    def _measured_rise(self, tool: HeldTool, place: Array) -> Motion[tuple[float, float]]:
+        arm = self.context.arm
+        blocks: list[Observation] = []
+        blocks += yield from arm.hold(0.1)
+        yield from arm.line(
+            tool.pose_B_P(self.context.world, place),
+            self.params.travel_speed_m_s,
+            acceleration_m_s2=RISE_ACCELERATION_M_S2,
+            jerk_m_s3=RISE_JERK_M_S3,
+            guard=blocks.append,
+        )
+        blocks += yield from arm.hold(0.15)
+        up_S = arm.description.gripper.pose_E_P.rotation @ arm.pose_B_P.rotation[2]
+        stamps = np.concatenate([b.stamp_s for b in blocks])
+        even = np.arange(stamps[0], stamps[-1], 1.0 / RATE_HZ)
+        height = np.interp(even, stamps, np.concatenate([b.position_B_P[:, 2] for b in blocks]))
+        force = np.interp(even, stamps, np.concatenate([b.wrench_S for b in blocks])[:, :3] @ up_S)
+        return wrench_delay(height, force, RATE_HZ)
+
+    def _turn(self, tool: HeldTool, place: Array, yaw_B_rad: float) -> Motion[None]:
+        """About the vertical through the ball, through the grasp's yaw, so that the last joint stays off its stops."""
+        for yaw in (tool.yaw_B_rad, yaw_B_rad):
+            goal = tool.pose_B_P(self.context.world, place, yaw)
+            if abs(_wrapped(self.context.arm.pose_B_P.yaw_rad - yaw)) > 1e-3:
+                yield from self.context.arm.line(goal, self.params.travel_speed_m_s)
+
+    def _touch_walls(self, tool: HeldTool, place: Array) -> Motion[list[WallTouch]]:
+        """One touch of each wall, from `place` and back."""
+        p, arm = self.params, self.context.arm
+        prober = Prober(self.context, tool, GuardParams(latency_s=tool.latency_s))
+        sides = quiet_corner(self.context.world)
+        found = []
+        for wall, name in enumerate(corner_walls(self.context.world)):
+            out = np.zeros(3)
+            out[wall] = sides[wall]
+            probed = yield from prober.move(place + (p.gap_m - tool.tip_radius_m + p.search_m) * out, p.speed_m_s)
+            if probed.contact is None:
+                raise SkillFailed(
+                    "no_wall",
+                    f"the ball met nothing up to {p.search_m * 1e3:.0f} mm past the {name}",
+                    advice="check the container's pose and that the probe is held by its handle",
+                )
+            self.event("contact", contact=probed.contact)
+            approach_B = self.context.world.container.pose_B_K.rotation @ out
+            found.append(
+                WallTouch(
+                    wall=wall,
+                    approach=out[:2],
+                    tip_m=probed.contact.tip_K_m[:2],
+                    approach_P=(arm.pose_B_P.rotation.T @ approach_B)[:2],
+                    speed_m_s=p.speed_m_s,
+                )
+            )
+            back = float((prober.tip_K_m - place) @ out)
+            yield from prober.retreat(-out, back, p.travel_speed_m_s)
+        return found
+
+    def _measured(self, tool: HeldTool, found: TipCalibration) -> HeldTool:
+        """The tool with what was found, if the touches agree."""
+        worst = float(np.abs(found.residuals_m).max())
+        if worst > LARGEST_RESIDUAL_M:
+            raise SkillFailed(
+                "slipped",
+                f"touches of the walls disagree by {worst * 1e3:.2f} mm",
+                advice="raise grip_N of tool_pickup, or lower speed_m_s",
+                residual_m=worst,
+            )
+        latency = max(tool.latency_s + found.late_s, 0.0)
+        measured = dataclasses.replace(
+            tool,
+            tip_P_m=tool.tip_P_m + np.array([*found.tip_error_P_m, 0.0]),
+            latency_s=latency,
+            tip_sd_m=found.tip_sd_m,
+            corner_K_m=quiet_corner(self.context.world) * found.walls_m,
+        )
+        self.event(
+            "calibration",
+            tip_P_m=measured.tip_P_m,
+            tip_sd_m=found.tip_sd_m,
+            latency_s=latency,
+            latency_sd_s=found.late_sd_s,
+            corner_K_m=measured.corner_K_m,
+            residuals_m=found.residuals_m,
+        )
+        return measured
+
+
+def _wrapped(angle_rad: float) -> float:
+    return float((angle_rad + np.pi) % (2 * np.pi) - np.pi)

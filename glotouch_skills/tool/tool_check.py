@@ -1,0 +1,120 @@
+"""Is the probe still in the hand as it was? By the jaws' opening, by its weight, and where they differ by the floor."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from glotouch_bt.skill import UNCHANGED, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_skills.common.hand import GRAVITY_M_S2, rise_clear, weigh
+from glotouch_skills.common.probe import HELD_TOLERANCE_M, HeldTool, feel_floor
+
+TAKE_ANEW = "put it back into its holder and take it anew"
+PUT_IT_THERE = "it lies in the container or beside it; take it out by hand and put it into its holder"
+
+
+class ToolCheckParams(SkillParams):
+    """Parameters of `tool_check`."""
+
+    light: float = param("Share of its weight that may be missing", default=0.5, gt=0.0, lt=1.0)
+    askew: float = param("Sine of the tilt at which it hangs askew, by its moment", default=0.25, gt=0.0, lt=1.0)
+    slip_m: float = param("The floor may be felt so far from where it was", unit="m", default=0.002, gt=0.0, le=0.005)
+    touch: bool = param("Touch the floor even if jaws and weight agree", default=False)
+    speed_m_s: float = param("Speed with the probe in the hand", unit="m/s", default=0.10, gt=0.0, le=0.15)
+    corner_gap_m: float = param("Ball centre to each wall at that corner", unit="m", default=0.014, ge=0.008, le=0.05)
+
+
+class ToolCheck(Skill):
+    """Rise to free air and look: are the jaws as far apart as with the handle, does the probe weigh on the wrist?
+
+    If both say so, it is held; if both say no, it is lost. If they differ (a drifted tare weighs, too; a stuck report
+    of the jaws shows nothing) the floor is touched in a free corner: without a probe nothing is met there. A probe that
+    turned in the jaws weighs as before, but aside: its moment tells, and it touches nothing more.
+
+    A hand that let go of it on purpose (`tool_return`, `stow`) need not look.
+
+    SUCCESS: the probe is held as it was taken.
+    FAILURE `tool_lost`: it is not in the hand.
+    FAILURE `tool_slipped`: it is held, but the ball is not where it was: it hangs askew, or the floor was felt too high
+    or too low.
+    FAILURE `hard_contact`: the wrench passed a hard limit on the way to the floor.
+    FAILURE `motion_refused`: the hand cannot rise, or the corner not be reached.
+    """
+
+    Params = ToolCheckParams
+    params: ToolCheckParams
+
+    # On success it is known to be there, whatever happened before.
+    NEEDS: ClassVar = {"hand": frozenset({"probe", "empty", "untared"})}
+    LEAVES: ClassVar = {"hand": "probe"}
+    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "tool_lost": "the probe is not in the hand",
+        "tool_slipped": "it is held, but the ball is not where it was",
+        "hard_contact": "the wrench passed a hard limit on the way to the floor",
+        "motion_refused": "the hand cannot rise, or the corner not be reached",
+    }
+
+    taken = In(HeldTool, "the probe as it was taken", key="tool")
+    tool = Out(HeldTool, "the probe, the jaws as far apart as they are said to be now")
+    tool_lost = Out(bool, "the probe is not in the hand", always=True)
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        self.tool_lost = False
+        arm, tool, p = self.context.arm, self.taken, self.params
+        if not arm.scene.holding_tool:
+            self.tool_lost = True
+            raise SkillFailed("tool_lost", "the probe is not in the hand any more", advice=PUT_IT_THERE)
+        yield from rise_clear(arm, p.speed_m_s)
+        felt = yield from weigh(arm)  # the tare was taken with the probe in the hand
+        missing_N = -felt.weight_N
+        weight_N = self.context.world.probe.mass_kg * GRAVITY_M_S2
+        apart = arm.aperture_m
+        light = not missing_N < p.light * weight_N
+        other = not abs(apart - tool.aperture_m) <= HELD_TOLERANCE_M
+        if not light:
+            self._refuse_askew(felt.moment_Nm, weight_N * self.context.world.probe.com_below_grasp_m)
+        floor_m: float | None = tool.floor_z_K_m
+        if light and other:
+            floor_m = None
+        elif light or other or p.touch:
+            floor_m = yield from feel_floor(self.context, tool, p.corner_gap_m, p.speed_m_s)
+        self.event("tool_check", missing_N=missing_N, aperture_m=apart, floor_z_K_m=floor_m)
+        if floor_m is None:
+            self.tool_lost = True
+            why = "" if light and other else ", and nothing was met where the floor is"
+            arm.scene.hold_tool(False)
+            raise SkillFailed(
+                "tool_lost",
+                f"the probe is not in the hand: {missing_N:.2f} N of its {weight_N:.2f} N are missing, the jaws are "
+                f"{apart * 1e3:.1f} mm apart and were {tool.aperture_m * 1e3:.1f} with it" + why,
+                advice=PUT_IT_THERE,
+                missing_N=missing_N,
+                aperture_m=apart,
+                taken_m=tool.aperture_m,
+            )
+        off = floor_m - tool.floor_z_K_m
+        if not np.abs(off) <= p.slip_m:
+            raise SkillFailed(
+                "tool_slipped",
+                f"the floor was felt {off * 1e3:.1f} mm from where it was: the probe slipped in the jaws",
+                advice=TAKE_ANEW,
+                off_m=float(off),
+            )
+        self.tool = replace(tool, aperture_m=apart)
+
+    def _refuse_askew(self, moment_Nm: float, level_Nm: float) -> None:
+        """Refuse a probe that turned in the jaws; held level, its weight would turn the hand with `level_Nm`."""
+        if not moment_Nm <= self.params.askew * level_Nm:
+            raise SkillFailed(
+                "tool_slipped",
+                f"the probe hangs askew: its weight turns the hand with {moment_Nm * 1e3:.1f} mNm, hanging straight it "
+                f"would not, and level with {level_Nm * 1e3:.1f}",
+                advice=TAKE_ANEW,
+                moment_Nm=moment_Nm,
+                level_Nm=level_Nm,
+            )

@@ -1,0 +1,198 @@
+"""Take the probe out of its holder and feel the floor with it."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+
+from glotouch_bt.motion import Motion
+from glotouch_bt.perception.touch.calibration import JawZero, measured_zero
+from glotouch_bt.robot import Pose, SetPayload, Tare
+from glotouch_bt.skill import UNCHANGED, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_skills.common.hand import (
+    DOWN_B,
+    GRAVITY_M_S2,
+    UP_B,
+    easy_yaw,
+    finish,
+    may_touch,
+    straight_guard,
+    weigh_N,
+    why_stopped,
+)
+from glotouch_skills.common.probe import FLOOR_SEARCH_M, HeldTool, feel_floor
+
+MET_N = 8.0
+"""Change of force at which the open hand goes no farther down over the handle; unhindered it is below 2 N."""
+STUCK_N, OUT_M_S = 25.0, 0.05
+"""Change of force at which the probe is drawn out of its holder no farther, and how fast it is at most. At that speed
+a probe held by 3 N/mm is pulled by 2.5 N more until the arm stands: below the hard limit. A ball that snags on its slot
+pulls with up to 23 N (harsh, simulated), and comes out."""
+HANDLE_TOLERANCE_M = 0.004
+"""The jaws hold the handle if they are this near to its width: twice the largest bias of their report, and its give."""
+
+
+class ToolPickupParams(SkillParams):
+    """Parameters of `tool_pickup`."""
+
+    grip_N: float = param("Jaw force on the handle", unit="N", default=60.0, gt=0.0, le=60.0)
+    speed_m_s: float = param("Speed with the probe in the hand", unit="m/s", default=0.10, gt=0.0, le=0.15)
+    free_speed_m_s: float = param("Speed of the empty hand", unit="m/s", default=0.25, gt=0.0, le=0.25)
+    floor_touch: bool = param("Touch the floor in a free corner to learn its height", default=True)
+    corner_gap_m: float = param("Ball centre to each wall at that corner", unit="m", default=0.014, ge=0.008, le=0.05)
+
+
+class ToolPickup(Skill):
+    """Grasp the probe in its holder, draw it out, tell the controller its weight, tare, and touch the floor.
+
+    Started with the probe in the jaws (it was broken off before), it goes on from there and never lets go of it.
+
+    SUCCESS: the probe is held and its floor height is known.
+    FAILURE `no_probe`: the jaws closed on nothing (or on something of another width).
+    FAILURE `probe_not_lifted`: the hand came up without the probe's weight; if the jaws are as far apart as its handle
+        is wide, it counts as held all the same, and may be put back.
+    FAILURE `hard_contact`: the open hand met something on its way to the handle; or the probe is held, and is stuck in
+        its holder, or met something hard on the way to the floor.
+    FAILURE `no_floor`: the ball met nothing where the container's floor should be; the probe is held.
+    FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
+    FAILURE `motion_refused`: the holder cannot be reached.
+    """
+
+    PAUSE = "retreat"
+    Params = ToolPickupParams
+    params: ToolPickupParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers", "untared", "probe"})}
+    LEAVES: ClassVar = {"hand": "probe"}
+    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "empty", "probe"})}
+    PUT_BACK_WITH: ClassVar = {"hand": "tool_return"}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "no_probe": "the jaws closed on nothing, or on something of another width",
+        "probe_not_lifted": "the hand came up without the probe's weight",
+        "no_floor": "the ball met nothing where the container's floor should be",
+        "hard_contact": "the wrench passed a limit on the way to the handle, out of the holder, or to the floor",
+        "request_failed": "the sensor could not be zeroed, or the payload not be set",
+        "motion_refused": "the holder cannot be reached",
+    }
+
+    tool = Out(HeldTool, "the probe in the jaws")
+    jaw_zero = Out(JawZero, "what the jaws report too much, by the handle's width")
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        arm, world, p = self.context.arm, self.context.world, self.params
+        probe = world.probe
+        weight_N = probe.mass_kg * GRAVITY_M_S2
+        if arm.scene.holding_tool and self._handle_wide(arm.aperture_m):
+            aperture, yaw = arm.aperture_m, arm.pose_B_P.yaw_rad
+            yield from self._rise(float(world.holder.pose_B_grasp.position_m[2] - arm.pose_B_P.position_m[2]))
+        else:
+            arm.scene.hold_tool(False)
+            yaw = easy_yaw(arm, world.holder.pose_B_grasp.yaw_rad)
+            aperture = yield from self._grip(yaw)
+            yield from self._rise(0.0)
+            weight_N = yield from weigh_N(arm)
+        if weight_N < 0.5 * probe.mass_kg * GRAVITY_M_S2:
+            apart = arm.aperture_m
+            arm.scene.hold_tool(self._handle_wide(apart))  # what they may hold is not dropped: the wrist may be wrong
+            raise SkillFailed(
+                "probe_not_lifted",
+                f"the hand carries {weight_N:.2f} N; the probe weighs {probe.mass_kg * GRAVITY_M_S2:.2f} N; the jaws "
+                f"are {apart * 1e3:.1f} mm apart, the handle is {probe.handle_m[1] * 1e3:.1f}",
+                advice="raise grip_N, or check the handle",
+                weight_N=weight_N,
+            )
+        payload = SetPayload(probe.mass_kg, np.array([0.0, 0.0, probe.com_below_grasp_m]))
+        yield from finish(self.context.requests.start(payload), "payload")
+        seen = yield from arm.hold(0.2, tactile=True)
+        self.jaw_zero = measured_zero(seen, probe.handle_m[1], arm.description.gripper.pad_shape)
+        yield from finish(self.context.requests.start(Tare()), "tare")
+        tool = HeldTool(
+            tip_P_m=np.array([0.0, 0.0, probe.grasp_to_tip_m]),
+            tip_radius_m=probe.tip_radius_m,
+            shaft_radius_m=0.5 * probe.shaft_diameter_m,
+            aperture_m=aperture,
+            yaw_B_rad=yaw,
+        )
+        if p.floor_touch:
+            tool = yield from self._feel_floor(tool)
+        self.event(
+            "tool", held=True, grasp_to_tip_m=probe.grasp_to_tip_m, floor_z_K_m=tool.floor_z_K_m, weight_N=weight_N,
+            jaw_zero=self.jaw_zero,
+        )  # fmt: skip
+        self.tool = tool
+
+    def _handle_wide(self, aperture_m: float) -> bool:
+        """True if the jaws are as far apart as the handle is wide."""
+        return abs(aperture_m - self.context.world.probe.handle_m[1]) <= HANDLE_TOLERANCE_M
+
+    def _grip(self, yaw_B_rad: float) -> Motion[float]:
+        """Go down over the stowed probe with open jaws and close them on its handle; their aperture."""
+        arm, world, p = self.context.arm, self.context.world, self.params
+        grasp = Pose.pointing_down(world.holder.pose_B_grasp.position_m, yaw_B_rad)
+        above = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, 0.06]))
+        handle = world.probe.handle_m[1]
+        opening = min(handle + 0.03, arm.description.gripper.stroke_m)
+        yield from arm.jaws(opening, speed_m_s=0.15)
+        yield from arm.transit(
+            above, height_B_m=max(above.position_m[2], arm.pose_B_P.position_m[2]), speed_m_s=p.free_speed_m_s
+        )
+        yield from finish(self.context.requests.start(Tare()), "tare")
+        with may_touch(arm, "hand", "probe", "holder"):
+            guard = yield from straight_guard(arm, DOWN_B, MET_N)
+            moved = yield from arm.line(grasp, 0.05, guard=guard)
+            if (why := why_stopped(moved)) is not None:
+                yield from arm.line(above, 0.05)
+                raise SkillFailed(
+                    "hard_contact",
+                    f"the open hand met something on its way down over the handle: {why}",
+                    advice="check the holder's pose",
+                    travelled_m=moved.travelled_m,
+                )
+            state = yield from arm.jaws(0.0, speed_m_s=0.04, force_N=p.grip_N)
+            if not self._handle_wide(state.aperture_m):
+                yield from arm.jaws(opening, speed_m_s=0.1)
+                yield from arm.line(above, 0.05)
+                raise SkillFailed(
+                    "no_probe",
+                    f"the jaws closed to {state.aperture_m * 1e3:.1f} mm, the handle is {handle * 1e3:.1f}",
+                    advice="check that the probe stands in its holder and that the holder's pose is right",
+                    aperture_m=state.aperture_m,
+                )
+        arm.scene.hold_tool(True)
+        return state.aperture_m
+
+    def _rise(self, short_m: float) -> Motion[None]:
+        """Straight up until the ball is well above the holder, from `short_m` below the stowed probe's grasp.
+
+        Raises:
+            SkillFailed: `hard_contact`.
+            GuardTripped: The arm does not follow its setpoints.
+        """
+        arm, up = self.context.arm, self.context.world.probe.length_m + 0.06 + short_m
+        if up <= 1e-4:
+            return
+        guard = yield from straight_guard(arm, UP_B, STUCK_N)
+        speed_m_s = min(self.params.speed_m_s, OUT_M_S)
+        moved = yield from arm.shift(up * UP_B, speed_m_s, check=False, guard=guard)
+        if (why := why_stopped(moved)) is not None:
+            raise SkillFailed(
+                "hard_contact",
+                f"the probe does not come out of its holder: {why}",
+                advice="check the holder's pose, and that nothing blocks the probe",
+                travelled_m=moved.travelled_m,
+            )
+
+    def _feel_floor(self, tool: HeldTool) -> Motion[HeldTool]:
+        """Learn the floor's height in the corner nearest to the holder."""
+        floor_z = yield from feel_floor(self.context, tool, self.params.corner_gap_m, self.params.speed_m_s)
+        if floor_z is None:
+            raise SkillFailed(
+                "no_floor",
+                f"the ball met no floor {FLOOR_SEARCH_M * 1e3:.0f} mm below where the registration puts it",
+                advice="check the container's pose and that the probe is held by its handle",
+            )
+        return dataclasses.replace(tool, floor_z_K_m=floor_z)

@@ -1,0 +1,55 @@
+"""Put the probe back into its holder."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from glotouch_bt.skill import UNCHANGED, In, Skill, SkillParams, SkillRun, param
+from glotouch_skills.common.probe import HeldTool, return_probe
+
+
+class ToolReturnParams(SkillParams):
+    """Parameters of `tool_return`."""
+
+    speed_m_s: float = param("Speed with the probe in the hand", unit="m/s", default=0.10, gt=0.0, le=0.15)
+    insert_speed_m_s: float = param("Speed into the holder", unit="m/s", default=0.02, gt=0.0, le=0.1)
+
+
+class ToolReturn(Skill):
+    """Carry the probe over its holder, lower it in, open the jaws, rise, and tare the empty hand.
+
+    The probe is let go of nowhere but in the holder, also when the skill is broken off.
+
+    SUCCESS: the jaws are empty and above the holder.
+    FAILURE `tool_lost`: the probe was dropped on its way into the holder; the hand is empty and above it.
+    FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
+    FAILURE `motion_refused`: the holder cannot be reached from here.
+    """
+
+    Params = ToolReturnParams
+    params: ToolReturnParams
+
+    # `untared`: let go of, but not yet zeroed without it; nothing but this skill or `tool_pickup` may follow.
+    NEEDS: ClassVar = {"hand": frozenset({"probe", "untared"})}
+    LEAVES: ClassVar = {"hand": "empty"}
+    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "untared"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "tool_lost": "the probe was dropped on its way into the holder",
+        "request_failed": "the sensor could not be zeroed, or the payload not be set",
+        "motion_refused": "the holder cannot be reached from here",
+    }
+
+    tool = In(HeldTool, "the probe in the jaws")
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        tool, p = self.tool, self.params
+        yield from return_probe(
+            self.context,
+            tool.yaw_B_rad,
+            tool.aperture_m,
+            speed_m_s=p.speed_m_s,
+            insert_speed_m_s=p.insert_speed_m_s,
+        )
+        self.event("tool", held=False)

@@ -1,0 +1,63 @@
+"""Does the wrist sensor read nothing in free air? A tare that drifted or went stale shows there."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from glotouch_bt.skill import Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_skills.common.hand import RISE_M_S, STAND_S, rise_clear
+
+
+class WristCheckParams(SkillParams):
+    """Parameters of `wrist_check`.
+
+    Half a newton is what the force drifts in five minutes at worst (harsh: 0.1 N/sqrt(min), two standard deviations),
+    and far below what a closure reacts to (3 N).
+    """
+
+    force_N: float = param("Largest force in free air", unit="N", default=0.5, gt=0.0, le=10.0)
+    torque_Nm: float = param("Largest torque about the sensor in free air", unit="Nm", default=0.10, gt=0.0, le=3.0)
+    look_s: float = param("How long is looked", unit="s", default=0.15, ge=0.02, le=2.0)
+    speed_m_s: float = param("Speed of rising to free air", unit="m/s", default=RISE_M_S, gt=0.0, le=0.15)
+
+
+class WristCheck(Skill):
+    """Rise to free air if need be, stand still, and look at the tared wrist: it must read nothing.
+
+    SUCCESS: force and torque are within bounds.
+    FAILURE `off_zero`: they are not. The tare drifted, was taken while something touched the hand, or the hand does not
+    carry what the controller believes (a lost probe reads as its weight, upwards).
+    FAILURE `motion_refused`: the hand cannot rise.
+    """
+
+    Params = WristCheckParams
+    params: WristCheckParams
+
+    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers", "probe"})}
+    USES: ClassVar = frozenset({"arm"})
+    FAILURES: ClassVar = {
+        "off_zero": "the wrist does not read nothing in free air",
+        "motion_refused": "the hand cannot rise",
+    }
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        arm, p = self.context.arm, self.params
+        yield from rise_clear(arm, p.speed_m_s)
+        yield from arm.hold(STAND_S)
+        blocks = yield from arm.hold(p.look_s)
+        mean = np.concatenate([b.wrench_S for b in blocks]).mean(axis=0)
+        force, torque = float(np.linalg.norm(mean[:3])), float(np.linalg.norm(mean[3:]))
+        if not (force <= p.force_N and torque <= p.torque_Nm):  # false for NaN, too
+            raise SkillFailed(
+                "off_zero",
+                f"in free air the wrist reads {force:.2f} N and {torque:.3f} Nm; "
+                f"{p.force_N:g} N and {p.torque_Nm:g} Nm are allowed",
+                advice="zero it again with tare; if it drifts on, the sensor is faulty",
+                force_N=force,
+                force_limit_N=p.force_N,
+                torque_Nm=torque,
+                torque_limit_Nm=p.torque_Nm,
+            )

@@ -1,5 +1,0 @@
-"""Skills: one file each. A skill names no backend; see `base` for what a skill is."""
-
-from skills.base import Context, In, Journal, Out, Reason, Skill, SkillFailed, SkillParams, SkillRun, param
-
-__all__ = ["Context", "In", "Journal", "Out", "Reason", "Skill", "SkillFailed", "SkillParams", "SkillRun", "param"]

@@ -1,0 +1,36 @@
+"""Thinning: fewer triangles, closed like before, and where the surface was."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+import pytest
+import trimesh
+
+from glotouch_backends.mujoco.hulls.thinning import MOST_FACES, thinned
+from glotouch_bt.robot.scene.meshes import Mesh
+
+
+def as_mesh(solid: trimesh.Trimesh) -> Mesh:
+    v, f = np.array(solid.vertices), np.array(solid.faces)
+    return Mesh("solid", v, f, hashlib.sha256(v.tobytes()).hexdigest())
+
+
+def test_few_faces_stay_as_they_are() -> None:
+    mesh = as_mesh(trimesh.creation.icosphere(4, 0.03))
+    vertices, faces = thinned(mesh)
+    assert vertices is mesh.vertices_m or np.array_equal(vertices, mesh.vertices_m)
+    assert np.array_equal(faces, mesh.faces)
+
+
+def test_many_faces_become_few_and_the_shape_stays() -> None:
+    mesh = as_mesh(trimesh.creation.torus(0.03, 0.012, major_sections=320, minor_sections=160))
+    vertices, faces = thinned(mesh)
+    solid = trimesh.Trimesh(vertices, faces, process=False)
+    assert 0.3 * MOST_FACES < len(faces) <= MOST_FACES
+    assert solid.is_watertight
+    assert solid.volume == pytest.approx(2 * np.pi**2 * 0.03 * 0.012**2, rel=0.01)  # Pappus
+    used = vertices[np.unique(faces)]
+    ring = np.hypot(np.linalg.norm(used[:, :2], axis=1) - 0.03, used[:, 2])
+    assert np.abs(ring - 0.012).max() < 1e-4

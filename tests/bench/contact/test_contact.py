@@ -1,0 +1,91 @@
+"""`bench contact`: the arithmetic of its figures against closed forms, and one real trial of each mode."""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from glotouch_bt.bench.contact import bench as contact
+from glotouch_bt.bench.contact.square import TrueSquare, fit_square, polygon_distance, rectangle
+from glotouch_bt.robot import Pose
+
+SIDES = np.array([0.06, 0.06])
+
+
+@given(
+    yaw=st.floats(-np.pi, np.pi), x=st.floats(-0.1, 0.1), y=st.floats(-0.1, 0.1), u=st.floats(-0.029, 0.029),
+    off=st.floats(-0.01, 0.02), side=st.integers(0, 3),
+)  # fmt: skip
+def test_distance_from_a_face_is_how_far_off_it_is(yaw, x, y, u, off, side) -> None:
+    corners = rectangle(np.array([x, y]), SIDES, yaw)
+    a, b = corners[side], corners[(side + 1) % 4]
+    out = np.array([(b - a)[1], -(b - a)[0]]) / 0.06
+    inside = -min(0.03 - abs(u), -off) if off < 0 else off
+    point = 0.5 * (a + b) + u * (b - a) / 0.06 + off * out
+    assert polygon_distance(point[None], corners)[0] == pytest.approx(inside, abs=1e-12)
+
+
+def test_distance_from_a_corner_is_round() -> None:
+    corners = rectangle(np.zeros(2), SIDES, 0.0)
+    np.testing.assert_allclose(polygon_distance(np.array([[0.033, 0.034]]), corners), [0.005], atol=1e-12)
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.006])
+def test_a_square_is_fitted_to_what_touched_it(radius: float) -> None:
+    """Points, or balls outside of it, four a side."""
+    u = np.linspace(-0.02, 0.02, 4)
+    faces = [np.column_stack([u, np.full(4, 0.03 + radius)]) @ np.array([[c, s], [-s, c]]) for c, s in
+             ((1, 0), (0, 1), (-1, 0), (0, -1))]  # fmt: skip
+    turn = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
+    fit = fit_square(np.concatenate(faces) @ turn + (0.02, -0.03), radius)
+    np.testing.assert_allclose(fit.centre_K_m, [0.02, -0.03], atol=2e-5)
+    np.testing.assert_allclose(fit.size_m, SIDES, atol=1e-4)
+
+
+def test_the_true_square_stands_as_its_pose_says() -> None:
+    square = TrueSquare(Pose.planar((0.6, 0.1, -0.2), 0.4), SIDES)
+    np.testing.assert_allclose(square.corners_B_m.mean(axis=0), square.centre_B_m)
+    edge = square.corners_B_m[3] - square.corners_B_m[2]
+    assert np.arctan2(edge[1], edge[0]) == pytest.approx(0.4)
+
+
+def row(tool: str, square: str, seed: int, value: float, cause: str = "") -> dict[str, Any]:
+    return {"tool": tool, "square": square, "seed": seed, "cause": cause, **dict.fromkeys(contact.METRICS, value)}
+
+
+def test_a_trial_that_failed_counts() -> None:
+    rows = [row("probe", "fixed", 0, 0.2), row("probe", "fixed", 1, 0.4), row("probe", "fixed", 2, 0, "not_traced")]
+    summary = contact.summarise(rows)
+    assert summary["probe"]["centre_error_mm"]["mean"] == pytest.approx(0.3)
+    assert (summary["probe"]["traced"]["rate"], summary["probe"]["traced"]["n"]) == (pytest.approx(2 / 3), 3)
+    assert summary["not_traced"] == ["fixed probe seed 2: not_traced"]
+
+
+def test_every_mode_is_tried_on_every_seed(tmp_path: Path) -> None:
+    campaign = contact.Campaign((3, 4), "nominal", 5, "mujoco", tmp_path)
+    asked = [(tool, fixed, r.seed, r.settings["contacts"]) for tool, fixed, r in campaign.requests()]
+    assert len(asked) == len(set(asked)) == 8
+    assert {a[3] for a in asked} == {"20"}
+
+
+@pytest.mark.slow
+def test_one_seed_for_real(tmp_path: Path) -> None:
+    """The bolted square by the probe is far better than the targets; the whole folder is written."""
+    campaign = contact.Campaign((1,), "nominal", 3, "mujoco", tmp_path)
+    with ThreadPoolExecutor(1) as pool:
+        summary = contact.run_campaign(campaign, pool)
+    assert summary["probe"]["traced"]["rate"] == 1.0, summary["not_traced"]
+    assert summary["probe"]["centre_error_mm"]["mean"] < 0.3
+    assert summary["probe"]["contact_rms_mm"]["mean"] < 0.6
+    assert summary["probe"]["tip_after_mm"]["mean"] < 0.1 < summary["probe"]["tip_before_mm"]["mean"]
+    assert summary["free"]["probe"]["displacement_mm"]["mean"] < 10.0
+    assert json.loads((tmp_path / "summary.json").read_text())["probe"] == summary["probe"]
+    assert (tmp_path / "traces.png").stat().st_size > 1000
+    assert (tmp_path / "errors.png").stat().st_size > 1000

@@ -1,0 +1,88 @@
+import csv
+import json
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from glotouch_bt.bench import retrieve
+from glotouch_bt.run.launch import RunRequest
+
+LOST = {"node": "sequence/grasp/lift", "code": "lost", "message": "", "evidence": {}, "advice": ""}
+
+
+def _result(request: RunRequest) -> dict[str, Any]:
+    """Seed 0 retrieves, seed 1 lifts another object, seed 2 loses it, seed 3 stops for safety."""
+    target = request.settings["target"]
+    status = {2: "failure", 3: "aborted"}.get(request.seed, "success")
+    held = {0: target, 1: "other"}.get(request.seed)
+    return {
+        "status": status, "retrieved": held, "correct": held == target, "candidates": [1, 2], "sim_time_s": 100.0,
+        "wall_time_s": 10.0 + request.seed, "peak_force_N": 9.0, "probe_path_m": 3.0, "contacts": 7,
+        "reason_chain": [LOST] if request.seed == 2 else [{**LOST, "code": "safety_stop"}] if request.seed == 3 else [],
+    }  # fmt: skip
+
+
+@pytest.fixture
+def campaign(tmp_path: Path) -> retrieve.Campaign:
+    return retrieve.Campaign("retrieve", ("a", "b"), (0, 1, 2, 3, 4), "nominal", None, "fake", tmp_path / "out")
+
+
+def test_every_trial_is_counted_and_named(campaign: retrieve.Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+    def launch(request: RunRequest) -> Any:
+        if request.seed == 4:
+            raise RuntimeError("a bug")
+        code = {2: 1, 3: 3}.get(request.seed, 0)
+        return SimpleNamespace(result=_result(request), exit_code=code)
+
+    monkeypatch.setattr(retrieve, "launch", launch)
+    shown: list[int] = []
+    with ThreadPoolExecutor(2) as pool:
+        summary = retrieve.run_campaign(campaign, pool, lambda row, done, total: shown.append(done))
+    assert shown == list(range(1, 11))
+    assert (summary["success"]["rate"], summary["success"]["n"]) == (0.2, 10)
+    assert summary["by_target"]["a"]["rate"] == 0.2
+    assert summary["wrong_object"]["rate"] == 0.2
+    assert summary["safety_stops"]["rate"] == 0.2
+    assert summary["tracebacks"]["rate"] == 0.2
+    assert summary["causes"] == {
+        "wrong_object": 2, "lift: lost": 2, "lift: safety_stop": 2, "traceback RuntimeError: a bug": 2
+    }  # fmt: skip
+    assert summary["wall_s"]["n"] == 8
+    with (campaign.out / "trials.csv").open() as f:
+        assert len(list(csv.DictReader(f))) == 10
+    assert json.loads((campaign.out / "summary.json").read_text())["success"] == summary["success"]
+
+
+def test_a_mission_that_says_success_with_an_empty_hand_is_no_success() -> None:
+    row = {"status": "success", "retrieved": None, "correct": False, "target": "a", "cause": "nothing_in_gripper"}
+    assert not retrieve.succeeded(row)
+    assert retrieve.cause({"status": "success", "retrieved": None, "correct": False}) == "nothing_in_gripper"
+
+
+def test_a_resumed_campaign_keeps_what_was_run_and_passes_settings_on(
+    campaign: retrieve.Campaign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[RunRequest] = []
+
+    def launch(request: RunRequest) -> Any:
+        asked.append(request)
+        assert request.out is not None
+        request.out.mkdir(parents=True)
+        (request.out / "result.json").write_text(json.dumps(_result(request)))
+        return SimpleNamespace(result=_result(request), exit_code={2: 1, 3: 3}.get(request.seed, 0))
+
+    monkeypatch.setattr(retrieve, "launch", launch)
+    first = replace(campaign, seeds=(0, 1), settings={"devices": "simulated"})
+    with ThreadPoolExecutor(1) as pool:
+        retrieve.run_campaign(first, pool)
+        assert {r.settings["devices"] for r in asked} == {"simulated"}
+        before = len(asked)
+        again = replace(first, seeds=(0, 1, 3), resume=True)
+        summary = retrieve.run_campaign(again, pool)
+    assert len(asked) == before + 2, "only the new seed"
+    assert summary["success"]["n"] == 6
+    assert summary["safety_stops"]["rate"] == pytest.approx(2 / 6)

@@ -1,0 +1,108 @@
+"""`bench fuzz`: the same documents each time, every class of damage noticed by the watch, few trials for real."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from copy import deepcopy
+from pathlib import Path
+
+import pytest
+
+from glotouch_bt.validation.fuzz import campaign as campaign_module
+from glotouch_bt.validation.fuzz import trial as trial_module
+from glotouch_bt.validation.fuzz.campaign import FuzzCampaign, run_campaign
+from glotouch_bt.validation.fuzz.corrupt import ODD_VALUES
+from glotouch_bt.validation.fuzz.trial import BAD, Result, document_of, run_trials
+
+SEED = 7
+
+
+def test_a_trial_is_the_same_whenever_it_is_made() -> None:
+    for n in range(60):
+        kind, text, _ = document_of(SEED, n)
+        again = document_of(SEED, n)
+        assert (kind, text) == again[:2]
+
+
+def test_a_document_does_not_depend_on_those_before_it() -> None:
+    before = deepcopy(ODD_VALUES)
+    first = [document_of(1, n)[1] for n in range(1500)]
+    assert repr(before) == repr(ODD_VALUES)
+    assert first == [document_of(1, n)[1] for n in range(1500)]
+
+
+def test_documents_are_of_both_kinds_and_in_all_states() -> None:
+    documents = [document_of(SEED, n)[:2] for n in range(300)]
+    assert {kind for kind, _ in documents} == {"mission", "fault plan"}
+    texts = [text for _, text in documents]
+    assert any(b"!!python" in t for t in texts), "tags"
+    assert any(b"&a" in t for t in texts), "anchors"
+    assert any(t.count(b"[" * 20) or t.count(b"- " * 20) for t in texts), "deep nesting"
+    assert sum(b"tool_pickup" in t for t in texts) > 20, "and things that make sense"
+
+
+def test_nothing_bad_comes_of_some_of_them() -> None:
+    results = run_trials(SEED, range(60))
+    assert [(r.number, r.came, r.detail) for r in results if r.came in BAD] == []
+    assert {"refused with places", "refused unread"} < {r.came for r in results}
+
+
+@pytest.fixture
+def broken_check(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
+    """Lets a test say what reading a mission does."""
+    monkeypatch.setattr(trial_module, "LONGEST_S", 0.3)
+    return monkeypatch
+
+
+def missions(n: int) -> list[int]:
+    return [i for i in range(60) if document_of(SEED, i)[0] == "mission"][:n]
+
+
+def bug(path: object, settings: object) -> None:
+    raise KeyError("a bug")
+
+
+def endless(path: object, settings: object) -> None:
+    while True:
+        pass
+
+
+def starts_a_process(path: object, settings: object) -> None:
+    subprocess.run([sys.executable, "-c", ""], check=True)
+
+
+def writes_a_file(path: Path, settings: object) -> None:
+    (path.parent / "left").write_text("x")
+
+
+def runs_text(path: Path, settings: object) -> None:
+    eval("'glotouch_fuzz_canary'")
+
+
+@pytest.mark.parametrize(
+    ("what", "came"),
+    [(bug, "traceback"), (endless, "hang"), (starts_a_process, "code run"), (writes_a_file, "code run"),
+     (runs_text, "code run")],
+)  # fmt: skip
+def test_what_must_not_happen_is_noticed(broken_check: pytest.MonkeyPatch, what: object, came: str) -> None:
+    broken_check.setattr(trial_module, "load_mission", what)
+    (result,) = run_trials(SEED, missions(1))
+    assert result.came == came
+    assert result.text, "with what it came of"
+
+
+def test_a_campaign_counts_and_keeps_what_broke(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def made(seed: int, numbers: tuple[int, ...]) -> list[Result]:
+        return [Result(n, "mission", "traceback" if n == 3 else "ran to success", "why", b"\xff") for n in numbers]
+
+    monkeypatch.setattr(campaign_module, "run_trials", made)
+    with ThreadPoolExecutor(1) as pool:
+        summary = run_campaign(FuzzCampaign(120, SEED, tmp_path / "out"), pool)
+    assert summary["counts"] == {"mission": {"ran to success": 119, "traceback": 1}}
+    assert json.loads((tmp_path / "out/summary.json").read_text())["failures"][0]["trial"] == 3
+    assert (tmp_path / "out/failures/traceback-3.yaml").read_bytes() == b"\xff"
+    assert os.listdir(tmp_path / "out/failures") != []

@@ -1,0 +1,87 @@
+"""Five deliberately broken backends, and the test of the suite that finds each; the unbroken one passes them all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from glotouch_backends.mujoco import MujocoBackend
+from glotouch_backends.mujoco.robot import MujocoRobot
+from glotouch_backends.rizon4 import RIZON4_XENSE
+from glotouch_bt.conformance import RobotConformance, Wall
+from glotouch_bt.robot import Conditions, Robot
+from tests.conformance.broken import Break, Degrees, DroppedSamples, LateStop, SwallowedFault, Wrapped, WrongSign
+from tests.conformance.conformance_world import OPTIONS, WORLD, floor
+
+pytestmark = pytest.mark.slow
+
+
+def blow_up(robot: Robot) -> None:
+    assert isinstance(robot, Wrapped)
+    assert isinstance(robot.inner, MujocoRobot)
+    robot.inner.data.qvel[0] = np.nan
+
+
+class Suite(RobotConformance):
+    """The suite round a backend that is broken by `break_it`."""
+
+    break_it: Break
+
+    def make(self) -> Robot:
+        return type(self).break_it(MujocoBackend().open(WORLD, Conditions(), 0, OPTIONS))
+
+    def wall(self) -> Wall:
+        return floor(RIZON4_XENSE)
+
+    def losses(self) -> Mapping[str, Callable[[Robot], None]]:
+        return {"the simulation": blow_up}
+
+
+@contextmanager
+def suite(break_it: Break) -> Iterator[Suite]:
+    made = type("Broken", (Suite,), {"break_it": staticmethod(break_it), "_shared": None})
+    try:
+        yield made()
+    finally:
+        made.teardown_class()
+
+
+FOUND_BY = {
+    WrongSign: ("sign_and_frame_of_the_wrench", (0.3,)),
+    DroppedSamples: ("blocks_are_complete_and_in_order", ()),
+    LateStop: ("it_stops_when_nothing_is_commanded", ()),
+    Degrees: ("joints_and_pose_agree", ()),
+    SwallowedFault: ("a_lost_device_is_an_error", ()),
+}
+
+
+@pytest.mark.parametrize("broken", FOUND_BY, ids=lambda b: b.__name__)
+def test_a_broken_backend_fails(broken: Break) -> None:
+    name, arguments = FOUND_BY[broken]  # type: ignore[index]
+    with suite(broken) as bad, pytest.raises(AssertionError):
+        getattr(bad, f"test_{name}")(*arguments)
+
+
+@pytest.mark.parametrize("broken", FOUND_BY, ids=lambda b: b.__name__)
+def test_the_same_backend_unbroken_passes(broken: Break) -> None:
+    name, arguments = FOUND_BY[broken]  # type: ignore[index]
+    with suite(Wrapped) as good:
+        getattr(good, f"test_{name}")(*arguments)
+
+
+@pytest.mark.parametrize(
+    ("broken", "also"),
+    [
+        (WrongSign, "a_guarded_move_stops_at_a_wall"),
+        (LateStop, "it_stops_on_hold"),
+        (LateStop, "it_holds_when_a_command_is_refused"),
+        (SwallowedFault, "the_hard_limit_stops_the_arm"),
+    ],
+    ids=lambda v: getattr(v, "__name__", v),
+)
+def test_others_find_it_too(broken: Break, also: str) -> None:
+    with suite(broken) as bad, pytest.raises((AssertionError, pytest.fail.Exception)):
+        getattr(bad, f"test_{also}")()

@@ -1,0 +1,106 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from glotouch_bt.perception.search import SearchMap, Trace, admit, elsewhere_m, joins, part_of
+from glotouch_bt.perception.search.candidates import _outline, quality
+from glotouch_bt.perception.touch import Candidate, Contact
+
+R = 0.006
+LIMB = ((0.0, 0.022, 0, 1), (0.0, -0.022, 0, -1), (0.012, 0.0, 1, 0))
+"""Contacts round something narrow: x, y and outward normal."""
+
+
+def contact(x, y, nx, ny):
+    """A ball's contact with a surface through (x, y) whose outward normal is (nx, ny)."""
+    out = np.array([nx, ny, 0.0])
+    tip = np.array([x, y, 0.018]) + R * out
+    return Contact(0.0, tip, -out, out, tip[:2] - R * out[:2], 1.0)
+
+
+def half_a_box():
+    """One end of a box of 90 mm x 44 mm from x = -50 mm to 40 mm."""
+    return (
+        contact(-0.03, 0.022, 0, 1),
+        contact(0.01, 0.022, 0, 1),
+        contact(-0.05, 0.0, -1, 0),
+        contact(-0.03, -0.022, 0, -1),
+        contact(0.01, -0.022, 0, -1),
+    )
+
+
+@pytest.fixture
+def candidate():
+    contacts = half_a_box()
+    return Candidate(0, _outline(contacts, R).contour, 0.018, 0.5, contacts)
+
+
+def test_the_far_end_of_a_box_is_a_part_of_it(candidate):
+    assert part_of((candidate,), contact(0.04, 0.0, 1, 0), R) is candidate
+
+
+def test_what_stands_beside_it_is_not(candidate):
+    assert part_of((candidate,), contact(0.0, 0.060, 0, -1), R) is None  # it faces the box
+    assert part_of((candidate,), contact(0.15, 0.0, 1, 0), R) is None  # too far
+    assert part_of((), contact(0.04, 0.0, 1, 0), R) is None
+
+
+def test_more_of_a_candidate_replaces_it_and_counts_nothing(candidate):
+    belief = SearchMap.blank((0.2, 0.15), expected=2).with_exclusion(candidate.contour, 0.01)
+    last = contact(0.04, 0.0, 1, 0)
+    contacts = (*candidate.contacts, last)
+    traced = Trace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)), continued=True)
+    admitted = admit(belief, (candidate,), last, traced, 0.018, 0.01, part_of=candidate)
+    assert (admitted.index, len(admitted.candidates), admitted.belief.found) == (0, 1, 1)
+    np.testing.assert_allclose(admitted.candidates[0].contour.centre_K_m, [-0.005, 0.0], atol=1e-3)
+    np.testing.assert_allclose(sorted(admitted.candidates[0].contour.size_m), [0.044, 0.090], atol=2e-3)
+
+
+def test_what_stands_too_near_for_another_object_is_the_same(candidate):
+    """16 mm off the contacts, where no other object can stand (30 mm); 26 mm off one can."""
+    two = {}
+    for gap in (0.016, 0.026):
+        contacts = tuple(contact(0.01 + gap + dx, y, nx, ny) for dx, y, nx, ny in LIMB)
+        traced = Trace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)))
+        belief = SearchMap.blank((0.2, 0.15), expected=2).with_exclusion(candidate.contour, 0.01)
+        near = dataclasses.replace(candidate, contour=_outline(candidate.contacts[:3], R).contour)
+        two[gap] = len(admit(belief, (near,), contacts[0], traced, 0.018, 0.01).candidates)
+    assert two == {0.016: 1, 0.026: 2}
+
+
+@pytest.mark.parametrize("gap", [0.016, 0.026])
+def test_a_trace_turns_out_to_be_of_a_candidate_where_it_will_be_made_one_with_it(candidate, gap):
+    contacts = tuple(contact(0.01 + gap + dx, y, nx, ny) for dx, y, nx, ny in LIMB)
+    near = dataclasses.replace(candidate, contour=_outline(candidate.contacts[:3], R).contour)
+    traced = Trace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)))
+    belief = SearchMap.blank((0.2, 0.15), expected=2).with_exclusion(candidate.contour, 0.01)
+    one = len(admit(belief, (near,), contacts[0], traced, 0.018, 0.01).candidates) == 1
+    assert joins((near,), contacts, R) == one == (gap == 0.016)
+    assert not joins((), contacts, R)
+
+
+def test_the_end_of_something_long_is_less_known_than_a_disc():
+    """Both are touched all round their supposed middles: by coverage alone they are alike."""
+    angles = np.deg2rad([10.0, 100.0, 190.0, 280.0])
+    disc = tuple(
+        contact(*(0.022 * np.array([c, s])), c, s) for c, s in zip(np.cos(angles), np.sin(angles), strict=True)
+    )
+    end = (
+        contact(0.0, 0.022, 0, 1),
+        contact(-0.022, 0.008, -1, 0),
+        contact(-0.01, -0.022, 0, -1),
+        contact(0.012, -0.022, 0, -1),
+    )
+    assert quality(_outline(disc, R)) > 0.9
+    assert quality(_outline(end, R)) < 0.6
+
+
+@pytest.mark.parametrize(("away_m", "lost"), [(0.0, False), (0.09, False), (0.11, True), (-0.11, True)])
+def test_a_trace_that_ended_on_a_neighbour_is_not_the_candidate(candidate, away_m, lost):
+    """Two boxes of 90 mm x 44 mm: the circles round them, of 100 mm, meet or do not."""
+    box = dataclasses.replace(candidate.contour, size_m=np.array([0.09, 0.044]))
+    before = dataclasses.replace(candidate, contour=box)
+    there = dataclasses.replace(box, centre_K_m=box.centre_K_m + np.array([0.6, 0.8]) * away_m)
+    off = elsewhere_m(before, dataclasses.replace(before, contour=there))
+    assert off == (pytest.approx(abs(away_m)) if lost else 0.0)

@@ -1,0 +1,104 @@
+import numpy as np
+import pytest
+
+from glotouch_bt.perception.search import SearchMap
+from glotouch_bt.perception.touch import Contact, Contour
+from glotouch_bt.robot import ParamError
+
+DISC = Contour("round", np.array([0.05, 0.0]), (0.06, 0.06), 0.0, 0.0, np.zeros(0))
+
+
+def blank():
+    return SearchMap.blank((0.188, 0.138), expected=2)
+
+
+def test_path_is_resampled_to_two_millimetres():
+    line = np.column_stack([np.linspace(-0.1, 0.1, 1501), np.zeros(1501), np.full(1501, 0.02)])
+    for belief in (blank().with_path(line), blank().with_path(line[[0, -1]])):
+        steps = np.linalg.norm(np.diff(belief.path_K_m, axis=0), axis=1)
+        assert len(belief.path_K_m) == 101
+        np.testing.assert_allclose(steps, 0.002, atol=1e-6)
+
+
+def test_path_goes_on_without_repeating_itself():
+    belief = blank()
+    for i in range(200):
+        belief = belief.with_path(np.array([[4e-4 * i, 0.0], [4e-4 * (i + 1), 0.0]]))
+    steps = np.linalg.norm(np.diff(belief.path_K_m, axis=0), axis=1)
+    assert steps.min() > 0.0019
+    assert steps.max() < 0.0025
+    assert belief.with_path(np.zeros((0, 2))) is belief
+    assert len(belief.with_path(belief.path_K_m[-1:]).path_K_m) == len(belief.path_K_m)
+
+
+def test_values_are_frozen_and_old_maps_stay():
+    first = blank()
+    second = first.with_path([[0.0, 0.0], [0.1, 0.0]]).with_exclusion(DISC, 0.01).with_dropped([0.1, 0.1])
+    assert (len(first.path_K_m), first.found, len(first.dropped)) == (0, 0, 0)
+    assert (second.found, len(second.dropped), second.complete) == (1, 1, False)
+    assert second.with_exclusion(DISC, 0.01).complete
+    with pytest.raises(ValueError, match="read-only"):
+        second.path_K_m[0] = 1.0
+
+
+def test_exclusion_is_the_inflated_outline():
+    belief = blank().with_exclusion(DISC, 0.01)
+    points = np.array([[0.05, 0.0], [0.05, 0.0399], [0.05, 0.0401], [-0.1, 0.0]])
+    np.testing.assert_array_equal(belief.inside_exclusion(points), [True, True, False, False])
+    limbs = Contour("round", DISC.centre_K_m, DISC.size_m, 0.0, 0.003, np.array([0.004, -0.002, 0.0]))
+    np.testing.assert_array_equal(blank().with_exclusion(limbs, 0.01).inside_exclusion(points), [1, 1, 1, 0])
+
+
+def test_covered_fraction_of_one_stripe():
+    """A stripe of half width r along the whole length covers r / half of the region."""
+    belief = blank().with_path([[-0.188, 0.0], [0.188, 0.0]])
+    assert belief.covered_fraction(0.046) == pytest.approx(0.046 / 0.138, abs=0.03)
+    assert blank().covered_fraction(0.05) == 0.0
+    everything = Contour("box", np.zeros(2), (0.5, 0.5), 0.0, 0.0, np.zeros(0))
+    assert blank().with_exclusion(everything, 0.0).covered_fraction(0.01) == 1.0
+
+
+def test_bad_values_are_refused():
+    with pytest.raises(ParamError, match="half_extent_m"):
+        SearchMap.blank((0.1, 0.0), 1)
+    with pytest.raises(ParamError, match="expected"):
+        SearchMap.blank((0.1, 0.1), 0)
+    with pytest.raises(ParamError, match="margin_m"):
+        blank().with_exclusion(DISC, -1.0)
+    with pytest.raises(ParamError, match="points_K_m"):
+        blank().with_path([[np.nan, 0.0]])
+
+
+def test_an_obstacle_is_kept_clear_of_and_is_no_object():
+    belief = blank().with_obstacle([0.05, 0.02], 0.012)
+    points = np.array([[0.05, 0.02], [0.05, 0.0319], [0.05, 0.0321]])
+    np.testing.assert_array_equal(belief.inside_exclusion(points), [True, True, False])
+    np.testing.assert_allclose(belief.clearance(points), [-0.012, -0.0001, 0.0001], atol=1e-9)
+    assert (belief.found, belief.complete) == (0, False)
+    for radius in (0.0, -0.01, np.nan, np.inf):
+        with pytest.raises(ParamError, match="radius_m"):
+            blank().with_obstacle([0.0, 0.0], radius)
+
+
+def test_hints_are_those_given_last():
+    up = np.array([0.0, 0.0, 1.0])
+    one, two = (Contact(t, np.zeros(3), -up, up, np.zeros(2), 1.0) for t in (1.0, 2.0))
+    belief = blank().with_hints((one,))
+    assert belief.with_path([[0.0, 0.0]]).hints == (one,)
+    assert belief.with_hints((two, one)).hints == (two, one)
+    assert belief.hints == (one,)
+
+
+def test_a_surface_that_faces_a_traced_object_is_not_that_objects():
+    disc = Contour("round", np.zeros(2), (0.06, 0.06), 0.0, 0.0, np.zeros(0))
+    known = SearchMap.blank((0.2, 0.15), expected=2).with_exclusion(disc, 0.01)
+
+    def contact(x, push):
+        tip = np.array([x, 0.0, 0.018])
+        return Contact(0.0, tip, np.array([-push, 0.0, 0.0]), np.array([push, 0.0, 0.0]), tip[:2], 1.0)
+
+    assert known.knows(contact(0.038, 1.0))
+    assert known.knows(contact(0.044, 1.0))
+    assert not known.knows(contact(0.050, 1.0))
+    assert not known.knows(contact(0.038, -1.0))
+    assert not known.with_obstacle((0.1, 0.0), 0.012).knows(contact(0.1, 1.0))

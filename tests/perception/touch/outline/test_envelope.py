@@ -1,0 +1,39 @@
+import numpy as np
+import pytest
+
+from glotouch_bt.perception.touch import Candidate, Contact, Contour
+from glotouch_bt.perception.touch.outline.envelope import envelope
+
+
+def _candidate(points: np.ndarray) -> Candidate:
+    contacts = tuple(
+        Contact(0.0, np.array([*p, 0.0]), np.array([1.0, 0, 0]), np.array([-1.0, 0, 0]), p, 1.0) for p in points
+    )
+    outline = Contour("round", points.mean(axis=0), (0.01, 0.01), 0.0, 0.0, np.zeros(len(points)))
+    return Candidate(0, outline, 0.05, 1.0, contacts)
+
+
+@pytest.mark.parametrize("yaw_deg", [-80.0, -30.0, 0.0, 17.0, 60.0])
+def test_a_rectangle_is_its_own_envelope(yaw_deg: float) -> None:
+    yaw = np.deg2rad(yaw_deg)
+    local = np.array([[x, y] for x in np.linspace(-0.05, 0.05, 9) for y in (-0.02, 0.02)])
+    c, s = np.cos(yaw), np.sin(yaw)
+    found = envelope(_candidate(local @ np.array([[c, s], [-s, c]]) + [0.03, -0.07]))
+    assert found.kind == "box"
+    assert found.size_m == pytest.approx((0.10, 0.04), abs=1e-9)
+    assert found.centre_K_m == pytest.approx([0.03, -0.07], abs=1e-9)
+    assert np.cos(2 * (found.yaw_rad - yaw)) == pytest.approx(1.0)
+
+
+def test_a_circle_is_its_own_envelope() -> None:
+    a = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    found = envelope(_candidate(0.03 * np.stack([np.cos(a), np.sin(a)], axis=1)))
+    assert found.kind == "round"
+    assert found.size_m[0] == pytest.approx(0.06)
+
+
+def test_everything_lies_inside() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(30):
+        points = rng.normal(0.0, 0.02, (9, 2)) * [1.0, rng.uniform(0.3, 1.0)]
+        assert (envelope(_candidate(points)).residuals_m <= 1e-12).all()

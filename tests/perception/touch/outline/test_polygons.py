@@ -1,0 +1,85 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from glotouch_bt.perception.touch.outline.polygons import (
+    area_and_centroid,
+    convex_hull,
+    minimum_rectangle,
+    polygon_distance,
+    shrunk_convex,
+    star_hull,
+)
+from glotouch_bt.robot import ParamError
+
+CORNERS = np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 2.0], [2.0, 2.0], [2.0, 5.0], [0.0, 5.0]])  # an L
+
+
+def turned(points, angle, shift):
+    c, s = np.cos(angle), np.sin(angle)
+    return points @ np.array([[c, s], [-s, c]]) + shift
+
+
+@given(st.floats(-3, 3), st.floats(-5, 5), st.floats(-5, 5))
+def test_area_and_centroid_of_an_l(angle, x, y):
+    """Two rectangles: 6 x 2 about (3, 1) and 2 x 3 about (1, 3.5)."""
+    area, centroid = area_and_centroid(turned(CORNERS, angle, [x, y]))
+    want = turned(np.array([(12 * 3 + 6 * 1) / 18, (12 * 1 + 6 * 3.5) / 18]), angle, [x, y])
+    assert area == pytest.approx(18)
+    np.testing.assert_allclose(centroid, want, atol=1e-9)
+
+
+@given(st.floats(-3, 3), st.floats(0.3, 4), st.floats(0.3, 4))
+def test_least_rectangle_of_a_rectangle(angle, a, b):
+    centre, size, yaw = minimum_rectangle(turned(np.array([[a, b], [-a, b], [-a, -b], [a, -b]]), angle, [1, 2]))
+    np.testing.assert_allclose(centre, [1, 2], atol=1e-9)
+    np.testing.assert_allclose(size, sorted([2 * a, 2 * b], reverse=True))
+    assert -np.pi / 2 <= yaw < np.pi / 2
+    if abs(a - b) > 1e-3:
+        assert abs(np.cos(yaw - angle)) == pytest.approx(1.0 if a > b else 0.0, abs=1e-6)
+
+
+@given(st.integers(0, 10_000), st.floats(0.01, 0.2))
+def test_shrinking_undoes_growing(seed, radius):
+    """The support function of what is left is that of the points; the disc is a polygon of 256 sides."""
+    points = np.random.default_rng(seed).normal(0, 1, (12, 2))
+    a = np.linspace(0, 2 * np.pi, 256, endpoint=False)
+    ring = np.c_[np.cos(a), np.sin(a)]
+    grown = convex_hull((points[:, None] + radius * ring).reshape(-1, 2))
+    left = shrunk_convex(grown, radius)
+    np.testing.assert_allclose((left @ ring.T).max(0), (points @ ring.T).max(0), atol=1e-3 * radius + 1e-9)
+
+
+def test_what_is_too_small_shrinks_to_its_centroid():
+    assert shrunk_convex(np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]), 0.6).shape == (1, 2)
+
+
+def test_distance_of_an_l():
+    """Against a dense outline, and rectangles for the sign."""
+    dense = np.concatenate(
+        [a + np.linspace(0, 1, 2001)[:, None] * (b - a) for a, b in zip(CORNERS, np.roll(CORNERS, -1, 0), strict=True)]
+    )
+    points = np.random.default_rng(0).uniform(-1, 7, (300, 2))
+    got = polygon_distance(CORNERS, points)
+    np.testing.assert_allclose(np.abs(got), np.linalg.norm(points[:, None] - dense, axis=2).min(1), atol=2e-3)
+    x, y = points.T
+    np.testing.assert_array_equal(got < 0, (x > 0) & (y > 0) & (((x < 6) & (y < 2)) | ((x < 2) & (y < 5))))
+
+
+def test_no_area_no_hull():
+    with pytest.raises(ParamError):
+        convex_hull(np.zeros((5, 2)))
+
+
+@given(st.integers(0, 10_000))
+def test_the_hull_of_a_star_is_the_hull_of_its_points(seed):
+    """Against Qhull, for random distances along evenly spaced rays."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(8, 80))
+    bearing = np.linspace(-np.pi, np.pi, n, endpoint=False)
+    star = rng.uniform(0.02, 0.05, n)[:, None] * np.c_[np.cos(bearing), np.sin(bearing)]
+    got, want = star[star_hull(star)], convex_hull(star)
+    assert len(got) == len(want)
+    first = int(np.argmin(np.linalg.norm(want - got[0], axis=1)))
+    np.testing.assert_array_equal(got, np.roll(want, -first, axis=0))

@@ -1,0 +1,60 @@
+import numpy as np
+import pytest
+
+from glotouch_bt.perception.touch import patch_statistics, relative_nonplanarity
+
+ROWS, COLS = np.meshgrid(np.arange(35.0), np.arange(20.0), indexing="ij")
+
+
+def test_any_plane_has_no_nonplanarity():
+    for slope in ((0, 0), (1e-6, 2e-6), (-3e-6, 1e-6)):
+        depth = 4e-4 + slope[0] * ROWS + slope[1] * COLS
+        stats = patch_statistics(depth)
+        assert stats.valid
+        assert stats.rho == pytest.approx(0.0, abs=1e-9)
+        assert stats.area_fraction == stats.valid_fraction == 1.0
+        assert stats.patches == 1
+
+
+def test_sphere_has_its_closed_form():
+    """Paraboloid cap d0 (1 - r^2/R^2) on its disc: depth is uniform on [0, d0], so the plane is its mean d0/2, the RMS
+    d0/sqrt(12) and the 90th percentile 0.9 d0; rho = 0.3208."""
+    y, x = np.meshgrid(np.linspace(-1, 1, 401), np.linspace(-1, 1, 401), indexing="ij")
+    depth = 1e-3 * (1 - x**2 - y**2)
+    assert relative_nonplanarity(depth, depth > 0) == pytest.approx(1 / np.sqrt(12) / 0.9, rel=0.01)
+    coarse = 1e-3 * (1 - ((ROWS - 17) / 12) ** 2 - ((COLS - 9.5) / 9) ** 2)
+    assert patch_statistics(np.maximum(coarse, 0), threshold_m=1e-6).rho == pytest.approx(0.3208, rel=0.05)
+
+
+def test_cylinder_has_its_closed_form():
+    """d0 (1 - t^2), t uniform in [-1, 1]: variance 4/45 d0^2, 90th percentile 0.99 d0."""
+    t = np.linspace(-1, 1, 2001)
+    depth = np.tile(1e-3 * (1 - t**2), (35, 1))
+    want = np.sqrt(4 / 45) / 0.99
+    assert relative_nonplanarity(depth, depth >= 0) == pytest.approx(want, rel=0.01)
+
+
+def test_small_specks_and_dead_taxels():
+    depth = np.zeros((35, 20))
+    depth[5:15, 3:13] = 3e-4
+    depth[25, 15] = 5e-4  # a speck
+    depth[10, :] = np.nan  # a dead row across the patch does not cut it in two
+    stats = patch_statistics(depth)
+    assert stats.patches == 1
+    assert stats.mask.sum() == 90
+    assert stats.valid_fraction == pytest.approx(90 / 91)
+    assert stats.area_fraction == pytest.approx(90 / (34 * 20))
+    assert stats.depth_q90_m == pytest.approx(3e-4)
+    two = np.zeros((35, 20))
+    two[2:8, 2:8] = two[20:30, 2:12] = 3e-4
+    assert patch_statistics(two).patches == 2
+
+
+@pytest.mark.parametrize("depth", [np.zeros((35, 20)), np.full((35, 20), np.nan)])
+def test_no_contact(depth):
+    stats = patch_statistics(depth)
+    assert not stats.valid
+    assert np.isnan(stats.rho)
+    assert stats.area_fraction == stats.valid_fraction == stats.depth_q90_m == 0.0
+    noise = np.random.default_rng(0).normal(0, 2e-5, (35, 20))
+    assert not patch_statistics(noise).valid

@@ -1,0 +1,338 @@
+"""Supervision below the tree: every guard trips on what it is for, within one period, and on nothing else."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from glotouch_bt.robot import (
+    HOLD,
+    BackendError,
+    Command,
+    GripperTarget,
+    GuardTripped,
+    JointSetpoint,
+    Observation,
+    ParamError,
+    Pose,
+    SafetyStop,
+    StaleReading,
+)
+from glotouch_bt.robot.fake import FakeRobot, forward
+from glotouch_bt.robot.supervision.limits import GUARDS, SupervisionLimits
+from glotouch_bt.robot.supervision.supervisor import RECORDED
+from tests.robot.supervision.supervised import (
+    Device,
+    Spoil,
+    all_of,
+    jaws,
+    setpoint,
+    spin,
+    stamps,
+    supervised,
+    with_part,
+)
+
+FATAL: list[tuple[str, Spoil]] = [
+    ("not_finite", all_of("wrench_S", 2, np.nan)),
+    ("not_finite", all_of("q", 3, np.inf)),
+    ("not_finite", jaws(aperture_m=float("nan"))),
+    ("stamps", stamps(lambda s: s[0] + 0.0 * s)),
+    ("stamps", stamps(lambda s: s - 1.0)),
+    ("joint_range", all_of("q", 1, 2.9)),
+    ("joint_speed", all_of("dq", 6, 3.5)),
+    ("out_of_reach", all_of("position_B_P", 0, 7.0)),
+    ("out_of_reach", all_of("quat_B_P", 2, 0.9)),
+    ("wrench", all_of("wrench_S", 0, 31.0)),
+    ("wrench", all_of("wrench_S", 4, -10.5)),
+    ("following", all_of("position_B_P", 2, 0.2)),
+    ("gripper_stale", jaws(stamp_s=-5.0)),
+]
+
+
+@pytest.mark.parametrize(("guard", "spoil"), FATAL, ids=lambda v: v if isinstance(v, str) else "")
+def test_each_guard_holds_the_arm_within_the_period_and_is_on_record(guard: str, spoil: Spoil) -> None:
+    device = Device(spoil, since=20)
+    robot, found = supervised(device)
+    if guard == "following":
+        robot.cycle(setpoint(device.description.home_q))
+    with pytest.raises(GuardTripped) as trip:
+        spin(robot, 30)
+    assert trip.value.guard == guard
+    assert device.cycles <= 21 + (6 if "finite" in guard else 0), "not in the period in which it was wrong"
+    assert device.holds == 1
+    assert found[-1].guard == guard
+    assert found[-1].fatal
+    assert guard in GUARDS
+    assert np.isnan(trip.value.value) or trip.value.value != trip.value.limit
+    assert str(trip.value.stamp_s)[:4] in str(trip.value) or trip.value.stamp_s > 0
+    # from now on it only holds, and raises the same again
+    commands = len(device.commands)
+    with pytest.raises(GuardTripped) as again:
+        robot.cycle(setpoint(np.zeros(7)))
+    assert again.value is trip.value
+    assert device.commands[commands:] == [HOLD]
+
+
+@pytest.mark.parametrize("part", ["q", "dq", "wrench_S", "position_B_P", "quat_B_P"])
+def test_single_samples_that_are_no_numbers_are_dropped(part: str) -> None:
+    device = Device(with_part(part, 4, 0, np.nan), since=5, until=6)
+    robot, found = supervised(device)
+    for k in range(20):
+        seen = robot.cycle(HOLD)
+        assert len(seen.stamp_s) == (9 if k == 5 else 10)
+        assert all(np.isfinite(getattr(seen, p)).all() for p in ("q", "dq", "wrench_S", "position_B_P", "quat_B_P"))
+    assert [f.guard for f in found] == ["not_finite"]
+    assert not found[0].fatal
+    assert part in found[0].what
+
+
+def test_a_sample_out_of_order_is_dropped() -> None:
+    def swap(s: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        s[[3, 4]] = s[[4, 3]]
+        return s
+
+    robot, found = supervised(Device(stamps(swap), since=5, until=6))
+    blocks = [robot.cycle(HOLD) for _ in range(10)]
+    s = np.concatenate([b.stamp_s for b in blocks])
+    assert (np.diff(s) > 0).all()
+    assert {f.guard for f in found} == {"stamps"}
+
+
+def test_patience_ends() -> None:
+    robot, found = supervised(Device(with_part("wrench_S", 0, 0, np.nan), since=5))
+    with pytest.raises(GuardTripped) as trip:
+        spin(robot, 50)
+    assert trip.value.guard == "not_finite"
+    assert sum(not f.fatal for f in found) == SupervisionLimits().tolerated
+
+
+def test_rare_findings_never_end_patience_and_do_not_flood_the_record() -> None:
+    class Rare(Device):
+        def cycle(self, command: Command) -> Observation:
+            self._since = self._until = -1
+            if self.cycles % 50 == 7:
+                self._since, self._until = 0, 10**9
+            return super().cycle(command)
+
+    robot, found = supervised(Rare(with_part("dq", 9, 2, np.nan)))
+    for _ in range(50 * (RECORDED + 10)):
+        robot.cycle(HOLD)
+    assert robot.counts == {"not_finite": RECORDED + 10}
+    assert len(found) == RECORDED
+
+
+def test_an_arm_that_moves_while_it_is_held_is_noticed() -> None:
+    def drift(seen: Observation) -> Observation:
+        return dataclasses.replace(
+            seen, position_B_P=seen.position_B_P + [[0.0, 0.002, 0.0]] * np.maximum(seen.stamp_s[:, None] - 0.2, 0.0)
+        )
+
+    device = Device(drift)
+    robot, _ = supervised(device)
+    robot.cycle(setpoint(device.description.home_q))
+    with pytest.raises(GuardTripped, match="told to stay") as trip:
+        spin(robot, 1000)
+    limit = SupervisionLimits().following_m
+    assert limit < trip.value.value < limit * 1.02
+
+
+@pytest.mark.parametrize("force_N", [0.0, 7.0, 9.0, -20.0])
+def test_an_arm_that_strays_trips_sooner_while_it_presses(force_N: float) -> None:
+    """What presses goes with how far the hand strays: half as far is allowed then."""
+
+    def astray(seen: Observation) -> Observation:
+        away = [[0.002, 0.0, 0.0]] * np.maximum(seen.stamp_s[:, None] - 0.2, 0.0)
+        wrench = seen.wrench_S + force_N * np.eye(6)[0]
+        return dataclasses.replace(seen, position_B_P=seen.position_B_P + away, wrench_S=wrench)
+
+    device = Device(astray)
+    robot, found = supervised(device)
+    robot.cycle(setpoint(device.description.home_q))
+    with pytest.raises(GuardTripped) as trip:
+        spin(robot, 1000)
+    rules = SupervisionLimits()
+    touches = abs(force_N) > rules.touching_N
+    limit = rules.touching_m if touches else rules.following_m
+    assert trip.value.guard == "following"
+    assert limit < trip.value.value < limit * 1.02
+    assert ("N press" in found[-1].what) is touches
+
+
+def test_an_arm_that_gives_as_a_servo_does_may_press() -> None:
+    """0.15 mm a newton, what the simulated servo gives at most, up to 12 N."""
+
+    def gives(seen: Observation) -> Observation:
+        force = np.minimum(10.0 * np.maximum(seen.stamp_s - 0.2, 0.0), 12.0)
+        wrench = seen.wrench_S.copy()
+        wrench[:, 1] = force
+        position = seen.position_B_P.copy()
+        position[:, 1] += 1.5e-4 * force
+        return dataclasses.replace(seen, position_B_P=position, wrench_S=wrench)
+
+    device = Device(gives)
+    robot, found = supervised(device)
+    robot.cycle(setpoint(device.description.home_q))
+    spin(robot, 200)
+    assert not [f for f in found if f.fatal]
+
+
+def test_an_arm_that_lags_in_motion_is_let_go_on() -> None:
+    """A servo's delay of 50 ms at half of a joint's speed is no following error."""
+    device = Device()
+    queue: list[Command] = [HOLD] * 5
+
+    class Lagging(Device):
+        def cycle(self, command: Command) -> Observation:
+            queue.append(command)
+            return super().cycle(queue.pop(0))
+
+    device = Lagging()
+    robot, found = supervised(device)
+    home = np.array(device.description.home_q)
+    for k in range(100):
+        robot.cycle(setpoint(home + 0.0125 * k * np.eye(7)[6], 1.25 * np.eye(7)[6]))
+    assert found == []
+
+
+HOME = np.array(FakeRobot().description.home_q)
+BAD_COMMANDS = {
+    "a number that is none": setpoint(HOME + np.nan),
+    "a joint out of range": setpoint(np.full(7, 2.9)),
+    "a jump": setpoint(HOME + 0.5),
+    "a velocity": setpoint(HOME, np.full(7, 9.0)),
+    "the wrong shape": Command(JointSetpoint(np.zeros(6), np.zeros(6), np.zeros(6), Pose(np.zeros(3)))),
+    "the aperture": Command(gripper=GripperTarget(0.2, 0.1, 10.0)),
+    "the jaws' speed": Command(gripper=GripperTarget(0.05, float("nan"), 10.0)),
+    "the jaws' force": Command(gripper=GripperTarget(0.05, 0.1, 1e4)),
+    "a number of the aperture": Command(gripper=GripperTarget(float("inf"), 0.1, 10.0)),
+}
+
+
+@pytest.mark.parametrize("command", BAD_COMMANDS.values(), ids=BAD_COMMANDS.keys())
+def test_what_must_not_be_sent_is_not_sent(command: Command) -> None:
+    device = Device()
+    robot, found = supervised(device)
+    robot.cycle(setpoint(HOME))
+    with pytest.raises(GuardTripped) as trip:
+        robot.cycle(command)
+    assert trip.value.guard == "command"
+    assert all(c is not command for c in device.commands)
+    assert device.holds == 1
+    assert found[-1].guard == "command"
+
+
+def test_a_tool_that_would_be_too_fast_is_not_sent() -> None:
+    """Every joint within its speed, together too fast for the tool: P by differences of the forward kinematics."""
+    device = Device()
+    robot, _ = supervised(device)
+    robot.cycle(setpoint(HOME))
+    step = 0.02 * np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    speed = np.linalg.norm(
+        forward(device.description, HOME + step).position_m - forward(device.description, HOME).position_m
+    )
+    assert speed / 0.01 > device.limits.tcp_speed_m_s
+    with pytest.raises(GuardTripped, match="m/s"):
+        robot.cycle(setpoint(HOME + step, step / 0.01))
+
+
+def test_after_a_hold_a_setpoint_begins_where_the_arm_stands() -> None:
+    device = Device()
+    robot, found = supervised(device)
+    for k in range(5):
+        robot.cycle(setpoint(HOME + 0.0002 * k, np.full(7, 0.01)))
+    spin(robot, 5)
+    robot.cycle(setpoint(device.observe().q[-1] + 0.01))
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    ("error", "guard"),
+    [
+        (BackendError("cable"), "device"),
+        (StaleReading("wrench", 1.0, 0.2), "device"),
+        (SafetyStop("force_N", 33.0, 30.0, 0.1), "wrench"),
+    ],
+)
+def test_what_the_device_raises_is_on_record_and_raised(error: BackendError, guard: str) -> None:
+    class Lost(Device):
+        def cycle(self, command: Command) -> Observation:
+            raise error
+
+    device = Lost()
+    robot, found = supervised(device)
+    with pytest.raises(type(error)) as raised:
+        robot.cycle(HOLD)
+    assert raised.value is error
+    assert [f.guard for f in found] == [guard]
+    assert device.holds >= 1
+    with pytest.raises(type(error)):
+        robot.cycle(HOLD)
+
+
+@settings(max_examples=10, deadline=None, suppress_health_check=list(HealthCheck))
+@given(seed=st.integers(0, 2**32 - 1), noise=st.floats(0.0, 0.25))
+def test_what_is_in_order_passes_untouched(seed: int, noise: float) -> None:
+    """Random walks within half of the limits, with noise: the very same blocks come out, and nothing is found."""
+    rng = np.random.default_rng(seed)
+    device = Device(noise_N=noise)
+    robot, found = supervised(device)
+    q = HOME.copy()
+    speed = np.zeros(7)
+    for k in range(300):
+        speed = np.clip(speed + 0.02 * rng.standard_normal(7), -0.05, 0.05)
+        q = q + 0.01 * speed
+        jaws = GripperTarget(float(rng.uniform(0, 0.085)), 0.1, 10.0) if k % 40 == 0 else None
+        command = HOLD if k % 50 > 40 else dataclasses.replace(setpoint(q, speed), gripper=jaws, tactile=k % 2 == 0)
+        if k % 50 > 40:
+            speed[:] = 0.0
+        before = device.cycles
+        seen = robot.cycle(command)
+        assert device.cycles == before + 1
+        assert len(seen.stamp_s) == 10
+    assert found == []
+
+
+def test_it_is_a_robot_like_the_one_it_watches() -> None:
+    device = Device()
+    robot, _ = supervised(device)
+    assert (robot.description, robot.limits, robot.period_s) == (device.description, device.limits, device.period_s)
+    assert robot.inner is device
+    assert robot.snapshot() is None
+    with robot:
+        assert robot.observe() is device.observe()
+    assert device.holds == 1
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
+def test_limits_are_checked_at_birth(value: float) -> None:
+    with pytest.raises(ParamError, match="following_rad"):
+        SupervisionLimits(following_rad=value)
+
+
+def test_a_guard_above_holds_the_arm_and_is_on_record_once() -> None:
+    robot, found = supervised(Device())
+    error = GuardTripped("following", "off", 4e-3, 3e-3, 0.2)
+    robot.heed(error)
+    robot.heed(error)
+    assert [(f.guard, f.what, f.value, f.limit, f.stamp_s, f.fatal) for f in found] == [
+        ("following", "off", 4e-3, 3e-3, 0.2, True)
+    ]
+    assert robot.counts == {"following": 1}
+    with pytest.raises(GuardTripped) as again:
+        robot.cycle(HOLD)
+    assert again.value is error
+
+
+def test_a_guard_of_its_own_is_not_on_record_again_when_it_is_handed_back() -> None:
+    robot, found = supervised(Device(with_part("q", slice(None), slice(None), np.nan), since=5))
+    with pytest.raises(GuardTripped) as trip:
+        spin(robot, 30)
+    count = len(found)
+    robot.heed(trip.value)
+    assert len(found) == count

@@ -1,0 +1,125 @@
+"""Supervision of time: samples that are missing, cycles that are late, and how long nothing was seen."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from glotouch_bt.robot import HOLD, Command, GuardTripped, Observation
+from tests.robot.supervision.supervised import Device, Spoil, setpoint, spin, supervised
+
+
+def missing(count: int) -> Spoil:
+    def spoil(seen: Observation) -> Observation:
+        names = ("stamp_s", "q", "dq", "position_B_P", "quat_B_P", "wrench_S")
+        return dataclasses.replace(seen, **{n: getattr(seen, n)[: len(seen.stamp_s) - count] for n in names})
+
+    return spoil
+
+
+def test_missing_samples_are_put_on_record_and_then_end_it() -> None:
+    robot, found = supervised(Device(missing(7)))
+    spin(robot, 30)
+    assert found == [], "a device that is polled gives seven to nine of ten, or worse"
+    robot, found = supervised(Device(missing(8), since=5, until=7))
+    spin(robot, 30)
+    assert {f.guard for f in found} == {"samples_missing", "overrun"}, "what came after them, came late"
+    robot, found = supervised(Device(missing(8), since=5))
+    with pytest.raises(GuardTripped, match="samples_missing"):
+        spin(robot, 30)
+
+
+class Late(Device):
+    """Its clock runs on: so many extra periods pass in one cycle, and their samples are lost or come with it."""
+
+    def __init__(self, extra: int, *at: int, lost: bool) -> None:
+        self._extra, self._at, self._lost = extra, at, lost
+        super().__init__()
+
+    def cycle(self, command: Command) -> Observation:
+        blocks = []
+        if self.cycles in self._at:
+            blocks = [super(Late, self).cycle(HOLD) for _ in range(self._extra)]
+        newest = super().cycle(command)
+        if self._lost:
+            return newest
+        names = ("stamp_s", "q", "dq", "position_B_P", "quat_B_P", "wrench_S")
+        parts = {n: np.concatenate([getattr(b, n) for b in (*blocks, newest)]) for n in names}
+        return dataclasses.replace(newest, **parts)
+
+
+def move(k: int, home: Any) -> Command:
+    return setpoint(np.array(home) + 0.001 * k * np.eye(7)[6], 0.1 * np.eye(7)[6])
+
+
+@pytest.mark.parametrize("lost", [True, False])
+def test_a_gap_ends_a_motion_but_not_a_rest(lost: bool) -> None:
+    device = Late(40, 5, lost=lost)
+    robot, found = supervised(device)
+    spin(robot, 20)
+    assert not any(f.fatal for f in found)
+    assert found[0].guard == "overrun"
+    device = Late(40, 5, lost=lost)
+    robot, _ = supervised(device)
+    for k in range(5):
+        robot.cycle(move(k + 1, device.description.home_q))
+    with pytest.raises(GuardTripped, match="overrun"):
+        robot.cycle(move(6, device.description.home_q))
+
+
+@pytest.mark.parametrize(("extra", "times", "ends"), [(5, 4, False), (20, 1, False), (20, 2, True)])
+def test_blind_gaps_in_a_motion_end_it_when_a_quarter_of_a_second_was_not_seen(
+    extra: int, times: int, ends: bool
+) -> None:
+    """The device holds in each of them."""
+    device = Late(extra, *(5 + (extra + 3) * i for i in range(times)), lost=True)
+    robot, found = supervised(device)
+    guards = []
+    for k in range(5 + 3 * times):
+        try:
+            robot.cycle(move(k + 1, device.description.home_q))
+        except GuardTripped as e:
+            guards.append(e.guard)
+            break
+    assert guards == ["samples_missing"] * ends
+    blind = [f for f in found if f.guard == "samples_missing"]
+    assert len(blind) == times
+    assert all(f.value > f.limit > 1.0 for f in blind), "a value and its limit are of one kind"
+
+
+def test_a_long_thought_before_a_motion_is_no_overrun() -> None:
+    device = Late(40, 5, lost=False)
+    robot, found = supervised(device)
+    spin(robot, 5)
+    for k in range(5):
+        robot.cycle(move(k + 1, device.description.home_q))
+    assert [f.fatal for f in found] == [False]
+
+
+@pytest.mark.parametrize(("extra", "lost"), [(4, True), (7, False)])
+def test_a_late_cycle_now_and_then_is_put_on_record(extra: int, lost: bool) -> None:
+    device = Late(extra, 5, lost=lost)
+    robot, found = supervised(device)
+    for k in range(5):
+        robot.cycle(move(k + 1, device.description.home_q))
+    robot.cycle(move(6, device.description.home_q))
+    assert {f.guard for f in found} == {"overrun"} | ({"samples_missing"} if lost else set())
+
+
+def test_how_many_samples_a_period_has_is_learnt_from_the_first_block_of_several() -> None:
+    class Single(Device):
+        """As a driver that answers with one sample when it is opened."""
+
+        def observe(self) -> Observation:
+            seen = super().observe()
+            names = ("stamp_s", "q", "dq", "position_B_P", "quat_B_P", "wrench_S")
+            return seen if self.cycles else dataclasses.replace(seen, **{n: getattr(seen, n)[-1:] for n in names})
+
+    robot, found = supervised(Single(missing(8), since=5))
+    spin(robot, 5)
+    assert found == []
+    with pytest.raises(GuardTripped, match="8 of 10 samples are missing"):
+        spin(robot, 10)

@@ -1,0 +1,34 @@
+"""Intended contact ends with its block, however that ends."""
+
+from __future__ import annotations
+
+import pytest
+
+from glotouch_bt.robot import UnknownName
+from glotouch_skills.common.hand.clearance_rules import may_touch
+
+
+def test_taken_back_in_every_case(bench) -> None:
+    arm = bench().arm
+    with may_touch(arm, "tool", "floor", "holder"):
+        assert ("tip", "floor") in arm.scene._allowed
+        assert ("shaft", "holder") in arm.scene._allowed
+    assert not arm.scene._allowed
+    with pytest.raises(ZeroDivisionError), may_touch(arm, "hand", "probe"):
+        raise ZeroDivisionError
+    assert not arm.scene._allowed
+
+    def body():
+        with may_touch(arm, "hand", "probe"):
+            yield
+
+    generator = body()
+    next(generator)
+    assert arm.scene._allowed
+    generator.close()
+    assert not arm.scene._allowed
+
+
+def test_unknown_names(bench) -> None:
+    with pytest.raises(UnknownName), may_touch(bench().arm, "foot", "floor"):
+        pass

@@ -1,0 +1,115 @@
+"""The guarded moves that skills share: rest, both rules, inertia, and what a contact says of the push."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from glotouch_bt.perception.touch import GuardParams
+from glotouch_bt.skill import SkillFailed
+from glotouch_skills.common.probe.guarded_probe import LONGEST_REST_S, REST_S, Prober
+
+START = np.array([-0.05, 0.1, 0.06])
+
+
+@pytest.fixture
+def make(bench, things, tool):
+    def make_one(thing=None, **keywords):
+        b = bench(things=[thing or things.floor()], **keywords)
+        b.arm.scene.hold_tool(True)
+        b.go(b.arm.joints(b.arm.kinematics.ik(tool.pose_B_P(b.world, START), b.arm.q)))
+        return b, Prober(b.context, tool, GuardParams())
+
+    return make_one
+
+
+def plate(force_N, height_m):
+    """A force straight up as soon as the ball's centre is below a height, however deep."""
+
+    def force(ball, radius):
+        out = np.zeros_like(ball)
+        out[:, 2] = np.where(ball[:, 2] < height_m, force_N, 0.0)
+        return out
+
+    return force
+
+
+@pytest.mark.parametrize("way", [[0, 0, 0.04], [0, 0, -0.04], [0.06, 0, 0], [0, -0.06, 0.0], [0.03, 0, 0.03]])
+@pytest.mark.parametrize("any_direction", [False, True])
+def test_starts_and_stops_are_no_contact(make, way, any_direction) -> None:
+    b, prober = make()
+    probed = b.go(prober.move(START + way, 0.05, any_direction=any_direction))
+    assert probed.contact is None
+    np.testing.assert_allclose(probed.path_K_m[-1], START + way, atol=1e-5)
+
+
+def test_a_gentle_touch_from_above_is_found(make) -> None:
+    """0.25 N: less than the hand's inertia along the probe, 0.47 N."""
+    b, prober = make(plate(0.25, 0.04))
+    probed = b.go(prober.move(START - [0, 0, 0.04], 0.03))
+    assert probed.contact is not None
+    assert probed.contact.tip_K_m[2] == pytest.approx(0.04, abs=6e-4)
+    assert not probed.contact.pushed_K_m.any()
+
+
+def test_a_hard_contact_ends_the_move_and_says_so(make) -> None:
+    b, prober = make(plate(24.0, 0.04))
+    with pytest.raises(SkillFailed) as failed:
+        b.go(prober.move(START - [0, 0, 0.04], 0.03))
+    reason = failed.value.reason
+    assert reason.code == "hard_contact"
+    assert reason.evidence["quantity"] == "residual_force_N"
+    assert reason.evidence["value"] == pytest.approx(24.0, abs=0.5)
+    b.go(b.arm.hold(0.05))
+    assert np.abs(b.context.observation.dq).max() < 1e-6
+
+
+def test_a_rest_lasts_until_the_wrench_is_steady_and_no_longer_than_allowed(make) -> None:
+    b, prober = make()
+    still = b.context.observation.now_s
+    b.go(prober.rest())
+    assert b.context.observation.now_s - still == pytest.approx(REST_S, abs=0.021)
+    # Nothing happened since: the same rest stands, and costs nothing.
+    before, first = b.context.observation.now_s, b.go(b.arm.hold(0.0))
+    assert first == []
+    again = prober.rest()
+    with pytest.raises(StopIteration):
+        next(again)
+    assert b.context.observation.now_s == before
+    # A force that swings is waited for; one that goes on swinging is not waited for without end.
+    for ends_s, longest_s in ((before + 0.3, 0.3 + REST_S + 0.05), (np.inf, LONGEST_REST_S)):
+        b, prober = make(swinging(ends_s))
+        b.go(b.arm.hold(max(before - b.context.observation.now_s, 0.01)))
+        begin = b.context.observation.now_s
+        b.go(prober.rest())
+        assert b.context.observation.now_s - begin <= longest_s + 1e-9
+        assert b.context.observation.now_s - begin > REST_S + 0.05
+
+
+def swinging(ends_s):
+    """2 N up and down at 4 Hz, by the count of calls (one a period)."""
+    calls = [0]
+
+    def force(ball, radius):
+        calls[0] += 1
+        t = calls[0] * 0.01
+        return np.tile([0.0, 0.0, 2.0 * np.sin(25.0 * t) * (t < ends_s)], (len(ball), 1))
+
+    return force
+
+
+def test_the_latency_is_the_tools(make, tool) -> None:
+    b, _ = make()
+    late = dataclasses.replace(tool, latency_s=0.008)
+    assert Prober(b.context, late, GuardParams())._guard.latency_s == 0.008
+
+
+def test_a_post_that_does_not_yield_is_pushed_at_most_by_the_overrun(make, things, tool) -> None:
+    b, prober = make(things.post((0.03, 0.1), 0.03, 0.2))
+    probed = b.go(prober.move(START + np.array([0.08, 0, 0]), 0.04))
+    contact = probed.contact
+    way = probed.path_K_m[-1, :2] - contact.tip_K_m[:2]
+    assert 0 < np.linalg.norm(contact.pushed_K_m) < np.linalg.norm(way) < 2e-3
+    assert contact.pushed_K_m @ contact.reaction_K[:2] < 0

@@ -1,0 +1,31 @@
+"""search_anew: what is kept of a search."""
+
+from __future__ import annotations
+
+import numpy as np
+from py_trees.common import Status
+
+from glotouch_bt.perception.search import SearchMap
+from glotouch_bt.perception.touch.outline import envelope
+from glotouch_skills.explore.search_anew import SearchAnew
+
+
+def test_objects_are_kept_and_ways_forgotten(bench, found) -> None:
+    thing = found.round((0.05, 0.0), 0.02)
+    before = SearchMap.blank((0.13, 0.18), 3).with_exclusion(envelope(thing), 0.01)
+    before = before.with_path(np.array([[-0.1, 0.0], [0.0, 0.1]])).with_dropped((0.1, 0.1))
+    b = bench()
+    skill = b.make(SearchAnew, inputs={"before": before})
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    after = skill.map
+    assert (after.expected, after.found, after.exclusions) == (3, 1, before.exclusions)
+    assert (len(after.path_K_m), len(after.dropped)) == (0, 0)
+    assert after.covered_fraction(0.03) < 0.5 * before.covered_fraction(0.03)
+
+
+def test_nothing_to_forget(bench) -> None:
+    b = bench()
+    skill = b.make(SearchAnew)
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "nothing_searched")

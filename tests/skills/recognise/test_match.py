@@ -1,0 +1,93 @@
+"""match: synthetic squeezes of known solids, recognised or not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from py_trees.common import Status
+
+from glotouch_bt.perception.recognition.synthetic.acquisition import IDEAL, acquire
+from glotouch_bt.robot import BadInput
+from glotouch_bt.robot.scene.meshes import load_mesh
+from glotouch_skills.recognise.match import Match, load_target
+
+POSE = (0.03, -0.02, 0.4)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory):
+    path = tmp_path_factory.mktemp("stl")
+    trimesh.creation.box((0.060, 0.036, 0.060)).export(path / "block.stl")
+    trimesh.creation.cylinder(0.026, 0.055, sections=96).export(path / "can.stl")
+    return path
+
+
+@pytest.fixture(scope="module")
+def touchsets(folder, found):
+    """Ideal squeezes of the block (0) and the can (1)."""
+    made = []
+    for i, name in enumerate(("block", "can")):
+        touchset, _ = acquire(load_mesh(folder / f"{name}.stl"), POSE, IDEAL, np.random.default_rng(i), i)
+        contour = touchset.candidate.contour
+        thing = found.round if contour.kind == "round" else found.box
+        size = contour.radius_m if contour.kind == "round" else contour.size_m
+        contacts = thing(tuple(contour.centre_K_m), size).contacts
+        made.append(replace(touchset, candidate=replace(touchset.candidate, contacts=contacts)))
+    return tuple(made)
+
+
+@pytest.fixture
+def make(bench, folder):
+    def make_one(target, touchsets):
+        b = bench()
+        b.context.world = replace(b.world, objects=replace(b.world.objects, folder=folder))
+        return b, b.make(Match, inputs={} if touchsets is None else {"touchsets": touchsets}, target=target)
+
+    return make_one
+
+
+@pytest.mark.parametrize(("target", "index"), [("block", 0), ("can", 1)])
+def test_the_target_is_recognised_and_its_grasp_planned(make, touchsets, target: str, index: int) -> None:
+    b, skill = make(target, touchsets)
+    b.run(skill)
+    assert skill.ranking.best.index == index
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    assert skill.plan.candidate == index
+    assert np.linalg.norm(skill.plan.position_K_m[:2] - POSE[:2]) < 0.03
+    assert not [c for c in b.commands if c.motion is not None]
+
+
+@pytest.mark.parametrize("none", [None, ()])
+def test_no_touch(make, none) -> None:
+    b, skill = make("block", none)
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_touch")
+
+
+def test_not_recognised(make, touchsets) -> None:
+    """Two alike: whichever is best, it is not surely the target. The ranking is written all the same."""
+    twin = replace(touchsets[0], candidate=replace(touchsets[0].candidate, index=1))
+    b, skill = make("block", (touchsets[0], twin))
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "not_recognised")
+    assert len(skill.ranking.matches) == 2
+    assert skill.reason.message.startswith("no candidate is surely block: ")
+
+
+def test_broken_off(make, touchsets) -> None:
+    b, skill = make("block", touchsets)
+    b.run(skill, 1)
+    b.preempt(skill)
+
+
+def test_a_target_is_a_name_or_a_path(folder) -> None:
+    assert load_target("can", folder).digest == load_target(str(folder / "can.stl"), folder / "elsewhere").digest
+    with pytest.raises(BadInput, match="has no spoon"):
+        load_target("spoon", folder)
+    with pytest.raises(BadInput, match="empty name"):
+        load_target("", folder)
+    with pytest.raises(BadInput, match="no such STL file"):
+        load_target("gone.stl", folder)

@@ -1,0 +1,182 @@
+"""touch_next on the fake robot: one closure a call, in order of what tells most, until it is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import trimesh
+from py_trees.blackboard import Blackboard
+from py_trees.common import Status
+
+import glotouch_skills.recognise.touch_next as module
+from glotouch_bt.perception.recognition import Closure, Match, Ranking
+from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
+from glotouch_skills.recognise.touch_next import TouchNext
+
+WIDTH = 0.05
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory):
+    path = tmp_path_factory.mktemp("stl")
+    trimesh.creation.cylinder(0.5 * WIDTH, 0.06, sections=48).export(path / "can.stl")
+    return path
+
+
+class Oracle:
+    """A matcher that knows after `enough` layers on candidate `right`; it values its closures most."""
+
+    def __init__(self, right: int | None, enough: int, evidence: float = 9.0) -> None:
+        self.right, self.enough, self.evidence = right, enough, evidence
+
+    def believe(self, model, touchsets) -> SimpleNamespace:
+        felt = {t.candidate.index: sum(layer.stable for layer in t.layers) for t in touchsets}
+        known = sum(felt.values()) >= self.enough if self.right is None else felt[self.right] >= self.enough
+        n = len(felt)
+        p = {i: (float(i == self.right) if known else 1.0 / (n + 1)) for i in felt}
+        matches = [Match(i, 1.0 - p[i], {}, None, (0, 0, 0), float(felt[i]), p[i]) for i in felt]
+        matches.sort(key=lambda m: m.loss)
+        accepted = known and self.right is not None
+        return SimpleNamespace(
+            params=LikelihoodParams(),
+            touchsets=tuple(touchsets),
+            ranking=Ranking(tuple(matches), 1.0, accepted, (), 1.0 - sum(p.values())),
+        )
+
+    def expected_gain(self, belief, closures) -> np.ndarray:
+        return np.array([0.5 if c.candidate == self.right or self.right is None else 0.1 for c in closures])
+
+
+@pytest.fixture
+def make(bench, found, folder, monkeypatch):
+    def make_one(oracle: Oracle, things=None, grip_width_m=WIDTH, stuff=(), tip_P_m=0.13, **params):
+        b = bench(grip_width_m=grip_width_m, things=stuff, tip_P_m=tip_P_m)
+        b.context.world = replace(b.world, objects=replace(b.world.objects, folder=folder))
+        monkeypatch.setattr(module, "believe", oracle.believe)
+        monkeypatch.setattr(module, "expected_gain", oracle.expected_gain)
+        things = things or (found.round((0.0, -0.08), 0.025), found.round((0.0, 0.08), 0.025, index=1))
+        return b, b.make(TouchNext, inputs={"candidates": things}, target="can", **params)
+
+    return make_one
+
+
+def repeat(b, skill, limit: int = 60) -> int:
+    """As the tree's repeat does; how many passes it took."""
+    for n in range(limit):
+        b.run(skill)
+        assert skill.status is Status.SUCCESS, skill.feedback_message
+        if skill.decided:
+            return n + 1
+    raise AssertionError("never decided")
+
+
+def pads_height(b) -> float:
+    return float(b.world.container.pose_B_K.inverse().apply(b.arm.pose_B_P.position_m)[2])
+
+
+def test_it_touches_where_it_tells_most_and_stops_when_it_knows(make) -> None:
+    b, skill = make(Oracle(right=1, enough=3))
+    assert repeat(b, skill) == 4
+    first, second = skill.touchsets
+    assert (len(first.layers), len(second.layers)) == (0, 3)
+    (sequence,) = second.sequences
+    heights = [layer.height_m for layer in sequence.layers]
+    assert heights == sorted(heights), "one stance, from below upwards"
+    assert [layer.aperture_m for layer in sequence.layers] == pytest.approx([WIDTH] * 3, abs=1e-6)
+    np.testing.assert_allclose(sequence.layers[-1].position_K_m, [0.0, 0.08], atol=1e-4)
+    closures = b.of_kind("closure")
+    assert [c["number"] for c in closures] == [1, 2, 3]
+    assert all(isinstance(c["chosen"], Closure) and c["chosen"].gain_nats == 0.5 for c in closures)
+    (decided,) = b.of_kind("decided")
+    assert (decided["closures"], decided["stances"], decided["candidates"]) == (3, 1, 1)
+    assert [e["touchset"].candidate.index for e in b.of_kind("touchset")] == [1]
+    assert pads_height(b) > 0.13, "the hand is high again"
+    assert not [o for o in b.arm.scene.obstacles if o.startswith("candidate")]
+
+
+def test_none_of_them(make) -> None:
+    """The oracle is sure after one closure that the target is absent: a decision, too, once both have been felt and the
+    likeliest, here the first, as often as it takes to be taken."""
+    b, skill = make(Oracle(right=None, enough=1))
+    assert repeat(b, skill) == 4
+    assert [len(t.layers) for t in skill.touchsets] == [2, 1]
+    assert "none of them" in b.of_kind("decided")[0]["why"]
+
+
+def test_it_ends_when_nothing_can_help(make) -> None:
+    """Gains below the least are not worth a closure; only the likeliest, here the first, gets its evidence."""
+    b, skill = make(Oracle(right=1, enough=3), least_gain_nats=0.6)
+    assert repeat(b, skill) == 3
+    assert [len(t.layers) for t in skill.touchsets] == [2, 0]
+    assert "no closure" in b.of_kind("decided")[0]["why"]
+
+
+def test_sure_but_with_too_little_evidence_is_touched_again(make, monkeypatch) -> None:
+    """Known from the first closure on, but taken only with evidence: the candidate itself is touched on."""
+    oracle = Oracle(right=1, enough=1)
+    plain = oracle.believe
+
+    def believe(model, touchsets):
+        belief = plain(model, touchsets)
+        best = belief.ranking.matches[0]
+        ranking = replace(belief.ranking, accepted=best.evidence >= belief.params.evidence)
+        return SimpleNamespace(touchsets=belief.touchsets, ranking=ranking, params=belief.params)
+
+    def gain(belief, closures):
+        felt = any(t.layers for t in belief.touchsets)
+        return np.array([0.5 if c.candidate == 1 and not felt else 0.0 for c in closures])
+
+    oracle.believe, oracle.expected_gain = believe, gain
+    b, skill = make(oracle)
+    repeat(b, skill)
+    assert [len(t.layers) for t in skill.touchsets] == [0, 2]
+
+
+def test_a_candidate_that_is_gone_is_left_alone(make) -> None:
+    """Nothing is ever felt: each candidate gets a few closures, then it ends."""
+    b, skill = make(Oracle(right=1, enough=3), grip_width_m=None)
+    repeat(b, skill)
+    assert [len(t.layers) for t in skill.touchsets] == [module.MOST_IN_VAIN] * 2
+    assert not any(layer.stable for t in skill.touchsets for layer in t.layers)
+
+
+def test_fingers_on_something_cost_a_choice_not_the_mission(make, things) -> None:
+    b, skill = make(Oracle(right=1, enough=3), stuff=[things.floor(0.045)], tip_P_m=0.022)
+    repeat(b, skill)
+    assert sum(len(t.layers) for t in skill.touchsets) == 0
+    assert b.of_kind("note")
+    assert pads_height(b) > 0.13
+
+
+def test_no_candidates_and_an_unusable_target(make, found) -> None:
+    b, skill = make(Oracle(right=1, enough=3), things=(found.round((0, 0), 0.025),))
+    b.run(skill, 0)
+    empty = b.make(TouchNext, inputs={"candidates": ()}, target="can")
+    b.run(empty)
+    assert (empty.status, empty.reason.code) == (Status.FAILURE, "no_candidates")
+
+
+def test_broken_off_anywhere_it_goes_on(make) -> None:
+    """After a break the hand stands anywhere: it rises first, and what was felt before is kept."""
+    b, skill = make(Oracle(right=1, enough=2))
+    total = 0
+    while b.tick(skill) is Status.RUNNING:
+        total += 1
+    b, skill = make(Oracle(right=1, enough=2))
+    b.run(skill)
+    keys = skill.default_keys()
+    assert keys["felt"] == keys["touchsets"] == "touchsets"
+    b.run(skill, 60)
+    b.preempt(skill)
+    assert repeat(b, skill) >= 2
+    assert len(skill.touchsets[1].layers) >= 2
+    for k in np.linspace(1, total - 2, 4).astype(int):
+        b, skill = make(Oracle(right=1, enough=2))
+        b.run(skill, int(k))
+        b.preempt(skill)
+        repeat(b, skill)
+        assert len(skill.touchsets[1].layers) == 2
+    Blackboard.clear()

@@ -1,0 +1,169 @@
+"""The house rules that tools can check: imports run downward, everything public is described, nothing leaks in."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("glotouch_bt", "glotouch_skills", "glotouch_backends", "glotouch_missions")
+LONGEST = 400
+
+
+def sources(*folders: str) -> list[Path]:
+    return [p for folder in folders for p in sorted((ROOT / folder).rglob("*.py"))]
+
+
+def committed() -> list[Path]:
+    """Every file git knows; skips where there is no repository."""
+    if not (ROOT / ".git").exists() or shutil.which("git") is None:
+        pytest.skip("not a git checkout")
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True).stdout
+    return [ROOT / name for name in listed.decode().split("\0") if name and (ROOT / name).is_file()]
+
+
+def shown(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+def test_imports_run_downward() -> None:
+    tool = Path(sys.executable).with_name("lint-imports")
+    if not tool.exists():
+        pytest.skip("import-linter is not installed")
+    done = subprocess.run([tool, "--no-cache"], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def undescribed(tree: ast.Module) -> Iterator[str]:
+    """Public functions, classes and methods without a docstring; what overrides is described where it is declared."""
+    if ast.get_docstring(tree) is None and tree.body:
+        yield "the module"
+    stack: list[tuple[str, ast.AST]] = [("", tree)]
+    while stack:
+        above, node = stack.pop()
+        for child in ast.iter_child_nodes(node):
+            if not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+                continue
+            if child.name.startswith("_"):
+                continue
+            overload = any("overload" in ast.unparse(d) or "override" in ast.unparse(d) for d in child.decorator_list)
+            if ast.get_docstring(child) is None and not overload:
+                yield f"{above}{child.name} (line {child.lineno})"
+            if isinstance(child, ast.ClassDef):
+                stack.append((f"{above}{child.name}.", child))
+
+
+@pytest.mark.parametrize("path", sources(*PACKAGES), ids=shown)
+def test_everything_public_is_described(path: Path) -> None:
+    assert list(undescribed(ast.parse(path.read_text()))) == []
+
+
+def test_files_stay_short() -> None:
+    long = {shown(p): n for p in sources(*PACKAGES, "tests") if (n := len(p.read_text().splitlines())) > LONGEST}
+    assert long == {}, "split them"
+
+
+@pytest.mark.parametrize(
+    ("what", "pattern", "folders"),
+    [
+        ("wall time (time is the robot's clock)", r"\btime\.time\(", PACKAGES),
+        ("sleeping, but for the driver's one clock", r"\btime\.sleep\((?!left\))", PACKAGES),
+        ("uninitialised memory", r"\bnp\.empty(_like)?\(", PACKAGES),
+        ("global random numbers", r"\bnp\.random\.(seed|rand|randn|normal|uniform)\b|^import random$", PACKAGES),
+        ("a backend's name", r"(?i)mujoco|flexiv|xense|rizon", ("skills",)),
+        ("a backend's import", r"^\s*(from|import) backends\b", ("glotouch_bt", "skills")),
+    ],
+)
+def test_banned(what: str, pattern: str, folders: tuple[str, ...]) -> None:
+    found = []
+    for path in sources(*folders):
+        code = "\n".join(line for line in path.read_text().splitlines() if "noqa" not in line)
+        found += [f"{shown(path)}: {m[0]}" for m in re.finditer(pattern, code, re.MULTILINE)]
+    assert found == [], what
+
+
+def test_no_code_knows_an_object_by_name() -> None:
+    """No string of the code is the name of a shipped object (missions and their defaults are not code)."""
+    names = {p.stem for p in (ROOT / "missions" / "objects").glob("*.stl")}
+    assert names
+    found = [
+        f"{shown(path)}:{node.lineno}: {node.value!r}"
+        for path in sources(*PACKAGES)
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.lower() in names
+    ]
+    assert found == []
+
+
+REGISTRY = re.compile(
+    rb"(?i)https?://[^\s)\"'>]*(pypi|pythonhosted|artifactory|nexus|mirror|/simple\b)|--(extra-)?index[-]url|--trusted-host"
+    rb"|--find-links|index[-_]url *="
+)
+MACHINE = re.compile(
+    rb"/home/[a-z]|/root/|/Users/|/work/[a-z]|\b(?:10|192\.168|172\.16)(?:\.\d{1,3}){2,3}\b|\blocalhost:\d"
+)
+
+
+def test_no_registry_host_or_machine_path_is_committed() -> None:
+    found = []
+    for path in committed():
+        if path == Path(__file__) or path.suffix in (".npz", ".stl", ".png", ".ico"):
+            continue
+        text = path.read_bytes()
+        found += [
+            f"{shown(path)}: {m[0].decode(errors='replace')}"
+            for rule in (REGISTRY, MACHINE)
+            for m in rule.finditer(text)
+        ]
+    assert found == []
+
+
+def test_backends_and_skills_are_regular_packages() -> None:
+    """Else, with `backends/` itself on the path, our folder would shadow `import mujoco`."""
+    for name in ("backends", "backends/mujoco", "skills", "missions"):
+        assert (ROOT / name / "__init__.py").is_file()
+    assert not list((ROOT / "tests").rglob("__init__.py")), "tests are imported by path"
+
+
+@pytest.mark.slow
+def test_an_installed_wheel_carries_everything(tmp_path: Path) -> None:
+    """Missions, worlds, conditions, meshes and their hulls are package data; every entry point's module is inside."""
+    source = tmp_path / "source"
+    for path in committed():
+        if path.relative_to(ROOT).parts[0] in (*PACKAGES, "pyproject.toml", "README.md", "LICENSE"):
+            target = source / path.relative_to(ROOT)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, target)
+    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
+    done = subprocess.run([*command, str(source), "-w", str(tmp_path)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        inside = set(archive.namelist())
+        (entry_points,) = (n for n in inside if n.endswith("entry_points.txt"))
+        points = archive.read(entry_points).decode()
+    expected = {
+        shown(p)
+        for p in committed()
+        if p.relative_to(ROOT).parts[0] in PACKAGES and p.suffix in (".py", ".yaml", ".stl", ".npz")
+    }
+    assert expected - inside == set()
+    for kind in (
+        "glotouch_missions/worlds/",
+        "glotouch_missions/conditions/",
+        "glotouch_missions/objects/",
+        "glotouch_missions/hulls/",
+    ):
+        assert any(n.startswith(kind) for n in inside), kind
+    assert not [n for n in inside if n.startswith("tests/")]
+    for module in re.findall(r"= *([\w.]+):", points):
+        path = module.replace(".", "/")
+        assert f"{path}.py" in inside or f"{path}/__init__.py" in inside, module

@@ -1,0 +1,45 @@
+"""The kill study on a house without physics: it counts what happened, and a resumed study keeps what it has."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from glotouch_bt.validation.kill_resume import KillStudy, run_study, summarise
+
+HOUSE = Path(__file__).parents[1] / "support" / "fake_cli.py"
+MISSION = """mission: m
+world: container_five
+tree:
+  sequence:
+    - wait: {name: first, seconds: 2.0}
+    - wait: {name: second, seconds: 150.0}
+    - wait: {name: last, seconds: 2.0}
+"""
+
+
+def test_a_killed_run_is_compared_with_its_twin(tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text(MISSION)
+    study = KillStudy(str(tmp_path / "m.yaml"), [3], 1, tmp_path / "out", words=(sys.executable, str(HOUSE)))
+    rows: list[dict[str, object]] = []
+    summary = run_study(study, lambda row, done, total: rows.append(row))
+    (row,) = rows
+    assert row["outcome"] == "killed", "of a mission long enough that its processor time is no accident"
+    assert row["exit_code"] == 0, row["message"]
+    assert row["same_end"]
+    assert row["same_result"]
+    assert row["same_record"]
+    assert row["skill_lost"] == 0
+    assert summary["same_record"]["rate"] == 1.0
+    assert summary["outside"] == 0
+    assert json.loads((tmp_path / "out" / "summary.json").read_text()) == json.loads(json.dumps(summary))
+    again = run_study(KillStudy(study.mission, [3], 1, study.out, resume=True, words=("false",)))
+    assert again["same_record"] == summary["same_record"], "nothing was run again"
+
+
+def test_a_moment_outside_the_mission_is_no_kill() -> None:
+    inside = {"outcome": "killed", "same_end": True, "readable_after_kill": True, "readable_at_end": True}
+    summary = summarise([inside, {"outcome": "not begun"}, {"outcome": "ended before"}])
+    assert summary["outside"] == 2
+    assert summary["same_end"]["n"] == 1
