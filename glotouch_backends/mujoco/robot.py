@@ -20,7 +20,7 @@ from glotouch_backends.mujoco.control import (
 )
 from glotouch_backends.mujoco.model import STEP_S, STEPS, Handles, handle_mesh
 from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, Tactile, WristSensor, up_in
-from glotouch_backends.mujoco.simulation import Keeper, Trace
+from glotouch_backends.mujoco.simulation import SnapshotStore, Trace
 from glotouch_backends.mujoco.truth import Truth
 from glotouch_bt.robot import (
     Array,
@@ -111,7 +111,7 @@ class MujocoRobot(Robot):
         self.peak_force_N = 0.0
 
         self.trace = Trace(model, data) if traced else None
-        self._keeper = Keeper(model, data)
+        self._keeper = SnapshotStore(model, data)
 
         self._samples[:] = data.sensordata
         self._wrist.fill(-self._samples[0, s.force.start : s.torque.stop])

@@ -26,7 +26,7 @@ def resume(
 ) -> int:
     """Go on with a run after a crash, a kill, Ctrl-C or a safety stop; finished skills are not done again."""
     from glotouch_bt.commands.terminal import Operator, console, operated, tell_end
-    from glotouch_bt.run import GoingOn
+    from glotouch_bt.run import ResumableRun
     from glotouch_bt.run import resume as go_on
 
     if list_:
@@ -35,7 +35,7 @@ def resume(
 
     told: list[str] = []
 
-    def tell(found: GoingOn) -> None:
+    def tell(found: ResumableRun) -> None:
         told.extend(found.notes)
         if json_:
             return

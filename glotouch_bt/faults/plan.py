@@ -26,7 +26,7 @@ from glotouch_bt.mission.spec import Findings, Map, MissionFaults, Node, NodeSpe
 
 PLAN_KEYS = ("faults", "description", "seed", "plan")
 FAULT_KEYS = ("fault", "name", "with", "when", "for", "repeat")
-MOST_FAULTS = 1000
+MAX_FAULTS = 1000
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -128,8 +128,8 @@ def _plan(source: Node, findings: Findings) -> FaultPlan | None:
             at, "missing_key" if items is None else "wrong_type", "a fault plan needs 'plan', a list of faults"
         )
         return None
-    if len(items.items) > MOST_FAULTS:
-        findings.add(items.place, "wrong_value", f"{len(items.items)} faults: at most {MOST_FAULTS} in a plan")
+    if len(items.items) > MAX_FAULTS:
+        findings.add(items.place, "wrong_value", f"{len(items.items)} faults: at most {MAX_FAULTS} in a plan")
         return None
     taken: set[str] = set()
     faults = [f for item in items.items if (f := _fault(item, taken, findings)) is not None]

@@ -48,7 +48,7 @@ from glotouch_bt.robot import BadInput, World
 from glotouch_bt.skill import Skill
 
 MISSION_KEYS = ("mission", "description", "world", "parameters", "tree", "timeout_s", "leaves", "subtrees")
-LONGEST_S = 3600.0
+MAX_DURATION_S = 3600.0
 
 
 @dataclass(frozen=True)
@@ -191,11 +191,11 @@ def _text(source: Map, key: str, findings: Findings, *, required: bool) -> str:
 def _timeout(source: Map, findings: Findings) -> float:
     node = source.get("timeout_s")
     if node is None:
-        return LONGEST_S
+        return MAX_DURATION_S
     value = node.value if isinstance(node, Scalar) else None
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= 86_400:
         findings.add(node.place, "wrong_value", "timeout_s: must be a number of seconds in (0, 86400]")
-        return LONGEST_S
+        return MAX_DURATION_S
     return float(value)
 
 
@@ -283,4 +283,4 @@ def _document(
     return document
 
 
-__all__ = ["LONGEST_S", "Mission", "load_mission", "split_settings"]
+__all__ = ["MAX_DURATION_S", "Mission", "load_mission", "split_settings"]

@@ -119,7 +119,7 @@ class _Playing(Skill):
             self._write(outcome.ports)
         begin_s = self.context.observation.now_s
         until = float("inf") if outcome.kind == "hangs" else begin_s + outcome.after_s
-        longest = begin_s + self.LONGEST_S
+        longest = begin_s + self.MAX_DURATION_S
         while self.context.observation.now_s < until - 1e-9:
             self.stage.wake(min([until, longest, *(getattr(node, "deadline_s", until) for node in self._above())]))
             yield HOLD

@@ -23,7 +23,7 @@ from glotouch_bt.robot import Command, FakeRobot, GlotouchError, Observation, Ro
 if TYPE_CHECKING:
     from glotouch_bt.motion import Arm
 
-MOST_TICKS = 20_000
+MAX_TICKS = 20_000
 
 
 class RunsAway(GlotouchError):
@@ -133,14 +133,14 @@ class _Heard(NullRecord):
     """A record that keeps each node's last status and each key's last value."""
 
     statuses: dict[str, str]
-    most_ticks: int = MOST_TICKS
+    max_ticks: int = MAX_TICKS
     keys: dict[str, Any] = field(default_factory=dict)
     blocks: int = 0
 
     def block(self, observation: Observation, command: Command) -> None:
         self.blocks += 1
-        if self.blocks > self.most_ticks:
-            raise RunsAway(f"no end after {self.most_ticks} ticks ({observation.now_s:g} s on the robot's clock)")
+        if self.blocks > self.max_ticks:
+            raise RunsAway(f"no end after {self.max_ticks} ticks ({observation.now_s:g} s on the robot's clock)")
 
     def tick(self, stamp_s: float, changes: Sequence[tuple[str, object, object]]) -> None:
         for path, _, new in changes:
@@ -166,7 +166,7 @@ def run_scripted(
     robot: Robot | None = None,
     timeout_s: float | None = None,
     make_arm: Callable[[Robot, World], Arm] | None = None,
-    most_ticks: int = MOST_TICKS,
+    max_ticks: int = MAX_TICKS,
 ) -> ScriptedRun:
     """Run a mission with its leaves scripted; what no pattern fits succeeds at once.
 
@@ -176,7 +176,7 @@ def run_scripted(
         robot: An open robot (default: a FakeRobot, whose clock skips the time in which leaves only wait).
         timeout_s: Longest duration on the robot's clock (default: the mission's).
         make_arm: Makes the motion generators (default: none at all; the real ones if a leaf is `real()`).
-        most_ticks: A mission that has not ended after so many is aborted with `RunsAway`.
+        max_ticks: A mission that has not ended after so many is aborted with `RunsAway`.
 
     Raises:
         ScriptError: The script does not fit the mission.
@@ -192,7 +192,7 @@ def run_scripted(
         moving = any(p is None for p in parts.values())
         make_arm = default_arm if moving else lambda robot, world: cast("Arm", StillArm())
     supervision = PATIENT if isinstance(robot, SkippingRobot) else None
-    heard = _Heard(dict.fromkeys(paths, "INVALID"), most_ticks)
+    heard = _Heard(dict.fromkeys(paths, "INVALID"), max_ticks)
     scripted = replace(mission, tree=_played(mission.tree, stage.parts))
     injector = injector_in(robot)
     record: Record = heard if injector is None else ListeningRecord(heard, injector)

@@ -2,10 +2,10 @@
 
 from glotouch_bt.motion.arm import Arm
 from glotouch_bt.motion.clearance import Blocked, Scene
-from glotouch_bt.motion.feed import Feed, Style
 from glotouch_bt.motion.jaws import JawWatch
 from glotouch_bt.motion.kinematics import Kinematics, build_model
 from glotouch_bt.motion.paths import Arc, Line, Path, Piece, Polyline
+from glotouch_bt.motion.pause_signal import PauseSignal, Style
 from glotouch_bt.motion.plan import Plan, plan_piece
 from glotouch_bt.motion.shapes import finger_outline_half_m
 from glotouch_bt.motion.timing import rest_to_rest
@@ -15,7 +15,6 @@ __all__ = [
     "Arc",
     "Arm",
     "Blocked",
-    "Feed",
     "Guard",
     "JawWatch",
     "Kinematics",
@@ -23,6 +22,7 @@ __all__ = [
     "Motion",
     "MoveResult",
     "Path",
+    "PauseSignal",
     "Piece",
     "Plan",
     "Polyline",

@@ -5,7 +5,7 @@ Each motion is planned, and unless told otherwise checked, completely before its
 the first of the deceleration. A generator may be closed at any yield; the arm's setpoint is then what was last
 yielded.
 
-A pause (`Feed`) stops a motion where it is along its path, softly; the guard goes on listening, and afterwards the
+A pause (`PauseSignal`) stops a motion where it is along its path, softly; the guard keeps listening, and afterwards the
 motion goes on along the same path. A motion's caller never notices.
 """
 
@@ -67,7 +67,7 @@ class Arm(Mover):
     Attributes:
         kinematics: Forward and inverse kinematics.
         scene: What must not be hit; skills add what they find to it.
-        feed: Whether motions go on or are paused; the runner writes it.
+        pause_signal: Whether motions go on or are paused; the runner writes it.
     """
 
     def __init__(self, description: RobotDescription, limits: Limits, world: World, period_s: float) -> None:
@@ -238,7 +238,7 @@ class Arm(Mover):
         Returns:
             The last reported state, its aperture the mean over the still window.
         """
-        with self.feed.finishing():
+        with self.pause_signal.finishing():
             return (yield from self._jaws(aperture_m, speed_m_s, force_N, timeout_s, tactile, on_observation))
 
     # -- inside ------------------------------------------------------------------------------------------------------

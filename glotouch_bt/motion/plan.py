@@ -71,9 +71,9 @@ class Plan:
         progress = brake(self.progress, k, self.pace, period_s)
         return None if progress is None else self._timed(progress)
 
-    def between(self, s0: float, s1: float, period_s: float, most_m_s: float = np.inf) -> Plan:
-        """From rest to rest along this path, m, forwards or backwards, at its own pace or at most `most_m_s`."""
-        pace = Pace(min(self.pace.speed, most_m_s), self.pace.acceleration, self.pace.jerk)
+    def between(self, s0: float, s1: float, period_s: float, max_m_s: float = np.inf) -> Plan:
+        """From rest to rest along this path, m, forwards or backwards, at its own pace or at most `max_m_s`."""
+        pace = Pace(min(self.pace.speed, max_m_s), self.pace.acceleration, self.pace.jerk)
         return self._timed(between(s0, s1, pace, period_s))
 
     def _timed(self, progress: Progress) -> Plan:

@@ -1,6 +1,6 @@
 """Playing planned motions, one setpoint a control period: guards that break them off, pauses that make them wait.
 
-A pause (`Feed`) stops a motion where it is along its path, softly; the guard goes on listening, and afterwards the
+A pause (`PauseSignal`) stops a motion where it is along its path, softly; the guard keeps listening, and afterwards the
 motion goes on along the same path under the same limits. A motion's caller never notices.
 """
 
@@ -12,8 +12,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from glotouch_bt.motion.feed import BACK_OFF_M, BACK_OFF_M_S, Feed
 from glotouch_bt.motion.kinematics import Kinematics
+from glotouch_bt.motion.pause_signal import BACK_OFF_M, BACK_OFF_M_S, PauseSignal
 from glotouch_bt.motion.plan import Plan
 from glotouch_bt.motion.timing import JointProfile, between, brake
 from glotouch_bt.robot import Array, Command, JointSetpoint, Limits, Observation, Pose, RobotDescription
@@ -98,7 +98,7 @@ class Mover:
 
     Attributes:
         kinematics: Forward and inverse kinematics.
-        feed: Whether motions go on or are paused; the runner writes it.
+        pause_signal: Whether motions go on or are paused; the runner writes it.
     """
 
     def __init__(self, description: RobotDescription, limits: Limits, period_s: float) -> None:
@@ -106,7 +106,7 @@ class Mover:
         self.kinematics = Kinematics(description)
         self._q: Array = self.kinematics.home.copy()
         self._aperture_m = description.gripper.stroke_m
-        self.feed = Feed()
+        self.pause_signal = PauseSignal()
         self._touched: tuple[Plan, float] | None = None
 
     # -- where it is -------------------------------------------------------------------------------------------------
@@ -138,8 +138,8 @@ class Mover:
         limits = self.limits
         trip = _Trip(guard)
         done_m, travelled = 0.0, 0.0
-        if guard is not None and self.feed.stops:  # its zero was taken just now, and must not grow old unheard
-            with self.feed.taking():
+        if guard is not None and self.pause_signal.stops:  # its zero was taken just now, and must not grow old unheard
+            with self.pause_signal.handling():
                 yield from self._wait(trip, tactile)
         for plan in plans if not trip.over() else ():
             running: Plan | None = plan
@@ -153,7 +153,7 @@ class Mover:
                         yield from self._play(halt, trip, tactile)
                         travelled = float(halt.progress.s[-1])
                     self._touched = (plan, travelled)
-                elif k < len(now) - 1 and self.feed.stops:
+                elif k < len(now) - 1 and self.pause_signal.stops:
                     travelled = yield from self._stand(now, k, trip, tactile)
                     if trip.over():
                         self._touched = (plan, travelled)
@@ -182,7 +182,7 @@ class Mover:
             trip.take(observation)
             if listening and trip.ask(observation):
                 return k
-            if breakable and self.feed.stops:
+            if breakable and self.pause_signal.stops:
                 return k
         return len(plan) - 1
 
@@ -191,14 +191,14 @@ class Mover:
 
         If the guard trips on the way it is a contact as ever, and the pause is left to the next motion.
         """
-        with self.feed.taking():
+        with self.pause_signal.handling():
             at_m = float(plan.progress.s[k])
             slower = plan.brake(k, self.period_s)
             legs: list[Plan] = []
             if slower is not None:
                 at_m = min(float(slower.progress.s[-1]), plan.piece.length_m)
                 legs.append(slower)
-            if trip.guard is not None and self.feed.style == "retreat" and at_m > 1e-6:
+            if trip.guard is not None and self.pause_signal.style == "retreat" and at_m > 1e-6:
                 legs.append(plan.between(at_m, max(0.0, at_m - BACK_OFF_M), self.period_s, BACK_OFF_M_S))
             for leg in legs:
                 k = yield from self._play(leg, trip, tactile)
@@ -210,8 +210,8 @@ class Mover:
 
     def _wait(self, trip: _Trip, tactile: bool) -> Motion[None]:
         """Stand until the pause is over or the guard trips."""
-        self.feed.standing = True
-        while self.feed.stops:
+        self.pause_signal.standing = True
+        while self.pause_signal.stops:
             observation = yield Command(tactile=tactile)
             self._see(observation)
             trip.take(observation)
@@ -250,7 +250,7 @@ class Mover:
             pose = self.kinematics.fk(self._q)
             self._see((yield Command(JointSetpoint(self._q, profile.dq[k], profile.ddq[k], pose))))
             self._touched = None
-            if breakable and self.feed.stops and k < len(profile.q) - 1:
+            if breakable and self.pause_signal.stops and k < len(profile.q) - 1:
                 return k
         return None
 
@@ -258,7 +258,7 @@ class Mover:
         """Stop a joint move after period `k`, wait until the pause is over; what is left of it."""
         at = float(profile.share.s[k])
         slower = brake(profile.share, k, profile.pace, self.period_s)
-        with self.feed.taking():
+        with self.pause_signal.handling():
             if slower is not None:
                 yield from self._turn(JointProfile.along(profile.start, profile.way, slower, profile.pace))
                 at = min(float(slower.s[-1]), 1.0)

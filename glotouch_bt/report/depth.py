@@ -69,7 +69,7 @@ def _layers(touchset: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _pads(layer: dict[str, Any]) -> list[Array]:
-    """Left and right depth map of a journaled layer; missing taxels are null there and NaN here."""
+    """Left and right depth map of a recorded layer; missing taxels are null there and NaN here."""
     out = []
     for key in ("left_m", "right_m"):
         try:

@@ -30,7 +30,7 @@ def candidates(record: RunRecord) -> list[dict[str, Any]]:
 
 
 def contour_of(candidate: dict[str, Any]) -> Contour | None:
-    """The contour of a journaled candidate, or None if it is not one."""
+    """The contour of a recorded candidate, or None if it is not one."""
     c: Any = candidate.get("contour")
     try:
         return Contour(
@@ -48,7 +48,7 @@ def contour_of(candidate: dict[str, Any]) -> Contour | None:
 
 
 def _corners(contour: dict[str, Any]) -> Array:
-    """(n, 2) corners of a journaled free outline; ValueError if they are none."""
+    """(n, 2) corners of a recorded free outline; ValueError if they are none."""
     corners = np.asarray(contour["boundary_K_m"], float)
     if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3 or not np.isfinite(corners).all():
         raise ValueError("not the corners of an outline")

@@ -4,11 +4,11 @@ from glotouch_bt.run.folder import RunFolder
 from glotouch_bt.run.launch import RunRequest, RunResult, launch
 from glotouch_bt.run.result import installed_versions
 from glotouch_bt.run.resume import resume
-from glotouch_bt.run.resume_point import EARLIER, GoingOn, copy_run, find
+from glotouch_bt.run.resume_point import EARLIER, ResumableRun, copy_run, find
 
 __all__ = [
     "EARLIER",
-    "GoingOn",
+    "ResumableRun",
     "RunFolder",
     "RunRequest",
     "RunResult",

@@ -17,16 +17,16 @@ from typing import Any
 from glotouch_bt.faults import FaultInjector, FaultPlan, ListeningRecord, injector_in, read_plan, wrong_models
 from glotouch_bt.mission import Mission, load_mission, split_settings
 from glotouch_bt.mission.checkpoint import FILE as CHECKPOINTS
-from glotouch_bt.mission.checkpoint import CheckpointFile, Keeper, TakenUp
+from glotouch_bt.mission.checkpoint import CheckpointFile, CheckpointWriter, ResumePoint
 from glotouch_bt.mission.execution import Control, Outcome, Stuck, deferred_interrupt, run_mission
 from glotouch_bt.mission.read import load_conditions
-from glotouch_bt.mission.record import Record, Recorder, Tally
+from glotouch_bt.mission.record import Record, Recorder, RunSummary
 from glotouch_bt.robot import Backend, BadInput, Conditions, GlotouchError, Robot, load_backend
 from glotouch_bt.robot.simulation import Referee, TrueObject
 from glotouch_bt.run.folder import RunFolder, claimed
 from glotouch_bt.run.request import RunRequest, RunResult
 from glotouch_bt.run.result import description, installed_versions, mission_yaml, score, truth
-from glotouch_bt.run.resume_point import GoingOn, describe_run
+from glotouch_bt.run.resume_point import ResumableRun, describe_run
 
 LARGEST_SEED = 2**32 - 1
 
@@ -37,9 +37,9 @@ def launch(
     request: RunRequest,
     *,
     on_start: Callable[[Mission, Path], None] | None = None,
-    on_progress: Callable[[float, Tally], None] | None = None,
+    on_progress: Callable[[float, RunSummary], None] | None = None,
     control: Control | None = None,
-    going_on: GoingOn | None = None,
+    resumable: ResumableRun | None = None,
 ) -> RunResult:
     """Check everything, open the backend, run the mission, score it, write the run's folder.
 
@@ -48,7 +48,7 @@ def launch(
         on_start: Called with the mission and its folder once the backend is open.
         on_progress: As in `run_mission`.
         control: Who may pause and stop it.
-        going_on: A broken-off run to go on with, in its own folder (`study.resume`).
+        resumable: A broken-off run to go on with, in its own folder (`study.resume`).
 
     Raises:
         BadInput: Something given is wrong; nothing moved and nothing is left on disk.
@@ -57,8 +57,8 @@ def launch(
     began = time.perf_counter()
     if not 0 <= request.seed <= LARGEST_SEED:
         raise BadInput(f"--seed {request.seed}: must be in 0 .. {LARGEST_SEED}")
-    if going_on is not None:
-        mission = going_on.mission
+    if resumable is not None:
+        mission = resumable.mission
     else:
         mission = load_mission(request.mission, request.settings, objects=request.objects)
     conditions = load_conditions(request.conditions)
@@ -70,7 +70,7 @@ def launch(
         try:
             if (
                 plan is not None
-                and going_on is None
+                and resumable is None
                 and (models := wrong_models(plan, mission, folder.path / "models"))
             ):
                 mission = load_mission(request.mission, {**request.settings, **models}, objects=request.objects)
@@ -82,7 +82,7 @@ def launch(
                 known = ", ".join(mission.parameters) or "none"
                 raise BadInput(f"{e} (parameters of mission {mission.name!r}: {known})") from e
             referee = backend.referee(robot)
-            world = None if going_on is None else going_on.file.world(going_on.row.number)
+            world = None if resumable is None else resumable.file.world(resumable.row.number)
             objects_at_start = referee.objects() if referee else []
             if world is not None:
                 robot.restore(world)
@@ -92,13 +92,13 @@ def launch(
             folder.abandon()
             raise
         with robot:
-            if going_on is None:
+            if resumable is None:
                 folder.clear()
             if on_start is not None:
                 on_start(mission, folder.path)
-            taken_up = None if going_on is None else going_on.taken_up(same_world=world is not None)
+            resume_point = None if resumable is None else resumable.resume_point(same_world=world is not None)
             run = _Run(
-                request, mission, conditions, robot, referee, folder, objects_at_start, began, going_on, taken_up
+                request, mission, conditions, robot, referee, folder, objects_at_start, began, resumable, resume_point
             )
             return _run(run, on_progress, control)
 
@@ -131,37 +131,37 @@ class _Run:
     folder: RunFolder
     objects_at_start: list[TrueObject]
     began: float
-    going_on: GoingOn | None
-    taken_up: TakenUp | None
+    resumable: ResumableRun | None
+    resume_point: ResumePoint | None
 
 
-def _record(run: _Run) -> tuple[Recorder, CheckpointFile, Keeper]:
+def _record(run: _Run) -> tuple[Recorder, CheckpointFile, CheckpointWriter]:
     """The record and the checkpoints: new ones, or those of the run that goes on."""
     told_first = description(run.request, run.mission, run.conditions, run.robot)
-    going_on, folder = run.going_on, run.folder
-    if going_on is None:
+    resumable, folder = run.resumable, run.folder
+    if resumable is None:
         recorder = Recorder(folder.path / "run.mcap", told_first)
         asked = run.request.as_json()
         told = describe_run(asked, run.mission, run.conditions, installed_versions())
         file = CheckpointFile.create(folder.path / CHECKPOINTS, told)
-        return recorder, file, Keeper(file, recorder)
+        return recorder, file, CheckpointWriter(file, recorder)
     part = folder.path / ".run.mcap.part"
     recorder = Recorder(part, told_first)
     try:
-        going_on.begin(part, recorder, run.taken_up is not None and run.taken_up.same_world)
+        resumable.begin(part, recorder, run.resume_point is not None and run.resume_point.same_world)
     except BaseException:
         recorder.close()
         part.unlink(missing_ok=True)
         raise
-    return recorder, going_on.file, Keeper(going_on.file, recorder, going_on.row.number + 1)
+    return recorder, resumable.file, CheckpointWriter(resumable.file, recorder, resumable.row.number + 1)
 
 
-def _run(run: _Run, on_progress: Callable[[float, Tally], None] | None, control: Control | None) -> RunResult:
+def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, control: Control | None) -> RunResult:
     request, mission, robot, referee, folder = run.request, run.mission, run.robot, run.referee, run.folder
-    if run.going_on is None:
+    if run.resumable is None:
         folder.write_text("mission.yaml", mission_yaml(request, mission))
     ready = time.perf_counter()
-    recorder, checkpoints, keeper = _record(run)
+    recorder, store, checkpoints = _record(run)
     injector = injector_in(robot)
     record: Record = recorder if injector is None else ListeningRecord(recorder, injector)
 
@@ -176,7 +176,7 @@ def _run(run: _Run, on_progress: Callable[[float, Tally], None] | None, control:
         finally:
             os._exit(3)
 
-    with closing(checkpoints), closing(recorder):
+    with closing(store), closing(recorder):
         try:
             outcome = run_mission(
                 mission,
@@ -185,12 +185,12 @@ def _run(run: _Run, on_progress: Callable[[float, Tally], None] | None, control:
                 on_progress=on_progress,
                 control=control,
                 on_lost=lost,
-                keeper=keeper,
-                taken_up=run.taken_up,
+                checkpoints=checkpoints,
+                resume_point=run.resume_point,
             )
         except BaseException:  # it raises only before the first tick
             recorder.close()
-            if run.going_on is None:
+            if run.resumable is None:
                 folder.clear()
                 folder.abandon()
             raise
@@ -198,8 +198,8 @@ def _run(run: _Run, on_progress: Callable[[float, Tally], None] | None, control:
             ended = time.perf_counter()
             result = score(request, mission, outcome, referee)
             result |= {"wall_time_s": round(ended - ready, 3), "wall_open_s": round(ready - run.began, 3)}
-            if run.going_on is not None:
-                result["resumed"] = [*run.going_on.before, run.going_on.told()]
+            if run.resumable is not None:
+                result["resumed"] = [*run.resumable.before, run.resumable.told()]
             if injector is not None:
                 root = outcome.chain[-1].as_dict() if outcome.chain else {"code": "", "message": ""}
                 injector.conclude(outcome.status, str(root["code"]), str(root["message"]), outcome.end_s)
@@ -210,7 +210,7 @@ def _run(run: _Run, on_progress: Callable[[float, Tally], None] | None, control:
                 truths = {**ends, "tip_B_m": referee.tip_B_m().tolist()}
                 unwritten += _unless_refused(lambda: folder.write_json("truth.json", truths))
             if not unwritten:  # a run killed before this can be gone on with
-                unwritten = _unless_refused(lambda: checkpoints.note("ended", outcome.status))
+                unwritten = _unless_refused(lambda: store.note("ended", outcome.status))
     report, warning = _report(folder.path) if request.report else (None, "")
     return RunResult(folder.path, result, outcome, report, warning, tuple(unwritten))
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from glotouch_bt.mission import Mission
 from glotouch_bt.mission.execution import Control
-from glotouch_bt.mission.record import Tally
+from glotouch_bt.mission.record import RunSummary
 from glotouch_bt.run.folder import claimed
 from glotouch_bt.run.launch import RunRequest, RunResult, launch
 from glotouch_bt.run.result import installed_versions
-from glotouch_bt.run.resume_point import GoingOn, copy_run, find
+from glotouch_bt.run.resume_point import ResumableRun, copy_run, find
 
 
 def resume(
@@ -19,9 +19,9 @@ def resume(
     *,
     start: str | None = None,
     out: Path | None = None,
-    on_found: Callable[[GoingOn], None] | None = None,
+    on_found: Callable[[ResumableRun], None] | None = None,
     on_start: Callable[[Mission, Path], None] | None = None,
-    on_progress: Callable[[float, Tally], None] | None = None,
+    on_progress: Callable[[float, RunSummary], None] | None = None,
     control: Control | None = None,
     report: bool = True,
 ) -> RunResult:
@@ -48,13 +48,13 @@ def resume(
         with claimed(folder):  # a run under way is not copied in the middle
             copy_run(folder, out)
         folder = out
-    going_on = find(folder, start, installed_versions())
+    resumable = find(folder, start, installed_versions())
     try:
-        asked = going_on.request
+        asked = resumable.request
         if asked["faults"] is not None:
-            going_on.notes.append(f"goes on without the faults of {asked['faults']}")
+            resumable.notes.append(f"goes on without the faults of {asked['faults']}")
         if on_found is not None:
-            on_found(going_on)
+            on_found(resumable)
         request = RunRequest(
             mission=asked["mission"],
             backend=asked["backend"],
@@ -65,6 +65,6 @@ def resume(
             out=folder,
             report=report,
         )
-        return launch(request, on_start=on_start, on_progress=on_progress, control=control, going_on=going_on)
+        return launch(request, on_start=on_start, on_progress=on_progress, control=control, resumable=resumable)
     finally:
-        going_on.file.close()
+        resumable.file.close()

@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 
 from glotouch_bt.mission import Mission, load_mission
-from glotouch_bt.mission.checkpoint import FILE, CheckpointFile, Row, TakenUp
+from glotouch_bt.mission.checkpoint import FILE, CheckpointFile, ResumePoint, Row
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import Recorder, read_chunks
 from glotouch_bt.mission.spec import NodeSpec
@@ -24,7 +24,7 @@ EARLIER = "earlier"
 
 
 @dataclass(frozen=True)
-class GoingOn:
+class ResumableRun:
     """What a run goes on from.
 
     Attributes:
@@ -49,10 +49,10 @@ class GoingOn:
     before: tuple[Mapping[str, Any], ...]
     notes: list[str] = field(default_factory=list)
 
-    def taken_up(self, same_world: bool) -> TakenUp:
+    def resume_point(self, same_world: bool) -> ResumePoint:
         """For the runner."""
         start = "" if self.leads else self.start
-        return TakenUp(self.row.number, self.file.state(self.row.number), same_world, start)
+        return ResumePoint(self.row.number, self.file.state(self.row.number), same_world, start)
 
     def told(self) -> dict[str, Any]:
         """This resumption, as result.json has it."""
@@ -83,7 +83,7 @@ class GoingOn:
         except BadInput as e:
             self.notes.append(f"the record does not hold what was before the checkpoint: {e}")
         try:
-            kept = self._put_by()
+            kept = self._save()
             if record.is_file():
                 _link(record, kept / "run.mcap")
             part.replace(record)
@@ -93,7 +93,7 @@ class GoingOn:
         self.file.note("resumed", [*self.before, self.told()])
         self.file.note("ended", None)
 
-    def _put_by(self) -> Path:
+    def _save(self) -> Path:
         number = 1
         while (self.folder / EARLIER / str(number)).exists():
             number += 1
@@ -121,7 +121,7 @@ def describe_run(
     }
 
 
-def find(folder: Path, start: str | None, versions: Mapping[str, str]) -> GoingOn:
+def find(folder: Path, start: str | None, versions: Mapping[str, str]) -> ResumableRun:
     """Where a run can go on.
 
     Args:
@@ -144,7 +144,7 @@ def find(folder: Path, start: str | None, versions: Mapping[str, str]) -> GoingO
         raise
 
 
-def _find(folder: Path, file: CheckpointFile, start: str | None, versions: Mapping[str, str]) -> GoingOn:
+def _find(folder: Path, file: CheckpointFile, start: str | None, versions: Mapping[str, str]) -> ResumableRun:
     run, rows, notes = file.run, file.rows(), list[str]()
     if not rows:
         raise BadInput(f"{folder}: was broken off before its first checkpoint; run it again")
@@ -167,7 +167,9 @@ def _find(folder: Path, file: CheckpointFile, start: str | None, versions: Mappi
     if path and row is None:
         _require_inputs(mission, path, file.state(rows[-1].number))
     leads = row is not None
-    return GoingOn(folder, file, row or rows[-1], mission, path, leads, run["request"], tuple(run["resumed"]), notes)
+    return ResumableRun(
+        folder, file, row or rows[-1], mission, path, leads, run["request"], tuple(run["resumed"]), notes
+    )
 
 
 def _as_loaded(data: Mapping[str, Any]) -> dict[str, Any]:

@@ -41,7 +41,7 @@ from glotouch_bt.skill.ports import In, Out, Port
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 UNCHANGED = "unchanged"
-"""In `AFTER_FAILURE`: the resource may be in the state in which the skill found it."""
+"""In `FAILURE_STATES`: the resource may be in the state in which the skill found it."""
 
 
 class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: ignore[call-arg]
@@ -52,29 +52,29 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
     says what skills did on purpose. What was lost against their will is a fault: the next skill that needs it notices.
 
     Attributes:
-        NEEDS: States of resources in which it may start.
-        LEAVES: Their states after SUCCESS; of those not named, what they were.
-        AFTER_FAILURE: What they may be after FAILURE (`UNCHANGED`: what they were); of those not named, what they were
+        PRECONDITIONS: States of resources in which it may start.
+        POSTCONDITIONS: Their states after SUCCESS; of those not named, what they were.
+        FAILURE_STATES: What they may be after FAILURE (`UNCHANGED`: what they were); of those not named, what they were
             or what they are after SUCCESS.
-        PUT_BACK_WITH: Of what it leaves, what should not outlast a mission unsaid, and the skill that puts it back.
+        RESTORED_BY: Of what it leaves, what should not outlast a mission unsaid, and the skill that puts it back.
         USES: What it has for itself while it runs: no two skills that use the same may run at once.
         FAILURES: Codes it may fail with, each in a few words (beside `GENERAL_FAILURES`).
         PAUSE: What a pause does to it: `hold` (a motion stops where it is along its path, and its guard goes on
             listening), `retreat` (the same, and a guarded motion also backs off a few millimetres the way it came),
-            `finish` (the present motion is made to its end). What stands under `arm.feed.finishing()`, as all that
+            `finish` (the present motion is made to its end). All under `arm.pause_signal.finishing()`, as all that
             moves the jaws, is finished in any case. A skill never notices: timeouts and durations do not run.
-        LONGEST_S: Longest duration of one run on the mission's clock: a skill that yields for ever ends with FAILURE
+        MAX_DURATION_S: Longest duration of one run on the mission's clock: a skill that never ends gets FAILURE
             `skill_timeout`.
     """
 
-    NEEDS: ClassVar[Mapping[str, frozenset[str]]] = NOTHING
-    LEAVES: ClassVar[Mapping[str, str]] = NOTHING
-    AFTER_FAILURE: ClassVar[Mapping[str, frozenset[str]]] = NOTHING
-    PUT_BACK_WITH: ClassVar[Mapping[str, str]] = NOTHING
+    PRECONDITIONS: ClassVar[Mapping[str, frozenset[str]]] = NOTHING
+    POSTCONDITIONS: ClassVar[Mapping[str, str]] = NOTHING
+    FAILURE_STATES: ClassVar[Mapping[str, frozenset[str]]] = NOTHING
+    RESTORED_BY: ClassVar[Mapping[str, str]] = NOTHING
     USES: ClassVar[frozenset[str]] = frozenset()
     FAILURES: ClassVar[Mapping[str, str]] = NOTHING
     PAUSE: ClassVar[Literal["hold", "retreat", "finish"]] = "hold"
-    LONGEST_S: ClassVar[float] = 900.0
+    MAX_DURATION_S: ClassVar[float] = 900.0
 
     Params: ClassVar[type[SkillParams]] = SkillParams
     INPUT_PORTS: ClassVar[dict[str, PortInformation]] = {}
@@ -145,7 +145,7 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
     def update(self) -> Status:
         """Hand the newest observation to the body, take its next command."""
         assert self._run is not None
-        if self.context.mission_s - self._begun_s > self.LONGEST_S:
+        if self.context.mission_s - self._begun_s > self.MAX_DURATION_S:
             return self._too_long()
         try:
             if self._started:
@@ -166,8 +166,8 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
 
     def _too_long(self) -> Status:
         self.context.preempted = True  # it may be broken off in a motion
-        message = f"it took longer than {self.LONGEST_S:g} s, the longest a {type(self).__name__} may take"
-        evidence = {"limit_s": self.LONGEST_S, "since_s": self._begun_s}
+        message = f"it took longer than {self.MAX_DURATION_S:g} s, the longest a {type(self).__name__} may take"
+        evidence = {"limit_s": self.MAX_DURATION_S, "since_s": self._begun_s}
         return self._fail(Reason("skill_timeout", message, evidence, "it hangs, or its task is larger than foreseen"))
 
     @classmethod

@@ -161,13 +161,13 @@ class Recheck(Skill):
         )
         return (yield from self._touch_one(fingers, float(np.min(half))))
 
-    def _touch_one(self, tool: HeldTool, least_m: float) -> Motion[int | None]:
+    def _touch_one(self, tool: HeldTool, min_m: float) -> Motion[int | None]:
         """Touch a candidate from its side; its index, or None: none is known, or none can be reached.
 
-        `least_m`: the tool reaches at least so far from its middle.
+        `min_m`: the tool reaches at least so far from its middle.
         """
         p = self.params
-        for candidate, start, goal in self._ways(tool, least_m):
+        for candidate, start, goal in self._ways(tool, min_m):
             prober = Prober(self.context, tool, GuardParams())
             try:
                 yield from prober.hop(np.array([*start, 0.0]), tool.floor_z_K_m + p.headroom_m, p.speed_m_s)
@@ -199,7 +199,7 @@ class Recheck(Skill):
             candidate=candidate.index,
         )
 
-    def _ways(self, tool: HeldTool, least_m: float) -> list[tuple[Candidate, Array, Array]]:
+    def _ways(self, tool: HeldTool, min_m: float) -> list[tuple[Candidate, Array, Array]]:
         """(candidate, where to be lowered, where to go) with the most room first; places (2,) in K."""
         p = self.params
         known: tuple[Candidate, ...] = (self.candidates or ()) if p.touch else ()
@@ -217,7 +217,7 @@ class Recheck(Skill):
                 room = min((float(signed_distance(c, start[None])[0]) for c in others), default=np.inf)
                 room = min(room - tool.tip_radius_m, float((half - np.abs(start)).min()) + ROOM_M)
                 if room >= ROOM_M:
-                    goal = edge + out * (least_m - BEYOND_M)
+                    goal = edge + out * (min_m - BEYOND_M)
                     ways.append((-room, len(ways), candidate, start, goal))
         return [(c, start, goal) for _, _, c, start, goal in sorted(ways, key=lambda w: w[:2])][: 2 * len(known)]
 

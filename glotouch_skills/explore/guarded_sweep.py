@@ -41,7 +41,7 @@ class GuardedSweep(Skill):
     Params = GuardedSweepParams
     params: GuardedSweepParams
 
-    NEEDS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
         "search_exhausted": "nothing is left to explore, or to reach",

@@ -41,7 +41,7 @@ class RefineOutline(Skill):
     Params = RefineOutlineParams
     params: RefineOutlineParams
 
-    NEEDS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
         "not_met": "nothing was touched where it should stand, or the trace ended on another object",

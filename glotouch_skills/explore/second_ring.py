@@ -20,7 +20,7 @@ class SecondRingParams(TracingParams):
     share: float = param("Its height, as a share of the touched top's", default=0.6, gt=0.0, lt=1.0)
     apart_m: float = param("... at least so far above the first ring", unit="m", default=0.012, ge=0.005, le=0.1)
     clear_m: float = param("... and so far below the top", unit="m", default=0.010, ge=0.006, le=0.05)
-    most_contacts: int = param("Most contacts of the second ring", default=10, ge=4, le=60)
+    max_contacts: int = param("Most contacts of the second ring", default=10, ge=4, le=60)
     wall_gap_m: float = param("Ball centre kept from the walls", unit="m", default=0.012, ge=0.008, le=0.05)
     hop_m: float = param("A way over the top counts as so much travel", unit="m", default=0.1, ge=0.02, le=1.0)
 
@@ -45,7 +45,7 @@ class SecondRing(Skill):
     Params = SecondRingParams
     params: SecondRingParams
 
-    NEEDS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
         "hard_contact": "the wrench passed a hard limit on the way",

@@ -46,7 +46,7 @@ class TouchTop(Skill):
     Params = TouchTopParams
     params: TouchTopParams
 
-    NEEDS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
         "no_top": "nothing was met above where its sides had been touched",

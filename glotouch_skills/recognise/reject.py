@@ -29,7 +29,7 @@ class Reject(Skill):
     Params = RejectParams
     params: RejectParams
 
-    NEEDS: ClassVar = {"hand": frozenset({"empty"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty"})}
     FAILURES: ClassVar = {"wrong_object": "too many objects were taken in vain"}
 
     made = In(GraspPlan, "how it was taken")

@@ -13,7 +13,7 @@ from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.skill import UNCHANGED, In, Out, Skill, SkillFailed, SkillRun
 from glotouch_skills.common.hand import keeping_clear_of
 from glotouch_skills.common.planning import (
-    LEAST_GAP_M,
+    MIN_GAP_M,
     ClosureParams,
     Squeezing,
     Stance,
@@ -41,9 +41,9 @@ class Squeeze(Skill):
     Params = SqueezeParams
     params: SqueezeParams
 
-    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
-    LEAVES: ClassVar = {"hand": "empty"}
-    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
+    POSTCONDITIONS: ClassVar = {"hand": "empty"}
+    FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
         "nothing_felt": "no closure reached a plateau on anything",
@@ -130,6 +130,6 @@ class Squeeze(Skill):
 def _elsewhere(heights: Array) -> list[float]:
     """For each height another one to try: half way to the next, of the highest half way to the one before."""
     if len(heights) == 1:
-        return [float(heights[0]) + LEAST_GAP_M]
+        return [float(heights[0]) + MIN_GAP_M]
     gaps = np.diff(heights)
     return [*(heights[:-1] + 0.5 * gaps).tolist(), float(heights[-1] - 0.5 * gaps[-1])]

@@ -27,7 +27,7 @@ from glotouch_skills.common.planning import (
 )
 from glotouch_skills.recognise.match import load_target
 
-MOST_IN_VAIN = 4
+MAX_IN_VAIN = 4
 """Closures without a plateau, after which a candidate is left alone: it is not where it was traced."""
 
 STILL_THERE_M = 0.003
@@ -39,7 +39,7 @@ class TouchNextParams(ClosureParams):
 
     target: str = param("The object to find: an STL file, or the name of one in the world's object folder", names="stl")
     confidence: float = param("Probability that is enough", default=0.95, gt=0.5, lt=1.0)
-    least_gain_nats: float = param("Expected gain below which no closure is worth it", default=0.005, ge=0.0)
+    min_gain_nats: float = param("Expected gain below which no closure is worth it", default=0.005, ge=0.0)
 
 
 class TouchNext(Skill):
@@ -55,9 +55,9 @@ class TouchNext(Skill):
     Params = TouchNextParams
     params: TouchNextParams
 
-    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
-    LEAVES: ClassVar = {"hand": "empty"}
-    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
+    POSTCONDITIONS: ClassVar = {"hand": "empty"}
+    FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
         "no_candidates": "there is nothing to touch",
@@ -118,7 +118,7 @@ class TouchNext(Skill):
         self.touchsets, self.decided = touchsets, False
         yield HOLD  # thinking takes longer than a control period; on hardware the arm holds meanwhile
         belief = believe(self._target_model(), touchsets)
-        self._hopeless = frozenset(t.candidate.index for t in touchsets if _in_vain(t) >= MOST_IN_VAIN)
+        self._hopeless = frozenset(t.candidate.index for t in touchsets if _in_vain(t) >= MAX_IN_VAIN)
         why = self._enough(belief)
         chosen = None if why else self._choose(belief, down)
         if chosen is None:
@@ -188,7 +188,7 @@ class TouchNext(Skill):
         closures = [c for o in found for c in (o.closure, *o.after)]
         gains = np.split(expected_gain(belief, closures), np.cumsum([1 + len(o.after) for o in found])[:-1])
         rates = best_rates(found, gains)
-        worth = np.array([g.max() for g in gains]) >= p.least_gain_nats
+        worth = np.array([g.max() for g in gains]) >= p.min_gain_nats
         quick = np.array([1.0 / o.seconds for o in found])
         for score in (
             quick * [o.closure.candidate in self._wanted(belief) for o in found],

@@ -23,7 +23,7 @@ class GraspParams(SkillParams):
     descent_speed_m_s: float = param("Speed down beside the object", unit="m/s", default=0.010, gt=0.0, le=0.04)
     headroom_m: float = param("Fingertips above the floor on the way", unit="m", default=0.14, ge=0.05, le=0.25)
     side_gap_m: float = param("Least gap between open jaw and object", unit="m", default=0.005, ge=0.001, le=0.03)
-    least_aperture_m: float = param("Closed farther than this: nothing held", unit="m", default=0.003, ge=0.0)
+    min_aperture_m: float = param("Closed farther than this: nothing held", unit="m", default=0.003, ge=0.0)
 
 
 class Grasp(Skill):
@@ -39,9 +39,9 @@ class Grasp(Skill):
     Params = GraspParams
     params: GraspParams
 
-    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
-    LEAVES: ClassVar = {"hand": "object"}
-    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
+    POSTCONDITIONS: ClassVar = {"hand": "object"}
+    FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {"no_grasp": "no grasp of the plan could be made; the hand has risen, jaws open"}
 
@@ -100,7 +100,7 @@ class Grasp(Skill):
             raise
         yield from arm.hold(0.1)
         self.event("grasp", aperture_m=state.aperture_m, expected_m=plan.aperture_m, force_N=state.force_N)
-        if state.aperture_m < p.least_aperture_m:
+        if state.aperture_m < p.min_aperture_m:
             yield from arm.jaws(opening, speed_m_s=0.2)
             yield from arm.line(above, p.travel_speed_m_s, check=False)
             raise MotionRefused(

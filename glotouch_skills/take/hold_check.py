@@ -35,8 +35,8 @@ class HoldCheck(Skill):
     Params = HoldCheckParams
     params: HoldCheckParams
 
-    NEEDS: ClassVar = {"hand": frozenset({"object"})}
-    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"object"})}
+    FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
         "lost": "it is not in the hand any more",

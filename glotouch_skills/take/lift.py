@@ -15,8 +15,8 @@ class LiftParams(SkillParams):
 
     height_m: float = param("How far to lift", unit="m", default=0.15, gt=0.0, le=0.3)
     speed_m_s: float = param("Lifting speed", unit="m/s", default=0.06, gt=0.0, le=0.2)
-    least_weight_N: float = param("Less weight than this in the hand: nothing lifted", unit="N", default=0.3, ge=0.0)
-    least_aperture_m: float = param("Closed farther than this: it was lost", unit="m", default=0.003, ge=0.0)
+    min_weight_N: float = param("Less weight than this in the hand: nothing lifted", unit="N", default=0.3, ge=0.0)
+    min_aperture_m: float = param("Closed farther than this: it was lost", unit="m", default=0.003, ge=0.0)
 
 
 class Lift(Skill):
@@ -29,9 +29,9 @@ class Lift(Skill):
     Params = LiftParams
     params: LiftParams
 
-    NEEDS: ClassVar = {"hand": frozenset({"object"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"object"})}
     # `lost` is a verdict by weight and aperture: something light may still be between the pads.
-    AFTER_FAILURE: ClassVar = {"hand": frozenset({"object", "empty"})}
+    FAILURE_STATES: ClassVar = {"hand": frozenset({"object", "empty"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
         "lost": "the jaws are empty at the top",
@@ -48,7 +48,7 @@ class Lift(Skill):
         weight = yield from weigh_N(arm)
         state = self.context.observation.gripper
         self.event("lift", weight_N=weight, aperture_m=state.aperture_m)
-        if weight < p.least_weight_N or state.aperture_m < p.least_aperture_m:
+        if weight < p.min_weight_N or state.aperture_m < p.min_aperture_m:
             raise SkillFailed(
                 "lost",
                 f"{weight:.2f} N hang in the hand and the jaws are {state.aperture_m * 1e3:.1f} mm apart",

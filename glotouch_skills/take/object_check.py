@@ -45,8 +45,8 @@ class ObjectCheck(Skill):
     Params = ObjectCheckParams
     params: ObjectCheckParams
 
-    NEEDS: ClassVar = {"hand": frozenset({"object"})}
-    LEAVES: ClassVar = {"hand": "object"}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"object"})}
+    POSTCONDITIONS: ClassVar = {"hand": "object"}
     USES: ClassVar = frozenset({"arm"})  # it holds the arm while it thinks
     FAILURES: ClassVar = {
         "not_as_felt": "the target is this wide elsewhere, but not where the plan took it",
@@ -107,7 +107,7 @@ class ObjectCheck(Skill):
             f"stop at least {least * 1e3:.1f} mm from there",
             advice="put it back and try the next candidate",
             off_m=off,
-            least_m=least,
+            min_m=least,
             limit_m=p.width_m,
         )
 

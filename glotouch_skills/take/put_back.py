@@ -30,7 +30,7 @@ class PutBackParams(SkillParams):
     lower_speed_m_s: float = param("Speed of setting down", unit="m/s", default=0.008, gt=0.0, le=0.04)
     drop_m: float = param("It may stand so far above its place when it is let go", unit="m", default=0.015, ge=0.0,
                           le=0.05)  # fmt: skip
-    least_aperture_m: float = param("Closed farther than this: nothing held", unit="m", default=0.003, ge=0.0)
+    min_aperture_m: float = param("Closed farther than this: nothing held", unit="m", default=0.003, ge=0.0)
 
 
 class PutBack(Skill):
@@ -46,9 +46,9 @@ class PutBack(Skill):
     Params = PutBackParams
     params: PutBackParams
 
-    NEEDS: ClassVar = {"hand": frozenset({"object", "empty"})}
-    LEAVES: ClassVar = {"hand": "empty"}
-    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"object", "empty"})}
+    POSTCONDITIONS: ClassVar = {"hand": "empty"}
+    FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
         "in_the_way": "it met something high above its place and is still held",
@@ -65,7 +65,7 @@ class PutBack(Skill):
         yield from self._let_jaws_rest()
         apart = arm.aperture_m
         opening = min(max(apart, 0.0) + 0.02, arm.description.gripper.stroke_m)
-        if apart < p.least_aperture_m or made is None:
+        if apart < p.min_aperture_m or made is None:
             yield from arm.jaws(opening)
             return
         opening = min(max(made.opening_m, opening), arm.description.gripper.stroke_m)

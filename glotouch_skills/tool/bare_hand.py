@@ -39,8 +39,8 @@ class BareHand(Skill):
     Params = BareHandParams
     params: BareHandParams
 
-    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
-    LEAVES: ClassVar = {"hand": "fingers"}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
+    POSTCONDITIONS: ClassVar = {"hand": "fingers"}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
         "probe_held": "the probe is in the jaws",

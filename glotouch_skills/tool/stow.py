@@ -10,7 +10,7 @@ from glotouch_bt.skill import UNCHANGED, Skill, SkillFailed, SkillParams, SkillR
 from glotouch_skills.common.hand import GRAVITY_M_S2, RISE_M_S, rise_clear, weigh_N
 from glotouch_skills.common.probe import HELD_TOLERANCE_M, nothing_in_hand, return_probe
 
-LEAST_HELD_M, LEAST_HELD_N = 0.003, 1.0
+MIN_HELD_M, MIN_HELD_N = 0.003, 1.0
 """Jaws farther apart than this that still press hold something."""
 
 
@@ -38,9 +38,9 @@ class Stow(Skill):
     Params = StowParams
     params: StowParams
 
-    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers", "untared", "probe", "object"})}
-    LEAVES: ClassVar = {"hand": "empty"}
-    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "untared"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "untared", "probe", "object"})}
+    POSTCONDITIONS: ClassVar = {"hand": "empty"}
+    FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "untared"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
         "tool_lost": "the probe was dropped on its way into the holder",
@@ -65,7 +65,7 @@ class Stow(Skill):
             )
             self.event("tool", held=False)
             return
-        if not arm.scene.holding_tool and apart > LEAST_HELD_M and pressed > LEAST_HELD_N:
+        if not arm.scene.holding_tool and apart > MIN_HELD_M and pressed > MIN_HELD_N:
             raise SkillFailed(
                 "object_held",
                 f"the jaws are {apart * 1e3:.1f} mm apart and press with {pressed:.0f} N: they keep what they hold",

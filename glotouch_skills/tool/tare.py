@@ -28,7 +28,7 @@ class Tare(Skill):
     params: TareParams
 
     # An object in the hand, whose weight the controller does not know, would be zeroed away.
-    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers", "probe"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "probe"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
         "request_failed": "the sensor could not be zeroed",

@@ -63,7 +63,7 @@ class ToolCalibrate(Skill):
     Params = ToolCalibrateParams
     params: ToolCalibrateParams
 
-    NEEDS: ClassVar = {"hand": frozenset({"probe"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"probe"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
         "no_wall": "the ball met nothing where a wall should be",
@@ -113,7 +113,7 @@ class ToolCalibrate(Skill):
 
     def _rise(self, tool: HeldTool, place: Array) -> Motion[tuple[float, float]]:
         """Up to the touching height; the wrist sensor's latency and its standard deviation, s. Pauses come later."""
-        with self.context.arm.feed.finishing():
+        with self.context.arm.pause_signal.finishing():
             return (yield from self._measured_rise(tool, place))
 
     def _measured_rise(self, tool: HeldTool, place: Array) -> Motion[tuple[float, float]]:

@@ -47,9 +47,9 @@ class ToolCheck(Skill):
     params: ToolCheckParams
 
     # On success it is known to be there, whatever happened before.
-    NEEDS: ClassVar = {"hand": frozenset({"probe", "empty", "untared"})}
-    LEAVES: ClassVar = {"hand": "probe"}
-    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"probe", "empty", "untared"})}
+    POSTCONDITIONS: ClassVar = {"hand": "probe"}
+    FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
         "tool_lost": "the probe is not in the hand",

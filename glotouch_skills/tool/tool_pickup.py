@@ -64,10 +64,10 @@ class ToolPickup(Skill):
     Params = ToolPickupParams
     params: ToolPickupParams
 
-    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers", "untared", "probe"})}
-    LEAVES: ClassVar = {"hand": "probe"}
-    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "empty", "probe"})}
-    PUT_BACK_WITH: ClassVar = {"hand": "tool_return"}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "untared", "probe"})}
+    POSTCONDITIONS: ClassVar = {"hand": "probe"}
+    FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "empty", "probe"})}
+    RESTORED_BY: ClassVar = {"hand": "tool_return"}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
         "no_probe": "the jaws closed on nothing, or on something of another width",

@@ -30,9 +30,9 @@ class ToolReturn(Skill):
     params: ToolReturnParams
 
     # `untared`: let go of, but not yet zeroed without it; nothing but this skill or `tool_pickup` may follow.
-    NEEDS: ClassVar = {"hand": frozenset({"probe", "untared"})}
-    LEAVES: ClassVar = {"hand": "empty"}
-    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "untared"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"probe", "untared"})}
+    POSTCONDITIONS: ClassVar = {"hand": "empty"}
+    FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "untared"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
         "tool_lost": "the probe was dropped on its way into the holder",

@@ -35,7 +35,7 @@ class WristCheck(Skill):
     Params = WristCheckParams
     params: WristCheckParams
 
-    NEEDS: ClassVar = {"hand": frozenset({"empty", "fingers", "probe"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "probe"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = {
         "off_zero": "the wrist does not read nothing in free air",

@@ -54,7 +54,7 @@ def test_nothing_bad_comes_of_some_of_them() -> None:
 @pytest.fixture
 def broken_check(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Lets a test say what reading a mission does."""
-    monkeypatch.setattr(trial_module, "LONGEST_S", 0.3)
+    monkeypatch.setattr(trial_module, "MAX_DURATION_S", 0.3)
     return monkeypatch
 
 

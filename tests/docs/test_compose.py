@@ -16,7 +16,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"^```(?P<language>\w+)(?: file=(?P<file>\S+))?\n(?P<body>.*?)^```$", re.MULTILINE | re.DOTALL)
 COMMANDS = {"pip": "pip", "pytest": "pytest", "glotouch": "glotouch_bt.cli"}
-LONGEST_S = 120.0
+MAX_DURATION_S = 120.0
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def test_the_page_is_true(tmp_path: Path) -> None:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            timeout=LONGEST_S,
+            timeout=MAX_DURATION_S,
             check=False,
         )
         said = f"$ {step.body}\n{done.stdout}"

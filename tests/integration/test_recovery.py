@@ -129,7 +129,7 @@ def planned(*plans: GraspPlan) -> type[Skill]:
     class Sure(Skill):
         """Writes a plan. FAILURE `not_recognised`: it has no more."""
 
-        LEAVES: ClassVar = {}
+        POSTCONDITIONS: ClassVar = {}
         plan = Out(GraspPlan, "how to grasp it")
         candidates = Out(tuple, "what is known")
         touchsets = Out(tuple, "what was felt", element=TouchSet)
@@ -224,7 +224,7 @@ selector:
 
 def test_jaws_that_stalled_on_the_handle_close_again(run: Run) -> None:
     tree = "sequence:\n  - subtree: {file: SUBTREES/take_probe.yaml, ports: {tool: tool}}\n  - tool_return"
-    done = run(tree, "  - {fault: grip_short, with: {least_m: 0.03}, when: {node: tool_pickup}, for: node}", **ONE)
+    done = run(tree, "  - {fault: grip_short, with: {min_m: 0.03}, when: {node: tool_pickup}, for: node}", **ONE)
     assert done.outcome.status == "success", done.outcome.reasons
     assert done.notes.codes() == ["no_probe"]
     assert done.referee.probe_in_holder()

@@ -177,7 +177,7 @@ def test_a_real_skill_runs_among_scripted_ones(mission: Make, fake_robot: Callab
 
 
 def test_a_mission_that_does_not_end_is_broken_off(mission: Make) -> None:
-    run = run_scripted(mission("\n  repeat: {times: 1000000, do: find}\n"), most_ticks=50)
+    run = run_scripted(mission("\n  repeat: {times: 1000000, do: find}\n"), max_ticks=50)
     assert isinstance(run.error, RunsAway)
 
 

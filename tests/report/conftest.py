@@ -256,7 +256,7 @@ def squeeze(clock: Clock, candidate: Candidate, rng: np.random.Generator) -> Tou
 
 
 def ranking(made: Made) -> dict[str, object]:
-    """As recognition's Ranking, journaled."""
+    """As recognition's Ranking, recorded."""
     losses = {0: 1.312, 1: 2.4, 2: 1.957, 3: 0.4325, 4: 0.911}
     matches = []
     for index in sorted(losses, key=lambda i: losses[i]):

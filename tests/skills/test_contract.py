@@ -86,15 +86,17 @@ def test_the_docstring_names_no_other_failure(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_declared_states_fit_together(name: str) -> None:
     skill = SHELF[name]
-    assert set(skill.LEAVES) | set(skill.AFTER_FAILURE) <= set(skill.NEEDS), "what it changes it must ask for"
-    for resource, states in skill.NEEDS.items():
+    assert set(skill.POSTCONDITIONS) | set(skill.FAILURE_STATES) <= set(skill.PRECONDITIONS), (
+        "what it changes it must ask for"
+    )
+    for resource, states in skill.PRECONDITIONS.items():
         assert states
         assert UNCHANGED not in states
-        assert skill.LEAVES.get(resource) != UNCHANGED
-    for resource in skill.PUT_BACK_WITH:
-        back = SHELF[skill.PUT_BACK_WITH[resource]]
-        assert skill.LEAVES[resource] in back.NEEDS[resource]
-        assert back.LEAVES[resource] != skill.LEAVES[resource]
+        assert skill.POSTCONDITIONS.get(resource) != UNCHANGED
+    for resource in skill.RESTORED_BY:
+        back = SHELF[skill.RESTORED_BY[resource]]
+        assert skill.POSTCONDITIONS[resource] in back.PRECONDITIONS[resource]
+        assert back.POSTCONDITIONS[resource] != skill.POSTCONDITIONS[resource]
 
 
 class _Undeclared(Skill):

@@ -18,7 +18,7 @@ from glotouch_backends.mujoco.model import STEP_S
 from glotouch_bt.robot import Array
 
 STREAM_S = 0.010  # a setpoint is reached no sooner than this: the interval that setpoints are streamed at
-LONGEST_S = 60.0
+MAX_DURATION_S = 60.0
 basis = lru_cache(maxsize=64)(hermite)
 
 
@@ -39,7 +39,7 @@ def cubic_extremes(delta: Array, v0: Array, v1: Array, time_s: float) -> tuple[A
 def shortest(fits: Callable[[float], bool]) -> float:
     """The shortest time, on a grid of 2 %, for which `fits` holds; the streaming interval at least."""
     time_s = STREAM_S
-    while not fits(time_s) and time_s < LONGEST_S:
+    while not fits(time_s) and time_s < MAX_DURATION_S:
         time_s *= 1.02
     return time_s
 

@@ -7,7 +7,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from glotouch_bt.robot import Array
 
-LEAST_VOLUME_M3 = 1e-12
+MIN_VOLUME_M3 = 1e-12
 """Parts below 0.001 mm3 are crumbs of the cutting; MuJoCo refuses to compile a mesh without volume."""
 
 
@@ -30,7 +30,7 @@ def trimmed_hull(points: Array, max_vertices: int, tolerance_m: float) -> Array 
         hull = ConvexHull(points)
     except (QhullError, ValueError):
         return None
-    if hull.volume < LEAST_VOLUME_M3:
+    if hull.volume < MIN_VOLUME_M3:
         return None
     vertices = np.asarray(points[hull.vertices], dtype=np.float64)
     chosen = _first_simplex(vertices)

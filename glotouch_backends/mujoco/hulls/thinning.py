@@ -8,20 +8,20 @@ import numpy.typing as npt
 from glotouch_bt.robot import Array
 from glotouch_bt.robot.scene import Mesh
 
-MOST_FACES = 20_000
+MAX_FACES = 20_000
 """A lumpy ball of 100 000 triangles took 140 s to cut, thinned to 16 000 it took 13 s, and the parts
 bulged alike (0.18 mm)."""
 FIRST_CELL_M, GROWTH = 0.0004, 1.25
 
 
 def thinned(mesh: Mesh) -> tuple[Array, npt.NDArray[np.int64]]:
-    """(vertices (v, 3) m, faces (f, 3)) of a mesh as it is, or with at most `MOST_FACES`.
+    """(vertices (v, 3) m, faces (f, 3)) of a mesh as it is, or with at most `MAX_FACES`.
 
     Vertex clustering (Rossignac and Borrel 1993): all vertices in one cell of a grid become their mean; cells grow
     until the faces are few enough. Smooth surfaces lose far less than a cell, as their vertices move along them.
     """
     vertices, faces, cell_m = np.asarray(mesh.vertices_m), np.asarray(mesh.faces), FIRST_CELL_M
-    while len(faces) > MOST_FACES:
+    while len(faces) > MAX_FACES:
         vertices, faces = _clustered(mesh, cell_m)
         cell_m *= GROWTH
     return vertices, faces

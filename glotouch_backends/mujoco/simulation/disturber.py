@@ -24,7 +24,7 @@ LIFT_M = 0.002
 """What is put down is put down from so high."""
 WAY_STEP_M, TURN_STEP_RAD = 0.002, np.deg2rad(5.0)
 """How finely a way is looked at: the probe's shaft is three times as thick as the first."""
-LEAST_FRICTION = 0.3
+MIN_FRICTION = 0.3
 """A knocked object slides no farther than with this coefficient."""
 
 
@@ -55,7 +55,7 @@ class MujocoDisturber:
         r, velocity = self._robot, np.asarray(velocity_B_m_s, dtype=np.float64)
         body = r.handles.object_bodies[index]
         speed = float(np.linalg.norm(velocity))
-        far = velocity * speed / (2.0 * LEAST_FRICTION * GRAVITY_M_S2)
+        far = velocity * speed / (2.0 * MIN_FRICTION * GRAVITY_M_S2)
         pose, count = self._pose(index), int(np.ceil(np.linalg.norm(far) / WAY_STEP_M))
         steps = np.linspace(0.0, 1.0, count + 1)[1:, None] * np.array([*far, 0.0])
         self._room.require({body}, [{body: Pose(pose.position_m + s, pose.quat)} for s in steps], rests=False)

@@ -47,7 +47,7 @@ BULKY = ("bvh_", "mesh_", "tex_", "hfield_", "skin_", "flex", "names", "paths", 
 DRAWN_ONLY = ("bvh_active", "bvh_aabb_dyn")
 
 
-class Keeper:
+class SnapshotStore:
     """Takes and puts back the state of one robot.
 
     Args:

@@ -102,7 +102,7 @@ def _tilt(pose: Pose) -> float:
 
 
 def from_json(hint: Any, value: Any) -> Any:
-    """A journaled value as what it was: `mission.mcap_json.to_json` backwards, by the type that is wanted.
+    """A recorded value as what it was: `mission.mcap_json.to_json` backwards, by the type that is wanted.
 
     Args:
         hint: A dataclass, or the type of one of its fields.

@@ -27,7 +27,7 @@ from glotouch_bt.perception.touch import Candidate
 from glotouch_skills.explore import GuardedSweepParams, OrbitProbeParams, RefineOutlineParams
 
 BUDGET_M = 8.0
-MOST_MOVES = 5000
+MAX_MOVES = 5000
 """No exploration needs so many; refused moves cost no travel, so the budget alone would not end it."""
 
 
@@ -77,7 +77,7 @@ class _Budget:
     def execute(self, move: Move) -> Felt:
         """As the world does."""
         self._moves += 1
-        if self._world.travel_m >= self._budget_m or self._moves > MOST_MOVES:
+        if self._world.travel_m >= self._budget_m or self._moves > MAX_MOVES:
             raise _OutOfBudget
         return self._world.execute(move)
 

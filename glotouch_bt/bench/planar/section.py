@@ -180,7 +180,7 @@ def _section(key: _Keyed, probe: Probe, height_m: float) -> FeltSection:
     corners = np.concatenate(shrunk)
     hull = ConvexHull(corners)
     polygon = corners[hull.vertices]
-    size, yaw = least_rectangle(polygon)
+    size, yaw = min_rectangle(polygon)
     return FeltSection(
         name=mesh.name,
         side=side,
@@ -310,7 +310,7 @@ def centre_of_area(polygon: Array) -> Array:
     return np.asarray((both * cross[:, None]).sum(axis=0) / (3.0 * cross.sum()))
 
 
-def least_rectangle(hull: Array) -> tuple[tuple[float, float], float]:
+def min_rectangle(hull: Array) -> tuple[tuple[float, float], float]:
     """(long, short) side of the rectangle of least area round a convex polygon, and the long side's direction, rad.
 
     One side lies along an edge of the polygon (Freeman and Shapira, CACM 18, 1975).

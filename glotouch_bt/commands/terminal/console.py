@@ -16,7 +16,7 @@ from rich.text import Text
 
 if TYPE_CHECKING:
     from glotouch_bt.mission import Mission
-    from glotouch_bt.mission.record import Tally
+    from glotouch_bt.mission.record import RunSummary
     from glotouch_bt.run import RunResult
 
 REFRESH_S = 0.1
@@ -53,16 +53,18 @@ class RunProgress:
             self._live = Live(console=self._console, auto_refresh=False, transient=True)
             self._live.start()
 
-    def update(self, robot_s: float, tally: Tally) -> None:
+    def update(self, robot_s: float, summary: RunSummary) -> None:
         """Show where the run is."""
         if self._quiet:
             return
-        node = tally.node.rsplit("/", 1)[-1]
-        line = f"t = {robot_s:6.1f} s  {node:<14} contacts {tally.contacts:3d}  candidates {len(tally.candidates):2d}"
-        if tally.last_event[1] in ("pause", "paused"):
-            line += "  PAUSED (p goes on)" if tally.last_event[1] == "paused" else "  pausing"
+        node = summary.node.rsplit("/", 1)[-1]
+        line = (
+            f"t = {robot_s:6.1f} s  {node:<14} contacts {summary.contacts:3d}  candidates {len(summary.candidates):2d}"
+        )
+        if summary.last_event[1] in ("pause", "paused"):
+            line += "  PAUSED (p goes on)" if summary.last_event[1] == "paused" else "  pausing"
         else:
-            line += f"  last: {tally.last_event[1]}" if tally.last_event[1] else ""
+            line += f"  last: {summary.last_event[1]}" if summary.last_event[1] else ""
         now = time.perf_counter()
         if self._live is not None:
             if now - self._shown_s >= REFRESH_S:

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from glotouch_bt.mission.spec import Finding
 
-MOST_STEPS = 8
+MAX_STEPS = 8
 _COLOUR = {"error": "bold red", "warning": "bold yellow"}
 
 
@@ -52,8 +52,8 @@ def path_in_words(path: tuple[str, ...]) -> str:
         steps.append(f"{step} ×{times}" if times > 1 else step)
     odd = [i for i, s in enumerate(steps) if not (s.endswith((" ok", " holds", " has no item")))]
     first = min(odd, default=len(steps))
-    if first > MOST_STEPS:
-        steps = [steps[0], f"({first - MOST_STEPS // 2 - 1} more ok)", *steps[first - MOST_STEPS // 2 :]]
+    if first > MAX_STEPS:
+        steps = [steps[0], f"({first - MAX_STEPS // 2 - 1} more ok)", *steps[first - MAX_STEPS // 2 :]]
     return " > ".join(steps)
 
 

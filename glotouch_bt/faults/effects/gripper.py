@@ -37,7 +37,7 @@ class ShortParams(FaultParams):
     """Parameters of `grip_short`."""
 
     short_m: float = param("The jaws stop so far before what they are told", unit="m", default=0.004, gt=0.0, le=0.08)
-    least_m: float = param("and never close farther than this", unit="m", default=0.0, ge=0.0, le=0.08)
+    min_m: float = param("and never close farther than this", unit="m", default=0.0, ge=0.0, le=0.08)
 
 
 class Short(Effect):
@@ -52,7 +52,7 @@ class Short(Effect):
         if asked is None or asked.aperture_m >= self.scene.sensed.gripper.aperture_m:
             return command
         stroke = self.scene.description.gripper.stroke_m
-        aperture = min(max(asked.aperture_m + self.params.short_m, self.params.least_m), stroke)
+        aperture = min(max(asked.aperture_m + self.params.short_m, self.params.min_m), stroke)
         return replace(command, gripper=replace(asked, aperture_m=aperture))
 
 

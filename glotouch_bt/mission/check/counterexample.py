@@ -29,7 +29,7 @@ from glotouch_bt.mission.spec import (
 )
 from glotouch_bt.skill import UNCHANGED
 
-MOST_STATES, MOST_STEPS = 30_000, 120_000
+MAX_STATES, MAX_STEPS = 30_000, 120_000
 """A search that sees more states gives up, and so do all searches of a check that have taken the second together, some
 2 s: the finding then stands without a path."""
 OUT_OF_PATIENCE = 3
@@ -73,7 +73,7 @@ class _At:
 class Patience:
     """How many steps, seen states or new ones, the searches of one check may still take together."""
 
-    steps: int = MOST_STEPS
+    steps: int = MAX_STEPS
 
 
 def shortest_path(flow: Flow, goal: Goal, patience: Patience | None = None) -> tuple[str, ...]:
@@ -115,7 +115,7 @@ class _Search:
         for at in self._enter(self._flow.tree, (), first):
             if found := see(at, None, ""):
                 return self._told(found, came)
-        while queue and len(came) < MOST_STATES and patience.steps > 0:
+        while queue and len(came) < MAX_STATES and patience.steps > 0:
             here = queue.popleft()
             if here.done:
                 continue
@@ -374,8 +374,8 @@ class _Search:
         for resource, variable in self._variables.resources.items():
             if variable not in self._index:
                 continue
-            leaves = skill.LEAVES.get(resource)
-            after = set(skill.AFTER_FAILURE.get(resource, {UNCHANGED, leaves or UNCHANGED}))
+            leaves = skill.POSTCONDITIONS.get(resource)
+            after = set(skill.FAILURE_STATES.get(resource, {UNCHANGED, leaves or UNCHANGED}))
             names = {leaves or UNCHANGED} if how == "success" else after
             if how == "running":
                 names |= {UNCHANGED, leaves or UNCHANGED}

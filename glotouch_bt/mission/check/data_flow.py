@@ -153,8 +153,8 @@ class Flow:
             else:
                 failure = sets.allow(failure, variable, (bad,))
         for resource, variable in self.variables.resources.items():
-            leaves = skill.LEAVES.get(resource)
-            after = skill.AFTER_FAILURE.get(resource, frozenset({UNCHANGED, leaves or UNCHANGED}))
+            leaves = skill.POSTCONDITIONS.get(resource)
+            after = skill.FAILURE_STATES.get(resource, frozenset({UNCHANGED, leaves or UNCHANGED}))
             states = [self.variables.state(resource, s) for s in after - {UNCHANGED}]
             if UNCHANGED in after:
                 failure = sets.allow(failure, variable, states)
@@ -227,8 +227,8 @@ class Flow:
                     effects.setdefault(variables.keys[source.key], set()).add(UNSET)
             if below.skill_type is not None:
                 skill = below.skill_type
-                for resource in {*skill.LEAVES, *skill.AFTER_FAILURE}:
-                    after = {*skill.AFTER_FAILURE.get(resource, ()), skill.LEAVES.get(resource, UNCHANGED)}
+                for resource in {*skill.POSTCONDITIONS, *skill.FAILURE_STATES}:
+                    after = {*skill.FAILURE_STATES.get(resource, ()), skill.POSTCONDITIONS.get(resource, UNCHANGED)}
                     values = effects.setdefault(variables.resources[resource], set())
                     values.update(variables.state(resource, s) for s in after - {UNCHANGED})
         return effects

@@ -106,7 +106,7 @@ def demands_of(node: NodeSpec, variables: Variables) -> Iterator[Demand]:
             optional: Literal["not always", "allowed"] = "allowed" if wire.place == node.place else "not always"
             element = getattr(getattr(skill, port, None), "element", None) or object
             yield look(port, "never" if info.required else optional, info.data_type, unit_of_name(port), element)
-        for resource, states in skill.NEEDS.items():
+        for resource, states in skill.PRECONDITIONS.items():
             good = frozenset(variables.state(resource, s) for s in states)
             yield Demand(
                 node, resource, resource, variables.resources[resource], node.place, good, "allowed", frozenset(states)

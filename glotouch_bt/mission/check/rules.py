@@ -25,7 +25,7 @@ from glotouch_bt.mission.check.state_variables import (
 )
 from glotouch_bt.mission.spec import Findings, ForEachSettings, NodeSpec, Place
 
-MOST_PATHS = 40
+MAX_PATHS = 40
 """Findings beyond so many are reported without a path."""
 DEEPEST_PYTHON = 50_000
 
@@ -174,7 +174,7 @@ class _Judge:
 
     def _search(self, flow: Flow, goal: Goal) -> tuple[str, ...]:
         self._paths += 1
-        return shortest_path(flow, goal, self._patience) if self._paths <= MOST_PATHS else ()
+        return shortest_path(flow, goal, self._patience) if self._paths <= MAX_PATHS else ()
 
     # -- the rest ----------------------------------------------------------------------------------------------------
 
@@ -223,13 +223,13 @@ class _Judge:
                 continue
             for node in tree.walk():
                 skill = node.skill_type
-                if skill is None or resource not in skill.PUT_BACK_WITH:
+                if skill is None or resource not in skill.RESTORED_BY:
                     continue
-                left = skill.LEAVES[resource]
+                left = skill.POSTCONDITIONS[resource]
                 value = variables.state(resource, left)
                 if value in found:
                     what = f"the mission may end in success with the {resource} {left!r}, taken by {node.name!r}"
-                    back = skill.PUT_BACK_WITH[resource]
+                    back = skill.RESTORED_BY[resource]
                     valid = f"{back} before the end, or `leaves: {{{resource}: {left}}}` at the top"
                     path = self._search(self._exact, Goal(None, "", variable, frozenset({value})))
                     self._findings.add(node.place, "not_put_back", what, valid=valid, path=path, node=node.name)

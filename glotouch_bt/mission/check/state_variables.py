@@ -104,10 +104,10 @@ def _states(tree: NodeSpec) -> dict[str, list[str]]:
         skill = node.skill_type
         if skill is None:
             continue
-        for table in (skill.NEEDS, skill.AFTER_FAILURE):
+        for table in (skill.PRECONDITIONS, skill.FAILURE_STATES):
             for resource, named in table.items():
                 states.setdefault(resource, {FIRST_STATE: None}).update(dict.fromkeys(sorted(named - {UNCHANGED})))
-        for resource, one in skill.LEAVES.items():
+        for resource, one in skill.POSTCONDITIONS.items():
             states.setdefault(resource, {FIRST_STATE: None})[one] = None
     return {resource: list(named) for resource, named in states.items()}
 

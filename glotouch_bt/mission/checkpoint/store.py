@@ -34,7 +34,7 @@ CREATE TABLE checkpoint (
     begun TEXT NOT NULL,         -- JSON: nodes that began since the row before
     lacking TEXT NOT NULL,       -- JSON: {what: why it could not be kept}
     record_bytes INTEGER,        -- length of run.mcap up to here
-    state BLOB NOT NULL,         -- tree, ports, arm, tally, reasons
+    state BLOB NOT NULL,         -- tree, ports, arm, summary, reasons
     world BLOB                   -- the simulated world, or NULL
 );
 """

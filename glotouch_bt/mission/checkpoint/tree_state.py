@@ -58,7 +58,7 @@ def _node_state(node: Behaviour, tree: BuiltTree) -> dict[str, Any]:
     return state
 
 
-class TreeAtWork:
+class TreeState:
     """A fresh tree brought to where another one stood; tick it once, then call `done`.
 
     Args:

@@ -37,5 +37,5 @@ def _hand_at(tree: BuiltTree, path: str) -> frozenset[str] | None:
     """What may be in the hand when the first skill at a node begins; None: it does not say."""
     for node in tree.root.iterate():
         if isinstance(node, Skill) and (tree.paths[node.id] + "/").startswith(path + "/"):
-            return node.NEEDS.get("hand")
+            return node.PRECONDITIONS.get("hand")
     return None

@@ -16,9 +16,9 @@ from py_trees.common import Status
 
 from glotouch_bt.mission.checkpoint.codec import CannotKeep, encode, encode_parts
 from glotouch_bt.mission.checkpoint.store import CheckpointFile, Row
-from glotouch_bt.mission.checkpoint.tree_state import TreeAtWork, start_at, tree_state
+from glotouch_bt.mission.checkpoint.tree_state import TreeState, start_at, tree_state
 from glotouch_bt.mission.checkpoint.world_check import world_check
-from glotouch_bt.mission.record import JournaledRequests, Tally
+from glotouch_bt.mission.record import RecordedRequests, RunSummary
 from glotouch_bt.mission.tree import BuiltTree, ReasonBook
 from glotouch_bt.robot import BadInput, Robot
 from glotouch_bt.skill import Context, Skill
@@ -37,7 +37,7 @@ class Flushed(Protocol):
 
 
 @dataclass
-class Work:
+class RunState:
     """A mission at work: what the loop holds, as checkpoints see it. All of it is the loop's own.
 
     Attributes:
@@ -51,9 +51,9 @@ class Work:
     tree: BuiltTree
     context: Context
     robot: Robot
-    tally: Tally
+    summary: RunSummary
     book: ReasonBook
-    requests: JournaledRequests
+    requests: RecordedRequests
     status: dict[object, Status]
     written: dict[str, object] = field(default_factory=dict)
     guards: dict[str, int] = field(default_factory=dict)
@@ -62,7 +62,7 @@ class Work:
 
 
 @dataclass(frozen=True)
-class TakenUp:
+class ResumePoint:
     """A checkpoint to go on from.
 
     Attributes:
@@ -78,7 +78,7 @@ class TakenUp:
     start: str = ""
 
 
-class Keeper:
+class CheckpointWriter:
     """Writes a checkpoint whenever a skill has ended.
 
     Args:
@@ -100,7 +100,7 @@ class Keeper:
         """These nodes run from now on."""
         self._begun.update(dict.fromkeys(paths))
 
-    def keep(self, work: Work, finished: Sequence[Behaviour]) -> None:
+    def keep(self, work: RunState, finished: Sequence[Behaviour]) -> None:
         """Write a checkpoint; the last of `finished` has just ended, none: before the first tick.
 
         Raises:
@@ -130,8 +130,8 @@ class Keeper:
         self._begun.clear()
         self._number += 1
 
-    def _encoded(self, work: Work, finished: Sequence[Behaviour]) -> bytes:
-        work.tally.settle()
+    def _encoded(self, work: RunState, finished: Sequence[Behaviour]) -> bytes:
+        work.summary.settle()
         paths, storage, space = work.tree.paths, Blackboard.storage, work.tree.namespace
         values = {k: storage[f"{space}/{k}"] for k in work.tree.keys if f"{space}/{k}" in storage}
         parts: dict[str, object] = {f"port {key}": value for key, value in values.items()}
@@ -143,7 +143,7 @@ class Keeper:
             "arm": work.context.arm.state(),
             "preempted": work.context.preempted,
             "paused_s": work.context.paused_s,
-            "tally": work.tally.state(),
+            "summary": work.summary.state(),
             "reasons": {paths[i]: failure for i, failure in work.book.noted().items()},
             "status": {paths[i]: status.value for i, status in work.status.items()},
             "ticks": work.ticks,
@@ -156,25 +156,25 @@ class Keeper:
         return encoded
 
 
-class Keeping:
+class CheckpointHooks:
     """What a run's loop tells of itself, and what it is told, so that it can be kept and gone on with.
 
     Args:
-        keeper: Writes checkpoints; None: nobody does.
-        taken_up: A checkpoint to go on from, or None.
+        checkpoints: Writes checkpoints; None: nobody does.
+        resume_point: A checkpoint to go on from, or None.
 
     Attributes:
         look_first: A skill to be run before the mission goes on, or None.
     """
 
-    def __init__(self, keeper: Keeper | None = None, taken_up: TakenUp | None = None) -> None:
-        self._keeper, self._taken_up = keeper, taken_up
-        self._work: Work | None = None
-        self._resumed: TreeAtWork | None = None
+    def __init__(self, checkpoints: CheckpointWriter | None = None, resume_point: ResumePoint | None = None) -> None:
+        self._keeper, self._taken_up = checkpoints, resume_point
+        self._work: RunState | None = None
+        self._resumed: TreeState | None = None
         self._finished: list[Behaviour] = []
         self.look_first: Skill | None = None
 
-    def begin(self, work: Work) -> None:
+    def begin(self, work: RunState) -> None:
         """Before the first tick: take up the checkpoint, or write the first one.
 
         Raises:
@@ -214,14 +214,14 @@ class Keeping:
             self._keeper.began(paths)
 
 
-def take_up(work: Work, kept: TakenUp) -> TreeAtWork | None:
+def take_up(work: RunState, kept: ResumePoint) -> TreeState | None:
     """Bring a mission that is about to begin to a checkpoint; returns what must be told when its first tick is over.
 
     Raises:
         BadInput: The checkpoint is of another tree, or lacks what the tree needs.
     """
     state, tree, context = kept.state, work.tree, work.context
-    for name in ("tree", "arm", "tally", "reasons", "status", "elapsed"):
+    for name in ("tree", "arm", "summary", "reasons", "status", "elapsed"):
         if name not in state:
             raise BadInput(f"checkpoint {kept.number} lacks the state of the {name}: it could not be kept")
     for name, value in state.items():
@@ -243,12 +243,12 @@ def take_up(work: Work, kept: TakenUp) -> TreeAtWork | None:
         raise BadInput(f"checkpoint {kept.number} is of another tree (it knows {odd[0]})")
     work.guards.update(state["guards"])
     work.book.take_up({ids[p]: failure for p, failure in state["reasons"].items()})
-    work.tally.take_up(state["tally"])
-    resumed: TreeAtWork | None = None
+    work.summary.take_up(state["summary"])
+    resumed: TreeState | None = None
     if kept.start:
         start_at(tree, state["tree"], kept.start)
     else:
-        resumed = TreeAtWork(tree, state["tree"])
+        resumed = TreeState(tree, state["tree"])
     for path, status in state["status"].items():
         work.status[ids[path]] = Status(status)
     return resumed

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Literal
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from glotouch_bt.mission.checkpoint import Keeper, Keeping, TakenUp, Work, WorldChanged
+from glotouch_bt.mission.checkpoint import CheckpointHooks, CheckpointWriter, ResumePoint, RunState, WorldChanged
 from glotouch_bt.mission.execution.abort_reason import why_aborted
 from glotouch_bt.mission.execution.control import Control, Preempted
 from glotouch_bt.mission.execution.pause_gate import PauseGate
 from glotouch_bt.mission.execution.safe_stop import end_high
 from glotouch_bt.mission.execution.watchdog import STUCK_S, SkillHung, Stuck, Watchdog, deferred_interrupt
 from glotouch_bt.mission.load import Mission
-from glotouch_bt.mission.record import JournaledRequests, Record, Rounding, Tally
+from glotouch_bt.mission.record import Record, RecordedRequests, Rounding, RunSummary
 from glotouch_bt.mission.tree import BuiltTree, Failure, ReasonBook, build_tree, sensed
 from glotouch_bt.robot import HOLD, Command, GuardTripped, Observation, Robot, World
 from glotouch_bt.robot.supervision import Finding, SupervisionLimits, Supervisor
@@ -47,7 +47,7 @@ class Outcome:
     """
 
     status: Literal["success", "failure", "aborted"]
-    found: Tally
+    found: RunSummary
     chain: list[Failure] = field(default_factory=list)
     error: BaseException | None = None
     start_s: float = 0.0
@@ -80,14 +80,14 @@ def run_mission(
     record: Record,
     *,
     make_arm: Callable[[Robot, World], Arm] = default_arm,
-    on_progress: Callable[[float, Tally], None] | None = None,
+    on_progress: Callable[[float, RunSummary], None] | None = None,
     timeout_s: float | None = None,
     control: Control | None = None,
     supervision: SupervisionLimits | None = None,
     stuck_s: float = STUCK_S,
     on_lost: Callable[[Stuck, Outcome], None] | None = None,
-    keeper: Keeper | None = None,
-    taken_up: TakenUp | None = None,
+    checkpoints: CheckpointWriter | None = None,
+    resume_point: ResumePoint | None = None,
 ) -> Outcome:
     """Tick a mission to its end.
 
@@ -100,34 +100,34 @@ def run_mission(
         robot: An open robot; it is supervised (`robot.supervision`) from the first cycle on.
         record: Where everything sensed, commanded, ticked and decided goes; not closed here.
         make_arm: Makes the motion generators.
-        on_progress: Called about twice a second of robot time with (robot time since start, tally).
+        on_progress: Called about twice a second of robot time with (robot time since start, summary).
         timeout_s: Longest duration on the robot's clock, without pauses (default: the mission's).
         control: Who may pause and stop it.
         supervision: What the guards tolerate.
         stuck_s: Longest wall time of one tick and its cycle.
         on_lost: Called, from another thread, when a tick does not come back and cannot be broken off; it should write
             what it can and end the process.
-        keeper: Writes a checkpoint whenever a skill has ended.
-        taken_up: A checkpoint to go on from; where it says so, the robot has been put back to it already.
+        checkpoints: Writes a checkpoint whenever a skill has ended.
+        resume_point: A checkpoint to go on from; where it says so, the robot has been put back to it already.
     """
-    tally, device = Tally(record), robot
+    summary, device = RunSummary(record), robot
     robot = supervisor = Supervisor(robot, supervision)
-    supervisor.on_finding = lambda finding: _note_finding(tally, finding)
+    supervisor.on_finding = lambda finding: _note_finding(summary, finding)
     arm = make_arm(robot, mission.world)
     observation = robot.observe()
     rounding = Rounding(observation.q.shape[1])
     observation = rounding(observation)
     arm.sync(observation)
-    if taken_up is None or not taken_up.same_world:
-        tally.block(observation, HOLD)  # a replay begins where the robot did
+    if resume_point is None or not resume_point.same_world:
+        summary.block(observation, HOLD)  # a replay begins where the robot did
     context = Context(
-        world=mission.world, arm=arm, requests=robot, journal=tally, observation=observation, command=HOLD
+        world=mission.world, arm=arm, requests=robot, journal=summary, observation=observation, command=HOLD
     )
-    context.requests = requests = JournaledRequests(robot, tally, lambda: context.observation.now_s)
+    context.requests = requests = RecordedRequests(robot, summary, lambda: context.observation.now_s)
     tree = build_tree(mission.tree, context, mission.name)
-    outcome = Outcome("aborted", tally, start_s=observation.now_s)
-    loop = _Loop(tree, context, robot, tally, rounding, on_progress, control or Control(), outcome)
-    loop.begin(device, requests, supervisor.counts, Keeping(keeper, taken_up))
+    outcome = Outcome("aborted", summary, start_s=observation.now_s)
+    loop = _Loop(tree, context, robot, summary, rounding, on_progress, control or Control(), outcome)
+    loop.begin(device, requests, supervisor.counts, CheckpointHooks(checkpoints, resume_point))
 
     def lost(stuck: Stuck) -> None:
         if on_lost is not None:
@@ -135,7 +135,7 @@ def run_mission(
             outcome.abort(stuck.error(), stuck.node)
             on_lost(stuck, outcome)
 
-    watchdog = loop.watchdog = Watchdog(robot, lambda: tally.node or mission.name, stuck_s, lost)
+    watchdog = loop.watchdog = Watchdog(robot, lambda: summary.node or mission.name, stuck_s, lost)
     with deferred_interrupt(watchdog) as interrupted:
         try:
             with watchdog:
@@ -151,7 +151,7 @@ def run_mission(
                 supervisor.heed(error)
             outcome.abort(error, error.node if isinstance(error, SkillHung) else loop.node_of(e))
             if isinstance(error, SkillHung):
-                tally.event("stuck", context.observation.now_s, {"node": error.node, "stack": error.stack})
+                summary.event("stuck", context.observation.now_s, {"node": error.node, "stack": error.stack})
         finally:
             interrupted.raising = False
             robot.hold()
@@ -160,14 +160,14 @@ def run_mission(
             interrupted.raising = True  # what a skill does when it is closed may take for ever
             _preempt(tree.root)
             interrupted.raising = False
-            tally.settle()
+            summary.settle()
             tree.forget()
     return outcome
 
 
-def _note_finding(tally: Tally, finding: Finding) -> None:
+def _note_finding(summary: RunSummary, finding: Finding) -> None:
     data = {"guard": finding.guard, "what": finding.what, "value": finding.value, "limit": finding.limit}
-    tally.event("guard", finding.stamp_s, {**data, "node": tally.node, "fatal": finding.fatal})
+    summary.event("guard", finding.stamp_s, {**data, "node": summary.node, "fatal": finding.fatal})
 
 
 def _preempt(root: Behaviour) -> None:
@@ -185,9 +185,9 @@ class _Loop:
         tree: BuiltTree,
         context: Context,
         robot: Robot,
-        tally: Tally,
+        summary: RunSummary,
         rounding: Rounding,
-        on_progress: Callable[[float, Tally], None] | None,
+        on_progress: Callable[[float, RunSummary], None] | None,
         control: Control,
         outcome: Outcome,
     ) -> None:
@@ -196,23 +196,25 @@ class _Loop:
         self._next_progress_s = outcome.start_s
         self._interrupted: Callable[[], bool] = lambda: False
         self.watchdog: Watchdog | None = None
-        self._tree, self._context, self._robot, self._tally = tree, context, robot, tally
+        self._tree, self._context, self._robot, self._summary = tree, context, robot, summary
         self._on_progress = on_progress
         self._book = ReasonBook()
         self._nodes = list(tree.root.iterate())
         self._status: dict[object, Status] = {n.id: Status.INVALID for n in self._nodes}
         self._written: dict[str, object] = {}
-        self._keeping = Keeping()
+        self._keeping = CheckpointHooks()
 
-    def begin(self, device: Robot, requests: JournaledRequests, guards: dict[str, int], keeping: Keeping) -> None:
+    def begin(
+        self, device: Robot, requests: RecordedRequests, guards: dict[str, int], keeping: CheckpointHooks
+    ) -> None:
         """Take up a checkpoint, or write the first one.
 
         Raises:
             BadInput: The checkpoint is not of this mission.
         """
         self._keeping, outcome = keeping, self._outcome
-        held = (self._tree, self._context, device, self._tally, self._book, requests, self._status, self._written)
-        work = Work(*held, guards=guards, start_s=outcome.start_s)
+        held = (self._tree, self._context, device, self._summary, self._book, requests, self._status, self._written)
+        work = RunState(*held, guards=guards, start_s=outcome.start_s)
         keeping.begin(work)
         outcome.start_s, outcome.ticks = work.start_s, work.ticks
 
@@ -247,7 +249,7 @@ class _Loop:
             WorldChanged: It is not as it was.
         """
         context = self._context
-        self._tally.node = skill.name
+        self._summary.node = skill.name
         while True:
             context.command = HOLD
             skill.tick_once()
@@ -260,7 +262,7 @@ class _Loop:
     def end(self, interrupted: Callable[[], bool]) -> None:
         """After a stop: close what runs, bring the arm to rest, raise it if it is free."""
         _preempt(self._tree.root)
-        self._gate.feed.wanted = False
+        self._gate.pause_signal.requested = False
         ending = end_high(self._context)
         try:
             command = next(ending)
@@ -270,7 +272,7 @@ class _Loop:
             self._outcome.ending = end.value
         except Exception as e:
             self._outcome.ending = f"held where it was: {type(e).__name__}: {e}"
-        self._tally.event("ending", self._context.observation.now_s, {"done": self._outcome.ending})
+        self._summary.event("ending", self._context.observation.now_s, {"done": self._outcome.ending})
 
     def _heed(self) -> None:
         """Someone may have asked for an end."""
@@ -284,12 +286,12 @@ class _Loop:
         context, now_s = self._context, self._context.observation.now_s
         observation = self._rounding(self._robot.cycle(command))
         context.observation = observation
-        self._tally.block(observation, command)
+        self._summary.block(observation, command)
         if self.watchdog is not None:
             self.watchdog.beat()
         if self._on_progress is not None and now_s >= self._next_progress_s:
             self._next_progress_s = now_s + PROGRESS_EVERY_S
-            self._on_progress(now_s - self._outcome.start_s, self._tally)
+            self._on_progress(now_s - self._outcome.start_s, self._summary)
         if heed:
             self._heed()
         return observation
@@ -328,7 +330,7 @@ class _Loop:
             if node.status is Status.FAILURE:
                 self._book.note(node, sensed(self._context.observation))
                 if isinstance(node, Skill) and not again:
-                    self._tally.event("failure", now_s, self._book.of(node).as_dict())
+                    self._summary.event("failure", now_s, self._book.of(node).as_dict())
             if node.status is not Status.RUNNING:
                 self._keeping.ended(node, self._outcome.ticks)
         if changed:
@@ -344,17 +346,17 @@ class _Loop:
             changes.append((self._tree.paths[node.id], old, new))
             self._status[node.id] = new
             if new is Status.RUNNING and not node.children:
-                self._tally.node = self._tree.paths[node.id]
+                self._summary.node = self._tree.paths[node.id]
                 if isinstance(node, Skill):
                     self._gate.begins(node.PAUSE)
         if changes:
-            self._tally.tick(now_s, changes)
+            self._summary.tick(now_s, changes)
             self._keeping.began([path for path, _, new in changes if new is Status.RUNNING])
         for key in self._tree.keys:
             value = self._tree.value(key)
             if value is not None and value is not self._written.get(key):
                 self._written[key] = value
-                self._tally.port(now_s, key, value)
+                self._summary.port(now_s, key, value)
 
     def _decide(self, outcome: Outcome, root: Behaviour) -> None:
         if root.status is Status.SUCCESS:

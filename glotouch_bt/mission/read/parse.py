@@ -30,7 +30,7 @@ from glotouch_bt.robot import BadInput
 from glotouch_bt.skill import Skill
 
 KEY = re.compile(r"[a-z][a-z0-9_]*")
-MOST_NODES, DEEPEST_NODE = 3000, 100
+MAX_NODES, DEEPEST_NODE = 3000, 100
 BTCPP = {kind.btcpp: name for name, kind in KINDS.items() if kind.btcpp}
 TITLE, CHILD = {"name": ""}, {"name": "", "do": ""}
 
@@ -39,11 +39,11 @@ def parse_tree(node: Node, scope: Scope) -> NodeSpec:
     """Read one node and everything below it."""
     reading = scope.reading
     reading.nodes += 1
-    if reading.nodes > MOST_NODES or reading.depth >= DEEPEST_NODE:
-        if reading.nodes <= MOST_NODES + 1:
-            what = f"more than {MOST_NODES} nodes, or nested deeper than {DEEPEST_NODE}"
+    if reading.nodes > MAX_NODES or reading.depth >= DEEPEST_NODE:
+        if reading.nodes <= MAX_NODES + 1:
+            what = f"more than {MAX_NODES} nodes, or nested deeper than {DEEPEST_NODE}"
             scope.findings.add(node.place, "too_large", f"the tree has {what} (subtrees included)")
-            reading.nodes = MOST_NODES + 1
+            reading.nodes = MAX_NODES + 1
         return _lost(node)
     reading.depth += 1
     try:

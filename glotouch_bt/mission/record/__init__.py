@@ -4,10 +4,10 @@ from glotouch_bt.mission.record.mcap_json import Json, to_json
 from glotouch_bt.mission.record.mcap_packing import join, unpack
 from glotouch_bt.mission.record.mcap_schemas import EVENT_PREFIX
 from glotouch_bt.mission.record.reading import read_chunks
-from glotouch_bt.mission.record.recorded_requests import REQUEST_DONE, JournaledRequests
+from glotouch_bt.mission.record.recorded_requests import REQUEST_DONE, RecordedRequests
 from glotouch_bt.mission.record.recorder import RESULT_ATTACHMENT, RUN_ATTACHMENT, Recorder
 from glotouch_bt.mission.record.rounding import STAMP_S, Rounding, to_step
-from glotouch_bt.mission.record.run_summary import NullRecord, Record, Tally
+from glotouch_bt.mission.record.run_summary import NullRecord, Record, RunSummary
 
 __all__ = [
     "EVENT_PREFIX",
@@ -15,13 +15,13 @@ __all__ = [
     "RESULT_ATTACHMENT",
     "RUN_ATTACHMENT",
     "STAMP_S",
-    "JournaledRequests",
     "Json",
     "NullRecord",
     "Record",
+    "RecordedRequests",
     "Recorder",
     "Rounding",
-    "Tally",
+    "RunSummary",
     "join",
     "read_chunks",
     "to_json",

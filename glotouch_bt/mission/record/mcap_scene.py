@@ -92,7 +92,7 @@ def event_scene(kind: str, stamp_ns: int, data: Json) -> Iterator[Message]:
 
 
 def _outline(contour: Any) -> list[tuple[float, float]]:
-    """Closed polyline in K of a journaled contour."""
+    """Closed polyline in K of a recorded contour."""
     if contour.get("family") == "free":
         corners = [_floats(p, 2) for p in contour["boundary_K_m"]]
         if len(corners) < 3:

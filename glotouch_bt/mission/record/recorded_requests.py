@@ -20,7 +20,7 @@ class Events(Protocol):
         ...
 
 
-class JournaledRequests:
+class RecordedRequests:
     """Passes requests on to a robot; events say when each was started and when it was first seen to be done.
 
     Args:

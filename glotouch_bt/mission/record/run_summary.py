@@ -50,7 +50,7 @@ class NullRecord:
 _NOT_COUNTED = ("_record", "_pending")
 
 
-class Tally:
+class RunSummary:
     """A record that passes everything on and keeps count.
 
     Attributes:

@@ -19,7 +19,7 @@ from glotouch_bt.mission_testing.scripted import RunsAway, ScriptedRun, run_scri
 from glotouch_bt.mission_testing.standins import port_value, stand_in
 from glotouch_bt.skill import Skill
 
-MOST_TICKS, MOST_STEPS = 3000, 6
+MAX_TICKS, MAX_STEPS = 3000, 6
 RUNS_AWAY = "runs away"
 Rows = Mapping[str, tuple[Outcome, ...]]
 
@@ -211,7 +211,7 @@ class Search:
 
     def _run(self, mission: Mission, rows: Rows) -> ScriptedRun:
         known = {n.name for n in mission.tree.walk() if n.kind == "skill"}
-        return run_scripted(mission, {n: r for n, r in rows.items() if n in known}, most_ticks=MOST_TICKS)
+        return run_scripted(mission, {n: r for n, r in rows.items() if n in known}, max_ticks=MAX_TICKS)
 
     def _differs(self, mutant: Mission, rows: Rows, expected: tuple[Any, ...] | None = None) -> bool:
         here = behaviour(self._run(self._mission, rows)) if expected is None else expected
@@ -269,5 +269,5 @@ def _step(call: Call) -> str:
 
 
 def _rest(run: ScriptedRun, steps: list[str]) -> str:
-    shown = " ".join(steps[:MOST_STEPS]) + (f" and {len(steps) - MOST_STEPS} more" if len(steps) > MOST_STEPS else "")
+    shown = " ".join(steps[:MAX_STEPS]) + (f" and {len(steps) - MAX_STEPS} more" if len(steps) > MAX_STEPS else "")
     return f"{shown or 'no more calls'}: {run.status}{f' ({run.code})' if run.code else ''}"

@@ -19,7 +19,7 @@ from glotouch_bt.perception.touch import (
 from glotouch_bt.perception.touch.outline import OutlineBelief, convex_hull, envelope, polygon_distance
 from glotouch_bt.robot import Array
 
-LEAST_CONTACTS = 3
+MIN_CONTACTS = 3
 """An outline fitted to fewer is a guess."""
 SAME_M = 0.010
 """Contacts this near to the room a known object takes are its own: objects stand farther apart."""
@@ -68,7 +68,7 @@ def admit(
 ) -> Admitted:
     """Add a trace to the map and to the candidates.
 
-    Its way is evidence, its strays are hints. With too few contacts for an outline the first one's place is dropped. A
+    Its way is evidence, its outliers hints. With too few contacts for an outline the first one's place is dropped. A
     trace beside or over a known candidate is more of that one: both are fitted as one, and nothing is counted again.
 
     Args:
@@ -80,8 +80,8 @@ def admit(
         exclusion_m: Margin round it that the search keeps out of.
         part_of: The candidate whose contacts the trace was begun with.
     """
-    belief = belief.with_path(traced.path_K_m).with_hints((*belief.hints, *traced.strays))
-    if traced.outline is None or len(traced.contacts) < LEAST_CONTACTS:
+    belief = belief.with_path(traced.path_K_m).with_hints((*belief.hints, *traced.outliers))
+    if traced.outline is None or len(traced.contacts) < MIN_CONTACTS:
         return Admitted(belief.with_dropped(first.point_K_m), known, None)
     radius = traced.outline.touches.radius_m
     if part_of is not None and traced.continued:

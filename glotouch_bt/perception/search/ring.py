@@ -30,7 +30,7 @@ TRIES = 3
 """Ways down that are tried."""
 OUT_M = np.arange(0.0, 0.12, 0.002)
 """Distances from the middle at which a way down is looked for."""
-LEAST_CONTACTS = 4
+MIN_CONTACTS = 4
 """Fewer contacts higher up say nothing about a centre."""
 SLIM_M = 0.010
 """A higher section may be much smaller than an object: a neck, a handle."""
@@ -80,7 +80,7 @@ def outline_of(contacts: Sequence[Contact], radius_m: float) -> OutlineBelief:
 def with_second_ring(candidate: Candidate, traced: Trace, height_m: float, lower_m: float) -> Candidate | None:
     """The candidate with what was traced higher up, moved along with the object if that pushed it; None if that was too
     little for an outline."""
-    if traced.outline is None or len(traced.contacts) < LEAST_CONTACTS:
+    if traced.outline is None or len(traced.contacts) < MIN_CONTACTS:
         return None
     by = traced.displaced_K_m
     there = tuple(

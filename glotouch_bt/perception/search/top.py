@@ -84,7 +84,7 @@ class TopRule:
         lift_m: First lift there; three times as much for as long as the way on is still blocked.
         near_m: Round the highest place the ball looks so far in four directions.
         climbs: Most rounds of that, each about the highest place by then.
-        most_touches: The plan ends after so many touches from above.
+        max_touches: The plan ends after so many touches from above.
     """
 
     clearance_m: float = 0.0008
@@ -95,7 +95,7 @@ class TopRule:
     lift_m: float = 0.006
     near_m: float = 0.004
     climbs: int = 3
-    most_touches: int = 20
+    max_touches: int = 20
 
     def __post_init__(self) -> None:
         for name in ("clearance_m", "reach_m", "onward_m", "back_m", "lift_m"):
@@ -272,7 +272,7 @@ class _Search:
         """Above everything met on the way to `goal` (2,); False if a move was refused or it took too many touches."""
         rule = self.rule
         onward, last = rule.onward_m, None
-        while self.touches < rule.most_touches:
+        while self.touches < rule.max_touches:
             if self.tip[2] > self.level_m + 1e-4:  # come down to the pass, unless something is met
                 yield from self.down(self.level_m)
             yield from self.lift(self.level_m)

@@ -166,7 +166,7 @@ class Layer:
         force_N: Jaw force on the plateau.
         stable: The aperture reached a plateau and the arm stood still; only stable layers carry evidence.
         why_not: What was missing, if it is not stable.
-        slide_m, turn_rad, gave_m: What the closure did to the object, as far as the robot can tell (`touch.yielding`):
+        slide_m, turn_rad, compliance_m: What the closure did to the object, as far as the robot knows (`ObjectMotion`):
             displacement along the closing direction (+y_P), turn about +z_K, closing after both pads touched; NaN if
             nobody watched.
         zero_sd_m: Standard deviation of the error that `aperture_m` shares with every other layer.
@@ -183,7 +183,7 @@ class Layer:
     why_not: str = ""
     slide_m: float = math.nan
     turn_rad: float = math.nan
-    gave_m: float = math.nan
+    compliance_m: float = math.nan
     zero_sd_m: float = ZERO_SD_M
 
 

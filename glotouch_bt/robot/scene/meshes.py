@@ -20,7 +20,7 @@ from glotouch_bt.robot.errors import BadInput
 from glotouch_bt.robot.geometry import Array
 
 SMALLEST_M, LARGEST_M = 0.005, 0.30
-LEAST_VOLUME_M3 = 1e-7
+MIN_VOLUME_M3 = 1e-7
 MERGE_DECIMALS = (8, 6, 5)
 """Of a metre: corners this near are one. Files of 32 bit floats and exporters that scale miss by up to a
 micrometre."""
@@ -132,7 +132,7 @@ def _orient(path: Path, mesh: trimesh.Trimesh) -> None:
         mesh.faces = faces
     if mesh.volume < 0:
         mesh.invert()
-    if mesh.volume < LEAST_VOLUME_M3:
+    if mesh.volume < MIN_VOLUME_M3:
         raise BadInput(f"{path}: encloses no volume; its faces lie upon each other")
 
 

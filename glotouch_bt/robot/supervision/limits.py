@@ -57,7 +57,7 @@ class SupervisionLimits:
             may it be called stuck. Noise-free simulations never get there. Source: ours.
         noise_N: A change between two periods that is less is no noise. Source: ours, a fiftieth of the force sensors'
             resolution.
-        most_noise_N, noise_over_s: Mean jump of a force component from sample to sample, over so long. Source: three
+        max_noise_N, noise_over_s: Mean jump of a force component from sample to sample, over so long. Source: three
             times that of harsh CONDITIONS (0.15 N sd jump by 0.17 N).
         live_taxels: Least share of a pad that gives numbers. Source: harsh CONDITIONS have 3 % dead; half of a pad
             cannot be matched.
@@ -86,7 +86,7 @@ class SupervisionLimits:
     stuck_s: float = 0.04
     noisy_s: float = 5.0
     noise_N: float = 1e-6
-    most_noise_N: float = 0.5
+    max_noise_N: float = 0.5
     noise_over_s: float = 0.3
     live_taxels: float = 0.5
     late_periods: float = 25.0

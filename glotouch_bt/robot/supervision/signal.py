@@ -43,7 +43,7 @@ class WristWatch:
             self._noisy_periods = self._noisy_periods + 1 if change > self._rules.noise_N else 0
         step = abs(newest.item(0) - w[-2].item(0)) if len(w) > 1 else 0.0
         self._noise_N += self._share * (step - self._noise_N)
-        if self._noise_N > self._rules.most_noise_N:
+        if self._noise_N > self._rules.max_noise_N:
             self._note_noise(o.now_s, found)
 
     def _look_for_stuck(self, w: Array, stamp_s: float, found: list[Finding]) -> None:
@@ -73,7 +73,7 @@ class WristWatch:
         if stamp_s - self._noted_s < self._rules.window_s:
             return
         self._noted_s = stamp_s
-        limit = self._rules.most_noise_N
+        limit = self._rules.max_noise_N
         what = f"the force jumps by {self._noise_N:.2f} N from sample to sample, {limit:.2f} N are expected at most"
         found.append(Finding("wrench_noise", what, self._noise_N, limit, stamp_s, fatal=False))
 

@@ -241,16 +241,16 @@ class SensedWatch:
         rules, p, q = self._rules, o.position_B_P[-1].tolist(), o.quat_B_P[-1].tolist()
         aways = [(math.dist(p, t[:3]), _turn_rad(q, t[3:])) for t in self._told]
         touches = self._touches(o)
-        most_m = min(rules.touching_m, rules.following_m) if touches else rules.following_m
-        if any(m <= most_m and rad <= rules.following_rad for m, rad in aways):
+        max_m = min(rules.touching_m, rules.following_m) if touches else rules.following_m
+        if any(m <= max_m and rad <= rules.following_rad for m, rad in aways):
             return
         told = "told to " + ("be" if self._moving else "stay")
         m, rad = min(aways)
-        if m > most_m:
-            what = f"the hand is {m * 1e3:.1f} mm from where it was {told}, {most_m * 1e3:.1f} are allowed"
+        if m > max_m:
+            what = f"the hand is {m * 1e3:.1f} mm from where it was {told}, {max_m * 1e3:.1f} are allowed"
             if touches:
                 what += f" while {float(np.linalg.norm(o.wrench_S[-1, :3])):.0f} N press"
-            found.append(Finding("following", what, m, most_m, float(o.stamp_s[-1])))
+            found.append(Finding("following", what, m, max_m, float(o.stamp_s[-1])))
         else:
             what = f"the hand is turned {rad:.3f} rad from how it was {told}, {rules.following_rad:.3f} are allowed"
             found.append(Finding("following", what, rad, rules.following_rad, float(o.stamp_s[-1])))

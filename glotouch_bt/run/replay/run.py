@@ -12,7 +12,7 @@ import numpy as np
 
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.execution import Outcome, TimedPauses, run_mission
-from glotouch_bt.mission.record import REQUEST_DONE, Json, NullRecord, Tally, to_json
+from glotouch_bt.mission.record import REQUEST_DONE, Json, NullRecord, RunSummary, to_json
 from glotouch_bt.report import Event, RunRecord, read_run
 from glotouch_bt.robot import BadInput, Limits, RobotDescription
 from glotouch_bt.robot.supervision import SupervisionLimits
@@ -103,7 +103,7 @@ def replay(
     first_s, last_s = record.span_s
     notes = _Notes()
 
-    def progress(seconds: float, tally: Tally) -> None:
+    def progress(seconds: float, summary: RunSummary) -> None:
         if on_progress is not None:
             on_progress(seconds, last_s - first_s)
 

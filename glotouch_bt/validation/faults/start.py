@@ -11,7 +11,7 @@ from pathlib import Path
 
 from glotouch_bt.faults import FaultPlan
 from glotouch_bt.mission.checkpoint import FILE, CheckpointFile, Row
-from glotouch_bt.run import GoingOn, copy_run, find, installed_versions
+from glotouch_bt.run import ResumableRun, copy_run, find, installed_versions
 from glotouch_bt.validation.faults.rejoin import watched
 
 
@@ -24,7 +24,7 @@ def _first(rows: list[Row], node: str) -> tuple[str, Row, int] | None:
     return None
 
 
-def start_from(twin: Path, out: Path, plan: FaultPlan, warm_up_s: float) -> GoingOn | None:
+def start_from(twin: Path, out: Path, plan: FaultPlan, warm_up_s: float) -> ResumableRun | None:
     """A copy of the twin's run in `out`, to go on with shortly before a fault; None if its node never ran.
 
     Args:
@@ -50,6 +50,6 @@ def start_from(twin: Path, out: Path, plan: FaultPlan, warm_up_s: float) -> Goin
     soon = [r for r in rows[: index + 1] if r.stamp_s <= begins_s - warm_up_s] or rows[:1]
     shutil.rmtree(out, ignore_errors=True)
     copy_run(twin, out)
-    going_on = find(out, path, installed_versions())
-    going_on.file.close()
-    return replace(going_on, file=watched(out, twin, plan, begins_s), row=soon[-1], start="")
+    resumable = find(out, path, installed_versions())
+    resumable.file.close()
+    return replace(resumable, file=watched(out, twin, plan, begins_s), row=soon[-1], start="")

@@ -24,7 +24,7 @@ from glotouch_bt.validation.faults.start import start_from
 HUNG_S = 900.0
 """Wall time after which a trial counts as hanging."""
 ROW, STARTED = "row.json", "started"
-MOST_STARTS = 2
+MAX_STARTS = 2
 VERDICTS = ("recovered", "safely ended", "wrong", "unsafe")
 
 
@@ -108,8 +108,8 @@ def run_trial(
     began = time.perf_counter()
     row = dict(labels) | {"folder": request.out.name}
     try:
-        if starts > MOST_STARTS:
-            raise Hung(f"took its process down {MOST_STARTS} times")
+        if starts > MAX_STARTS:
+            raise Hung(f"took its process down {MAX_STARTS} times")
         with hang_guard():
             result = _launched(request, twin)
     except BadInput:
@@ -133,18 +133,18 @@ def run_trial(
 
 def _launched(request: RunRequest, twin: Path | None) -> Mapping[str, Any]:
     """The result of a run; of one that was its twin again, the twin's, with what the faults did here."""
-    going_on = None
+    resumable = None
     plan = request.faults
     if twin is not None and isinstance(plan, FaultPlan) and request.out is not None:
         (spec,) = plan.faults
         if spec.kind.channel != "model":  # another model is another mission
             (case,) = chosen_cases([spec.kind.name])
-            going_on = start_from(twin, request.out, plan, case.warm_up_s)
+            resumable = start_from(twin, request.out, plan, case.warm_up_s)
     try:
-        done = launch(request, going_on=going_on)
+        done = launch(request, resumable=resumable)
     finally:
-        if going_on is not None:
-            going_on.file.close()
+        if resumable is not None:
+            resumable.file.close()
     if not isinstance(done.outcome.error, Rejoined):
         return done.result
     assert twin is not None

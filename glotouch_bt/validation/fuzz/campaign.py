@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from glotouch_bt.bench import wilson
-from glotouch_bt.validation.fuzz.trial import BAD, LONGEST_S, Result, run_trials
+from glotouch_bt.validation.fuzz.trial import BAD, MAX_DURATION_S, Result, run_trials
 
 CHUNK = 50
 
@@ -63,7 +63,7 @@ def run_campaign(campaign: FuzzCampaign, executor: Executor, on_chunk: OnChunk |
     summary = {
         "trials": campaign.trials,
         "seed": campaign.seed,
-        "longest_s": LONGEST_S,
+        "longest_s": MAX_DURATION_S,
         "counts": {kind: {c: n for (k, c), n in sorted(counts.items()) if k == kind} for kind in _kinds(counts)},
         "bad": wilson(len(bad), campaign.trials),
         "failures": [{"trial": r.number, "kind": r.kind, "came": r.came, "detail": r.detail} for r in bad],

@@ -157,7 +157,7 @@ def _skill(rng: np.random.Generator, grown: Grown, parameter: bool) -> Any:
     for port, key in skill.default_keys().items():
         if port in skill.OUTPUT_PORTS:
             grown.keys[key] = skill.OUTPUT_PORTS[port].data_type
-    grown.hand = skill.LEAVES.get("hand", grown.hand)
+    grown.hand = skill.POSTCONDITIONS.get("hand", grown.hand)
     body = _values(skill.Params, rng, lambda: rng.random() < 0.15)
     if parameter and "expected_objects" in skill.Params.model_fields:
         body["expected_objects"] = "$n"
@@ -169,7 +169,7 @@ def _skill(rng: np.random.Generator, grown: Grown, parameter: bool) -> Any:
 def _fits(skill: type[Skill], grown: Grown) -> bool:
     keys = skill.default_keys()
     needed = [keys[p] for p, info in skill.INPUT_PORTS.items() if info.required]
-    return all(k in grown.keys for k in needed) and grown.hand in skill.NEEDS.get("hand", {grown.hand})
+    return all(k in grown.keys for k in needed) and grown.hand in skill.PRECONDITIONS.get("hand", {grown.hand})
 
 
 def _values(model: type[BaseModel], rng: np.random.Generator, wanted: Callable[[], bool]) -> Document:

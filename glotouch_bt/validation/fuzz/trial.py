@@ -32,7 +32,7 @@ Class = Literal[
     "checked only", "traceback", "hang", "code run", "accepted wrongly",
 ]  # fmt: skip
 BAD: tuple[Class, ...] = ("traceback", "hang", "code run", "accepted wrongly")
-LONGEST_S, MOST_TICKS = 30.0, 300
+MAX_DURATION_S, MAX_TICKS = 30.0, 300
 PLAN_SHARE = 0.25
 
 
@@ -105,10 +105,10 @@ def run_trial(seed: int, number: int, folder: Path) -> Result:
     path.write_bytes(text)
     watch = _watch()
     try:
-        with watch.on(folder, LONGEST_S):
+        with watch.on(folder, MAX_DURATION_S):
             came, detail = _mission(path, rng) if kind == "mission" else _plan(path, rng)
     except TooLong:
-        came, detail = "hang", f"not done after {LONGEST_S:g} s\n{traceback.format_exc()}"
+        came, detail = "hang", f"not done after {MAX_DURATION_S:g} s\n{traceback.format_exc()}"
     except (Exception, SystemExit, KeyboardInterrupt, MemoryError):
         came, detail = "traceback", traceback.format_exc()
     if watch.seen:
@@ -139,7 +139,7 @@ def _mission(path: Path, rng: np.random.Generator) -> tuple[Class, str]:
 
 
 def _run(mission: Mission, rng: np.random.Generator) -> tuple[Class, str]:
-    run = run_scripted(mission, ScriptMaker(mission).rows(rng), most_ticks=MOST_TICKS)
+    run = run_scripted(mission, ScriptMaker(mission).rows(rng), max_ticks=MAX_TICKS)
     repr(run)
     if isinstance(run.error, RunsAway):
         return "ran on", ""
@@ -179,7 +179,7 @@ def _run_faulted(plan: FaultPlan, mission: Mission, rng: np.random.Generator) ->
         return _refused(e)
     script = {"*": ok().after(float(rng.uniform(0.0, 0.7)))}
     try:
-        run = run_scripted(mission, script, robot=robot, most_ticks=MOST_TICKS)
+        run = run_scripted(mission, script, robot=robot, max_ticks=MAX_TICKS)
     except BackendError:  # before the first tick: the runner lets it through, the command line says it
         return "stopped by a fault", ""
     robot.report()

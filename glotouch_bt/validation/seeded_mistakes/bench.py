@@ -26,7 +26,7 @@ from glotouch_bt.mission.tree import build_tree
 from glotouch_bt.skill import Context, Out, Skill, SkillParams
 from glotouch_bt.validation.seeded_mistakes.mistakes import MISTAKES, RIGHT, Mistake
 
-MOST_TICKS = 2000
+MAX_TICKS = 2000
 IN_PYTHON = {"unknown_skill", "missing_parameter", "unknown_parameter", "unknown_port"}
 """Findings that plain Python, without a mission file, would give as an exception where the node is made."""
 
@@ -96,7 +96,7 @@ def _in_py_trees(mistake: Mistake) -> tuple[str, str]:
             tree = py_trees.trees.BehaviourTree(built.root)
             when = "setup"
             tree.setup()
-            for tick in range(1, MOST_TICKS + 1):
+            for tick in range(1, MAX_TICKS + 1):
                 when = f"tick {tick}"
                 tree.tick()
                 if tree.root.status is not Status.RUNNING:

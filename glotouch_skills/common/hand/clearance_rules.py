@@ -10,7 +10,7 @@ from glotouch_bt.motion import Arm
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.perception.touch.outline import envelope
 
-LEAST_HEIGHT_M = 0.01
+MIN_HEIGHT_M = 0.01
 """An obstacle is at least this high, whatever its top touch said."""
 
 
@@ -43,7 +43,7 @@ def keeping_clear_of(arm: Arm, candidates: Iterable[Candidate]) -> Iterator[None
                 room.kind,
                 centre_K_m=room.centre_K_m,
                 size_m=room.size_m,
-                height_m=max(candidate.height_m, LEAST_HEIGHT_M),
+                height_m=max(candidate.height_m, MIN_HEIGHT_M),
                 yaw_rad=room.yaw_rad,
             )
         yield

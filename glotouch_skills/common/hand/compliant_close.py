@@ -40,7 +40,7 @@ FREE_S = 0.05
 """So long the hand is felt before the jaws move."""
 PACE = 0.75
 """Speed of giving way against the closing speed; half of it would only keep the jaw that touches where it is."""
-LEAST_STEP_M = 0.0005
+MIN_STEP_M = 0.0005
 TIMEOUT_S = 4.0
 LETTING_GO_M_S, LETTING_GO_N, LET_GO_M, LETTING_GO_S = 0.02, 2.0, 0.003, 0.5
 """Opening begins slowly and weakly, until the jaws are so much farther apart; jaws that do not move are given so long:
@@ -50,7 +50,7 @@ OPENING_M_S, OPENING_N, OPENING_S = 0.2, 10.0, 3.5
 LOOSE_N, CAUGHT_N, FREED_N = 0.5, 4.0, 1.0
 """Jaws that hold with less than the first should not be felt: more than the second on the hand, and it is caught; less
 than the third, and it is free again."""
-FREEING_M, FREEING_M_S, LEAST_TIP_M = 0.006, 0.02, 0.002
+FREEING_M, FREEING_M_S, MIN_TIP_M = 0.006, 0.02, 0.002
 """How far the hand goes the way it is pushed, how fast, and how near to the floor a fingertip may come."""
 
 Watcher = Callable[[Observation], None]
@@ -85,7 +85,7 @@ def close_gently(
             rested, `STOOD_N` or `STOOD_SHARE` of the jaw force while pressing; the jaws have opened again.
     """
     closing = _Closing(arm, speed_m_s, tactile, seen_by)
-    with arm.feed.finishing():  # a pause comes when the jaws rest: until then the hand must be able to give way
+    with arm.pause_signal.finishing():  # a pause comes when the jaws rest: until then the hand must be able to give way
         yield from closing.feel_free()
         state = yield from closing.until_rest([min(GENTLE_N, force_N)])
         if force_N > GENTLE_N:
@@ -113,9 +113,9 @@ class _Closing:
         """How much the force on the hand differs from a free hand's now."""
         return float(np.linalg.norm(self._force_N - self._free_N))
 
-    def refuse_beyond(self, most_N: float, pressed_N: float) -> Motion[None]:
+    def refuse_beyond(self, max_N: float, pressed_N: float) -> Motion[None]:
         """Open again and refuse if the hand is pressed with more than this; a NaN is more."""
-        if not pressed_N <= most_N:
+        if not pressed_N <= max_N:
             yield from let_go(self._arm, self._opening_m)
             raise MotionRefused("closing", f"the hand was pressed with {pressed_N:.0f} N while the jaws closed")
 
@@ -127,7 +127,7 @@ class _Closing:
             force_N = forces_N[min(k, len(forces_N) - 1)]
             seen = yield from self._one_period(force_N if k < len(forces_N) else None)
             self._force_N = _force_P(seen)
-            yield from self.refuse_beyond(_most_N(force_N), float(np.linalg.norm(self._force_N)))
+            yield from self.refuse_beyond(_max_N(force_N), float(np.linalg.norm(self._force_N)))
             if k >= len(forces_N) and watch.still(seen.now_s, seen.gripper):
                 break
             yield from self._give_way(seen)
@@ -159,7 +159,7 @@ class _Closing:
         y_B = np.asarray(arm.pose_B_P.rotation[:, 1])
         given = side * float((arm.pose_B_P.position_m - self._start_B) @ y_B)
         room = 0.5 * (self._opening_m - arm.aperture_m) - given
-        if room > LEAST_STEP_M:
+        if room > MIN_STEP_M:
             yield from arm.shift(
                 side * room * y_B,
                 PACE * self._speed_m_s,
@@ -170,7 +170,7 @@ class _Closing:
             )
 
 
-def _most_N(jaw_N: float) -> float:
+def _max_N(jaw_N: float) -> float:
     """Force on the hand at which a closure under this jaw force ends."""
     return WEDGED_N if jaw_N <= GENTLE_N else min(max(STOOD_N, STOOD_SHARE * jaw_N), GIVE_UP_N)
 
@@ -183,7 +183,7 @@ def let_go(arm: Arm, opening_m: float) -> Motion[None]:
     What was held may drop onto a fingertip only after the jaws are off it, so this is watched until they are open. A
     pause waits until then.
     """
-    with arm.feed.finishing():
+    with arm.pause_signal.finishing():
         yield from _let_go(arm, opening_m)
 
 
@@ -196,7 +196,7 @@ def _let_go(arm: Arm, opening_m: float) -> Motion[None]:
         force = _force_P(seen)
         pressed = np.linalg.norm(force) > CAUGHT_N
         still = watch.still(seen.now_s, seen.gripper)
-        if pressed and not (weak and seen.gripper.force_N >= LOOSE_N) and given < FREEING_M - LEAST_STEP_M:
+        if pressed and not (weak and seen.gripper.force_N >= LOOSE_N) and given < FREEING_M - MIN_STEP_M:
             yield from _turn_jaws(arm, arm.aperture_m, True)
             given += yield from _free(arm, force, FREEING_M - given)
             held, weak, since = arm.aperture_m, True, k
@@ -216,15 +216,15 @@ def _turn_jaws(arm: Arm, aperture_m: float, weak: bool) -> Motion[None]:
     yield from arm.jaws(aperture_m, speed_m_s=speed_m_s, force_N=force_N, timeout_s=arm.period_s)
 
 
-def _free(arm: Arm, force_P_N: Array, most_m: float) -> Motion[float]:
-    """Go the way the hand is pushed (3,) until it is free, `most_m` at most; how far it went, at least a step."""
+def _free(arm: Arm, force_P_N: Array, max_m: float) -> Motion[float]:
+    """Go the way the hand is pushed (3,) until it is free, `max_m` at most; how far it went, at least a step."""
     container, tip_m = arm.world.container, arm.description.gripper.fingertip_below_P_m
     way_B = arm.pose_B_P.rotation @ (force_P_N / np.linalg.norm(force_P_N))
     down = -float(container.pose_B_K.rotation[:, 2] @ way_B)
-    room = float(container.pose_B_K.inverse().apply(arm.pose_B_P.position_m)[2]) - tip_m - LEAST_TIP_M
-    length = most_m if down <= 0.0 else min(most_m, max(room, 0.0) / down)
-    if length < LEAST_STEP_M:
-        return most_m
+    room = float(container.pose_B_K.inverse().apply(arm.pose_B_P.position_m)[2]) - tip_m - MIN_TIP_M
+    length = max_m if down <= 0.0 else min(max_m, max(room, 0.0) / down)
+    if length < MIN_STEP_M:
+        return max_m
     moved = yield from arm.shift(
         length * way_B,
         FREEING_M_S,
@@ -232,7 +232,7 @@ def _free(arm: Arm, force_P_N: Array, most_m: float) -> Motion[float]:
         check=False,
         what="free the hand",
     )
-    return max(moved.travelled_m, LEAST_STEP_M)
+    return max(moved.travelled_m, MIN_STEP_M)
 
 
 def _until_released(side: float, seen_by: Watcher) -> Callable[[Observation], str | None]:

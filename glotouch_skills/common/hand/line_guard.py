@@ -37,18 +37,18 @@ class Strayed:
     """The move ended because the hand left its way.
 
     Attributes:
-        off_m: How far beside the line it is; most_off_m: how far it may be.
+        off_m: How far beside the line it is; max_off_m: how far it may be.
         force_N: How much more than at rest was felt.
         stamp_s: Robot clock.
     """
 
     off_m: float
-    most_off_m: float
+    max_off_m: float
     force_N: float
     stamp_s: float
 
     def __str__(self) -> str:
-        off, most = 1e3 * self.off_m, 1e3 * self.most_off_m
+        off, most = 1e3 * self.off_m, 1e3 * self.max_off_m
         return f"the hand is {off:.1f} mm beside its setpoint with {self.force_N:.0f} N on it, {most:.1f} are allowed"
 
 
@@ -58,24 +58,24 @@ class StraightGuard:
 
     Attributes:
         free_S_N: (3,) force at rest; a period's mean is compared with it.
-        most_N: Largest difference.
+        max_N: Largest difference.
         start_B_m, along_B: (3,) each, a point of the commanded line and its direction.
-        most_off_m: Largest distance of P from it.
+        max_off_m: Largest distance of P from it.
     """
 
     free_S_N: Array
-    most_N: float
+    max_N: float
     start_B_m: Array
     along_B: Array
-    most_off_m: float
+    max_off_m: float
 
     def __call__(self, seen: Observation) -> Pressed | Strayed | None:
         """See `motion.Guard`."""
         force = float(np.linalg.norm(seen.wrench_S[:, :3].mean(axis=0) - self.free_S_N))
-        if force > self.most_N:
+        if force > self.max_N:
             return Pressed(force)
         off = self.off_m(seen)
-        return Strayed(off, self.most_off_m, force, seen.now_s) if off > self.most_off_m else None
+        return Strayed(off, self.max_off_m, force, seen.now_s) if off > self.max_off_m else None
 
     def off_m(self, seen: Observation) -> float:
         """How far P is beside the line, newest sample."""
@@ -83,13 +83,13 @@ class StraightGuard:
         return float(np.linalg.norm(way - (way @ self.along_B) * self.along_B))
 
 
-def straight_guard(arm: Arm, along_B: Array, most_N: float) -> Motion[StraightGuard]:
+def straight_guard(arm: Arm, along_B: Array, max_N: float) -> Motion[StraightGuard]:
     """Stand a moment and take what is felt now as a free hand's force; for a move from here along `along_B` (3,)."""
     blocks = yield from arm.hold(STAND_S)
     free = np.concatenate([b.wrench_S[:, :3] for b in blocks]).mean(axis=0)
     unit = along_B / np.linalg.norm(along_B)
-    guard = StraightGuard(free, most_N, arm.pose_B_P.position_m, unit, ASTRAY_M)
-    return replace(guard, most_off_m=max(ASTRAY_M, guard.off_m(blocks[-1]) + FARTHER_M))
+    guard = StraightGuard(free, max_N, arm.pose_B_P.position_m, unit, ASTRAY_M)
+    return replace(guard, max_off_m=max(ASTRAY_M, guard.off_m(blocks[-1]) + FARTHER_M))
 
 
 def why_stopped(moved: MoveResult) -> str | None:
@@ -101,5 +101,5 @@ def why_stopped(moved: MoveResult) -> str | None:
     """
     stop = moved.stop
     if isinstance(stop, Strayed) and stop.off_m > stop.force_N * GIVES_M_N + FARTHER_M:
-        raise GuardTripped("following", str(stop), stop.off_m, stop.most_off_m, stop.stamp_s)
+        raise GuardTripped("following", str(stop), stop.off_m, stop.max_off_m, stop.stamp_s)
     return None if stop is None else f"after {moved.travelled_m * 1e3:.0f} mm {stop}"

@@ -3,7 +3,7 @@
 from glotouch_skills.common.planning.grasp_holds import SHIFTS_M
 from glotouch_skills.common.planning.grasp_plan import GraspPlan, plan_grasp
 from glotouch_skills.common.planning.squeeze_motion import (
-    LEAST_GAP_M,
+    MIN_GAP_M,
     ClosureParams,
     Squeezing,
     disturbance,
@@ -14,7 +14,7 @@ from glotouch_skills.common.planning.squeeze_plan import Stance, plan_stances
 from glotouch_skills.common.planning.touch_options import Option, Standing, best_rates, options
 
 __all__ = [
-    "LEAST_GAP_M",
+    "MIN_GAP_M",
     "SHIFTS_M",
     "ClosureParams",
     "GraspPlan",

@@ -24,13 +24,13 @@ FITTED = 3
 """So many of the grasps come from the fitted pose, if it can be believed."""
 APART_RAD, APART_M = math.radians(25.0), 0.012
 """Two grasps from the fitted pose differ in yaw or place by at least one of these: what spoils one spares the other."""
-LEAST_WORTH = 0.02
+MIN_WORTH = 0.02
 BELIEVED_M = 0.002
 """The pose is believed if the mesh standing there is as wide as was felt: three quarters of the closures within this of
 one offset. Wider than the width's scatter in recognition, for the place of the closures is off too."""
-LEAST_OFFSET_M, GREATEST_OFFSET_M = -0.004, 0.0015
+MIN_OFFSET_M, GREATEST_OFFSET_M = -0.004, 0.0015
 """The offset, of what was felt against the mesh: both gels give, and the jaws' zero is off (CONDITIONS)."""
-LEAST_LAYERS = 3
+MIN_LAYERS = 3
 FORCE_N = 30.0
 FARTHEST_M, WIDEST_M, GREATEST_ZERO_M, LARGEST_YAW_RAD = 2.0, 0.5, 0.005, 4.0 * math.pi
 """Beyond what any box, jaws or turn need: such a number was meant in millimetres or degrees."""
@@ -103,10 +103,10 @@ def misfit_m(touchset: TouchSet, match: Match, model: TargetModel) -> float:
         along = float(np.array([np.cos(layer.yaw_rad), np.sin(layer.yaw_rad)]) @ (layer.position_K_m - middle))
         off.append(layer.aperture_m - model.width_at(along, layer.height_m, layer.yaw_rad - theta))
     off = [d for d in off if math.isfinite(d)]
-    if len(off) < LEAST_LAYERS:
+    if len(off) < MIN_LAYERS:
         return math.inf
     offset = float(np.median(off))
-    if not LEAST_OFFSET_M <= offset <= GREATEST_OFFSET_M:
+    if not MIN_OFFSET_M <= offset <= GREATEST_OFFSET_M:
         return math.inf
     return float(np.quantile(np.abs(np.array(off) - offset), 0.75))
 
@@ -124,7 +124,7 @@ def _fitted(index: int, match: Match, model: TargetModel, holds: Holds, side_gap
     chosen: list[GraspPlan] = []
     for flat in np.argsort(-holds.worth, axis=None, kind="stable")[:2000].tolist():
         i, j, k = np.unravel_index(flat, holds.worth.shape)
-        if holds.worth[i, j, k] < LEAST_WORTH or len(chosen) == FITTED:
+        if holds.worth[i, j, k] < MIN_WORTH or len(chosen) == FITTED:
             break
         yaw = match.pose_K_O[2] + float(holds.phi_rad[i])
         c, s = math.cos(yaw), math.sin(yaw)

@@ -16,7 +16,7 @@ from glotouch_skills.common.planning.squeeze_plan import Stance
 
 HAND_CLEARANCE_M = 0.005
 """Fingertips stay this far above the floor, and the hand's body this far above a candidate's top."""
-LEAST_GAP_M = 0.003
+MIN_GAP_M = 0.003
 """Two closures nearer to each other than this are one."""
 OVER_TOP_M = 0.02
 """From so far above a candidate's top the hand goes down carefully."""
@@ -65,7 +65,7 @@ def layer_heights(candidate: Candidate, gripper: Gripper, p: ClosureParams) -> A
     """
     lowest = lowest_pads_m(candidate.height_m, gripper)
     highest = max(candidate.height_m - p.top_overlap_m, min(lowest + p.layer_gap_m, candidate.height_m), lowest)
-    least = 1 if highest - lowest < LEAST_GAP_M else min(2, p.layers)
+    least = 1 if highest - lowest < MIN_GAP_M else min(2, p.layers)
     count = int(np.clip(np.floor((highest - lowest) / p.layer_gap_m) + 1, least, p.layers))
     return np.linspace(lowest, highest, count)
 
@@ -122,7 +122,7 @@ class Squeezing:
         Raises:
             MotionRefused: The hand was pressed too hard; the jaws are open.
         """
-        with self._context.arm.feed.finishing():
+        with self._context.arm.pause_signal.finishing():
             return (yield from self._close())
 
     def _close(self) -> Motion[tuple[Layer, Yielding]]:
@@ -174,7 +174,7 @@ def disturbance(candidate: Candidate, layer: Layer, yielding: Yielding) -> dict[
         "height_m": layer.height_m,
         "slide_m": layer.slide_m,
         "turn_rad": layer.turn_rad,
-        "gave_m": layer.gave_m,
+        "compliance_m": layer.compliance_m,
         "lost": layer.why_not if lost else "",
     }
 

@@ -12,7 +12,7 @@ from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import HOLD, Array, Container, Gripper, MotionRefused
 from glotouch_skills.common.hand import CLEARANCE_M, hand_pose_B, require_clear
 
-LEAST_SIDE_GAP_M = 0.004
+MIN_SIDE_GAP_M = 0.004
 TURNS_RAD = np.deg2rad([0.0, 60.0, -60.0])
 BASES_RAD = np.deg2rad([0.0, 15.0, -15.0, 30.0])
 """Base yaws tried for a round candidate; with the three turns they cover half a circle every 15 degrees."""
@@ -45,7 +45,7 @@ def stance(candidate: Candidate, along_m: float, yaw_K_rad: float, side_gap_m: f
     x = np.array([np.cos(yaw_K_rad), np.sin(yaw_K_rad)])
     y = np.array([-x[1], x[0]])
     low, high = candidate.span_m(yaw_K_rad + 0.5 * np.pi)
-    if high - low > stroke_m - 2 * LEAST_SIDE_GAP_M:
+    if high - low > stroke_m - 2 * MIN_SIDE_GAP_M:
         return None
     position = (candidate.contour.centre_K_m @ x + along_m) * x + 0.5 * (low + high) * y
     return Stance(position, yaw_K_rad, min(high - low + 2 * side_gap_m, stroke_m))

@@ -52,7 +52,7 @@ class Dropped:
 
 @dataclasses.dataclass(frozen=True)
 class Lowering:
-    """A guard of the probe's way into its holder: it is held all the way, and neither presses nor strays.
+    """A guard of the probe's way into its holder: it is held all the way, and neither presses nor outliers.
 
     Attributes:
         straight: What it may press and how far it may stray.
@@ -110,14 +110,14 @@ def return_probe(
     yield from nothing_in_hand(context)
 
 
-def _lower(context: Context, goal: Pose, speed_m_s: float, aperture_m: float, most_N: float) -> Motion[MoveResult]:
-    """Down to `goal`, until something presses with more than `most_N`.
+def _lower(context: Context, goal: Pose, speed_m_s: float, aperture_m: float, max_N: float) -> Motion[MoveResult]:
+    """Down to `goal`, until something presses with more than `max_N`.
 
     Raises:
         SkillFailed: `tool_lost`; the hand has risen again.
     """
     arm = context.arm
-    straight = yield from straight_guard(arm, DOWN_B, most_N)
+    straight = yield from straight_guard(arm, DOWN_B, max_N)
     let_go = not arm.scene.holding_tool or np.linalg.norm(goal.position_m - arm.pose_B_P.position_m) < THERE_M
     guard = straight if let_go else Lowering(straight, aperture_m)  # let go of, where the skill was broken off
     moved = yield from arm.line(goal, speed_m_s, check=False, guard=guard)

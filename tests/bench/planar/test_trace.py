@@ -46,8 +46,8 @@ def test_a_disc_is_where_it_is_and_as_large(world_of: WorldOf, radius: float, an
     # in the world's own words: contacts are exact, the object stands where it is now
     np.testing.assert_allclose(result.contour.centre_K_m, world.centres_K_m()[0], atol=3e-4)
     assert result.contour.size_m[0] == pytest.approx(2 * radius, abs=6e-4)
-    assert TraceParams().least_contacts <= len(result.contacts) <= TraceParams().most_contacts
-    assert result.strays == ()
+    assert TraceParams().min_contacts <= len(result.contacts) <= TraceParams().max_contacts
+    assert result.outliers == ()
     assert result.ended
     assert np.linalg.norm(result.displaced_K_m - (world.centres_K_m()[0] - CENTRE)) < 5e-4
 
@@ -58,12 +58,12 @@ def test_a_box_is_traced_within_its_bounds(world_of: WorldOf) -> None:
     assert result.contour is not None
     np.testing.assert_allclose(result.contour.centre_K_m, world.centres_K_m()[0], atol=2e-3)
     np.testing.assert_allclose(sorted(result.contour.size_m), [0.05, 0.09], atol=5e-3)
-    assert len(result.contacts) <= TraceParams().most_contacts
+    assert len(result.contacts) <= TraceParams().max_contacts
 
 
 def test_the_most_contacts_are_a_bound(world_of: WorldOf) -> None:
     world = world_of([cylinder(0.03)], [(*CENTRE, 0)])
-    params = TraceParams(centre_sd_m=1e-9, radial_sd_m=1e-9, least_contacts=3, most_contacts=6)
+    params = TraceParams(centre_sd_m=1e-9, radial_sd_m=1e-9, min_contacts=3, max_contacts=6)
     assert len(traced(world, touched_from(world, 0.0), params).contacts) == 6
 
 
@@ -89,7 +89,7 @@ def test_what_was_touched_at_a_limbs_end_is_beside_it(
     first = Contact(0.0, tip, -out, out, (tip - TIP * out)[:2], 1.0)
     world.lowered, world.tip_K_m = True, tip[:2] + 0.004 * out[:2]
     result = drive(trace(first, world.tip_K_m, TIP, OrbitProbeParams().rule(), half_extent_m=INNER), world)
-    assert len(result.contacts) >= TraceParams().least_contacts
+    assert len(result.contacts) >= TraceParams().min_contacts
     assert result.outline is not None
     assert np.linalg.norm(result.outline.centre_K_m - world.centres_K_m()[0]) < 0.02
 
@@ -106,7 +106,7 @@ def test_what_turns_out_to_be_known_is_not_traced_to_the_end(world_of: WorldOf) 
     plan = trace(first, world.tip_K_m, TIP, params, half_extent_m=INNER, joined=joined)
     result = drive(plan, world)
     assert (result.ended, len(result.contacts)) == ("it is an object that is known", 5)
-    assert min(asked) == params.least_contacts
+    assert min(asked) == params.min_contacts
 
 
 def test_what_is_too_small_is_no_object(world_of: WorldOf) -> None:
@@ -137,7 +137,7 @@ def test_a_contact_that_faces_the_middle_is_with_something_else(world_of: WorldO
     first = touched_from(world, np.pi)
     result = drive(trace(first, world.tip_K_m, TIP, half_extent_m=INNER), intruded)
     assert intruded.met is not None
-    assert [s is intruded.met for s in result.strays] == [True]
+    assert [s is intruded.met for s in result.outliers] == [True]
     assert result.contour is not None
     np.testing.assert_allclose(result.contour.centre_K_m, world.centres_K_m()[0], atol=5e-4)
 
@@ -152,7 +152,7 @@ def test_what_moved_unfelt_is_traced_anew(world_of: WorldOf) -> None:
         for shift in [(0.006, 0.004), (-0.009, 0.002), (0.002, -0.010), (0.012, 0.0), (0.0, 0.0)]:
             world = world_of([solid], [(*CENTRE, 0.3)], ContactModel(), seed=k)
             first = touched_from(world, 0.7 + k)
-            before = traced(world, first, TraceParams(centre_sd_m=5e-3, radial_sd_m=0.02, least_contacts=5))
+            before = traced(world, first, TraceParams(centre_sd_m=5e-3, radial_sd_m=0.02, min_contacts=5))
             world.poses[0, :2] += shift
             result = drive(trace_more(before.contacts, world.tip_K_m, TIP, half_extent_m=INNER), world)
             assert result.contour is not None
@@ -197,7 +197,7 @@ def test_refining_finds_every_limb(world_of: WorldOf) -> None:
     found = landed = 0
     for k, angle in enumerate((0.2, 1.3, 2.4, 3.5, 4.6, 5.7)):
         world = world_of([three_limbs()], [(*CENTRE, 0.3)], ContactModel(), seed=k)
-        coarse = TraceParams(centre_sd_m=6e-3, radial_sd_m=0.0225, least_contacts=4, most_contacts=5)
+        coarse = TraceParams(centre_sd_m=6e-3, radial_sd_m=0.0225, min_contacts=4, max_contacts=5)
         before = traced(world, touched_from(world, angle), coarse)
         moves: list[tuple[Move, Felt]] = []
         result = refine(world, before, moves)
@@ -227,6 +227,6 @@ def test_what_is_too_long_for_one_object_is_two(world_of: WorldOf) -> None:
                 tip = np.array([*middle, 0.018]) + (0.03 + TIP) * out
                 state.raw.append(Contact(0.0, tip, -out, out, tip[:2] - TIP * out[:2], 1.0))
         assert state.keep_one(state.outline(), TraceParams())
-        assert (len(state.raw), len(state.strays)) == (5, 3)
+        assert (len(state.raw), len(state.outliers)) == (5, 3)
         np.testing.assert_allclose(state.outline().centre_K_m, CENTRE, atol=1e-3)
         assert not state.keep_one(state.outline(), TraceParams())

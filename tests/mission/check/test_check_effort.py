@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from glotouch_bt.mission.check import rules as judge
-from glotouch_bt.mission.check.counterexample import MOST_STEPS, Patience
+from glotouch_bt.mission.check.counterexample import MAX_STEPS, Patience
 from glotouch_bt.mission.load import load_mission
 from glotouch_bt.mission.spec.findings import MissionFaults
 
@@ -39,4 +39,4 @@ def test_forty_mistakes_behind_an_exploration(tmp_path: Path, monkeypatch: pytes
     assert findings[0].path, "the first one is shown"
     (patience,) = kept
     most_at_once = 1_000  # of the state being left when it ran out
-    assert -most_at_once < patience.steps < MOST_STEPS
+    assert -most_at_once < patience.steps < MAX_STEPS

@@ -32,8 +32,8 @@ from glotouch_bt.mission.tree import build, decorators
 from glotouch_bt.mission.tree.build import build_tree
 from glotouch_bt.skill import UNCHANGED, Context, In, Out, Skill, SkillFailed, SkillRun
 
-MOST_RUNS = 600
-MOST_STEPS = 16
+MAX_RUNS = 600
+MAX_STEPS = 16
 ITEMS = 2
 
 
@@ -91,20 +91,20 @@ class Leaf(Skill):
         for port, info in self.INPUT_PORTS.items():
             if info.required and not self.blackboard_client.exists(port):
                 wrong(self.name, port, "unset")
-        if "hand" in self.NEEDS and World.hand not in self.NEEDS["hand"]:
+        if "hand" in self.PRECONDITIONS and World.hand not in self.PRECONDITIONS["hand"]:
             wrong(self.name, "hand", World.hand)
         World.steps += 1
         World.looks += 1
-        if World.steps > MOST_STEPS:
+        if World.steps > MAX_STEPS:
             raise TooLong
         how = World.oracle.choose(3 if World.timeouts.get(self.name) else 2)
         for port in self.OUTPUT_PORTS:
             sure = how == 0 or (how == 1 and getattr(type(self), port).always)
             if sure or World.oracle.choose(2):
                 self.write_port(port, self.value(port))
-        if "hand" in {*self.LEAVES, *self.AFTER_FAILURE}:
-            left = self.LEAVES.get("hand", UNCHANGED)
-            after = sorted(self.AFTER_FAILURE.get("hand", {UNCHANGED, left}))
+        if "hand" in {*self.POSTCONDITIONS, *self.FAILURE_STATES}:
+            left = self.POSTCONDITIONS.get("hand", UNCHANGED)
+            after = sorted(self.FAILURE_STATES.get("hand", {UNCHANGED, left}))
             states = [left] if how == 0 else after if how == 1 else sorted({*after, UNCHANGED, left})
             state = states[World.oracle.choose(len(states))]
             World.hand = World.hand if state == UNCHANGED else state
@@ -151,23 +151,23 @@ class Lister(Leaf):
 class Take(Leaf):
     """Takes the tool."""
 
-    NEEDS: ClassVar = {"hand": frozenset({"empty", "tool"})}
-    LEAVES: ClassVar = {"hand": "tool"}
-    AFTER_FAILURE: ClassVar = {"hand": frozenset({UNCHANGED, "tool"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "tool"})}
+    POSTCONDITIONS: ClassVar = {"hand": "tool"}
+    FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "tool"})}
 
 
 class Use(Leaf):
     """Needs the tool."""
 
-    NEEDS: ClassVar = {"hand": frozenset({"tool"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"tool"})}
     a = Out(int, "a")
 
 
 class Give(Leaf):
     """Puts the tool back."""
 
-    NEEDS: ClassVar = {"hand": frozenset({"tool"})}
-    LEAVES: ClassVar = {"hand": "empty"}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"tool"})}
+    POSTCONDITIONS: ClassVar = {"hand": "empty"}
 
 
 SKILLS: dict[str, type[Skill]] = {"a": A, "b": B, "c": C, "lister": Lister, "take": Take, "use": Use, "give": Give}
@@ -227,7 +227,7 @@ def free_comparisons() -> Iterator[None]:
         if value is None or condition.is_set is not None:
             return true(condition, value)
         World.steps += 1
-        if World.steps > MOST_STEPS:
+        if World.steps > MAX_STEPS:
             raise TooLong
         return World.oracle.choose(2) == 0
 
@@ -259,7 +259,7 @@ def by_ticking(spec: NodeSpec) -> tuple[dict[tuple[str, str, str], int], set[tup
     }
     ends: set[tuple[Status, str, bool, bool]] = set()
     whole = True
-    for _ in range(MOST_RUNS):
+    for _ in range(MAX_RUNS):
         World.hand, World.steps, World.looks, World.hanging = "empty", 0, 0, False
         context = Standing(None, None, None, None, None)  # type: ignore[arg-type]
         context.observation = type("Seen", (), {"now_s": 0.0})()
@@ -278,7 +278,7 @@ def by_ticking(spec: NodeSpec) -> tuple[dict[tuple[str, str, str], int], set[tup
                 found = (built.value("a") is not None, built.value("b") is not None)
                 ends.add((built.root.status, World.hand, *found))
         except TooLong:
-            whole = whole and World.steps <= MOST_STEPS
+            whole = whole and World.steps <= MAX_STEPS
         finally:
             built.root.stop(Status.INVALID)
             built.forget()

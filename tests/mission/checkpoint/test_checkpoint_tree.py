@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from glotouch_bt.mission.checkpoint.store import CheckpointFile
-from glotouch_bt.mission.checkpoint.writer import Keeper, TakenUp
+from glotouch_bt.mission.checkpoint.writer import CheckpointWriter, ResumePoint
 from glotouch_bt.mission.execution.runner import Outcome, run_mission
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.record.run_summary import NullRecord
@@ -90,7 +90,7 @@ class KeptRobot(ClockRobot):
 
 
 class KeptArm:
-    feed = SimpleNamespace(wanted=False, style="hold", standing=False, stops=False, waits=False)
+    pause_signal = SimpleNamespace(requested=False, style="hold", standing=False, stops=False, deferred=False)
     period_s = 0.01
 
     def __init__(self) -> None:
@@ -222,11 +222,13 @@ def mission_of(tree: NodeSpec) -> Mission:
 
 def run(tree: NodeSpec, file: CheckpointFile | None, number: int = 0, **options: Any) -> tuple[Outcome, Trace]:
     trace, robot = Trace(), KeptRobot()
-    keeper = None if file is None else Keeper(file, trace, number)
+    checkpoints = None if file is None else CheckpointWriter(file, trace, number)
     if "world" in options:
         robot.restore(options.pop("world"))
     make: Any = lambda robot, world: KeptArm()  # noqa: E731
-    return run_mission(mission_of(tree), cast(Any, robot), trace, make_arm=make, keeper=keeper, **options), trace
+    return run_mission(
+        mission_of(tree), cast(Any, robot), trace, make_arm=make, checkpoints=checkpoints, **options
+    ), trace
 
 
 def ending(outcome: Outcome) -> Any:
@@ -248,8 +250,8 @@ def test_a_resumed_tree_goes_on_as_the_one_that_was_not_broken_off(case: tuple[N
         row = rows[pick % len(rows)]
         state, world = file.state(row.number), file.world(row.number)
         file.drop_after(row.number)
-        taken = TakenUp(row.number, state, same_world=True)
-        resumed, rest = run(tree, file, row.number + 1, taken_up=taken, world=world)
+        taken = ResumePoint(row.number, state, same_world=True)
+        resumed, rest = run(tree, file, row.number + 1, resume_point=taken, world=world)
         assert ending(resumed) == ending(whole)
         done = state["record"]
         assert rest.ticks == trace.ticks[done["ticks"] :]
@@ -277,8 +279,8 @@ def test_what_runs_beside_the_skill_that_ended_starts_from_its_beginning(tmp_pat
     whole, _ = run(tree, file)
     assert whole.status == "success"
     [row] = [r for r in file.rows() if r.node == "m/sequence/parallel/step"]
-    taken = TakenUp(row.number, file.state(row.number), same_world=True)
-    resumed, rest = run(tree, None, taken_up=taken, world=file.world(row.number))
+    taken = ResumePoint(row.number, file.state(row.number), same_world=True)
+    resumed, rest = run(tree, None, resume_point=taken, world=file.world(row.number))
     assert resumed.status == "success"
     assert resumed.ticks == whole.ticks + 2, "the long one lost the periods it had done"
     ended = [(p, new) for _, changes in rest.ticks for p, _, new in changes if "step" in p and new != "RUNNING"]
@@ -287,8 +289,8 @@ def test_what_runs_beside_the_skill_that_ended_starts_from_its_beginning(tmp_pat
 
 
 def started(tree: NodeSpec, file: CheckpointFile, path: str, number: int) -> tuple[Outcome, list[str]]:
-    taken = TakenUp(number, file.state(number), same_world=True, start=path)
-    outcome, rest = run(tree, None, taken_up=taken, world=file.world(number))
+    taken = ResumePoint(number, file.state(number), same_world=True, start=path)
+    outcome, rest = run(tree, None, resume_point=taken, world=file.world(number))
     begun = [p.removeprefix("m/sequence/") for _, changes in rest.ticks for p, _, new in changes if new == "RUNNING"]
     ended = [p.removeprefix("m/sequence/") for _, changes in rest.ticks for p, _, new in changes if new == "SUCCESS"]
     return outcome, [p for p in dict.fromkeys((*begun, *ended)) if "step" in p]
@@ -316,8 +318,8 @@ def test_a_mission_starts_inside_a_for_each_and_inside_a_selector(tmp_path: Path
     assert whole.status == "success"
     path = "m/sequence/for_each/selector/sequence 2/step 3"
     fresh = next(r.number for r in file.rows() if r.node.endswith("items"))
-    taken = TakenUp(fresh, file.state(fresh), same_world=True, start=path)
-    outcome, rest = run(tree, None, taken_up=taken, world=file.world(fresh))
+    taken = ResumePoint(fresh, file.state(fresh), same_world=True, start=path)
+    outcome, rest = run(tree, None, resume_point=taken, world=file.world(fresh))
     assert outcome.status == "success"
     items = [value for _, key, value in rest.ports if key == "item"]
     assert items == ["a", "b", "c"]
@@ -326,8 +328,8 @@ def test_a_mission_starts_inside_a_for_each_and_inside_a_selector(tmp_path: Path
     ]
     assert first[0] == "step 3"
     midway = [r.number for r in file.rows() if r.node.endswith("step 3")][1]
-    taken = TakenUp(midway, file.state(midway), same_world=True, start=path)
-    outcome, rest = run(tree, None, taken_up=taken, world=file.world(midway))
+    taken = ResumePoint(midway, file.state(midway), same_world=True, start=path)
+    outcome, rest = run(tree, None, resume_point=taken, world=file.world(midway))
     assert outcome.status == "success"
     marks = [value for _, key, value in rest.ports if key == "marks"]
     assert len(marks[-1]) == 3, "the first item's mark was kept, the loop went on with the second"
@@ -337,7 +339,7 @@ def test_a_mission_starts_inside_a_for_each_and_inside_a_selector(tmp_path: Path
 def test_a_checkpoint_of_another_tree_is_refused_before_the_first_tick(tmp_path: Path) -> None:
     file = CheckpointFile.create(tmp_path / "a.sqlite", {})
     run(leaf("RS"), file)
-    taken = TakenUp(1, file.state(1), same_world=True)
+    taken = ResumePoint(1, file.state(1), same_world=True)
     with pytest.raises(BadInput, match="another tree"):
-        run(node("sequence", [leaf("RS"), leaf("S")]), None, taken_up=taken, world=file.world(1))
+        run(node("sequence", [leaf("RS"), leaf("S")]), None, resume_point=taken, world=file.world(1))
     file.close()

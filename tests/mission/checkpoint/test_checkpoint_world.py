@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from glotouch_bt.mission.record.run_summary import Tally
+from glotouch_bt.mission.record.run_summary import RunSummary
 from glotouch_bt.report import read_run
 from glotouch_bt.run.launch import RunRequest, launch
 from glotouch_bt.run.resume import resume
@@ -43,8 +43,8 @@ def request(mission: Path, out: Path) -> RunRequest:
     return RunRequest(mission=str(mission), seed=6, out=out, report=False)
 
 
-def broken_off_at(stamp_s: float) -> Callable[[float, Tally], None]:
-    def look(robot_s: float, tally: Tally) -> None:
+def broken_off_at(stamp_s: float) -> Callable[[float, RunSummary], None]:
+    def look(robot_s: float, summary: RunSummary) -> None:
         if robot_s >= stamp_s:
             raise KeyboardInterrupt
 

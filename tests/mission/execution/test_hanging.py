@@ -23,7 +23,7 @@ from glotouch_bt.skill import Out, Skill, SkillFailed, SkillRun
 class Forever(Skill):
     """Yields for ever."""
 
-    LONGEST_S: ClassVar[float] = 2.0
+    MAX_DURATION_S: ClassVar[float] = 2.0
 
     def run(self) -> SkillRun:
         while True:

@@ -147,5 +147,5 @@ def test_ctrl_c_takes_effect_between_cycles(go: Any, robot: Any) -> None:
 
 def test_progress_comes_twice_a_second_of_robot_time(go: Any) -> None:
     seen: list[float] = []
-    go("  - act: {script: " + "R" * 200 + "}\n", on_progress=lambda t, tally: seen.append(t))
+    go("  - act: {script: " + "R" * 200 + "}\n", on_progress=lambda t, summary: seen.append(t))
     assert seen == pytest.approx([0.0, 0.5, 1.0, 1.5])

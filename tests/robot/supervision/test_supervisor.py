@@ -144,7 +144,7 @@ def test_an_arm_that_moves_while_it_is_held_is_noticed() -> None:
 
 @pytest.mark.parametrize("force_N", [0.0, 7.0, 9.0, -20.0])
 def test_an_arm_that_strays_trips_sooner_while_it_presses(force_N: float) -> None:
-    """What presses goes with how far the hand strays: half as far is allowed then."""
+    """What presses goes with how far the hand outliers: half as far is allowed then."""
 
     def astray(seen: Observation) -> Observation:
         away = [[0.002, 0.0, 0.0]] * np.maximum(seen.stamp_s[:, None] - 0.2, 0.0)

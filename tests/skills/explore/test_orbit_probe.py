@@ -49,7 +49,7 @@ def test_the_outline_is_the_posts(make) -> None:
     assert candidate.contour.size_m[0] == pytest.approx(2 * RADIUS, abs=8e-4)
     assert (candidate.contour.family, candidate.contour.covariance.shape) == ("circle", (3, 3))
     assert candidate.height_m == 0.018, "the top is touched later: so far only the sensing height is known"
-    assert 4 <= len(candidate.contacts) <= OrbitProbe.Params().most_contacts
+    assert 4 <= len(candidate.contacts) <= OrbitProbe.Params().max_contacts
     (event,) = b.of_kind("candidate")
     assert event["candidate"] is candidate
     assert event["displaced_m"] < 0.002
@@ -72,7 +72,7 @@ def test_what_is_touched_by_the_way_becomes_a_hint(make, monkeypatch: pytest.Mon
 
     def with_a_stray(*args, **keywords):
         traced = yield from trace(*args, **keywords)
-        return dataclasses.replace(traced, strays=(stray,))
+        return dataclasses.replace(traced, outliers=(stray,))
 
     monkeypatch.setattr("glotouch_skills.explore.orbit_probe.trace", with_a_stray)
     b, skill = make(belief=SearchMap.blank(np.array([0.138, 0.188]), expected=2).with_hints((old,)))

@@ -143,4 +143,4 @@ def test_what_stands_still_is_not_reported_as_moved(make) -> None:
     b, skill = make()
     b.run(skill)
     assert not b.of_kind("object_moved")
-    assert all(abs(layer.slide_m) + abs(layer.turn_rad) + layer.gave_m < 1e-6 for layer in skill.touchset.layers)
+    assert all(abs(layer.slide_m) + abs(layer.turn_rad) + layer.compliance_m < 1e-6 for layer in skill.touchset.layers)

@@ -108,7 +108,7 @@ def test_none_of_them(make) -> None:
 
 def test_it_ends_when_nothing_can_help(make) -> None:
     """Gains below the least are not worth a closure; only the likeliest, here the first, gets its evidence."""
-    b, skill = make(Oracle(right=1, enough=3), least_gain_nats=0.6)
+    b, skill = make(Oracle(right=1, enough=3), min_gain_nats=0.6)
     assert repeat(b, skill) == 3
     assert [len(t.layers) for t in skill.touchsets] == [2, 0]
     assert "no closure" in b.of_kind("decided")[0]["why"]
@@ -139,7 +139,7 @@ def test_a_candidate_that_is_gone_is_left_alone(make) -> None:
     """Nothing is ever felt: each candidate gets a few closures, then it ends."""
     b, skill = make(Oracle(right=1, enough=3), grip_width_m=None)
     repeat(b, skill)
-    assert [len(t.layers) for t in skill.touchsets] == [module.MOST_IN_VAIN] * 2
+    assert [len(t.layers) for t in skill.touchsets] == [module.MAX_IN_VAIN] * 2
     assert not any(layer.stable for t in skill.touchsets for layer in t.layers)
 
 

@@ -57,7 +57,7 @@ def test_nowhere_so_wide(judged, grip_m: float) -> None:
     assert (skill.fits, skill.impossible) == (False, True)
     # Gels of 1.5 mm: the jaws stop up to 3 mm below the width.
     least = {0.020: 0.035 - 0.003 - 0.020, 0.072: 0.072 - float(np.hypot(0.050, 0.035))}[grip_m]
-    assert skill.reason.evidence["least_m"] == pytest.approx(least, abs=2e-3)
+    assert skill.reason.evidence["min_m"] == pytest.approx(least, abs=2e-3)
 
 
 @pytest.mark.parametrize("weight_N", [0.05, 9.0])

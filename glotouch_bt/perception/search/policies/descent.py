@@ -23,17 +23,17 @@ class RandomDescent:
 
     Args:
         seed: Of the draws.
-        most_descents: After so many hops the search counts as exhausted. The draws alone would never end; the default
+        max_descents: After so many hops the search counts as exhausted. The draws alone would never end; the default
             is some 30 m of travel in a 0.3 m x 0.4 m container, six times the largest budget of the paper.
 
     Raises:
-        ParamError: `most_descents` below 1.
+        ParamError: `max_descents` below 1.
     """
 
-    def __init__(self, seed: int = 0, *, most_descents: int = 200) -> None:
-        if most_descents < 1:
-            raise ParamError("most_descents", most_descents, "at least 1")
-        self._seed, self._most = seed, most_descents
+    def __init__(self, seed: int = 0, *, max_descents: int = 200) -> None:
+        if max_descents < 1:
+            raise ParamError("max_descents", max_descents, "at least 1")
+        self._seed, self._most = seed, max_descents
 
     def next_stretch(self, belief: SearchMap, tip_K_m: Array) -> Stretch | None:
         """See `SearchPolicy`."""

@@ -15,7 +15,7 @@ from glotouch_bt.perception.touch import Contact
 from glotouch_bt.perception.touch.outline import OutlineBelief, wrapped
 from glotouch_bt.robot import Array
 
-LEAST_MORE = 3
+MIN_MORE = 3
 """Contacts made of an object that was thought to be known."""
 BESIDE_RAD = np.deg2rad(10.0)
 """The ball is not sent nearer than this to the bearing of something else beside the object."""
@@ -125,7 +125,7 @@ def _until_known(
     outline, missed, ended, about = s.outline(), 0, "", False
     while not ended:
         ended = _enough(outline, s, p)
-        if not ended and joined is not None and len(s.raw) >= p.least_contacts and joined(s.present()):
+        if not ended and joined is not None and len(s.raw) >= p.min_contacts and joined(s.present()):
             ended = "it is an object that is known"
         if ended:
             break
@@ -155,7 +155,7 @@ def _until_known(
                 missed = 0
         else:
             missed += 1
-            s.strays.append(found)
+            s.outliers.append(found)
             s.blocked.append(bearing)
             s.felt((yield Move("retreat", s.tip + p.clearance_m * unit(found.reaction_K[:2]))))
         if missed > p.misses:
@@ -178,10 +178,10 @@ def _retreat(s: TraceState, p: TraceParams) -> Plan[None]:
 
 def _enough(outline: OutlineBelief, s: TraceState, p: TraceParams) -> str:
     n = len(s.raw)
-    if n >= p.most_contacts and (s.known or n >= s.given + LEAST_MORE):
+    if n >= p.max_contacts and (s.known or n >= s.given + MIN_MORE):
         return f"{n} contacts"
     if (
-        n < p.least_contacts
+        n < p.min_contacts
         or max(outline.contour.size_m) < p.smallest_m
         or (s.known and s.odd >= 0 and n < s.odd + p.settling)
     ):
@@ -230,8 +230,8 @@ def _choose(outline: OutlineBelief, s: TraceState, p: TraceParams) -> _Aim | Non
 
 
 def _barred(outline: OutlineBelief, s: TraceState, p: TraceParams, here: float, side: float) -> float:
-    """How far, rad, the way round is free of what is not the object: strays beside it stand in the way."""
-    off = np.array([c.tip_K_m[:2] for c in s.strays]).reshape(-1, 2) - outline.centre_K_m
+    """How far, rad, the way round is free of what is not the object: outliers beside it stand in the way."""
+    off = np.array([c.tip_K_m[:2] for c in s.outliers]).reshape(-1, 2) - outline.centre_K_m
     at = np.arctan2(off[:, 1], off[:, 0])
     beside = np.hypot(off[:, 0], off[:, 1]) < s.passing(outline, at, p) + s.radius
     turns = wrapped(side * (at[beside] - here)) % (2 * np.pi)

@@ -16,7 +16,7 @@ class TraceParams:
         widest_margin_m: No more than this is added.
         centre_sd_m: Enough is known when the centre's standard deviation is below this ...
         radial_sd_m: ... and the outline's nowhere above this.
-        least_contacts, most_contacts: Bounds whatever the covariance says.
+        min_contacts, max_contacts: Bounds whatever the covariance says.
         unfelt_m: Standard deviation of how far what was known before may have moved unfelt, each way; contacts made
             since say how far it did not.
         smallest_m: What is shorter is a part of an object: not enough is known.
@@ -55,8 +55,8 @@ class TraceParams:
     widest_margin_m: float = 0.002
     centre_sd_m: float = 0.0010
     radial_sd_m: float = 0.0035
-    least_contacts: int = 4
-    most_contacts: int = 14
+    min_contacts: int = 4
+    max_contacts: int = 14
     unfelt_m: float = 0.004
     smallest_m: float = 0.030
     largest_m: float = 0.118

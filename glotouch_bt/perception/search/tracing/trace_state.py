@@ -59,7 +59,7 @@ class Trace:
         outline: What they say, or None if they say nothing.
         displaced_K_m: (2,) how far the object was pushed in all.
         path_K_m: (n, 2) where the ball has been at sensing height.
-        strays: Contacts that belong to something else.
+        outliers: Contacts that belong to something else.
         ended: Why no more probes were made.
         missing: It was not met where it had been traced.
         moves: So many times it moved without being felt to, and was traced anew.
@@ -70,7 +70,7 @@ class Trace:
     outline: OutlineBelief | None
     displaced_K_m: Array
     path_K_m: Array
-    strays: tuple[Contact, ...] = ()
+    outliers: tuple[Contact, ...] = ()
     ended: str = ""
     missing: bool = False
     moves: int = 0
@@ -93,7 +93,7 @@ class TraceState:
         raw: The contacts as they were felt.
         half: (2,) it keeps within |x|, |y| of this.
         paths: Where it has been.
-        strays: Contacts with something else.
+        outliers: Contacts with something else.
         blocked: Bearings that were tried in vain, rad.
         side: The way round so far: +1 counter-clockwise, 0 not chosen yet.
         moves: So many times the object moved unfelt.
@@ -112,7 +112,7 @@ class TraceState:
     raw: list[Contact]
     half: Array
     paths: list[Array] = field(default_factory=list)
-    strays: list[Contact] = field(default_factory=list)
+    outliers: list[Contact] = field(default_factory=list)
     blocked: list[float] = field(default_factory=list)
     side: float = 0.0
     moves: int = 0
@@ -288,7 +288,7 @@ class TraceState:
     def keep_one(self, outline: OutlineBelief, p: TraceParams) -> bool:
         """If what was traced is larger than any object, keep the contacts with one of two; whether it was so.
 
-        The two are told by the best cut across the long side; the others are strays. The larger part is kept.
+        The two are told by the best cut across the long side; the others are outliers. The larger part is kept.
         """
         size = outline.contour.size_m
         if len(self.raw) < 2 * FEWEST_OF_ONE or max(size) <= p.largest_m:
@@ -308,7 +308,7 @@ class TraceState:
                     else order[k:]
                 )
         keep = {int(i) for i in kept}
-        self.strays += [c for i, c in enumerate(now) if i not in keep]
+        self.outliers += [c for i, c in enumerate(now) if i not in keep]
         self.raw = [c for i, c in enumerate(self.raw) if i in keep]
         self.given = sum(i < self.given for i in keep)
         self.odd, self.known = -1, 0
@@ -332,7 +332,7 @@ class TraceState:
             outline,
             self.moved_K_m + np.sum([c.pushed_K_m for c in self.raw], axis=0),
             np.concatenate(self.paths) if self.paths else np.zeros((0, 2)),
-            tuple(self.strays),
+            tuple(self.outliers),
             ended,
             moves=self.moves,
             continued=self.given > 0 or self.moves > 0,

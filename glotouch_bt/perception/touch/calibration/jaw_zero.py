@@ -16,7 +16,7 @@ from glotouch_bt.perception.touch.squeeze import temporal_median
 from glotouch_bt.perception.touch.values import ZERO_SD_M
 from glotouch_bt.robot import Observation
 
-LEAST_SUNK_M = 2e-4
+MIN_SUNK_M = 2e-4
 """Less than this in the middle of a pad, and it does not press on the handle's side. At 60 N it is 0.54 mm."""
 MEASURED_SD_M = 1e-4
 """What remains: 0.15 mm of noise in 20 reports, 0.05 mm that the tops of rough contacts read differently from flat
@@ -52,7 +52,7 @@ def measured_zero(blocks: Sequence[Observation], width_m: float, pad_shape: tupl
     if any(np.isfinite(m).mean() < 0.5 for m in maps):
         return JawZero()
     sunk = [float(np.nanmedian(m)) for m in maps]
-    if min(sunk) < LEAST_SUNK_M:
+    if min(sunk) < MIN_SUNK_M:
         return JawZero()
     aperture = float(np.mean([b.gripper.aperture_m for b in blocks]))
     return JawZero(aperture + sum(sunk) - width_m, MEASURED_SD_M)

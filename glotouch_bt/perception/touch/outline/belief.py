@@ -54,7 +54,7 @@ def believe_outline(
     pushed_K_m: Array | None = None,
     free_K_m: Array | None = None,
     contact_sd_m: float = CONTACT_SD_M,
-    strays: int = 0,
+    outliers: int = 0,
 ) -> OutlineBelief:
     """The belief after k >= 1 contacts with one object.
 
@@ -66,7 +66,7 @@ def believe_outline(
         pushed_K_m: (k, 2) how far each contact shoved the object; all contacts are moved to where it stands now.
         free_K_m: (m, 2) places the ball's centre has been without touching the object as it stands now.
         contact_sd_m: Scatter of a ball's centre at the onset.
-        strays: So many of the first contacts were made before the object moved, by a common, unknown shift.
+        outliers: So many of the first contacts were made before the object moved, by a common, unknown shift.
 
     Raises:
         ParamError: No contact, none since the object moved, wrong shapes, or values that are not finite.
@@ -75,8 +75,8 @@ def believe_outline(
     if tips.ndim != 2 or len(tips) < 1 or tips.shape[1] not in (2, 3):
         raise ParamError("tip_K_m", tips.shape, "(k, 2) or (k, 3) with k >= 1 contacts")
     tips = tips[:, :2]
-    if not 0 <= strays < len(tips):
-        raise ParamError("strays", strays, f"0 to {len(tips) - 1}")
+    if not 0 <= outliers < len(tips):
+        raise ParamError("outliers", outliers, f"0 to {len(tips) - 1}")
     if not np.isfinite(tips).all():
         raise ParamError("tip_K_m", "NaN or infinity inside", "finite")
     approach = _directions("approach_K", approach_K, len(tips))
@@ -88,10 +88,10 @@ def believe_outline(
     normal = np.where(felt[:, None], reaction, -approach)
     sd = np.where(felt, NORMAL_SD_RAD, np.where(seen, APPROACH_SD_RAD, np.inf))
     bearing = np.arctan2(normal[:, 1], normal[:, 0])
-    touches = Touches(tips, bearing, sd, approach, np.zeros((0, 2)), tip_radius_m, contact_sd_m, strays)
+    touches = Touches(tips, bearing, sd, approach, np.zeros((0, 2)), tip_radius_m, contact_sd_m, outliers)
     if free_K_m is not None and len(free_K_m) > 0:
         free = _nearest_free(np.asarray(free_K_m, dtype=np.float64)[:, :2], touches)
-        touches = Touches(tips, bearing, sd, approach, free, tip_radius_m, contact_sd_m, strays)
+        touches = Touches(tips, bearing, sd, approach, free, tip_radius_m, contact_sd_m, outliers)
     return OutlineBelief(*_hypotheses(touches), touches)
 
 

@@ -159,8 +159,8 @@ def explain(
         sd = np.concatenate([sd, amplitude * np.tile(spread, 2)], axis=1)
         start = np.concatenate([start, np.zeros((s, 2 * len(spread)))], axis=1)
         noise = np.hypot(noise, amplitude * REST_SD_M)
-    if touches.strays:
-        moved = np.where(np.arange(k) < touches.strays, 1.0, 0.0)[:, None]
+    if touches.outliers:
+        moved = np.where(np.arange(k) < touches.outliers, 1.0, 0.0)[:, None]
         slide = np.zeros((s, len(touches.points_m), 2))
         slide[:, :k] = -moved * towards[:, 0]
         rows = np.concatenate([rows, slide], axis=2)
@@ -172,10 +172,10 @@ def explain(
     evidence = posterior.log_density - np.log(noise).sum(axis=1)
     # A contact on a face that looks along its approach would have been made from inside.
     evidence -= 10.0 * (-(g.by_params[:, :k, :2] * touches.approach).sum(axis=2) > 0.3).sum(axis=1)
-    if not wavy and not touches.strays:
+    if not wavy and not touches.outliers:
         posterior = replace(posterior, mean=_upheld(shape, params, posterior.mean, start, sd, noise, touches))
     residuals = g.distance_m[:, :k] - r + (rows[:, :k] @ posterior.mean[..., None])[..., 0]
-    own = posterior.mean.shape[1] - (2 if touches.strays else 0)
+    own = posterior.mean.shape[1] - (2 if touches.outliers else 0)
     return [
         Hypothesis(
             shape,

@@ -21,7 +21,7 @@ FEWEST = 3
 
 
 def believe_contacts(
-    contacts: Sequence[Contact], tip_radius_m: float, free_K_m: Array | None = None, *, strays: int = 0
+    contacts: Sequence[Contact], tip_radius_m: float, free_K_m: Array | None = None, *, outliers: int = 0
 ) -> OutlineBelief:
     """As `believe_outline`, from contacts in order of time; each push moves the contacts made before it."""
     return believe_outline(
@@ -31,7 +31,7 @@ def believe_contacts(
         reaction_K=np.array([c.reaction_K[:2] for c in contacts]),
         pushed_K_m=np.array([c.pushed_K_m for c in contacts]),
         free_K_m=free_K_m,
-        strays=strays,
+        outliers=outliers,
     )
 
 
@@ -51,7 +51,7 @@ def split_moved(
     contacts = tuple(contacts)
     scores = [believe_contacts(contacts, tip_radius_m).log_evidence]
     for first in range(1, len(contacts) - FEWEST + 1):
-        moved = believe_contacts(contacts, tip_radius_m, strays=first)
+        moved = believe_contacts(contacts, tip_radius_m, outliers=first)
         scores.append(moved.log_evidence + math.log(LIKELY_PRIOR if first == likely else MOVED_PRIOR))
     best = int(np.argmax(scores))
     return contacts[:best], contacts[best:]

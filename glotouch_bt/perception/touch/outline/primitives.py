@@ -47,7 +47,7 @@ class Touches:
         free_m: (m, 2) places where the ball's centre was without touching; few, near the outline.
         radius_m: Radius of the ball.
         contact_sd_m: Scatter of a ball's centre at the onset, and what a plain primitive may leave of an outline.
-        strays: So many of the first contacts were made before the object moved, by a common, unknown shift.
+        outliers: So many of the first contacts were made before the object moved, by a common, unknown shift.
     """
 
     tips_m: Array
@@ -57,12 +57,12 @@ class Touches:
     free_m: Array
     radius_m: float
     contact_sd_m: float = CONTACT_SD_M
-    strays: int = 0
+    outliers: int = 0
 
     @cached_property
     def rooted(self) -> Touches:
         """Those made since the object moved."""
-        s = self.strays
+        s = self.outliers
         tips, normal, sd = self.tips_m[s:], self.normal_rad[s:], self.normal_sd_rad[s:]
         return Touches(tips, normal, sd, self.approach[s:], self.free_m, self.radius_m, self.contact_sd_m)
 

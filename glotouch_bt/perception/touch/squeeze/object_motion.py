@@ -22,12 +22,12 @@ PUSH_N = 0.3
 BOTH_N = 1.5
 """Twice the jaw force less the push on the hand: more of it and the other jaw touches, too."""
 BASELINE_PERIODS = 6
-LEAST_LEVER_M = 0.003
+MIN_LEVER_M = 0.003
 """Closer than this the pads are opposite to each other: no lever."""
 FRICTION_RADIUS = 0.65
 """c over half the diagonal of the outline: 0.54 for a 7 x 4 cm box of even pressure, 1 if it stands on its corners."""
 TURN_LIMIT_RAD = float(np.deg2rad(20.0))
-DEEP_TAXELS, LEAST_TAXELS = 8, 6
+DEEP_TAXELS, MIN_TAXELS = 8, 6
 SLIDE_M, TURN_RAD, GAVE_M = 0.0025, float(np.deg2rad(3.0)), 0.003
 """From here on a closure has moved its object: the spread of a sequence's own pose in `recognition` is of this size."""
 
@@ -39,19 +39,19 @@ class Yielding:
     Attributes:
         slide_m: Displacement along +y_P of the side that was touched first, at the pad; 0 if both were touched at once.
         turn_rad: Turn about +z_B, at most `TURN_LIMIT_RAD` either way; 0 if nothing had a lever.
-        gave_m: How far the jaws closed after both touched, the gels' own give taken off.
+        compliance_m: How far the jaws closed after both touched, the gels' own give taken off.
         felt: Something was pushed or pressed at all.
     """
 
     slide_m: float
     turn_rad: float
-    gave_m: float
+    compliance_m: float
     felt: bool
 
     @property
     def moved(self) -> bool:
         """It is not where it was."""
-        return abs(self.slide_m) > SLIDE_M or abs(self.turn_rad) > TURN_RAD or self.gave_m > GAVE_M
+        return abs(self.slide_m) > SLIDE_M or abs(self.turn_rad) > TURN_RAD or self.compliance_m > GAVE_M
 
 
 def watch_yielding(
@@ -105,7 +105,7 @@ def _turn(frames: Sequence[TactileFrame], dents: Array, aperture: Array, width_m
         return 0.0
     between = (aperture + dents.sum(axis=1))[seen]
     arm = 0.5 * (lever[seen][1:] + lever[seen][:-1])
-    use = np.abs(arm) > LEAST_LEVER_M
+    use = np.abs(arm) > MIN_LEVER_M
     return float(np.sum(-np.diff(between)[use] / arm[use]))
 
 
@@ -126,7 +126,7 @@ def _dents(frame: TactileFrame) -> tuple[float, float]:
 def _middle_m(depth: Array, width_m: float) -> float:
     """Place along x_P of a contact's middle, weighted by depth; NaN without contact."""
     touched = np.where(np.nan_to_num(depth) > THRESHOLD_M, np.nan_to_num(depth), 0.0)
-    if np.count_nonzero(touched) < LEAST_TAXELS:
+    if np.count_nonzero(touched) < MIN_TAXELS:
         return float("nan")
     across = (np.arange(depth.shape[1]) + 0.5) / depth.shape[1] - 0.5
     weight = touched.sum(axis=0)

@@ -162,5 +162,5 @@ def make_layer(
         why_not=plateau.why_not,
         slide_m=math.nan if yielding is None else yielding.slide_m,
         turn_rad=math.nan if yielding is None else yielding.turn_rad,
-        gave_m=math.nan if yielding is None else yielding.gave_m,
+        compliance_m=math.nan if yielding is None else yielding.compliance_m,
     )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from glotouch_backends.mujoco.hulls.thinning import MOST_FACES, thinned
+from glotouch_backends.mujoco.hulls.thinning import MAX_FACES, thinned
 from glotouch_bt.robot.scene.meshes import Mesh
 
 
@@ -28,7 +28,7 @@ def test_many_faces_become_few_and_the_shape_stays() -> None:
     mesh = as_mesh(trimesh.creation.torus(0.03, 0.012, major_sections=320, minor_sections=160))
     vertices, faces = thinned(mesh)
     solid = trimesh.Trimesh(vertices, faces, process=False)
-    assert 0.3 * MOST_FACES < len(faces) <= MOST_FACES
+    assert 0.3 * MAX_FACES < len(faces) <= MAX_FACES
     assert solid.is_watertight
     assert solid.volume == pytest.approx(2 * np.pi**2 * 0.03 * 0.012**2, rel=0.01)  # Pappus
     used = vertices[np.unique(faces)]

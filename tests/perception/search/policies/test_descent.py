@@ -48,7 +48,7 @@ def test_it_goes_elsewhere_once_the_map_has_grown_and_answers_alike_for_the_same
 
 
 def test_it_gives_up_after_so_many_descents() -> None:
-    policy, belief, tip = RandomDescent(most_descents=12), SearchMap.blank(HALF, 5), np.zeros(2)
+    policy, belief, tip = RandomDescent(max_descents=12), SearchMap.blank(HALF, 5), np.zeros(2)
     count = 0
     while (stretch := policy.next_stretch(belief, tip)) is not None:
         tip = stretch.waypoints_K_m[-1]
@@ -69,4 +69,4 @@ def test_missions_call_it_by_name() -> None:
 
 def test_no_descents_is_refused() -> None:
     with pytest.raises(ParamError):
-        RandomDescent(most_descents=0)
+        RandomDescent(max_descents=0)

@@ -72,7 +72,7 @@ def test_a_block_off_the_middle_slides_by_as_much_as_it_is_off(
     assert felt.felt
     assert felt.slide_m == pytest.approx(-side * off, abs=0.0006)
     assert felt.turn_rad == 0.0
-    assert felt.gave_m < 0.0006
+    assert felt.compliance_m < 0.0006
     assert felt.moved == (abs(felt.slide_m) > 0.0025)
 
 
@@ -103,7 +103,7 @@ def test_a_box_held_by_two_corners_turns_by_what_the_jaws_close_over_the_lever(l
 def test_closing_on_nothing_or_on_what_stands_still() -> None:
     empty = [block(0.01 * i, 0.05 - 3e-4 * i, 0.0, 0.0) for i in range(100)]
     felt = watch_yielding(empty, PAD_WIDTH)
-    assert (felt.felt, felt.moved, felt.slide_m, felt.turn_rad, felt.gave_m) == (False, False, 0.0, 0.0, 0.0)
+    assert (felt.felt, felt.moved, felt.slide_m, felt.turn_rad, felt.compliance_m) == (False, False, 0.0, 0.0, 0.0)
     assert not watch_yielding(empty[:3], PAD_WIDTH).felt
     held = empty + [block(1.0 + 0.01 * k, 0.02, 10.0, 0.0, 0.0, frame(1.0, 0.0, 0.0)) for k in range(20)]
     felt = watch_yielding(held, PAD_WIDTH)
@@ -116,7 +116,7 @@ def test_what_slips_out_under_both_jaws_is_seen_without_depth_maps() -> None:
     blocks = [block(0.01 * i, 0.05 - 3e-4 * i, 0.0, 0.0) for i in range(30)]
     blocks += [block(0.3 + 0.01 * k, 0.041 - 4e-4 * min(k, 20), 3.0, 0.0) for k in range(40)]
     felt = watch_yielding(blocks, PAD_WIDTH)
-    assert felt.gave_m == pytest.approx(0.008, abs=5e-4)
+    assert felt.compliance_m == pytest.approx(0.008, abs=5e-4)
     assert felt.moved
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from glotouch_skills.common.hand.clearance_rules import keeping_clear_of
-from glotouch_skills.common.planning.squeeze_plan import LEAST_SIDE_GAP_M, plan_stances, schemes, stance
+from glotouch_skills.common.planning.squeeze_plan import MIN_SIDE_GAP_M, plan_stances, schemes, stance
 
 STROKE = 0.085
 
@@ -37,7 +37,7 @@ def test_a_stance_is_midway_of_what_was_traced_not_of_the_fit(found) -> None:
 
 
 def test_the_opening_is_no_wider_than_the_stroke_and_what_is_too_wide_has_no_stance(found) -> None:
-    widest = STROKE - 2 * LEAST_SIDE_GAP_M
+    widest = STROKE - 2 * MIN_SIDE_GAP_M
     assert stance(found.box((0, 0), (0.09, widest - 1e-6)), 0.0, 0.0, 0.01, STROKE).opening_m == STROKE
     assert stance(found.box((0, 0), (0.09, widest + 1e-6)), 0.0, 0.0, 0.01, STROKE) is None
 

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from glotouch_bt.motion import Arm, Kinematics, MoveResult
-from glotouch_bt.motion.feed import BACK_OFF_M
+from glotouch_bt.motion.pause_signal import BACK_OFF_M
 from glotouch_bt.robot import Array, Command, Observation
 from glotouch_bt.robot.fake import FakeRobot, SpringWall
 
@@ -29,7 +29,7 @@ def play(
         while True:
             commands.append(command)
             seen = robot.cycle(command)
-            arm.feed.wanted = wanted(len(commands))
+            arm.pause_signal.requested = wanted(len(commands))
             command = motion.send(seen)
     except StopIteration as end:
         return end.value, commands
@@ -49,7 +49,7 @@ def track(arm: Arm, commands: list[Command]) -> Array:
 def test_a_held_line_is_the_same_line(world: Any, pauses: list[tuple[int, int]], retreat: bool) -> None:
     arm, robot = Arm(FakeRobot().description, FakeRobot().limits, world, DT), FakeRobot()
     arm.sync(robot.observe())
-    arm.feed.style = "retreat" if retreat else "hold"
+    arm.pause_signal.style = "retreat" if retreat else "hold"
     begin, way = arm.pose_B_P.position_m, np.array([-0.05, 0.08, 0.03])
     held = {n for start, length in pauses for n in range(start, start + length)}
     guard = (lambda _: None) if retreat else None
@@ -82,7 +82,7 @@ def test_a_pause_brings_a_line_to_rest_and_nothing_moves(arm: Arm, robot: FakeRo
 
 def test_finish_goes_to_the_end_of_its_motion(arm: Arm, robot: FakeRobot) -> None:
     arm.sync(robot.observe())
-    arm.feed.style = "finish"
+    arm.pause_signal.style = "finish"
     result, commands = play(arm, robot, arm.shift((0.0, 0.1, 0.0), 0.1), lambda n: n > 10)
     assert result.completed
     assert all(c.motion is not None for c in commands)
@@ -92,12 +92,12 @@ def test_what_is_finished_is_not_interrupted(arm: Arm, robot: FakeRobot) -> None
     arm.sync(robot.observe())
 
     def closing() -> Generator[Command, Observation, MoveResult]:
-        with arm.feed.finishing():
+        with arm.pause_signal.finishing():
             return (yield from arm.shift((0.0, 0.1, 0.0), 0.1))
 
     _, commands = play(arm, robot, closing(), lambda n: n > 10)
     assert all(c.motion is not None for c in commands)
-    assert not arm.feed.waits
+    assert not arm.pause_signal.deferred
 
 
 @QUIET
@@ -107,7 +107,7 @@ def test_a_guard_trips_at_the_same_wall_whenever_it_is_held(world: Any, start: i
     gap, stiffness, speed = 0.03, 3000.0, 0.02
     description = FakeRobot().description
     arm = Arm(description, FakeRobot().limits, world, DT)
-    arm.feed.style = "retreat"
+    arm.pause_signal.style = "retreat"
     face = arm.pose_B_P.apply((0.0, 0.0, 0.13)) + np.array([0.0, gap + 0.006, 0.0])
     robot = FakeRobot(walls=[SpringWall(face, np.array([0.0, -1.0, 0.0]), stiffness)])
     arm.sync(robot.observe())
@@ -122,7 +122,7 @@ def test_a_guard_trips_at_the_same_wall_whenever_it_is_held(world: Any, start: i
     assert robot.peak_force_N < stiffness * 0.0012
     # backing off leaves the wall, coming back ends where it was, at the same force
     at = arm.q.copy()
-    arm.feed.wanted = False
+    arm.pause_signal.requested = False
     out, _ = play(arm, robot, arm.back_off(), lambda _: True)
     assert np.linalg.norm(robot.observe().wrench_S[-1, :3]) < 1e-9
     assert np.linalg.norm(arm.pose_B_P.position_m - arm.kinematics.fk(at).position_m) == pytest.approx(
@@ -144,15 +144,15 @@ def test_a_guard_that_trips_while_the_motion_stands_is_a_contact(arm: Arm, robot
     assert result.stop == "pushed"
     assert not result.completed
     assert len(commands) == 200
-    assert not arm.feed.standing
-    assert not arm.feed.taken
+    assert not arm.pause_signal.standing
+    assert not arm.pause_signal.handled
 
 
 def test_a_guarded_motion_that_begins_in_a_pause_listens_first(arm: Arm, robot: FakeRobot) -> None:
     """Its zero was taken just before: it must see every sample from then on."""
     arm.sync(robot.observe())
     stamps: list[float] = []
-    arm.feed.wanted = True
+    arm.pause_signal.requested = True
     move = arm.shift((0.0, 0.02, 0.0), 0.05, guard=lambda seen: stamps.extend(seen.stamp_s.tolist()))
     result, commands = play(arm, robot, move, lambda n: n < 50)
     assert result.completed
@@ -181,9 +181,9 @@ def test_closing_a_held_motion_leaves_nothing_behind(arm: Arm, robot: FakeRobot)
     motion = arm.shift((0.0, 0.1, 0.0), 0.05)
     command = next(motion)
     for _ in range(60):
-        arm.feed.wanted = True
+        arm.pause_signal.requested = True
         command = motion.send(robot.cycle(command))
-    assert arm.feed.standing
+    assert arm.pause_signal.standing
     motion.close()
-    assert not arm.feed.standing
-    assert not arm.feed.taken
+    assert not arm.pause_signal.standing
+    assert not arm.pause_signal.handled

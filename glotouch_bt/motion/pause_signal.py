@@ -19,41 +19,41 @@ BACK_OFF_M_S = 0.02
 
 
 @dataclass
-class Feed:
+class PauseSignal:
     """What a pause does to motions.
 
     Attributes:
-        wanted: A pause is asked for.
+        requested: A pause is asked for.
         style: What it does to the skill that runs: `hold`, `retreat` (a guarded motion also backs off), `finish` (the
             present motion is made to its end).
-        taken: A motion under way takes care of the pause: it brakes, backs off or stands.
+        handled: A motion under way takes care of the pause: it brakes, backs off or stands.
         standing: It stands.
     """
 
-    wanted: bool = False
+    requested: bool = False
     style: Style = "hold"
-    taken: bool = False
+    handled: bool = False
     standing: bool = False
     _finishing: int = 0
 
     @property
     def stops(self) -> bool:
         """A motion under way must stop now."""
-        return self.wanted and self.style != "finish" and not self._finishing
+        return self.requested and self.style != "finish" and not self._finishing
 
     @property
-    def waits(self) -> bool:
+    def deferred(self) -> bool:
         """A pause must wait for what is being finished."""
         return bool(self._finishing)
 
     @contextmanager
-    def taking(self) -> Iterator[None]:
+    def handling(self) -> Iterator[None]:
         """A motion takes care of the pause."""
-        self.taken = True
+        self.handled = True
         try:
             yield
         finally:
-            self.taken = self.standing = False
+            self.handled = self.standing = False
 
     @contextmanager
     def finishing(self) -> Iterator[None]:
