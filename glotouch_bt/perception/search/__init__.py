@@ -13,7 +13,6 @@ from glotouch_bt.perception.search.policies import (
     Stretch,
     search_policy,
 )
-from glotouch_bt.perception.search.ring import outline_of, trace_ring, with_second_ring
 from glotouch_bt.perception.search.routes import Routes, segment_is_free
 from glotouch_bt.perception.search.seeking import Sought, seek
 from glotouch_bt.perception.search.top import BallMove, Met, Top, TopPlan, TopRule, rounds, top_plan
@@ -48,7 +47,6 @@ __all__ = [
     "elsewhere_m",
     "joins",
     "of_another",
-    "outline_of",
     "part_of",
     "refined",
     "rounds",
@@ -58,6 +56,4 @@ __all__ = [
     "top_plan",
     "trace",
     "trace_more",
-    "trace_ring",
-    "with_second_ring",
 ]

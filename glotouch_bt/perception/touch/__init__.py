@@ -62,7 +62,6 @@ from glotouch_bt.perception.touch.values import (
     ContourFamily,
     ContourKind,
     Layer,
-    Ring,
     TouchSequence,
     TouchSet,
 )
@@ -88,7 +87,6 @@ __all__ = [
     "PatchStats",
     "Plateau",
     "PlateauParams",
-    "Ring",
     "TipFusion",
     "TouchSequence",
     "TouchSet",

@@ -104,21 +104,6 @@ class Contour:
 
 
 @dataclass(frozen=True)
-class Ring:
-    """What was felt round an object at a height of its own.
-
-    Attributes:
-        height_m: Of the ball's centre above the container floor.
-        contour: Outline of the section there.
-        contacts: What it was fitted to, where the object stands now.
-    """
-
-    height_m: float
-    contour: Contour
-    contacts: tuple[Contact, ...]
-
-
-@dataclass(frozen=True)
 class Candidate:
     """An object found by the probe (the paper's C_i).
 
@@ -128,7 +113,6 @@ class Candidate:
         height_m: Top above the container floor.
         quality: 0..1, how well its centre is known: 1/2 at a standard deviation of 5 mm (`search.candidates.quality`).
         contacts: What it was fitted to.
-        rings: What was felt at other heights, where one was ambiguous (`touch.rings`).
     """
 
     index: int
@@ -136,7 +120,6 @@ class Candidate:
     height_m: float
     quality: float
     contacts: tuple[Contact, ...]
-    rings: tuple[Ring, ...] = ()
 
     def span_m(self, yaw_rad: float) -> tuple[float, float]:
         """(least, greatest) coordinate along the direction `yaw_rad` in K of the contact points and the outline.

@@ -14,12 +14,10 @@ from glotouch_bt.perception.touch.outline.moved import believe_contacts, split_m
 from glotouch_bt.perception.touch.outline.polygons import convex_hull, polygon_distance
 from glotouch_bt.perception.touch.outline.primitives import wrapped
 from glotouch_bt.perception.touch.outline.pushing import pushed
-from glotouch_bt.perception.touch.outline.rings import ambiguous, ring_height_m, with_ring
 from glotouch_bt.perception.touch.outline.tracing import largest_gap_direction, needs_more, next_direction, widest_gap
 
 __all__ = [
     "OutlineBelief",
-    "ambiguous",
     "believe_contacts",
     "believe_outline",
     "consistent",
@@ -35,10 +33,8 @@ __all__ = [
     "polygon_distance",
     "present_tips",
     "pushed",
-    "ring_height_m",
     "signed_distance",
     "split_moved",
     "widest_gap",
-    "with_ring",
     "wrapped",
 ]
