@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glotouch_bt.motion import Kinematics, Line, Plan, plan_piece
+from glotouch_bt.motion import Kinematics, Line, MotionPlan, plan_piece
 from glotouch_bt.robot import HOLD, Array, Command, JointSetpoint, Observation, Pose, Request, Robot
 
 WAIT_S = 10.0
@@ -73,7 +73,7 @@ class Rig:
         command = Command(tactile=tactile)
         return [self.cycle(command) for _ in range(max(1, round(duration_s / self.period_s)))]
 
-    def plan(self, goal_B_P: Pose, speed_m_s: float) -> Plan | None:
+    def plan(self, goal_B_P: Pose, speed_m_s: float) -> MotionPlan | None:
         """Setpoints from where the arm was told to be to a pose; None if it is there."""
         limits = self.robot.limits
         piece = Line(self.kinematics.fk(self.q), goal_B_P)

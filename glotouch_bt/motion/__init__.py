@@ -1,12 +1,12 @@
-"""Kinematics (Pinocchio), timing (ruckig), clearance (python-fcl), and the guarded motions made of them."""
+"""Arm and jaw motions: kinematics (Pinocchio), time profiles (ruckig), clearance (python-fcl) and guarded moves."""
 
 from glotouch_bt.motion.arm import Arm
-from glotouch_bt.motion.clearance import Blocked, Scene
-from glotouch_bt.motion.jaws import JawWatch
+from glotouch_bt.motion.clearance import ClearanceViolation, Scene
+from glotouch_bt.motion.jaws import JawRestDetector
 from glotouch_bt.motion.kinematics import Kinematics, build_model
 from glotouch_bt.motion.paths import Arc, Line, Path, Piece, Polyline
 from glotouch_bt.motion.pause_signal import PauseSignal, Style
-from glotouch_bt.motion.plan import Plan, plan_piece
+from glotouch_bt.motion.plan import MotionPlan, plan_piece
 from glotouch_bt.motion.shapes import finger_outline_half_m
 from glotouch_bt.motion.timing import rest_to_rest
 from glotouch_bt.motion.travel import Guard, Motion, MoveResult
@@ -14,9 +14,9 @@ from glotouch_bt.motion.travel import Guard, Motion, MoveResult
 __all__ = [
     "Arc",
     "Arm",
-    "Blocked",
+    "ClearanceViolation",
     "Guard",
-    "JawWatch",
+    "JawRestDetector",
     "Kinematics",
     "Line",
     "Motion",
@@ -24,7 +24,7 @@ __all__ = [
     "Path",
     "PauseSignal",
     "Piece",
-    "Plan",
+    "MotionPlan",
     "Polyline",
     "Scene",
     "Style",

@@ -1,12 +1,8 @@
 """Motions as generators: `result = yield from arm.line(pose, 0.04, guard=detector)`.
 
-Each motion is planned, and unless told otherwise checked, completely before its first command; then it yields one
-`Command` a control period and takes the `Observation` sensed in it. A guard that trips makes the very NEXT command
-the first of the deceleration. A generator may be closed at any yield; the arm's setpoint is then what was last
-yielded.
-
-A pause (`PauseSignal`) stops a motion where it is along its path, softly; the guard keeps listening, and afterwards the
-motion goes on along the same path. A motion's caller never notices.
+A motion is planned and checked completely before its first command. Then it yields one `Command` per control period and
+receives the `Observation` of that period. When a guard trips, the NEXT command starts the deceleration. A generator may
+be closed at any yield; the setpoint is then the last one yielded.
 """
 
 from __future__ import annotations
@@ -18,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from glotouch_bt.motion.clearance import Scene
-from glotouch_bt.motion.jaws import JawWatch
+from glotouch_bt.motion.jaws import JawRestDetector
 from glotouch_bt.motion.joints import plan_joints
 from glotouch_bt.motion.paths import Arc, Line, Path, Polyline
 from glotouch_bt.motion.plan import plan_piece
@@ -37,14 +33,16 @@ from glotouch_bt.robot import (
     World,
 )
 
-# Null-space pull towards home in free motions, per metre travelled: half the way home in 0.35 m.
 POSTURE_GAIN_1_M = 2.0
-# A path may begin this far from where the arm is (servo error right after `sync`).
-_START_M, _START_RAD = 2e-3, 0.02
+"""Null-space pull towards home in free motions, per metre travelled: half of the difference after 0.35 m."""
+_START_M = 2e-3
+"""Maximum distance of a path's start from the setpoint (servo error right after `sync`)."""
+_START_RAD = 0.02
+"""Maximum rotation of a path's start from the setpoint (servo error right after `sync`)."""
 
 
 class MoveOptions(TypedDict, total=False):
-    """Keyword options of `Arm.follow`, taken by every motion along a path; see there."""
+    """Keyword options of `Arm.follow`, accepted by every Cartesian motion."""
 
     acceleration_m_s2: float | None
     jerk_m_s3: float | None
@@ -56,18 +54,18 @@ class MoveOptions(TypedDict, total=False):
 
 
 class Arm(Mover):
-    """The arm's motions. Holds the present setpoint, so one Arm drives one robot.
+    """Motions of one arm. It stores the current setpoint, so one Arm drives one robot.
 
     Args:
-        description: The robot's numbers.
-        limits: Robot-wide limits; the ones of the tool bound every motion here.
+        description: Robot data.
+        limits: Robot-wide limits; the tool limits bound every motion.
         world: Nominal container, probe and holder.
         period_s: Control period.
 
     Attributes:
         kinematics: Forward and inverse kinematics.
-        scene: What must not be hit; skills add what they find to it.
-        pause_signal: Whether motions go on or are paused; the runner writes it.
+        scene: Obstacles; skills add the objects they find.
+        pause_signal: Pause state, written by the runner.
     """
 
     def __init__(self, description: RobotDescription, limits: Limits, world: World, period_s: float) -> None:
@@ -76,20 +74,20 @@ class Arm(Mover):
         self.scene = Scene(self.kinematics, world)
 
     def state(self) -> dict[str, Any]:
-        """What it remembers between two motions, its scene included; for `restore`."""
+        """Return the state kept between two motions, including the scene, for `restore`."""
         remembered = {"q": self._q.copy(), "aperture_m": self._aperture_m}
         return remembered | {"scene": self.scene.state()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Go back to a `state`; where the arm really is elsewhere, `sync` after it."""
+        """Restore a `state`; call `sync` afterwards if the arm has moved since."""
         self._q = np.array(state["q"])
-        self._aperture_m, self._touched = state["aperture_m"], None
+        self._aperture_m, self._last_contact = state["aperture_m"], None
         self.scene.restore(state["scene"])
 
     # -- motions -----------------------------------------------------------------------------------------------------
 
     def hold(self, duration_s: float, *, tactile: bool = False) -> Motion[list[Observation]]:
-        """Stay at rest for a whole number of periods (rounded up); returns what was sensed."""
+        """Stay at rest for a whole number of periods (rounded up); return the observations."""
         out = []
         for _ in range(int(np.ceil(duration_s / self.period_s - 1e-9))):
             observation = yield Command(tactile=tactile)
@@ -101,22 +99,22 @@ class Arm(Mover):
         """Move to joint positions `q` (dof,) rad along a straight line in joint space, from rest to rest.
 
         Args:
-            q: Where to.
-            speed: 0..1, share of the joints' speed limits; lowered so that P keeps within the tool's speed limit.
-            check: Refuse what would leave the limits or hit something.
+            q: Target.
+            speed: 0..1, fraction of the joint speed limits; lowered so that P stays within the tool speed limit.
+            check: Check clearance along the move.
 
         Raises:
-            MotionRefused: Before the first command.
+            MotionRefused: Before the first command: a limit or the clearance would be violated.
         """
         plan = plan_joints(self.kinematics, self._q, np.asarray(q, dtype=np.float64), speed, self.limits, self.period_s)
         if check:
             self._clear(plan.checks_q, "joint move")
         running: JointProfile | None = plan.profile
         while running is not None:
-            k = yield from self._turn(running, breakable=True)
+            k = yield from self._play_joints(running, pausable=True)
             if k is None:
                 return
-            running = yield from self._turn_on_later(running, k)
+            running = yield from self._pause_joints(running, k)
 
     def follow(
         self,
@@ -131,21 +129,21 @@ class Arm(Mover):
         posture_gain: float | None = None,
         what: str = "follow",
     ) -> Motion[MoveResult]:
-        """Travel a Cartesian path of P from rest to rest; rests between the pieces of a path that has several.
+        """Travel a Cartesian path of P from rest to rest, with a rest between its pieces.
 
         Args:
-            path: Begins where P is.
-            speed_m_s, acceleration_m_s2, jerk_m_s3: Along the path; the limits' acceleration and jerk when omitted.
-            guard: Called once a period with the fresh observation; anything but None breaks the motion off with the
-                limits' stop deceleration and jerk, and comes back as `stop`.
-            check: Look for collisions along the path (reach and joint limits are always looked at).
-            tactile: Ask for depth maps on the way.
-            posture_gain: Null-space pull towards home per metre; by default 0 under a guard, else `POSTURE_GAIN_1_M`.
-            what: Named in a refusal.
+            path: Path that begins at the current pose of P.
+            speed_m_s, acceleration_m_s2, jerk_m_s3: Limits along the path; the last two default to the robot's limits.
+            guard: Called once a period with the newest observation. Any value but None stops the motion with the stop
+                deceleration and jerk of the limits, and is returned as `stop`.
+            check: Check clearance along the path (reach and joint limits are always checked).
+            tactile: Request depth maps.
+            posture_gain: Null-space pull towards home per metre; by default 0 with a guard, else `POSTURE_GAIN_1_M`.
+            what: Name of the motion for the error message.
 
         Raises:
-            MotionRefused: Before the first command: the path does not begin here, asks for more than the limits, leaves
-                the arm's reach or a joint's range or speed, or would hit something (the pair is named).
+            MotionRefused: Before the first command: the path does not begin at P, exceeds a limit, leaves the arm's
+                reach or a joint's range or speed, or has too little clearance (the pair is named).
         """
         acceleration = self.limits.tcp_acceleration_m_s2 if acceleration_m_s2 is None else acceleration_m_s2
         jerk = self.limits.tcp_jerk_m_s3 if jerk_m_s3 is None else jerk_m_s3
@@ -174,14 +172,14 @@ class Arm(Mover):
         return (yield from self._travel(plans, guard, tactile))
 
     def line(self, pose_B_P: Pose, speed_m_s: float, **options: Unpack[MoveOptions]) -> Motion[MoveResult]:
-        """Straight to a pose of P in B; options as in `follow`."""
+        """Move straight to a pose of P in B; options as in `follow`."""
         options.setdefault("what", "line")
         return (yield from self.follow(Line(self.pose_B_P, pose_B_P), speed_m_s, **options))
 
     def shift(
         self, displacement_B_m: npt.ArrayLike, speed_m_s: float, **options: Unpack[MoveOptions]
     ) -> Motion[MoveResult]:
-        """Straight by a displacement (3,) m in B, orientation kept; options as in `follow`."""
+        """Move straight by a displacement (3,) m in B at constant orientation; options as in `follow`."""
         here = self.pose_B_P
         there = Pose(here.position_m + np.asarray(displacement_B_m, dtype=np.float64), here.quat)
         options.setdefault("what", "shift")
@@ -197,7 +195,7 @@ class Arm(Mover):
         turn: bool = False,
         **options: Unpack[MoveOptions],
     ) -> Motion[MoveResult]:
-        """Round an axis through `centre_B_m` (3,) by an angle, the hand turning along or not; options of `follow`."""
+        """Move on an arc about an axis through `centre_B_m` (3,); `turn` rotates the hand; options as in `follow`."""
         options.setdefault("what", "arc")
         path = Arc(self.pose_B_P, centre_B_m, axis, angle_rad, turn)
         return (yield from self.follow(path, speed_m_s, **options))
@@ -205,9 +203,9 @@ class Arm(Mover):
     def transit(
         self, pose_B_P: Pose, height_B_m: float, speed_m_s: float, **options: Unpack[MoveOptions]
     ) -> Motion[MoveResult]:
-        """Straight up to a height of P in B, across (turning on the way), straight down; options as in `follow`.
+        """Move straight up to a height of P in B, across with all rotation, and straight down; options as in `follow`.
 
-        A start or a goal above the height is left or reached by the crossing itself, at its own height.
+        A start or goal above the height is not lowered to it.
         """
         here = self.pose_B_P
         up = Pose(np.array([*here.position_m[:2], max(here.position_m[2], height_B_m)]), here.quat)
@@ -226,17 +224,17 @@ class Arm(Mover):
         tactile: bool = False,
         on_observation: Callable[[Observation], None] | None = None,
     ) -> Motion[GripperState]:
-        """Drive the jaws while the arm holds, until they are reported still for about 60 ms, or the time is out.
+        """Drive the jaws while the arm holds, until they rest for about 60 ms or the timeout ends.
 
         Args:
-            aperture_m: Target opening; clipped to the stroke.
-            speed_m_s, force_N: Limits of the jaws; clipped to what the gripper can do.
-            timeout_s: Give up waiting (the last state says `moving`).
-            tactile: Ask for depth maps.
-            on_observation: Called with every observation on the way (to collect frames).
+            aperture_m: Target aperture; clipped to the stroke.
+            speed_m_s, force_N: Limits of the jaws; clipped to the gripper's limits.
+            timeout_s: Maximum duration; after a timeout the returned state says `moving`.
+            tactile: Request depth maps.
+            on_observation: Called with every observation (to collect frames).
 
         Returns:
-            The last reported state, its aperture the mean over the still window.
+            The last reported state with aperture and force averaged over the rest window.
         """
         with self.pause_signal.finishing():
             return (yield from self._jaws(aperture_m, speed_m_s, force_N, timeout_s, tactile, on_observation))
@@ -256,7 +254,7 @@ class Arm(Mover):
         target = GripperTarget(
             min(max(aperture_m, 0.0), hand.stroke_m), min(speed_m_s, hand.speed_m_s), min(force_N, hand.force_N)
         )
-        watch = JawWatch(self.period_s)
+        watch = JawRestDetector(self.period_s)
         gripper: GripperTarget | None = target
         for _ in range(max(1, int(np.ceil(timeout_s / self.period_s - 1e-9)))):
             observation = yield Command(gripper=gripper, tactile=tactile)
@@ -284,11 +282,11 @@ class Arm(Mover):
         turned = 2.0 * float(np.arccos(min(1.0, abs(float(begin.quat @ here.quat)))))
         if away > _START_M or turned > _START_RAD:
             raise MotionRefused(
-                what, f"it begins {away * 1e3:.1f} mm and {np.degrees(turned):.1f} deg from P's setpoint"
+                what, f"the path begins {away * 1e3:.1f} mm and {np.degrees(turned):.1f} deg from P's setpoint"
             )
 
     def _clear(self, q: Array, what: str) -> None:
-        found = self.scene.first_blocked(q, self._aperture_m)
+        found = self.scene.first_violation(q, self._aperture_m)
         if found is not None:
             share = 100.0 * found.index / max(len(q) - 1, 1)
             raise MotionRefused(what, f"{found}, {share:.0f} % of the way")

@@ -1,8 +1,7 @@
-"""What would the arm, the hand or the held probe hit? Exact distances from python-fcl, few of them.
+"""Clearance of arm, hand and held probe from the nominal world.
 
-All positions come in one batch: axis-aligned boxes of every part at every posture against those of every obstacle
-(numpy) leave the few pairs that are really near, and only those are measured by fcl. Nominal numbers of the world;
-frame B inside, K for obstacles.
+Broad phase: axis-aligned boxes of all parts at all postures against all obstacles, in one numpy batch. Narrow phase:
+exact distances from python-fcl for the remaining pairs. Frame B; obstacles are given in K.
 """
 
 from __future__ import annotations
@@ -19,8 +18,8 @@ from glotouch_bt.motion.kinematics import Kinematics
 from glotouch_bt.motion.shapes import (
     OWN_OBSTACLES,
     WALLS,
+    MovingPart,
     Obstacle,
-    Part,
     arm_parts,
     make_obstacle,
     stowed_probe,
@@ -29,20 +28,20 @@ from glotouch_bt.motion.shapes import (
 )
 from glotouch_bt.robot import Array, ParamError, Pose, UnknownName, World
 
-# A part that starts too near may leave, but not come nearer by more than this.
 _LEAVING_M = 2e-4
+"""Tolerance for a part that starts below the margin: it may not come nearer than its start by more than this."""
 
 
 @dataclass(frozen=True)
-class Blocked:
-    """The first place of a path that is not clear.
+class ClearanceViolation:
+    """First posture of a path with too little clearance.
 
     Attributes:
-        index: Which posture of the batch.
-        part: The moving part, e.g. "left finger".
-        obstacle: What it comes too near to.
+        index: Index of the posture in the batch.
+        part: Moving part, e.g. "left finger".
+        obstacle: Obstacle it comes too near to.
         distance_m: Signed distance; negative is penetration.
-        margin_m: What was asked for.
+        margin_m: Required clearance.
     """
 
     index: int
@@ -59,19 +58,19 @@ class Blocked:
 
 
 class Scene:
-    """Everything that must not be touched, and what is allowed to be.
+    """Obstacles, moving parts and the pairs of them that may touch.
 
     Parts: "<link name>" of each moving link, "gripper body", "left finger", "right finger", and while the probe is
     held "tip", "shaft", "handle". Groups: "fingers", "tool" (tip, shaft, handle), "hand" (all but the arm's links),
     "arm". Obstacles: "floor", "wall +x", "wall -x", "wall +y", "wall -y" (of the container, in K), "table" (under it),
-    "holder", "probe" (its handle, while it stands in the holder) and whatever `add_obstacle` added.
+    "holder", "probe" (its handle in the holder) and the names given to `add_obstacle`.
 
-    The hand against the arm itself is not looked at: over a container in front of it the arm cannot fold that far.
+    Self-collision is not checked: above a container in front of it the arm cannot fold that far.
 
     Args:
         kinematics: The arm.
         world: Nominal container, probe and holder.
-        margin_m: Least clearance of every pair that is not allowed.
+        margin_m: Required clearance of every pair that may not touch.
     """
 
     def __init__(self, kinematics: Kinematics, world: World, *, margin_m: float = 0.002) -> None:
@@ -91,7 +90,7 @@ class Scene:
         self._probe = stowed_probe(world)
         self._obstacles[self._probe.name] = self._probe
 
-    # -- what is there -----------------------------------------------------------------------------------------------
+    # -- contents ----------------------------------------------------------------------------------------------------
 
     @property
     def obstacles(self) -> tuple[str, ...]:
@@ -100,7 +99,7 @@ class Scene:
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """Names of all moving parts, the probe's included whether or not it is held."""
+        """Names of all moving parts, including the probe's, held or not."""
         return tuple(p.name for p in (*self._arm_parts, *self._tool_parts))
 
     @property
@@ -109,7 +108,7 @@ class Scene:
         return self._holding
 
     def hold_tool(self, held: bool) -> None:
-        """Say whether the probe is in the jaws (its parts move with the hand) or in its holder (an obstacle)."""
+        """Move the probe into the jaws (its parts move with the hand) or into its holder (an obstacle)."""
         self._holding = held
         if held:
             self._obstacles.pop(self._probe.name, None)
@@ -127,10 +126,10 @@ class Scene:
         yaw_rad: float = 0.0,
         base_K_m: float = 0.0,
     ) -> None:
-        """Add, or replace, an upright prism or cylinder standing in the container.
+        """Add or replace an upright box or cylinder in the container.
 
         Args:
-            name: Any name that no built-in obstacle has.
+            name: Any name but a built-in obstacle's.
             kind: "round" (a cylinder of diameter size_m[0]) or "box".
             centre_K_m: (2,) its axis in K.
             size_m: (along yaw, across), m.
@@ -139,10 +138,10 @@ class Scene:
             base_K_m: Height of its base above the container floor.
 
         Raises:
-            ParamError: A taken name, an unknown kind, or sizes that are not positive and finite.
+            ParamError: A built-in name, an unknown kind, or sizes that are not positive and finite.
         """
         if name in OWN_OBSTACLES:
-            raise ParamError("obstacle", name, "not one of the world's own names")
+            raise ParamError("obstacle", name, "not the name of a built-in obstacle")
         if kind not in ("round", "box"):
             raise ParamError("obstacle.kind", kind, "'round' or 'box'")
         centre = np.asarray(centre_K_m, dtype=np.float64)
@@ -167,7 +166,7 @@ class Scene:
         }
 
     def remove_obstacle(self, name: str) -> None:
-        """Forget an added obstacle and what was allowed to touch it.
+        """Remove an added obstacle and its allowed contacts.
 
         Raises:
             UnknownName: No such added obstacle.
@@ -179,17 +178,17 @@ class Scene:
         self._allowed = {pair for pair in self._allowed if pair[1] != name}
 
     def clear_obstacles(self) -> None:
-        """Forget every added obstacle."""
+        """Remove every added obstacle."""
         for name in [n for n in self._obstacles if n not in OWN_OBSTACLES]:
             self.remove_obstacle(name)
 
     def state(self) -> dict[str, Any]:
-        """What is there beyond the world's own, what is held, what may be touched; for `restore`."""
+        """Return the added obstacles, the allowed contacts and whether the probe is held, for `restore`."""
         added = tuple((name, dict(given)) for name, given in self._added.items())
         return {"holding": self._holding, "added": added, "allowed": frozenset(self._allowed)}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Go back to a `state`."""
+        """Restore a `state`."""
         self.clear_obstacles()
         for name, given in state["added"]:
             self.add_obstacle(name, **given)
@@ -197,7 +196,7 @@ class Scene:
         self._allowed = set(state["allowed"])
 
     def allow(self, part: str, obstacle: str) -> None:
-        """Let a part, or a group of parts, touch an obstacle: intended contact.
+        """Allow a part, or a group of parts, to touch an obstacle.
 
         Raises:
             UnknownName: No such part, group or obstacle.
@@ -205,7 +204,7 @@ class Scene:
         self._allowed |= self._pairs(part, obstacle)
 
     def disallow(self, part: str, obstacle: str) -> None:
-        """Take back `allow`."""
+        """Undo `allow`."""
         self._allowed -= self._pairs(part, obstacle)
 
     def _pairs(self, part: str, obstacle: str) -> set[tuple[str, str]]:
@@ -225,18 +224,18 @@ class Scene:
             raise UnknownName("obstacle", obstacle, known)
         return {(name, obstacle) for name in groups.get(part, [part])}
 
-    # -- asking ------------------------------------------------------------------------------------------------------
+    # -- queries -----------------------------------------------------------------------------------------------------
 
-    def why_blocked(self, q: Array, aperture_m: float, margin_m: float | None = None) -> str | None:
-        """Why the arm must not be at `q` (dof,) rad with the jaws at `aperture_m`; None when all is clear."""
-        found = self.first_blocked(np.asarray(q, dtype=np.float64)[None], aperture_m, margin_m)
+    def describe_violation(self, q: Array, aperture_m: float, margin_m: float | None = None) -> str | None:
+        """Describe the clearance violation at `q` (dof,) rad with the jaws at `aperture_m`; None if clear."""
+        found = self.first_violation(np.asarray(q, dtype=np.float64)[None], aperture_m, margin_m)
         return None if found is None else str(found)
 
-    def first_blocked(self, q: Array, aperture_m: float, margin_m: float | None = None) -> Blocked | None:
-        """The first of several postures in order, (n, dof) rad, that is not clear, or None.
+    def first_violation(self, q: Array, aperture_m: float, margin_m: float | None = None) -> ClearanceViolation | None:
+        """Return the first clearance violation along postures (n, dof) rad, or None.
 
-        A pair that is already too near at the first posture may stay or part, but not come nearer (so that a part can
-        be withdrawn from a contact).
+        A pair below the margin at the first posture may stay or part, but not come nearer. So a part can retract from a
+        contact.
         """
         margin = self.margin_m if margin_m is None else margin_m
         parts = [*self._arm_parts, *(self._tool_parts if self._holding else ())]
@@ -260,11 +259,11 @@ class Scene:
                     continue
                 if distance >= at_start.get((i, k), np.inf) - _LEAVING_M:
                     continue
-            return Blocked(n, parts[i].name, obstacles[k].name, float(distance), margin)
+            return ClearanceViolation(n, parts[i].name, obstacles[k].name, float(distance), margin)
         return None
 
     def distance_m(self, part: str, obstacle: str, q: Array, aperture_m: float) -> float:
-        """Signed distance of one part (m, negative is penetration) from one obstacle at `q` (dof,) rad."""
+        """Return the signed distance of a part from an obstacle at `q` (dof,) rad; negative is penetration."""
         parts = {p.name: p for p in (*self._arm_parts, *self._tool_parts)}
         if part not in parts:
             raise UnknownName("part", part, parts)
@@ -275,7 +274,7 @@ class Scene:
         body.setTransform(fcl.Transform(rotations[0, 0], centres[0, 0]))
         return float(fcl.distance(body, self._obstacles[obstacle].body, self._request, fcl.DistanceResult()))
 
-    def _placed(self, parts: list[Part], q: Array, aperture_m: float) -> tuple[Array, Array]:
+    def _placed(self, parts: list[MovingPart], q: Array, aperture_m: float) -> tuple[Array, Array]:
         links = [self._kinematics.link_placements(row) for row in q]
         index = [p.link for p in parts]
         link_R = np.stack([r for r, _ in links])[:, index]

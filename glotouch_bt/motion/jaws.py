@@ -1,4 +1,4 @@
-"""When do the jaws stand still? Decided from late, noisy reports."""
+"""Detection of jaw rest from delayed, noisy gripper reports."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ import numpy as np
 
 from glotouch_bt.robot import GripperState
 
-# Reports older than this after the command cannot show the motion yet (latency up to 30 ms, plus the start itself).
 REACTION_S = 0.06
+"""Reports earlier than this after the command do not show the motion yet: latency up to 30 ms plus the start."""
 STILL_S = 0.06
-# Drift between the halves of the still window that still counts as rest: 5 mm/s, ten times the reported noise's mean.
-DRIFT_M = 3e-4
+"""Length of the rest window."""
+MAX_DRIFT_M = 3e-4
+"""Maximum difference between the mean apertures of the window's halves at rest: 5 mm/s, ten times the noise."""
 
 
-class JawWatch:
-    """Judges rest from successive gripper reports.
+class JawRestDetector:
+    """Detect jaw rest from successive gripper reports.
 
     Args:
         period_s: Control period.
@@ -28,7 +29,7 @@ class JawWatch:
         self._last: GripperState | None = None
 
     def still(self, now_s: float, report: GripperState) -> bool:
-        """Take one report; True once the jaws have been at rest for the whole window."""
+        """Add one report; return True once the jaws have been at rest for the whole window."""
         if self._begin_s is None:
             self._begin_s = now_s
         self._last = report
@@ -40,16 +41,16 @@ class JawWatch:
             return False
         apertures = np.array([r.aperture_m for r in self._window])
         half = len(apertures) // 2
-        return bool(abs(apertures[:half].mean() - apertures[half:].mean()) < DRIFT_M)
+        return bool(abs(apertures[:half].mean() - apertures[half:].mean()) < MAX_DRIFT_M)
 
     def state(self) -> GripperState:
-        """The newest report, its aperture and force averaged over the still window.
+        """Return the newest report with aperture and force averaged over the rest window.
 
         Raises:
-            ValueError: No report was taken.
+            ValueError: No report was added yet.
         """
         if self._last is None:
-            raise ValueError("no gripper report was taken")
+            raise ValueError("no gripper report was added yet")
         if not self._window:
             return self._last
         return GripperState(

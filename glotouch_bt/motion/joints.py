@@ -1,4 +1,4 @@
-"""Moves in joint space: for long ways through free space, where the track of P does not matter."""
+"""Joint-space moves for long free-space travel, where the path of P does not matter."""
 
 from __future__ import annotations
 
@@ -7,21 +7,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from glotouch_bt.motion.kinematics import Kinematics
-from glotouch_bt.motion.timing import JointProfile, Pace, Progress, joint_move
+from glotouch_bt.motion.timing import JointProfile, ProfileLimits, Progress, joint_move
 from glotouch_bt.robot import Array, Limits, MotionRefused
 
-# The description has no acceleration limits; a joint takes this long to its full speed and acceleration. Ours, gentle.
 SPEED_RISE_S = 0.4
+"""Time to full joint speed. Own choice; the description has no acceleration limits."""
 ACCELERATION_RISE_S = 0.1
-_SAMPLES = 40
+"""Time to full joint acceleration. Own choice; the description has no jerk limits."""
+_SPEED_SAMPLES = 40
+"""Number of postures at which the tool speed is checked."""
 
 
 @dataclass(frozen=True)
 class JointPlan:
-    """A joint move and the postures to check it at.
+    """A joint move and the postures at which to check clearance.
 
     Attributes:
-        profile: Setpoints per control period.
+        profile: Setpoints, one per control period.
         checks_q: (k, dof) rad, evenly spaced from start to end, at most 2 degrees apart.
     """
 
@@ -37,8 +39,8 @@ def plan_joints(
     Args:
         kinematics: The arm.
         start, end: (dof,) rad.
-        speed: 0..1, share of the joints' speed limits; lowered so that P stays within the tool's speed limit.
-        limits: For the tool's speed.
+        speed: 0..1, fraction of the joint speed limits; lowered so that P stays within the tool speed limit.
+        limits: Source of the tool speed limit.
         period_s: Control period.
 
     Raises:
@@ -58,13 +60,13 @@ def plan_joints(
     checks = np.linspace(start, end, max(2, int(np.ceil(largest / np.radians(2.0))) + 1))
     if largest < 1e-9:
         there = Progress(np.ones(1), np.zeros(1), np.zeros(1))
-        return JointPlan(JointProfile.along(start, end - start, there, Pace(1.0, 1.0, 1.0)), checks)
+        return JointPlan(JointProfile.along(start, end - start, there, ProfileLimits(1.0, 1.0, 1.0)), checks)
     velocity = speed * kinematics.velocity
     profile = _profile(start, end, velocity, 1.0, period_s)
-    picks = np.unique(np.linspace(0, len(profile.q) - 1, _SAMPLES).astype(int))
+    picks = np.unique(np.linspace(0, len(profile.q) - 1, _SPEED_SAMPLES).astype(int))
     fastest = max(float(np.linalg.norm((kinematics.jacobian(profile.q[k]) @ profile.dq[k])[:3])) for k in picks)
     if fastest > limits.tcp_speed_m_s:
-        # Stretching time by 1/r scales speed by r, acceleration by r^2 and jerk by r^3: the same track, slower.
+        # Time scaling: stretching time by 1/r scales speed by r, acceleration by r^2 and jerk by r^3 on the same path.
         profile = _profile(start, end, velocity, 0.98 * limits.tcp_speed_m_s / fastest, period_s)
     return JointPlan(profile, checks)
 

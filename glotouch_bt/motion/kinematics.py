@@ -1,7 +1,7 @@
-"""Forward and inverse kinematics of a described arm, with Pinocchio as the engine.
+"""Forward and inverse kinematics of an arm, computed with Pinocchio.
 
-The Pinocchio model is built in code from the `RobotDescription` (no URDF or MJCF in between, so nothing is lost on
-the way: armature, velocity limits and every body arrive). Frames: B arm base, P pads' mid-point.
+The model is built directly from the `RobotDescription`, so armature, velocity limits and all bodies are kept.
+Frames: B arm base, P mid-point between the pads.
 """
 
 from __future__ import annotations
@@ -14,18 +14,22 @@ from scipy.linalg.lapack import dgesv
 from glotouch_bt.robot import Array, Joint, Link, MotionRefused, ParamError, Pose, RobotDescription
 
 _POSITION_TOLERANCE_M = 1e-8
+"""Position error at which inverse kinematics stops."""
 _ROTATION_TOLERANCE_RAD = 1e-7
-_LARGEST_STEP_RAD = 0.3
-_ITERATIONS = 200
+"""Rotation error at which inverse kinematics stops."""
+_MAX_STEP_RAD = 0.3
+"""Maximum joint change per iteration."""
+_MAX_ITERATIONS = 200
+"""Maximum number of iterations per start."""
 
 
 def se3(pose: Pose) -> pin.SE3:
-    """The same pose as a Pinocchio SE3."""
+    """Convert a pose to a Pinocchio SE3."""
     return pin.SE3(np.array(pose.rotation), np.array(pose.position_m))
 
 
 def known_pose(position_m: Array, quat: Array) -> Pose:
-    """A Pose from arrays that are known to be finite and of unit length; made read-only, not checked."""
+    """Build a Pose from a finite position and a unit quaternion without checking them; make both read-only."""
     position_m.setflags(write=False)
     quat.setflags(write=False)
     pose = object.__new__(Pose)
@@ -35,10 +39,9 @@ def known_pose(position_m: Array, quat: Array) -> Pose:
 
 
 def build_model(description: RobotDescription) -> pin.Model:
-    """Pinocchio model of the arm: joints, limits, armature, link inertias and the frame "P".
+    """Build the Pinocchio model of the arm: joints, limits, armature, link inertias and the frame "P".
 
-    The gripper's body and fingers (jaws closed) are appended to the last link, so that mass matrices are the arm's with
-    its hand.
+    Gripper body and fingers (jaws closed) are appended to the last link, so that the mass matrix includes the hand.
     """
     model = pin.Model()
     model.name = description.name
@@ -82,10 +85,10 @@ def _inertia(link: Link) -> pin.Inertia:
 
 
 class Kinematics:
-    """Kinematics of one arm. Not for use from two threads at once (one Pinocchio workspace inside).
+    """Kinematics of one arm. Not thread-safe: it holds one Pinocchio workspace.
 
     Attributes:
-        description: What it was built from.
+        description: Source of the model.
         lower, upper: (dof,) position limits, rad.
         velocity: (dof,) velocity limits, rad/s.
         home: (dof,) the description's home posture, rad.
@@ -104,7 +107,7 @@ class Kinematics:
         self._error = 0.0
 
     def fk(self, q: Array) -> Pose:
-        """Pose of P in B at joint positions `q` (dof,), rad."""
+        """Return the pose of P in B at joint positions `q` (dof,), rad."""
         pin.forwardKinematics(self.model, self._data, self._checked(q))
         placement = pin.updateFramePlacement(self.model, self._data, self._frame)
         x, y, z, qx, qy, qz, qw = pin.SE3ToXYZQUAT(placement).tolist()
@@ -112,45 +115,45 @@ class Kinematics:
         return known_pose(np.array([x, y, z]), np.array([sign * qw, sign * qx, sign * qy, sign * qz]))
 
     def place(self, q: Array) -> tuple[Array, Array]:
-        """Position (3,) and rotation (3, 3) of P in B at `q`; the same as `fk` without the quaternion."""
+        """Return position (3,) m and rotation (3, 3) of P in B at `q` (dof,) rad."""
         pin.forwardKinematics(self.model, self._data, self._checked(q))
         placement = pin.updateFramePlacement(self.model, self._data, self._frame)
         return placement.translation.copy(), placement.rotation.copy()
 
     def jacobian(self, q: Array) -> Array:
-        """(6, dof) Jacobian of P: linear (m/s) over angular (rad/s) velocity, both written in B's axes, per rad/s."""
+        """Return the Jacobian (6, dof) of P: linear (m/s) over angular (rad/s) velocity in B, per rad/s."""
         pin.computeJointJacobians(self.model, self._data, self._checked(q))
         pin.updateFramePlacement(self.model, self._data, self._frame)
         j = pin.getFrameJacobian(self.model, self._data, self._frame, pin.LOCAL_WORLD_ALIGNED)
         return np.asarray(j, dtype=np.float64)
 
     def link_placements(self, q: Array) -> tuple[Array, Array]:
-        """Every joint's link frame in B at `q`: rotations (dof, 3, 3) and origins (dof, 3), m."""
+        """Return every link frame in B at `q`: rotations (dof, 3, 3) and origins (dof, 3), m."""
         pin.forwardKinematics(self.model, self._data, self._checked(q))
         frames = list(self._data.oMi)[1:]
         return np.array([m.rotation for m in frames]), np.array([m.translation for m in frames])
 
     def step(self, pose_B_P: Pose, q: Array) -> Array:
-        """One Newton step of q (dof,) towards a near pose: smallest joint change, no posture task, limits ignored.
+        """Take one Newton step from `q` (dof,) towards a near pose: minimum joint change, joint limits ignored.
 
-        The error falls quadratically: from 1 mm away to about a micrometre.
+        Convergence is quadratic: an error of 1 mm becomes about a micrometre.
         """
         return q + self._newton(pose_B_P.position_m, pose_B_P.rotation, q, None)[:, 0]
 
-    def flow(
+    def path_step(
         self, position_m: Array, rotation: Array, q: Array, twist_B: Array, posture_gain: float = 0.0
     ) -> tuple[Array, Array, float]:
-        """Correction and tangent for following a path, both from one Jacobian at `q`.
+        """Compute correction and tangent for path following from one Jacobian at `q`.
 
         Args:
             position_m, rotation: The target of P, (3,) m and (3, 3).
             q: (dof,) rad, near the target.
             twist_B: (6,) linear and angular change of the target per metre of path, in B.
-            posture_gain: How strongly the null space pulls towards home, per metre of path.
+            posture_gain: Null-space pull towards home, per metre of path.
 
         Returns:
-            The Newton correction (dof,) rad; dq/ds (dof,) rad/m at the path's twist plus the posture pull; and how far
-            P at `q` is from the target (largest component of m and rad).
+            Newton correction (dof,) rad; dq/ds (dof,) rad/m of twist and posture pull; distance of P from the target
+            (largest component in m and rad).
         """
         both = self._newton(position_m, rotation, q, twist_B, posture_gain)
         return both[:, 0], both[:, 1], self._error
@@ -185,24 +188,23 @@ class Kinematics:
         posture_q: npt.ArrayLike | None = None,
         what: str = "reaching a pose",
     ) -> Array:
-        """Joint positions that put P at a pose: damped least squares with limits and a null-space posture task.
+        """Solve inverse kinematics by damped least squares with joint limits and a null-space posture task.
 
-        Levenberg-Marquardt damping that vanishes with the error (Sugihara 2011); a joint that would leave its range is
-        clamped and taken out of the step. When the seed fails, home and home turned towards the target are tried.
+        The Levenberg-Marquardt damping vanishes with the error (Sugihara 2011). A joint that would leave its range is
+        clamped and removed from the step. If the seed fails, home and home turned towards the target are tried.
 
         Args:
-            pose_B_P: Where P shall be.
-            q_seed: (dof,) rad, where to start; the nearest branch is found.
-            posture_weight: 0..1, share of the way to `posture_q` taken in the null space per iteration; 0 leaves the
-                null space as it falls out of the seed.
-            posture_q: (dof,) rad, the posture wished for; home when omitted.
-            what: Named in the error.
+            pose_B_P: Target pose of P in B.
+            q_seed: (dof,) rad, start of the iteration; the solution is on its branch.
+            posture_weight: 0..1, fraction of the distance to `posture_q` travelled in the null space per iteration.
+            posture_q: (dof,) rad, preferred posture; home if omitted.
+            what: Name of the motion for the error message.
 
         Returns:
-            (dof,) rad, inside the limits, exact to 1e-8 m and 1e-7 rad.
+            (dof,) rad, within the limits, exact to 1e-8 m and 1e-7 rad.
 
         Raises:
-            MotionRefused: No solution within the joint limits was found; says how near it came and which joint blocks.
+            MotionRefused: No solution within the joint limits; gives the remaining distance and the blocking joint.
         """
         posture = self.home if posture_q is None else self._checked(np.asarray(posture_q, dtype=np.float64))
         seed = self._checked(np.asarray(q_seed, dtype=np.float64))
@@ -229,7 +231,7 @@ class Kinematics:
         dof = len(q)
         blocked = ""
         norm = np.inf
-        for _ in range(_ITERATIONS):
+        for _ in range(_MAX_ITERATIONS):
             before = q.copy()
             j = self.jacobian(q)
             frame = self._data.oMf[self._frame]
@@ -247,11 +249,11 @@ class Kinematics:
                 back = jf.T @ solved
                 dq = np.zeros(dof)
                 dq[free] = back[:, 0] + pull[free] - back[:, 1]
-                dq *= min(1.0, _LARGEST_STEP_RAD / max(float(np.abs(dq).max()), 1e-12))
+                dq *= min(1.0, _MAX_STEP_RAD / max(float(np.abs(dq).max()), 1e-12))
                 out = free & (((q + dq > self.upper) & (dq > 0)) | ((q + dq < self.lower) & (dq < 0)))
                 if not out.any():
                     break
-                # The joint goes to its limit now and drops out of what the others have to solve.
+                # Active set: clamp the joint to its limit and solve for the remaining joints.
                 i = int(np.flatnonzero(out)[0])
                 limit = self.upper[i] if dq[i] > 0 else self.lower[i]
                 blocked = f"{self.description.joints[i].name} at its limit of {limit:.3f} rad"

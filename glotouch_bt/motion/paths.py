@@ -1,7 +1,7 @@
-"""Cartesian paths of P: where it goes, not when. Small values with a length and a pose at each metre of it.
+"""Geometric paths of P in B, without timing: a length and a pose at each path coordinate.
 
-Frame B throughout. The length of a piece is that of P's track, or the turn at a 0.1 m lever where that is more (so that
-a turn in place has a length, and 0.1 m/s means at most 1 rad/s).
+The length of a piece is the distance travelled by P, or its rotation times a 0.1 m lever if that is larger. So a
+rotation in place has a length, and 0.1 m/s means at most 1 rad/s.
 """
 
 from __future__ import annotations
@@ -17,14 +17,15 @@ import numpy.typing as npt
 from glotouch_bt.robot import Array, ParamError, Pose
 
 TURN_LEVER_M = 0.1
+"""Path length per radian of rotation."""
 
 
 class Path(Protocol):
-    """A track of P made of smooth pieces; the arm rests where two pieces meet."""
+    """A path of P made of smooth pieces; the arm comes to rest between pieces."""
 
     @property
     def length_m(self) -> float:
-        """Length of the whole path."""
+        """Length of the path, m."""
         ...
 
     @property
@@ -33,7 +34,7 @@ class Path(Protocol):
         ...
 
     def pose(self, s: float) -> Pose:
-        """Pose of P in B at `s` metres from the start (clamped to the ends)."""
+        """Return the pose of P in B at `s` metres from the start, clamped to the ends."""
         ...
 
 
@@ -41,28 +42,28 @@ class Piece(Path, Protocol):
     """A path with a continuous tangent."""
 
     @property
-    def bend_1_m(self) -> float:
-        """Curvature of P's track, 1/m; a speed v needs an acceleration v^2 times this."""
+    def curvature_1_m(self) -> float:
+        """Curvature, 1/m: the centripetal acceleration at speed v is v^2 times this."""
         ...
 
     def sample(self, s: Array) -> tuple[Array, Array]:
-        """Positions (n, 3) m and unit quaternions (n, 4) w x y z of P in B at each of `s` (n,) m."""
+        """Return positions (n, 3) m and unit quaternions (n, 4) w x y z of P in B at `s` (n,) m."""
         ...
 
     def twist(self, s: Array) -> Array:
-        """(n, 6) linear and angular change of P per metre of path, in B, at each of `s` (n,) m."""
+        """Return linear and angular change (n, 6) of P per metre of path, in B, at `s` (n,) m."""
         ...
 
 
 def _rotation_vector(rotation: Array) -> Array:
-    """(3,) rotation vector of a rotation matrix, angle in [0, pi] (through the quaternion, good near pi)."""
+    """Return the rotation vector (3,) of a matrix, angle in [0, pi]; the quaternion keeps it accurate near pi."""
     q = Pose.from_matrix(np.zeros(3), rotation).quat
     n = float(np.linalg.norm(q[1:]))
     return np.zeros(3) if n < 1e-15 else q[1:] * (2.0 * float(np.arctan2(n, q[0])) / n)
 
 
 def _turn_quat(vector: Array, share: Array, quat: Array) -> Array:
-    """Quaternions (n, 4) of exp(share * vector) applied in B after `quat` (4,)."""
+    """Return the quaternions (n, 4) of exp(share * vector) applied in B after `quat` (4,)."""
     angle = float(np.linalg.norm(vector))
     axis = vector / angle if angle > 0 else vector
     half = 0.5 * angle * share
@@ -74,7 +75,7 @@ def _turn_quat(vector: Array, share: Array, quat: Array) -> Array:
 
 
 def quats_to_matrices(quat: Array) -> Array:
-    """Rotation matrices (n, 3, 3) of unit quaternions (n, 4) w x y z."""
+    """Convert unit quaternions (n, 4) w x y z to rotation matrices (n, 3, 3)."""
     w, x, y, z = quat.T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -86,7 +87,7 @@ def quats_to_matrices(quat: Array) -> Array:
 
 @dataclass(frozen=True)
 class Line:
-    """Straight from one pose to another, turning evenly about one axis on the way.
+    """Straight line between two poses with a constant rotation rate about one axis.
 
     Attributes:
         start, end: Poses of P in B.
@@ -100,13 +101,13 @@ class Line:
         return np.asarray(self.end.position_m - self.start.position_m, dtype=np.float64)
 
     @cached_property
-    def _turn(self) -> Array:
+    def _rotation(self) -> Array:
         return _rotation_vector(self.end.rotation @ self.start.rotation.T)
 
     @cached_property
     def length_m(self) -> float:
         """Length; see the module's text for turns."""
-        return max(float(np.linalg.norm(self._shift)), TURN_LEVER_M * float(np.linalg.norm(self._turn)))
+        return max(float(np.linalg.norm(self._shift)), TURN_LEVER_M * float(np.linalg.norm(self._rotation)))
 
     @property
     def pieces(self) -> tuple[Piece, ...]:
@@ -114,8 +115,8 @@ class Line:
         return (self,) if self.length_m > 1e-9 else ()
 
     @property
-    def bend_1_m(self) -> float:
-        """Straight: 0."""
+    def curvature_1_m(self) -> float:
+        """Curvature of a straight line: 0."""
         return 0.0
 
     def pose(self, s: float) -> Pose:
@@ -125,24 +126,24 @@ class Line:
     def sample(self, s: Array) -> tuple[Array, Array]:
         """Positions (n, 3) and quaternions (n, 4) in B at `s` (n,) m."""
         share = np.clip(s / max(self.length_m, 1e-12), 0.0, 1.0)
-        return self.start.position_m + share[:, None] * self._shift, _turn_quat(self._turn, share, self.start.quat)
+        return self.start.position_m + share[:, None] * self._shift, _turn_quat(self._rotation, share, self.start.quat)
 
     def twist(self, s: Array) -> Array:
         """(n, 6) change per metre in B."""
-        one = np.concatenate([self._shift, self._turn]) / max(self.length_m, 1e-12)
+        one = np.concatenate([self._shift, self._rotation]) / max(self.length_m, 1e-12)
         return np.broadcast_to(one, (len(s), 6))
 
 
 @dataclass(frozen=True)
 class Arc:
-    """Part of a circle about an axis.
+    """Circular arc about an axis.
 
     Attributes:
-        start: Pose of P in B where it begins.
+        start: Pose of P in B at the start.
         centre_B: (3,) any point of the axis, m.
         axis: (3,) direction of the axis in B.
-        angle: How far round, rad, right-handed about the axis; negative goes the other way, more than 2 pi is allowed.
-        turn: Let the hand turn with the arc; otherwise its orientation stays.
+        angle: Signed angle about the axis, rad, right-handed; more than 2 pi is allowed.
+        turn: Rotate the hand with the arc; otherwise keep its orientation.
     """
 
     start: Pose
@@ -186,8 +187,8 @@ class Arc:
         return (self,) if self.length_m > 1e-9 else ()
 
     @property
-    def bend_1_m(self) -> float:
-        """Curvature seen by the progress along `length_m`: v^2 times this is the centripetal acceleration."""
+    def curvature_1_m(self) -> float:
+        """Curvature with respect to `length_m`: the centripetal acceleration at speed v is v^2 times this."""
         if self.length_m <= 1e-9:
             return 0.0
         return self.radius_m * (self.angle / self.length_m) ** 2
@@ -218,7 +219,7 @@ class Arc:
 
 @dataclass(frozen=True)
 class Polyline:
-    """Straight lines through poses; the arm comes to rest at each corner.
+    """Straight lines through several poses; the arm comes to rest at each corner.
 
     Attributes:
         poses: At least two poses of P in B.
@@ -233,7 +234,7 @@ class Polyline:
 
     @cached_property
     def pieces(self) -> tuple[Piece, ...]:
-        """The lines that have a length."""
+        """The lines of non-zero length."""
         return tuple(p for a, b in zip(self.poses[:-1], self.poses[1:], strict=True) for p in Line(a, b).pieces)
 
     @cached_property

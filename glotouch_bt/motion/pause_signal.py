@@ -1,7 +1,4 @@
-"""The feed: whether motions go on, stop where they are along their path, or are stopped already.
-
-One small value that the runner writes and the motions read, once a control period.
-"""
+"""The pause signal: the runner writes it, the motions read it once a control period."""
 
 from __future__ import annotations
 
@@ -12,22 +9,22 @@ from typing import Literal
 
 Style = Literal["hold", "retreat", "finish"]
 
-BACK_OFF_M = 0.003
-"""How far a `retreat` backs off: the probe bends and its pads give less than a millimetre at a touch."""
-BACK_OFF_M_S = 0.02
-"""Largest speed of backing off, and of coming back to the contact."""
+RETREAT_M = 0.003
+"""Distance of a retreat from a contact. Above the combined compliance of probe and pads, which is below 1 mm."""
+RETREAT_M_S = 0.02
+"""Maximum speed of a retreat and of the return to the contact."""
 
 
 @dataclass
 class PauseSignal:
-    """What a pause does to motions.
+    """State of a pause, shared by the runner and the motions.
 
     Attributes:
-        requested: A pause is asked for.
-        style: What it does to the skill that runs: `hold`, `retreat` (a guarded motion also backs off), `finish` (the
-            present motion is made to its end).
-        handled: A motion under way takes care of the pause: it brakes, backs off or stands.
-        standing: It stands.
+        requested: The operator or a rule requested a pause.
+        style: Effect on the running skill: `hold` (brake on the path), `retreat` (a guarded motion also backs off),
+            `finish` (complete the current motion first).
+        handled: The current motion handles the pause: it brakes, backs off or stands still.
+        standing: The current motion stands still.
     """
 
     requested: bool = False
@@ -38,17 +35,17 @@ class PauseSignal:
 
     @property
     def stops(self) -> bool:
-        """A motion under way must stop now."""
+        """True if the current motion must stop now."""
         return self.requested and self.style != "finish" and not self._finishing
 
     @property
     def deferred(self) -> bool:
-        """A pause must wait for what is being finished."""
+        """True while an uninterruptible section defers the pause."""
         return bool(self._finishing)
 
     @contextmanager
     def handling(self) -> Iterator[None]:
-        """A motion takes care of the pause."""
+        """Mark the pause as handled by the current motion."""
         self.handled = True
         try:
             yield
@@ -57,7 +54,7 @@ class PauseSignal:
 
     @contextmanager
     def finishing(self) -> Iterator[None]:
-        """What is done inside is not interrupted by a pause, whatever the skill's style: the pause comes after it."""
+        """Defer every pause to the end of this section, whatever the skill's style."""
         self._finishing += 1
         try:
             yield

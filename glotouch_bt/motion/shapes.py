@@ -1,4 +1,4 @@
-"""The convex shapes of the arm, the hand, the probe and the world, built once for python-fcl."""
+"""Convex collision shapes of the arm, the hand, the probe and the world, built once for python-fcl."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 
 from glotouch_bt.robot import Array, Gripper, Pose, Probe, RobotDescription, World
 
-# Between the handle's lower face and the holder block's top ("just below the handle").
 HOLDER_GAP_M = 0.003
+"""Gap between the lower face of the handle and the top of the holder block."""
 WALLS = ("wall +x", "wall -x", "wall +y", "wall -y")
 OWN_OBSTACLES = (*WALLS, "floor", "table", "holder", "probe")
-# The table the container stands on, taken as a large slab.
 _TABLE_HALF_M = (2.0, 2.0, 0.1)
+"""Half sizes of the table under the container, modelled as a large slab."""
 
 
 @dataclass
-class Part:
-    """A moving convex shape: its frame in a link's frame, and the half sizes of its box there."""
+class MovingPart:
+    """A moving convex shape: its pose in a link's frame and the half sizes of its bounding box there."""
 
     name: str
     link: int
@@ -31,7 +31,7 @@ class Part:
 
 @dataclass
 class Obstacle:
-    """A fixed convex shape in B and its axis-aligned box."""
+    """A fixed convex shape in B and its axis-aligned bounding box."""
 
     name: str
     centre_m: Array
@@ -39,14 +39,14 @@ class Obstacle:
     body: fcl.CollisionObject
 
 
-def _part(name: str, link: int, pose: Pose, half_m: Array, shape: fcl.CollisionGeometry) -> Part:
-    return Part(
+def _part(name: str, link: int, pose: Pose, half_m: Array, shape: fcl.CollisionGeometry) -> MovingPart:
+    return MovingPart(
         name, link, pose.rotation.copy(), pose.position_m.copy(), half_m, fcl.CollisionObject(shape, fcl.Transform())
     )
 
 
-def arm_parts(description: RobotDescription) -> list[Part]:
-    """Capsules of the moving links, then the gripper's body and fingers (closed)."""
+def arm_parts(description: RobotDescription) -> list[MovingPart]:
+    """Return the capsules of the moving links, then the gripper's body and its closed fingers."""
     parts = []
     for i, joint in enumerate(description.joints):
         for capsule in joint.link.capsules:
@@ -68,7 +68,7 @@ def arm_parts(description: RobotDescription) -> list[Part]:
 
 
 def _rotation_to(direction: Array) -> Array:
-    """A rotation (3, 3) whose z axis points along `direction`; identity for no direction."""
+    """Return a rotation (3, 3) whose z axis points along `direction`; the identity for a zero vector."""
     length = float(np.linalg.norm(direction))
     if length < 1e-9:
         return np.eye(3)
@@ -79,13 +79,13 @@ def _rotation_to(direction: Array) -> Array:
 
 
 def make_obstacle(name: str, pose: Pose, half_m: Array, shape: fcl.CollisionGeometry) -> Obstacle:
-    """A fixed shape at a pose in B; `half_m` (3,) are the half sizes of its box in its own frame."""
+    """Return a fixed shape at a pose in B; `half_m` (3,) are the half sizes of its box in its own frame."""
     body = fcl.CollisionObject(shape, fcl.Transform(np.array(pose.rotation), np.array(pose.position_m)))
     return Obstacle(name, np.array(pose.position_m), np.abs(pose.rotation) @ half_m, body)
 
 
 def world_obstacles(world: World) -> list[Obstacle]:
-    """The container's floor and walls, the table under it, and the block of the holder."""
+    """Return the container's floor and walls, the table under it and the holder block."""
     box, t = world.container, world.container.wall_m
     x, y, z = (0.5 * side for side in box.interior_m)
     places = {
@@ -108,13 +108,13 @@ def world_obstacles(world: World) -> list[Obstacle]:
 
 
 def stowed_probe(world: World) -> Obstacle:
-    """The handle of the probe that stands in its holder."""
+    """Return the handle of the probe in its holder as an obstacle."""
     half = 0.5 * np.array(world.probe.handle_m)
     return make_obstacle("probe", world.holder.pose_B_grasp, half, fcl.Box(*(2 * half)))
 
 
-def tool_parts(description: RobotDescription, probe: Probe) -> list[Part]:
-    """The probe while it is held, its handle's centre at P: tip ball, shaft, handle."""
+def tool_parts(description: RobotDescription, probe: Probe) -> list[MovingPart]:
+    """Return tip ball, shaft and handle of the held probe; the centre of its handle is at P."""
     last = description.dof - 1
     hand_pose = description.pose_last_E @ description.gripper.pose_E_P
     half_handle = 0.5 * probe.handle_m[2]
@@ -130,6 +130,6 @@ def tool_parts(description: RobotDescription, probe: Probe) -> list[Part]:
 
 
 def finger_outline_half_m(gripper: Gripper, aperture_m: float) -> Array:
-    """(2,) half size along x_P and y_P of the rectangle round both fingers at an aperture."""
+    """Return the half sizes (2,) along x_P and y_P of the rectangle around both fingers at an aperture."""
     outer = gripper.finger.centre_m[1] + gripper.finger.half_m[1]
     return np.array([gripper.finger.half_m[0], outer + 0.5 * aperture_m])

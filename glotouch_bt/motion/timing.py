@@ -1,7 +1,6 @@
-"""When a path is travelled: speed-, acceleration- and jerk-limited profiles from ruckig, sampled at the control period.
+"""Time profiles limited in speed, acceleration and jerk, computed with ruckig and sampled at the control period.
 
-Only ruckig's local, state-to-state solutions are used: no position limits (the library ignores them) and no
-intermediate positions (the library would ask a web service).
+Only ruckig's local state-to-state solver is used: it ignores position limits, and way points need a web service.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from glotouch_bt.robot import Array, BackendError
 
 @dataclass(frozen=True)
 class Progress:
-    """How far along a path, at the END of each control period; the last sample is at rest.
+    """Progress along a path at the END of each control period; the last sample is at rest.
 
     Attributes:
         s: (n,) m.
@@ -30,23 +29,23 @@ class Progress:
 
 
 @dataclass(frozen=True)
-class Pace:
-    """The limits a way is travelled under: m/s, m/s2, m/s3 (of a joint move, shares of the way instead of metres)."""
+class ProfileLimits:
+    """Limits of a time profile: m/s, m/s2, m/s3 (for a joint move per s, s2, s3 of the fraction travelled)."""
 
     speed: float
     acceleration: float
     jerk: float
 
 
-EASED = (1.0, 1.0 - 1e-6, 1.0 - 1e-4)
-"""Parts of the acceleration tried. Where two sorts of profile meet (speed times jerk is exactly the acceleration
-squared, and the way just long enough) the library's root finding fails by rounding; a hair beside it does not."""
+ACCELERATION_RETRIES = (1.0, 1.0 - 1e-6, 1.0 - 1e-4)
+"""Fractions of the acceleration limit to try in turn. Ruckig's root finding fails by rounding where two profile types
+meet: speed times jerk equals the acceleration squared. A slightly lower limit avoids it."""
 
 
 def _solve(dof: int, target: ruckig.InputParameter) -> ruckig.Trajectory:
     acceleration = list(target.max_acceleration)
     failure: Exception | None = None
-    for part in EASED:
+    for part in ACCELERATION_RETRIES:
         target.max_acceleration = [part * a for a in acceleration]
         trajectory = ruckig.Trajectory(dof)
         try:
@@ -61,12 +60,12 @@ def _solve(dof: int, target: ruckig.InputParameter) -> ruckig.Trajectory:
 
 
 def _periods(duration_s: float, period_s: float) -> int:
-    # A whole number of periods must not gain one from rounding.
+    # The tolerance keeps rounding from adding a period to a whole number of periods.
     return max(1, int(np.ceil(duration_s / period_s - 1e-9)))
 
 
 def rest_to_rest(length_m: float, speed: float, acceleration: float, jerk: float, period_s: float) -> Progress:
-    """Fastest travel of `length_m` from rest to rest under limits (m/s, m/s2, m/s3).
+    """Return the fastest profile over `length_m` from rest to rest under limits (m/s, m/s2, m/s3).
 
     Raises:
         BackendError: Ruckig found no profile (a limit is not positive or not finite).
@@ -79,7 +78,7 @@ def rest_to_rest(length_m: float, speed: float, acceleration: float, jerk: float
 
 
 def stop(s: float, v: float, a: float, acceleration: float, jerk: float, period_s: float) -> Progress:
-    """Fastest halt from progress `s` with speed `v` and acceleration `a`, under the given deceleration and jerk."""
+    """Return the fastest stop from progress `s`, speed `v` and acceleration `a` under limits (m/s2, m/s3)."""
     p = ruckig.InputParameter(1)
     p.control_interface = ruckig.ControlInterface.Velocity
     p.current_position, p.current_velocity, p.current_acceleration = [s], [v], [a]
@@ -89,24 +88,24 @@ def stop(s: float, v: float, a: float, acceleration: float, jerk: float, period_
     return _sample(trajectory, period_s, trajectory.at_time(trajectory.duration)[0][0])
 
 
-def between(s0: float, s1: float, pace: Pace, period_s: float) -> Progress:
-    """Fastest travel from rest at `s0` to rest at `s1`, forwards or backwards along the way."""
-    way = rest_to_rest(abs(s1 - s0), pace.speed, pace.acceleration, pace.jerk, period_s)
+def between(s0: float, s1: float, limits: ProfileLimits, period_s: float) -> Progress:
+    """Return the fastest profile from rest at `s0` to rest at `s1`, forwards or backwards along the path."""
+    way = rest_to_rest(abs(s1 - s0), limits.speed, limits.acceleration, limits.jerk, period_s)
     sign = 1.0 if s1 >= s0 else -1.0
     s = s0 + sign * way.s
     s[-1] = s1
     return Progress(s, sign * way.v, sign * way.a)
 
 
-def brake(progress: Progress, k: int, pace: Pace, period_s: float) -> Progress | None:
-    """From period `k` of a travel under `pace` to rest under the same limits; None if it is at rest there.
+def brake(progress: Progress, k: int, limits: ProfileLimits, period_s: float) -> Progress | None:
+    """Return the stop after period `k` of a profile under its own limits; None if it is at rest there.
 
-    The rest of the travel ends at rest under these limits, so that the fastest halt ends before it does.
+    It ends before the profile does, because the profile itself comes to rest under these limits.
     """
     s, v, a = (float(x[k]) for x in (progress.s, progress.v, progress.a))
     if v == 0.0 and a == 0.0:
         return None
-    return stop(s, v, a, pace.acceleration, pace.jerk, period_s)
+    return stop(s, v, a, limits.acceleration, limits.jerk, period_s)
 
 
 def _sample(trajectory: ruckig.Trajectory, period_s: float, end: float) -> Progress:
@@ -118,30 +117,30 @@ def _sample(trajectory: ruckig.Trajectory, period_s: float, end: float) -> Progr
 
 @dataclass(frozen=True)
 class JointProfile:
-    """A joint move at the END of each control period; the last sample is at rest.
+    """Setpoints of a joint move at the END of each control period; the last sample is at rest.
 
     Attributes:
-        start, way: (dof,) where it begins and what it travels, rad.
-        share: Share of the way, 0 to 1.
-        pace: Limits of the share.
+        start, way: (dof,) start and displacement, rad.
+        share: Fraction travelled, 0 to 1.
+        limits: Limits of the fraction.
         q, dq, ddq: (n, dof) rad, rad/s, rad/s2.
     """
 
     start: Array
     way: Array
     share: Progress
-    pace: Pace
+    limits: ProfileLimits
     q: Array
     dq: Array
     ddq: Array
 
     @classmethod
-    def along(cls, start: Array, way: Array, share: Progress, pace: Pace) -> JointProfile:
-        """Setpoints of a progress along the way."""
+    def along(cls, start: Array, way: Array, share: Progress, limits: ProfileLimits) -> JointProfile:
+        """Build the setpoints of a progress along the straight line from `start`."""
         q = start + share.s[:, None] * way
         if share.s[-1] == 1.0:
             q[-1] = start + way
-        out = cls(start, way, share, pace, q, share.v[:, None] * way, share.a[:, None] * way)
+        out = cls(start, way, share, limits, q, share.v[:, None] * way, share.a[:, None] * way)
         for array in (out.q, out.dq, out.ddq):
             array.setflags(write=False)
         return out
@@ -150,10 +149,10 @@ class JointProfile:
 def joint_move(
     start: Array, end: Array, velocity: Array, acceleration: Array, jerk: Array, period_s: float
 ) -> JointProfile:
-    """Straight line in joint space from rest to rest under per-joint limits (dof,), rad/s, rad/s2, rad/s3.
+    """Return a straight joint-space move from rest to rest under per-joint limits (dof,), rad/s, rad/s2, rad/s3.
 
-    One profile of the share of the way, 0 to 1, whose limits are the tightest joint's: the joints are exactly in phase,
-    so the line that was checked is the line that is travelled (ruckig's own phase synchronisation silently gives up).
+    One scalar profile under the tightest joint's limits keeps all joints exactly in phase, so the arm travels the line
+    that was checked. Ruckig's own phase synchronisation can fail silently.
 
     Raises:
         BackendError: Ruckig found no profile.
@@ -161,4 +160,4 @@ def joint_move(
     way = end - start
     size = np.maximum(np.abs(way), 1e-12)
     v, a, j = (float((limit / size).min()) for limit in (velocity, acceleration, jerk))
-    return JointProfile.along(start, way, rest_to_rest(1.0, v, a, j, period_s), Pace(v, a, j))
+    return JointProfile.along(start, way, rest_to_rest(1.0, v, a, j, period_s), ProfileLimits(v, a, j))

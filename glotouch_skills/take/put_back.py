@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.motion import JawWatch
+from glotouch_bt.motion import JawRestDetector
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import Pose
 from glotouch_bt.skill import UNCHANGED, In, Skill, SkillFailed, SkillParams, SkillRun, param
@@ -96,7 +96,7 @@ class PutBack(Skill):
     def _let_jaws_rest(self) -> SkillRun:
         """Jaws that are still closing would be taken for jaws that hold something."""
         arm = self.context.arm
-        watch = JawWatch(arm.period_s)
+        watch = JawRestDetector(arm.period_s)
         for _ in range(round(REST_S / arm.period_s)):
             (seen,) = yield from arm.hold(arm.period_s)
             if watch.still(seen.now_s, seen.gripper):

@@ -56,7 +56,7 @@ def test_lines_are_straight_and_smooth(description, world: World, drive) -> None
     np.testing.assert_allclose(track[-1], begin.position_m + way, atol=1e-6)
 
 
-def test_arc_keeps_radius_and_slows_for_its_bend(arm: Arm, robot: FakeRobot, drive) -> None:  # type: ignore[no-untyped-def]
+def test_arc_keeps_its_radius_and_limits_centripetal_acceleration(arm: Arm, robot: FakeRobot, drive) -> None:  # type: ignore[no-untyped-def]
     start_at(arm, robot, Pose.pointing_down((0.6, 0.0, 0.0), np.pi), drive)
     centre = arm.pose_B_P.position_m + np.array([0.02, 0.0, 0.0])
     result = drive(robot, arm.arc(centre, (0, 0, 1), 2 * np.pi, 0.25))
@@ -95,7 +95,9 @@ def test_free_motions_keep_the_posture_near_home(arm: Arm, robot: FakeRobot, dri
 
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(speed=st.floats(0.01, 0.12), gap=st.floats(0.0005, 0.06), acceleration=st.floats(0.2, 1.0))
-def test_guarded_stop_is_short(world: World, drive, speed: float, gap: float, acceleration: float) -> None:  # type: ignore[no-untyped-def]
+def test_guarded_stop_stays_within_the_stop_distance(
+    world: World, drive, speed: float, gap: float, acceleration: float
+) -> None:  # type: ignore[no-untyped-def]
     """After the block that shows the contact, P travels at most v dt + v^2/2a + v a/2j, and a little while a0 falls."""
     arm = Arm(RIZON4_XENSE, Limits(), world, DT)
     begin = arm.pose_B_P
@@ -150,7 +152,7 @@ def test_guard_takes_effect_in_the_next_command(arm: Arm, robot: FakeRobot, driv
     assert len(speeds) == 60 + 4  # v/a + a/j = 32 ms, rounded up to whole periods
 
 
-def test_wall_is_refused_by_name_before_any_command(arm: Arm, robot: FakeRobot, drive) -> None:  # type: ignore[no-untyped-def]
+def test_collision_is_refused_by_name_before_any_command(arm: Arm, robot: FakeRobot, drive) -> None:  # type: ignore[no-untyped-def]
     start_at(arm, robot, Pose.pointing_down((0.6, 0.0, -0.15), np.pi), drive)
     before = robot.cycles
     with pytest.raises(MotionRefused, match=r"shift refused: left finger would hit wall \+y of the container"):
@@ -175,7 +177,7 @@ def test_limits_are_refused_by_name(arm: Arm, robot: FakeRobot, drive) -> None: 
             "cannot follow the path beyond|would leave its range|would hit|would turn at",
         ),
         (arm.arc(here.position_m, (0, 0, 1), -4.0, 0.1, turn=True), "joint7 would leave its range"),
-        (arm.follow(Line(Pose(here.position_m + 0.01, here.quat), here), 0.1), "it begins 17.3 mm"),
+        (arm.follow(Line(Pose(here.position_m + 0.01, here.quat), here), 0.1), "begins 17.3 mm"),
         (arm.joints(np.full(7, 3.0)), "joint1 at 3.000 rad is outside its range"),
     ):
         with pytest.raises(MotionRefused, match=match):
@@ -221,7 +223,7 @@ def test_hold_counts_whole_periods(arm: Arm, robot: FakeRobot, drive) -> None:  
     assert 11 <= len(frames) <= 13
 
 
-def test_closing_a_motion_leaves_the_last_setpoint(arm: Arm, robot: FakeRobot) -> None:
+def test_closing_a_motion_keeps_the_last_setpoint(arm: Arm, robot: FakeRobot) -> None:
     arm.sync(robot.observe())
     motion = arm.shift((0, 0.1, 0), 0.1)
     command = next(motion)
@@ -232,7 +234,7 @@ def test_closing_a_motion_leaves_the_last_setpoint(arm: Arm, robot: FakeRobot) -
     np.testing.assert_array_equal(arm.q, command.motion.q)
 
 
-def test_a_path_of_no_length_ends_at_once(arm: Arm, robot: FakeRobot, drive) -> None:  # type: ignore[no-untyped-def]
+def test_zero_length_path_ends_without_a_command(arm: Arm, robot: FakeRobot, drive) -> None:  # type: ignore[no-untyped-def]
     arm.sync(robot.observe())
     result = drive(robot, arm.shift((0, 0, 0), 0.1))
     assert result.completed
@@ -242,7 +244,7 @@ def test_a_path_of_no_length_ends_at_once(arm: Arm, robot: FakeRobot, drive) -> 
     assert arm.pose_B_P.yaw_rad == pytest.approx(np.angle(np.exp(1j * (np.pi + 0.5))), abs=1e-6)
 
 
-def test_same_motion_same_bytes(world: World, drive) -> None:  # type: ignore[no-untyped-def]
+def test_motions_are_reproducible_to_the_bit(world: World, drive) -> None:  # type: ignore[no-untyped-def]
     records = []
     for _ in range(2):
         arm, robot = Arm(RIZON4_XENSE, Limits(), world, DT), FakeRobot(RIZON4_XENSE)

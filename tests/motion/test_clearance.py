@@ -1,4 +1,4 @@
-"""Distances against closed forms; reasons that name the pair; allowances; leaving a contact."""
+"""Distances against closed forms, named violations, allowed contacts, retracting from a contact."""
 
 from __future__ import annotations
 
@@ -57,25 +57,27 @@ def test_links_are_where_the_description_says(scene: Scene, kinematics: Kinemati
         assert scene.distance_m(joint.link.name, "ball-like", q, 0.0) == pytest.approx(by_hand, abs=3e-4)
 
 
-def test_reason_names_pair_and_penetration(scene: Scene, kinematics: Kinematics) -> None:
-    assert scene.why_blocked(kinematics.home, 0.05) is None
+def test_violation_names_pair_and_penetration(scene: Scene, kinematics: Kinematics) -> None:
+    assert scene.describe_violation(kinematics.home, 0.05) is None
     # Its faces lie 0.20 and 0.214 along y, the wall's 0.200 and 0.208: 8 mm is the shortest way out.
     q = at(kinematics, 0.0, 0.18, 0.05)
-    assert scene.why_blocked(q, 0.04) == "left finger would hit wall +y of the container (penetration 8.0 mm)"
+    assert scene.describe_violation(q, 0.04) == "left finger would hit wall +y of the container (penetration 8.0 mm)"
     q = at(kinematics, 0.0, 0.2 - 0.02 - 0.014 - 0.001, 0.05)
-    assert scene.why_blocked(q, 0.04) == ("left finger would pass wall +y of the container at 1.0 mm (margin 2.0 mm)")
-    assert scene.why_blocked(q, 0.04, margin_m=0.0) is None
-    assert scene.why_blocked(q, 0.02) is None
+    assert scene.describe_violation(q, 0.04) == (
+        "left finger would pass wall +y of the container at 1.0 mm (margin 2.0 mm)"
+    )
+    assert scene.describe_violation(q, 0.04, margin_m=0.0) is None
+    assert scene.describe_violation(q, 0.02) is None
 
 
-def test_body_over_a_wall_is_seen(scene: Scene, kinematics: Kinematics) -> None:
+def test_gripper_body_above_a_wall_is_checked(scene: Scene, kinematics: Kinematics) -> None:
     """Fingers inside, low, near a wall: the 0.08 m wall is below the body (0.115 m above P)."""
     q = at(kinematics, 0.0, 0.15, 0.02)
     assert scene.distance_m("gripper body", "wall +y", q, 0.0) == pytest.approx(0.115 + 0.02 - 0.08, abs=1e-6)
 
 
-def test_broad_phase_never_loses_a_pair(scene: Scene, kinematics: Kinematics) -> None:
-    """Random postures: `why_blocked` is None exactly when every single distance is above the margin."""
+def test_broad_phase_keeps_every_near_pair(scene: Scene, kinematics: Kinematics) -> None:
+    """Random postures: `describe_violation` is None exactly when every single distance is above the margin."""
     scene.hold_tool(True)
     scene.add_obstacle("block", "box", centre_K_m=(0.05, 0.1), size_m=(0.06, 0.03), height_m=0.07, yaw_rad=0.6)
     rng = np.random.default_rng(3)
@@ -88,62 +90,60 @@ def test_broad_phase_never_loses_a_pair(scene: Scene, kinematics: Kinematics) ->
             for o in scene.obstacles
             if o not in ("probe", "table")
         )
-        why = scene.why_blocked(q, 0.016)
+        why = scene.describe_violation(q, 0.016)
         assert (why is None) == (least >= scene.margin_m), f"{why} {least}"
         blocked += why is not None
     assert 5 < blocked < 55
 
 
-def test_obstacles_come_and_go(scene: Scene, kinematics: Kinematics) -> None:
+def test_obstacles_are_added_and_removed(scene: Scene, kinematics: Kinematics) -> None:
     q = at(kinematics, 0.0, 0.0, 0.05)
     scene.add_obstacle("can", "round", centre_K_m=(0.0, 0.05), size_m=(0.06, 0.06), height_m=0.06)
     assert scene.distance_m("left finger", "can", q, 0.0) == pytest.approx(0.05 - 0.03 - 0.014, abs=2e-5)
-    assert "can" in str(scene.why_blocked(q, 0.085))
+    assert "can" in str(scene.describe_violation(q, 0.085))
     scene.remove_obstacle("can")
-    assert scene.why_blocked(q, 0.085) is None
+    assert scene.describe_violation(q, 0.085) is None
     scene.add_obstacle("a", "box", centre_K_m=(0.0, 0.0), size_m=(0.02, 0.02), height_m=0.04)
     scene.clear_obstacles()
     assert "a" not in scene.obstacles
 
 
-def test_allowed_contact_is_allowed_only_for_that_pair(scene: Scene, kinematics: Kinematics) -> None:
+def test_allow_applies_to_one_pair_only(scene: Scene, kinematics: Kinematics) -> None:
     scene.hold_tool(True)
     scene.add_obstacle("can", "round", centre_K_m=(0.0, 0.0), size_m=(0.05, 0.05), height_m=0.06)
     q = at(kinematics, 0.03, 0.0, 0.02 + TIP_BELOW_P)
-    assert str(scene.why_blocked(q, 0.016)).startswith("tip would hit can")
+    assert str(scene.describe_violation(q, 0.016)).startswith("tip would hit can")
     scene.allow("tip", "can")
     # The shaft stands 1 mm from the can: nearer than the margin, and not allowed.
-    assert str(scene.why_blocked(q, 0.016)).startswith("shaft would pass can")
+    assert str(scene.describe_violation(q, 0.016)).startswith("shaft would pass can")
     scene.allow("tool", "can")
-    assert scene.why_blocked(q, 0.016) is None
+    assert scene.describe_violation(q, 0.016) is None
     scene.disallow("tool", "can")
-    assert scene.why_blocked(q, 0.016) is not None
+    assert scene.describe_violation(q, 0.016) is not None
 
 
-def test_pickup_needs_no_allowance_for_the_holder_but_for_the_probe(
-    scene: Scene, kinematics: Kinematics, world: World
-) -> None:
+def test_pickup_must_allow_the_probe_but_not_the_holder(scene: Scene, kinematics: Kinematics, world: World) -> None:
     q = kinematics.ik(world.holder.pose_B_grasp, kinematics.home)
-    assert scene.why_blocked(q, 0.05) is None
-    assert "probe" in str(scene.why_blocked(q, 0.015))
+    assert scene.describe_violation(q, 0.05) is None
+    assert "probe" in str(scene.describe_violation(q, 0.015))
     scene.hold_tool(True)
-    assert "holder" in str(scene.why_blocked(q, 0.016))
+    assert "holder" in str(scene.describe_violation(q, 0.016))
     scene.allow("tool", "holder")
-    assert scene.why_blocked(q, 0.016) is None
+    assert scene.describe_violation(q, 0.016) is None
 
 
-def test_a_part_may_leave_a_contact_but_not_press_on(scene: Scene, kinematics: Kinematics) -> None:
+def test_part_may_retract_from_a_contact_but_not_come_nearer(scene: Scene, kinematics: Kinematics) -> None:
     scene.hold_tool(True)
     low = TIP_BELOW_P + TIP_RADIUS
     touching, higher = at(kinematics, 0, 0, low + 0.0005), at(kinematics, 0, 0, low + 0.0015)
     deeper = at(kinematics, 0, 0, low - 0.001)
-    assert scene.first_blocked(np.stack([touching, higher]), 0.016) is None
-    found = scene.first_blocked(np.stack([touching, deeper]), 0.016)
+    assert scene.first_violation(np.stack([touching, higher]), 0.016) is None
+    found = scene.first_violation(np.stack([touching, deeper]), 0.016)
     assert found is not None
     assert (found.index, found.part, found.obstacle) == (1, "tip", "floor")
 
 
-def test_bad_names_and_sizes_are_refused(scene: Scene) -> None:
+def test_invalid_names_and_sizes_are_refused(scene: Scene) -> None:
     with pytest.raises(UnknownName, match="left finger"):
         scene.allow("left fingr", "floor")
     with pytest.raises(UnknownName):

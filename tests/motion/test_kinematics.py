@@ -122,7 +122,7 @@ def test_ik_recovers_random_configurations(kinematics: Kinematics) -> None:
         assert np.all(found <= kinematics.upper)
 
 
-def test_posture_weight_brings_the_null_space_home(kinematics: Kinematics) -> None:
+def test_posture_weight_moves_the_null_space_towards_home(kinematics: Kinematics) -> None:
     pose = kinematics.fk(kinematics.home)
     swung = kinematics.home.copy()
     for _ in range(100):  # along the null space, away from home

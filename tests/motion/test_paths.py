@@ -1,4 +1,4 @@
-"""Paths against their geometry: lengths, ends, tangents by finite difference."""
+"""Lengths, ends and tangents (by finite differences) of paths."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_twist_is_the_derivative_of_the_pose(piece: Piece) -> None:
     np.testing.assert_allclose(twist[:, 3:], np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], 1), atol=1e-7)
 
 
-def test_line_ends_and_stays_straight() -> None:
+def test_line_is_straight_and_ends_at_its_poses() -> None:
     line = PIECES[0]
     assert isinstance(line, Line)
     np.testing.assert_allclose(line.pose(0.0).position_m, line.start.position_m)
@@ -41,7 +41,7 @@ def test_line_ends_and_stays_straight() -> None:
     assert np.abs(off).max() < 1e-15
 
 
-def test_arc_keeps_its_radius_and_turns_the_hand_only_when_told() -> None:
+def test_arc_keeps_its_radius_and_rotates_the_hand_only_on_request() -> None:
     still, turning = PIECES[3], PIECES[4]
     for arc, change in ((still, 0.0), (turning, 2.0)):
         p, q = arc.sample(np.linspace(0, arc.length_m, 30))
@@ -52,10 +52,10 @@ def test_arc_keeps_its_radius_and_turns_the_hand_only_when_told() -> None:
         assert np.angle(np.exp(1j * (yaw - change))) == pytest.approx(0.0, abs=1e-9)
     assert still.length_m == pytest.approx(4.0 * 0.05)
     assert turning.length_m == pytest.approx(2.0 * 0.1)  # the turn at its lever is the longer
-    assert still.bend_1_m == pytest.approx(20.0)
+    assert still.curvature_1_m == pytest.approx(20.0)
 
 
-def test_polyline_adds_up_and_skips_empty_lines() -> None:
+def test_polyline_sums_lengths_and_skips_empty_lines() -> None:
     a, b, c = (Pose(np.array(p)) for p in ((0.0, 0, 0), (0.1, 0, 0), (0.1, 0.2, 0)))
     path = Polyline((a, a, b, c))
     assert len(path.pieces) == 2
@@ -64,7 +64,7 @@ def test_polyline_adds_up_and_skips_empty_lines() -> None:
     np.testing.assert_allclose(path.pose(9.0).position_m, c.position_m)
 
 
-def test_bad_paths_are_refused() -> None:
+def test_invalid_paths_are_refused() -> None:
     with pytest.raises(ParamError):
         Polyline((DOWN,))
     with pytest.raises(ParamError):

@@ -1,4 +1,4 @@
-"""A held feed: the same path, within the same limits, guards listening, however often and whenever it is held."""
+"""Pauses keep the path, the limits and the guard of a motion, however often and whenever they come."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from glotouch_bt.motion import Arm, Kinematics, MoveResult
-from glotouch_bt.motion.pause_signal import BACK_OFF_M
+from glotouch_bt.motion.pause_signal import RETREAT_M
 from glotouch_bt.robot import Array, Command, Observation
 from glotouch_bt.robot.fake import FakeRobot, SpringWall
 
@@ -22,7 +22,7 @@ QUIET = settings(max_examples=25, deadline=None, suppress_health_check=list(Heal
 def play(
     arm: Arm, robot: FakeRobot, motion: Generator[Command, Observation, Any], wanted: Callable[[int], bool]
 ) -> tuple[Any, list[Command]]:
-    """Drive a motion, a pause wanted in the cycles of which `wanted` says so."""
+    """Drive a motion; request a pause in the cycles for which `wanted` is true."""
     commands: list[Command] = []
     try:
         command = next(motion)
@@ -36,7 +36,7 @@ def play(
 
 
 def track(arm: Arm, commands: list[Command]) -> Array:
-    """(n, 3) commanded positions of P; while held, where it stands."""
+    """Return the commanded positions (n, 3) of P; during a hold the last one."""
     out, q = [], None
     for command in commands:
         q = command.motion.q if command.motion is not None else q
@@ -46,7 +46,7 @@ def track(arm: Arm, commands: list[Command]) -> Array:
 
 @QUIET
 @given(st.lists(st.tuples(st.integers(1, 90), st.integers(1, 40)), min_size=1, max_size=5), st.booleans())
-def test_a_held_line_is_the_same_line(world: Any, pauses: list[tuple[int, int]], retreat: bool) -> None:
+def test_paused_line_stays_on_the_line(world: Any, pauses: list[tuple[int, int]], retreat: bool) -> None:
     arm, robot = Arm(FakeRobot().description, FakeRobot().limits, world, DT), FakeRobot()
     arm.sync(robot.observe())
     arm.pause_signal.style = "retreat" if retreat else "hold"
@@ -71,16 +71,16 @@ def test_a_held_line_is_the_same_line(world: Any, pauses: list[tuple[int, int]],
         assert np.diff(along).min() > -1e-9, "went back"
 
 
-def test_a_pause_brings_a_line_to_rest_and_nothing_moves(arm: Arm, robot: FakeRobot) -> None:
+def test_pause_stops_a_line_and_holds_it_still(arm: Arm, robot: FakeRobot) -> None:
     arm.sync(robot.observe())
     _, commands = play(arm, robot, arm.shift((0.0, 0.1, 0.0), 0.1), lambda n: 40 <= n < 2040)
     still = [i for i, c in enumerate(commands) if c.motion is None]
-    assert still[0] - 40 < 20, "it took longer than 0.2 s to stand"
+    assert still[0] - 40 < 20, "the stop took longer than 0.2 s"
     assert len(still) > 1950
-    assert still == list(range(still[0], still[-1] + 1)), "it moved in between"
+    assert still == list(range(still[0], still[-1] + 1)), "the arm moved during the pause"
 
 
-def test_finish_goes_to_the_end_of_its_motion(arm: Arm, robot: FakeRobot) -> None:
+def test_finish_style_completes_the_motion(arm: Arm, robot: FakeRobot) -> None:
     arm.sync(robot.observe())
     arm.pause_signal.style = "finish"
     result, commands = play(arm, robot, arm.shift((0.0, 0.1, 0.0), 0.1), lambda n: n > 10)
@@ -88,7 +88,7 @@ def test_finish_goes_to_the_end_of_its_motion(arm: Arm, robot: FakeRobot) -> Non
     assert all(c.motion is not None for c in commands)
 
 
-def test_what_is_finished_is_not_interrupted(arm: Arm, robot: FakeRobot) -> None:
+def test_finishing_section_is_not_interrupted(arm: Arm, robot: FakeRobot) -> None:
     arm.sync(robot.observe())
 
     def closing() -> Generator[Command, Observation, MoveResult]:
@@ -102,8 +102,8 @@ def test_what_is_finished_is_not_interrupted(arm: Arm, robot: FakeRobot) -> None
 
 @QUIET
 @given(start=st.integers(1, 250), length=st.integers(1, 300))
-def test_a_guard_trips_at_the_same_wall_whenever_it_is_held(world: Any, start: int, length: int) -> None:
-    """Against a spring wall the stop is at the wall, a held feed or not, and the force is bounded alike."""
+def test_guard_trips_at_the_same_wall_with_and_without_a_pause(world: Any, start: int, length: int) -> None:
+    """Stop at a spring wall with the same bound on the force, with and without a pause."""
     gap, stiffness, speed = 0.03, 3000.0, 0.02
     description = FakeRobot().description
     arm = Arm(description, FakeRobot().limits, world, DT)
@@ -120,19 +120,19 @@ def test_a_guard_trips_at_the_same_wall_whenever_it_is_held(world: Any, start: i
     assert result.stop == "touch"
     assert gap < result.travelled_m < gap + 0.0015
     assert robot.peak_force_N < stiffness * 0.0012
-    # backing off leaves the wall, coming back ends where it was, at the same force
+    # the retreat leaves the wall, and the return ends at the same joint positions
     at = arm.q.copy()
     arm.pause_signal.requested = False
-    out, _ = play(arm, robot, arm.back_off(), lambda _: True)
+    out, _ = play(arm, robot, arm.retreat(), lambda _: True)
     assert np.linalg.norm(robot.observe().wrench_S[-1, :3]) < 1e-9
     assert np.linalg.norm(arm.pose_B_P.position_m - arm.kinematics.fk(at).position_m) == pytest.approx(
-        BACK_OFF_M, abs=1e-4
+        RETREAT_M, abs=1e-4
     )
-    play(arm, robot, arm.come_back(out), lambda _: True)
+    play(arm, robot, arm.return_to_contact(out), lambda _: True)
     np.testing.assert_array_equal(arm.q, at)
 
 
-def test_a_guard_that_trips_while_the_motion_stands_is_a_contact(arm: Arm, robot: FakeRobot) -> None:
+def test_guard_that_trips_during_a_pause_reports_a_contact(arm: Arm, robot: FakeRobot) -> None:
     arm.sync(robot.observe())
     cycles = [0]
 
@@ -148,8 +148,8 @@ def test_a_guard_that_trips_while_the_motion_stands_is_a_contact(arm: Arm, robot
     assert not arm.pause_signal.handled
 
 
-def test_a_guarded_motion_that_begins_in_a_pause_listens_first(arm: Arm, robot: FakeRobot) -> None:
-    """Its zero was taken just before: it must see every sample from then on."""
+def test_guard_evaluates_every_sample_when_a_motion_starts_paused(arm: Arm, robot: FakeRobot) -> None:
+    """The guard's baseline was taken just before, so it must see every later sample."""
     arm.sync(robot.observe())
     stamps: list[float] = []
     arm.pause_signal.requested = True
@@ -162,7 +162,7 @@ def test_a_guarded_motion_that_begins_in_a_pause_listens_first(arm: Arm, robot: 
 
 @QUIET
 @given(start=st.integers(1, 150), length=st.integers(1, 60))
-def test_a_held_joint_move_is_the_same_move(kinematics: Kinematics, world: Any, start: int, length: int) -> None:
+def test_paused_joint_move_stays_on_its_line(kinematics: Kinematics, world: Any, start: int, length: int) -> None:
     robot = FakeRobot(kinematics.description)
     arm = Arm(kinematics.description, robot.limits, world, DT)
     arm.sync(robot.observe())
@@ -176,7 +176,7 @@ def test_a_held_joint_move_is_the_same_move(kinematics: Kinematics, world: Any, 
     np.testing.assert_allclose(q[-1], end, atol=1e-12)
 
 
-def test_closing_a_held_motion_leaves_nothing_behind(arm: Arm, robot: FakeRobot) -> None:
+def test_closing_a_paused_motion_resets_the_pause_signal(arm: Arm, robot: FakeRobot) -> None:
     arm.sync(robot.observe())
     motion = arm.shift((0.0, 0.1, 0.0), 0.05)
     command = next(motion)

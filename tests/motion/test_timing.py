@@ -1,4 +1,4 @@
-"""Profiles against closed forms and their own limits."""
+"""Time profiles against closed forms and against their limits."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_joint_move_is_straight_and_within_limits() -> None:
 
 
 @pytest.mark.parametrize("ulps", range(-8, 9))
-def test_ways_that_just_reach_full_speed_have_a_profile(ulps: int) -> None:
+def test_length_that_just_reaches_full_speed_has_a_profile(ulps: int) -> None:
     """Speed times jerk is exactly the acceleration squared: to full speed and back takes exactly 2 v a / j metres."""
     way = 0.005 + ulps * np.spacing(0.005)
     profile = rest_to_rest(way, 0.05, 1.0, 20.0, PERIOD)

@@ -92,7 +92,7 @@ class PauseGate:
     def _waiting(self, ticks: int) -> Motion[None]:
         arm, way = self._context.arm, None
         if self.pause_signal.style == "retreat":
-            way = yield from arm.back_off()
+            way = yield from arm.retreat()
         self._stands("backed off" if way else "at rest")
         while True:
             yield HOLD
@@ -100,7 +100,7 @@ class PauseGate:
             if not self.pause_signal.requested:
                 break
         if way is not None:
-            yield from arm.come_back(way)
+            yield from arm.return_to_contact(way)
 
     def _stands(self, where: str) -> None:
         if not self._standing:

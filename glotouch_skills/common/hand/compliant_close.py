@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from glotouch_bt.motion import Arm, JawWatch, Motion
+from glotouch_bt.motion import Arm, JawRestDetector, Motion
 from glotouch_bt.robot import Array, GripperState, MotionRefused, Observation
 
 GENTLE_N = 3.0
@@ -122,7 +122,7 @@ class _Closing:
     def until_rest(self, forces_N: Sequence[float]) -> Motion[GripperState]:
         """Close under each force for one period, then under the last one until the jaws rest."""
         arm = self._arm
-        watch = JawWatch(arm.period_s)
+        watch = JawRestDetector(arm.period_s)
         for k in range(round(TIMEOUT_S / arm.period_s)):
             force_N = forces_N[min(k, len(forces_N) - 1)]
             seen = yield from self._one_period(force_N if k < len(forces_N) else None)
@@ -189,7 +189,7 @@ def let_go(arm: Arm, opening_m: float) -> Motion[None]:
 
 def _let_go(arm: Arm, opening_m: float) -> Motion[None]:
     held, given, weak, since = arm.aperture_m, 0.0, True, 0
-    watch = JawWatch(arm.period_s)
+    watch = JawRestDetector(arm.period_s)
     yield from _turn_jaws(arm, opening_m, weak)
     for k in range(round(OPENING_S / arm.period_s)):
         (seen,) = yield from arm.hold(arm.period_s)
@@ -206,7 +206,7 @@ def _let_go(arm: Arm, opening_m: float) -> Motion[None]:
             break
         else:
             continue
-        watch = JawWatch(arm.period_s)
+        watch = JawRestDetector(arm.period_s)
         yield from _turn_jaws(arm, opening_m, weak)
 
 

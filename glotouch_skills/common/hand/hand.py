@@ -44,7 +44,7 @@ def require_clear(arm: Arm, pose_B_P: Pose, aperture_m: float, margin_m: float |
         MotionRefused: Out of reach, or some part would hit something; the pair is named.
     """
     q = arm.kinematics.ik(pose_B_P, arm.q)
-    blocked = arm.scene.why_blocked(q, aperture_m, margin_m)
+    blocked = arm.scene.describe_violation(q, aperture_m, margin_m)
     if blocked is not None:
         raise MotionRefused("pose", blocked)
 
