@@ -1,7 +1,7 @@
 """Robot over MuJoCo: the arm, the tactile gripper, a really grasped probe and free objects. See `backend`."""
 
 from glotouch_backends.mujoco.backend import MujocoBackend, build_world
-from glotouch_backends.mujoco.robot import HELD_DISTANCE_M
+from glotouch_backends.mujoco.robot import MAX_HELD_DISTANCE_M
 from glotouch_backends.mujoco.truth import Truth
 
-__all__ = ["HELD_DISTANCE_M", "MujocoBackend", "Truth", "build_world"]
+__all__ = ["MAX_HELD_DISTANCE_M", "MujocoBackend", "Truth", "build_world"]

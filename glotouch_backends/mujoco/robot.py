@@ -10,9 +10,9 @@ import numpy as np
 from glotouch_backends.mujoco.control import (
     CHUNK,
     PAYLOAD_S,
-    Guard,
+    HardLimitGuard,
     JawReports,
-    Jaws,
+    JawServo,
     PendingPayload,
     PendingTare,
     Servo,
@@ -20,7 +20,7 @@ from glotouch_backends.mujoco.control import (
 )
 from glotouch_backends.mujoco.model import STEP_S, STEPS, Handles, handle_mesh
 from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, Tactile, WristSensor, up_in
-from glotouch_backends.mujoco.simulation import SnapshotStore, Trace
+from glotouch_backends.mujoco.simulation import ControlTrace, SnapshotStore
 from glotouch_backends.mujoco.truth import Truth
 from glotouch_bt.robot import (
     Array,
@@ -40,7 +40,7 @@ from glotouch_bt.robot import (
     World,
 )
 
-HELD_DISTANCE_M = 0.02  # the probe counts as held while its handle is this near the pads' mid-point
+MAX_HELD_DISTANCE_M = 0.02  # the probe counts as held while its handle is this near the pads' mid-point
 
 
 class MujocoRobot(Robot):
@@ -67,9 +67,9 @@ class MujocoRobot(Robot):
         self._aperture = aperture = float(data.qpos[handles.jaw_qpos].sum())
         self._servo = Servo(model, data, handles, description, self.period_s, limits.stop_acceleration_m_s2)
         self._servo.reset(np.array(data.qpos[handles.arm_qpos]))
-        self._jaws = Jaws(model, handles, description.gripper, aperture)
+        self._jaws = JawServo(model, handles, description.gripper, aperture)
         self._wrist = WristSensor(description, conditions, seed)
-        self._guard = Guard(limits)
+        self._guard = HardLimitGuard(limits)
         self._tactile = Tactile(
             model,
             data,
@@ -110,7 +110,7 @@ class MujocoRobot(Robot):
         self._closed = False
         self.peak_force_N = 0.0
 
-        self.trace = Trace(model, data) if traced else None
+        self.trace = ControlTrace(model, data) if traced else None
         self._keeper = SnapshotStore(model, data)
 
         self._samples[:] = data.sensordata
@@ -199,7 +199,7 @@ class MujocoRobot(Robot):
         """See `Robot`. What `trace` remembers begins anew."""
         self._keeper.put_back(self, snapshot)
         if self.trace is not None:
-            self.trace = Trace(self.model, self.data)
+            self.trace = ControlTrace(self.model, self.data)
 
     def _advance(self) -> None:
         """Ten steps, looking at the wrench after each chunk."""
@@ -215,7 +215,7 @@ class MujocoRobot(Robot):
                 sample[:] = sensed
                 external[:] = external_now
             # The sensor gives the force of hand on arm; the hand feels its opposite.
-            if self._guard.tripped is None and self._guard.look(-wrenches - self._expected, data.time):
+            if self._guard.tripped is None and self._guard.check(-wrenches - self._expected, data.time):
                 self._stop_here()
 
     def _stop_here(self) -> None:
@@ -267,7 +267,7 @@ class MujocoRobot(Robot):
     def _note_peak(self) -> None:
         """Largest true contact force so far, on the hand and on the probe while it is in the hand."""
         x, y, z = (self._probe_now - self._samples[-1, self._s.position]).tolist()
-        self._counted[3] = x * x + y * y + z * z < HELD_DISTANCE_M**2
+        self._counted[3] = x * x + y * y + z * z < MAX_HELD_DISTANCE_M**2
         force = (self._counted @ self._external)[:, 3:]
         flat = force.ravel()
         if flat @ flat > self.peak_force_N**2:  # else not one of them can be a new peak

@@ -29,7 +29,7 @@ class Truth:
         pose_B_K: True container frame.
         pose_handle_shaft: The probe's shaft frame (origin at the handle's centre) in its handle's frame: identity plus
             the grasp offset, so that the ball is not exactly where the nominal grasp says.
-        pad_friction: Pads on anything.
+        pad_friction: PadContacts on anything.
         objects: In the order of the world's object set.
         fixed: The objects are bolted to the container's floor instead of standing on it.
     """

@@ -1,6 +1,6 @@
-"""For those who write backends: one suite that every backend must pass. Needs pytest.
+"""The test suite that every backend must pass, for authors of backends. Needs pytest.
 
-from glotouch_bt.testing import RobotConformance
+from glotouch_bt.conformance import RobotConformance
 
 class TestMine(RobotConformance):
     def make(self) -> Robot: return MyBackend().open(world, Conditions(), 0, {})

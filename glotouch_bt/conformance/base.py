@@ -1,4 +1,4 @@
-"""What the parts of the conformance suite share: what a subclass says, and the robots they use."""
+"""Settings of the suite and the robots that its tests use."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from glotouch_bt.robot import GlotouchError, Robot, Tare
 
 
 class Conformance:
-    """What is said about one robot; subclass `RobotConformance` and implement `make`.
+    """Expected properties of one robot; subclass `RobotConformance` and implement `make`.
 
     Attributes:
         sample_s: Time between two samples.
-        paced: Time passes by the wall's clock: stamps jitter, and a period may be late now and then.
-        track_m: How far P may be from its setpoint in a slow motion.
-        rest_force_N, rest_torque_Nm: How large the mean tared wrench may be at rest, up to 20 degrees from where the
-            sensor was tared (noise, drift, imperfect weight compensation).
-        weight_share: How wrong the compensation of a payload may be.
-        aperture_m: How wrong the reported aperture may be.
-        pads: It has tactile pads.
-        stop_s: From a hold to the arm braking.
-        loss_s: From losing a device to an error.
+        paced: True if the robot's clock runs with wall time: stamps jitter, and a period may be late now and then.
+        track_m: Largest distance of P from its setpoint in a slow motion.
+        rest_force_N, rest_torque_Nm: Largest mean tared wrench at rest, up to 20 degrees from the orientation of the
+            tare (noise, drift, imperfect weight compensation).
+        weight_share: Relative error of the payload compensation.
+        aperture_m: Largest error of the reported aperture.
+        pads: True if the robot has tactile pads.
+        stop_s: Longest time from a hold until the arm brakes.
+        loss_s: Longest time from losing a device to an error.
     """
 
     sample_s: ClassVar[float] = 0.001
@@ -38,18 +38,18 @@ class Conformance:
     loss_s: ClassVar[float] = 1.0
     _shared: ClassVar[Rig | None] = None
 
-    # --- what a subclass says ---------------------------------------------------------------------------------------
+    # --- set by a subclass ------------------------------------------------------------------------------------------
 
     def make(self) -> Robot:
-        """A robot, ready, at its home posture with free space around; it is closed here."""
-        raise NotImplementedError("say how a robot is made")
+        """Return a robot at its home posture, ready and in free space. The suite closes it."""
+        raise NotImplementedError("implement `make`: open and return the robot")
 
     def wall(self) -> Wall | None:
-        """A wall whose place is known, in the world of `make`."""
+        """Return a wall at a known place in the world of `make`, or None."""
         return None
 
     def losses(self) -> Mapping[str, Callable[[Robot], None]]:
-        """Ways to lose a device or to give it a fault, by name."""
+        """Return functions that lose a device or give it a fault, by name."""
         return {}
 
     # --- robots -----------------------------------------------------------------------------------------------------
@@ -62,7 +62,7 @@ class Conformance:
             cls._shared = None
 
     def rig(self) -> Rig:
-        """The shared robot at home, at rest and tared; a new one if it has been broken."""
+        """Return the shared robot at home, at rest and tared; open a new one if it is broken."""
         cls = type(self)
         if cls._shared is not None:
             try:
@@ -81,7 +81,7 @@ class Conformance:
 
     @contextmanager
     def own(self) -> Iterator[Rig]:
-        """A robot of one's own, closed at the end. The shared one is closed first: there may be only one device."""
+        """Open a robot for one test and close it at the end. The shared robot is closed first."""
         self.teardown_class()
         robot = self.make()
         try:

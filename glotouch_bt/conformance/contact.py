@@ -1,4 +1,4 @@
-"""A wall whose place is known: what a guarded move relies on, and the hard limit below it."""
+"""Tests against a wall at a known place: a guarded move, and the hard limit below it."""
 
 from __future__ import annotations
 
@@ -11,71 +11,81 @@ from glotouch_bt.conformance.base import Conformance
 from glotouch_bt.conformance.rig import Rig, Wall, stack
 from glotouch_bt.robot import Array, Command, JointSetpoint, Observation, Pose, SafetyStop, Tare
 
-GUARD_N = 2.0
+TOUCH_FORCE_N = 2.0
+"""Force at which the guarded move has touched the wall."""
 SPEED_M_S = 0.02
-SEEN_FROM_M = 0.008
-BEYOND_M = 0.05
+"""Speed of the guarded move."""
+APPROACH_GAP_M = 0.008
+"""Gap to the wall at which the guarded move starts."""
+OVERTRAVEL_M = 0.05
+"""Distance beyond the wall that is commanded."""
 
 
 @dataclass(frozen=True)
-class Touch:
-    """What a guarded move ended with: the period that tripped it, and where the hand had been before."""
+class GuardedContact:
+    """End of a guarded move.
 
-    found: Observation
+    Attributes:
+        sensed: Block in which the guard tripped.
+        gap_m: Gap to the nominal wall in that block.
+        before_N: Largest force along the normal before it.
+    """
+
+    sensed: Observation
     gap_m: float
     before_N: float
 
 
 class ContactTests(Conformance):
-    """See the module's text."""
+    """Contact with a wall."""
 
     def _wall(self) -> Wall:
         wall = self.wall()
         if wall is None:
-            pytest.skip("no known wall is offered")
+            pytest.skip("`wall` gives no wall")
         return wall
 
     def _approach(self, rig: Rig, wall: Wall) -> None:
-        """Near the wall, at rest and tared."""
+        """Move near the wall, come to rest and tare."""
         rig.go(wall.start_B_P, 0.15)
         gap = wall.gap_m(rig.kinematics.fk(rig.q))
-        rig.shift(-wall.normal_B * (gap - SEEN_FROM_M), 0.1)
+        rig.shift(-wall.normal_B * (gap - APPROACH_GAP_M), 0.1)
         rig.rest(0.3)
         rig.ask(Tare())
 
     @staticmethod
     def _felt_B(o: Observation, wall: Wall, rig: Rig) -> Array:
-        """(n,) force along the wall's normal, N, at every sample."""
+        """Return the force (n,) along the wall's normal, N, at every sample."""
         E_P = rig.robot.description.gripper.pose_E_P
         turns = [(Pose(p, q) @ E_P.inverse()).rotation for p, q in zip(o.position_B_P, o.quat_B_P, strict=True)]
         return np.array([(r @ w[:3]) @ wall.normal_B for r, w in zip(turns, o.wrench_S, strict=True)])
 
-    def _until_touch(self, rig: Rig, wall: Wall) -> Touch:
-        """Press on until the guard trips; the arm is still moving then."""
+    def _until_touch(self, rig: Rig, wall: Wall) -> GuardedContact:
+        """Approach until the guard trips; the arm is still moving then."""
         before: list[float] = []
 
         def trips(o: Observation) -> bool:
             felt = self._felt_B(o, wall, rig)
-            if (np.linalg.norm(o.wrench_S[:, :3], axis=1) > GUARD_N).any():
+            if (np.linalg.norm(o.wrench_S[:, :3], axis=1) > TOUCH_FORCE_N).any():
                 return True
             before.append(float(np.abs(felt).max()))
             return False
 
         here = rig.kinematics.fk(rig.q)
-        goal = Pose(here.position_m - wall.normal_B * (SEEN_FROM_M + BEYOND_M), here.quat)
+        goal = Pose(here.position_m - wall.normal_B * (APPROACH_GAP_M + OVERTRAVEL_M), here.quat)
         rig.go(goal, SPEED_M_S, until=trips)
-        return Touch(rig.last, wall.gap_m(rig.last.pose_B_P), max(before[:-3], default=0.0))
+        return GuardedContact(rig.last, wall.gap_m(rig.last.pose_B_P), max(before[:-3], default=0.0))
 
     def test_a_guarded_move_stops_at_a_wall(self) -> None:
-        """Nothing is felt before the wall; at it a force out of the wall, in time; then the arm stands near it."""
+        """No force before the wall, a force out of the wall at it, in time; then the arm stands near it."""
         wall = self._wall()
         with self.own() as rig:
             self._approach(rig, wall)
             touch = self._until_touch(rig, wall)
-            assert touch.before_N < GUARD_N, "something was felt before the wall"
+            assert touch.before_N < TOUCH_FORCE_N, "something was felt before the wall"
             assert abs(touch.gap_m) < wall.tolerance_m + 0.002, f"felt {touch.gap_m * 1e3:.1f} mm before the wall"
-            felt = self._felt_B(touch.found, wall, rig)
-            assert felt.max() > 0.8 * GUARD_N, "the hand must feel the wall pushing it back"
+            felt = self._felt_B(touch.sensed, wall, rig)
+            assert felt.max() > 0.8 * TOUCH_FORCE_N, "the hand must feel the wall pushing it back"
             assert felt.max() > -felt.min()
             seen = rig.hold(0.3)
             deepest = min(wall.gap_m(Pose(p, q)) for o in seen for p, q in zip(o.position_B_P, o.quat_B_P, strict=True))
@@ -89,7 +99,7 @@ class ContactTests(Conformance):
             assert np.linalg.norm(rig.mean_wrench()[:3]) < self.rest_force_N + 0.3, "the force stayed after parting"
 
     def test_the_hard_limit_stops_the_arm(self) -> None:
-        """Whatever is commanded: SafetyStop once, and in every later cycle, and the arm stands; hold never raises."""
+        """SafetyStop in this and every later cycle, whatever is commanded; the arm stands; hold never raises."""
         wall = self._wall()
         with self.own() as rig:
             self._approach(rig, wall)

@@ -1,4 +1,4 @@
-"""The jaws and their pads."""
+"""Tests of the jaws and their pads."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ from glotouch_bt.conformance.rig import Rig
 from glotouch_bt.robot import Command, GripperTarget, Observation
 
 FRAMES_S = 1.0
+"""Duration for which depth maps are requested."""
 
 
 class HandTests(Conformance):
-    """See the module's text."""
+    """Jaws and pads."""
 
     def _drive(self, rig: Rig, aperture_m: float, speed_m_s: float, force_N: float) -> list[Observation]:
-        """Send a target and wait for what it must take, and some more."""
+        """Send a target; wait for the motion's duration and 0.5 s more."""
         way = abs(rig.last.gripper.aperture_m - aperture_m)
         first = rig.cycle(Command(gripper=GripperTarget(aperture_m, speed_m_s, force_N)))
         return [first, *rig.hold(way / speed_m_s + 0.5)]
 
-    def test_the_jaws_go_where_they_are_told(self) -> None:
-        """In metres, 0 closed; `moving` says when; a reading is never from the future and never old."""
+    def test_jaw_targets_are_reached(self) -> None:
+        """Apertures are in metres, 0 closed; `moving` is set in motion; a reading is neither early nor stale."""
         rig = self.rig()
         stroke = rig.robot.description.gripper.stroke_m
         for aperture in (0.8 * stroke, 0.3 * stroke, 0.6 * stroke):
@@ -40,7 +41,7 @@ class HandTests(Conformance):
                 age = o.now_s - o.gripper.stamp_s
                 assert -1e-6 <= age < rig.robot.limits.max_age_s, f"a reading that is {age:.3f} s old"
 
-    def test_the_jaws_keep_to_their_speed(self) -> None:
+    def test_jaw_speed_is_limited(self) -> None:
         """Opening by half the stroke at 40 mm/s takes as long as it must."""
         rig = self.rig()
         stroke = rig.robot.description.gripper.stroke_m
@@ -53,19 +54,19 @@ class HandTests(Conformance):
         speed = np.polyfit(stamps[between], way[between], 1)[0]
         assert 0.8 * 0.04 < speed < 1.1 * 0.04
 
-    def test_the_jaws_hold_the_arm_still(self) -> None:
-        """Moving them moves nothing else."""
+    def test_jaws_do_not_move_the_arm(self) -> None:
+        """The hand stays in place while the jaws move."""
         rig = self.rig()
         at = rig.last.position_B_P[-1].copy()
         self._drive(rig, 0.5 * rig.robot.description.gripper.stroke_m, 0.1, 10.0)
         assert np.linalg.norm(rig.last.position_B_P[-1] - at) < 1e-3
 
-    def test_depth_maps_come_when_asked_for(self) -> None:
-        """In metres, about 0 where nothing touches, in pairs of the described shape, in order, fresh; else never."""
+    def test_depth_maps_arrive_on_request(self) -> None:
+        """Depth maps arrive only on request: in pairs, in order, fresh, in metres, about 0 where nothing touches."""
         if not self.pads:
             pytest.skip("this robot has no pads")
         rig = self.rig()
-        assert all(o.tactile is None for o in rig.hold(0.3)), "nobody asked"
+        assert all(o.tactile is None for o in rig.hold(0.3)), "depth maps arrived without a request"
         frames = [(o.now_s, o.tactile) for o in rig.hold(FRAMES_S, tactile=True) if o.tactile is not None]
         assert len(frames) >= 5, f"{len(frames)} pairs in {FRAMES_S} s"
         shape = rig.robot.description.gripper.pad_shape

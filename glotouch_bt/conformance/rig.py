@@ -1,4 +1,4 @@
-"""Small motions and measurements the conformance suite is made of."""
+"""Motions and measurements that the tests share."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ import numpy as np
 from glotouch_bt.motion import Kinematics, Line, MotionPlan, plan_piece
 from glotouch_bt.robot import HOLD, Array, Command, JointSetpoint, Observation, Pose, Request, Robot
 
-WAIT_S = 10.0
+MAX_REQUEST_S = 10.0
+"""Longest wait for a request."""
 
 
 @dataclass(frozen=True)
 class Wall:
-    """A plane that the bare hand can be pressed against from free space.
+    """A plane that the bare hand can touch from free space.
 
     Attributes:
         point_B_m: (3,) any point of it.
-        normal_B: (3,) unit, into free space.
-        tip_P_m: (3,) the point of the hand that meets it, in P.
-        tolerance_m: How well all of this is known.
-        start_B_P: Where P begins the approach; free space lies between.
+        normal_B: (3,) unit normal into free space.
+        tip_P_m: (3,) point of the hand that touches it, in P.
+        tolerance_m: Uncertainty of the plane.
+        start_B_P: Pose of P at the start of the approach; free space lies between.
     """
 
     point_B_m: Array
@@ -32,12 +33,12 @@ class Wall:
     start_B_P: Pose
 
     def gap_m(self, pose_B_P: Pose) -> float:
-        """From the hand's point to the plane; negative behind it."""
+        """Return the distance from the hand's point to the plane; negative behind it."""
         return float((pose_B_P.apply(self.tip_P_m) - self.point_B_m) @ self.normal_B)
 
 
 class Rig:
-    """A robot with everything that was commanded and sensed.
+    """A robot with its last setpoint and everything it sensed.
 
     Args:
         robot: At rest.
@@ -64,17 +65,17 @@ class Rig:
         return self.robot.period_s
 
     def cycle(self, command: Command = HOLD) -> Observation:
-        """One control period."""
+        """Run one control period."""
         self.seen.append(self.robot.cycle(command))
         return self.last
 
     def hold(self, duration_s: float, *, tactile: bool = False) -> list[Observation]:
-        """Command nothing for a while; what was sensed."""
+        """Run periods without a motion; return their blocks."""
         command = Command(tactile=tactile)
         return [self.cycle(command) for _ in range(max(1, round(duration_s / self.period_s)))]
 
     def plan(self, goal_B_P: Pose, speed_m_s: float) -> MotionPlan | None:
-        """Setpoints from where the arm was told to be to a pose; None if it is there."""
+        """Plan a straight line from the last setpoint to a pose; None if it is there."""
         limits = self.robot.limits
         piece = Line(self.kinematics.fk(self.q), goal_B_P)
         if piece.length_m < 1e-5:
@@ -92,7 +93,7 @@ class Rig:
         )
 
     def send(self, setpoint: JointSetpoint) -> Observation:
-        """One setpoint."""
+        """Send one setpoint."""
         observation = self.cycle(Command(motion=setpoint))
         self.q, self.dq = np.array(setpoint.q), np.array(setpoint.dq)
         return observation
@@ -100,7 +101,7 @@ class Rig:
     def go(
         self, goal_B_P: Pose, speed_m_s: float = 0.1, until: Callable[[Observation], bool] | None = None
     ) -> list[tuple[JointSetpoint, Observation]]:
-        """Straight to a pose of P in B; broken off at speed, without braking, once `until` says so."""
+        """Move P straight to a pose in B; stop sending at full speed when `until` returns True."""
         plan = self.plan(goal_B_P, speed_m_s)
         track = []
         for k in range(0 if plan is None else len(plan)):
@@ -112,24 +113,24 @@ class Rig:
         return track
 
     def shift(self, displacement_B_m: Array, speed_m_s: float = 0.1) -> list[tuple[JointSetpoint, Observation]]:
-        """Straight by a displacement (3,) in B."""
+        """Move P straight by a displacement (3,) in B."""
         here = self.kinematics.fk(self.q)
         return self.go(Pose(here.position_m + displacement_B_m, here.quat), speed_m_s)
 
     def tilt(self, angle_rad: float) -> Pose:
-        """Where P is commanded to be, turned by an angle about its own x axis."""
+        """Return the last commanded pose of P, turned by an angle about its own x axis."""
         half = 0.5 * angle_rad
         turn = Pose(np.zeros(3), np.array([np.cos(half), np.sin(half), 0.0, 0.0]))
         return self.kinematics.fk(self.q) @ turn
 
     def rest(self, duration_s: float = 0.5) -> Observation:
-        """Hold until the arm stands; its place is the next motion's start."""
+        """Hold for a while; the next motion starts from the measured joints."""
         self.hold(duration_s)
         self.q, self.dq = np.array(self.last.q[-1]), np.zeros_like(self.q)
         return self.last
 
-    def ask(self, request: Request, wait_s: float = WAIT_S) -> int:
-        """Start a request and cycle until it is done; how many periods that took."""
+    def ask(self, request: Request, wait_s: float = MAX_REQUEST_S) -> int:
+        """Start a request, cycle until it is done, and return the number of periods."""
         before = self.robot.observe().now_s
         ticket = self.robot.start(request)
         assert self.robot.observe().now_s == before, "starting a request may not block"
@@ -142,10 +143,10 @@ class Rig:
         raise AssertionError(f"{request} was not done after {wait_s} s")
 
     def mean_wrench(self, duration_s: float = 0.3) -> Array:
-        """(6,) mean of the wrench at rest."""
+        """Return the mean wrench (6,) at rest."""
         return np.asarray(np.concatenate([o.wrench_S for o in self.hold(duration_s)]).mean(axis=0))
 
 
 def stack(observations: list[Observation], name: str) -> Array:
-    """One field of all blocks, one below the other."""
+    """Concatenate one field of all blocks."""
     return np.concatenate([np.asarray(getattr(o, name), dtype=np.float64) for o in observations])

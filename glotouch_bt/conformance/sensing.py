@@ -1,4 +1,4 @@
-"""Units, frames, signs and time of what is sensed."""
+"""Tests of the units, frames, signs and times of readings."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ GRAVITY_M_S2 = 9.81
 
 
 class SensingTests(Conformance):
-    """See the module's text."""
+    """Readings and setpoints."""
 
     def test_joints_and_pose_agree(self) -> None:
-        """q in rad through the description's kinematics is the reported pose of P in B, in m, at every sample."""
+        """q in rad, through the description's kinematics, gives the reported pose of P in B at every sample."""
         rig = self.rig()
         rig.shift(np.array([0.0, 0.06, 0.03]))
         rig.go(rig.tilt(0.3))
@@ -28,7 +28,7 @@ class SensingTests(Conformance):
                 assert abs(float(expected.quat @ quat)) > np.cos(0.01), "the hand is not turned as q turns it"
                 assert abs(float(np.linalg.norm(quat)) - 1.0) < 1e-6
 
-    def test_velocities_are_those_of_the_positions(self) -> None:
+    def test_velocities_match_positions(self) -> None:
         """dq in rad/s is the rate of q."""
         rig = self.rig()
         seen = [o for _, o in rig.shift(np.array([0.0, 0.10, 0.0]))]
@@ -40,8 +40,8 @@ class SensingTests(Conformance):
         assert np.abs(rate - mean).max() < 0.1 * np.abs(rate).max()
 
     @pytest.mark.parametrize("axis", [0, 1, 2])
-    def test_it_goes_where_it_is_told(self, axis: int) -> None:
-        """Setpoints move P along the axes of B, by metres; each is reached at the end of its period."""
+    def test_setpoints_are_reached(self, axis: int) -> None:
+        """Setpoints move P along the axes of B; each is reached at the end of its period."""
         rig = self.rig()
         start = rig.last.position_B_P[-1].copy()
         wish = np.zeros(3)
@@ -53,7 +53,7 @@ class SensingTests(Conformance):
         assert np.linalg.norm(end - start - wish) < 0.5 * self.track_m + 1e-4
 
     def test_blocks_are_complete_and_in_order(self) -> None:
-        """Samples of all periods follow each other without a gap or a repetition, also in motion."""
+        """Consecutive periods have no gap and no repeated sample, also in motion."""
         rig = self.rig()
         before = rig.last
         seen = [o for _, o in rig.shift(np.array([0.0, 0.08, 0.0]))] + rig.hold(0.5, tactile=True)
@@ -72,7 +72,7 @@ class SensingTests(Conformance):
             assert len({len(o.stamp_s), len(o.q), len(o.dq), len(o.position_B_P), len(o.wrench_S)}) == 1
 
     def test_a_cycle_lasts_a_period(self) -> None:
-        """On the robot's clock, whether it is commanded or not."""
+        """One cycle takes one period on the robot's clock, with and without a command."""
         rig = self.rig()
         stamps = [rig.last.now_s, *(o.now_s for o in rig.hold(0.5)), *(o.now_s for _, o in rig.shift(np.full(3, 0.02)))]
         lasted = np.diff(stamps)
@@ -83,7 +83,7 @@ class SensingTests(Conformance):
             assert np.abs(lasted - rig.period_s).max() < 1e-6
 
     def test_tare(self) -> None:
-        """It takes its time, the arm stands meanwhile, and afterwards the wrench is zero, also with the hand tilted."""
+        """A tare takes time, the arm stands meanwhile, and afterwards the wrench is zero, also with the hand tilted."""
         rig = self.rig()
         start = rig.last.position_B_P[-1].copy()
         periods = rig.ask(Tare(0.2))
@@ -101,8 +101,8 @@ class SensingTests(Conformance):
         assert np.linalg.norm(mean[:3]) < self.rest_force_N, f"{when}: {mean[:3]} N"
         assert np.linalg.norm(mean[3:]) < self.rest_torque_Nm, f"{when}: {mean[3:]} Nm"
 
-    def test_a_tare_of_no_time_is_refused(self) -> None:
-        """As is a payload of negative mass."""
+    def test_invalid_requests_are_refused(self) -> None:
+        """A tare without a positive duration and a payload of negative mass raise ParamError."""
         rig = self.rig()
         for bad in (0.0, -1.0, float("nan")):
             with pytest.raises(ParamError):
@@ -112,9 +112,9 @@ class SensingTests(Conformance):
 
     @pytest.mark.parametrize("angle_rad", [0.0, 0.3])
     def test_sign_and_frame_of_the_wrench(self, angle_rad: float) -> None:
-        """A payload that is not there is a force upwards: its weight is taken out of the wrench, so m g up is added.
+        """A payload that is set but not held shows as an upward force m g, because its weight is subtracted.
 
-        In S at S's origin; with its centre of mass beside the axis it is also a torque, c x F.
+        The wrench is in S about S's origin; a centre of mass beside the axis also gives the torque c x F.
         """
         mass, com_P = 0.3, np.array([0.03, 0.02, 0.0])
         rig = self.rig()
@@ -133,8 +133,8 @@ class SensingTests(Conformance):
         force = weight * up_S
         torque = np.cross(rig.robot.description.gripper.pose_E_P.apply(com_P), force)
         assert np.linalg.norm(change[:3] - force) < self.weight_share * weight + 0.1, f"{change[:3]}, not {force} N"
-        room = self.weight_share * weight * 0.25 + 0.02
-        assert np.linalg.norm(change[3:] - torque) < room, f"{change[3:]}, not {torque} Nm"
+        tolerance = self.weight_share * weight * 0.25 + 0.02
+        assert np.linalg.norm(change[3:] - torque) < tolerance, f"{change[3:]}, not {torque} Nm"
 
     @staticmethod
     def _up_in_S(rig: Rig) -> Array:

@@ -1,4 +1,4 @@
-"""Opening and closing, limits that are refused, and coming to rest."""
+"""Tests of opening, closing, refused commands and stopping."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from glotouch_bt.robot import HOLD, BackendError, Command, GripperTarget, JointS
 
 
 class StoppingTests(Conformance):
-    """See the module's text."""
+    """Opening, refusals and stopping."""
 
-    def test_it_opens_at_rest_with_a_valid_observation(self) -> None:
-        """`observe` is valid at once, lets no time pass, and nothing moves without a command."""
+    def test_first_observation_is_valid_and_at_rest(self) -> None:
+        """`observe` is valid at once and lets no time pass; the arm does not move without a command."""
         with self.own() as rig:
             first, dof = rig.robot.observe(), rig.robot.description.dof
             n = len(first.stamp_s)
@@ -32,8 +32,8 @@ class StoppingTests(Conformance):
             drift = stack(seen, "position_B_P") - first.position_B_P[-1]
             assert np.abs(drift).max() < 1e-3, "it moves without a command"
 
-    def test_it_can_be_opened_again(self) -> None:
-        """Closing is idempotent, a closed robot takes no cycle, hold and close never raise, and another one opens."""
+    def test_closing_is_idempotent_and_another_robot_opens(self) -> None:
+        """A closed robot accepts no cycle; hold and close never raise."""
         with self.own() as rig:
             rig.hold(0.05)
             rig.robot.close()
@@ -60,7 +60,7 @@ class StoppingTests(Conformance):
         yield "degrees", replace(good, q=np.degrees(q))
 
     def test_setpoints_beyond_the_limits_are_refused(self) -> None:
-        """With a ParamError; nothing is sent, the arm holds, and the next good command is taken."""
+        """ParamError; nothing is sent, the arm holds, and the next valid command is accepted."""
         rig = self.rig()
         start = rig.last.position_B_P[-1].copy()
         for what, setpoint in self._broken_setpoints(rig):
@@ -69,7 +69,7 @@ class StoppingTests(Conformance):
             except ParamError:
                 pass
             else:
-                raise AssertionError(f"{what} was taken")
+                raise AssertionError(f"{what} was accepted")
             rig.hold(0.05)
             assert np.linalg.norm(rig.last.position_B_P[-1] - start) < 1e-3, f"{what} moved it"
         rig.rest(0.1)
@@ -77,7 +77,7 @@ class StoppingTests(Conformance):
         assert rig.rest(0.2).position_B_P[-1][2] - start[2] > 0.015
 
     def test_jaw_targets_beyond_the_limits_are_refused(self) -> None:
-        """With a ParamError."""
+        """ParamError; the next valid command is accepted."""
         rig, hand = self.rig(), self.rig().robot.description.gripper
         good = GripperTarget(0.5 * hand.stroke_m, 0.5 * hand.speed_m_s, 0.5 * hand.force_N)
         for bad in (
@@ -93,7 +93,7 @@ class StoppingTests(Conformance):
             rig.hold(0.03)
 
     def _moving(self, rig: Rig, speed_m_s: float = 0.1) -> Pose:
-        """Get it moving; where it was told to be last."""
+        """Bring the arm into motion; return its measured pose."""
         here = rig.kinematics.fk(rig.q)
 
         def far(o: Observation) -> bool:
@@ -103,7 +103,7 @@ class StoppingTests(Conformance):
         return rig.last.pose_B_P
 
     def _stops(self, rig: Rig, at: Pose, speed_m_s: float = 0.1) -> None:
-        """It stands within v / a and v^2 / 2a, with room for the latency, and stays."""
+        """Check that the arm stops within v / a and v^2 / 2a plus the latency, and stays."""
         braking_s = speed_m_s / rig.robot.limits.stop_acceleration_m_s2
         seen = rig.hold(braking_s + self.stop_s + 0.2)
         stamps, track = stack(seen, "stamp_s"), stack(seen, "position_B_P")
@@ -118,21 +118,21 @@ class StoppingTests(Conformance):
         assert np.linalg.norm(after - track[-1], axis=1).max() < 5e-4, "it does not stay"
         rig.rest(rig.period_s)
 
-    def test_it_stops_when_nothing_is_commanded(self) -> None:
+    def test_stops_without_a_motion_command(self) -> None:
         """A cycle without a motion brakes to rest."""
         rig = self.rig()
         self._stops(rig, self._moving(rig))
 
-    def test_it_stops_on_hold(self) -> None:
-        """`hold` may be called at any time, any number of times."""
+    def test_stops_on_hold(self) -> None:
+        """`hold` may be called several times."""
         rig = self.rig()
         at = self._moving(rig)
         rig.robot.hold()
         rig.robot.hold()
         self._stops(rig, at)
 
-    def test_it_holds_when_a_command_is_refused(self) -> None:
-        """In the middle of a motion."""
+    def test_holds_after_a_refused_command(self) -> None:
+        """A command refused in motion brakes the arm."""
         rig = self.rig()
         at = self._moving(rig)
         bad = JointSetpoint(rig.q * np.nan, rig.dq, np.zeros_like(rig.q), rig.kinematics.fk(rig.q))
@@ -141,7 +141,7 @@ class StoppingTests(Conformance):
         self._stops(rig, at)
 
     def test_leaving_by_an_exception_holds_and_closes(self) -> None:
-        """As a context manager."""
+        """Leaving the context manager by an exception holds and closes the robot."""
         with self.own() as rig, suppress(ZeroDivisionError), rig.robot:
             self._moving(rig)
             raise ZeroDivisionError

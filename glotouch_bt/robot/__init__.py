@@ -1,7 +1,7 @@
-"""The seam between missions and machines. Imports nothing else of this project.
+"""The interface between missions and robots. Imports nothing else of this project.
 
-`Robot.cycle(command) -> observation` is the whole contract; see `interface`. Values here are frozen and carry units and
-frames in their names; see `observation` for the frames.
+`Robot.cycle(command) -> observation` is the contract; see `interface`. Values are frozen and carry units and frames in
+their names; see `observation` for the frames.
 """
 
 from glotouch_bt.robot.command import HOLD, Command, GripperTarget, JointSetpoint, Request, SetPayload, Tare, Ticket

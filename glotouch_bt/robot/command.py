@@ -1,4 +1,4 @@
-"""What a robot is told for one control period, and the slow requests that are started and polled."""
+"""Commands for one control period, and slow requests that are started and polled."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from glotouch_bt.robot.geometry import Array, Pose, frozen_array
 
 @dataclass(frozen=True, slots=True)
 class JointSetpoint:
-    """Where the joints shall be at the END of the coming control period.
+    """Joint state to reach at the END of the next control period.
 
     The backend interpolates from the previous setpoint (cubic Hermite, so position and velocity are continuous).
 
@@ -18,7 +18,7 @@ class JointSetpoint:
         q: (dof,) rad.
         dq: (dof,) rad/s.
         ddq: (dof,) rad/s2, feed-forward.
-        pose_B_P: The pose of the pads' mid-point that `q` realises; Cartesian devices are sent this.
+        pose_B_P: Pose of P that `q` realises; sent to Cartesian devices.
     """
 
     q: Array
@@ -49,7 +49,7 @@ class Command:
     Attributes:
         motion: A joint setpoint, or None to hold the last setpoint at rest.
         gripper: A new gripper target, or None to keep the last one.
-        tactile: Ask for depth maps (they cost time to make; ask only while squeezing).
+        tactile: Request depth maps; they cost computing time, so request them only while squeezing.
     """
 
     motion: JointSetpoint | None = None
@@ -69,7 +69,7 @@ class Tare:
 
 @dataclass(frozen=True)
 class SetPayload:
-    """Tell the controller what the hand carries, so that it compensates its weight.
+    """Tell the controller the payload in the hand, so that it compensates its weight.
 
     Attributes:
         mass_kg: Mass beyond the gripper itself.
@@ -87,14 +87,14 @@ Request = Tare | SetPayload
 
 
 class Ticket(Protocol):
-    """A slow request under way. Poll it between cycles; time passes only in `Robot.cycle`."""
+    """State of a slow request. Poll it between cycles; time passes only in `Robot.cycle`."""
 
     @property
     def done(self) -> bool:
-        """True once the request has finished (well or badly)."""
+        """True once the request has succeeded or failed."""
         ...
 
     @property
     def error(self) -> str | None:
-        """Why it failed, or None."""
+        """Reason of the failure, or None."""
         ...

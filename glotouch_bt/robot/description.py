@@ -1,6 +1,6 @@
 """The robot as numbers: kinematics, inertia, limits, collision capsules and the gripper. No backend, no solver.
 
-Both a simulator and a planner are built from one description, so that they cannot disagree.
+Simulator and planner are built from the same description.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ Vec3 = tuple[float, float, float]
 
 @dataclass(frozen=True, kw_only=True)
 class Capsule:
-    """A collision capsule in its link's frame: segment `start_m`..`end_m` swept by a ball of `radius_m`."""
+    """A collision capsule in its link's frame: the segment `start_m`..`end_m` swept by a ball of `radius_m`."""
 
     start_m: Vec3
     end_m: Vec3
@@ -53,7 +53,7 @@ class Joint:
         velocity_rad_s: Velocity limit.
         torque_Nm: Torque limit.
         armature_kgm2: Reflected rotor inertia.
-        link: What it carries; the link frame is the joint frame.
+        link: The link it moves; the link frame is the joint frame.
     """
 
     name: str
@@ -108,7 +108,7 @@ class Gripper:
 
     @property
     def fingertip_below_P_m(self) -> float:
-        """How far the fingers reach beyond P along z_P."""
+        """Distance from P to the fingertips along z_P."""
         return self.finger.centre_m[2] + self.finger.half_m[2]
 
 
@@ -117,13 +117,13 @@ class RobotDescription:
     """One arm with one gripper.
 
     Attributes:
-        name: Model name, for people.
+        name: Model name.
         base: The fixed base link, in B.
         joints: The chain from B to the last link.
         pose_last_E: Flange frame in the last joint's frame.
-        home_q: A posture well inside the limits with the hand pointing down; also the posture task's target.
+        home_q: Posture well inside the limits with the hand pointing down; also the target of the posture task.
         gripper: The hand.
-        source: Where the numbers come from.
+        source: Origin of the numbers.
     """
 
     name: str

@@ -1,15 +1,15 @@
-"""Every error this project raises has one root, carries data, and says what was expected.
+"""All errors of the project. They have one root, carry data, and say what is valid.
 
 GlotouchError
 +-- BadInput            the user's file, option or mesh is wrong; nothing moved     (exit 2)
 |   +-- ParamError      one named value breaks one stated rule
-|   +-- UnknownName     a name nobody registered; lists the valid ones
+|   +-- UnknownName     a name that is not registered; lists the valid ones
 +-- MissionFailed       the mission ran and did not reach its goal                  (exit 1)
-+-- MotionRefused       a plan that would collide or leave the joint limits; not tried
++-- MotionRefused       a motion would collide or leave the joint limits; not started
 +-- BackendError        the device or simulator failed; cause chained               (exit 3)
     +-- SafetyStop      a hard limit tripped below the skills; the arm is held
     +-- StaleReading    a sensor stopped delivering
-    +-- GuardTripped    supervision below the tree found something wrong; the arm is held
+    +-- GuardTripped    a guard below the tree tripped; the arm is held
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class GlotouchError(Exception):
 
 
 class BadInput(GlotouchError):
-    """The user's input cannot be used. The message names the file and the place."""
+    """The user's input is not usable. The message names the file and the place."""
 
 
 class ParamError(BadInput):
@@ -31,7 +31,7 @@ class ParamError(BadInput):
 
     Args:
         name: Dotted name of the value, e.g. ``$.container.interior_m``.
-        value: What was given.
+        value: The given value.
         rule: What is valid, in words.
     """
 
@@ -41,11 +41,11 @@ class ParamError(BadInput):
 
 
 class UnknownName(BadInput):
-    """A name that nobody registered; the message lists the valid ones and the nearest.
+    """A name that is not registered; the message lists the valid ones and the nearest.
 
     Args:
-        kind: What is named (``skill``, ``backend``, ``world`` ...).
-        name: What was given.
+        kind: Kind of name (``skill``, ``backend``, ``world`` ...).
+        name: The given name.
         valid: The names that exist.
     """
 
@@ -57,7 +57,7 @@ class UnknownName(BadInput):
 
 
 class MissionFailed(GlotouchError):
-    """The mission ended without reaching its goal; carries the reason chain, root cause last."""
+    """The mission ended without reaching its goal; `reasons` is the chain, root cause last."""
 
     def __init__(self, reasons: Iterable[str]) -> None:
         self.reasons = list(reasons)
@@ -65,10 +65,10 @@ class MissionFailed(GlotouchError):
 
 
 class MotionRefused(GlotouchError):
-    """A motion was not started because it cannot be made safely.
+    """A motion was not started because it is not safe.
 
     Args:
-        what: The motion that was asked for.
+        what: The requested motion.
         why: The colliding pair, the joint limit, or the unreachable pose, with numbers.
     """
 
@@ -82,10 +82,10 @@ class BackendError(GlotouchError):
 
 
 class SafetyStop(BackendError):
-    """A hard limit tripped below the skill layer; the arm has been stopped and is held.
+    """A hard limit tripped below the skills; the arm is stopped and held.
 
     Args:
-        quantity: What was measured, with its unit in the name (``force_N``).
+        quantity: The measured quantity, with its unit in the name (``force_N``).
         value: The measured value.
         limit: The limit it passed.
         stamp_s: Robot clock at the offending sample.
@@ -97,20 +97,20 @@ class SafetyStop(BackendError):
 
 
 class StaleReading(BackendError):
-    """A reading is older than its declared age limit."""
+    """A reading is older than allowed."""
 
     def __init__(self, what: str, age_s: float, max_age_s: float) -> None:
-        super().__init__(f"{what} is {age_s:.3f} s old; at most {max_age_s:.3f} s is allowed")
+        super().__init__(f"{what} is {age_s:.3f} s old; at most {max_age_s:.3f} s are allowed")
         self.what, self.age_s, self.max_age_s = what, age_s, max_age_s
 
 
 class GuardTripped(BackendError):
-    """Supervision below the tree found something wrong and holds the arm.
+    """A guard below the tree tripped and holds the arm.
 
     Args:
-        guard: Which guard: one of `supervision_limits.GUARDS`.
-        what: What was wrong, one clause, units and the valid range in it.
-        value: What was found.
+        guard: A key of `supervision.limits.GUARDS`.
+        what: One clause with units and the valid range.
+        value: The offending value.
         limit: What it passed.
         stamp_s: Robot clock at the offending sample.
     """

@@ -1,7 +1,7 @@
-"""A robot without physics, for tests that must be fast: it is exactly where it was told to be.
+"""A robot without physics, for fast tests: it is exactly where it was commanded to be.
 
-Between two setpoints every quantity moves linearly over the samples of the period. What it touches is a few elastic
-walls (or a function the test gives), what it grips is a rigid width, its gels are flat. No randomness, no sleeping.
+Every quantity moves linearly from one setpoint to the next. The tip touches elastic walls (or feels a function that the
+test gives), the jaws grip a rigid width, and the gels are flat. No randomness, no sleeping.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ FAKE_ARM = _fake_arm()
 
 
 def forward(description: RobotDescription, q: npt.ArrayLike) -> Pose:
-    """Pose of P in B at `q` (dof,) rad, by chaining the description's frames one after the other."""
+    """Return the pose of P in B at `q` (dof,) rad by chaining the description's frames."""
     pose = Pose(np.zeros(3))
     for joint, angle in zip(description.joints, np.asarray(q, dtype=np.float64), strict=True):
         roll, pitch, yaw = joint.origin_rpy_rad
@@ -98,14 +98,14 @@ def forward(description: RobotDescription, q: npt.ArrayLike) -> Pose:
 
 
 def _about(axis: tuple[float, float, float], angle: float) -> Array:
-    """Rotation matrix (3, 3) about a unit axis (Rodrigues)."""
+    """Return the rotation matrix (3, 3) about a unit axis (Rodrigues)."""
     x, y, z = axis
     k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k), dtype=np.float64)
 
 
 def _turned(quat: Array, vector: Array) -> Array:
-    """Vectors (n, 3) turned by unit quaternions (n, 4): v + 2 u x (w v + u x v)."""
+    """Rotate vectors (n, 3) by unit quaternions (n, 4): v + 2 u x (w v + u x v)."""
     w, u = quat[:, :1], quat[:, 1:]
     return np.asarray(vector + 2.0 * np.cross(u, w * vector + np.cross(u, vector)), dtype=np.float64)
 
@@ -133,14 +133,14 @@ class SpringWall:
         object.__setattr__(self, "normal_B", frozen_array("wall.normal_B", normal / length, (3,)))
 
     def force_B_N(self, ball_B_m: Array, radius_m: float) -> Array:
-        """(n, 3) force on a ball of `radius_m` at centres `ball_B_m` (n, 3): stiffness times depth along the normal."""
+        """Return the force (n, 3) on a ball of `radius_m` with centres `ball_B_m` (n, 3): stiffness times depth."""
         depth = np.maximum(radius_m - (ball_B_m - self.point_B_m) @ self.normal_B, 0.0)
         return np.asarray(self.stiffness_N_m * depth[:, None] * self.normal_B, dtype=np.float64)
 
 
 @dataclass
 class FakeTicket:
-    """A request that is done after a number of cycles."""
+    """A request that ends after a number of cycles."""
 
     cycles_left: int
     error: str | None = None
@@ -152,24 +152,24 @@ class FakeTicket:
 
 
 class FakeRobot(Robot):
-    """See the module's text.
+    """A robot that follows every setpoint exactly.
 
     Args:
         description: The arm.
-        limits: Hard limits it enforces.
+        limits: Hard limits to enforce.
         period_s: Control period.
         samples: Samples per period.
-        walls: What the tip touches.
+        walls: Walls that the tip can touch.
         tip_P_m: (3,) centre of the ball that touches them, in P.
-        tip_radius_m: Its radius.
-        wrench: Instead of walls: (stamps (n,), positions (n, 3), quaternions (n, 4) of P in B) -> (n, 6) in S.
-        grip_width_m: Width of a rigid thing between the jaws, or None.
-        frame_rate_Hz: How often flat depth maps arrive while they are asked for.
+        tip_radius_m: Radius of the ball.
+        wrench: Used instead of walls: (stamps (n,), positions (n, 3), quaternions (n, 4) of P in B) -> (n, 6) in S.
+        grip_width_m: Width of a rigid object between the jaws, or None.
+        frame_rate_Hz: Rate of the flat depth maps while they are requested.
 
     Attributes:
         cycles: Control periods so far.
         peak_force_N: Largest norm of the untared contact force so far.
-        commands: Every command taken.
+        commands: Every accepted command.
     """
 
     def __init__(
@@ -209,11 +209,11 @@ class FakeRobot(Robot):
         self._newest = self._block(-period_s, self._q, self._pose, self._grip(), None)
 
     def observe(self) -> Observation:
-        """The newest block."""
+        """See `Robot`."""
         return self._newest
 
     def cycle(self, command: Command) -> Observation:
-        """One control period; errors as in `Robot.cycle`."""
+        """See `Robot`."""
         if self._stop is not None:
             raise SafetyStop(self._stop.quantity, self._stop.value, self._stop.limit, self._stop.stamp_s)
         q, pose = self._q, self._pose
@@ -234,7 +234,7 @@ class FakeRobot(Robot):
         return self._newest
 
     def start(self, request: Request) -> FakeTicket:
-        """Tare takes its duration, a payload one cycle."""
+        """Start a tare, which takes its duration, or a payload, which takes no time."""
         if isinstance(request, SetPayload):
             ticket = FakeTicket(0)
         else:
@@ -244,10 +244,10 @@ class FakeRobot(Robot):
         return ticket
 
     def hold(self) -> None:
-        """It holds by itself."""
+        """See `Robot`; the arm rests whenever no motion is commanded."""
 
     def close(self) -> None:
-        """Nothing to release."""
+        """See `Robot`; there is nothing to release."""
 
     def _check(self, q: Array) -> None:
         if q.shape != self._lower.shape or not np.isfinite(q).all():
@@ -259,7 +259,7 @@ class FakeRobot(Robot):
             raise ParamError(f"command.motion.q[{joint.name}]", float(q[out[0]]), valid)
 
     def _grip(self) -> GripperState:
-        """Let the jaws move for one period and report them."""
+        """Move the jaws for one period and return their report."""
         step = self._target.speed_m_s * self.period_s
         goal, now = self._target.aperture_m, self._aperture
         stop = 0.0 if self.grip_width_m is None or self.grip_width_m > now + 1e-12 else self.grip_width_m
@@ -295,7 +295,7 @@ class FakeRobot(Robot):
         return Observation(stamp, joints, speed, position, quat, raw - self._bias, state, frame)
 
     def _felt(self, stamp: Array, position: Array, quat: Array) -> Array:
-        """(n, 6) wrench of the walls on the tip, in S at S's origin."""
+        """Return the wrench (n, 6) of the walls on the tip, in S about S's origin."""
         out = np.zeros((len(stamp), 6))
         if not self.walls:
             return out
@@ -331,16 +331,16 @@ class FakeRobot(Robot):
 
 
 class FakeBackend(Backend):
-    """Entry point `fake`: an empty world and an arm that is always where it should be. Conditions have no effect."""
+    """Entry point `fake`: an empty world and an arm that follows exactly. Conditions have no effect."""
 
     name = "fake"
     summary = "no physics: follows every setpoint exactly and touches nothing (for trying missions and for tests)"
 
     def open(self, world: World, conditions: Conditions, seed: int, options: Mapping[str, object]) -> FakeRobot:
-        """A new robot at home.
+        """Return a new robot at home.
 
         Raises:
-            BadInput: Any option: it has none.
+            BadInput: An option was given; it has none.
         """
         if options:
             raise BadInput(f"the fake backend has no options (given: {', '.join(sorted(options))})")

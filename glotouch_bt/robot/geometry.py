@@ -30,8 +30,8 @@ def frozen_array(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> Arr
 
 
 def quat_to_matrix(q: Array) -> Array:
-    """Rotation matrix (3, 3) of a unit quaternion (4,) w x y z."""
-    w, x, y, z = q.tolist()  # the same doubles, but Python's own arithmetic on single numbers is five times faster
+    """Return the rotation matrix (3, 3) of a unit quaternion (4,) w x y z."""
+    w, x, y, z = q.tolist()  # Python floats: single numbers are five times faster than in numpy
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -42,7 +42,7 @@ def quat_to_matrix(q: Array) -> Array:
 
 
 def matrix_to_quat(m: Array) -> Array:
-    """Unit quaternion (4,) w x y z, w >= 0, of a rotation matrix (3, 3) (Shepperd's method)."""
+    """Return the unit quaternion (4,) w x y z, w >= 0, of a rotation matrix (3, 3) (Shepperd's method)."""
     r = m.tolist()
     trace = r[0][0] + r[1][1] + r[2][2]
     t = (trace, r[0][0], r[1][1], r[2][2])
@@ -89,18 +89,18 @@ class Pose:
 
     @classmethod
     def from_matrix(cls, position_m: npt.ArrayLike, rotation: Array) -> Pose:
-        """Pose from an origin (3,) and a rotation matrix (3, 3)."""
+        """Return the pose with an origin (3,) and a rotation matrix (3, 3)."""
         return cls(np.asarray(position_m, dtype=np.float64), matrix_to_quat(rotation))
 
     @classmethod
     def planar(cls, position_m: npt.ArrayLike, yaw_rad: float) -> Pose:
-        """Upright frame (z up) turned by `yaw_rad` about z."""
+        """Return an upright frame (z up) turned by `yaw_rad` about z."""
         h = 0.5 * yaw_rad
         return cls(np.asarray(position_m, dtype=np.float64), np.array([np.cos(h), 0.0, 0.0, np.sin(h)]))
 
     @classmethod
     def pointing_down(cls, position_m: npt.ArrayLike, yaw_rad: float) -> Pose:
-        """Tool frame with z down and its x axis at `yaw_rad` from the reference frame's x."""
+        """Return a tool frame with z down and its x axis at `yaw_rad` from the reference frame's x."""
         c, s = np.cos(yaw_rad), np.sin(yaw_rad)
         r = np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, -1.0]])
         return cls.from_matrix(position_m, r)
@@ -116,10 +116,10 @@ class Pose:
         return Pose.from_matrix(self.position_m + self.rotation @ other.position_m, self.rotation @ other.rotation)
 
     def inverse(self) -> Pose:
-        """pose_B_A of pose_A_B."""
+        """Return pose_B_A of pose_A_B."""
         rt = self.rotation.T
         return Pose.from_matrix(-rt @ self.position_m, rt)
 
     def apply(self, points: npt.ArrayLike) -> Array:
-        """Points (..., 3) of this frame, written in the reference frame."""
+        """Return points (..., 3) of this frame in the reference frame."""
         return np.asarray(points, dtype=np.float64) @ self.rotation.T + self.position_m

@@ -1,4 +1,4 @@
-"""The seam: one robot, one synchronous call a control period, in simulation and on hardware alike."""
+"""The interface of every robot and backend: one synchronous call a control period, in simulation and on hardware."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from glotouch_bt.robot.scene import Conditions, World
 from glotouch_bt.robot.simulation import Disturber, Referee
 
 Snapshot = Mapping[str, object]
-"""Plain values, arrays, tuples, mappings, random generators and dataclasses, as `mission.values` can keep."""
+"""Plain values, arrays, tuples, mappings, random generators and dataclasses, as a checkpoint can encode them."""
 
 
 class Robot(ABC):
-    """An arm with a wrist force sensor and a tactile gripper. As a context manager it holds the arm on leaving.
+    """An arm with a wrist force sensor and a tactile gripper. As a context manager it holds the arm on exit.
 
     Attributes:
         description: Kinematics, inertia, limits, gripper.
-        limits: The frozen limits the backend enforces below the skills.
-        period_s: Control period; each `cycle` lets exactly this much time pass on the robot's clock.
-        paced: The robot's clock is the wall's: it goes on whether or not `cycle` is called.
+        limits: Limits that the backend enforces below the skills.
+        period_s: Control period; each `cycle` lets this much time pass on the robot's clock.
+        paced: True if the robot's clock runs with wall time, whether or not `cycle` is called.
     """
 
     description: RobotDescription
@@ -36,50 +36,51 @@ class Robot(ABC):
 
     @abstractmethod
     def observe(self) -> Observation:
-        """The newest block, without letting time pass (valid right after opening)."""
+        """Return the newest block without letting time pass; valid right after opening."""
 
     @abstractmethod
     def cycle(self, command: Command) -> Observation:
         """Send one command, let one control period pass, return what was sensed in it.
 
         Raises:
-            SafetyStop: A hard limit tripped; the arm is held, and every later cycle only holds and raises again.
+            SafetyStop: A hard limit tripped; the arm is held, and every later cycle holds and raises again.
             BackendError: The device or simulator failed; cause chained.
-            ParamError: The command is not finite or breaks a joint limit; nothing was sent, the arm holds.
+            ParamError: The command is not finite or breaks a joint limit; nothing was sent, and the arm holds.
         """
 
     @abstractmethod
     def start(self, request: Request) -> Ticket:
-        """Begin a slow request (tare, payload). Never blocks: keep cycling and poll the ticket."""
+        """Start a slow request (tare, payload) without blocking; keep cycling and poll the ticket."""
 
     @abstractmethod
     def hold(self) -> None:
-        """Stop the arm where it is and keep it there. Safe to call at any time, any number of times; never raises."""
+        """Stop the arm and keep it there. Callable at any time, any number of times; never raises."""
 
     @abstractmethod
     def close(self) -> None:
         """Hold, then release the device. Idempotent."""
 
     def snapshot(self) -> Snapshot | None:
-        """The whole state of robot and world between two cycles, or None: it cannot be kept (any real device).
+        """Return the whole state of robot and world between two cycles, or None if it cannot be saved (any real
+        device).
 
-        A wrapper keeps what it wraps inside its own snapshot, and is None if that is.
+        A wrapper includes the snapshot of the wrapped robot, and returns None if that is None.
 
         Raises:
-            BackendError: The device or simulator has failed; its state is worth nothing.
+            BackendError: The device or simulator has failed.
         """
         return None
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot, of this robot or of another one opened with the same world, conditions, seed, options.
+        """Return to a snapshot of this robot, or of one opened with the same world, conditions, seed and options.
 
-        The same commands then give the same observations, bit for bit. Tickets given before stay as they were.
+        The same commands then give bit-identical observations. Tickets given before stay as they were.
 
         Raises:
-            BadInput: It is of another backend, of another version, or of a robot that was opened otherwise.
+            BadInput: The snapshot is from another backend or version, or from a robot that was opened differently.
             BackendError: This robot keeps no snapshots.
         """
-        raise BackendError(f"{type(self).__name__} cannot be put back into an earlier state")
+        raise BackendError(f"{type(self).__name__} cannot be restored to an earlier state")
 
     def __enter__(self) -> Self:
         return self
@@ -92,20 +93,20 @@ class Robot(ABC):
 
 
 class Backend(ABC):
-    """What an entry point of the group `glotouch_bt.backends` provides: a factory of robots."""
+    """A factory of robots, registered as an entry point of the group `glotouch_bt.backends`."""
 
     name: str
     summary: str
 
     @abstractmethod
     def open(self, world: World, conditions: Conditions, seed: int, options: Mapping[str, object]) -> Robot:
-        """Connect or build, ready for the first cycle.
+        """Connect or build a robot that is ready for its first cycle.
 
         Args:
             world: The nominal world.
             conditions: Disturbances to apply (a hardware backend ignores them).
             seed: Every random draw of the robot and its world comes from this.
-            options: Backend options (`--set name=value` that no mission parameter takes).
+            options: Backend options: every `--set name=value` that is not a mission parameter.
 
         Raises:
             BadInput: The world cannot be built (objects that do not fit, unusable meshes, unknown options).
@@ -113,9 +114,9 @@ class Backend(ABC):
         """
 
     def referee(self, robot: Robot) -> Referee | None:
-        """The truth about `robot`'s world, for scoring after the fact; None on hardware."""
+        """Return access to the ground truth of `robot`'s world, for scoring only; None on hardware."""
         return None
 
     def disturber(self, robot: Robot) -> Disturber | None:
-        """Hands inside `robot`'s world, for faults; None on hardware."""
+        """Return the interface through which faults change `robot`'s world; None on hardware."""
         return None

@@ -1,4 +1,4 @@
-"""Frozen limits, each with its source. The backend enforces the hard ones below the skill layer."""
+"""Robot-wide limits, each with its source. The backend enforces the hard ones below the skills."""
 
 from __future__ import annotations
 
@@ -15,16 +15,18 @@ class Limits:
     Joint position, velocity and torque limits are in `description.Joint`, next to the kinematics they belong to.
 
     Attributes:
-        hard_force_N: Norm of the tared contact force at which the robot itself stops. Source: 30 N is what public code
-            for a Rizon 4 with a Xense gripper sets as its maximum contact wrench.
-        hard_torque_Nm: Norm of the tared torque at S that stops the robot: the force limit on the probe's 0.34 m lever.
-        tcp_speed_m_s: Largest commanded speed of P. Source: vendor motion-force default 0.5 m/s, halved for blind work.
-        tcp_acceleration_m_s2: Largest commanded acceleration of P (vendor default 2.0).
-        tcp_jerk_m_s3: Largest commanded jerk of P.
-        stop_acceleration_m_s2: Deceleration of a guarded stop (measured: 2 m/s2 moves an object 1.1 mm p95 at 40 mm/s).
-        stop_jerk_m_s3: Jerk of a guarded stop: full deceleration within 2 ms. At 200 m/s3 fingers that met an object at
-            20 mm/s pressed past the hard limit.
-        max_age_s: A reading older than this is stale.
+        hard_force_N: Norm of the tared contact force at which the robot stops itself. Source: the maximum contact
+            wrench that public code sets for a Rizon 4 with a Xense gripper.
+        hard_torque_Nm: Norm of the tared torque at S at which it stops. Source: the force limit on the probe's 0.34 m
+            lever.
+        tcp_speed_m_s: Largest commanded speed of P. Source: vendor default of motion-force mode, 0.5 m/s, halved.
+        tcp_acceleration_m_s2: Largest commanded acceleration of P. Source: vendor default 2.0, halved.
+        tcp_jerk_m_s3: Largest commanded jerk of P. Source: ours.
+        stop_acceleration_m_s2: Deceleration of a guarded stop. Source: measured; at 40 mm/s an object moves 1.1 mm
+            (p95).
+        stop_jerk_m_s3: Jerk of a guarded stop. Source: measured; full deceleration after 2 ms. At 200 m/s3, fingers
+            that met an object at 20 mm/s exceeded the hard force limit.
+        max_age_s: A reading older than this is stale. Source: ours.
     """
 
     hard_force_N: float = 30.0

@@ -1,4 +1,4 @@
-"""What a robot sensed during one control period: a block of samples, not a snapshot.
+"""Readings of one control period: a block of samples, not a single one.
 
 Frames: B arm base, E flange, S wrist force sensor (S = E: same origin, same axes), P pads' mid-point. SI units.
 
@@ -15,10 +15,10 @@ from glotouch_bt.robot.geometry import Array, Pose
 
 @dataclass(frozen=True, slots=True)
 class GripperState:
-    """The jaws as last reported by the gripper.
+    """Last report of the gripper about its jaws.
 
     Attributes:
-        stamp_s: Robot clock when the reported value was measured (already late by the gripper's latency).
+        stamp_s: Robot clock when the value was measured; the report is late by the gripper's latency.
         aperture_m: Distance between the two pad surfaces, undeformed gel to undeformed gel; 0 is closed.
         force_N: Closing force of one jaw, >= 0.
         moving: True while the jaws move.
@@ -39,7 +39,7 @@ class TactileFrame:
 
     Attributes:
         stamp_s: Robot clock when the frame was taken.
-        left_m: (rows, cols) indentation of the pad at +y_P; NaN for a taxel that delivered nothing.
+        left_m: (rows, cols) indentation of the pad at +y_P; NaN for a dead taxel.
         right_m: (rows, cols) indentation of the pad at -y_P.
     """
 
@@ -57,11 +57,11 @@ class Observation:
         q: (n, dof) joint positions, rad.
         dq: (n, dof) joint velocities, rad/s.
         position_B_P: (n, 3) pads' mid-point in B, m.
-        quat_B_P: (n, 4) its orientation, w x y z.
-        wrench_S: (n, 6) force N then torque Nm that all beyond the sensor FEELS (environment and gravity), written in
-            S at S's origin, minus the last tare. Pressing a down-pointing tool onto the floor gives +z_B force.
+        quat_B_P: (n, 4) orientation of P in B, w x y z.
+        wrench_S: (n, 6) force N then torque Nm that the hand FEELS from environment and gravity, written in S about S's
+            origin, minus the last tare. Pressing a down-pointing tool onto the floor gives +z_B force.
         gripper: Last report of the jaws.
-        tactile: A NEW pair of depth maps, if one arrived this period and the command asked for frames; else None.
+        tactile: A NEW pair of depth maps, if one arrived this period and was requested; else None.
     """
 
     stamp_s: Array
@@ -80,5 +80,5 @@ class Observation:
 
     @property
     def pose_B_P(self) -> Pose:
-        """Pads' mid-point at the newest sample."""
+        """Pose of P at the newest sample."""
         return Pose(self.position_B_P[-1], self.quat_B_P[-1])

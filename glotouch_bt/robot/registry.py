@@ -1,4 +1,4 @@
-"""Backends are found by name through the entry-point group `glotouch_bt.backends`."""
+"""Find backends by name through the entry-point group `glotouch_bt.backends`."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ GROUP = "glotouch_bt.backends"
 
 
 def backend_entry_points() -> dict[str, EntryPoint]:
-    """Installed backends by name; nothing is imported."""
+    """Return the installed backends by name without importing them."""
     return {e.name: e for e in entry_points(group=GROUP)}
 
 
 def load_backend(name: str) -> Backend:
-    """Import and make one backend.
+    """Import and create one backend.
 
     Raises:
-        UnknownName: Nobody registered it; lists those that exist.
+        UnknownName: It is not registered; lists those that are.
         BackendError: It is registered but cannot be imported here (a missing dependency); cause chained.
     """
     found = backend_entry_points()

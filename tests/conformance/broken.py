@@ -1,4 +1,4 @@
-"""Backends that break one promise each, round a good one: what the suite must find."""
+"""Wrappers that break one promise of a good backend each."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from glotouch_bt.robot import BackendError, Command, JointSetpoint, Observation,
 
 
 class Wrapped(Robot):
-    """Passes everything on."""
+    """Forwards every call."""
 
     def __init__(self, robot: Robot) -> None:
         self.inner = robot
@@ -37,7 +37,7 @@ class Wrapped(Robot):
 
 
 class WrongSign(Wrapped):
-    """The wrench the hand exerts, not the one it feels."""
+    """Reports the wrench that the hand exerts, not the one it feels."""
 
     def changed(self, observation: Observation) -> Observation:
         return replace(observation, wrench_S=-np.asarray(observation.wrench_S))
@@ -59,7 +59,7 @@ class DroppedSamples(Wrapped):
 
 
 class LateStop(Wrapped):
-    """Goes on along its last motion for 0.15 s after it has been told to hold."""
+    """Continues its last motion for 0.15 s after a hold."""
 
     last: JointSetpoint | None = None
     left = 0
@@ -85,7 +85,7 @@ class Degrees(Wrapped):
 
 
 class SwallowedFault(Wrapped):
-    """When the device fails it says what it said last."""
+    """Repeats the last observation when the device fails."""
 
     def cycle(self, command: Command) -> Observation:
         try:

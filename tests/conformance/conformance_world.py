@@ -1,4 +1,4 @@
-"""The world the suite is tried in: an empty corner of the container, whose floor is the known wall."""
+"""World of the conformance tests: an empty corner of the container, whose floor is the known wall."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ OPTIONS = {"layout": {NAME: (0.08, 0.13, 0.0)}}
 
 
 def floor(description: RobotDescription) -> Wall:
-    """The container's floor, met by the bare fingertips."""
+    """Return the container's floor as a wall for the bare fingertips."""
     tip = np.array([0.0, 0.0, description.gripper.fingertip_below_P_m])
     start = Pose.pointing_down((0.58, -0.06, -0.10), np.pi)
     return Wall(K.position_m, np.array([0.0, 0.0, 1.0]), tip, 0.001, start)

@@ -1,4 +1,4 @@
-"""Five deliberately broken backends, and the test of the suite that finds each; the unbroken one passes them all."""
+"""The suite finds each of five deliberately broken backends; the unbroken one passes the same tests."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def blow_up(robot: Robot) -> None:
 
 
 class Suite(RobotConformance):
-    """The suite round a backend that is broken by `break_it`."""
+    """The suite on a backend that is broken by `break_it`."""
 
     break_it: Break
 
@@ -52,7 +52,7 @@ def suite(break_it: Break) -> Iterator[Suite]:
 FOUND_BY = {
     WrongSign: ("sign_and_frame_of_the_wrench", (0.3,)),
     DroppedSamples: ("blocks_are_complete_and_in_order", ()),
-    LateStop: ("it_stops_when_nothing_is_commanded", ()),
+    LateStop: ("stops_without_a_motion_command", ()),
     Degrees: ("joints_and_pose_agree", ()),
     SwallowedFault: ("a_lost_device_is_an_error", ()),
 }
@@ -76,12 +76,12 @@ def test_the_same_backend_unbroken_passes(broken: Break) -> None:
     ("broken", "also"),
     [
         (WrongSign, "a_guarded_move_stops_at_a_wall"),
-        (LateStop, "it_stops_on_hold"),
-        (LateStop, "it_holds_when_a_command_is_refused"),
+        (LateStop, "stops_on_hold"),
+        (LateStop, "holds_after_a_refused_command"),
         (SwallowedFault, "the_hard_limit_stops_the_arm"),
     ],
     ids=lambda v: getattr(v, "__name__", v),
 )
-def test_others_find_it_too(broken: Break, also: str) -> None:
+def test_other_tests_fail_as_well(broken: Break, also: str) -> None:
     with suite(broken) as bad, pytest.raises((AssertionError, pytest.fail.Exception)):
         getattr(bad, f"test_{also}")()

@@ -1,4 +1,4 @@
-"""The Flexiv/Xense backend with simulated devices: through its driver process, in lock-step."""
+"""The conformance suite on the Flexiv/Xense backend: simulated devices behind the driver process, in lock-step."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 
 
 def disturb(name: str) -> Callable[[Robot], None]:
-    """Ask the simulated world to break something."""
+    """Return a function that disturbs the simulated devices."""
 
     def do(robot: Robot) -> None:
         assert isinstance(robot, FlexivXenseRobot)

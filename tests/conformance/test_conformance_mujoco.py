@@ -1,4 +1,4 @@
-"""The MuJoCo backend, under the conditions figures are reported under and under none."""
+"""The conformance suite on the MuJoCo backend."""
 
 from __future__ import annotations
 

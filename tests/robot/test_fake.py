@@ -15,7 +15,7 @@ def setpoint(pose: Pose, q: np.ndarray = HOME) -> Command:
     return Command(JointSetpoint(q, np.zeros(7), np.zeros(7), pose))
 
 
-def test_home_is_where_it_should_be() -> None:
+def test_forward_kinematics_of_the_home_posture() -> None:
     pose = forward(FAKE_ARM, HOME)
     np.testing.assert_allclose(pose.position_m, [0.6, 0.0, 0.1], atol=1e-12)
     np.testing.assert_allclose(pose.rotation, Pose.pointing_down((0, 0, 0), np.pi).rotation, atol=1e-12)
@@ -37,7 +37,7 @@ def test_spring_wall_force_closed_form() -> None:
     assert robot.peak_force_N == pytest.approx(4.0)
 
 
-def test_samples_run_evenly_through_time_and_space() -> None:
+def test_samples_are_evenly_spaced_in_time_and_position() -> None:
     robot = FakeRobot()
     start = robot.observe().pose_B_P
     first = robot.cycle(setpoint(Pose(start.position_m + np.array([0.01, 0.0, 0.0]), start.quat)))
@@ -58,7 +58,7 @@ def test_orientation_turns_evenly() -> None:
     np.testing.assert_allclose(yaws, np.arange(1, 11) * 0.002, atol=1e-6)
 
 
-def test_tare_takes_its_time_and_subtracts() -> None:
+def test_tare_takes_its_duration_and_subtracts_the_mean() -> None:
     weight = np.array([0.0, 0.0, 5.0, 0.1, 0.0, 0.0])
     robot = FakeRobot(wrench=lambda t, p, q: np.tile(weight, (len(t), 1)))
     np.testing.assert_allclose(robot.cycle(Command()).wrench_S[-1], weight)
@@ -71,7 +71,7 @@ def test_tare_takes_its_time_and_subtracts() -> None:
     np.testing.assert_allclose(robot.cycle(Command()).wrench_S, 0.0, atol=1e-12)
 
 
-def test_hard_limit_stops_for_good() -> None:
+def test_hard_limit_stops_permanently() -> None:
     robot = FakeRobot(wrench=lambda t, p, q: np.where(t[:, None] > 0.025, 40.0, 0.0) * np.eye(6)[2])
     robot.cycle(Command())
     robot.cycle(Command())
@@ -92,7 +92,7 @@ def test_commands_outside_the_limits_are_refused() -> None:
     assert robot.cycles == 0
 
 
-def test_jaws_run_at_their_speed_and_stop_on_a_width() -> None:
+def test_jaws_keep_their_speed_and_stop_at_a_rigid_width() -> None:
     robot = FakeRobot(grip_width_m=0.04)
     first = robot.cycle(Command(gripper=GripperTarget(0.0, 0.1, 7.0))).gripper
     assert first.aperture_m == pytest.approx(0.085 - 0.001)
@@ -103,7 +103,7 @@ def test_jaws_run_at_their_speed_and_stop_on_a_width() -> None:
     assert robot.cycle(Command(gripper=GripperTarget(0.06, 0.1, 7.0))).gripper.force_N == 0.0
 
 
-def test_flat_frames_at_their_rate() -> None:
+def test_flat_frames_arrive_at_their_rate() -> None:
     robot = FakeRobot()
     frames = [robot.cycle(Command(tactile=True)).tactile for _ in range(100)]
     got = [f for f in frames if f is not None]

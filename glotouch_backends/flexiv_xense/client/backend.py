@@ -6,12 +6,21 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from glotouch_backends.flexiv_xense.client.link import OPEN_S, Link
+from glotouch_backends.flexiv_xense.client.link import OPEN_S, DriverLink
 from glotouch_backends.flexiv_xense.client.options import Options, read_options
 from glotouch_backends.flexiv_xense.client.process import DriverProcess
 from glotouch_backends.flexiv_xense.client.referee import RemoteReferee
 from glotouch_backends.flexiv_xense.client.robot import FlexivXenseRobot
-from glotouch_backends.flexiv_xense.driver import PROTOCOL, ArmLimits, Block, Devices, HandLimits, Open, Opened, Tool
+from glotouch_backends.flexiv_xense.driver import (
+    PROTOCOL,
+    ArmLimits,
+    Block,
+    Devices,
+    HandLimits,
+    Open,
+    Opened,
+    ToolData,
+)
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import Backend, Conditions, Limits, Pose, Robot, RobotDescription, World
 from glotouch_bt.robot.simulation import Referee
@@ -23,14 +32,14 @@ def _pose(pose: Pose) -> tuple[float, ...]:
     return (*pose.position_m.tolist(), *pose.quat.tolist())
 
 
-def _tool(description: RobotDescription) -> Tool:
+def _tool(description: RobotDescription) -> ToolData:
     """The bare hand: gripper body and both fingers."""
     g = description.gripper
     fingers = 2.0 * g.finger_mass_kg
     middle = g.pose_E_P.apply((g.finger.centre_m[0], 0.0, g.finger.centre_m[2]))
     mass = g.mass_kg + fingers
     com = [(g.mass_kg * c + fingers * m) / mass for c, m in zip(g.com_E_m, middle.tolist(), strict=True)]
-    return Tool(mass_kg=mass, com_E_m=tuple(com), pose_E_P=_pose(g.pose_E_P))
+    return ToolData(mass_kg=mass, com_E_m=tuple(com), pose_E_P=_pose(g.pose_E_P))
 
 
 def _arm_limits(description: RobotDescription, limits: Limits) -> ArmLimits:
@@ -97,13 +106,13 @@ class FlexivXenseBackend(Backend):
         process: DriverProcess | None = None
         if not options.driver:
             process = DriverProcess(options)
-        link: Link | None = None
+        link: DriverLink | None = None
         try:
             if process is not None:
                 if options.devices == "simulated":
                     process.put_world(world, conditions, seed, options.simulated)
                 process.start()
-            link = Link(
+            link = DriverLink(
                 options.driver or (process.address if process else ""),
                 (lambda: None) if process is None else process.gone,
                 paced=not options.lockstep,

@@ -14,11 +14,11 @@ import zmq
 import zmq.auth
 
 from glotouch_backends.flexiv_xense.driver import (
-    HEART,
+    HEARTBEAT_SUFFIX,
     Answer,
     Beat,
     Failed,
-    Progress,
+    OpenProgress,
     Refused,
     Request,
     decode_answer,
@@ -28,9 +28,9 @@ from glotouch_bt.robot import BackendError, ParamError, StaleReading
 
 A = TypeVar("A")
 BEAT_S = 0.1
-SILENT_S = 0.5
+MAX_SILENCE_S = 0.5
 """A paced driver that says nothing for this long is lost; it sends a heartbeat every 0.05 s."""
-PATIENT_S = 10.0
+SLOW_REQUEST_S = 10.0
 """The same while a slow request is under way: the vendor's blocking calls may keep the whole driver waiting."""
 OPEN_S = 120.0
 LOCKSTEP_S = 120.0
@@ -56,7 +56,7 @@ def failure(answer: Failed) -> BackendError:
     return error
 
 
-class Link:
+class DriverLink:
     """One client of one driver.
 
     Args:
@@ -66,7 +66,7 @@ class Link:
         keys: Folder with client.key_secret and driver.key, for tcp.
 
     Attributes:
-        patient: A slow request is under way; see `PATIENT_S`.
+        slow_request: A slow request is under way; see `SLOW_REQUEST_S`.
     """
 
     def __init__(self, address: str, alive: Callable[[], str | None], *, paced: bool, keys: Path | None = None) -> None:
@@ -75,7 +75,7 @@ class Link:
         self._context = zmq.Context()
         self._name = uuid.uuid4().hex.encode()  # in hex, so that no name ends as a heart's does, or begins with zero
         self._socket = self._connect(self._name)
-        self.patient = False
+        self.slow_request = False
         self._number = 0
         self._stop = threading.Event()
         self._heart: threading.Thread | None = None
@@ -105,7 +105,7 @@ class Link:
 
     def _beat_on(self) -> None:
         body = encode(Beat())
-        socket = self._connect(self._name + HEART)  # a zmq socket belongs to one thread
+        socket = self._connect(self._name + HEARTBEAT_SUFFIX)  # a zmq socket belongs to one thread
         while not self._stop.wait(BEAT_S):
             _send(socket, body)
         socket.close()
@@ -145,7 +145,7 @@ class Link:
         began = heard = time.perf_counter()
         quiet_s = limit_s
         if self._paced and on_progress is None:
-            quiet_s = PATIENT_S if self.patient else SILENT_S
+            quiet_s = SLOW_REQUEST_S if self.slow_request else MAX_SILENCE_S
         while True:
             answer = self._receive(POLL_S)
             now = time.perf_counter()
@@ -157,7 +157,7 @@ class Link:
                     raise BackendError(f"nothing heard of the driver for {now - heard:.2f} s (limit {quiet_s:g} s)")
                 continue
             heard = now
-            if isinstance(answer, Progress) and on_progress is not None:
+            if isinstance(answer, OpenProgress) and on_progress is not None:
                 on_progress(answer.text)
             if isinstance(answer, Failed) and answer.number in (0, number):
                 raise failure(answer)

@@ -14,7 +14,6 @@ from glotouch_backends.flexiv_xense.client.options import Options
 from glotouch_bt.robot import BackendError, Conditions, World
 
 END_S = 15.0
-CELL_S = 30.0
 INSTALLED, HERE = "glotouch_driver", "glotouch_backends.flexiv_xense.driver"
 CELL = "glotouch_backends.flexiv_xense.simulated.cell"
 

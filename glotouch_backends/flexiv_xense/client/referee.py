@@ -5,7 +5,7 @@ from __future__ import annotations
 import pickle
 from typing import cast
 
-from glotouch_backends.flexiv_xense.client.link import Link
+from glotouch_backends.flexiv_xense.client.link import DriverLink
 from glotouch_backends.flexiv_xense.driver import RefereeAnswer, RefereeRequest
 from glotouch_bt.robot import Array, Pose
 from glotouch_bt.robot.simulation import BareSteps, TrueObject
@@ -18,7 +18,7 @@ class RemoteReferee:
         link: To a driver with simulated devices.
     """
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: DriverLink) -> None:
         self._link = link
 
     def _ask(self, method: str, *arguments: object) -> object:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glotouch_backends.flexiv_xense.client.chain import Chain
-from glotouch_backends.flexiv_xense.client.link import Link
+from glotouch_backends.flexiv_xense.client.link import DriverLink
 from glotouch_backends.flexiv_xense.client.process import DriverProcess
 from glotouch_backends.flexiv_xense.driver import (
     COLUMNS,
@@ -18,7 +18,7 @@ from glotouch_backends.flexiv_xense.driver import (
     Block,
     Cycle,
     HoldRequest,
-    Jaws,
+    JawTarget,
     Maps,
     PayloadRequest,
     Quit,
@@ -74,7 +74,7 @@ class FlexivXenseRobot(Robot):
         description: RobotDescription,
         limits: Limits,
         period_s: float,
-        link: Link,
+        link: DriverLink,
         process: DriverProcess | None,
         info: dict[str, str],
         first: Block,
@@ -101,7 +101,7 @@ class FlexivXenseRobot(Robot):
             raise self._failed
         setpoint = None if command.motion is None else self._setpoint(command.motion)
         g = command.gripper
-        jaws = None if g is None else Jaws(float(g.aperture_m), float(g.speed_m_s), float(g.force_N))
+        jaws = None if g is None else JawTarget(float(g.aperture_m), float(g.speed_m_s), float(g.force_N))
         number, began = self.link.number(), time.monotonic()
         try:
             block = self.link.ask(Cycle(number=number, setpoint=setpoint, jaws=jaws, tactile=command.tactile), Block)
@@ -129,7 +129,7 @@ class FlexivXenseRobot(Robot):
             com = tuple(request.com_P_m.tolist())
             message = PayloadRequest(number=number, ticket=number, mass_kg=float(request.mass_kg), com_P_m=com)
         self._tickets[number] = ticket
-        self.link.patient = True
+        self.link.slow_request = True
         self.link.ask(message, Accepted)
         return ticket
 
@@ -191,7 +191,7 @@ class FlexivXenseRobot(Robot):
             ticket = self._tickets.pop(done.ticket, None)
             if ticket is not None:
                 ticket.error, ticket.done = done.error or None, True
-        self.link.patient = bool(self._tickets)
+        self.link.slow_request = bool(self._tickets)
         self.late_periods += block.late
         rows = np.frombuffer(block.samples, dtype="<f8").reshape(-1, COLUMNS)
         j = block.jaws

@@ -5,7 +5,7 @@ nothing of the rest of the project. `messages` is what it shares with its client
 """
 
 from .clock import Clock, SteppedClock, WallClock
-from .endpoint import HEART
+from .endpoint import HEARTBEAT_SUFFIX
 from .messages import (
     COLUMNS,
     PROTOCOL,
@@ -19,12 +19,12 @@ from .messages import (
     Failed,
     HandLimits,
     HoldRequest,
-    Jaws,
+    JawTarget,
     Maps,
     Open,
     Opened,
+    OpenProgress,
     PayloadRequest,
-    Progress,
     Quit,
     RefereeAnswer,
     RefereeRequest,
@@ -32,16 +32,16 @@ from .messages import (
     Request,
     Setpoint,
     TareRequest,
-    Tool,
+    ToolData,
     decode_answer,
     encode,
 )
-from .priority import DEVICES, hurry
+from .priority import DEVICES_PRIORITY, request_realtime
 
 __all__ = [
     "COLUMNS",
-    "DEVICES",
-    "HEART",
+    "DEVICES_PRIORITY",
+    "HEARTBEAT_SUFFIX",
     "PROTOCOL",
     "Accepted",
     "Answer",
@@ -54,12 +54,12 @@ __all__ = [
     "Failed",
     "HandLimits",
     "HoldRequest",
-    "Jaws",
+    "JawTarget",
     "Maps",
     "Open",
     "Opened",
     "PayloadRequest",
-    "Progress",
+    "OpenProgress",
     "Quit",
     "RefereeAnswer",
     "RefereeRequest",
@@ -68,9 +68,9 @@ __all__ = [
     "Setpoint",
     "SteppedClock",
     "TareRequest",
-    "Tool",
+    "ToolData",
     "WallClock",
     "decode_answer",
     "encode",
-    "hurry",
+    "request_realtime",
 ]

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from .endpoint import DriverSocket
-from .priority import DRIVER, hurry
+from .priority import DRIVER_PRIORITY, request_realtime
 from .serve import Log, serve
 
 
@@ -30,7 +30,7 @@ def main(argv: list[str] | None = None) -> int:
     signal.signal(signal.SIGINT, lambda number, _: stopped.append(number))
     log = Log(options.log)
     if options.urgent:  # before any thread is started: they inherit it
-        log("priority", granted=hurry(DRIVER))
+        log("priority", granted=request_realtime(DRIVER_PRIORITY))
     while True:
         try:
             socket = DriverSocket(options.address, options.keys)

@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from .faults import CommandRefused
 from .messages import ArmLimits, Setpoint
 
-SLACK = 1.02
+STEP_SLACK = 1.02
 """Of velocities implied by two setpoints, for rounding."""
 SPEED_SLACK = 1.1
-START_M = 5e-3
+MAX_START_OFFSET_M = 5e-3
 """The first setpoint may be this far from where the arm stands (servo error)."""
-UNIT = 1e-3
+MAX_NORM_ERROR = 1e-3
 """A quaternion's length may differ from 1 by this."""
 
 
@@ -31,11 +31,11 @@ class SetpointCheck:
         self._position: Sequence[float] = ()
         self._fresh = True
 
-    def stands_at(self, q: Sequence[float], pose: Sequence[float]) -> None:
+    def reset_to(self, q: Sequence[float], pose: Sequence[float]) -> None:
         """The arm is at rest at joints (7,) and TCP pose (7,), not at a setpoint of ours."""
         self._q, self._position, self._fresh = tuple(q), tuple(pose[:3]), True
 
-    def look(self, s: Setpoint) -> None:
+    def check(self, s: Setpoint) -> None:
         """Take the setpoint as the new last one, if it is sane.
 
         Raises:
@@ -46,9 +46,9 @@ class SetpointCheck:
             if len(values) != n or not all(map(math.isfinite, values)):
                 raise CommandRefused(f"setpoint.{name}", list(values), f"{n} finite numbers")
         norm = math.sqrt(sum(v * v for v in s.pose[3:]))
-        if abs(norm - 1.0) > UNIT:
+        if abs(norm - 1.0) > MAX_NORM_ERROR:
             raise CommandRefused("setpoint.pose", list(s.pose[3:]), "a unit quaternion (w x y z)")
-        reach = START_M if self._fresh else 0.0
+        reach = MAX_START_OFFSET_M if self._fresh else 0.0
         for i in range(7):
             q, dq, top = s.q[i], s.dq[i], limits.dq_max[i]
             low, high = limits.q_min[i] - 1e-9, limits.q_max[i] + 1e-9
@@ -58,7 +58,7 @@ class SetpointCheck:
                 raise CommandRefused(f"setpoint.dq[joint{i + 1}]", dq, f"within {-top:.4f} .. {top:.4f} rad/s")
             step = (q - self._q[i]) / self._period
             # Right after a stop the null space has let the joints go where the arm's own controller wanted them.
-            if abs(step) > SLACK * top and not self._fresh:
+            if abs(step) > STEP_SLACK * top and not self._fresh:
                 raise CommandRefused(f"setpoint.(q - last q)/period[joint{i + 1}]", step, f"within {top:.4f} rad/s")
         moved = math.dist(s.pose[:3], self._position)
         allowed = SPEED_SLACK * limits.speed_m_s * self._period + reach
@@ -70,7 +70,7 @@ class SetpointCheck:
         self._q, self._position, self._fresh = s.q, s.pose[:3], False
 
 
-def braked(setpoint: Setpoint, acceleration_m_s2: float) -> tuple[float, ...]:
+def rest_pose(setpoint: Setpoint, acceleration_m_s2: float) -> tuple[float, ...]:
     """The pose (7,) at which P comes to rest when it is slowed evenly from a setpoint's twist.
 
     Linear: v^2 / 2a along v. The turn is slowed in the same time (never less than 0.02 s for a turn on the spot).

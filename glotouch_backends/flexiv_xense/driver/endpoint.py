@@ -18,7 +18,7 @@ from zmq.auth.thread import ThreadAuthenticator
 from .messages import Answer, Beat, Failed, Request, decode_request, encode
 
 LINGER_MS = 200
-HEART = b"+"
+HEARTBEAT_SUFFIX = b"+"
 """A client's heartbeats come from a thread, hence a socket, of their own: its name with this at its end."""
 
 
@@ -62,13 +62,13 @@ class DriverSocket:
         frames: list[bytes] = self._socket.recv_multipart()
         sender, body = frames[0], frames[-1]
         if self._client is None:
-            self._client = sender.removesuffix(HEART)
+            self._client = sender.removesuffix(HEARTBEAT_SUFFIX)
         try:
             request: Request = decode_request(body)
         except msgspec.MsgspecError as e:
             self._answer(sender, Failed(number=0, kind="link", message=f"a request could not be read: {e}"))
             return None
-        if sender == self._client + HEART:
+        if sender == self._client + HEARTBEAT_SUFFIX:
             return request if isinstance(request, Beat) else None
         if sender != self._client:
             number = getattr(request, "number", 0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from .messages import Event
+from .messages import ArmEvent
 
 
 class DeviceFault(Exception):
@@ -20,7 +20,7 @@ class DeviceFault(Exception):
     """
 
     def __init__(
-        self, kind: str, message: str, events: Sequence[Event] = (), *, age_s: float = 0.0, limit_s: float = 0.0
+        self, kind: str, message: str, events: Sequence[ArmEvent] = (), *, age_s: float = 0.0, limit_s: float = 0.0
     ) -> None:
         super().__init__(message)
         self.kind, self.message, self.events = kind, message, tuple(events)

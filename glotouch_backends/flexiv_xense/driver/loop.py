@@ -4,7 +4,7 @@ Paced: the arm is read every millisecond and a block is answered on a fixed grid
 never made up: the arm is held meanwhile.
 
     no command for HOLD_AFTER_S         the arm is told to come to rest on its way
-    nothing from the client for LOST_S  Stop(), IDLE, devices released, the process ends
+    nothing from the client for CLIENT_LOST_S  Stop(), IDLE, devices released, the process ends
 """
 
 from __future__ import annotations
@@ -30,24 +30,24 @@ from .messages import (
     Request,
     TareRequest,
 )
-from .session import Session
+from .session import DriverSession
 
 SAMPLE_S = 0.001
 HOLD_AFTER_S = 0.03
-LOST_S = 0.5
+CLIENT_LOST_S = 0.5
 BEAT_S = 0.05
-LOCKSTEP_LOST_S = 10.0
-STILL_M_S = 1e-3
-BEHIND_S = 0.02
+LOCKSTEP_CLIENT_LOST_S = 10.0
+MAX_STANDSTILL_M_S = 1e-3
+MAX_BEHIND_S = 0.02
 """When the loop is later than this, it gives up catching up: samples are missing, and their stamps say so."""
 
 Log = Callable[..., None]
 
 
-class _Loop:
+class _DriverLoop:
     """What both loops answer alike."""
 
-    def __init__(self, session: Session, socket: DriverSocket, log: Log, stopping: Callable[[], bool]) -> None:
+    def __init__(self, session: DriverSession, socket: DriverSocket, log: Log, stopping: Callable[[], bool]) -> None:
         self._session, self._socket, self._log, self._stopping = session, socket, log, stopping
 
     def _refuse(self, number: int, error: CommandRefused) -> None:
@@ -99,7 +99,7 @@ class _Loop:
         return True
 
 
-class Lockstep(_Loop):
+class Lockstep(_DriverLoop):
     """Time passes only in a cycle, exactly one period."""
 
     def run(self, period_s: float) -> None:
@@ -115,7 +115,7 @@ class Lockstep(_Loop):
                 request = socket.receive(1.0)
                 now = time.monotonic()
                 if request is None:
-                    if now - heard > LOCKSTEP_LOST_S:
+                    if now - heard > LOCKSTEP_CLIENT_LOST_S:
                         self._log("client lost", peak_force_N=session.peak_force_N)
                         return
                     continue
@@ -142,14 +142,14 @@ class Lockstep(_Loop):
                         self._log("fault", kind=session.failed.kind, message=session.failed.message)
 
 
-class _Silence:
+class _CommandTimeout:
     """What is done, and written down, when no command has come for a while."""
 
-    def __init__(self, session: Session, log: Log) -> None:
+    def __init__(self, session: DriverSession, log: Log) -> None:
         self._session, self._log = session, log
         self._silent = self._still = False
 
-    def look(self, silent_s: float) -> None:
+    def check(self, silent_s: float) -> None:
         """Once a sample."""
         session = self._session
         if silent_s <= HOLD_AFTER_S:
@@ -160,12 +160,12 @@ class _Silence:
             session.recent_peak_N = 0.0
             self._log("no command", silent_s=silent_s, speed_m_s=session.speed_m_s)
             session.hold()
-        if not self._still and session.speed_m_s < STILL_M_S:
+        if not self._still and session.speed_m_s < MAX_STANDSTILL_M_S:
             self._still = True
             self._log("standstill", silent_s=silent_s, peak_force_N=session.recent_peak_N)
 
 
-class Paced(_Loop):
+class Paced(_DriverLoop):
     """The clock runs on by itself."""
 
     def run(self, period_s: float) -> None:
@@ -179,11 +179,11 @@ class Paced(_Loop):
         begin = due = clock.now_s()
         heard = commanded = beaten = begin
         late = tick = 0
-        silence = _Silence(session, self._log)
+        timeout = _CommandTimeout(session, self._log)
         while not self._stopping():
             due += SAMPLE_S
             now = clock.now_s()
-            if now - due > BEHIND_S:
+            if now - due > MAX_BEHIND_S:
                 self._log("late", by_s=now - due)
                 due = now
             tick += 1
@@ -202,7 +202,7 @@ class Paced(_Loop):
                     socket.wait(left)
                 session.sample()
                 now = clock.now_s()
-                silence.look(now - commanded)
+                timeout.check(now - commanded)
                 if tick % steps == 0:
                     session.poll()
                     if waiting is None:
@@ -220,6 +220,6 @@ class Paced(_Loop):
             if now - beaten > BEAT_S:
                 beaten = now
                 socket.send(Beat())
-            if now - heard > LOST_S:
+            if now - heard > CLIENT_LOST_S:
                 self._log("client lost", silent_s=now - heard, speed_m_s=session.speed_m_s)
                 return

@@ -15,7 +15,7 @@ COLUMNS = 7 + 7 + 3 + 4 + 6
 Numbers = tuple[float, ...]
 
 
-class Tool(msgspec.Struct, frozen=True, kw_only=True):
+class ToolData(msgspec.Struct, frozen=True, kw_only=True):
     """What is bolted to the flange.
 
     Attributes:
@@ -104,7 +104,7 @@ class Setpoint(msgspec.Struct, frozen=True, array_like=True):
     twist: Numbers
 
 
-class Jaws(msgspec.Struct, frozen=True, array_like=True):
+class JawTarget(msgspec.Struct, frozen=True, array_like=True):
     """Gripper target: aperture m, speed m/s, force N."""
 
     aperture_m: float
@@ -121,7 +121,7 @@ class Open(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     number: int
     protocol: int
     devices: Devices
-    tool: Tool
+    tool: ToolData
     arm: ArmLimits
     hand: HandLimits
     posture: Numbers
@@ -135,7 +135,7 @@ class Cycle(msgspec.Struct, frozen=True, kw_only=True, tag=True):
 
     number: int
     setpoint: Setpoint | None = None
-    jaws: Jaws | None = None
+    jaws: JawTarget | None = None
     tactile: bool = False
 
 
@@ -182,7 +182,7 @@ class Beat(msgspec.Struct, frozen=True, tag=True):
 # -- answers -----------------------------------------------------------------------------------------------------------
 
 
-class Event(msgspec.Struct, frozen=True, array_like=True):
+class ArmEvent(msgspec.Struct, frozen=True, array_like=True):
     """An entry of the arm's event log: level, id, description, what to do."""
 
     level: str
@@ -226,7 +226,7 @@ class Opened(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     q_max: Numbers
 
 
-class Progress(msgspec.Struct, frozen=True, tag=True):
+class OpenProgress(msgspec.Struct, frozen=True, tag="Progress"):
     """What opening is busy with."""
 
     text: str
@@ -278,7 +278,7 @@ class Failed(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     kind: str
     message: str
     cause: str = ""
-    events: tuple[Event, ...] = ()
+    events: tuple[ArmEvent, ...] = ()
     age_s: float = 0.0
     limit_s: float = 0.0
 
@@ -291,7 +291,7 @@ class RefereeAnswer(msgspec.Struct, frozen=True, kw_only=True, tag=True):
 
 
 Request = Open | Cycle | TareRequest | PayloadRequest | HoldRequest | RefereeRequest | Quit | Beat
-Answer = Opened | Progress | Block | Accepted | Refused | Failed | RefereeAnswer | Beat
+Answer = Opened | OpenProgress | Block | Accepted | Refused | Failed | RefereeAnswer | Beat
 
 encode = msgspec.msgpack.Encoder().encode
 decode_request = msgspec.msgpack.Decoder(Request).decode

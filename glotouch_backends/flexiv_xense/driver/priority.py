@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 
-DRIVER, DEVICES = 20, 21
+DRIVER_PRIORITY, DEVICES_PRIORITY = 20, 21
 """FIFO priorities: simulated devices come first, as real ones do. Far below the kernel's own (50)."""
 
 
-def hurry(level: int) -> bool:
+def request_realtime(level: int) -> bool:
     """Ask for FIFO priority `level` for the calling thread and those it starts; False if the system refuses.
 
     Without it a busy machine wakes the process milliseconds late, and samples are missing. Linux grants it to root, and

@@ -9,14 +9,14 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from .devices import connect
+from .devices import connect_devices
 from .endpoint import DriverSocket
 from .faults import DeviceFault
 from .loop import Lockstep, Paced
-from .messages import PROTOCOL, Beat, Failed, Open, Opened, Progress, Quit
-from .session import Session
+from .messages import PROTOCOL, Beat, Failed, Open, Opened, OpenProgress, Quit
+from .session import DriverSession
 
-FIRST_WORD_S = 60.0
+MAX_WAIT_FOR_OPEN_S = 60.0
 
 
 class Log:
@@ -52,14 +52,14 @@ def serve(socket: DriverSocket, log: Log, stopping: Callable[[], bool], *, forev
         socket.send(Failed(number=request.number, kind="connect", message=message))
         return 1
     try:
-        devices = connect(request, lambda text: socket.send(Progress(text)))
+        devices = connect_devices(request, lambda text: socket.send(OpenProgress(text)))
     except DeviceFault as e:
         log("not opened", kind=e.kind, message=e.message)
         cause = "" if e.__cause__ is None else f"{type(e.__cause__).__name__}: {e.__cause__}"
         socket.send(Failed(number=request.number, kind=e.kind, message=e.message, cause=cause, events=e.events))
         return 1
     try:
-        session = Session(devices, request)
+        session = DriverSession(devices, request)
         low, high = devices.arm.joint_limits()
         info = devices.arm.describe() | {"devices": request.devices.kind, "python": sys.version.split()[0]}
         socket.send(Opened(number=request.number, info=info, q_min=low, q_max=high))
@@ -88,6 +88,6 @@ def _first(socket: DriverSocket, stopping: Callable[[], bool], *, forever: bool)
             return None
         if request is not None and not isinstance(request, Beat):
             socket.send(Failed(number=request.number, kind="connect", message="the first request must be Open"))
-        if not forever and time.monotonic() - began > FIRST_WORD_S:
+        if not forever and time.monotonic() - began > MAX_WAIT_FOR_OPEN_S:
             return None
     return None

@@ -9,22 +9,34 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .checks import SetpointCheck, braked
-from .dating import Dating
+from .checks import SetpointCheck, rest_pose
+from .clock_offset import StampConverter
 from .devices import Connected
 from .faults import CommandRefused, DeviceFault
 from .frames import payload_on_tool, wrench_map
-from .messages import COLUMNS, Block, Cycle, Done, Jaws, JawState, Maps, Open, PayloadRequest, Setpoint, TareRequest
+from .messages import (
+    COLUMNS,
+    Block,
+    Cycle,
+    Done,
+    JawState,
+    JawTarget,
+    Maps,
+    Open,
+    PayloadRequest,
+    Setpoint,
+    TareRequest,
+)
 
-IN_A_ROW = 5
+MIN_SAMPLES_OVER = 5
 """So many samples in a row beyond the hard limit stop the arm (5 ms); one alone may be noise."""
-KEPT = 60_000
+MAX_BUFFERED_SAMPLES = 60_000
 """Samples kept while nobody asks (60 s)."""
 SPEED_SAMPLES = 20
 NO_JAWS = JawState(0.0, math.nan, 0.0, False)
 
 
-class Session:
+class DriverSession:
     """See the module's text.
 
     Args:
@@ -44,10 +56,10 @@ class Session:
         self._check = SetpointCheck(request.arm, request.period_s)
         self._to_S = wrench_map(request.tool.pose_E_P)
         self._zero_s = self.clock.now_s()
-        self._stamps: deque[float] = deque(maxlen=KEPT)
-        self._rows: deque[list[float]] = deque(maxlen=KEPT)
+        self._stamps: deque[float] = deque(maxlen=MAX_BUFFERED_SAMPLES)
+        self._rows: deque[list[float]] = deque(maxlen=MAX_BUFFERED_SAMPLES)
         self._device_stamp: object = None
-        self._dating = Dating()
+        self._to_our_clock = StampConverter()
         self._fresh_s = self._zero_s
         self._over = 0
         self._newest: list[float] | None = None
@@ -64,7 +76,7 @@ class Session:
         self.peak_force_N = self.recent_peak_N = 0.0
         self._track: deque[tuple[float, list[float]]] = deque(maxlen=SPEED_SAMPLES)
         self.sample()
-        self._stand()
+        self._reset_to_measured()
         self.poll()
 
     @property
@@ -95,11 +107,11 @@ class Session:
         if self.failed is not None:
             raise self.failed
         if cycle.tactile and self.devices.pads is not None:
-            self.devices.pads.want()
+            self.devices.pads.request()
         if self.stop is not None:
             return
         try:
-            self._look(cycle)
+            self._check_command(cycle)
         except CommandRefused:
             self.hold()
             raise
@@ -112,17 +124,17 @@ class Session:
             self.hold()
         self._sent_s = time.monotonic()
 
-    def _look(self, cycle: Cycle) -> None:
+    def _check_command(self, cycle: Cycle) -> None:
         if not self._moves and (cycle.setpoint is not None or cycle.jaws is not None):
             raise CommandRefused("command", "a motion", "none in a session that only looks")
         if cycle.jaws is not None:
-            self._look_at_jaws(cycle.jaws)
+            self._check_jaws(cycle.jaws)
         if cycle.setpoint is not None:
             if self._busy:
                 raise CommandRefused("command.motion", "a setpoint", "none while a tare or payload is under way")
-            self._check.look(cycle.setpoint)
+            self._check.check(cycle.setpoint)
 
-    def _look_at_jaws(self, jaws: Jaws) -> None:
+    def _check_jaws(self, jaws: JawTarget) -> None:
         if self.devices.gripper is None:
             raise CommandRefused("command.gripper", jaws, "none: no gripper is connected")
         self.devices.gripper.check(jaws)
@@ -136,7 +148,7 @@ class Session:
         if self._last is None or self._busy:
             return  # it stands, or is being stopped by the request under way
         if self._rest is None:
-            self._rest = braked(self._last, self._limits.stop_acceleration_m_s2)
+            self._rest = rest_pose(self._last, self._limits.stop_acceleration_m_s2)
         self._arm.hold_at(self._rest)
 
     def start(self, request: TareRequest | PayloadRequest) -> None:
@@ -156,25 +168,25 @@ class Session:
                     self._arm.zero(request.duration_s)
                 else:
                     self._arm.idle()
-                    self._arm.load(*self._loaded(request))
+                    self._arm.load(*self._hand_with_payload(request))
                 self._arm.enter_motion()
             except DeviceFault as e:
                 self.failed = self.failed or e
                 self._done.append(Done(request.ticket, e.message))
             else:
                 self._done.append(Done(request.ticket))
-        self._stand()
+        self._reset_to_measured()
         self._busy = False
 
-    def _loaded(self, request: PayloadRequest) -> tuple[float, list[float]]:
+    def _hand_with_payload(self, request: PayloadRequest) -> tuple[float, list[float]]:
         t = self._tool
         return payload_on_tool(t.mass_kg, t.com_E_m, request.mass_kg, request.com_P_m, t.pose_E_P)
 
-    def _stand(self) -> None:
+    def _reset_to_measured(self) -> None:
         """The arm stands where its own controller has left it, not at a setpoint of ours."""
         self._last = self._rest = None
         if self._newest is not None:
-            self._check.stands_at(self._newest[:7], self._newest[14:21])
+            self._check.reset_to(self._newest[:7], self._newest[14:21])
 
     # -- sensing -----------------------------------------------------------------------------------------------------
 
@@ -199,11 +211,11 @@ class Session:
             raise DeviceFault("vendor", "the arm reports numbers that are not finite")
         self._track.append((now, row[14:17]))
         self._fresh_s, self._newest = now, row
-        self._stamps.append(self._dating(state.stamp, now - self._zero_s))
+        self._stamps.append(self._to_our_clock(state.stamp, now - self._zero_s))
         self._rows.append(row)
-        self._guard(wrench, state.pose, now)
+        self._enforce_hard_limit(wrench, state.pose, now)
 
-    def _guard(self, wrench: list[float], pose: Sequence[float], now: float) -> None:
+    def _enforce_hard_limit(self, wrench: list[float], pose: Sequence[float], now: float) -> None:
         """The hard limit below the client: stop where the arm is, and stay stopped."""
         force, torque = math.hypot(*wrench[:3]), math.hypot(*wrench[3:])
         self.peak_force_N = max(self.peak_force_N, force)
@@ -213,7 +225,7 @@ class Session:
             self._over = 0
             return
         self._over += 1
-        if self._over < IN_A_ROW or self.stop is not None or self._busy:
+        if self._over < MIN_SAMPLES_OVER or self.stop is not None or self._busy:
             return
         beyond = force > limits.force_N
         self.stop = (

@@ -1,6 +1,6 @@
 """Devices that are not there: the vendors' modules, names and quirks over the MuJoCo world. See `open_vendor`."""
 
-from glotouch_backends.flexiv_xense.simulated.distant import DistantVendor, open_vendor_at
+from glotouch_backends.flexiv_xense.simulated.remote import RemoteVendor, open_remote_vendor
 from glotouch_backends.flexiv_xense.simulated.vendor import (
     GRIPPER_ADDRESS,
     PAD_SNS,
@@ -13,8 +13,8 @@ __all__ = [
     "GRIPPER_ADDRESS",
     "PAD_SNS",
     "ROBOT_SN",
-    "DistantVendor",
+    "RemoteVendor",
     "SimulatedVendor",
     "open_vendor",
-    "open_vendor_at",
+    "open_remote_vendor",
 ]

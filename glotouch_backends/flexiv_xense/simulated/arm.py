@@ -14,7 +14,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from glotouch_backends.flexiv_xense.simulated.kinematics import Kinematics, inverse, rotation_between
+from glotouch_backends.flexiv_xense.simulated.kinematics import ControllerKinematics, inverse, rotation_between
 from glotouch_backends.flexiv_xense.simulated.trajectory import Trajectory, cubic_extremes, shortest
 from glotouch_backends.mujoco.control import BRAKE_REACH_M
 from glotouch_backends.mujoco.model import DAMPING_PER_STIFFNESS_S, JOINT_DAMPING, STEP_S, STIFFNESS_NM_RAD, Handles
@@ -82,7 +82,7 @@ class Load:
 FLANGE = Load(0.0, np.zeros(3), Pose(np.zeros(3)))
 
 
-class Arm:
+class SimulatedArm:
     """Trajectory, servo, wrench and tare of the simulated arm; stepped by the world.
 
     Args:
@@ -102,7 +102,7 @@ class Arm:
         self.description = description
         self._model, self._data, self._h, self.sensors = model, data, handles, handles.sensors
         self.trajectory = Trajectory(np.array(data.qpos[handles.arm_qpos]))
-        self.kinematics = Kinematics(model, handles)
+        self.kinematics = ControllerKinematics(model, handles)
         kp = np.array(STIFFNESS_NM_RAD)
         self._per_kp, self._lead = 1.0 / kp, DAMPING_PER_STIFFNESS_S + JOINT_DAMPING / kp
         self._vector, self._product = np.zeros(model.nv), np.zeros(model.nv)

@@ -24,7 +24,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from glotouch_backends.flexiv_xense.driver import DEVICES, hurry
+from glotouch_backends.flexiv_xense.driver import DEVICES_PRIORITY, request_realtime
 from glotouch_backends.flexiv_xense.simulated.vendor import SimulatedVendor, assemble
 from glotouch_backends.flexiv_xense.simulated.wire import NEW, REFEREE, Reference
 from glotouch_backends.flexiv_xense.simulated.world import SimulatedWorld
@@ -57,7 +57,7 @@ class CellClock:
         threading.Thread(target=work, daemon=True).start()
 
 
-class Watch:
+class StandstillMonitor:
     """From the moment a client is lost: how the arm comes to rest."""
 
     def __init__(self, world: SimulatedWorld, write: Callable[..., None]) -> None:
@@ -111,7 +111,7 @@ class Cell:
         self._makers = self._find_makers()
         self._made: dict[int, tuple[int, Any]] = {}
         self._links: dict[int, int] = {}  # client: open connections
-        self._watch = Watch(world, self.write)
+        self._watch = StandstillMonitor(world, self.write)
         self._parent = os.getppid()
         self._last_client_s = time.monotonic()
         self.ended = False
@@ -227,7 +227,7 @@ def main(argv: list[str]) -> int:
     """The process; see the module's text."""
     world_file, address, log_file = argv
     world = SimulatedWorld.unpickle(Path(world_file).read_bytes())
-    granted = hurry(DEVICES)
+    granted = request_realtime(DEVICES_PRIORITY)
     with Path(log_file).open("a") as log, Listener(address, family="AF_UNIX") as listener:
         cell = Cell(world, log)
 

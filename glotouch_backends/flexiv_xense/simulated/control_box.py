@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from glotouch_backends.flexiv_xense.driver import Clock
-from glotouch_backends.flexiv_xense.simulated.arm import FLANGE, Arm, Load
+from glotouch_backends.flexiv_xense.simulated.arm import FLANGE, Load, SimulatedArm
 from glotouch_backends.flexiv_xense.simulated.vendor_api import (
     EPOCH_S,
     Mode,
@@ -36,7 +36,7 @@ class ControlBox:
         clock: What blocking calls wait on.
     """
 
-    def __init__(self, serial: str, arm: Arm, clock: Clock) -> None:
+    def __init__(self, serial: str, arm: SimulatedArm, clock: Clock) -> None:
         self.serial, self.arm, self.clock = serial, arm, clock
         self.mode = Mode.IDLE
         self.linked = True

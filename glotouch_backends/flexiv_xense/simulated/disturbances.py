@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from glotouch_backends.flexiv_xense.simulated.arm import Arm
+from glotouch_backends.flexiv_xense.simulated.arm import SimulatedArm
 from glotouch_backends.flexiv_xense.simulated.control_box import ControlBox
 from glotouch_backends.flexiv_xense.simulated.vendor_api import GripperLink, PadLink
 from glotouch_backends.mujoco.simulation import MujocoReferee, Simulated
@@ -11,7 +11,7 @@ from glotouch_bt.robot import UnknownName
 COLLISION = 200101  # ours
 
 
-class Disturber(MujocoReferee):
+class DisturbingReferee(MujocoReferee):
     """The referee of a simulated cell, who can also disturb it.
 
     Args:
@@ -48,7 +48,7 @@ class Disturber(MujocoReferee):
         ways[name]()
 
     @property
-    def _arm(self) -> Arm:
+    def _arm(self) -> SimulatedArm:
         return self._box.arm
 
     def _fault(self) -> None:

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from glotouch_backends.mujoco import Truth
-from glotouch_backends.mujoco.control import JawReports, Jaws
+from glotouch_backends.mujoco.control import JawReports, JawServo
 from glotouch_backends.mujoco.model import STEP_S, STEPS, Handles, handle_mesh
 from glotouch_backends.mujoco.sensing import Tactile
 from glotouch_bt.robot import Array, Conditions, GripperState, GripperTarget, RobotDescription, TactileFrame, World
@@ -27,8 +27,8 @@ class JawStatus(NamedTuple):
     force_N: float
 
 
-class Hand:
-    """Jaws and pads, stepped by the world once a period.
+class SimulatedHand:
+    """JawTarget and pads, stepped by the world once a period.
 
     Args:
         description, conditions, seed, world, truth: As for the MuJoCo backend.
@@ -53,7 +53,7 @@ class Hand:
         self._s = handles.sensors
         self.gripper = description.gripper
         self._aperture = aperture = float(data.qpos[handles.jaw_qpos].sum())
-        self._jaws = Jaws(model, handles, self.gripper, aperture)
+        self._jaws = JawServo(model, handles, self.gripper, aperture)
         self._rows = np.zeros((STEPS, 2))
         surfaces = [(b, o.mesh) for b, o in zip(handles.object_bodies, truth.objects, strict=True)]
         surfaces.insert(0, (handles.probe_body, handle_mesh(world.probe)))

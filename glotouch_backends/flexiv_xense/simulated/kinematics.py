@@ -24,7 +24,7 @@ def rotation_between(goal: Array, now: Array) -> Array:
     return np.asarray(axis * (np.arctan2(sine, cosine) / sine))
 
 
-class Kinematics:
+class ControllerKinematics:
     """Of the pads' mid-point P, on a scratch copy of the world.
 
     Args:

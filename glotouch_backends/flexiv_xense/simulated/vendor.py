@@ -9,7 +9,7 @@ from typing import Any
 
 from glotouch_backends.flexiv_xense.driver import Clock, SteppedClock
 from glotouch_backends.flexiv_xense.simulated.control_box import ControlBox
-from glotouch_backends.flexiv_xense.simulated.disturbances import Disturber
+from glotouch_backends.flexiv_xense.simulated.disturbances import DisturbingReferee
 from glotouch_backends.flexiv_xense.simulated.vendor_api import GripperLink, PadLink, flexivrdk, xensegripper, xensesdk
 from glotouch_backends.flexiv_xense.simulated.world import SimulatedWorld
 
@@ -40,7 +40,7 @@ class SimulatedVendor:
     def referee(self, question: bytes) -> bytes:
         """Ask the world's referee (or disturber): a pickled (method, arguments) in, the pickled result out."""
         method, arguments = pickle.loads(question)
-        referee = Disturber(self.world, self.box, self.gripper, self.pads)
+        referee = DisturbingReferee(self.world, self.box, self.gripper, self.pads)
         return pickle.dumps(getattr(referee, method)(*arguments))
 
 

@@ -9,12 +9,12 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from glotouch_backends.flexiv_xense.simulated.arm import Arm
-from glotouch_backends.flexiv_xense.simulated.hand import Hand
-from glotouch_backends.mujoco import HELD_DISTANCE_M, build_world
+from glotouch_backends.flexiv_xense.simulated.arm import SimulatedArm
+from glotouch_backends.flexiv_xense.simulated.hand import SimulatedHand
+from glotouch_backends.mujoco import MAX_HELD_DISTANCE_M, build_world
 from glotouch_backends.mujoco.control import check_sane
 from glotouch_backends.mujoco.model import STEP_S, STEPS
-from glotouch_backends.mujoco.simulation import Trace
+from glotouch_backends.mujoco.simulation import ControlTrace
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import BackendError, Conditions, RobotDescription, World
 
@@ -40,10 +40,10 @@ class SimulatedWorld:
     ) -> None:
         self.world, self.conditions, self.seed, self.description = world, conditions, seed, description
         self.truth, self.model, self.data, self.handles = build_world(description, world, conditions, seed, options)
-        self.trace: Trace | None = None
+        self.trace: ControlTrace | None = None
         self.peak_force_N = 0.0
-        self.arm = Arm(description, conditions, seed, self.model, self.data, self.handles)
-        self.hand = Hand(description, conditions, seed, world, self.truth, self.model, self.data, self.handles)
+        self.arm = SimulatedArm(description, conditions, seed, self.model, self.data, self.handles)
+        self.hand = SimulatedHand(description, conditions, seed, world, self.truth, self.model, self.data, self.handles)
         self.steps = 0
         h = self.handles
         self._ctrl = np.array(self.data.ctrl)
@@ -110,6 +110,6 @@ class SimulatedWorld:
         """Largest true contact force so far, on the hand and on the probe while it is in the hand."""
         h = self.handles
         gap = self.data.xpos[h.probe_body] - self._samples[-1, h.sensors.position]
-        self._counted[3] = float(gap @ gap) < HELD_DISTANCE_M**2
+        self._counted[3] = float(gap @ gap) < MAX_HELD_DISTANCE_M**2
         force = (self._counted @ self._external)[:, 3:]
         self.peak_force_N = max(self.peak_force_N, float((force * force).sum(axis=1).max()) ** 0.5)

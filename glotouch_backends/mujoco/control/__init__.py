@@ -1,17 +1,17 @@
 """TODO door of glotouch_backends/mujoco/control."""
 
-from glotouch_backends.mujoco.control.jaws import JawReports, Jaws
+from glotouch_backends.mujoco.control.jaws import JawReports, JawServo
 from glotouch_backends.mujoco.control.requests import PAYLOAD_S, PendingPayload, PendingTare
-from glotouch_backends.mujoco.control.safety import CHUNK, Guard, check_sane, silence_mujoco
+from glotouch_backends.mujoco.control.safety import CHUNK, HardLimitGuard, check_sane, silence_mujoco
 from glotouch_backends.mujoco.control.servo import BRAKE_REACH_M, Servo, hermite
 
 __all__ = [
     "BRAKE_REACH_M",
     "CHUNK",
     "PAYLOAD_S",
-    "Guard",
+    "HardLimitGuard",
     "JawReports",
-    "Jaws",
+    "JawServo",
     "PendingPayload",
     "PendingTare",
     "Servo",

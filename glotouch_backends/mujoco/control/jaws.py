@@ -16,7 +16,7 @@ MOVING_M_S = 0.002  # aperture rate above which the jaws are reported as moving
 WINDUP_M = 0.001  # how far the ramp may lead the jaws beyond what the force limit needs
 
 
-class Jaws:
+class JawServo:
     """Ramps both jaws' servo commands towards the target and limits their force through the actuators' force range."""
 
     def __init__(self, model: mujoco.MjModel, handles: Handles, gripper: Gripper, aperture_m: float) -> None:

@@ -13,7 +13,7 @@ from glotouch_bt.robot import Array, BackendError, Limits, SafetyStop
 CHUNK = 5  # consecutive samples that must all be beyond the limit; also how often it is looked at
 
 
-class Guard:
+class HardLimitGuard:
     """Looks at every chunk of raw wrench samples; once tripped it stays tripped."""
 
     def __init__(self, limits: Limits) -> None:
@@ -21,7 +21,7 @@ class Guard:
         self._scale = np.array([1.0 / limits.hard_force_N] * 3 + [1.0 / limits.hard_torque_Nm] * 3)
         self.tripped: SafetyStop | None = None
 
-    def look(self, contact: Array, stamp_s: float) -> bool:
+    def check(self, contact: Array, stamp_s: float) -> bool:
         """Check a chunk (n, 6) of contact wrenches ending at `stamp_s`; True if a limit tripped now."""
         scaled = (contact * self._scale).ravel()
         if scaled @ scaled < 1.0:  # not one sample can be beyond a limit

@@ -9,7 +9,7 @@ from glotouch_backends.mujoco.model import DAMPING_PER_STIFFNESS_S, JOINT_DAMPIN
 from glotouch_bt.robot import Array, JointSetpoint, ParamError, RobotDescription
 
 BRAKE_REACH_M = 0.8  # the hand's distance from the axes, to turn a Cartesian deceleration into a joint one
-GREATEST_RAD_S2 = 1e3  # a feed-forward acceleration beyond this is a mistake
+MAX_ACCELERATION_RAD_S2 = 1e3  # a feed-forward acceleration beyond this is a mistake
 VELOCITY_SLACK = 1.02  # of the implied velocity between setpoints, for rounding
 
 
@@ -52,7 +52,7 @@ class Servo:
         # Rows: q, dq, ddq, implied velocity. |value - middle| <= half; false for NaN.
         self._middle = np.stack([0.5 * (lower + upper), np.zeros(n), np.zeros(n), np.zeros(n)])
         self._half = np.stack(
-            [0.5 * (upper - lower) + 1e-9, fastest, np.full(n, GREATEST_RAD_S2), VELOCITY_SLACK * fastest]
+            [0.5 * (upper - lower) + 1e-9, fastest, np.full(n, MAX_ACCELERATION_RAD_S2), VELOCITY_SLACK * fastest]
         )
         self._names = [j.name for j in joints]
         kp = np.array(STIFFNESS_NM_RAD)

@@ -15,7 +15,7 @@ SKIN_M = 0.001
 """Points deeper inside the solid than this belong to a crack between two hulls, not to the outer skin."""
 
 
-def inside_m(points: Array, hulls: Sequence[Array]) -> Array:
+def depth_inside_m(points: Array, hulls: Sequence[Array]) -> Array:
     """Depth (n,) of each point inside the nearest hull; outside negative, a lower bound of the gap."""
     depth = np.full(len(points), -np.inf)
     for hull in hulls:
@@ -46,7 +46,7 @@ def bulge_m(mesh: Mesh, hulls: Sequence[Array], samples: int = 20_000) -> Array:
 
     Returns:
         (n,) distances from the true surface in m, n <= samples; 0 where the union lies within the solid (how far it
-        falls short is measured by `inside_m` of points of the true surface).
+        falls short is measured by `depth_inside_m` of points of the true surface).
     """
     shells = [trimesh.convex.convex_hull(h) for h in hulls]
     area = np.array([s.area for s in shells])
@@ -58,7 +58,7 @@ def bulge_m(mesh: Mesh, hulls: Sequence[Array], samples: int = 20_000) -> Array:
     hidden = np.zeros(len(points), dtype=bool)
     for i, hull in enumerate(hulls):
         others = (owner != i) & ~hidden
-        hidden[others] = inside_m(points[others], [hull]) >= 1e-6
+        hidden[others] = depth_inside_m(points[others], [hull]) >= 1e-6
     found = points[~hidden]
     distance = surface_distance_m(found, mesh)
     inside = mesh.as_trimesh().contains(found)

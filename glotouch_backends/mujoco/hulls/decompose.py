@@ -30,12 +30,12 @@ from pathlib import Path
 
 import numpy as np
 
-from glotouch_backends.mujoco.hulls.bulge import bulge_m, inside_m
+from glotouch_backends.mujoco.hulls.bulge import bulge_m, depth_inside_m
 from glotouch_backends.mujoco.hulls.convex_parts import trimmed_hull
 from glotouch_backends.mujoco.hulls.feet import foot_centres
 from glotouch_backends.mujoco.hulls.files import Parts, locked, package_file, read_parts, user_folder, write_parts
 from glotouch_backends.mujoco.hulls.shells import shell_labels
-from glotouch_backends.mujoco.hulls.thinning import thinned
+from glotouch_backends.mujoco.hulls.simplify import simplified
 from glotouch_bt.robot import Array, BadInput, frozen_array
 from glotouch_bt.robot.scene import Mesh, load_folder
 
@@ -46,7 +46,7 @@ MAX_VERTICES = 256
 """Of one hull. With 64 an apple's one large part falls 0.6 mm (p95) short of its surface, with 256 0.1 mm; MuJoCo walks
 the hull's graph, so that the step does not get slower."""
 TOLERANCE_M = 0.0001
-WORST_GAP_M = 0.002
+MAX_GAP_M = 0.002
 """No vertex of the mesh may lie further outside every hull than this, or the decomposition is refused."""
 _POLL_S = 10.0
 
@@ -159,7 +159,7 @@ def decompose(mesh: Mesh, progress: Progress | None = None) -> Parts:
         try:
             hulls = _trim(_run_coacd(mesh, attempt, say))
             _check(mesh, hulls)
-        except _Failed as e:
+        except _CutFailed as e:
             say(f"{mesh.name}: cutting failed ({e}); trying a coarser way")
             continue
         return Parts(hulls, note)
@@ -169,7 +169,7 @@ def decompose(mesh: Mesh, progress: Progress | None = None) -> Parts:
     return Parts((hull,), "collision shape is the plain convex hull: cutting failed; repair the mesh for a true one")
 
 
-class _Failed(Exception):
+class _CutFailed(Exception):
     """One attempt gave nothing usable."""
 
 
@@ -181,17 +181,17 @@ def _trim(parts: Sequence[Array]) -> tuple[Array, ...]:
 def _check(mesh: Mesh, hulls: Sequence[Array]) -> None:
     """Every vertex of the mesh is covered, and nothing reaches out of its bounding box."""
     if not hulls:
-        raise _Failed("no part has a volume")
-    gap_m = -float(inside_m(mesh.vertices_m, hulls).min())
-    if gap_m > WORST_GAP_M:
-        raise _Failed(f"the parts leave {gap_m * 1e3:.1f} mm of the surface bare")
+        raise _CutFailed("no part has a volume")
+    gap_m = -float(depth_inside_m(mesh.vertices_m, hulls).min())
+    if gap_m > MAX_GAP_M:
+        raise _CutFailed(f"the parts leave {gap_m * 1e3:.1f} mm of the surface bare")
     points = np.concatenate(hulls)
     beyond_m = max(
         float((mesh.vertices_m.min(axis=0) - points.min(axis=0)).max()),
         float((points.max(axis=0) - mesh.vertices_m.max(axis=0)).max()),
     )
-    if beyond_m > WORST_GAP_M:
-        raise _Failed(f"the parts reach {beyond_m * 1e3:.1f} mm out of the mesh")
+    if beyond_m > MAX_GAP_M:
+        raise _CutFailed(f"the parts reach {beyond_m * 1e3:.1f} mm out of the mesh")
 
 
 def _run_coacd(mesh: Mesh, attempt: Attempt, say: Progress) -> list[Array]:
@@ -199,7 +199,7 @@ def _run_coacd(mesh: Mesh, attempt: Attempt, say: Progress) -> list[Array]:
     worker = Path(__file__).with_name("coacd_worker.py")
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "mesh.npz", Path(folder) / "parts.npz"
-        vertices, faces = thinned(mesh)
+        vertices, faces = simplified(mesh)
         np.savez(source, vertices=vertices, faces=faces, shells=shell_labels(vertices, faces))
         process = subprocess.Popen(
             # -P: without it the worker's own folder is on sys.path, and its files shadow installed modules
@@ -217,13 +217,13 @@ def _run_coacd(mesh: Mesh, attempt: Attempt, say: Progress) -> list[Array]:
                 except subprocess.TimeoutExpired:
                     waited_s += min(_POLL_S, attempt.limit_s - waited_s)
                     if waited_s >= attempt.limit_s:
-                        raise _Failed(f"not done after {attempt.limit_s:.0f} s") from None
+                        raise _CutFailed(f"not done after {attempt.limit_s:.0f} s") from None
                     say(f"{mesh.name}: still cutting, {waited_s:.0f} s")
         finally:
             process.kill()
             process.wait()
         if code != 0 or not target.is_file():
-            raise _Failed(f"CoACD ended with code {code}")
+            raise _CutFailed(f"CoACD ended with code {code}")
         with np.load(target) as data:
             return np.split(data["vertices"], np.cumsum(data["counts"])[:-1])
 

@@ -21,7 +21,7 @@ GROUP_VISUAL, GROUP_COLLISION = 2, 3
 # Time constant s and damping ratio. MuJoCo scales stiffness with the masses that meet: 4 ms is right for light objects,
 # but makes the hand (some 15 kg with the motors' inertia) hit the floor like a hammer: 120 N at 20 mm/s. Its housing is
 # softer: 50 ms against what is fixed; 10 ms against free bodies (solmix weighs the average), some 2 N/mm a contact
-# point, as slender fingers are. Pads have a constant of their own.
+# point, as slender fingers are. PadContacts have a constant of their own.
 STIFF = (0.004, 1.0)
 HOUSING = (0.050, 1.0)
 MIX = {ENVIRONMENT: 1.0, OBJECT: 1000.0, HAND: 150.0, PROBE: 1000.0}

@@ -26,7 +26,7 @@ from glotouch_bt.robot import Holder, ParamError, Pose, Probe
 from glotouch_bt.robot.scene import Mesh
 
 RAIL_HEIGHT_M = 0.003
-BALL_ROOM_M = 0.001  # least room between ball and rail, on each side
+MIN_BALL_CLEARANCE_M = 0.001  # least room between ball and rail, on each side
 LEDGE_M = 0.0015  # how far a rail reaches under the handle
 HANDLE_COLOUR, STEEL_COLOUR, STAND_COLOUR = (0.15, 0.35, 0.65, 1.0), (0.75, 0.77, 0.80, 1.0), (0.3, 0.32, 0.3, 1.0)
 
@@ -82,8 +82,8 @@ def _add_stand(spec: mujoco.MjSpec, probe: Probe, holder: Holder) -> None:
     hx, hy, hz = (0.5 * s for s in probe.handle_m)
     bx, by, bz = holder.half_m
     gap = hx - LEDGE_M  # half width of the slot
-    if gap < probe.tip_radius_m + BALL_ROOM_M:
-        least = 2e3 * (probe.tip_radius_m + BALL_ROOM_M + LEDGE_M)
+    if gap < probe.tip_radius_m + MIN_BALL_CLEARANCE_M:
+        least = 2e3 * (probe.tip_radius_m + MIN_BALL_CLEARANCE_M + LEDGE_M)
         raise ParamError(
             "probe.handle_m[0]", probe.handle_m[0], f">= {least:.0f} mm, or the ball does not pass the stand"
         )

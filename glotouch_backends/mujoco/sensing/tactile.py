@@ -17,8 +17,8 @@ from glotouch_backends.mujoco.sensing.rays import SurfaceRays
 from glotouch_bt.robot import Conditions, Gripper, Pose, TactileFrame
 from glotouch_bt.robot.scene import Mesh, stream
 
-SAME_DISTANCE_M = 1e-5  # the gel is not solved again while pads and forces stay this near the last solution
-SAME_FORCE_N = 0.5
+MAX_SAME_TRAVEL_M = 1e-5  # the gel is not solved again while pads and forces stay this near the last solution
+MAX_SAME_FORCE_N = 0.5
 
 
 def body_pose(data: mujoco.MjData, body: int) -> Pose:
@@ -26,7 +26,7 @@ def body_pose(data: mujoco.MjData, body: int) -> Pose:
     return Pose(data.xpos[body], data.xquat[body])
 
 
-class Pads:
+class PadContacts:
     """Contacts on the two pads, read from the solver at the present step."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, handles: Handles) -> None:
@@ -78,7 +78,7 @@ class Tactile:
         seed: int,
     ) -> None:
         self._data = data
-        self._pads = Pads(model, data, handles)
+        self._pads = PadContacts(model, data, handles)
         self._site = handles.pads_site
         self._gel = GelSensor(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
         self._meshes = dict(surfaces)
@@ -122,8 +122,8 @@ class Tactile:
     def _unchanged(self, jaws: Sequence[float], jaw_forces: Sequence[float]) -> bool:
         left, right, left_N, right_N = self._solved
         return (
-            abs(jaws[0] - left) + abs(jaws[1] - right) < SAME_DISTANCE_M
-            and abs(jaw_forces[0] - left_N) + abs(jaw_forces[1] - right_N) < SAME_FORCE_N
+            abs(jaws[0] - left) + abs(jaws[1] - right) < MAX_SAME_TRAVEL_M
+            and abs(jaw_forces[0] - left_N) + abs(jaw_forces[1] - right_N) < MAX_SAME_FORCE_N
         )
 
     def arrived(self, now_s: float, wanted: bool) -> TactileFrame | None:

@@ -9,7 +9,7 @@ from glotouch_bt.robot import Array, Conditions, RobotDescription
 from glotouch_bt.robot.scene import stream
 
 GRAVITY_M_S2 = 9.81
-BLOCKS = 128  # noise is drawn for this many periods at a time
+NOISE_BLOCKS = 128  # noise is drawn for this many periods at a time
 
 
 def weight_matrix(mass_kg: float, com_S_m: Array) -> Array:
@@ -66,8 +66,8 @@ class WristSensor:
         self._walk_sd = conditions.force_drift_N_per_sqrt_min * float(np.sqrt(STEP_S / 60.0))
         self._walk = np.zeros(3)
         self._noisy = bool(self._sd.any() or self._walk_sd > 0)
-        self._noise = np.zeros((BLOCKS, steps, 6))
-        self._block = BLOCKS
+        self._noise = np.zeros((NOISE_BLOCKS, steps, 6))
+        self._block = NOISE_BLOCKS
         self._measured = np.zeros((steps, 6))
         self._renew()
 
@@ -116,7 +116,7 @@ class WristSensor:
         out = self._measured
         np.subtract(self._line[: self._steps], matrix @ up + constant, out=out)
         if self._noisy:
-            if self._block == BLOCKS:
+            if self._block == NOISE_BLOCKS:
                 self._draw()
             out += self._noise[self._block]
             self._block += 1
@@ -128,11 +128,11 @@ class WristSensor:
         return self._bias
 
     def _draw(self) -> None:
-        n = BLOCKS * self._steps
+        n = NOISE_BLOCKS * self._steps
         noise = self._rng.standard_normal((n, 9))
         walk = self._walk + np.cumsum(self._walk_sd * noise[:, 6:], axis=0)
         self._walk = walk[-1]
         noise[:, :6] *= self._sd
         noise[:, :3] += walk
-        self._noise[:] = noise[:, :6].reshape(BLOCKS, self._steps, 6)
+        self._noise[:] = noise[:, :6].reshape(NOISE_BLOCKS, self._steps, 6)
         self._block = 0

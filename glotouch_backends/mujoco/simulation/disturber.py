@@ -1,6 +1,7 @@
 """Hands inside the simulated world, for faults: they change MuJoCo's state between two cycles.
 
-They move nothing through the robot: `Room` is asked first, and what has none is left as it is (`NoRoom`).
+They move nothing through the robot: `MotionClearance` is asked first, and what has none is left as it is
+    (`PathBlocked`).
 """
 
 from __future__ import annotations
@@ -13,16 +14,16 @@ import numpy as np
 
 from glotouch_backends.mujoco.model import Handles
 from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, body_pose
-from glotouch_backends.mujoco.simulation.room import Room
+from glotouch_backends.mujoco.simulation.clearance import MotionClearance
 from glotouch_backends.mujoco.truth import Truth, rotation_vector
 from glotouch_bt.robot import Array, BadInput, Pose, World
 
-AWAY_B_M = (-0.7, 0.8)
+PARKING_B_M = (-0.7, 0.8)
 """On the table, out of the arm's way; removed objects stand there in a row."""
-AWAY_STEP_M = 0.25
+PARKING_STEP_M = 0.25
 LIFT_M = 0.002
 """What is put down is put down from so high."""
-WAY_STEP_M, TURN_STEP_RAD = 0.002, np.deg2rad(5.0)
+PATH_STEP_M, TURN_STEP_RAD = 0.002, np.deg2rad(5.0)
 """How finely a way is looked at: the probe's shaft is three times as thick as the first."""
 MIN_FRICTION = 0.3
 """A knocked object slides no farther than with this coefficient."""
@@ -43,7 +44,7 @@ class MujocoDisturber:
 
     def __init__(self, robot: Disturbed) -> None:
         self._robot = robot
-        self._room = Room(robot)
+        self._clearance = MotionClearance(robot)
         self._from: dict[int, Pose] = {}
 
     def places_B_m(self) -> Array:
@@ -56,9 +57,9 @@ class MujocoDisturber:
         body = r.handles.object_bodies[index]
         speed = float(np.linalg.norm(velocity))
         far = velocity * speed / (2.0 * MIN_FRICTION * GRAVITY_M_S2)
-        pose, count = self._pose(index), int(np.ceil(np.linalg.norm(far) / WAY_STEP_M))
+        pose, count = self._pose(index), int(np.ceil(np.linalg.norm(far) / PATH_STEP_M))
         steps = np.linspace(0.0, 1.0, count + 1)[1:, None] * np.array([*far, 0.0])
-        self._room.require({body}, [{body: Pose(pose.position_m + s, pose.quat)} for s in steps], rests=False)
+        self._clearance.require({body}, [{body: Pose(pose.position_m + s, pose.quat)} for s in steps], rests=False)
         r.data.qvel[self._dof(index)][:2] += velocity
 
     def topple(self, index: int, about_rad: float) -> float:
@@ -78,17 +79,17 @@ class MujocoDisturber:
             return Pose(at.position_m + np.array([0.0, 0.0, rise]), quat)
 
         angles = np.linspace(0.0, 0.5 * np.pi, round(0.5 * np.pi / TURN_STEP_RAD) + 1)[1:]
-        self._room.require({body}, [{body: turned(float(a))} for a in angles])
+        self._clearance.require({body}, [{body: turned(float(a))} for a in angles])
         self._place(index, turned(0.5 * np.pi))
         return float(np.linalg.norm(r.data.xipos[body] - before))
 
     def remove(self, index: int) -> None:
         """See `Disturber`."""
         r, pose = self._robot, self._pose(index)
-        self._room.require({r.handles.object_bodies[index]})
+        self._clearance.require({r.handles.object_bodies[index]})
         self._from[index] = pose
         table_z = float(r.world.container.pose_B_K.position_m[2]) - r.world.container.wall_m
-        place = np.array([AWAY_B_M[0], AWAY_B_M[1] - AWAY_STEP_M * index, 0.0])
+        place = np.array([PARKING_B_M[0], PARKING_B_M[1] - PARKING_STEP_M * index, 0.0])
         away = Pose(place, pose.quat)
         self._place(index, Pose(place + np.array([0.0, 0.0, table_z + LIFT_M - self._lowest(index, away)]), pose.quat))
 
@@ -97,7 +98,7 @@ class MujocoDisturber:
         was = self._from[index]
         there = Pose(was.position_m + np.array([0.0, 0.0, LIFT_M]), was.quat)
         body = self._robot.handles.object_bodies[index]
-        self._room.require({body}, [{body: there}])
+        self._clearance.require({body}, [{body: there}])
         del self._from[index]
         self._place(index, there)
 
@@ -105,7 +106,7 @@ class MujocoDisturber:
         """See `Disturber`."""
         r = self._robot
         old, body = r.truth.pose_B_K, r.handles.container_body
-        away, held = set(self._from), self._room.held()
+        away, held = set(self._from), self._clearance.held()
         inside = [i for i, b in enumerate(r.handles.object_bodies) if i not in away and b not in held]
         places = {i: self._pose(i) for i in inside}
 
@@ -118,18 +119,18 @@ class MujocoDisturber:
 
         interior = r.world.container.interior_m
         longest = float(np.linalg.norm(shift_B_m)) + abs(yaw_rad) * 0.5 * float(np.hypot(interior[0], interior[1]))
-        count = max(1, int(np.ceil(longest / WAY_STEP_M)))
+        count = max(1, int(np.ceil(longest / PATH_STEP_M)))
         way = [{body: new, **poses} for new, poses in (moved(float(s)) for s in np.linspace(0.0, 1.0, count + 1)[1:])]
-        self._room.require({body, *(r.handles.object_bodies[i] for i in inside)}, way, container=True)
+        self._clearance.require({body, *(r.handles.object_bodies[i] for i in inside)}, way, container=True)
         new, _ = moved(1.0)
         change = new @ old.inverse()
         r.model.body_pos[body], r.model.body_quat[body] = new.position_m, new.quat
-        self._take_up_static_bodies()
+        self._refresh_static_bodies()
         r.truth = replace(r.truth, pose_B_K=new)
         for index in inside:
             self._place(index, change @ places[index])
 
-    def _take_up_static_bodies(self) -> None:
+    def _refresh_static_bodies(self) -> None:
         """MuJoCo computes where bodies without joints stand once, when its data are made or reset."""
         model, data = self._robot.model, self._robot.data
         fresh = mujoco.MjData(model)

@@ -10,13 +10,13 @@ from scipy.spatial import ConvexHull
 
 from glotouch_backends.mujoco.model import Handles
 from glotouch_backends.mujoco.sensing import body_pose
-from glotouch_backends.mujoco.simulation.trace import Trace
+from glotouch_backends.mujoco.simulation.control_trace import ControlTrace
 from glotouch_backends.mujoco.truth import Truth
 from glotouch_bt.robot import Array, Pose, World
 from glotouch_bt.robot.simulation import BareSteps, TrueObject
 
-STOWED_M = 0.005  # the handle's centre this near its place in the stand
-STOWED_TILT = 0.996  # cosine of 5 degrees
+MAX_STOWED_OFFSET_M = 0.005  # the handle's centre this near its place in the stand
+MIN_STOWED_COSINE = 0.996  # cosine of 5 degrees
 
 
 class Simulated(Protocol):
@@ -28,7 +28,7 @@ class Simulated(Protocol):
     data: mujoco.MjData
     handles: Handles
     peak_force_N: float
-    trace: Trace | None
+    trace: ControlTrace | None
 
 
 class MujocoReferee:
@@ -70,8 +70,8 @@ class MujocoReferee:
         r = self._robot
         stowed = r.world.holder.pose_B_grasp
         now = body_pose(r.data, r.handles.probe_body)
-        near = float(np.linalg.norm(now.position_m - stowed.position_m)) < STOWED_M
-        upright = float(now.rotation[:, 2] @ stowed.rotation[:, 2]) > STOWED_TILT
+        near = float(np.linalg.norm(now.position_m - stowed.position_m)) < MAX_STOWED_OFFSET_M
+        upright = float(now.rotation[:, 2] @ stowed.rotation[:, 2]) > MIN_STOWED_COSINE
         hand = r.handles.hand_bodies
         return near and upright and not any(self._on(r.handles.probe_body, b) for b in range(hand.start, hand.stop))
 

@@ -33,9 +33,9 @@ FIXED: Mapping[str, frozenset[str]] = {
         )
     ),
     "Servo": frozenset(("_model", "_data", "_dof", "_names")),
-    "Jaws": frozenset(("_gripper",)),
+    "JawServo": frozenset(("_gripper",)),
     "WristSensor": frozenset(("_P_in_S",)),
-    "Guard": frozenset(("_limits", "tripped")),
+    "HardLimitGuard": frozenset(("_limits", "tripped")),
     "Tactile": frozenset(("_data", "_pads", "_site", "_gel", "_meshes", "_rays", "_c")),
     "JawReports": frozenset(("_c",)),
 }

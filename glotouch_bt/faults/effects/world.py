@@ -14,7 +14,7 @@ import numpy as np
 
 from glotouch_bt.faults.effects.base import Effect, FaultParams, Scene, param, require_disturber
 from glotouch_bt.robot import Array, Command, Observation
-from glotouch_bt.robot.simulation import NoRoom
+from glotouch_bt.robot.simulation import PathBlocked
 
 Which = Literal["nearest", "farthest", "random"]
 SLIDE_S = 0.5
@@ -64,7 +64,7 @@ class WorldEffect(Effect):
         """Do it, and count it.
 
         Raises:
-            NoRoom: Not now.
+            PathBlocked: Not now.
         """
         raise NotImplementedError
 
@@ -72,7 +72,7 @@ class WorldEffect(Effect):
         now_s = self.scene.sensed.now_s
         try:
             self.act()
-        except NoRoom as e:
+        except PathBlocked as e:
             self._why, self._again_s = str(e), now_s + ASK_AGAIN_S
             return
         if self._why:
@@ -82,15 +82,15 @@ class WorldEffect(Effect):
         """Go in the drawn direction, or in the nearest to it that has room.
 
         Raises:
-            NoRoom: None has; why the first has not.
+            PathBlocked: None has; why the first has not.
         """
-        refused: NoRoom | None = None
+        refused: PathBlocked | None = None
         for k in range(WAYS):
             turn = (k + 1) // 2 * (1 if k % 2 else -1)
             try:
                 go(first_rad + turn * 2.0 * math.pi / WAYS)
                 return
-            except NoRoom as e:
+            except PathBlocked as e:
                 refused = refused or e
         assert refused is not None
         raise refused

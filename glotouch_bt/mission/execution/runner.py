@@ -19,7 +19,7 @@ from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.record import Record, RecordedRequests, Rounding, RunSummary
 from glotouch_bt.mission.tree import BuiltTree, Failure, ReasonBook, build_tree, sensed
 from glotouch_bt.robot import HOLD, Command, GuardTripped, Observation, Robot, World
-from glotouch_bt.robot.supervision import Finding, SupervisionLimits, Supervisor
+from glotouch_bt.robot.supervision import GuardFinding, SupervisionLimits, Supervisor
 from glotouch_bt.skill import Context, Reason, Skill
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def run_mission(
             interrupted.raising = False
             error = watchdog.stuck.error() if watchdog.stuck is not None else e
             if isinstance(error, GuardTripped):
-                supervisor.heed(error)
+                supervisor.trip_by(error)
             outcome.abort(error, error.node if isinstance(error, SkillHung) else loop.node_of(e))
             if isinstance(error, SkillHung):
                 summary.event("stuck", context.observation.now_s, {"node": error.node, "stack": error.stack})
@@ -165,7 +165,7 @@ def run_mission(
     return outcome
 
 
-def _note_finding(summary: RunSummary, finding: Finding) -> None:
+def _note_finding(summary: RunSummary, finding: GuardFinding) -> None:
     data = {"guard": finding.guard, "what": finding.what, "value": finding.value, "limit": finding.limit}
     summary.event("guard", finding.stamp_s, {**data, "node": summary.node, "fatal": finding.fatal})
 

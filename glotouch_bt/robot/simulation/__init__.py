@@ -1,6 +1,6 @@
-"""TODO door of glotouch_bt/robot/simulation."""
+"""Protocols that a simulation offers to scoring (`Referee`) and to faults (`Disturber`); no skill may use them."""
 
-from glotouch_bt.robot.simulation.disturber import Disturber, NoRoom
+from glotouch_bt.robot.simulation.disturber import Disturber, PathBlocked
 from glotouch_bt.robot.simulation.referee import BareSteps, Referee, TrueObject
 
-__all__ = ["BareSteps", "Disturber", "NoRoom", "Referee", "TrueObject"]
+__all__ = ["BareSteps", "Disturber", "PathBlocked", "Referee", "TrueObject"]

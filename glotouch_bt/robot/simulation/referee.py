@@ -1,4 +1,4 @@
-"""The truth of a simulated world, for scoring only. Nothing below `study` and `report` may import this but the seam."""
+"""Interface to the ground truth of a simulated world, for scoring only. Skills and the mission never import it."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from glotouch_bt.robot.geometry import Array, Pose
 
 @dataclass(frozen=True)
 class TrueObject:
-    """One object as it really is.
+    """Ground truth of one object.
 
     Attributes:
         name: STL stem.
         pose_B_O: The mesh frame in B.
         mass_kg: Mass.
-        outline_B_m: (n, 2) convex outline of the mesh as it lies, in B's xy plane.
+        outline_B_m: (n, 2) convex outline of the mesh in its present pose, in the xy plane of B.
         in_gripper: True if both pads touch it and it does not touch the container.
     """
 
@@ -29,12 +29,12 @@ class TrueObject:
 
 @dataclass(frozen=True)
 class BareSteps:
-    """The physics of a run done once more with nothing round it.
+    """Cost of a run's solver steps, repeated with nothing else around them.
 
     Attributes:
         steps: Solver steps.
-        wall_s, cpu_s: What they took on the wall's clock and of the processor.
-        same_end_state: They ended bit for bit where the run ended, so that nothing but its controls moved the world.
+        wall_s, cpu_s: Wall time and processor time of the steps.
+        same_end_state: True if they ended bit-identically to the run, so that only its controls moved the world.
     """
 
     steps: int
@@ -44,32 +44,32 @@ class BareSteps:
 
 
 class Referee(Protocol):
-    """What a simulation backend offers to those who score a run."""
+    """Ground truth that a simulation offers for scoring."""
 
     def objects(self) -> list[TrueObject]:
-        """All objects, now."""
+        """Return the present state of all objects."""
         ...
 
     def pose_B_K(self) -> Pose:
-        """The true container frame in B."""
+        """Return the true container frame in B."""
         ...
 
     def tip_B_m(self) -> Array:
-        """(3,) true centre of the probe's ball, wherever the probe is."""
+        """Return the true centre (3,) of the probe's ball in B."""
         ...
 
     def push_tip(self, force_B_N: Array) -> None:
-        """From now on pull the probe by a force (3,) at the ball's centre, until told otherwise; zero ends it."""
+        """Apply a force (3,) in B to the probe at the ball's centre until the next call; zero ends it."""
         ...
 
     def probe_in_holder(self) -> bool:
-        """True if the probe stands in its holder."""
+        """Return True if the probe stands in its holder."""
         ...
 
     def peak_force_N(self) -> float:
-        """Largest norm of the true contact force on the hand and what it holds, so far."""
+        """Return the largest norm so far of the true contact force on the hand and what it holds."""
         ...
 
     def replay_bare_steps(self) -> BareSteps | None:
-        """Repeat the run's physics in a copy of the world; None unless the backend was opened with `trace`."""
+        """Repeat the run's solver steps in a copy of the world; None unless the backend was opened with `trace`."""
         ...

@@ -1,6 +1,6 @@
-"""TODO door of glotouch_bt/robot/supervision."""
+"""Guards between the mission and the robot: the supervisor, its limits, and one file a kind of guard."""
 
-from glotouch_bt.robot.supervision.limits import Finding, SupervisionLimits
+from glotouch_bt.robot.supervision.limits import GuardFinding, SupervisionLimits
 from glotouch_bt.robot.supervision.supervisor import Supervisor
 
-__all__ = ["Finding", "SupervisionLimits", "Supervisor"]
+__all__ = ["GuardFinding", "SupervisionLimits", "Supervisor"]

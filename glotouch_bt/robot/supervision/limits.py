@@ -1,4 +1,4 @@
-"""What supervision below the tree tolerates: frozen values, each with its source."""
+"""Limits of the guards: frozen values, each with its source."""
 
 from __future__ import annotations
 
@@ -8,65 +8,66 @@ from dataclasses import dataclass, fields
 from glotouch_bt.robot.errors import ParamError
 
 GUARDS = {
-    "not_finite": "a reading that is no number (single samples are dropped)",
-    "stamps": "samples that do not follow each other in time (single samples are dropped)",
-    "samples_missing": "less than a quarter of the samples that a control period has, again and again",
-    "overrun": "control periods that passed without a command while the arm moved, very many or again and again",
-    "joint_range": "a joint measured outside its range",
-    "joint_speed": "a joint measured faster than its limit",
-    "out_of_reach": "a pose that no arm of this size has, or a rotation that is none",
-    "wrench": "a sensed wrench beyond the hard limit, sample after sample",
-    "wrench_stuck": "a noisy wrench sensor of which some or all components stand still",
-    "wrench_noise": "a force that jumps from sample to sample (only put on record)",
+    "not_finite": "a reading is not finite (single samples are dropped)",
+    "stamps": "a sample is not later than the one before it (single samples are dropped)",
+    "samples_missing": "a control period repeatedly has less than a quarter of its samples",
+    "overrun": "control periods pass without a command while the arm moves: too many at once, or too often",
+    "joint_range": "a joint is measured outside its range",
+    "joint_speed": "a joint is measured faster than its limit",
+    "out_of_reach": "a pose beyond the reach of any arm, or a quaternion that is not of unit length",
+    "wrench": "consecutive samples of the wrench are beyond the hard limit",
+    "wrench_stuck": "some or all components of a noisy wrench sensor stand still",
+    "wrench_noise": "the force jumps from sample to sample (only recorded)",
     "following": "the hand is not where it was told to be",
-    "gripper_stale": "the gripper does not report any more",
-    "tactile_stale": "depth maps were asked for and do not come",
-    "tactile_frozen": "noisy depth maps that come again and again",
-    "tactile_dead": "depth maps with hardly a live taxel, or with infinities, again and again",
-    "command": "a setpoint or a jaw target that is not finite, out of range, or a jump",
+    "gripper_stale": "the gripper stopped reporting",
+    "tactile_stale": "requested depth maps do not arrive",
+    "tactile_frozen": "noisy depth maps repeat",
+    "tactile_dead": "depth maps with hardly a live taxel, or with infinities, arrive repeatedly",
+    "command": "a setpoint or a jaw target is not finite, out of range, or a jump",
     "device": "the device or its driver failed",
 }
-"""Every guard by name, with what trips it."""
+"""Condition that trips each guard, by name."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SupervisionLimits:
-    """Limits of the guards; the joints' own, the hard wrench and the speeds are the robot's (`Limits`, `Joint`).
+    """Limits of the guards. The joints' limits, the hard wrench and the speeds are those of the robot (`Limits`,
+    `Joint`).
 
     Attributes:
-        joint_slack_rad: A joint may be measured so far beyond its range. Source: ours, 1 degree: a setpoint at the
-            stop and the servo's error.
-        speed_slack: Measured against allowed joint speed. Source: ours; differentiated encoders are noisy.
-        reach_m: No part of the hand is farther from the base. Source: twice the reach of the largest supported arm.
-        start_rad: After a hold, a setpoint may begin so far from where a joint is measured. Source: ours, 3 degrees.
-        wrench_samples: Samples in a row beyond the hard wrench limit. Source: that of the simulated backend's own
-            guard, 5 ms: what is shorter is the sensor's noise or the ringing of a stop.
-        following_m, following_rad: Largest distance of the hand from where it was told to be, and angle. The hand's,
-            not the joints': a device that is sent poses finds its own posture for them. Source: ten times what was
-            measured in a whole retrieval (harsh, MuJoCo): 0.5 mm at 8 N, 0.003 rad.
-        touching_N, touching_m: While at least this force is sensed, the hand may only be so far from there: a servo
-            that does not follow presses more with every millimetre. Source: twice what whole retrievals show beyond
-            4 N (MuJoCo, nominal: 0.8 mm, in one that pressed sideways with 11 N 1.7 mm).
-        lag_s: It may be where it was told to be so long ago. Source: ours, driver 30 ms (its hold) and servo, doubled.
-        command_slack: Commanded against allowed speeds. Source: ours, rounding and the end of a profile.
-        gripper_age_s, tactile_age_s: Oldest report, and longest wait for a depth map that was asked for. Source:
-            `Limits.max_age_s`, five times the slowest gripper of CONDITIONS, twice its slowest depth maps.
-        stuck_s: Bit-identical wrench samples for so long. Source: ours, a third of the shortest rest a probing skill
-            listens at (120 ms).
-        noisy_s: A sensor counts as noisy after so long without one repeated or (`noise_N`) unchanged force: only then
-            may it be called stuck. Noise-free simulations never get there. Source: ours.
-        noise_N: A change between two periods that is less is no noise. Source: ours, a fiftieth of the force sensors'
-            resolution.
-        max_noise_N, noise_over_s: Mean jump of a force component from sample to sample, over so long. Source: three
-            times that of harsh CONDITIONS (0.15 N sd jump by 0.17 N).
-        live_taxels: Least share of a pad that gives numbers. Source: harsh CONDITIONS have 3 % dead; half of a pad
-            cannot be matched.
-        late_periods: The arm may wait for so many periods while it moves, and samples of so many may be missing within
-            `window_s`. Source: that of the watchdog (0.25 s). The device holds by itself meanwhile (the driver after
-            30 ms), and looks at the hard limit.
-        held_periods: A wait of so many periods has made the device hold. Source: the driver does after 30 ms. Shorter
-            ones are only put on record.
-        tolerated: Findings of one transient kind within `window_s` that are only put on record.
+        joint_slack_rad: Distance by which a joint may be measured beyond its range. Source: ours, 1 degree: a setpoint
+            at the limit plus the servo's error.
+        speed_slack: Measured over allowed joint speed. Source: ours; differentiated encoders are noisy.
+        reach_m: Largest distance of the hand from the base. Source: twice the reach of the largest supported arm.
+        start_rad: After a hold, largest distance of a setpoint from the measured joint. Source: ours, 3 degrees.
+        wrench_samples: Consecutive samples beyond the hard wrench limit that trip the guard. Source: the simulated
+            backend's own limit, 5 ms; shorter peaks are noise or the ringing of a stop.
+        following_m, following_rad: Largest distance and angle between the hand's measured and commanded pose. The
+            joints
+            are not compared: a device that is sent poses chooses its own posture. Source: ten times the values measured
+            in a whole retrieval (harsh, MuJoCo): 0.5 mm at 8 N, 0.003 rad.
+        touching_N, touching_m: Above this force only this distance is allowed, because a servo that does not follow
+            presses harder with every millimetre. Source: twice the distance measured in whole retrievals beyond 4 N
+            (MuJoCo, nominal: 0.8 mm; 1.7 mm in one that pressed sideways with 11 N).
+        lag_s: The hand may be where it was commanded to be this long ago. Source: ours, the driver's 30 ms hold and the
+            servo's lag, doubled.
+        command_slack: Commanded over allowed speed. Source: ours, rounding and the end of a profile.
+        gripper_age_s, tactile_age_s: Oldest gripper report, longest wait for a requested depth map. Source:
+            `Limits.max_age_s`; five times the slowest gripper of CONDITIONS, twice its slowest depth maps.
+        stuck_s: Duration of bit-identical wrench samples. Source: ours, a third of the shortest rest at which a probing
+            skill averages the force (120 ms).
+        noisy_s: A sensor counts as noisy after this time without a repeated or (`noise_N`) unchanged force; only a
+            noisy sensor can be stuck. Noise-free simulations never reach it. Source: ours.
+        noise_N: A smaller change between two periods is not noise. Source: ours, a fiftieth of the sensors' resolution.
+        max_noise_N, noise_over_s: Mean jump of a force component from sample to sample, over this time. Source: three
+            times that of harsh CONDITIONS (noise of 0.15 N sd jumps by 0.17 N).
+        live_taxels: Smallest share of a pad that delivers numbers. Source: harsh CONDITIONS have 3 % dead taxels; half
+            of a pad cannot be matched.
+        late_periods: Longest wait of a moving arm, and most missing samples within `window_s`, in periods. Source: the
+            watchdog's 0.25 s. The device meanwhile holds (the driver after 30 ms) and enforces the hard limit.
+        held_periods: Wait after which the device has held by itself. Source: the driver's 30 ms. Shorter waits are only
+            recorded.
+        tolerated: Findings of one transient kind within `window_s` that are only recorded.
         window_s: See `tolerated`.
     """
 
@@ -102,16 +103,16 @@ class SupervisionLimits:
 
 
 @dataclass(frozen=True)
-class Finding:
-    """What a guard found.
+class GuardFinding:
+    """One finding of a guard.
 
     Attributes:
         guard: A key of `GUARDS`.
-        what: One clause, with units and what is valid.
-        value: What was found.
+        what: One clause with units and the valid range.
+        value: The offending value.
         limit: What it passed.
         stamp_s: Robot clock.
-        fatal: It ends the mission; else it is only put on record.
+        fatal: True if it ends the mission, False if it is only recorded.
     """
 
     guard: str
@@ -122,15 +123,15 @@ class Finding:
     fatal: bool = True
 
 
-class Patience:
-    """Counts findings of one transient kind; patience ends when too many came within the window."""
+class TransientCounter:
+    """Count transient findings of each guard within a sliding window."""
 
     def __init__(self, limits: SupervisionLimits) -> None:
         self._most, self._window_s = limits.tolerated, limits.window_s
         self._stamps: dict[str, list[float]] = {}
 
-    def ends(self, guard: str, stamp_s: float, count: int = 1) -> bool:
-        """Take `count` findings of a guard; True if there are too many of them now."""
+    def exceeded(self, guard: str, stamp_s: float, count: int = 1) -> bool:
+        """Add `count` findings of a guard; return True if there are too many within the window."""
         recent = [s for s in self._stamps.get(guard, ()) if 0.0 <= stamp_s - s < self._window_s]
         recent += [stamp_s] * count
         self._stamps[guard] = recent

@@ -1,10 +1,10 @@
-"""Supervision below the tree: a robot around any robot that holds it within one period when something is wrong.
+"""Wrap a robot so that a guard holds the arm within one control period when something is wrong.
 
-    Supervisor(FaultInjector(backend robot))      what is injected passes by the guards, as what a device does would
+    Supervisor(FaultInjector(backend robot))      injected faults pass the guards, like those of a device
 
-Every command is looked at before it is sent, every block before anyone else sees it. What is wrong for good holds the
-arm and raises; from then on every cycle only holds and raises again. What is transient (a sample that is no number, a
-late block) is taken out or let pass a declared number of times. Both go on record.
+The supervisor checks every command before it is sent and every block before anyone reads it. A fatal finding holds the
+arm and raises; every later cycle holds and raises again. A transient finding (a sample that is not finite, a late
+block) is dropped or tolerated a limited number of times. Both are recorded.
 """
 
 from __future__ import annotations
@@ -16,41 +16,41 @@ from glotouch_bt.robot.command import HOLD, Command, Request, Ticket
 from glotouch_bt.robot.errors import BackendError, GuardTripped, SafetyStop, StaleReading
 from glotouch_bt.robot.interface import Robot, Snapshot
 from glotouch_bt.robot.observation import Observation
-from glotouch_bt.robot.supervision.command import CommandWatch
-from glotouch_bt.robot.supervision.limits import Finding, SupervisionLimits
-from glotouch_bt.robot.supervision.state import SensedWatch
+from glotouch_bt.robot.supervision.command import CommandGuard
+from glotouch_bt.robot.supervision.limits import GuardFinding, SupervisionLimits
+from glotouch_bt.robot.supervision.readings import ReadingsGuard
 
-RECORDED = 20
-"""So many findings of one guard are put on record one by one; of more, only that there were more (at the end)."""
+MAX_RECORDED = 20
+"""Record this many findings of one guard one by one; `Supervisor.counts` counts the rest."""
 
 
 class Supervisor(Robot):
-    """See the module's text.
+    """A robot with guards around it.
 
     Args:
         robot: Any robot.
-        rules: What is tolerated.
+        rules: Limits of the guards.
 
     Attributes:
-        on_finding: Called with every finding (the first `RECORDED` of each guard); set by who keeps the record.
-        counts: Findings by guard, all of them.
+        on_finding: Called with every recorded finding (the first `MAX_RECORDED` of each guard); set by the recorder.
+        counts: Number of findings by guard, recorded or not.
     """
 
     def __init__(self, robot: Robot, rules: SupervisionLimits | None = None) -> None:
         self._robot = robot
         self.description, self.limits, self.period_s = robot.description, robot.limits, robot.period_s
-        self.rules = SupervisionLimits() if rules is None else rules
-        self.on_finding: Callable[[Finding], None] = lambda _: None
+        self.guard_limits = SupervisionLimits() if rules is None else rules
+        self.on_finding: Callable[[GuardFinding], None] = lambda _: None
         self.counts: dict[str, int] = {}
         self._lock = threading.RLock()
         self._newest = first = robot.observe()
-        self._commands = CommandWatch(self.description, self.limits, self.period_s, self.rules, first)
-        self._sensed = SensedWatch(self.description, self.limits, self.period_s, self.rules, first)
+        self._commands = CommandGuard(self.description, self.limits, self.period_s, self.guard_limits, first)
+        self._sensed = ReadingsGuard(self.description, self.limits, self.period_s, self.guard_limits, first)
         self._error: BackendError | None = None
 
     @property
     def inner(self) -> Robot:
-        """What it watches."""
+        """The supervised robot."""
         return self._robot
 
     @property
@@ -59,7 +59,7 @@ class Supervisor(Robot):
         return self._robot.paced
 
     def observe(self) -> Observation:
-        """The newest block that passed."""
+        """Return the newest block that passed the guards."""
         return self._newest
 
     def cycle(self, command: Command) -> Observation:
@@ -70,20 +70,20 @@ class Supervisor(Robot):
             BackendError: As the robot itself raises them.
         """
         if self._error is not None:
-            self._hold_on()
+            self._hold_one_period()
             raise self._error
-        if (wrong := self._commands.look(command, self._newest)) is not None:
+        if (wrong := self._commands.check(command, self._newest)) is not None:
             raise self._trip(wrong)
-        self._sensed.told(command)
+        self._sensed.on_command(command)
         try:
             with self._lock:
                 observation = self._robot.cycle(command)
         except BackendError as e:
-            self._lost(e)
+            self._on_device_error(e)
             raise
-        observation, found = self._sensed.look(observation)
-        if found:
-            self._report(found)
+        observation, findings = self._sensed.check(observation)
+        if findings:
+            self._report(findings)
         self._newest = observation
         return observation
 
@@ -93,7 +93,7 @@ class Supervisor(Robot):
 
     def hold(self) -> None:
         """See `Robot`; also from another thread, between two cycles."""
-        if self._lock.acquire(timeout=self.period_s):  # who cycles will find out by itself
+        if self._lock.acquire(timeout=self.period_s):  # else a cycle is under way and notices by itself
             try:
                 self._robot.hold()
             finally:
@@ -104,7 +104,7 @@ class Supervisor(Robot):
         self._robot.close()
 
     def snapshot(self) -> Snapshot | None:
-        """That of what it watches: guards begin anew."""
+        """Return the snapshot of the supervised robot; the guards keep no state in it."""
         return self._robot.snapshot()
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -112,37 +112,37 @@ class Supervisor(Robot):
         self._robot.restore(snapshot)
         self._error = None
         self._newest = newest = self._robot.observe()
-        self._commands.forget(newest)
-        self._sensed.forget(newest)
+        self._commands.reset(newest)
+        self._sensed.reset(newest)
 
-    def heed(self, error: GuardTripped) -> None:
-        """A guard above this one, a skill's own, tripped: hold from now on; it is put on record as our own are."""
+    def trip_by(self, error: GuardTripped) -> None:
+        """Hold from now on because a guard above this robot (a skill's own) tripped; record it like one of ours."""
         if error is not self._error:
             self._robot.hold()
             self._error = error
-            self._note(Finding(error.guard, error.what, error.value, error.limit, error.stamp_s))
+            self._record(GuardFinding(error.guard, error.what, error.value, error.limit, error.stamp_s))
 
-    def _report(self, found: list[Finding]) -> None:
-        for finding in found:
+    def _report(self, findings: list[GuardFinding]) -> None:
+        for finding in findings:
             if finding.fatal:
                 raise self._trip(finding)
-            self._note(finding)
+            self._record(finding)
 
-    def _note(self, finding: Finding) -> None:
+    def _record(self, finding: GuardFinding) -> None:
         count = self.counts[finding.guard] = self.counts.get(finding.guard, 0) + 1
-        if count <= RECORDED or finding.fatal:
+        if count <= MAX_RECORDED or finding.fatal:
             self.on_finding(finding)
 
-    def _trip(self, finding: Finding) -> GuardTripped:
-        """Hold, put on record, and the error to raise from now on."""
+    def _trip(self, finding: GuardFinding) -> GuardTripped:
+        """Hold, record the finding, and return the error to raise from now on."""
         self._robot.hold()
-        self._note(finding)
+        self._record(finding)
         error = GuardTripped(finding.guard, finding.what, finding.value, finding.limit, finding.stamp_s)
         self._error = error
         return error
 
-    def _lost(self, error: BackendError) -> None:
-        """The robot itself gave up: on record, too."""
+    def _on_device_error(self, error: BackendError) -> None:
+        """Hold and record that the robot itself failed."""
         value, limit, stamp_s = 0.0, 0.0, self._newest.now_s
         guard = "device"
         if isinstance(error, SafetyStop):
@@ -151,10 +151,10 @@ class Supervisor(Robot):
             value, limit = error.age_s, error.max_age_s
         self._robot.hold()
         self._error = error
-        self._note(Finding(guard, str(error), value, limit, stamp_s))
+        self._record(GuardFinding(guard, str(error), value, limit, stamp_s))
 
-    def _hold_on(self) -> None:
-        """One more period at rest, as far as the robot still can."""
+    def _hold_one_period(self) -> None:
+        """Let one more period pass at rest, as far as the robot still can."""
         try:
             self._robot.cycle(HOLD)
         except BackendError:

@@ -8,13 +8,13 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-from glotouch_backends.flexiv_xense.simulated import ROBOT_SN, open_vendor_at
+from glotouch_backends.flexiv_xense.simulated import ROBOT_SN, open_remote_vendor
 
 REACH_M = 0.08
 
 
 def main(address: str, speed_m_s: float) -> None:
-    vendor = open_vendor_at(address)
+    vendor = open_remote_vendor(address)
     rdk, clock = vendor.flexivrdk, vendor.clock
     robot: Any = rdk.Robot(ROBOT_SN)
     robot.Enable()

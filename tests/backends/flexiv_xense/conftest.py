@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from glotouch_backends.flexiv_xense.client.backend import PERIOD_S, FlexivXenseBackend
-from glotouch_backends.flexiv_xense.client.link import Link
+from glotouch_backends.flexiv_xense.client.link import DriverLink
 from glotouch_backends.flexiv_xense.client.options import read_options
 from glotouch_backends.flexiv_xense.client.robot import FlexivXenseRobot
 from glotouch_backends.flexiv_xense.driver.devices import connect
@@ -34,7 +34,7 @@ def open_robot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Open
         thread.start()
         read = read_options({"devices": "simulated", **options})
         backend = FlexivXenseBackend()
-        link = Link(address, lambda: None, paced=not read.lockstep)
+        link = DriverLink(address, lambda: None, paced=not read.lockstep)
 
         def end() -> None:
             if robot is not None:

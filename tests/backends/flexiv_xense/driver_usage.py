@@ -12,7 +12,7 @@ from pathlib import Path
 
 import glotouch_backends.flexiv_xense.driver as driver
 
-FOLDER = Path(driver.__file__).parent
+FOLDER = Path(driver.__file__).parent / "devices"
 ARM = {
     "self.robot": "Robot",
     "robot": "Robot",

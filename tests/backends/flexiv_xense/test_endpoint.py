@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import zmq.auth
 
-from glotouch_backends.flexiv_xense.client.link import Link
+from glotouch_backends.flexiv_xense.client.link import DriverLink
 from glotouch_backends.flexiv_xense.driver.endpoint import DriverSocket
 from glotouch_backends.flexiv_xense.driver.messages import Accepted, HoldRequest, Quit
 from glotouch_bt.robot import BackendError
@@ -47,7 +47,7 @@ def server(keys: Path) -> Iterator[str]:
 
 
 def test_a_client_with_a_known_key_is_let_in(server: str, keys: Path) -> None:
-    link = Link(server, lambda: None, paced=False, keys=keys)
+    link = DriverLink(server, lambda: None, paced=False, keys=keys)
     assert link.ask(HoldRequest(number=7), Accepted, limit_s=10.0).number == 7
     link.close()
 
@@ -59,7 +59,7 @@ def test_others_are_not_heard(server: str, keys: Path, who: str) -> None:
         given = keys / "strangers"
         zmq.auth.create_certificates(given, "client")
         (given / "driver.key").write_text((keys / "driver.key").read_text())
-    link = Link(server, lambda: None, paced=False, keys=given)
+    link = DriverLink(server, lambda: None, paced=False, keys=given)
     with pytest.raises(BackendError, match="nothing heard"):
         link.ask(HoldRequest(number=7), Accepted, limit_s=0.5)
     link.close()
@@ -78,7 +78,7 @@ def test_any_name_a_client_draws_is_heard(monkeypatch: pytest.MonkeyPatch, tmp_p
     with DriverSocket(address) as socket:
         thread = threading.Thread(target=answer_one, args=(socket, stop))
         thread.start()
-        link = Link(address, lambda: None, paced=False)
+        link = DriverLink(address, lambda: None, paced=False)
         try:
             assert link.ask(HoldRequest(number=7), Accepted, limit_s=10.0).number == 7
         finally:

@@ -99,11 +99,11 @@ def test_a_tare_runs_beside_the_loop(open_robot: Open) -> None:
 
 
 def test_a_second_client_is_told_so(open_robot: Open) -> None:
-    from glotouch_backends.flexiv_xense.client.link import Link
+    from glotouch_backends.flexiv_xense.client.link import DriverLink
     from glotouch_backends.flexiv_xense.driver.messages import Block
 
     robot = open_robot(ScriptedVendor(stepped=False), pace="real")
-    other = Link(robot.link._address, lambda: None, paced=False)
+    other = DriverLink(robot.link._address, lambda: None, paced=False)
     try:
         with pytest.raises(BackendError, match="another client"):
             other.ask(Cycle(number=1), Block, limit_s=PATIENCE_S)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from glotouch_backends.flexiv_xense.simulated import PAD_SNS, ROBOT_SN, DistantVendor, open_vendor_at
+from glotouch_backends.flexiv_xense.simulated import PAD_SNS, ROBOT_SN, RemoteVendor, open_remote_vendor
 from glotouch_backends.flexiv_xense.simulated.arm import LINK_LOST_S, STOP_RAD_S2
 from glotouch_bt.robot import Conditions
 from tests.conformance.conformance_world import OPTIONS, WORLD
@@ -77,7 +77,7 @@ def test_a_killed_clients_arm_stands_still(cell: Path) -> None:
 
 
 def test_calls_pass_with_their_values_and_errors(cell: Path) -> None:
-    vendor: DistantVendor = open_vendor_at(str(cell / "socket"))
+    vendor: RemoteVendor = open_remote_vendor(str(cell / "socket"))
     rdk = vendor.flexivrdk
     with pytest.raises(ValueError, match="serial"):
         rdk.Robot("Rizon4")

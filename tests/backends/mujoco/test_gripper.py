@@ -11,7 +11,7 @@ import pytest
 from glotouch_backends.mujoco import MujocoBackend
 from glotouch_backends.mujoco.control.jaws import JawReports
 from glotouch_backends.mujoco.robot import MujocoRobot
-from glotouch_backends.mujoco.sensing.tactile import Pads
+from glotouch_backends.mujoco.sensing.tactile import PadContacts
 from glotouch_bt.robot import Command, Conditions, GripperState, GripperTarget, ParamError, SetPayload
 
 Open = Callable[..., MujocoRobot]
@@ -31,7 +31,7 @@ def over_block(open_robot: Open, drive: Drive) -> Any:
 @pytest.mark.parametrize("force_N", [5.0, 10.0, 30.0])
 def test_force_limit(over_block: Any, force_N: float) -> None:
     """A block between the pads: each pad pushes with the asked force, in balance, and no harder on the way."""
-    robot, pads = over_block.robot, Pads(over_block.robot.model, over_block.robot.data, over_block.robot.handles)
+    robot, pads = over_block.robot, PadContacts(over_block.robot.model, over_block.robot.data, over_block.robot.handles)
     over_block.cycle(Command(gripper=GripperTarget(0.0, 0.04, force_N)))
     peak = 0.0
     for _ in range(150):

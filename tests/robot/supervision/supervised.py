@@ -1,4 +1,4 @@
-"""A fake robot whose readings a test spoils, under supervision."""
+"""A supervised fake robot whose readings a test modifies."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import numpy as np
 
 from glotouch_bt.robot import HOLD, Command, JointSetpoint, Observation
 from glotouch_bt.robot.fake import FakeRobot, forward
-from glotouch_bt.robot.supervision.limits import Finding, SupervisionLimits
+from glotouch_bt.robot.supervision.limits import GuardFinding, SupervisionLimits
 from glotouch_bt.robot.supervision.supervisor import Supervisor
 
 Spoil = Callable[[Observation], Observation]
 
 
 class Device(FakeRobot):
-    """A fake robot whose readings a test spoils from a cycle on; counts holds."""
+    """A fake robot whose readings a test modifies from one cycle to another; counts holds."""
 
     def __init__(self, spoil: Spoil | None = None, since: int = 0, until: int = 10**9, noise_N: float = 0.0) -> None:
         self._spoil, self._since, self._until, self._noise = spoil, since, until, noise_N
@@ -38,8 +38,8 @@ class Device(FakeRobot):
         self.holds += 1
 
 
-def supervised(device: FakeRobot, **rules: float) -> tuple[Supervisor, list[Finding]]:
-    found: list[Finding] = []
+def supervised(device: FakeRobot, **rules: float) -> tuple[Supervisor, list[GuardFinding]]:
+    found: list[GuardFinding] = []
     robot = Supervisor(device, SupervisionLimits(**rules))  # type: ignore[arg-type]
     robot.on_finding = found.append
     return robot, found

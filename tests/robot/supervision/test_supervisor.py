@@ -1,4 +1,4 @@
-"""Supervision below the tree: every guard trips on what it is for, within one period, and on nothing else."""
+"""Each guard trips within one period on its own fault, and no guard trips on anything else."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from glotouch_bt.robot import (
 )
 from glotouch_bt.robot.fake import FakeRobot, forward
 from glotouch_bt.robot.supervision.limits import GUARDS, SupervisionLimits
-from glotouch_bt.robot.supervision.supervisor import RECORDED
+from glotouch_bt.robot.supervision.supervisor import MAX_RECORDED
 from tests.robot.supervision.supervised import (
     Device,
     Spoil,
@@ -56,7 +56,7 @@ FATAL: list[tuple[str, Spoil]] = [
 
 
 @pytest.mark.parametrize(("guard", "spoil"), FATAL, ids=lambda v: v if isinstance(v, str) else "")
-def test_each_guard_holds_the_arm_within_the_period_and_is_on_record(guard: str, spoil: Spoil) -> None:
+def test_each_guard_holds_the_arm_within_one_period_and_is_recorded(guard: str, spoil: Spoil) -> None:
     device = Device(spoil, since=20)
     robot, found = supervised(device)
     if guard == "following":
@@ -64,14 +64,14 @@ def test_each_guard_holds_the_arm_within_the_period_and_is_on_record(guard: str,
     with pytest.raises(GuardTripped) as trip:
         spin(robot, 30)
     assert trip.value.guard == guard
-    assert device.cycles <= 21 + (6 if "finite" in guard else 0), "not in the period in which it was wrong"
+    assert device.cycles <= 21 + (6 if "finite" in guard else 0), "not in the faulty period"
     assert device.holds == 1
     assert found[-1].guard == guard
     assert found[-1].fatal
     assert guard in GUARDS
     assert np.isnan(trip.value.value) or trip.value.value != trip.value.limit
     assert str(trip.value.stamp_s)[:4] in str(trip.value) or trip.value.stamp_s > 0
-    # from now on it only holds, and raises the same again
+    # every later cycle holds and raises the same error
     commands = len(device.commands)
     with pytest.raises(GuardTripped) as again:
         robot.cycle(setpoint(np.zeros(7)))
@@ -80,7 +80,7 @@ def test_each_guard_holds_the_arm_within_the_period_and_is_on_record(guard: str,
 
 
 @pytest.mark.parametrize("part", ["q", "dq", "wrench_S", "position_B_P", "quat_B_P"])
-def test_single_samples_that_are_no_numbers_are_dropped(part: str) -> None:
+def test_single_samples_that_are_not_finite_are_dropped(part: str) -> None:
     device = Device(with_part(part, 4, 0, np.nan), since=5, until=6)
     robot, found = supervised(device)
     for k in range(20):
@@ -104,7 +104,7 @@ def test_a_sample_out_of_order_is_dropped() -> None:
     assert {f.guard for f in found} == {"stamps"}
 
 
-def test_patience_ends() -> None:
+def test_too_many_transient_findings_are_fatal() -> None:
     robot, found = supervised(Device(with_part("wrench_S", 0, 0, np.nan), since=5))
     with pytest.raises(GuardTripped) as trip:
         spin(robot, 50)
@@ -112,7 +112,7 @@ def test_patience_ends() -> None:
     assert sum(not f.fatal for f in found) == SupervisionLimits().tolerated
 
 
-def test_rare_findings_never_end_patience_and_do_not_flood_the_record() -> None:
+def test_rare_findings_are_tolerated_and_only_the_first_are_recorded() -> None:
     class Rare(Device):
         def cycle(self, command: Command) -> Observation:
             self._since = self._until = -1
@@ -121,13 +121,13 @@ def test_rare_findings_never_end_patience_and_do_not_flood_the_record() -> None:
             return super().cycle(command)
 
     robot, found = supervised(Rare(with_part("dq", 9, 2, np.nan)))
-    for _ in range(50 * (RECORDED + 10)):
+    for _ in range(50 * (MAX_RECORDED + 10)):
         robot.cycle(HOLD)
-    assert robot.counts == {"not_finite": RECORDED + 10}
-    assert len(found) == RECORDED
+    assert robot.counts == {"not_finite": MAX_RECORDED + 10}
+    assert len(found) == MAX_RECORDED
 
 
-def test_an_arm_that_moves_while_it_is_held_is_noticed() -> None:
+def test_following__an_arm_that_drifts_during_a_hold() -> None:
     def drift(seen: Observation) -> Observation:
         return dataclasses.replace(
             seen, position_B_P=seen.position_B_P + [[0.0, 0.002, 0.0]] * np.maximum(seen.stamp_s[:, None] - 0.2, 0.0)
@@ -143,15 +143,15 @@ def test_an_arm_that_moves_while_it_is_held_is_noticed() -> None:
 
 
 @pytest.mark.parametrize("force_N", [0.0, 7.0, 9.0, -20.0])
-def test_an_arm_that_strays_trips_sooner_while_it_presses(force_N: float) -> None:
-    """What presses goes with how far the hand outliers: half as far is allowed then."""
+def test_following__smaller_limit_while_the_arm_presses(force_N: float) -> None:
+    """Above the pressing force, half the following error trips the guard."""
 
-    def astray(seen: Observation) -> Observation:
+    def displaced(seen: Observation) -> Observation:
         away = [[0.002, 0.0, 0.0]] * np.maximum(seen.stamp_s[:, None] - 0.2, 0.0)
         wrench = seen.wrench_S + force_N * np.eye(6)[0]
         return dataclasses.replace(seen, position_B_P=seen.position_B_P + away, wrench_S=wrench)
 
-    device = Device(astray)
+    device = Device(displaced)
     robot, found = supervised(device)
     robot.cycle(setpoint(device.description.home_q))
     with pytest.raises(GuardTripped) as trip:
@@ -161,11 +161,11 @@ def test_an_arm_that_strays_trips_sooner_while_it_presses(force_N: float) -> Non
     limit = rules.touching_m if touches else rules.following_m
     assert trip.value.guard == "following"
     assert limit < trip.value.value < limit * 1.02
-    assert ("N press" in found[-1].what) is touches
+    assert ("presses with" in found[-1].what) is touches
 
 
-def test_an_arm_that_gives_as_a_servo_does_may_press() -> None:
-    """0.15 mm a newton, what the simulated servo gives at most, up to 12 N."""
+def test_following__servo_compliance_is_allowed() -> None:
+    """0.15 mm/N, the largest compliance of the simulated servo, up to 12 N."""
 
     def gives(seen: Observation) -> Observation:
         force = np.minimum(10.0 * np.maximum(seen.stamp_s - 0.2, 0.0), 12.0)
@@ -182,8 +182,8 @@ def test_an_arm_that_gives_as_a_servo_does_may_press() -> None:
     assert not [f for f in found if f.fatal]
 
 
-def test_an_arm_that_lags_in_motion_is_let_go_on() -> None:
-    """A servo's delay of 50 ms at half of a joint's speed is no following error."""
+def test_following__servo_lag_is_allowed() -> None:
+    """A delay of 50 ms at half of a joint's speed is not a following error."""
     device = Device()
     queue: list[Command] = [HOLD] * 5
 
@@ -202,7 +202,7 @@ def test_an_arm_that_lags_in_motion_is_let_go_on() -> None:
 
 HOME = np.array(FakeRobot().description.home_q)
 BAD_COMMANDS = {
-    "a number that is none": setpoint(HOME + np.nan),
+    "not finite": setpoint(HOME + np.nan),
     "a joint out of range": setpoint(np.full(7, 2.9)),
     "a jump": setpoint(HOME + 0.5),
     "a velocity": setpoint(HOME, np.full(7, 9.0)),
@@ -210,12 +210,12 @@ BAD_COMMANDS = {
     "the aperture": Command(gripper=GripperTarget(0.2, 0.1, 10.0)),
     "the jaws' speed": Command(gripper=GripperTarget(0.05, float("nan"), 10.0)),
     "the jaws' force": Command(gripper=GripperTarget(0.05, 0.1, 1e4)),
-    "a number of the aperture": Command(gripper=GripperTarget(float("inf"), 0.1, 10.0)),
+    "an infinite aperture": Command(gripper=GripperTarget(float("inf"), 0.1, 10.0)),
 }
 
 
 @pytest.mark.parametrize("command", BAD_COMMANDS.values(), ids=BAD_COMMANDS.keys())
-def test_what_must_not_be_sent_is_not_sent(command: Command) -> None:
+def test_command__is_not_sent(command: Command) -> None:
     device = Device()
     robot, found = supervised(device)
     robot.cycle(setpoint(HOME))
@@ -227,8 +227,8 @@ def test_what_must_not_be_sent_is_not_sent(command: Command) -> None:
     assert found[-1].guard == "command"
 
 
-def test_a_tool_that_would_be_too_fast_is_not_sent() -> None:
-    """Every joint within its speed, together too fast for the tool: P by differences of the forward kinematics."""
+def test_command__tool_speed() -> None:
+    """Every joint keeps its speed limit, but together they move the tool too fast (finite differences)."""
     device = Device()
     robot, _ = supervised(device)
     robot.cycle(setpoint(HOME))
@@ -241,7 +241,7 @@ def test_a_tool_that_would_be_too_fast_is_not_sent() -> None:
         robot.cycle(setpoint(HOME + step, step / 0.01))
 
 
-def test_after_a_hold_a_setpoint_begins_where_the_arm_stands() -> None:
+def test_command__after_a_hold_a_setpoint_starts_where_the_arm_stands() -> None:
     device = Device()
     robot, found = supervised(device)
     for k in range(5):
@@ -259,7 +259,7 @@ def test_after_a_hold_a_setpoint_begins_where_the_arm_stands() -> None:
         (SafetyStop("force_N", 33.0, 30.0, 0.1), "wrench"),
     ],
 )
-def test_what_the_device_raises_is_on_record_and_raised(error: BackendError, guard: str) -> None:
+def test_device__errors_are_recorded_and_raised(error: BackendError, guard: str) -> None:
     class Lost(Device):
         def cycle(self, command: Command) -> Observation:
             raise error
@@ -277,8 +277,8 @@ def test_what_the_device_raises_is_on_record_and_raised(error: BackendError, gua
 
 @settings(max_examples=10, deadline=None, suppress_health_check=list(HealthCheck))
 @given(seed=st.integers(0, 2**32 - 1), noise=st.floats(0.0, 0.25))
-def test_what_is_in_order_passes_untouched(seed: int, noise: float) -> None:
-    """Random walks within half of the limits, with noise: the very same blocks come out, and nothing is found."""
+def test_valid_readings_and_commands_pass_without_a_finding(seed: int, noise: float) -> None:
+    """Random walks within half of the limits, with noise."""
     rng = np.random.default_rng(seed)
     device = Device(noise_N=noise)
     robot, found = supervised(device)
@@ -298,7 +298,7 @@ def test_what_is_in_order_passes_untouched(seed: int, noise: float) -> None:
     assert found == []
 
 
-def test_it_is_a_robot_like_the_one_it_watches() -> None:
+def test_the_supervisor_has_the_properties_of_its_robot() -> None:
     device = Device()
     robot, _ = supervised(device)
     assert (robot.description, robot.limits, robot.period_s) == (device.description, device.limits, device.period_s)
@@ -310,16 +310,16 @@ def test_it_is_a_robot_like_the_one_it_watches() -> None:
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
-def test_limits_are_checked_at_birth(value: float) -> None:
+def test_limits_are_validated(value: float) -> None:
     with pytest.raises(ParamError, match="following_rad"):
         SupervisionLimits(following_rad=value)
 
 
-def test_a_guard_above_holds_the_arm_and_is_on_record_once() -> None:
+def test_a_guard_of_a_skill_holds_the_arm_and_is_recorded_once() -> None:
     robot, found = supervised(Device())
     error = GuardTripped("following", "off", 4e-3, 3e-3, 0.2)
-    robot.heed(error)
-    robot.heed(error)
+    robot.trip_by(error)
+    robot.trip_by(error)
     assert [(f.guard, f.what, f.value, f.limit, f.stamp_s, f.fatal) for f in found] == [
         ("following", "off", 4e-3, 3e-3, 0.2, True)
     ]
@@ -329,10 +329,10 @@ def test_a_guard_above_holds_the_arm_and_is_on_record_once() -> None:
     assert again.value is error
 
 
-def test_a_guard_of_its_own_is_not_on_record_again_when_it_is_handed_back() -> None:
+def test_a_guard_of_the_supervisor_is_not_recorded_again() -> None:
     robot, found = supervised(Device(with_part("q", slice(None), slice(None), np.nan), since=5))
     with pytest.raises(GuardTripped) as trip:
         spin(robot, 30)
     count = len(found)
-    robot.heed(trip.value)
+    robot.trip_by(trip.value)
     assert len(found) == count

@@ -1,4 +1,4 @@
-"""Supervision of time: samples that are missing, cycles that are late, and how long nothing was seen."""
+"""Guards of time: missing samples, late cycles and gaps."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ def missing(count: int) -> Spoil:
     return spoil
 
 
-def test_missing_samples_are_put_on_record_and_then_end_it() -> None:
+def test_samples_missing__recorded_then_fatal() -> None:
     robot, found = supervised(Device(missing(7)))
     spin(robot, 30)
-    assert found == [], "a device that is polled gives seven to nine of ten, or worse"
+    assert found == [], "a polled device delivers 0.7-0.9 of its samples, on a loaded machine fewer"
     robot, found = supervised(Device(missing(8), since=5, until=7))
     spin(robot, 30)
-    assert {f.guard for f in found} == {"samples_missing", "overrun"}, "what came after them, came late"
+    assert {f.guard for f in found} == {"samples_missing", "overrun"}, "the next block was late"
     robot, found = supervised(Device(missing(8), since=5))
     with pytest.raises(GuardTripped, match="samples_missing"):
         spin(robot, 30)
 
 
 class Late(Device):
-    """Its clock runs on: so many extra periods pass in one cycle, and their samples are lost or come with it."""
+    """A device whose cycle lets extra periods pass; their samples are lost or arrive with it."""
 
     def __init__(self, extra: int, *at: int, lost: bool) -> None:
         self._extra, self._at, self._lost = extra, at, lost
@@ -56,7 +56,7 @@ def move(k: int, home: Any) -> Command:
 
 
 @pytest.mark.parametrize("lost", [True, False])
-def test_a_gap_ends_a_motion_but_not_a_rest(lost: bool) -> None:
+def test_overrun__is_fatal_in_motion_but_not_at_rest(lost: bool) -> None:
     device = Late(40, 5, lost=lost)
     robot, found = supervised(device)
     spin(robot, 20)
@@ -71,10 +71,8 @@ def test_a_gap_ends_a_motion_but_not_a_rest(lost: bool) -> None:
 
 
 @pytest.mark.parametrize(("extra", "times", "ends"), [(5, 4, False), (20, 1, False), (20, 2, True)])
-def test_blind_gaps_in_a_motion_end_it_when_a_quarter_of_a_second_was_not_seen(
-    extra: int, times: int, ends: bool
-) -> None:
-    """The device holds in each of them."""
+def test_samples_missing__fatal_after_a_quarter_second_of_lost_motion(extra: int, times: int, ends: bool) -> None:
+    """The device holds during each gap."""
     device = Late(extra, *(5 + (extra + 3) * i for i in range(times)), lost=True)
     robot, found = supervised(device)
     guards = []
@@ -87,10 +85,10 @@ def test_blind_gaps_in_a_motion_end_it_when_a_quarter_of_a_second_was_not_seen(
     assert guards == ["samples_missing"] * ends
     blind = [f for f in found if f.guard == "samples_missing"]
     assert len(blind) == times
-    assert all(f.value > f.limit > 1.0 for f in blind), "a value and its limit are of one kind"
+    assert all(f.value > f.limit > 1.0 for f in blind), "value and limit have the same unit"
 
 
-def test_a_long_thought_before_a_motion_is_no_overrun() -> None:
+def test_overrun__a_long_computation_before_a_motion_is_allowed() -> None:
     device = Late(40, 5, lost=False)
     robot, found = supervised(device)
     spin(robot, 5)
@@ -100,7 +98,7 @@ def test_a_long_thought_before_a_motion_is_no_overrun() -> None:
 
 
 @pytest.mark.parametrize(("extra", "lost"), [(4, True), (7, False)])
-def test_a_late_cycle_now_and_then_is_put_on_record(extra: int, lost: bool) -> None:
+def test_overrun__a_single_late_cycle_is_only_recorded(extra: int, lost: bool) -> None:
     device = Late(extra, 5, lost=lost)
     robot, found = supervised(device)
     for k in range(5):
@@ -109,9 +107,9 @@ def test_a_late_cycle_now_and_then_is_put_on_record(extra: int, lost: bool) -> N
     assert {f.guard for f in found} == {"overrun"} | ({"samples_missing"} if lost else set())
 
 
-def test_how_many_samples_a_period_has_is_learnt_from_the_first_block_of_several() -> None:
+def test_samples_missing__the_first_block_of_several_samples_sets_the_rate() -> None:
     class Single(Device):
-        """As a driver that answers with one sample when it is opened."""
+        """A driver that answers with one sample when it is opened."""
 
         def observe(self) -> Observation:
             seen = super().observe()

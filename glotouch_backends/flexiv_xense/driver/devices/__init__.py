@@ -1,5 +1,5 @@
 """TODO door of glotouch_backends/flexiv_xense/driver/devices."""
 
-from .connect import Connected, connect
+from .connect import Connected, connect_devices
 
-__all__ = ["Connected", "connect"]
+__all__ = ["Connected", "connect_devices"]

@@ -14,24 +14,24 @@ from typing import Any
 
 from ..clock import Clock
 from ..faults import DeviceFault, vendor_call
-from ..messages import ArmLimits, Event, Numbers, Setpoint, Tool
+from ..messages import ArmEvent, ArmLimits, Numbers, Setpoint, ToolData
 
 TOOL_NAME = "glotouch"
 CLEAR_FAULT_S = 30
 ENABLE_S = 30.0
 TARE_WAIT_S = 5.0
 MODE_POLL_S = 0.01
-EVENTS_KEPT = 12
+MAX_EVENTS = 12
 MAX_ANGULAR_RAD_S, MAX_ANGULAR_RAD_S2 = 4.0, 40.0
 """Of the arm's own smoothing; far beyond the plan's 7.5 rad/s2, for it must not bind: setpoints come 10 ms apart, so a
 small error asks for much, and where it binds the hand falls behind. At 10 rad/s2 the simulated one did, by 0.1 rad."""
-HEADROOM = 1.5
+SMOOTHING_HEADROOM = 1.5
 """The arm's own smoothing may use this much more than the plan's limits; at 1 it could never catch up with it."""
 DEVICE_WRENCH_SHARE = 1.2
 """The device's own contact limit over the driver's. The driver stops at its limit; the device bounds the peak."""
 
 
-class State:
+class ArmState:
     """One reading of the arm: the device's stamp s, q, dq (7,), TCP pose (7,) in B, wrench (6,) on the TCP in P."""
 
     __slots__ = ("dq", "pose", "q", "stamp", "wrench")
@@ -42,7 +42,7 @@ class State:
         self.stamp, self.q, self.dq, self.pose, self.wrench = stamp, q, dq, pose, wrench
 
 
-class Arm(ABC):
+class DriverArm(ABC):
     """A Flexiv arm; subclasses know one version of the vendor's interface.
 
     Args:
@@ -62,7 +62,7 @@ class Arm(ABC):
         rdk: Any,
         robot: Any,
         clock: Clock,
-        tool: Tool,
+        tool: ToolData,
         limits: ArmLimits,
         posture: Numbers,
         *,
@@ -80,7 +80,7 @@ class Arm(ABC):
     # -- what differs between the versions ---------------------------------------------------------------------------
 
     @abstractmethod
-    def state(self) -> State:
+    def state(self) -> ArmState:
         """The newest reading. Does not block."""
 
     @abstractmethod
@@ -125,12 +125,14 @@ class Arm(ABC):
                 why = "is not operational"
             raise DeviceFault("state", f"the arm {why} ({self._status()})", self.events())
 
-    def events(self) -> tuple[Event, ...]:
+    def events(self) -> tuple[ArmEvent, ...]:
         """The last entries of the arm's event log; never raises."""
         try:
-            log = list(self.robot.event_log())[-EVENTS_KEPT:]
+            log = list(self.robot.event_log())[-MAX_EVENTS:]
             return tuple(
-                Event(str(getattr(e.level, "name", e.level)), int(e.id), str(e.description), str(e.recommended_actions))
+                ArmEvent(
+                    str(getattr(e.level, "name", e.level)), int(e.id), str(e.description), str(e.recommended_actions)
+                )
                 for e in log
             )
         except Exception:  # a log that cannot be read must not hide the fault it belongs to
@@ -242,9 +244,9 @@ class Arm(ABC):
         """Of the arm's own smoothing: linear and angular velocity, linear and angular acceleration."""
         limits = self._limits
         return (
-            HEADROOM * limits.speed_m_s,
+            SMOOTHING_HEADROOM * limits.speed_m_s,
             MAX_ANGULAR_RAD_S,
-            HEADROOM * max(limits.acceleration_m_s2, limits.stop_acceleration_m_s2),
+            SMOOTHING_HEADROOM * max(limits.acceleration_m_s2, limits.stop_acceleration_m_s2),
             MAX_ANGULAR_RAD_S2,
         )
 

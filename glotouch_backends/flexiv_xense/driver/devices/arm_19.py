@@ -5,21 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from .arm import Arm, State
+from .arm import ArmState, DriverArm
 
 NO_WRENCH = [0.0] * 6
 
 
-class Arm19(Arm):
-    """See `Arm`."""
+class Arm19(DriverArm):
+    """See `DriverArm`."""
 
     api = "1.9"
 
-    def state(self) -> State:
-        """See `Arm`."""
+    def state(self) -> ArmState:
+        """See `DriverArm`."""
         s: Any = self.robot.states()
         wrench = s.ext_wrench_in_tcp_raw if self._raw else s.ext_wrench_in_tcp
-        return State(s.timestamp, s.q, s.dq, s.tcp_pose, wrench)
+        return ArmState(s.timestamp, s.q, s.dq, s.tcp_pose, wrench)
 
     def _send(self, pose: Sequence[float], twist: Sequence[float]) -> None:
         self.robot.SendCartesianMotionForce(list(pose), NO_WRENCH, list(twist), *self._speed_limits)

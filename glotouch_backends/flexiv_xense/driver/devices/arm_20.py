@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from .arm import Arm, State
+from .arm import ArmState, DriverArm
 
 
-class Arm20(Arm):
-    """See `Arm`."""
+class Arm20(DriverArm):
+    """See `DriverArm`."""
 
     api = "2.0"
 
@@ -17,11 +17,11 @@ class Arm20(Arm):
     def _group(self) -> Any:
         return self.rdk.JointGroup.ARMS
 
-    def state(self) -> State:
-        """See `Arm`."""
+    def state(self) -> ArmState:
+        """See `DriverArm`."""
         s: Any = self.robot.states()[self._group]
         wrench = s.raw_tcp_wrench_local if self._raw else s.tcp_wrench_local
-        return State(s.timestamp, s.q, s.dq, s.tcp_pose, wrench)
+        return ArmState(s.timestamp, s.q, s.dq, s.tcp_pose, wrench)
 
     def _send(self, pose: Sequence[float], twist: Sequence[float]) -> None:
         command = self.rdk.NrtCartesianCmd()

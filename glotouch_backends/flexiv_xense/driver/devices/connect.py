@@ -10,11 +10,11 @@ from typing import Any
 from ..clock import Clock
 from ..faults import DeviceFault, vendor_call
 from ..messages import Open
-from .arm import Arm
+from .arm import DriverArm
 from .arm_19 import Arm19
 from .arm_20 import Arm20
-from .gripper import Gripper, open_gripper
-from .pads import Pads, open_sensor
+from .gripper import DriverGripper, open_gripper
+from .pads import TactileSensors, open_sensor
 from .vendor import Vendor, load_vendor
 
 APIS = {"1.9": Arm19, "2.0": Arm20}
@@ -25,9 +25,9 @@ class Connected:
     """The devices of one session; `referee` only where they are simulated."""
 
     clock: Clock
-    arm: Arm
-    gripper: Gripper | None
-    pads: Pads | None
+    arm: DriverArm
+    gripper: DriverGripper | None
+    pads: TactileSensors | None
     vendor: Vendor
 
     def release(self) -> None:
@@ -40,7 +40,7 @@ class Connected:
             self.pads.release()
 
 
-def api_of(rdk: Any, wanted: str) -> type[Arm]:
+def api_of(rdk: Any, wanted: str) -> type[DriverArm]:
     """The adapter for an installed flexivrdk.
 
     Raises:
@@ -55,7 +55,7 @@ def api_of(rdk: Any, wanted: str) -> type[Arm]:
     raise DeviceFault("connect", f"flexivrdk {version} is not supported (supported: {', '.join(APIS)}){why}")
 
 
-def connect(request: Open, progress: Callable[[str], None]) -> Connected:
+def connect_devices(request: Open, progress: Callable[[str], None]) -> Connected:
     """Everything up and, unless the request only looks, ready for the first setpoint.
 
     Raises:
@@ -82,12 +82,14 @@ def connect(request: Open, progress: Callable[[str], None]) -> Connected:
     try:
         if d.gripper:
             progress(f"connecting to the gripper {d.gripper}")
-            connected.gripper = Gripper(open_gripper(vendor.xensegripper, d.gripper), clock, request.hand, d.link_loss)
+            connected.gripper = DriverGripper(
+                open_gripper(vendor.xensegripper, d.gripper), clock, request.hand, d.link_loss
+            )
             connected.gripper.wait_for_status()
         if d.pads:
             progress("opening the tactile sensors")
             left, right = (open_sensor(vendor.xensesdk, serial) for serial in d.pads)
-            connected.pads = Pads(vendor.xensesdk, (left, right), clock, request.hand, d.mirror)
+            connected.pads = TactileSensors(vendor.xensesdk, (left, right), clock, request.hand, d.mirror)
         if request.move:
             arm.enable(progress)
             arm.ready(progress)

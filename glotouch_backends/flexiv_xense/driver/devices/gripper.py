@@ -8,14 +8,14 @@ from typing import Any
 from ..clock import Clock
 from ..faults import CommandRefused, DeviceFault, vendor_call
 from ..frames import MM
-from ..messages import HandLimits, Jaws, JawState
+from ..messages import HandLimits, JawState, JawTarget
 
 MOVING_M_S = 0.002
-ANSWER_S = 1.0
+MAX_RESPONSE_S = 1.0
 """A gripper that was told to move must show some change within this."""
-FAR_M = 1e-3
+MIN_MOVE_M = 1e-3
 """A target nearer than this need not show."""
-GRIPPING = 0.5
+GRIPPED_FORCE_SHARE = 0.5
 """A force beyond this share of the limit explains why the jaws do not close further."""
 FIRST_STATUS_S = 5.0
 POLL_S = 0.01
@@ -34,7 +34,7 @@ def open_gripper(sdk: Any, address: str) -> Any:
         return sdk.XenseGripper.create(address)
 
 
-class Gripper:
+class DriverGripper:
     """Targets in, states out. Aperture 0 is closed, as everywhere in this project (the vendor's 85 mm is open).
 
     Args:
@@ -46,10 +46,10 @@ class Gripper:
     """
 
     def __init__(self, device: Any, clock: Clock, limits: HandLimits, link_loss: str = "holds") -> None:
-        self._then = "keeps its grip" if link_loss == "holds" else "LETS GO of what it holds"
+        self._link_loss_effect = "keeps its grip" if link_loss == "holds" else "LETS GO of what it holds"
         self._device, self._clock, self._limits = device, clock, limits
-        self._target: Jaws | None = None
-        self._told_s = -math.inf
+        self._target: JawTarget | None = None
+        self._commanded_s = -math.inf
         self._seen: tuple[float, float, float] | None = None
         self._changed_s = clock.now_s()
         self._answered = True
@@ -73,7 +73,7 @@ class Gripper:
                 raise DeviceFault("connect", f"the gripper sent no status within {FIRST_STATUS_S:g} s")
             self._clock.sleep_until(now + POLL_S)
 
-    def check(self, target: Jaws) -> None:
+    def check(self, target: JawTarget) -> None:
         """Refuse what the hand cannot do.
 
         Raises:
@@ -88,16 +88,16 @@ class Gripper:
             if not (math.isfinite(value) and low - 1e-9 <= value <= high + 1e-9):
                 raise CommandRefused(f"gripper.{name}", value, f"within {low:g} .. {high:g}")
 
-    def send(self, target: Jaws) -> None:
+    def send(self, target: JawTarget) -> None:
         """A (checked) target; the vendor's own range checks cannot be relied on, so it is clamped once more."""
         limits = self._limits
         aperture = min(max(target.aperture_m, 0.0), limits.stroke_m)
         speed, force = min(target.speed_m_s, limits.speed_m_s), min(target.force_N, limits.force_N)
         with vendor_call("commanding the gripper", "link"):
             self._device.set_position(aperture / MM, speed / MM, force)
-        if self._target is None or abs(aperture - self._target.aperture_m) > FAR_M:
-            self._answered, self._told_s = False, self._clock.now_s()
-        self._target = Jaws(aperture, speed, force)
+        if self._target is None or abs(aperture - self._target.aperture_m) > MIN_MOVE_M:
+            self._answered, self._commanded_s = False, self._clock.now_s()
+        self._target = JawTarget(aperture, speed, force)
 
     def poll(self) -> JawState:
         """The newest status.
@@ -108,23 +108,25 @@ class Gripper:
         with vendor_call("reading the gripper", "link"):
             status = self._device.get_gripper_status()
         if status is None:
-            raise DeviceFault("link", f"the gripper has no status any more; without its link this model {self._then}")
+            raise DeviceFault(
+                "link", f"the gripper has no status any more; without its link this model {self._link_loss_effect}"
+            )
         self._take(status)
         now, target = self.state.stamp_s, self._target
-        if target is None or self._answered or now - self._told_s < ANSWER_S:
+        if target is None or self._answered or now - self._commanded_s < MAX_RESPONSE_S:
             return self.state
         closing = target.aperture_m < self.state.aperture_m
-        blocked = closing and self.state.force_N > GRIPPING * target.force_N
-        if abs(target.aperture_m - self.state.aperture_m) < FAR_M or blocked:
+        blocked = closing and self.state.force_N > GRIPPED_FORCE_SHARE * target.force_N
+        if abs(target.aperture_m - self.state.aperture_m) < MIN_MOVE_M or blocked:
             self._answered = True
             return self.state
         raise DeviceFault(
             "stale",
             f"the gripper was told to go to {target.aperture_m / MM:.1f} mm and still reports "
             f"{self.state.aperture_m / MM:.1f} mm; it is blocked, or its link is lost: then this model "
-            f"{self._then}",
+            f"{self._link_loss_effect}",
             age_s=now - self._changed_s,
-            limit_s=ANSWER_S,
+            limit_s=MAX_RESPONSE_S,
         )
 
     def _take(self, status: Any) -> None:

@@ -18,14 +18,14 @@ from ..frames import Array, depth_map_m
 from ..messages import HandLimits, Maps
 
 LEFT, RIGHT = 0, 1
-SAME_CLOCK_S = 1.0
+MAX_SAME_CLOCK_S = 1.0
 """Which clock a sensor stamps with is not documented. Stamps this near our clock, or this machine's calendar time, are
 on it; others are shifted by the smallest lateness seen."""
-PAIR_S = 0.04
+MAX_PAIR_S = 0.04
 """Two maps belong together if their stamps differ by less: one frame of the slower rate in use."""
-MISSING_S = 1.0
+MAX_MISSING_S = 1.0
 """No frame for this long while they are wanted is a fault."""
-IDLE_S = 0.2
+MAX_UNREQUESTED_S = 0.2
 """The reader ends when nobody has wanted a frame for this long."""
 POLL_S = 0.005
 
@@ -42,7 +42,7 @@ def open_sensor(sdk: Any, serial: str) -> Any:
         return sensor
 
 
-class Pads:
+class TactileSensors:
     """Pairs of depth maps, on demand.
 
     Args:
@@ -55,29 +55,29 @@ class Pads:
 
     def __init__(self, sdk: Any, sensors: tuple[Any, Any], clock: Clock, limits: HandLimits, mirror: str) -> None:
         self._sensors, self._clock = sensors, clock
-        self._shape, self._most = limits.pad_shape, limits.pad_depth_m
+        self._shape, self._max_depth_m = limits.pad_shape, limits.pad_depth_m
         self._types = sdk.Sensor.OutputType.Depth, sdk.Sensor.OutputType.TimeStamp
         self._mirrored = mirror == "left", mirror == "right"
         self._lateness = [math.inf, math.inf]
         self._last = [-math.inf, -math.inf]
         self._maps: list[Array | None] = [None, None]
         self._stamps = [-math.inf, -math.inf]
-        self._wanted_s = -math.inf
+        self._requested_s = -math.inf
         self._reading = False
         self._newest: Maps | None = None
         self._newest_s = -math.inf
         self._failed: DeviceFault | None = None
         self._closed = False
 
-    def want(self) -> None:
+    def request(self) -> None:
         """Frames are wanted now; called once a period."""
         now = self._clock.now_s()
-        if now - self._wanted_s > IDLE_S:
+        if now - self._requested_s > MAX_UNREQUESTED_S:
             self._newest, self._newest_s = None, now
-        self._wanted_s = now
+        self._requested_s = now
         if not self._reading and not self._closed:
             self._reading = True
-            self._clock.spawn(self._read_on)
+            self._clock.spawn(self._read_while_requested)
 
     def take(self) -> Maps | None:
         """A new pair, once.
@@ -88,16 +88,16 @@ class Pads:
         if self._failed is not None:
             raise self._failed
         now = self._clock.now_s()
-        if now - self._wanted_s <= IDLE_S and now - self._newest_s > MISSING_S:
+        if now - self._requested_s <= MAX_UNREQUESTED_S and now - self._newest_s > MAX_MISSING_S:
             raise DeviceFault(
-                "stale", "the tactile sensors deliver no frames", age_s=now - self._newest_s, limit_s=MISSING_S
+                "stale", "the tactile sensors deliver no frames", age_s=now - self._newest_s, limit_s=MAX_MISSING_S
             )
         newest, self._newest = self._newest, None
         return newest
 
-    def _read_on(self) -> None:
+    def _read_while_requested(self) -> None:
         try:
-            while not self._closed and self._clock.now_s() - self._wanted_s <= IDLE_S:
+            while not self._closed and self._clock.now_s() - self._requested_s <= MAX_UNREQUESTED_S:
                 for side in (LEFT, RIGHT):
                     self._read(side)
                 self._pair()
@@ -123,17 +123,17 @@ class Pads:
 
     def _on_our_clock(self, side: int, stamp_s: float) -> float:
         now = self._clock.now_s()
-        if abs(now - stamp_s) < SAME_CLOCK_S:
+        if abs(now - stamp_s) < MAX_SAME_CLOCK_S:
             return stamp_s
         calendar = time.time()  # noqa: TID251  the sensor's clock is compared with, no time is measured
-        if abs(calendar - stamp_s) < SAME_CLOCK_S:
+        if abs(calendar - stamp_s) < MAX_SAME_CLOCK_S:
             return now - (calendar - stamp_s)
         self._lateness[side] = min(self._lateness[side], now - stamp_s)
         return stamp_s + self._lateness[side]
 
     def _pair(self) -> None:
         left, right = self._maps
-        if left is None or right is None or abs(self._stamps[LEFT] - self._stamps[RIGHT]) > PAIR_S:
+        if left is None or right is None or abs(self._stamps[LEFT] - self._stamps[RIGHT]) > MAX_PAIR_S:
             return
         stamp = 0.5 * (self._stamps[LEFT] + self._stamps[RIGHT])
         self._maps = [None, None]

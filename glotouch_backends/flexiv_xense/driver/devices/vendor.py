@@ -84,7 +84,7 @@ def load_vendor(kind: str, world: str = "", *, gripper: bool = True, pads: bool 
         raise DeviceFault("connect", f"simulated devices need the whole project installed here: {e}") from e
     try:
         if kind == "cell":
-            return cast("Vendor", simulated.open_vendor_at(world))
+            return cast("Vendor", simulated.open_remote_vendor(world))
         return cast("Vendor", simulated.open_vendor(Path(world).read_bytes()))
     except Exception as e:
         raise DeviceFault("world", f"the simulated world cannot be opened: {type(e).__name__}: {e}") from e

@@ -154,7 +154,7 @@ def seven(pose: Pose) -> list[float]:
 
 
 @dataclass(frozen=True)
-class Reading:
+class ArmReading:
     """A sample, and what it takes to read it: MuJoCo's columns, the tool then in use, P in the flange frame."""
 
     sample: Sample
@@ -194,10 +194,10 @@ class RobotStates:
     __slots__ = ("_reading",)
 
     def __init__(self) -> None:
-        self._reading: Reading | None = None
+        self._reading: ArmReading | None = None
 
     @classmethod
-    def _of(cls, reading: Reading) -> RobotStates:
+    def _of(cls, reading: ArmReading) -> RobotStates:
         states = cls()
         states._reading = reading
         return states

@@ -26,10 +26,10 @@ from glotouch_backends.flexiv_xense.simulated.control_box import (
 )
 from glotouch_backends.flexiv_xense.simulated.vendor_api.checks import numbers, positive, within
 from glotouch_backends.flexiv_xense.simulated.vendor_api.flexiv_types import (
+    ArmReading,
     CoordType,
     Mode,
     OperationalStatus,
-    Reading,
     RobotEvent,
     RobotInfo,
     RobotStates,
@@ -146,7 +146,7 @@ class Robot:
         box = self._box
         if self._kept is None or (box.linked and not box.frozen):
             self._kept = RobotStates._of(
-                Reading(box.arm.sample, box.arm.sensors, box.arm.load, box.arm.description.gripper.pose_E_P)
+                ArmReading(box.arm.sample, box.arm.sensors, box.arm.load, box.arm.description.gripper.pose_E_P)
             )
         return self._kept
 

@@ -11,7 +11,7 @@ from enum import Enum
 from typing import Any, ClassVar
 
 from glotouch_backends.flexiv_xense.driver import Clock
-from glotouch_backends.flexiv_xense.simulated.hand import Hand
+from glotouch_backends.flexiv_xense.simulated.hand import SimulatedHand
 
 MM = 1e-3
 UNREACHABLE_S, CONNECT_S, FIRST_S = 7.5, 0.3, 0.02
@@ -26,7 +26,7 @@ class GripperLink:
         clock: What blocking calls wait on.
     """
 
-    def __init__(self, hand: Hand, clock: Clock) -> None:
+    def __init__(self, hand: SimulatedHand, clock: Clock) -> None:
         self.hand, self.clock, self.linked = hand, clock, True
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from glotouch_backends.flexiv_xense.driver import Clock
-from glotouch_backends.flexiv_xense.simulated.hand import Hand
+from glotouch_backends.flexiv_xense.simulated.hand import SimulatedHand
 from glotouch_backends.flexiv_xense.simulated.vendor_api.flexiv_types import EPOCH_S
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -36,7 +36,7 @@ class PadLink:
         camera: Its camera's number.
     """
 
-    def __init__(self, hand: Hand, clock: Clock, *, right: bool, camera: int) -> None:
+    def __init__(self, hand: SimulatedHand, clock: Clock, *, right: bool, camera: int) -> None:
         self.hand, self.clock, self.right, self.camera = hand, clock, right, camera
         self.missing = self.frozen = False
 

@@ -17,7 +17,7 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 from glotouch_backends.mujoco.hulls import decompose as room
-from glotouch_backends.mujoco.hulls.bulge import bulge_m, inside_m, surface_distance_m
+from glotouch_backends.mujoco.hulls.bulge import bulge_m, depth_inside_m, surface_distance_m
 from glotouch_backends.mujoco.hulls.convex_parts import trimmed_hull
 from glotouch_backends.mujoco.hulls.decompose import KEY, MAX_VERTICES, load_hulls
 from glotouch_backends.mujoco.hulls.feet import FOOT_PROTRUSION_M, FOOT_RADIUS_M, MAX_FEET, foot_centres
@@ -60,7 +60,7 @@ def ring() -> trimesh.Trimesh:
 
 def union_volume_m3(parts: tuple[np.ndarray, ...], lower: np.ndarray, upper: np.ndarray) -> float:
     points = np.random.default_rng(0).uniform(lower, upper, (20_000, 3))
-    return float((inside_m(points, parts) > 0).mean() * np.prod(upper - lower))
+    return float((depth_inside_m(points, parts) > 0).mean() * np.prod(upper - lower))
 
 
 @pytest.mark.parametrize(
@@ -73,8 +73,8 @@ def union_volume_m3(parts: tuple[np.ndarray, ...], lower: np.ndarray, upper: np.
 def test_hollows_stay_open(make, open_points_m, tmp_path: Path) -> None:
     mesh = as_mesh(make(), tmp_path, "shape")
     hulls = load_hulls(mesh).vertices
-    assert inside_m(np.array(open_points_m), hulls).max() < 0  # outside every hull
-    assert inside_m(mesh.vertices_m, hulls).min() > -2e-4  # every corner is kept
+    assert depth_inside_m(np.array(open_points_m), hulls).max() < 0  # outside every hull
+    assert depth_inside_m(mesh.vertices_m, hulls).min() > -2e-4  # every corner is kept
     lower, upper = mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)
     assert union_volume_m3(hulls, lower, upper) == pytest.approx(mesh.as_trimesh().volume, rel=0.05)
     assert np.percentile(bulge_m(mesh, hulls, 3000), 95) < 1e-3
@@ -178,7 +178,7 @@ def test_failed_cutting_falls_back_and_says_so(tmp_path: Path, monkeypatch: pyte
     hulls = load_hulls(mesh, said.append).vertices
     assert any("CoACD ended with code" in line for line in said)
     assert "coarse" in said[-1]
-    assert inside_m(np.array([[0.045, 0.045, 0.015]]), hulls)[0] < 0
+    assert depth_inside_m(np.array([[0.045, 0.045, 0.015]]), hulls)[0] < 0
     assert "coarse" in room.read_parts(user_folder() / f"{mesh.digest}.npz", KEY).note
 
 
@@ -211,14 +211,14 @@ def test_parts_that_lose_the_shape_are_refused(tmp_path: Path, monkeypatch: pyte
     parts = room.decompose(mesh, said.append)
     assert any("bare" in line for line in said)
     assert len(parts.hulls) == 1
-    assert inside_m(mesh.vertices_m, parts.hulls).min() > -1e-9
+    assert depth_inside_m(mesh.vertices_m, parts.hulls).min() > -1e-9
 
 
 def test_every_shipped_object_has_its_file() -> None:
-    objects = Path(str(resources.files("missions") / "objects"))
+    objects = Path(str(resources.files("glotouch_missions") / "objects"))
     total = 0
     for mesh in load_folder(objects):
-        file = resources.files("missions") / "hulls" / f"{mesh.digest}.npz"
+        file = resources.files("glotouch_missions") / "hulls" / f"{mesh.digest}.npz"
         parts = read_parts(file, KEY)
         assert parts is not None, (
             f"{mesh.name}: run python -m glotouch_backends.mujoco.hulls.decompose on glotouch_missions/objects"
@@ -228,7 +228,7 @@ def test_every_shipped_object_has_its_file() -> None:
         assert max(map(len, parts.hulls)) <= MAX_VERTICES
         assert np.percentile(bulge_m(mesh, parts.hulls, 2000), 95) < 1.2e-3
         surface = trimesh.sample.sample_surface(mesh.as_trimesh(), 2000, seed=0)[0]
-        assert np.percentile(-inside_m(surface, parts.hulls), 95) < 2e-4
+        assert np.percentile(-depth_inside_m(surface, parts.hulls), 95) < 2e-4
     assert total < 1_500_000
 
 
@@ -251,7 +251,7 @@ def test_trimmed_hull_keeps_true_corners_and_loses_little(limit: int) -> None:
     assert trimmed is not None
     assert len(trimmed) <= limit
     assert {tuple(v) for v in trimmed} <= {tuple(v) for v in points}
-    missed = -inside_m(points, [trimmed]).min()
+    missed = -depth_inside_m(points, [trimmed]).min()
     assert missed < 4 * 4 * np.pi * 0.03 / (3 * np.sqrt(3) * limit)
 
 
@@ -265,7 +265,7 @@ def test_trimmed_hull_drops_what_is_flat_or_within_tolerance() -> None:
     trimmed = trimmed_hull(bumpy, 64, 1e-4)
     assert trimmed is not None
     assert len(trimmed) <= 12  # the corners, and the four it started from
-    assert inside_m(bumpy, [trimmed]).min() > -1e-4
+    assert depth_inside_m(bumpy, [trimmed]).min() > -1e-4
 
 
 def test_feet_stand_on_the_support_polygon(tmp_path: Path) -> None:
@@ -307,7 +307,7 @@ def test_an_overhang_stays_open(tmp_path: Path) -> None:
     mesh = as_mesh(mushroom(), tmp_path, "mushroom")
     hulls = load_hulls(mesh).vertices
     below_the_cap = np.array([(0.025, 0.0, 0.035), (0.0, -0.02, 0.025), (-0.016, 0.0, 0.02)])
-    assert inside_m(below_the_cap, hulls).max() < -1e-3
+    assert depth_inside_m(below_the_cap, hulls).max() < -1e-3
     assert np.percentile(bulge_m(mesh, hulls, 3000), 95) < 1e-3
 
 

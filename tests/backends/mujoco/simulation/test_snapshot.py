@@ -186,7 +186,7 @@ def walk(robot: MujocoRobot) -> dict[str, bytes]:
     MuJoCo's data is looked at through its own state vector and every array of fixed size.
     """
     found: dict[str, bytes] = {}
-    ours = ("backends.", "glotouch_bt.")
+    ours = ("glotouch_backends.", "glotouch_bt.")
     seen: set[int] = set()
 
     def look(path: str, value: Any) -> None:

@@ -9,12 +9,12 @@ from glotouch_bt.robot import Array
 from glotouch_bt.robot.scene import Mesh
 
 MAX_FACES = 20_000
-"""A lumpy ball of 100 000 triangles took 140 s to cut, thinned to 16 000 it took 13 s, and the parts
+"""A lumpy ball of 100 000 triangles took 140 s to cut, simplified to 16 000 it took 13 s, and the parts
 bulged alike (0.18 mm)."""
 FIRST_CELL_M, GROWTH = 0.0004, 1.25
 
 
-def thinned(mesh: Mesh) -> tuple[Array, npt.NDArray[np.int64]]:
+def simplified(mesh: Mesh) -> tuple[Array, npt.NDArray[np.int64]]:
     """(vertices (v, 3) m, faces (f, 3)) of a mesh as it is, or with at most `MAX_FACES`.
 
     Vertex clustering (Rossignac and Borrel 1993): all vertices in one cell of a grid become their mean; cells grow

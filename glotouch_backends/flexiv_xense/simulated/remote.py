@@ -65,7 +65,7 @@ class CellLink:
                 pause.wait(RETRY_S)
 
 
-class Distant:
+class RemoteObject:
     """An object in the cell: every method is a call."""
 
     def __init__(self, link: CellLink, reference: Reference) -> None:
@@ -85,15 +85,15 @@ class Distant:
 def _maker(link: CellLink, name: str) -> Any:
     """Stands for a class: calling it makes the object in the cell."""
 
-    def make(*args: Any, **kwargs: Any) -> Distant:
-        plain = [a._reference if isinstance(a, Distant) else a for a in args]
-        return Distant(link, link.ask(NEW, name, plain, kwargs))
+    def make(*args: Any, **kwargs: Any) -> RemoteObject:
+        plain = [a._reference if isinstance(a, RemoteObject) else a for a in args]
+        return RemoteObject(link, link.ask(NEW, name, plain, kwargs))
 
     return make
 
 
 @dataclass(frozen=True)
-class DistantVendor:
+class RemoteVendor:
     """See `driver.vendor.Vendor`."""
 
     flexivrdk: Any
@@ -109,7 +109,7 @@ class DistantVendor:
         return answer
 
 
-def open_vendor_at(address: str) -> DistantVendor:
+def open_remote_vendor(address: str) -> RemoteVendor:
     """The vendors' modules over a cell.
 
     Args:
@@ -133,7 +133,7 @@ def open_vendor_at(address: str) -> DistantVendor:
         OutputType=xensesdk.Sensor.OutputType,
     )
     inner = SimpleNamespace(XenseGripper=gripper, XenseTCPGripper=tcp, XenseSerialGripper=serial)
-    return DistantVendor(
+    return RemoteVendor(
         SimpleNamespace(**arm),
         SimpleNamespace(Sensor=sensor),
         SimpleNamespace(XenseGripper=gripper, xense_gripper=inner),

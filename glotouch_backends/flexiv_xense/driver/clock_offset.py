@@ -14,7 +14,7 @@ PART_S = 0.1
 """The window moves on in parts of this length."""
 
 
-class Dating:
+class StampConverter:
     """Dates one device's readings; call it with every new one, in order."""
 
     def __init__(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from glotouch_backends.flexiv_xense.driver.dating import Dating
+from glotouch_backends.flexiv_xense.driver.clock_offset import StampConverter
 
 
 def stamped(made_s: float, drift: float = 0.0) -> tuple[int, int]:
@@ -17,11 +17,11 @@ def stamped(made_s: float, drift: float = 0.0) -> tuple[int, int]:
 def test_jitter_of_the_way_is_taken_out(drift: float) -> None:
     """True times are known here; after the first window the dates differ from them by the shortest way, 0.2 ms."""
     rng = np.random.default_rng(0)
-    dating, off, now = Dating(), [], 0.0
+    convert, off, now = StampConverter(), [], 0.0
     for k in range(20_000):
         made = 1e-3 * k
         now = max(now, made + 0.0002 + rng.exponential(0.002))
-        date = dating(stamped(made, drift), now)
+        date = convert(stamped(made, drift), now)
         assert date <= now + 2e-6
         off.append(date - made - 0.0002)
     assert np.abs(off[2000:]).max() < 3e-4, "ms jitter, and the drift of a second"
@@ -29,14 +29,14 @@ def test_jitter_of_the_way_is_taken_out(drift: float) -> None:
 
 
 def test_a_device_whose_clock_fell_back_is_followed() -> None:
-    dating = Dating()
+    convert = StampConverter()
     for k in range(3000):
-        dating(stamped(1e-3 * k), 1e-3 * k)
-    late = [dating(stamped(1e-3 * k), 1e-3 * k + 0.08) - (1e-3 * k + 0.08) for k in range(3000, 6000)]
+        convert(stamped(1e-3 * k), 1e-3 * k)
+    late = [convert(stamped(1e-3 * k), 1e-3 * k + 0.08) - (1e-3 * k + 0.08) for k in range(3000, 6000)]
     assert late[0] == pytest.approx(-0.08, abs=1e-6)
     assert late[-1] == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("stamp", [None, 3.5, "x", (1, 2, 3), (1.0, 2)])
 def test_without_a_stamp_it_was_made_now(stamp: object) -> None:
-    assert Dating()(stamp, 12.5) == 12.5
+    assert StampConverter()(stamp, 12.5) == 12.5

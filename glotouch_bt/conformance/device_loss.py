@@ -1,4 +1,4 @@
-"""Devices that are lost, stop delivering or have a fault."""
+"""Tests of devices that are lost, stop delivering or have a fault."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from glotouch_bt.conformance.base import Conformance
 from glotouch_bt.robot import HOLD, BackendError
 
 
-class LossTests(Conformance):
-    """See the module's text."""
+class DeviceLossTests(Conformance):
+    """Loss of a device."""
 
     def test_a_lost_device_is_an_error(self) -> None:
-        """Within `loss_s`, and in every later cycle; hold and close never raise, and another robot can be opened."""
+        """Raise within `loss_s` and in every later cycle; hold and close never raise; another robot can be opened."""
         losses = self.losses()
         if not losses:
             pytest.skip("no way to lose a device is offered")
@@ -26,7 +26,7 @@ class LossTests(Conformance):
                     except BackendError:
                         break
                 else:
-                    raise AssertionError(f"{name}: nobody noticed within {self.loss_s} s")
+                    raise AssertionError(f"{name}: no error within {self.loss_s} s")
                 for _ in range(3):
                     with pytest.raises(BackendError):
                         rig.robot.cycle(HOLD)

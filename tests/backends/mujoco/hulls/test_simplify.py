@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from glotouch_backends.mujoco.hulls.thinning import MAX_FACES, thinned
+from glotouch_backends.mujoco.hulls.simplify import MAX_FACES, simplified
 from glotouch_bt.robot.scene.meshes import Mesh
 
 
@@ -19,14 +19,14 @@ def as_mesh(solid: trimesh.Trimesh) -> Mesh:
 
 def test_few_faces_stay_as_they_are() -> None:
     mesh = as_mesh(trimesh.creation.icosphere(4, 0.03))
-    vertices, faces = thinned(mesh)
+    vertices, faces = simplified(mesh)
     assert vertices is mesh.vertices_m or np.array_equal(vertices, mesh.vertices_m)
     assert np.array_equal(faces, mesh.faces)
 
 
 def test_many_faces_become_few_and_the_shape_stays() -> None:
     mesh = as_mesh(trimesh.creation.torus(0.03, 0.012, major_sections=320, minor_sections=160))
-    vertices, faces = thinned(mesh)
+    vertices, faces = simplified(mesh)
     solid = trimesh.Trimesh(vertices, faces, process=False)
     assert 0.3 * MAX_FACES < len(faces) <= MAX_FACES
     assert solid.is_watertight

@@ -26,7 +26,7 @@ def state_of(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     return state
 
 
-class Trace:
+class ControlTrace:
     """Remembers from its making on; costs some 80 bytes a step and two copies a chunk.
 
     Args:

@@ -10,7 +10,7 @@ import numpy as np
 
 from glotouch_backends.mujoco.model import Handles
 from glotouch_bt.robot import Pose
-from glotouch_bt.robot.simulation import NoRoom
+from glotouch_bt.robot.simulation import PathBlocked
 
 PENETRATION_M = 0.0005
 """What stands or leans on something is so deep in it at most; what is moved may end no deeper in anything."""
@@ -24,7 +24,7 @@ class Posed(Protocol):
     handles: Handles
 
 
-class Room:
+class MotionClearance:
     """See the module's text.
 
     Args:
@@ -58,7 +58,7 @@ class Room:
             container: The container is one of them.
 
         Raises:
-            NoRoom: The robot touches one of them now, is in the way, or the place is taken.
+            PathBlocked: The robot touches one of them now, is in the way, or the place is taken.
         """
         own = self.held()
         scratch = self._scratch()
@@ -75,13 +75,13 @@ class Room:
         ends = zip(scratch.contact, self._bodies(scratch), strict=True) if way and rests else ()
         for contact, (one, other) in ends:
             if (one in moved) != (other in moved) and contact.dist < -PENETRATION_M:
-                raise NoRoom(f"{self._name(one)} and {self._name(other)} would be in one place")
+                raise PathBlocked(f"{self._name(one)} and {self._name(other)} would be in one place")
 
     def _look(self, scratch: mujoco.MjData, moved: Set[int], own: Set[int]) -> None:
         mujoco.mj_collision(self._robot.model, scratch)
         for one, other in self._bodies(scratch):
             if (one in moved and other in own) or (one in own and other in moved):
-                raise NoRoom(f"{self._name(one)} meets {self._name(other)}")
+                raise PathBlocked(f"{self._name(one)} meets {self._name(other)}")
 
     def _scratch(self) -> mujoco.MjData:
         """A copy of the world as it is now, positions only."""

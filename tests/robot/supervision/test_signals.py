@@ -1,4 +1,4 @@
-"""Guards of signals that are within every limit and yet none."""
+"""Guards of readings that are within every limit but carry no signal."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from glotouch_bt.robot.supervision.limits import SupervisionLimits
 from tests.robot.supervision.supervised import Device, spin, supervised
 
 
-def test_a_noisy_sensor_that_freezes_is_stuck() -> None:
+def test_wrench_stuck__a_noisy_sensor_freezes() -> None:
     frozen: list[np.ndarray[Any, Any]] = []
 
     def freeze(seen: Observation) -> Observation:
@@ -27,8 +27,8 @@ def test_a_noisy_sensor_that_freezes_is_stuck() -> None:
     assert trip.value.stamp_s < 8.0 + 0.06
 
 
-def test_a_loose_contact_ends_patience() -> None:
-    """Single blocks that repeat the last sample, three of ten."""
+def test_wrench_stuck__a_loose_contact() -> None:
+    """Three of ten blocks repeat the last sample."""
 
     def loose(seen: Observation) -> Observation:
         lost = round(seen.now_s * 100) % 10 in (0, 3, 6)
@@ -41,7 +41,7 @@ def test_a_loose_contact_ends_patience() -> None:
     assert sum(not f.fatal for f in found) == SupervisionLimits().tolerated
 
 
-def test_a_clipped_component_is_noticed() -> None:
+def test_wrench_stuck__a_clipped_component() -> None:
     def clip(seen: Observation) -> Observation:
         wrench = seen.wrench_S.copy()
         wrench[:, 2] = np.minimum(wrench[:, 2] + 9.0, 1.0)
@@ -53,7 +53,7 @@ def test_a_clipped_component_is_noticed() -> None:
 
 
 @pytest.mark.parametrize(("noise_N", "noted"), [(0.15, False), (1.0, True)])
-def test_a_drowned_force_is_put_on_record_only(noise_N: float, noted: bool) -> None:
+def test_wrench_noise__is_only_recorded(noise_N: float, noted: bool) -> None:
     robot, found = supervised(Device(noise_N=noise_N))
     spin(robot, 1000)
     assert {f.guard for f in found} == ({"wrench_noise"} if noted else set())
@@ -62,8 +62,8 @@ def test_a_drowned_force_is_put_on_record_only(noise_N: float, noted: bool) -> N
 
 
 @pytest.mark.parametrize("noise_m", [2e-5, 0.0])
-def test_maps_that_come_again_and_again(noise_m: float) -> None:
-    """Of noisy pads they are frozen; flat ones without noise say nothing."""
+def test_tactile_frozen__noisy_maps_repeat(noise_m: float) -> None:
+    """Repeated maps of noisy pads are frozen; those of noise-free pads are not."""
     rng = np.random.default_rng(3)
     frames = [noise_m * rng.standard_normal((2, 35, 20)) for _ in range(30)]
     count = [0]
@@ -83,9 +83,9 @@ def test_maps_that_come_again_and_again(noise_m: float) -> None:
         spin(robot, 4, Command(tactile=True))
 
 
-def test_a_noise_free_sensor_is_never_stuck() -> None:
+def test_wrench_stuck__a_noise_free_sensor_is_never_stuck() -> None:
     def pressed(seen: Observation) -> Observation:
-        """Loads and unloads without noise, as an ideal simulation does; constant in between."""
+        """Load and unload without noise, as an ideal simulation does."""
         wrench = np.zeros((10, 6))
         wrench[:, 2] = 5.0 * np.clip(np.sin(seen.stamp_s), 0.0, 0.9)
         return dataclasses.replace(seen, wrench_S=wrench)
@@ -95,7 +95,7 @@ def test_a_noise_free_sensor_is_never_stuck() -> None:
     assert found == []
 
 
-def test_depth_maps_that_do_not_come_are_missed_only_when_asked_for() -> None:
+def test_tactile_stale__requested_maps_do_not_arrive() -> None:
     device = FakeRobot(frame_rate_Hz=1e-3)
     robot, _ = supervised(device)
     robot.cycle(Command(tactile=True))  # the only frame for a thousand seconds
@@ -107,7 +107,7 @@ def test_depth_maps_that_do_not_come_are_missed_only_when_asked_for() -> None:
 @pytest.mark.parametrize(
     ("value", "share", "fatal"), [(np.nan, 0.03, False), (np.nan, 0.6, True), (np.inf, 0.01, True)]
 )
-def test_dead_taxels_are_borne_dead_pads_are_not(value: float, share: float, fatal: bool) -> None:
+def test_tactile_dead__dead_pads_but_not_single_taxels(value: float, share: float, fatal: bool) -> None:
     def spoil(seen: Observation) -> Observation:
         left = np.zeros((35, 20))
         left.ravel()[: round(share * left.size)] = value
@@ -122,8 +122,8 @@ def test_dead_taxels_are_borne_dead_pads_are_not(value: float, share: float, fat
         spin(robot, 100, Command(tactile=True))
 
 
-def test_a_map_from_before_it_was_asked_for_is_not_stale_yet() -> None:
-    """Devices give their last map first: it may be minutes old."""
+def test_tactile_stale__the_first_map_may_be_old() -> None:
+    """A device first delivers its last map, which may be minutes old."""
 
     def old(seen: Observation) -> Observation:
         if seen.tactile is None:

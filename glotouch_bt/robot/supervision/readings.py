@@ -1,0 +1,319 @@
+"""Guards of the readings: one fast test of the whole block, and single checks only when it fails."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import replace
+from operator import lt
+
+import numpy as np
+
+from glotouch_bt.robot.command import Command
+from glotouch_bt.robot.description import RobotDescription
+from glotouch_bt.robot.geometry import Array
+from glotouch_bt.robot.limits import Limits
+from glotouch_bt.robot.observation import Observation
+from glotouch_bt.robot.supervision.limits import GuardFinding, SupervisionLimits, TransientCounter
+from glotouch_bt.robot.supervision.signals import TactileSignalGuard, WrenchSignalGuard
+
+MAX_REST_SPEED_RAD_S = 0.01
+"""A joint below this speed stands still. Source: ours."""
+MAX_NORM_ERROR = 0.01
+"""Tolerated error of a quaternion's squared norm. Source: ours."""
+LATE_PERIODS = 0.5
+"""A cycle is late when it lasts this many periods more than one. Source: ours."""
+MIN_SAMPLE_SHARE = 0.25
+"""A block with fewer than this share of its samples is reported. Source: measured; a device that is polled every
+millisecond by a soft real-time loop gives 0.7-0.9 of them, on a loaded machine 0.5."""
+
+
+class ReadingsGuard:
+    """Check every block of readings.
+
+    Args:
+        description, limits, period_s: Those of the robot.
+        rules: Limits of the guards.
+        first: The newest block. The first block of several samples gives the number of samples a period.
+    """
+
+    def __init__(
+        self,
+        description: RobotDescription,
+        limits: Limits,
+        period_s: float,
+        rules: SupervisionLimits,
+        first: Observation,
+    ) -> None:
+        self._rules, self._limits, self._period_s = rules, limits, period_s
+        self._joints = description.joints
+        self._transients = TransientCounter(rules)
+        self._samples = self._count(first)
+        self._last_s = float(first.stamp_s[-1])
+        self._late_s = (1.0 + LATE_PERIODS) * period_s
+        slack = rules.joint_slack_rad
+        self._ranges = [(j.lower_rad - slack, j.upper_rad + slack) for j in description.joints]
+        self._max_speeds = rules.speed_slack * np.array([j.velocity_rad_s for j in description.joints])
+        # The fast test compares sums of squares over a block: below the limit no sample can exceed it or be NaN.
+        self._per_limit = np.array([1.0 / limits.hard_force_N] * 3 + [1.0 / limits.hard_torque_Nm] * 3)
+        self._max_speed_2, self._max_reach_2 = float(self._max_speeds.min()) ** 2, rules.reach_m**2
+        self._max_error_2, self._min_dot = rules.following_m**2, math.cos(0.5 * rules.following_rad)
+        self._min_pressing_force_2, self._max_pressing_error_2 = rules.touching_N**2, rules.touching_m**2
+        # Recently commanded positions and quaternions of P in B, newest last; empty while the arm brakes to an unknown
+        # place.
+        self._targets: deque[list[float]] = deque(maxlen=max(1, round(rules.lag_s / period_s)))
+        self._has_velocity = False
+        self._moving = False
+        self._was_moving = False  # by the command before the newest: a late cycle waited with that one
+        self._samples_over = 0
+        self._wrist = WrenchSignalGuard(period_s, rules, self._transients)
+        self._pads = TactileSignalGuard(rules, self._transients)
+
+    def reset(self, newest: Observation) -> None:
+        """Start again from `newest`: the robot was restored to an earlier state."""
+        self._last_s = float(newest.stamp_s[-1])
+        self._wrist.reset()
+        self._pads.reset()
+        self._targets.clear()
+        self._moving = self._has_velocity = self._was_moving = False
+        self._samples_over = 0
+
+    def on_command(self, command: Command) -> None:
+        """Note the command that the next block answers."""
+        self._was_moving = self._moving and self._has_velocity
+        motion = command.motion
+        if motion is not None:
+            pose = motion.pose_B_P
+            self._targets.append([*pose.position_m.tolist(), *pose.quat.tolist()])
+            self._moving, self._has_velocity = True, bool(np.count_nonzero(motion.dq))
+        elif self._moving and self._has_velocity:
+            self._targets.clear()
+            self._moving = False
+        elif self._targets:
+            self._targets.append(self._targets[-1])
+            self._moving = False
+        self._pads.on_command(command.tactile, self._last_s)
+
+    def check(self, o: Observation) -> tuple[Observation, list[GuardFinding]]:
+        """Return the block without its unusable samples, and the findings, gravest last.
+
+        A block without any usable sample is returned unchanged, with a fatal finding.
+        """
+        stamps = o.stamp_s.tolist()
+        findings: list[GuardFinding] = []
+        if self._samples == 0:
+            self._samples = self._count(o)
+        if len(stamps) < MIN_SAMPLE_SHARE * self._samples or not (
+            self._last_s < stamps[0] and stamps[-1] - self._last_s < self._late_s and all(map(lt, stamps, stamps[1:]))
+        ):
+            o = self._check_stamps(o, findings)
+            if findings and findings[-1].fatal:
+                return o, findings
+        if not self._in_order(o):
+            o = self._check_each(o, findings)
+        self._last_s = stamp_s = float(o.stamp_s[-1])
+        self._wrist.check(o, findings)
+        jaws = o.gripper
+        if not (stamp_s - jaws.stamp_s <= self._rules.gripper_age_s and math.isfinite(jaws.aperture_m + jaws.force_N)):
+            self._check_jaws(o, findings)
+        if self._pads.asked:
+            self._pads.check(o, findings)
+        return o, findings
+
+    def _count(self, o: Observation) -> int:
+        """Return the number of samples a period from their spacing; 0 if the block has only one."""
+        span_s = float(o.stamp_s[-1] - o.stamp_s[0])
+        return round(self._period_s * (len(o.stamp_s) - 1) / span_s) if len(o.stamp_s) > 1 and span_s > 0.0 else 0
+
+    def _in_order(self, o: Observation) -> bool:
+        """Return True if nothing is wrong: sums of squares over the block, range and pose of its newest sample."""
+        wrench = o.wrench_S * self._per_limit
+        scaled = wrench.ravel()
+        q, dq, position, quat = o.q.ravel(), o.dq.ravel(), o.position_B_P.ravel(), o.quat_B_P.ravel()
+        if not (
+            (scaled @ scaled < 1.0 or _within_limits(wrench))
+            and math.isfinite(q @ q)
+            and (dq @ dq <= self._max_speed_2 or bool((np.abs(o.dq).max(axis=0) <= self._max_speeds).all()))
+            and position @ position <= self._max_reach_2
+            and abs(quat @ quat - len(o.quat_B_P)) <= MAX_NORM_ERROR
+        ):
+            return False
+        self._samples_over = 0
+        for value, (low, high) in zip(o.q[-1].tolist(), self._ranges, strict=True):
+            if not low <= value <= high:
+                return False
+        x, y, z = o.position_B_P[-1].tolist()
+        w, i, j, k = o.quat_B_P[-1].tolist()
+        if not self._targets:
+            if not self._moving and np.abs(o.dq[-1]).max() < MAX_REST_SPEED_RAD_S:
+                self._targets.append([x, y, z, w, i, j, k])
+            return True
+        a, b, c, d, e, f, g = self._targets[-1]
+        away_2 = (x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2
+        if away_2 > self._max_pressing_error_2 and self._pressing(o):
+            return False
+        return bool(away_2 <= self._max_error_2 and abs(w * d + i * e + j * f + k * g) >= self._min_dot)
+
+    def _pressing(self, o: Observation) -> bool:
+        """Return True if the newest sample shows more force than a servo without error may press with."""
+        force = o.wrench_S[-1, :3]
+        return bool(force @ force > self._min_pressing_force_2)
+
+    def _check_stamps(self, o: Observation, findings: list[GuardFinding]) -> Observation:
+        """Drop samples out of order; report gaps and missing samples."""
+        s, last = o.stamp_s, self._last_s
+        newest = np.concatenate([[last], np.maximum.accumulate(np.where(np.isfinite(s), s, -np.inf))])
+        good = s > np.maximum(newest[:-1], last)
+        bad = len(s) - int(np.count_nonzero(good))
+        if bad:
+            fatal = not good.any() or self._transients.exceeded("stamps", last, bad)
+            what = f"{bad} of {len(s)} samples are not later than the one before them"
+            findings.append(GuardFinding("stamps", what, float(bad), float(self._rules.tolerated), last, fatal))
+            if fatal:
+                return o
+            o = _select(o, good)
+        now_s = float(o.stamp_s[-1])
+        periods = (now_s - last) / self._period_s
+        if periods >= 1.0 + LATE_PERIODS:
+            fatal = self._was_moving and periods > 1.0 + self._rules.late_periods
+            if not fatal and self._was_moving and periods > 1.0 + self._rules.held_periods:
+                fatal = self._transients.exceeded("overrun", now_s)
+            what = f"{periods:.1f} control periods passed in one cycle" + (" while the arm moved" * self._was_moving)
+            findings.append(GuardFinding("overrun", what, periods, 1.0 + self._rules.late_periods, now_s, fatal))
+        expected = round(self._samples * periods)
+        missing = expected - len(o.stamp_s) - bad
+        if missing > 1 and len(o.stamp_s) < MIN_SAMPLE_SHARE * expected:
+            blind = missing / (self._samples * self._rules.late_periods) if self._was_moving else 0.0
+            fatal = self._transients.exceeded(
+                "samples_missing", now_s, max(1, math.ceil(blind * self._rules.tolerated))
+            )
+            what = f"{missing} of {expected} samples are missing"
+            most = (1.0 - MIN_SAMPLE_SHARE) * expected
+            findings.append(GuardFinding("samples_missing", what, float(missing), most, now_s, fatal))
+        return o
+
+    def _check_each(self, o: Observation, findings: list[GuardFinding]) -> Observation:
+        """Find the guard that trips; drop samples that are not finite."""
+        good = np.ones(len(o.stamp_s), dtype=bool)
+        for part in (o.q, o.dq, o.wrench_S, o.position_B_P, o.quat_B_P):
+            good &= np.isfinite(part).all(axis=1)
+        bad = len(good) - int(np.count_nonzero(good))
+        if bad:
+            stamp_s = float(o.stamp_s[int(np.argmin(good))])
+            fatal = not good.any() or self._transients.exceeded("not_finite", stamp_s, bad)
+            names = [n for n in ("q", "dq", "wrench_S", "position_B_P", "quat_B_P")
+                     if not np.isfinite(getattr(o, n)).all()]  # fmt: skip
+            what = f"{bad} of {len(good)} samples are not finite ({', '.join(names)})"
+            findings.append(GuardFinding("not_finite", what, float(bad), float(self._rules.tolerated), stamp_s, fatal))
+            if not good.any():
+                return o
+            o = _select(o, good)
+        self._check_joints(o, findings)
+        far = float(np.abs(o.position_B_P).max())
+        if far > self._rules.reach_m:
+            what = f"the pads' mid-point is reported {far:.2f} m from the base"
+            findings.append(GuardFinding("out_of_reach", what, far, self._rules.reach_m, float(o.stamp_s[-1])))
+        norm = float(np.abs((o.quat_B_P * o.quat_B_P).sum(axis=1) - 1.0).max())
+        if norm > MAX_NORM_ERROR:
+            what = f"the square of a reported quaternion's length is off by {norm:.3g}"
+            findings.append(GuardFinding("out_of_reach", what, norm, MAX_NORM_ERROR, float(o.stamp_s[-1])))
+        self._check_pose(o, findings)
+        self._check_wrench(o, findings)
+        return o
+
+    def _check_joints(self, o: Observation, findings: list[GuardFinding]) -> None:
+        rules, stamp_s = self._rules, float(o.stamp_s[-1])
+        for i, joint in enumerate(self._joints):
+            low, high = float(o.q[:, i].min()), float(o.q[:, i].max())
+            value = low if joint.lower_rad - low > high - joint.upper_rad else high
+            limit = joint.lower_rad if value == low else joint.upper_rad
+            if not joint.lower_rad - rules.joint_slack_rad <= value <= joint.upper_rad + rules.joint_slack_rad:
+                valid = f"{joint.lower_rad:.3f}..{joint.upper_rad:.3f}"
+                what = f"{joint.name} is at {value:.3f} rad, its range is {valid}"
+                findings.append(GuardFinding("joint_range", what, value, limit, stamp_s))
+            fastest = float(np.abs(o.dq[:, i]).max())
+            if fastest > rules.speed_slack * joint.velocity_rad_s:
+                what = f"{joint.name} turns at {fastest:.2f} rad/s, its limit is {joint.velocity_rad_s:.2f}"
+                findings.append(GuardFinding("joint_speed", what, fastest, joint.velocity_rad_s, stamp_s))
+
+    def _check_pose(self, o: Observation, findings: list[GuardFinding]) -> None:
+        """Compare the hand's pose with those commanded now and within the lag.
+
+        The joints are not compared: a device that is sent poses chooses its own posture for them.
+        """
+        if not self._targets:
+            return
+        rules, p, q = self._rules, o.position_B_P[-1].tolist(), o.quat_B_P[-1].tolist()
+        aways = [(math.dist(p, t[:3]), _angle_rad(q, t[3:])) for t in self._targets]
+        touches = self._pressing(o)
+        max_m = min(rules.touching_m, rules.following_m) if touches else rules.following_m
+        if any(m <= max_m and rad <= rules.following_rad for m, rad in aways):
+            return
+        told = "told to " + ("be" if self._moving else "stay")
+        m, rad = min(aways)
+        if m > max_m:
+            what = f"the hand is {m * 1e3:.1f} mm from where it was {told}; {max_m * 1e3:.1f} mm are allowed"
+            if touches:
+                what += f" while it presses with {float(np.linalg.norm(o.wrench_S[-1, :3])):.0f} N"
+            findings.append(GuardFinding("following", what, m, max_m, float(o.stamp_s[-1])))
+        else:
+            what = (
+                f"the hand is turned by {rad:.3f} rad from how it was {told}; {rules.following_rad:.3f} rad are allowed"
+            )
+            findings.append(GuardFinding("following", what, rad, rules.following_rad, float(o.stamp_s[-1])))
+
+    def _check_wrench(self, o: Observation, findings: list[GuardFinding]) -> None:
+        """Count consecutive samples beyond the hard limit, also across blocks."""
+        limits = self._limits
+        force, torque = (np.linalg.norm(w, axis=1) for w in (o.wrench_S[:, :3], o.wrench_S[:, 3:]))
+        beyond = (force > limits.hard_force_N) | (torque > limits.hard_torque_Nm)
+        for i, over in enumerate(beyond.tolist()):
+            self._samples_over = self._samples_over + 1 if over else 0
+            if self._samples_over < self._rules.wrench_samples:
+                continue
+            by_force = force[i] / limits.hard_force_N >= torque[i] / limits.hard_torque_Nm
+            value, limit, unit = (
+                (float(force[i]), limits.hard_force_N, "N")
+                if by_force
+                else (float(torque[i]), limits.hard_torque_Nm, "Nm")
+            )
+            n = self._samples_over
+            what = f"{value:.1f} {unit} sensed at the wrist; {n} consecutive samples are beyond {limit:.1f} {unit}"
+            findings.append(GuardFinding("wrench", what, value, limit, float(o.stamp_s[i])))
+            return
+
+    def _check_jaws(self, o: Observation, findings: list[GuardFinding]) -> None:
+        jaws, now_s, limit = o.gripper, float(o.stamp_s[-1]), self._rules.gripper_age_s
+        if not math.isfinite(jaws.aperture_m + jaws.force_N + jaws.stamp_s):
+            what = f"the gripper reports {jaws.aperture_m} m, {jaws.force_N} N at {jaws.stamp_s} s"
+            fatal = self._transients.exceeded("not_finite", now_s, self._rules.tolerated + 1)
+            findings.append(GuardFinding("not_finite", what, math.nan, limit, now_s, fatal))
+            return
+        age = now_s - jaws.stamp_s
+        what = f"the gripper's last report is {age:.3f} s old"
+        findings.append(GuardFinding("gripper_stale", what, age, limit, now_s))
+
+
+def _select(o: Observation, good: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Observation:
+    """Return the block with the chosen samples only."""
+    return replace(
+        o,
+        stamp_s=o.stamp_s[good],
+        q=o.q[good],
+        dq=o.dq[good],
+        position_B_P=o.position_B_P[good],
+        quat_B_P=o.quat_B_P[good],
+        wrench_S=o.wrench_S[good],
+    )
+
+
+def _within_limits(wrench: Array) -> bool:
+    """Return True if no sample of a block (n, 6), scaled by the limits, exceeds 1."""
+    squares = (wrench * wrench).reshape(-1, 2, 3).sum(axis=2)
+    return bool(squares.max() < 1.0)
+
+
+def _angle_rad(a: list[float], b: list[float]) -> float:
+    """Return the angle between two rotations given as unit quaternions."""
+    half = abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3])
+    return 2.0 * math.acos(min(1.0, half))

@@ -1,0 +1,149 @@
+"""Guards of readings that are within every limit but carry no signal: dead lines, frozen maps, clipped or noisy forces.
+
+They learn a sensor's noise while it works. A noise-free signal, as of an ideal simulation, teaches nothing and may
+stand still.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glotouch_bt.robot.geometry import Array
+from glotouch_bt.robot.observation import Observation, TactileFrame
+from glotouch_bt.robot.supervision.limits import GuardFinding, SupervisionLimits, TransientCounter
+
+MIN_NOISY_FRAMES = 5
+"""Pads count as noisy after this many different pairs of maps without a touch. Source: ours."""
+MAX_EQUAL_FRAMES = 3
+"""Noisy pads that repeat a pair this many times are frozen. Source: ours."""
+MAX_UNTOUCHED_N = 0.5
+"""Below this jaw force nothing touches the pads. Source: ours."""
+
+
+class WrenchSignalGuard:
+    """Check the noise of the wrist force sensor once a period."""
+
+    def __init__(self, period_s: float, rules: SupervisionLimits, transients: TransientCounter) -> None:
+        self._period_s, self._rules, self._transients = period_s, rules, transients
+        self._share = period_s / rules.noise_over_s
+        self._noted_s = -np.inf
+        self.reset()
+
+    def reset(self) -> None:
+        """Learn anew."""
+        self._noisy_periods = self._same_periods = 0
+        self._noise_N = 0.0
+
+    def check(self, o: Observation, findings: list[GuardFinding]) -> None:
+        """Check one block: a noisy sensor never repeats a component, except within its resolution."""
+        w = o.wrench_S
+        first, newest = w[0], w[-1]
+        if np.count_nonzero(first == newest) and len(w) > 1:
+            self._check_stuck(w, o.now_s, findings)
+        else:
+            self._same_periods = 0
+            change = abs(newest.item(0) - first.item(0))
+            self._noisy_periods = self._noisy_periods + 1 if change > self._rules.noise_N else 0
+        step = abs(newest.item(0) - w[-2].item(0)) if len(w) > 1 else 0.0
+        self._noise_N += self._share * (step - self._noise_N)
+        if self._noise_N > self._rules.max_noise_N:
+            self._record_noise(o.now_s, findings)
+
+    def _check_stuck(self, w: Array, stamp_s: float, findings: list[GuardFinding]) -> None:
+        rules = self._rules
+        constant = (w == w[-1]).all(axis=0)
+        if not constant.any():
+            return
+        noisy = self._noisy_periods * self._period_s >= rules.noisy_s
+        if not constant.all():
+            if noisy:
+                names = [n for n, c in zip(("Fx", "Fy", "Fz", "Tx", "Ty", "Tz"), constant, strict=True) if c]
+                what = f"{', '.join(names)} stand still while the others do not: clipped, or a dead line"
+                fatal = self._transients.exceeded("wrench_stuck", stamp_s)
+                findings.append(GuardFinding("wrench_stuck", what, float(len(names)), 0.0, stamp_s, fatal))
+            return
+        self._same_periods += 1
+        same_s = self._same_periods * self._period_s
+        if noisy:
+            fatal = self._transients.exceeded("wrench_stuck", stamp_s) or same_s >= rules.stuck_s
+            what = f"the wrench has been bit-identical for {same_s:.2f} s; it was noisy before"
+            findings.append(GuardFinding("wrench_stuck", what, same_s, rules.stuck_s, stamp_s, fatal))
+        elif same_s >= rules.stuck_s:
+            self._noisy_periods = 0
+
+    def _record_noise(self, stamp_s: float, findings: list[GuardFinding]) -> None:
+        """Record noise once a window; it never ends a mission, because a skill notices when it cannot work with it."""
+        if stamp_s - self._noted_s < self._rules.window_s:
+            return
+        self._noted_s = stamp_s
+        limit = self._rules.max_noise_N
+        what = f"the force jumps by {self._noise_N:.2f} N from sample to sample; at most {limit:.2f} N are expected"
+        findings.append(GuardFinding("wrench_noise", what, self._noise_N, limit, stamp_s, fatal=False))
+
+
+class TactileSignalGuard:
+    """Check the depth maps while they are requested."""
+
+    def __init__(self, rules: SupervisionLimits, transients: TransientCounter) -> None:
+        self._rules, self._transients = rules, transients
+        self.reset()
+
+    def reset(self) -> None:
+        """Learn anew."""
+        self._since_s: float | None = None
+        self._last: TactileFrame | None = None
+        self._different = self._equal = 0
+
+    @property
+    def asked(self) -> bool:
+        """True while maps are requested."""
+        return self._since_s is not None
+
+    def on_command(self, tactile: bool, now_s: float) -> None:
+        """Note whether the next block should contain maps."""
+        if not tactile:
+            self._since_s = None
+        elif self._since_s is None:
+            self._since_s = now_s
+
+    def check(self, o: Observation, findings: list[GuardFinding]) -> None:
+        """Check one block."""
+        now_s, limit, frame = o.now_s, self._rules.tactile_age_s, o.tactile
+        since_s = now_s if self._since_s is None else self._since_s
+        if frame is None or frame.stamp_s < since_s - limit:  # also one taken before the request
+            waited = now_s - since_s
+            if waited > limit:
+                what = f"no depth map for {waited:.3f} s although they were requested"
+                findings.append(GuardFinding("tactile_stale", what, waited, limit, now_s))
+            return
+        self._since_s = now_s
+        if now_s - frame.stamp_s > limit:
+            age = now_s - frame.stamp_s
+            findings.append(GuardFinding("tactile_stale", f"a depth map is {age:.3f} s old", age, limit, now_s))
+        self._check_dead(frame, now_s, findings)
+        self._check_frozen(frame, o.gripper.force_N < MAX_UNTOUCHED_N, now_s, findings)
+
+    def _check_dead(self, frame: TactileFrame, now_s: float, findings: list[GuardFinding]) -> None:
+        for side, depth in (("left", frame.left_m), ("right", frame.right_m)):
+            live = float(np.count_nonzero(np.isfinite(depth))) / depth.size
+            if live < self._rules.live_taxels or np.isinf(depth).any():
+                fatal = self._transients.exceeded("tactile_dead", now_s)
+                what = f"{100.0 * live:.0f} % of the {side} pad deliver numbers"
+                findings.append(GuardFinding("tactile_dead", what, live, self._rules.live_taxels, now_s, fatal))
+
+    def _check_frozen(self, frame: TactileFrame, untouched: bool, now_s: float, findings: list[GuardFinding]) -> None:
+        last, self._last = self._last, frame
+        if last is None:
+            return
+        pairs = ((frame.left_m, last.left_m), (frame.right_m, last.right_m))
+        if not all(np.array_equal(now, before, equal_nan=True) for now, before in pairs):
+            self._equal = 0
+            self._different += untouched
+            return
+        if self._different < MIN_NOISY_FRAMES:
+            self._different = 0
+            return
+        self._equal += 1
+        if self._equal >= MAX_EQUAL_FRAMES:
+            what = f"{self._equal + 1} depth maps are bit-identical; they were noisy before"
+            findings.append(GuardFinding("tactile_frozen", what, float(self._equal), float(MAX_EQUAL_FRAMES), now_s))
