@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glotouch_bt.motion import Arm, Motion, finger_outline_half_m
+from glotouch_bt.motion import Arm, Motion, finger_outline_half_m, hand_pose_B
 from glotouch_bt.robot import Array, Observation, Pose, World
-from glotouch_skills.common.hand import hand_pose_B
 
 TOUCH_N = 2.5
 """Force that counts as a touch: above the hand's inertia at this speed, below what harms."""

@@ -2,6 +2,7 @@
 
 from glotouch_bt.motion.arm import Arm
 from glotouch_bt.motion.clearance import ClearanceViolation, Scene
+from glotouch_bt.motion.hand_pose import hand_pose_B, yaw_near_home
 from glotouch_bt.motion.jaws import JawRestDetector
 from glotouch_bt.motion.kinematics import Kinematics, build_model
 from glotouch_bt.motion.paths import Arc, Line, Path, Piece, Polyline
@@ -30,6 +31,8 @@ __all__ = [
     "Style",
     "build_model",
     "finger_outline_half_m",
+    "hand_pose_B",
     "plan_piece",
     "rest_to_rest",
+    "yaw_near_home",
 ]

@@ -1,5 +1,1 @@
-"""TODO door of glotouch_skills/common."""
-
-from glotouch_skills.common.recheck import Recheck
-
-__all__ = ["Recheck"]
+"""Motions and plans that several skills share, in one folder a topic; no skill is registered from here."""

@@ -9,7 +9,8 @@ import numpy as np
 from glotouch_bt.perception.search import SearchMap, search_policy, seek
 from glotouch_bt.perception.touch import Contact
 from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
-from glotouch_skills.common.probe import Explorer, ExploringSpeeds, HeldTool
+from glotouch_bt.skill.probing import HeldTool
+from glotouch_skills.common.probe import Explorer, ExploringSpeeds
 
 
 class GuardedSweepParams(SkillParams):

@@ -10,7 +10,8 @@ import numpy as np
 from glotouch_bt.perception.search import Move, Plan, SearchMap, admit, joins, of_another, part_of, trace
 from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillRun, param
-from glotouch_skills.common.probe import Explorer, HeldTool, TracingParams
+from glotouch_bt.skill.probing import HeldTool
+from glotouch_skills.common.probe import Explorer, TracingParams
 
 NEAR_M = 0.015
 """Farther than this from the first contact the ball goes back to it from above: a trace that was broken off may have

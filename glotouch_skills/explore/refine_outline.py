@@ -10,7 +10,8 @@ import numpy as np
 from glotouch_bt.perception.search import TraceParams, elsewhere_m, refined, trace_more
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillRun, param
-from glotouch_skills.common.probe import Explorer, HeldTool, TracingParams
+from glotouch_bt.skill.probing import HeldTool
+from glotouch_skills.common.probe import Explorer, TracingParams
 
 GAP_M = (0.004, 0.020)
 """So far from every contact the outline begins to be, and is fully, what no family of outlines may have thought of:

@@ -12,7 +12,7 @@ from glotouch_bt.perception.search import BallMove, Met, Top, TopPlan, TopRule, 
 from glotouch_bt.perception.touch import Candidate, GuardParams
 from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
-from glotouch_skills.common.probe import HeldTool, Prober
+from glotouch_bt.skill.probing import HeldTool, Prober
 
 RIM_PLACES, RIM_INSET_M = 4, 0.003
 """Where a hollow object is touched: so far inside of so many places of its rim, a quarter of the way round apart."""

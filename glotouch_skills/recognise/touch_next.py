@@ -7,14 +7,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from glotouch_bt.motion import Motion
+from glotouch_bt.motion import Motion, hand_pose_B
 from glotouch_bt.perception import target_model
 from glotouch_bt.perception.recognition import Belief, PadSpec, TargetModel, believe, expected_gain
 from glotouch_bt.perception.touch import Candidate, Layer, TouchSequence, TouchSet
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import HOLD, Array, MotionRefused, ParamError
 from glotouch_bt.skill import UNCHANGED, Context, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import CLEARANCE_M, hand_pose_B, keeping_clear_of, require_clear
+from glotouch_skills.common.hand import CLEARANCE_M, keeping_clear_of, require_clear
 from glotouch_skills.common.planning import (
     ClosureParams,
     Option,

@@ -6,11 +6,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.motion import Motion
+from glotouch_bt.motion import Motion, hand_pose_B
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import MotionRefused, Pose
 from glotouch_bt.skill import UNCHANGED, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import CLEARANCE_M, close_gently, glide, hand_pose_B, keeping_clear_of, require_clear
+from glotouch_skills.common.hand import CLEARANCE_M, close_gently, glide, keeping_clear_of, require_clear
 from glotouch_skills.common.planning import GraspPlan
 
 

@@ -6,11 +6,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.motion import JawRestDetector
+from glotouch_bt.motion import JawRestDetector, hand_pose_B
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import Pose
 from glotouch_bt.skill import UNCHANGED, In, Skill, SkillFailed, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import glide, hand_pose_B, keeping_clear_of, let_go, rise_clear
+from glotouch_skills.common.hand import glide, keeping_clear_of, let_go, rise_clear
 from glotouch_skills.common.planning import GraspPlan
 
 OVER_M = 0.03

@@ -6,12 +6,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.motion import finger_outline_half_m
+from glotouch_bt.motion import finger_outline_half_m, yaw_near_home
 from glotouch_bt.perception.touch.detection import Polygon
 from glotouch_bt.robot import Pose, SetPayload, Tare
 from glotouch_bt.skill import Out, Skill, SkillFailed, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import easy_yaw, finish
-from glotouch_skills.common.probe import HeldTool, corner_place
+from glotouch_bt.skill.probing import HeldTool
+from glotouch_skills.common.hand import finish
+from glotouch_skills.common.probe import corner_place
 
 TRAVEL_M_S = 0.1
 
@@ -57,7 +58,7 @@ class BareHand(Skill):
             raise SkillFailed("probe_held", "the probe is in the jaws", advice="return it first with tool_return")
         state = yield from arm.jaws(self.params.aperture_m)
         here = arm.pose_B_P
-        yaw = easy_yaw(arm, np.deg2rad(self.params.yaw_deg))
+        yaw = yaw_near_home(arm, np.deg2rad(self.params.yaw_deg))
         container = self.context.world.container.pose_B_K
         over = container.apply(np.array([*corner_place(self.context.world, self.params.corner_gap_m), 0.0]))
         yield from arm.line(Pose.pointing_down((*over[:2], here.position_m[2]), yaw), TRAVEL_M_S)

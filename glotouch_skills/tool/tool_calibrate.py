@@ -12,8 +12,9 @@ from glotouch_bt.perception.touch import GuardParams
 from glotouch_bt.perception.touch.calibration import TipCalibration, WallTouch, solve_tip, wrench_delay
 from glotouch_bt.robot import Array, MotionRefused, Observation
 from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill.probing import HeldTool, Prober
 from glotouch_skills.common.hand import may_touch
-from glotouch_skills.common.probe import HeldTool, Prober, corner_place, corner_walls, quiet_corner
+from glotouch_skills.common.probe import corner_place, corner_walls, quiet_corner
 
 NEAR_M = 0.012
 """So near to its corner in the plane the ball is taken straight there, else over the walls."""

@@ -8,8 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from glotouch_bt.skill import UNCHANGED, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill.probing import HeldTool
 from glotouch_skills.common.hand import GRAVITY_M_S2, rise_clear, weigh
-from glotouch_skills.common.probe import HELD_TOLERANCE_M, HeldTool, feel_floor
+from glotouch_skills.common.probe import HELD_TOLERANCE_M, feel_floor
 
 TAKE_ANEW = "put it back into its holder and take it anew"
 PUT_IT_THERE = "it lies in the container or beside it; take it out by hand and put it into its holder"

@@ -7,22 +7,22 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.motion import Motion
+from glotouch_bt.motion import Motion, yaw_near_home
 from glotouch_bt.perception.touch.calibration import JawZero, measured_zero
 from glotouch_bt.robot import Pose, SetPayload, Tare
 from glotouch_bt.skill import UNCHANGED, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill.probing import HeldTool
 from glotouch_skills.common.hand import (
     DOWN_B,
     GRAVITY_M_S2,
     UP_B,
-    easy_yaw,
     finish,
     may_touch,
     straight_guard,
     weigh_N,
     why_stopped,
 )
-from glotouch_skills.common.probe import FLOOR_SEARCH_M, HeldTool, feel_floor
+from glotouch_skills.common.probe import FLOOR_SEARCH_M, feel_floor
 
 MET_N = 8.0
 """Change of force at which the open hand goes no farther down over the handle; unhindered it is below 2 N."""
@@ -91,7 +91,7 @@ class ToolPickup(Skill):
             yield from self._rise(float(world.holder.pose_B_grasp.position_m[2] - arm.pose_B_P.position_m[2]))
         else:
             arm.scene.hold_tool(False)
-            yaw = easy_yaw(arm, world.holder.pose_B_grasp.yaw_rad)
+            yaw = yaw_near_home(arm, world.holder.pose_B_grasp.yaw_rad)
             aperture = yield from self._grip(yaw)
             yield from self._rise(0.0)
             weight_N = yield from weigh_N(arm)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import ClassVar
 
 from glotouch_bt.skill import UNCHANGED, In, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.probe import HeldTool, return_probe
+from glotouch_bt.skill.probing import HeldTool
+from glotouch_skills.common.probe import return_probe
 
 
 class ToolReturnParams(SkillParams):

@@ -9,7 +9,7 @@ import numpy as np
 from glotouch_bt.bench.detection.simulated import Rig
 from glotouch_bt.perception.touch import GuardParams
 from glotouch_bt.robot import Pose
-from glotouch_skills.common.probe.guarded_probe import Prober
+from glotouch_bt.skill.probing.guarded_probe import Prober
 
 
 def test_the_inertia_taken_out_leaves_less_than_half_of_the_threshold() -> None:

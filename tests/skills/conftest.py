@@ -32,7 +32,7 @@ from glotouch_bt.robot import (
 )
 from glotouch_bt.robot.fake import FakeRobot, forward
 from glotouch_bt.skill import Context, Skill
-from glotouch_skills.common.probe.held_tool import HeldTool
+from glotouch_bt.skill.probing.held_tool import HeldTool
 
 BRAKE_RAD_S2 = 2.5
 JUMP_RAD_S = 0.3  # a setpoint's velocity may change by this in a period; the hardest stop changes it by 0.05

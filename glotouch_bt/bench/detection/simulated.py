@@ -12,14 +12,13 @@ from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
 from glotouch_bt.bench.detection.signals import wrong
-from glotouch_bt.mission.read import load_conditions, load_world
+from glotouch_bt.mission.read import SkillShelf, load_conditions, load_world
 from glotouch_bt.motion import Arm, Motion
 from glotouch_bt.perception.touch import Carried, GuardParams
 from glotouch_bt.robot import HOLD, Array, BadInput, MotionRefused, Observation, Robot, load_backend
 from glotouch_bt.robot.simulation import Referee
 from glotouch_bt.skill import Context
-from glotouch_skills.common.probe import HeldTool, Probed, Prober
-from glotouch_skills.tool import ToolPickup
+from glotouch_bt.skill.probing import HeldTool, Probed, Prober
 
 WORLD, CORNER_K = "container_five", (0.075, 0.13, 0.0)
 """One object of the world, out of the way, in a corner of the container."""
@@ -83,8 +82,9 @@ class Rig:
         """Nobody reads along."""
 
     def _pick_up(self) -> HeldTool:
-        skill = ToolPickup("pickup", ToolPickup.Params(), self.context)
-        keys = {port: f"/detection/{id(self)}/{key}" for port, key in ToolPickup.default_keys().items()}
+        pickup = SkillShelf()["tool_pickup"]
+        skill = pickup("pickup", pickup.Params(), self.context)
+        keys = {port: f"/detection/{id(self)}/{key}" for port, key in pickup.default_keys().items()}
         skill.setup_ports(keys)
         while True:
             self.context.command = HOLD

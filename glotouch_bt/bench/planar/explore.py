@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
+from typing import Any
 
 from glotouch_bt.bench.planar.drive import drive
 from glotouch_bt.bench.planar.world import PlanarWorld
+from glotouch_bt.mission.read import SkillShelf
 from glotouch_bt.perception.search import (
     Felt,
     Move,
     SearchMap,
     SearchPolicy,
-    TraceParams,
     admit,
     elsewhere_m,
     joins,
@@ -24,7 +25,6 @@ from glotouch_bt.perception.search import (
     trace_more,
 )
 from glotouch_bt.perception.touch import Candidate
-from glotouch_skills.explore import GuardedSweepParams, OrbitProbeParams, RefineOutlineParams
 
 BUDGET_M = 8.0
 MAX_MOVES = 5000
@@ -82,15 +82,18 @@ class _Budget:
         return self._world.execute(move)
 
 
+@cache
+def _defaults(skill: str) -> Any:
+    """Default parameters of an installed skill."""
+    return SkillShelf()[skill].Params()
+
+
 def explore(
     world: PlanarWorld,
     policy: SearchPolicy,
     expected: int,
     *,
     budget_m: float = BUDGET_M,
-    tracing: TraceParams | None = None,
-    sweep: GuardedSweepParams | None = None,
-    orbit: OrbitProbeParams | None = None,
 ) -> Explored:
     """What the mission's exploration does, with geometry for an arm.
 
@@ -99,11 +102,8 @@ def explore(
         policy: Where to go.
         expected: How many objects are looked for.
         budget_m: Travel after which it is broken off.
-        tracing: How outlines are traced (default: as the skill's parameters say).
-        sweep, orbit: Parameters of the skills; their defaults by default.
     """
-    sweep, orbit = sweep or GuardedSweepParams(), orbit or OrbitProbeParams()
-    tracing = tracing or orbit.rule()
+    sweep, orbit = _defaults("guarded_sweep"), _defaults("orbit_probe")
     belief = SearchMap.blank(world.half_m + world.tip_radius_m - sweep.wall_gap_m, expected)
     found: dict[int, Traced] = {}
     candidates: tuple[Candidate, ...] = ()
@@ -124,7 +124,7 @@ def explore(
                 first,
                 world.tip_K_m,
                 radius,
-                tracing,
+                orbit.rule(),
                 half_extent_m=belief.half_extent_m,
                 known=known,
                 elsewhere=elsewhere,
@@ -142,9 +142,7 @@ def explore(
     return Explored(tuple(found[i] for i in sorted(found)), world.travel_m, ended, belief, untraced)
 
 
-def refine_all(
-    world: PlanarWorld, explored: Explored, *, budget_m: float = BUDGET_M, refine: RefineOutlineParams | None = None
-) -> tuple[Traced, ...]:
+def refine_all(world: PlanarWorld, explored: Explored, *, budget_m: float = BUDGET_M) -> tuple[Traced, ...]:
     """Go on where an exploration ended: all its candidates as they are after tracing on, in their order.
 
     The least known comes first, while the travel lasts; those it does not last for stay as they were.
@@ -153,9 +151,8 @@ def refine_all(
         world: As the exploration left it.
         explored: How it ended.
         budget_m: Travel, the exploration's included, after which it is broken off.
-        refine: Parameters of the skill.
     """
-    tracing, half = (refine or RefineOutlineParams()).rule(), explored.belief.half_extent_m
+    tracing, half = _defaults("refine_outline").rule(), explored.belief.half_extent_m
     out, limited = list(explored.found), _Budget(world, budget_m)
     for i, traced in sorted(enumerate(explored.found), key=lambda item: item[1].candidate.quality):
         known = traced.candidate.contacts

@@ -1,7 +1,7 @@
 """TODO door of glotouch_bt/mission/read."""
 
 from glotouch_bt.mission.read.fields import unit_of, validate
-from glotouch_bt.mission.read.library import SkillShelf, find_shipped, shipped, shipped_root, shown
+from glotouch_bt.mission.read.library import RESUME_CHECK_GROUP, SkillShelf, find_shipped, shipped, shipped_root, shown
 from glotouch_bt.mission.read.parameters import (
     Declaration,
     Parameter,
@@ -21,6 +21,7 @@ from glotouch_bt.mission.read.yaml_source import parse_yaml, read_yaml
 __all__ = [
     "Declaration",
     "Parameter",
+    "RESUME_CHECK_GROUP",
     "Reading",
     "Scope",
     "SkillShelf",

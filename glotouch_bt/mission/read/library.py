@@ -11,6 +11,8 @@ from glotouch_bt.robot import BadInput, UnknownName
 from glotouch_bt.skill import Skill
 
 SKILL_GROUP = "glotouch_bt.skills"
+RESUME_CHECK_GROUP = "glotouch_bt.resume_check"
+"""Entry-point group of the one skill that checks the world before a mission resumes in it."""
 
 
 def shipped_root() -> Path:
@@ -57,13 +59,17 @@ def shown(path: Path) -> str:
 class SkillShelf(Mapping[str, type[Skill]]):
     """Installed skills by name; a skill's module is imported when first asked for.
 
+    Args:
+        group: Entry-point group; that of mission skills, or `RESUME_CHECK_GROUP`.
+
     Raises:
         UnknownName: On looking up a name that nobody registered.
         BadInput: On looking up a skill whose module cannot be imported here.
     """
 
-    def __init__(self) -> None:
-        self._points: dict[str, EntryPoint] = {e.name: e for e in entry_points(group=SKILL_GROUP)}
+    def __init__(self, group: str = SKILL_GROUP) -> None:
+        self._group = group
+        self._points: dict[str, EntryPoint] = {e.name: e for e in entry_points(group=group)}
         self._loaded: dict[str, type[Skill]] = {}
 
     def __getitem__(self, name: str) -> type[Skill]:
@@ -75,7 +81,7 @@ class SkillShelf(Mapping[str, type[Skill]]):
             except (ImportError, AttributeError) as e:
                 raise BadInput(f"skill {name!r} cannot be used here: {e}") from e
             if not (isinstance(found, type) and issubclass(found, Skill)):
-                raise BadInput(f"entry point {name!r} of {SKILL_GROUP} is not a Skill class")
+                raise BadInput(f"entry point {name!r} of {self._group} is not a Skill class")
             self._loaded[name] = found
         return self._loaded[name]
 

@@ -2,7 +2,7 @@
 
 from glotouch_skills.common.hand.clearance_rules import keeping_clear_of, may_touch
 from glotouch_skills.common.hand.compliant_close import close_gently, let_go
-from glotouch_skills.common.hand.hand import CLEARANCE_M, easy_yaw, glide, hand_pose_B, require_clear
+from glotouch_skills.common.hand.hand import CLEARANCE_M, glide, require_clear
 from glotouch_skills.common.hand.line_guard import (
     DOWN_B,
     UP_B,
@@ -28,10 +28,8 @@ __all__ = [
     "StraightGuard",
     "Strayed",
     "close_gently",
-    "easy_yaw",
     "finish",
     "glide",
-    "hand_pose_B",
     "keeping_clear_of",
     "let_go",
     "may_touch",

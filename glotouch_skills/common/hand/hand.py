@@ -8,7 +8,7 @@ import numpy as np
 
 from glotouch_bt.motion import Arm, Motion
 from glotouch_bt.perception.touch import ContactGuard, GuardParams, fit_baseline
-from glotouch_bt.robot import Array, Container, MotionRefused, Pose
+from glotouch_bt.robot import MotionRefused, Pose
 from glotouch_bt.skill import Context
 
 CLEARANCE_M = 0.004
@@ -19,22 +19,6 @@ BUMP_CUTOFF_HZ = 100.0
 """A bump is far above the noise: a faster filter stops the hand sooner."""
 BASELINE_S = 0.1
 CAREFUL_ACCELERATION_M_S2, CAREFUL_JERK_M_S3 = 0.6, 20.0
-
-
-def easy_yaw(arm: Arm, yaw_B_rad: float) -> float:
-    """Of `yaw_B_rad` and its half turns, the one nearest to the arm's home yaw (far from the last joint's stops).
-
-    Parallel jaws look the same after half a turn.
-    """
-    home_yaw = arm.kinematics.fk(arm.kinematics.home).yaw_rad
-    away = (yaw_B_rad - home_yaw + 0.5 * np.pi) % np.pi - 0.5 * np.pi
-    return float(home_yaw + away)
-
-
-def hand_pose_B(arm: Arm, container: Container, position_K_m: Array, yaw_K_rad: float) -> Pose:
-    """Pose of P in B, pointing down at `position_K_m` (3,) with x_P along `yaw_K_rad` or its half turn."""
-    yaw_B = easy_yaw(arm, container.pose_B_K.yaw_rad + yaw_K_rad)
-    return Pose.pointing_down(container.pose_B_K.apply(position_K_m), yaw_B)
 
 
 def require_clear(arm: Arm, pose_B_P: Pose, aperture_m: float, margin_m: float | None = None) -> None:

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from glotouch_bt.motion import Motion
+from glotouch_bt.motion import Motion, hand_pose_B
 from glotouch_bt.perception.touch import Candidate, Layer, Yielding, make_layer, watch_yielding
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose
 from glotouch_bt.skill import Context, SkillParams, param
-from glotouch_skills.common.hand import close_gently, glide, hand_pose_B, let_go
+from glotouch_skills.common.hand import close_gently, glide, let_go
 from glotouch_skills.common.planning.squeeze_plan import Stance
 
 HAND_CLEARANCE_M = 0.005

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glotouch_bt.motion import Arm, Motion
+from glotouch_bt.motion import Arm, Motion, hand_pose_B
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import HOLD, Array, Container, Gripper, MotionRefused
-from glotouch_skills.common.hand import CLEARANCE_M, hand_pose_B, require_clear
+from glotouch_skills.common.hand import CLEARANCE_M, require_clear
 
 MIN_SIDE_GAP_M = 0.004
 TURNS_RAD = np.deg2rad([0.0, 60.0, -60.0])

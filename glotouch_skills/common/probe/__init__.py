@@ -2,8 +2,6 @@
 
 from glotouch_skills.common.probe.floor_contact import FLOOR_SEARCH_M, feel_floor
 from glotouch_skills.common.probe.free_corner import corner_place, corner_walls, quiet_corner
-from glotouch_skills.common.probe.guarded_probe import LISTENING_ACCELERATION_M_S2, LISTENING_JERK_M_S3, Probed, Prober
-from glotouch_skills.common.probe.held_tool import HeldTool
 from glotouch_skills.common.probe.plan_driver import HELD_TOLERANCE_M, Explorer, ExploringSpeeds
 from glotouch_skills.common.probe.return_probe import nothing_in_hand, return_probe
 from glotouch_skills.common.probe.tracing_params import TracingParams
@@ -11,13 +9,8 @@ from glotouch_skills.common.probe.tracing_params import TracingParams
 __all__ = [
     "FLOOR_SEARCH_M",
     "HELD_TOLERANCE_M",
-    "LISTENING_ACCELERATION_M_S2",
-    "LISTENING_JERK_M_S3",
     "Explorer",
     "ExploringSpeeds",
-    "HeldTool",
-    "Probed",
-    "Prober",
     "TracingParams",
     "corner_place",
     "corner_walls",

@@ -7,10 +7,9 @@ import numpy as np
 from glotouch_bt.motion import Motion
 from glotouch_bt.perception.touch import GuardParams
 from glotouch_bt.skill import Context
+from glotouch_bt.skill.probing import HeldTool, Prober
 from glotouch_skills.common.hand import may_touch
 from glotouch_skills.common.probe.free_corner import corner_place
-from glotouch_skills.common.probe.guarded_probe import Prober
-from glotouch_skills.common.probe.held_tool import HeldTool
 
 FLOOR_SEARCH_M = 0.005
 """The floor is looked for this far below where it should be."""

@@ -14,9 +14,8 @@ from glotouch_bt.perception.search import Felt, Move, Plan, T
 from glotouch_bt.perception.touch import Contact, GuardParams
 from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.skill import Context, SkillFailed
+from glotouch_bt.skill.probing import HeldTool, Prober
 from glotouch_skills.common.hand import GRAVITY_M_S2, rise_clear, weigh_N
-from glotouch_skills.common.probe.guarded_probe import Prober
-from glotouch_skills.common.probe.held_tool import HeldTool
 
 AT_HEIGHT_M = 0.004
 """The ball counts as lowered within this of the sensing height."""

@@ -10,7 +10,7 @@ from py_trees.common import Status
 
 from glotouch_bt.perception.search import SearchMap
 from glotouch_bt.perception.touch import Contact, GuardParams
-from glotouch_skills.common.probe.guarded_probe import Prober
+from glotouch_bt.skill.probing.guarded_probe import Prober
 from glotouch_skills.explore.guarded_sweep import GuardedSweep
 
 POST, RADIUS, TOP = (0.03, -0.04), 0.03, 0.06

@@ -10,7 +10,7 @@ from py_trees.common import Status
 
 from glotouch_bt.perception.search import SearchMap, trace
 from glotouch_bt.perception.touch import Contact, GuardParams, fit_contour
-from glotouch_skills.common.probe.guarded_probe import Prober
+from glotouch_bt.skill.probing.guarded_probe import Prober
 from glotouch_skills.explore.orbit_probe import OrbitProbe
 
 POST, RADIUS, TOP, BALL = (0.02, -0.03), 0.028, 0.055, 0.006

@@ -5,16 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from glotouch_bt.motion import hand_pose_B, yaw_near_home
 from glotouch_bt.robot import MotionRefused, Pose
 from glotouch_skills.common.hand.clearance_rules import keeping_clear_of
-from glotouch_skills.common.hand.hand import BUMP_N, easy_yaw, glide, hand_pose_B, require_clear
+from glotouch_skills.common.hand.hand import BUMP_N, glide, require_clear
 
 
 @pytest.mark.parametrize("yaw", np.linspace(-7.0, 7.0, 29))
 def test_an_easy_yaw_is_the_same_line_within_a_quarter_turn_of_home(bench, yaw: float) -> None:
     arm = bench().arm
     home = arm.kinematics.fk(arm.kinematics.home).yaw_rad
-    easy = easy_yaw(arm, yaw)
+    easy = yaw_near_home(arm, yaw)
     assert abs(easy - home) <= 0.5 * np.pi + 1e-9
     assert np.sin(easy - yaw) == pytest.approx(0.0, abs=1e-9)  # whole half turns apart
 

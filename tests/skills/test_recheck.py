@@ -14,7 +14,7 @@ import pytest
 from glotouch_bt.mission.read.library import SkillShelf
 from glotouch_bt.perception.touch import Candidate, Contour
 from glotouch_bt.skill import SkillFailed
-from glotouch_skills.common.recheck import Recheck, _reach_m
+from glotouch_skills.recheck import Recheck, _reach_m
 
 
 def candidate(kind: Any, centre: tuple[float, float], size: tuple[float, float], yaw: float = 0.0) -> Candidate:

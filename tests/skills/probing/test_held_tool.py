@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glotouch_bt.robot import Container, Pose
-from glotouch_skills.common.probe.held_tool import HeldTool
+from glotouch_bt.skill.probing.held_tool import HeldTool
 
 angle = st.floats(-np.pi, np.pi)
 length = st.floats(-0.3, 0.3)

@@ -23,8 +23,9 @@ from glotouch_bt.perception.touch import (
     settled,
 )
 from glotouch_bt.robot import Array, MotionRefused, Observation, Pose
-from glotouch_bt.skill import Context, SkillFailed
-from glotouch_skills.common.probe.held_tool import HeldTool
+from glotouch_bt.skill.context import Context
+from glotouch_bt.skill.failures import SkillFailed
+from glotouch_bt.skill.probing.held_tool import HeldTool
 
 REST_S, LONGEST_REST_S = 0.12, 0.6
 """The wrench and the twist must have been steady for so long before a guard listens; waited for at most so long."""

@@ -11,8 +11,9 @@ from glotouch_bt.perception.touch import Candidate, GuardParams, signed_distance
 from glotouch_bt.perception.touch.detection import Polygon
 from glotouch_bt.robot import Array, MotionRefused, SetPayload, Tare
 from glotouch_bt.skill import In, Skill, SkillFailed, SkillParams, SkillRun, come_to_rest, param
+from glotouch_bt.skill.probing import HeldTool, Prober
 from glotouch_skills.common.hand import finish, rise_clear
-from glotouch_skills.common.probe import HELD_TOLERANCE_M, HeldTool, Prober, feel_floor
+from glotouch_skills.common.probe import HELD_TOLERANCE_M, feel_floor
 
 GRIPPING_N = 1.0
 DIRECTIONS = 24
