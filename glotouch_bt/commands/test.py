@@ -19,12 +19,6 @@ from glotouch_bt.commands.terminal import guarded
 def mission_tests(
     mission: Annotated[str, typer.Argument(metavar="MISSION", help="path of a mission file, or a shipped name")],
     tests: Annotated[list[str] | None, typer.Argument(metavar="TESTS...", help="test files or folders")] = None,
-    least: Annotated[
-        float | None,
-        typer.Option(
-            "--min", min=0.0, max=100.0, metavar="PERCENT", help="fail if the tests notice fewer of the mutants"
-        ),
-    ] = None,
     coverage: Annotated[
         float | None,
         typer.Option(
@@ -32,7 +26,7 @@ def mission_tests(
         ),
     ] = None,
 ) -> int:
-    """Run a mission's tests, say which outcomes they exercise, and which slips in the mission none of them notices."""
+    """Run a mission's tests, say which outcomes of each leaf they exercise."""
     from glotouch_bt.mission import load_mission
     from glotouch_bt.robot import BadInput
 
@@ -41,8 +35,7 @@ def mission_tests(
     except ImportError as e:
         raise BadInput("glotouch test needs pytest, which is not installed here: pip install pytest") from e
     load_mission(mission)
-    words = [*(tests or []), "-q", "-p", "no:cacheprovider", "--glotouch-coverage", "--glotouch-mutate", mission]
-    words += [] if least is None else ["--glotouch-mutate-min", str(least)]
+    words = [*(tests or []), "-q", "-p", "no:cacheprovider", "--glotouch-coverage"]
     words += [] if coverage is None else ["--glotouch-coverage-min", str(coverage)]
     code = int(pytest.main(words))
     if code == int(pytest.ExitCode.NO_TESTS_COLLECTED):

@@ -1,7 +1,6 @@
-"""For those who write missions: run them with scripted leaves, see what was covered, and which test is missing.
+"""Test missions: run them with scripted leaves and see which outcomes were covered. A pytest plugin comes with it.
 
-A pytest plugin (`plugin.py`) comes with it; docs/compose.md shows it at work. Nothing is imported before it is asked
-for: pytest loads the plugin in every session of an environment, whether it tests missions or not.
+Names are imported on first use, because pytest loads the plugin in every session of an environment.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ if TYPE_CHECKING:
     from glotouch_bt.mission_testing.call import Call
     from glotouch_bt.mission_testing.casting import ScriptError
     from glotouch_bt.mission_testing.outcomes import fails, hangs, ok, raises, real
+    from glotouch_bt.mission_testing.random_script import ScriptMaker
     from glotouch_bt.mission_testing.scripted import RunsAway, ScriptedRun, run_scripted
     from glotouch_bt.mission_testing.standins import stand_in
 
@@ -20,6 +20,7 @@ _HOME = {
     "Call": "call",
     "ScriptError": "casting",
     "RunsAway": "scripted",
+    "ScriptMaker": "random_script",
     "ScriptedRun": "scripted",
     "fails": "outcomes",
     "hangs": "outcomes",
@@ -34,6 +35,7 @@ __all__ = [
     "Call",
     "RunsAway",
     "ScriptError",
+    "ScriptMaker",
     "ScriptedRun",
     "fails",
     "hangs",

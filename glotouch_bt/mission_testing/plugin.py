@@ -1,7 +1,7 @@
 """The pytest plugin: comes with the package (entry point `pytest11`), costs nothing until a fixture or option is used.
 
 Fixtures: `scripted` runs a mission with scripted leaves, `load` loads one, `fake_robot` makes robots without physics,
-`faulty` puts faults round them. Options: `--glotouch-coverage`, `--glotouch-coverage-min`, `--glotouch-mutate`.
+`faulty` puts faults round them. Options: `--glotouch-coverage`, `--glotouch-coverage-min`.
 """
 
 from __future__ import annotations
@@ -34,23 +34,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--glotouch-coverage-min", type=float, metavar="PERCENT", help="fail if fewer of them were; prints them too"
     )
-    group.addoption(
-        "--glotouch-mutate",
-        action="append",
-        default=[],
-        metavar="MISSION",
-        help="after the tests, change this mission in every way a slip would, and see that a test fails each time",
-    )
-    group.addoption(
-        "--glotouch-mutate-min", type=float, metavar="PERCENT", help="fail if fewer mutants than this are noticed"
-    )
-    group.addoption(
-        "--glotouch-search",
-        type=int,
-        default=300,
-        metavar="N",
-        help="random scripts tried on each mutant no test notices (default 300; 0: quick, none is called equivalent)",
-    )
 
 
 def session_of(config: pytest.Config) -> Session:
@@ -68,11 +51,10 @@ class Scripted:
     Args:
         session: What all tests share.
         here: The test's folder; relative paths are looked for there too.
-        test: The test's id.
     """
 
-    def __init__(self, session: Session, here: Path, test: str) -> None:
-        self._session, self._here, self._test = session, here, test
+    def __init__(self, session: Session, here: Path) -> None:
+        self._session, self._here = session, here
 
     def load(
         self,
@@ -87,7 +69,7 @@ class Scripted:
         Raises:
             MissionFaults: Everything that is wrong with it.
         """
-        return self._session.load(mission, settings or {}, objects, skills, self._here, self._test)
+        return self._session.load(mission, settings or {}, objects, skills, self._here)
 
     def __call__(
         self,
@@ -115,14 +97,14 @@ class Scripted:
 
         loaded = self.load(mission, settings) if isinstance(mission, str | Path) else mission
         run = run_scripted(loaded, script, robot=robot, timeout_s=timeout_s)
-        self._session.ran(loaded, run)
+        self._session.coverage.add(loaded, run)
         return run
 
 
 @pytest.fixture
 def scripted(request: pytest.FixtureRequest) -> Scripted:
     """Run missions with scripted leaves: `run = scripted("retrieve", {"squeeze": fails("no_squeeze")})`."""
-    return Scripted(session_of(request.config), request.path.parent, request.node.nodeid)
+    return Scripted(session_of(request.config), request.path.parent)
 
 
 @pytest.fixture
@@ -162,28 +144,6 @@ def faulty() -> Iterator[Callable[..., FaultInjector]]:
             pytest.fail(f"altered nothing: {', '.join(found)}", pytrace=False)
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    """Refuse what does not go together."""
-    if config.getoption("--glotouch-mutate") and config.getoption("numprocesses", None):
-        raise pytest.UsageError("--glotouch-mutate runs its tests in one process: leave out -n")
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_runtestloop(session: pytest.Session) -> Iterator[None]:
-    """After the tests, if they pass: the mutants."""
-    done = yield
-    missions = session.config.getoption("--glotouch-mutate")
-    if missions and not session.config.option.collectonly and not hasattr(session.config, "workerinput"):
-        if session.testsfailed:
-            session_of(session.config).mutation_lines.append("no mutant was tried, for a test fails without any")
-        else:
-            from glotouch_bt.mission_testing.mutation import mutate
-
-            for mission in missions:
-                mutate(session, session_of(session.config), mission)
-    return done
-
-
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """Send what a worker has seen to the controller; judge the coverage."""
     config = session.config
@@ -191,17 +151,13 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     if output is not None:
         output["glotouch_coverage"] = session_of(config).coverage.plain() if KEY in config.stash else {}
         return
-    if session.exitstatus == 0 and any(_short(config)):
+    if session.exitstatus == 0 and _coverage_is_short(config):
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
-def _short(config: pytest.Config) -> tuple[bool, bool]:
-    """Less than was asked: (outcomes exercised, mutants noticed)."""
-    outcomes, mutants = config.getoption("--glotouch-coverage-min"), config.getoption("--glotouch-mutate-min")
-    return (
-        outcomes is not None and session_of(config).coverage.percent < outcomes,
-        mutants is not None and any(s.percent < mutants for s in session_of(config).scores),
-    )
+def _coverage_is_short(config: pytest.Config) -> bool:
+    percent = config.getoption("--glotouch-coverage-min")
+    return percent is not None and session_of(config).coverage.percent < percent
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -213,36 +169,18 @@ def pytest_testnodedown(node: Any, error: object) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    """Print the coverage of outcomes, and what came of the mutants."""
-    least = config.getoption("--glotouch-coverage-min")
-    if config.getoption("--glotouch-coverage") or least is not None:
-        _print_coverage(terminalreporter, config, least)
-    if config.getoption("--glotouch-mutate"):
-        _print_mutants(terminalreporter, config)
-
-
-def _print_coverage(reporter: Any, config: pytest.Config, least: float | None) -> None:
+    """Print the coverage of outcomes."""
+    percent = config.getoption("--glotouch-coverage-min")
+    if not config.getoption("--glotouch-coverage") and percent is None:
+        return
     coverage = session_of(config).coverage
-    reporter.section("glotouch: outcomes of leaves")
+    terminalreporter.section("glotouch: outcomes of leaves")
     for line in coverage.lines():
-        reporter.line(line)
+        terminalreporter.line(line)
     if not coverage.missions:
-        reporter.line("no mission was run with scripted leaves (fixture `scripted`)")
-    if least is not None:
+        terminalreporter.line("no mission was run with scripted leaves (fixture `scripted`)")
+    if percent is not None:
         done, total = coverage.exercised()
-        words = f"{done} of {total} outcomes ({coverage.percent:.1f} %), at least {least:g} % asked"
-        _print_verdict(reporter, _short(config)[0], words)
-
-
-def _print_mutants(reporter: Any, config: pytest.Config) -> None:
-    session, least = session_of(config), config.getoption("--glotouch-mutate-min")
-    reporter.section("glotouch: mutants")
-    for line in session.mutation_lines:
-        reporter.line(line)
-    if least is not None and session.scores:
-        worst = min(s.percent for s in session.scores)
-        _print_verdict(reporter, _short(config)[1], f"{worst:.1f} % of the mutants noticed, at least {least:g} % asked")
-
-
-def _print_verdict(reporter: Any, short: bool, words: str) -> None:
-    reporter.line(f"{'FAILED: ' if short else ''}{words}", red=short, green=not short)
+        short = _coverage_is_short(config)
+        text = f"{done} of {total} outcomes ({coverage.percent:.1f} %), at least {percent:g} % asked"
+        terminalreporter.line(f"{'FAILED: ' if short else ''}{text}", red=short, green=not short)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-import glotouch_bt.mission_testing.mutation.rerun  # noqa: F401  loaded before pytester, which unloads what it loads
+import glotouch_bt.mission_testing.scripted  # noqa: F401  loaded before pytester, which unloads what it loads
 from glotouch_bt.mission.read.library import SkillShelf
 
 dict(SkillShelf())
@@ -68,50 +68,6 @@ def test_without_options_nothing_is_said(folder: pytest.Pytester) -> None:
     done = folder.runpytest_inprocess()
     assert "glotouch:" not in done.stdout.str()
     assert done.ret == 0
-
-
-def test_what_no_test_notices_is_named_with_the_test_that_would(folder: pytest.Pytester) -> None:
-    folder.makepyfile(WEAK)
-    done = folder.runpytest_inprocess("--glotouch-mutate", "missions/put_back.yaml", "--glotouch-mutate-min", "90")
-    done.stdout.fnmatch_lines(
-        [
-            "missions/put_back.yaml:7:*'retry': attempts 2 becomes 3: no test notices",
-            "*scripted(..., {'tool_return': fails(*",
-            "*they part after*",
-            "FAILED:*of the mutants noticed, at least 90 % asked",
-        ]
-    )
-    assert done.ret == pytest.ExitCode.TESTS_FAILED
-
-
-def test_enough_tests_notice_every_mutant(folder: pytest.Pytester) -> None:
-    folder.makepyfile(STRONG)
-    done = folder.runpytest_inprocess("--glotouch-mutate", "missions/put_back.yaml", "--glotouch-mutate-min", "100")
-    assert done.ret == 0, done.stdout.str()
-    done.stdout.fnmatch_lines(["100.0 % of the mutants noticed, at least 100 % asked"])
-    assert "no test notices" not in done.stdout.str()
-
-
-def test_no_mutant_is_tried_where_a_test_fails_without_any(folder: pytest.Pytester) -> None:
-    folder.makepyfile(WEAK.replace(".succeeded", ".never_ran('tool_pickup')"))
-    done = folder.runpytest_inprocess("--glotouch-mutate", "missions/put_back.yaml")
-    done.stdout.fnmatch_lines(["no mutant was tried, for a test fails without any"])
-    assert done.ret == pytest.ExitCode.TESTS_FAILED
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (("--glotouch-mutate", "put_bak.yaml"), "*--glotouch-mutate put_bak.yaml: *no such mission file*"),
-        (("--glotouch-mutate", "calibrate"), "*no test of this session loads it with the fixture `scripted`*"),
-        (("--glotouch-mutate", "calibrate", "-n", "2"), "*runs its tests in one process: leave out -n*"),
-    ],
-)
-def test_what_cannot_be_is_said(folder: pytest.Pytester, options: tuple[str, ...], words: str) -> None:
-    folder.makepyfile(WEAK)
-    done = folder.runpytest_inprocess(*options)
-    (done.stdout if "fixture" in words else done.stderr).fnmatch_lines([words])
-    assert "Traceback" not in done.stdout.str() + done.stderr.str()
 
 
 def test_workers_send_what_they_have_seen(folder: pytest.Pytester) -> None:

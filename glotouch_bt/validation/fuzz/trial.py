@@ -19,8 +19,7 @@ from glotouch_bt.faults import FaultInjector, FaultPlan, read_plan
 from glotouch_bt.mission import Mission, load_mission
 from glotouch_bt.mission.read import shipped_root
 from glotouch_bt.mission.spec import MissionFaults
-from glotouch_bt.mission_testing import RunsAway, ok, run_scripted
-from glotouch_bt.mission_testing.mutation import ScriptMaker
+from glotouch_bt.mission_testing import RunsAway, ScriptMaker, ok, run_scripted
 from glotouch_bt.robot import BackendError, BadInput, FakeRobot
 from glotouch_bt.validation.fuzz.corrupt import as_text, spoil, spoil_text
 from glotouch_bt.validation.fuzz.documents import PASSIVE, grow_mission, grow_plan
