@@ -29,7 +29,7 @@ def check(
 ) -> int:
     """Prove missions before anything moves: every fault on any outcome of any skill, with the run that shows it."""
     from glotouch_bt.mission import load_mission, split_settings
-    from glotouch_bt.mission.check import worst_case
+    from glotouch_bt.mission.nodes import kind_of
     from glotouch_bt.mission.spec import Finding, Findings, MissionFaults, Place
     from glotouch_bt.robot import BadInput
 
@@ -55,7 +55,7 @@ def check(
                 f"{name}; did you mean {near!r}?" if (near := Findings.nearest(name, mission.parameters)) else name
                 for name in split_settings(mission, settings)
             )
-            nodes, runs = sum(1 for _ in mission.tree.walk()), worst_case(mission.tree)
+            nodes, runs = sum(1 for _ in mission.tree.walk()), kind_of(mission.tree).max_runs(mission.tree)
             report |= {"nodes": nodes, "skill_runs": str(runs), "timeout_s": mission.timeout_s}
             items = ", n items a for_each" if len(runs.terms) > 1 else ""
             said = f"{nodes} nodes; at most {runs} skill runs{items}; {mission.timeout_s:g} s"

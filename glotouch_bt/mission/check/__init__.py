@@ -1,6 +1,5 @@
-"""TODO door of glotouch_bt/mission/check."""
+"""The load-time check: from a read tree to findings, each with the shortest run that shows it. Knows no py_trees."""
 
-from glotouch_bt.mission.check.loop_bounds import worst_case
 from glotouch_bt.mission.check.rules import check_flow
 
-__all__ = ["check_flow", "worst_case"]
+__all__ = ["check_flow"]

@@ -5,27 +5,15 @@ None of it needs more than the tree and the sets of its analysis.
 
 from __future__ import annotations
 
-from glotouch_bt.mission.check.data_flow import Flow
-from glotouch_bt.mission.check.loop_bounds import worst_case
+from glotouch_bt.mission.check.data_flow import DataFlow
 from glotouch_bt.mission.check.requirements import verdicts
-from glotouch_bt.mission.check.state_sets import EMPTY
-from glotouch_bt.mission.check.state_variables import UNSET
-from glotouch_bt.mission.spec import (
-    ConditionSettings,
-    Findings,
-    ForEachSettings,
-    NodeSpec,
-    Place,
-    RepeatSettings,
-    RetrySettings,
-    TimeoutSettings,
-)
+from glotouch_bt.mission.nodes import EMPTY, UNSET, kind_of
+from glotouch_bt.mission.spec import Findings, NodeSpec, Place
 
 ENDLESS_RUNS = 1_000_000
-CATCHING = {"selector", "succeed", "retry", "fail", "invert"}
 
 
-def check_habits(flow: Flow, findings: Findings, timeout_s: float) -> None:
+def check_habits(flow: DataFlow, findings: Findings, timeout_s: float) -> None:
     """Report what is probably not meant.
 
     Args:
@@ -34,40 +22,42 @@ def check_habits(flow: Flow, findings: Findings, timeout_s: float) -> None:
         timeout_s: Longest duration of the mission.
     """
     _Habits(flow, findings).look(flow.tree, (), timeout_s)
-    runs = worst_case(flow.tree)
+    runs = kind_of(flow.tree).max_runs(flow.tree)
     if runs.fixed > ENDLESS_RUNS:
         what = f"loops within loops: up to {runs} runs of skills"
         findings.add(flow.tree.place, "practically_endless", what)
 
 
 class _Habits:
-    def __init__(self, flow: Flow, findings: Findings) -> None:
+    def __init__(self, flow: DataFlow, findings: Findings) -> None:
         self._flow, self._findings = flow, findings
         self._read = {w.key for n in flow.tree.walk() for w in n.reads.values()}
         self._written = {w.key for n in flow.tree.walk() for w in n.writes.values()}
 
     def look(self, node: NodeSpec, above: tuple[NodeSpec, ...], timeout_s: float) -> None:
-        if node.kind == "parallel":
+        kind = kind_of(node)
+        if kind.concurrent:
             self._at_once(node)
-        elif node.kind == "repeat":
+        if kind.revisits:
             self._until(node, above)
-        elif node.kind == "for_each":
+        if kind.loses_gathered(node):
             self._all_or_nothing(node, above)
-            self._gathered(node)
-        elif node.kind == "condition":
+        self._gathered(node)
+        if not node.children:
             self._condition(node)
-        elif node.kind == "selector":
+        if not kind.continue_on:
             self._alternatives(node)
-        elif node.kind == "skill":
+        if node.skill_type is not None:
             self._renamed(node)
         self._no_effect(node)
-        if isinstance(node.settings, TimeoutSettings):
-            if node.settings.seconds >= timeout_s:
-                outer = next((n for n in reversed(above) if n.kind == "timeout"), None)
+        limit_s = kind.time_limit_s(node)
+        if limit_s is not None:
+            if limit_s >= timeout_s:
+                outer = next((n for n in reversed(above) if kind_of(n).time_limit_s(n) is not None), None)
                 whose = f"{outer.name!r} (line {outer.place.line})" if outer is not None else "the mission"
-                what = f"{node.name!r} allows {node.settings.seconds:g} s, {whose} only {timeout_s:g} s"
+                what = f"{node.name!r} allows {limit_s:g} s, {whose} only {timeout_s:g} s"
                 self._findings.add(node.place, "timeout_never", what, node=node.name)
-            timeout_s = min(timeout_s, node.settings.seconds)
+            timeout_s = min(timeout_s, limit_s)
         for child in node.children:
             self.look(child, (*above, node), timeout_s)
 
@@ -92,13 +82,14 @@ class _Habits:
                             self._add(below, "written_twice", what, wire.place)
 
     def _until(self, node: NodeSpec, above: tuple[NodeSpec, ...]) -> None:
-        wire = node.reads.get("until")
-        if wire is None:
+        compared = kind_of(node).comparison(node)
+        if compared is None:
             return
-        outer = next((n for n in reversed(above) if n.kind == "parallel"), node)
+        wire = node.reads[compared[0]]
+        outer = next((n for n in reversed(above) if kind_of(n).concurrent), node)
         if any(w.key == wire.key for n in outer.walk() for w in n.writes.values()):
             return
-        if any(n.kind == "unknown" for n in node.walk()):
+        if any(n.is_unread for n in node.walk()):
             return
         name = wire.key.rpartition("/")[2]
         self._add(
@@ -106,29 +97,28 @@ class _Habits:
         )
 
     def _all_or_nothing(self, node: NodeSpec, above: tuple[NodeSpec, ...]) -> None:
-        settings = node.settings
-        if not isinstance(settings, ForEachSettings) or "on_failure" in settings.model_fields_set:
+        if not node.children or not self._fails(node.children[0]):
             return
-        if not settings.collect or not node.children or not self._fails(node.children[0]):
-            return
-        if any(n.kind in CATCHING or _goes_on(n) for n in above):
+        if any(kind_of(n).catches_failure(n) for n in above):
             return
         what = f"if one item of {node.name!r} fails, the mission fails with what it gathered"
         what += "; say on_failure: continue, or on_failure: stop if it is meant"
         self._add(node, "all_or_nothing", what)
 
     def _condition(self, node: NodeSpec) -> None:
-        settings = node.settings
-        if not isinstance(settings, ConditionSettings) or "port" not in node.reads:
+        compared = kind_of(node).comparison(node)
+        if compared is None:
             return
-        variables = self._flow.variables
-        for demand in self._flow.demands[id(node)]:
-            found = variables.sets.values(self._flow.judged(demand), demand.variable) & (demand.good | {UNSET})
-            yes, no = verdicts(variables, demand, settings)
+        settings, variables = compared[1], self._flow.variables
+        for requirement in self._flow.requirements[id(node)]:
+            found = variables.sets.values(self._flow.judged(requirement), requirement.variable) & (
+                requirement.good | {UNSET}
+            )
+            yes, no = verdicts(variables, requirement, settings)
             if found - {UNSET} and not (found & yes and found & no):
                 said = "always holds" if found & yes else "never holds"
                 self._add(node, "constant_condition", f"{node.name!r} {said}")
-            kinds = [variables.kind(demand.key, v) for v in found - {UNSET}]
+            kinds = [variables.kind(requirement.key, v) for v in found - {UNSET}]
             measured = kinds and all(k.data_type is float for k in kinds)
             if settings.equals is not None and not isinstance(settings.equals, (bool, str)) and measured:
                 what = f"{node.name!r} compares the float {settings.port!r} for being exactly {settings.equals}"
@@ -136,7 +126,7 @@ class _Habits:
 
     def _alternatives(self, node: NodeSpec) -> None:
         for child in node.children:
-            idle = not any(n.kind in ("skill", "unknown") for n in child.walk())
+            idle = not any(n.skill_type is not None or n.is_unread for n in child.walk())
             if idle and self._entered(child) and not self._succeeds(child):
                 self._add(child, "cannot_help", f"{child.name!r} is an alternative that never succeeds")
 
@@ -150,31 +140,19 @@ class _Habits:
 
     def _gathered(self, node: NodeSpec) -> None:
         """What is gathered may be for the record only, unless somebody reads a key of such a name, never written."""
-        for port, wire in node.writes.items():
-            if port in node.reads and wire.key not in self._read:
-                name = wire.key.rpartition("/")[2]
+        for port, (_, target) in kind_of(node).gathers(node).items():
+            if target not in self._read:
+                name = target.rpartition("/")[2]
                 missed = {k.rpartition("/")[2] for k in self._read - self._written}
                 if near := self._findings.nearest(name, missed):
                     what = f"nobody reads {name!r}, in which {node.name!r} gathers, and nobody writes {near!r}"
-                    self._findings.add(wire.place, "unused_key", what, hint=near, node=node.name)
+                    self._findings.add(node.writes[port].place, "unused_key", what, hint=near, node=node.name)
 
     def _no_effect(self, node: NodeSpec) -> None:
-        why = ""
         child = node.children[0] if node.children else None
         if child is None or not self._entered(child):
             return
-        if isinstance(node.settings, RetrySettings) and node.settings.attempts == 1:
-            why = "one attempt is none again"
-        elif isinstance(node.settings, RepeatSettings) and node.settings.times == 1:
-            why = "one pass is no repetition"
-        elif node.kind in ("retry", "succeed") and not self._fails(child):
-            why = f"{child.name!r} never fails"
-        elif node.kind == "fail" and not self._succeeds(child):
-            why = f"{child.name!r} never succeeds"
-        elif node.kind in ("selector", "parallel") and len(node.children) == 1 and child.kind != "unknown":
-            why = "it has one child"
-        elif node.kind == "timeout" and not any(n.kind in ("skill", "unknown") for n in child.walk()):
-            why = "nothing below it takes time"
+        why = kind_of(node).no_effect(node, fails=self._fails(child), succeeds=self._succeeds(child))
         if why:
             self._add(node, "no_effect", f"{node.name!r} changes nothing: {why}")
 
@@ -182,10 +160,10 @@ class _Habits:
         return self._flow.entered.get(id(node), EMPTY) != EMPTY
 
     def _fails(self, node: NodeSpec) -> bool:
-        return id(node) in self._flow.left and self._flow.left[id(node)].failure != EMPTY
+        return id(node) in self._flow.exits and self._flow.exits[id(node)].failure != EMPTY
 
     def _succeeds(self, node: NodeSpec) -> bool:
-        return id(node) in self._flow.left and self._flow.left[id(node)].success != EMPTY
+        return id(node) in self._flow.exits and self._flow.exits[id(node)].success != EMPTY
 
 
 def _users(node: NodeSpec) -> dict[str, NodeSpec]:
@@ -195,7 +173,3 @@ def _users(node: NodeSpec) -> dict[str, NodeSpec]:
         for thing in below.skill_type.USES if below.skill_type is not None else ():
             found.setdefault(thing, below)
     return found
-
-
-def _goes_on(node: NodeSpec) -> bool:
-    return isinstance(node.settings, ForEachSettings) and node.settings.on_failure == "continue"

@@ -9,21 +9,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, get_type_hints
 
-from glotouch_bt.mission.check.counterexample import Goal, Patience, shortest_path
-from glotouch_bt.mission.check.data_flow import Flow
+from glotouch_bt.mission.check.counterexample import Goal, StepBudget, shortest_path
+from glotouch_bt.mission.check.data_flow import DataFlow
 from glotouch_bt.mission.check.lint import check_habits
-from glotouch_bt.mission.check.requirements import Demand, all_demands, same_quantity
-from glotouch_bt.mission.check.state_sets import EMPTY
-from glotouch_bt.mission.check.state_variables import (
-    ANYTHING,
-    UNSET,
-    Kind,
-    Variables,
-    gathered_kind,
-    item_kind,
-    written_kinds,
-)
-from glotouch_bt.mission.spec import Findings, ForEachSettings, NodeSpec, Place
+from glotouch_bt.mission.check.requirements import all_requirements, same_quantity
+from glotouch_bt.mission.check.state_variables import StateVariables
+from glotouch_bt.mission.nodes import ANYTHING, EMPTY, UNSET, Requirement, ValueKind, kind_of
+from glotouch_bt.mission.spec import Findings, NodeSpec, Place
 
 MAX_PATHS = 40
 """Findings beyond so many are reported without a path."""
@@ -42,11 +34,11 @@ def check_flow(
         timeout_s: Longest duration of the mission.
     """
     with _deep_recursion():
-        variables = Variables(tree)
-        demands = all_demands(tree, variables)
-        exact = Flow(tree, variables, demands)
+        variables = StateVariables(tree)
+        requirements = all_requirements(tree, variables)
+        exact = DataFlow(tree, variables, requirements)
         blocked = any(exact.entered.get(id(n), EMPTY) == EMPTY for n in tree.walk())
-        lenient = Flow(tree, variables, demands, lenient=True) if blocked else exact
+        lenient = DataFlow(tree, variables, requirements, lenient=True) if blocked else exact
         _Judge(exact, lenient, findings).all(leaves)
         check_habits(lenient, findings, timeout_s)
 
@@ -65,137 +57,141 @@ def _deep_recursion() -> Iterator[None]:
 class _Judge:
     """Findings about what is entered in a run come from the exact sets, those behind a mistake from the lenient."""
 
-    def __init__(self, exact: Flow, lenient: Flow, findings: Findings) -> None:
+    def __init__(self, exact: DataFlow, lenient: DataFlow, findings: Findings) -> None:
         self._exact, self._lenient, self._findings = exact, lenient, findings
         self._variables, self._sets = exact.variables, exact.variables.sets
         self._writers = _writers(exact.tree, exact.variables)
-        self._paths, self._patience = 0, Patience()
+        self._paths, self._budget = 0, StepBudget()
 
     def all(self, leaves: Mapping[str, tuple[frozenset[str], Place]]) -> None:
         for node in self._exact.tree.walk():
-            for demand in self._exact.demands[id(node)]:
-                self._demand(demand)
-            if node.kind == "for_each":
-                self._least_first(node)
+            for requirement in self._exact.requirements[id(node)]:
+                self._demand(requirement)
+            self._ordered_by(node)
         self._unreachable(self._exact.tree)
         self._end(leaves)
 
     # -- keys and resources ------------------------------------------------------------------------------------------
 
-    def _demand(self, demand: Demand) -> None:
-        flow = self._exact if self._exact.asked.get(demand, EMPTY) != EMPTY else self._lenient
-        asked = flow.judged(demand)
+    def _demand(self, requirement: Requirement) -> None:
+        flow = self._exact if self._exact.looked.get(requirement, EMPTY) != EMPTY else self._lenient
+        asked = flow.judged(requirement)
         if asked == EMPTY:
             return
-        found = self._sets.values(asked, demand.variable)
-        if demand.unset == "not always":  # what a mistake before it kept from being written is no mistake here
-            found |= self._sets.values(self._lenient.judged(demand), demand.variable) - {ANYTHING}
-        wrong = found - demand.good - {UNSET}
-        if demand.of_resource:
-            if bad := found - demand.good:
-                self._wrong_state(flow, demand, bad, always=not found & demand.good)
+        found = self._sets.values(asked, requirement.variable)
+        if requirement.unset == "not always":  # what a mistake before it kept from being written is no mistake here
+            found |= self._sets.values(self._lenient.judged(requirement), requirement.variable) - {ANYTHING}
+        wrong = found - requirement.good - {UNSET}
+        if requirement.of_resource:
+            if bad := found - requirement.good:
+                self._wrong_state(flow, requirement, bad, always=not found & requirement.good)
             return
-        if self._never_written(demand, found):
-            self._unset(flow, demand, asked)
-        elif UNSET in found and UNSET not in demand.good:
-            by = ", ".join(f"{n.name!r} (line {p.line})" for n, p in self._places(demand))
-            what = f"{_reader(demand)}, which is written only on some paths to it, by {by}"
-            path = self._path(flow, demand, {UNSET})
-            self._findings.add(demand.place, "port_maybe_unset", what, path=path, node=demand.node.name)
-        alike: dict[Kind, set[int]] = {}  # what differs in its value only is one mistake
+        if self._never_written(requirement, found):
+            self._unset(flow, requirement, asked)
+        elif UNSET in found and UNSET not in requirement.good:
+            by = ", ".join(f"{n.name!r} (line {p.line})" for n, p in self._places(requirement))
+            what = f"{_reader(requirement)}, which is written only on some paths to it, by {by}"
+            path = self._path(flow, requirement, {UNSET})
+            self._findings.add(requirement.place, "port_maybe_unset", what, path=path, node=requirement.node.name)
+        alike: dict[ValueKind, set[int]] = {}  # what differs in its value only is one mistake
         for value in sorted(wrong):
-            alike.setdefault(dataclasses.replace(self._variables.kind(demand.key, value), value=None), set()).add(value)
+            alike.setdefault(dataclasses.replace(self._variables.kind(requirement.key, value), value=None), set()).add(
+                value
+            )
         for kind, values in alike.items():
-            self._wrong_kind(flow, demand, kind, values)
+            self._wrong_kind(flow, requirement, kind, values)
 
-    def _never_written(self, demand: Demand, found: frozenset[int]) -> bool:
-        if demand.unset == "allowed":
+    def _never_written(self, requirement: Requirement, found: frozenset[int]) -> bool:
+        if requirement.unset == "allowed":
             # A test of whether it is set makes sense only if somebody sets it.
-            return demand.node.kind == "condition" and not self._writers.get(demand.key)
+            tested = not requirement.node.children and kind_of(requirement.node).comparison(requirement.node)
+            return bool(tested) and not self._writers.get(requirement.key)
         return found == {UNSET}
 
-    def _places(self, demand: Demand) -> list[tuple[NodeSpec, Place]]:
+    def _places(self, requirement: Requirement) -> list[tuple[NodeSpec, Place]]:
         """Who writes a key, each once; the reader itself last."""
-        found = {n.name: (n, p) for n, p, _ in self._writers.get(demand.key, [])}
-        return sorted(found.values(), key=lambda w: (w[0] is demand.node, w[1]))
+        found = {n.name: (n, p) for n, p, _ in self._writers.get(requirement.key, [])}
+        return sorted(found.values(), key=lambda w: (w[0] is requirement.node, w[1]))
 
-    def _unset(self, flow: Flow, demand: Demand, asked: int) -> None:
-        what = f"{_reader(demand)}, which no node writes before it"
-        name = demand.key.rpartition("/")[2]
-        inside = {k.partition("@")[0] for k in self._writers if k != demand.key and k.rpartition("/")[2] == name}
+    def _unset(self, flow: DataFlow, requirement: Requirement, asked: int) -> None:
+        what = f"{_reader(requirement)}, which no node writes before it"
+        name = requirement.key.rpartition("/")[2]
+        inside = {k.partition("@")[0] for k in self._writers if k != requirement.key and k.rpartition("/")[2] == name}
         for subtree in sorted(inside - {name}):
             what += f"; subtree {subtree!r} keeps its own {name!r} to itself, unless it is wired with ports"
-        later = [(n, p) for n, p in self._places(demand) if n is not demand.node]
+        later = [(n, p) for n, p in self._places(requirement) if n is not requirement.node]
         if later:
             what += f"; {later[0][0].name!r} at line {later[0][1].line} writes it, but later or elsewhere"
-        prefix = demand.key.rpartition("/")[0]
+        prefix = requirement.key.rpartition("/")[0]
         written = sorted(
             key
             for key, variable in self._variables.keys.items()
             if "@" not in key.removeprefix(prefix) and self._sets.values(asked, variable) - {UNSET}
         )
         names = [k.rpartition("/")[2] for k in written if k.rpartition("/")[0] == prefix]
-        near = Findings.near(demand.key.rpartition("/")[2], names)
+        near = Findings.near(requirement.key.rpartition("/")[2], names)
         valid = ", ".join(near) + (f" and {len(names) - len(near)} more" if len(names) > len(near) else "")
         valid = valid or "no key is written yet"
         if prefix and (outer := [k for k in written if "/" not in k]):
             valid += f"; of the caller, to be wired with ports: {', '.join(outer)}"
-        hint = self._findings.nearest(demand.key.rpartition("/")[2], names)
-        path = self._path(flow, demand, {UNSET})
-        self._findings.add(demand.place, "port_unset", what, valid=valid, hint=hint, path=path, node=demand.node.name)
+        hint = self._findings.nearest(requirement.key.rpartition("/")[2], names)
+        path = self._path(flow, requirement, {UNSET})
+        self._findings.add(
+            requirement.place, "port_unset", what, valid=valid, hint=hint, path=path, node=requirement.node.name
+        )
 
-    def _wrong_kind(self, flow: Flow, demand: Demand, kind: Kind, values: set[int]) -> None:
-        held = {self._variables.kind(demand.key, v) for v in values}
-        writer = next(((n, p) for n, p, kinds in self._writers.get(demand.key, []) if held & set(kinds)), None)
+    def _wrong_kind(self, flow: DataFlow, requirement: Requirement, kind: ValueKind, values: set[int]) -> None:
+        held = {self._variables.kind(requirement.key, v) for v in values}
+        writer = next(((n, p) for n, p, kinds in self._writers.get(requirement.key, []) if held & set(kinds)), None)
         by = f"{writer[0].name!r} (line {writer[1].line})" if writer else "another node"
-        path = self._path(flow, demand, values)
-        if kind.unit and demand.unit and kind.unit != demand.unit:
-            what = f"{_reader(demand)} in {demand.unit}, but {by} writes it in {kind.unit}"
-            if not same_quantity(kind.unit, demand.unit):
+        path = self._path(flow, requirement, values)
+        if kind.unit and requirement.unit and kind.unit != requirement.unit:
+            what = f"{_reader(requirement)} in {requirement.unit}, but {by} writes it in {kind.unit}"
+            if not same_quantity(kind.unit, requirement.unit):
                 what += ": another quantity"
-            self._findings.add(demand.place, "port_unit", what, path=path, node=demand.node.name)
+            self._findings.add(requirement.place, "port_unit", what, path=path, node=requirement.node.name)
             return
-        wanted, given = _type_name(demand.wanted), _type_name(kind.data_type)
+        wanted, given = _type_name(requirement.wanted), _type_name(kind.data_type)
         if wanted == given:  # what differs is inside
-            wanted, given = f"{wanted} of {demand.element.__name__}", f"{given} of {kind.element.__name__}"
-        what = f"{_reader(demand)} as {wanted}, but {by} writes {given}"
-        self._findings.add(demand.place, "port_type", what, path=path, node=demand.node.name)
+            wanted, given = f"{wanted} of {requirement.element.__name__}", f"{given} of {kind.element.__name__}"
+        what = f"{_reader(requirement)} as {wanted}, but {by} writes {given}"
+        self._findings.add(requirement.place, "port_type", what, path=path, node=requirement.node.name)
 
-    def _wrong_state(self, flow: Flow, demand: Demand, bad: frozenset[int], *, always: bool) -> None:
-        names = self._variables.state_names(demand.key)
+    def _wrong_state(self, flow: DataFlow, requirement: Requirement, bad: frozenset[int], *, always: bool) -> None:
+        names = self._variables.state_names(requirement.key)
         may = "is" if always else "may be"
-        what = f"{demand.node.name!r} starts while the {demand.key} {may} {_states(names, bad)}"
-        path = self._path(flow, demand, set(bad))
-        valid = ", ".join(sorted(demand.wanted))
-        self._findings.add(demand.place, "wrong_state", what, valid=valid, path=path, node=demand.node.name)
+        what = f"{requirement.node.name!r} starts while the {requirement.key} {may} {_states(names, bad)}"
+        path = self._path(flow, requirement, set(bad))
+        valid = ", ".join(sorted(requirement.wanted))
+        self._findings.add(requirement.place, "wrong_state", what, valid=valid, path=path, node=requirement.node.name)
 
-    def _path(self, flow: Flow, demand: Demand, wrong: set[int]) -> tuple[str, ...]:
-        return self._search(flow, Goal(demand.node, demand.port, demand.variable, frozenset(wrong)))
+    def _path(self, flow: DataFlow, requirement: Requirement, wrong: set[int]) -> tuple[str, ...]:
+        return self._search(flow, Goal(requirement.node, requirement.port, requirement.variable, frozenset(wrong)))
 
-    def _search(self, flow: Flow, goal: Goal) -> tuple[str, ...]:
+    def _search(self, flow: DataFlow, goal: Goal) -> tuple[str, ...]:
         self._paths += 1
-        return shortest_path(flow, goal, self._patience) if self._paths <= MAX_PATHS else ()
+        return shortest_path(flow, goal, self._budget) if self._paths <= MAX_PATHS else ()
 
     # -- the rest ----------------------------------------------------------------------------------------------------
 
-    def _least_first(self, node: NodeSpec) -> None:
-        settings = node.settings
-        if not isinstance(settings, ForEachSettings) or settings.least_first is None or "items" not in node.reads:
+    def _ordered_by(self, node: NodeSpec) -> None:
+        found = kind_of(node).ordered_by(node)
+        if found is None:
             return
-        key = node.reads["items"].key
+        key, field = found
         kinds = {k for _, _, found in self._writers.get(key, []) for k in found}
         elements = {k.element for k in kinds} - {object}
         element = elements.pop() if len(elements) == 1 else object
-        if element is not object and settings.least_first not in _fields(element):
+        if element is not object and field not in _fields(element):
             kind = f"field of {element.__name__}:"
-            self._findings.unknown(node.place, "unknown_field", kind, settings.least_first, _fields(element))
+            self._findings.unknown(node.place, "unknown_field", kind, field, _fields(element))
 
     def _unreachable(self, node: NodeSpec) -> None:
         """The topmost nodes that are never entered."""
         for i, child in enumerate(node.children):
             if self._lenient.entered.get(id(child), EMPTY) == EMPTY:
                 before = node.children[i - 1] if i else node
-                word = "succeeds" if node.kind == "selector" else "fails"
+                word = "fails" if kind_of(node).continue_on else "succeeds"
                 what = f"{child.name!r} can never be reached: {before.name!r} (line {before.place.line}) always {word}"
                 self._findings.add(child.place, "unreachable", what, node=child.name)
                 return
@@ -242,26 +238,17 @@ class _Judge:
         end, tree = self._exact.end, self._exact.tree
         if end.success == EMPTY and end.failure != EMPTY:
             self._findings.add(tree.place, "never_succeeds", "no run of this mission ends in success")
-        elif end.failure == EMPTY and end.success != EMPTY and any(n.kind == "skill" for n in tree.walk()):
+        elif end.failure == EMPTY and end.success != EMPTY and any(n.skill_type is not None for n in tree.walk()):
             what = "the mission ends in success whatever its skills do"
             self._findings.add(tree.place, "never_fails", what)
 
 
-def _writers(tree: NodeSpec, variables: Variables) -> dict[str, list[tuple[NodeSpec, Place, list[Kind]]]]:
+def _writers(tree: NodeSpec, variables: StateVariables) -> dict[str, list[tuple[NodeSpec, Place, list[ValueKind]]]]:
     """Who writes each key, where it says so, and what kinds of values."""
-    found: dict[str, list[tuple[NodeSpec, Place, list[Kind]]]] = {}
+    found: dict[str, list[tuple[NodeSpec, Place, list[ValueKind]]]] = {}
     for node in tree.walk():
         for port, wire in node.writes.items():
-            if node.skill_type is not None:
-                kinds = written_kinds(node, port)
-            elif port == "item" and "items" in node.reads:
-                items = node.reads["items"].key
-                kinds = [item_kind(variables.kind(items, v)) for v in variables.written(items)]
-            elif port in node.reads:
-                source = node.reads[port].key
-                kinds = [gathered_kind({variables.kind(source, v): None}) for v in variables.written(source)]
-            else:
-                kinds = [variables.kind(wire.key, v) for v in variables.written(wire.key)]
+            kinds = kind_of(node).written_kinds(node, port, variables.written_kinds)
             found.setdefault(wire.key, []).append((node, wire.place, kinds))
     return found
 
@@ -289,10 +276,10 @@ def _hints(thing: Any) -> dict[str, Any]:
         return dict.fromkeys(getattr(thing, "__annotations__", ()), object)
 
 
-def _reader(demand: Demand) -> str:
-    name = demand.key.rsplit("/", 1)[-1]
-    port = f"port {demand.port!r}" if demand.port == name else f"port {demand.port!r} (key {name!r})"
-    return f"{demand.node.name!r} reads {port}"
+def _reader(requirement: Requirement) -> str:
+    name = requirement.key.rsplit("/", 1)[-1]
+    port = f"port {requirement.port!r}" if requirement.port == name else f"port {requirement.port!r} (key {name!r})"
+    return f"{requirement.node.name!r} reads {port}"
 
 
 def _type_name(wanted: Any) -> str:

@@ -1,25 +1,28 @@
-"""Sets of configurations (an assignment of a value to each of some variables), without listing them.
+"""Sets of states (a state gives a value to each of some variables), without listing them.
 
 A set is a zero-suppressed multi-valued decision diagram (Minato, Zero-suppressed BDDs for set manipulation in
-combinatorial problems, DAC 1993): a node asks for one variable and has a child for each of its values; equal nodes are
-one node; a variable that is 0 in all of a set is not asked for. So two sets are equal exactly if they are the same
-number, independent variables cost their sum, not their product, and what has not happened yet costs nothing. Recursion
-is as deep as there are variables, through list comprehensions only: those stay off the C stack, so that the
-interpreter's recursion limit may be raised for it.
+combinatorial problems, DAC 1993). A node of it tests one variable and has a child for each of its values; equal nodes
+are one node; a variable that is 0 in all states of a set is not tested. So two sets are equal exactly if their numbers
+are equal, independent variables cost their sum, not their product, and a variable that is still 0 costs nothing. The
+recursion is as deep as there are variables. It goes through list comprehensions only, which stay off the C stack, so
+that the interpreter's recursion limit may be raised for it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-EMPTY, START = 0, 1
+from glotouch_bt.mission.nodes import EMPTY
+
+START = 1
+"""The set of the one state in which all variables are 0."""
 
 
-class Configurations:
-    """The algebra of sets over some variables. A set is an int: `EMPTY`; `START`, with all variables 0; or another.
+class StateSets:
+    """The algebra of sets of states over some variables. A set is an int: `EMPTY`, `START`, or another.
 
     Args:
-        sizes: How many values each variable has. Later ones are asked for first: those written late in a mission are
+        sizes: Number of values of each variable. Later variables are tested first: those written late in a mission are
             then near the top, where they cost least.
     """
 
@@ -42,12 +45,12 @@ class Configurations:
         return found
 
     def _children(self, node: int, variable: int) -> tuple[int, ...]:
-        """A node's children by the values of a variable that it asks for first, or that is 0 in it."""
+        """Return a node's children by the values of a variable that it tests first, or that is 0 in it."""
         at, children = self._nodes[node]
         return children if at == variable else (node,) + (EMPTY,) * (self._sizes[variable] - 1)
 
     def union(self, *sets: int) -> int:
-        """What is in any of them."""
+        """Return the union."""
         made = EMPTY
         for one in sets:
             made = self._union(made, one)
@@ -65,7 +68,7 @@ class Configurations:
         return found
 
     def meet(self, a: int, b: int) -> int:
-        """What is in both."""
+        """Return the intersection of two sets."""
         if EMPTY in (a, b):
             return EMPTY
         if a == b:
@@ -79,22 +82,22 @@ class Configurations:
         return found
 
     def where(self, given: int, variable: int, values: Iterable[int]) -> int:
-        """Those in which a variable has one of some values."""
+        """Return the states in which a variable has one of some values."""
         bits = 0
         for value in values:
             bits |= 1 << value
         return self._apply(given, variable, bits, 0)
 
     def assign(self, given: int, variable: int, value: int) -> int:
-        """All of them, with a variable set to a value."""
+        """Return all states, with a variable set to a value."""
         return self._apply(given, variable, 1 << value, 1)
 
     def allow(self, given: int, variable: int, values: Iterable[int]) -> int:
-        """All of them, and all of them with a variable set to any of some values."""
+        """Return all states as they are, and with a variable set to any of some values."""
         return self.union(given, *(self.assign(given, variable, v) for v in values))
 
     def _apply(self, given: int, variable: int, bits: int, forget: int) -> int:
-        """Restrict a variable to the values in `bits`, after forgetting what it was if `forget`."""
+        """Restrict a variable to the values in `bits`; with `forget`, whatever value it had."""
         at = self._nodes[given][0]
         if given == EMPTY:
             return EMPTY
@@ -118,7 +121,7 @@ class Configurations:
         return found
 
     def values(self, given: int, variable: int) -> frozenset[int]:
-        """The values a variable has in some of them."""
+        """Return the values that a variable has in some state of a set."""
         found: set[int] = set()
         seen: set[int] = set()
         todo = [given] if given else []
@@ -136,12 +139,12 @@ class Configurations:
                 found.add(0)
         return frozenset(found)
 
-    def holds(self, given: int, configuration: Sequence[int]) -> bool:
-        """A configuration (a value for each variable) is in the set."""
+    def holds(self, given: int, state: Sequence[int]) -> bool:
+        """Return True if a state (a value for each variable) is in the set."""
         for variable in range(len(self._sizes) - 1, -1, -1):
             at, children = self._nodes[given]
             if at == variable:
-                given = children[configuration[variable]]
-            elif configuration[variable]:
+                given = children[state[variable]]
+            elif state[variable]:
                 return False
         return given == START

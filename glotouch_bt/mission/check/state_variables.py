@@ -1,104 +1,72 @@
-"""What a configuration of a mission is made of: one variable for each key and each resource, and what they can be.
+"""The variables that make up a mission's state: one for each key, one for each resource, and their possible values.
 
-A key is unset, or holds a value of some kind: what type, of what items, in what unit. A resource is in one of the
-states that skills name. One more variable says that a node nobody knows has run: of what follows nothing is claimed.
+A key is unset, or holds a value of some kind: its type, the type of its items, its unit. A resource is in one of the
+states that skills name. One more variable is 1 after an unknown node: of what follows nothing is claimed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-
-from glotouch_bt.mission.check.state_sets import START, Configurations
-from glotouch_bt.mission.spec import NodeSpec, unit_of_name
+from glotouch_bt.mission.check.state_sets import START, StateSets
+from glotouch_bt.mission.nodes import ANYTHING, ValueKind, kind_of
+from glotouch_bt.mission.spec import NodeSpec
 from glotouch_bt.skill import UNCHANGED
 
-UNSET, ANYTHING = 0, 1
 FIRST_STATE = "empty"
 """The state of every resource when a mission begins."""
+_UNKNOWN = ValueKind()
 
 
-@dataclass(frozen=True)
-class Kind:
-    """What is known of a value.
-
-    Attributes:
-        data_type: Its type; `object` when not known.
-        element: Type of a tuple's items; `object` when not known.
-        unit: Unit its port's name carries, or empty.
-        value: The value itself, where the writer's outcome says it; None: any.
-    """
-
-    data_type: type = object
-    element: type = object
-    unit: str = ""
-    value: bool | int | float | str | None = None
-
-
-UNKNOWN = Kind()
-
-
-def written_kind(node: NodeSpec, port: str, how: str) -> Kind:
-    """The kind of what a skill writes to a port; `how` it ends: success, failure or running (broken off)."""
-    assert node.skill_type is not None
-    declared = getattr(node.skill_type, port, None)
-    element = getattr(declared, "element", None) or object
-    value = getattr(declared, f"on_{how}", None)
-    return Kind(node.skill_type.OUTPUT_PORTS[port].data_type, element, unit_of_name(port), value)
-
-
-def written_kinds(node: NodeSpec, port: str) -> list[Kind]:
-    """All kinds of what a skill may write to a port, each once."""
-    return list(dict.fromkeys(written_kind(node, port, how) for how in ("success", "failure", "running")))
-
-
-class Variables:
+class StateVariables:
     """The variables of a tree and the sets over them.
 
     Attributes:
         sets: The algebra.
-        start: The set of the one configuration in which a mission begins: no key written.
+        start: The set of the one state in which a mission begins: no key written.
         keys: Variable of each key.
         resources: Variable of each resource.
-        lost: Variable that is 1 once a node nobody knows may have run.
+        lost: Variable that is 1 once an unknown node may have run.
     """
 
     def __init__(self, tree: NodeSpec) -> None:
         kinds = _kinds(tree)
-        self._kinds = {key: [UNKNOWN, UNKNOWN, *found] for key, found in kinds.items()}  # places 0 and 1 are never met
+        self._kinds = {key: [_UNKNOWN, _UNKNOWN, *found] for key, found in kinds.items()}  # 0 and 1 stand for no kind
         self._states = _states(tree)
         self.keys = {key: i for i, key in enumerate(kinds)}
         self.resources = {name: len(self.keys) + i for i, name in enumerate(self._states)}
         self.lost = len(self.keys) + len(self.resources)
         self.names = (*self.keys, *self.resources)
         sizes = [*(len(k) for k in self._kinds.values()), *(len(s) for s in self._states.values()), 2]
-        self.sets = Configurations(sizes)
+        self.sets = StateSets(sizes)
         self.start = START
 
-    def kind(self, key: str, value: int) -> Kind:
-        """What a value of a key's variable stands for."""
+    def kind(self, key: str, value: int) -> ValueKind:
+        """Return what a value of a key's variable stands for."""
         return self._kinds[key][value]
 
-    def value(self, key: str, kind: Kind) -> int:
-        """The value of a key's variable that stands for a kind."""
+    def value(self, key: str, kind: ValueKind) -> int:
+        """Return the value of a key's variable that stands for a kind."""
         found = self._kinds[key]
         return found.index(kind, ANYTHING + 1) if kind in found[ANYTHING + 1 :] else ANYTHING
 
     def written(self, key: str) -> range:
-        """All values of a key's variable but unset."""
+        """Return all values of a key's variable but UNSET."""
         return range(ANYTHING, len(self._kinds[key]))
 
+    def written_kinds(self, key: str) -> list[ValueKind]:
+        """Return what these values stand for."""
+        return self._kinds[key][ANYTHING:]
+
     def state(self, resource: str, name: str) -> int:
-        """The value of a resource's variable that stands for a state."""
+        """Return the value of a resource's variable that stands for a state."""
         return self._states[resource].index(name)
 
     def state_names(self, resource: str) -> list[str]:
-        """All states of a resource."""
+        """Return all states of a resource."""
         return self._states[resource]
 
 
 def _states(tree: NodeSpec) -> dict[str, list[str]]:
-    """Every state of every resource that some skill of the tree names, the first one first."""
+    """Return every state of every resource that some skill of the tree names, the first state first."""
     states: dict[str, dict[str, None]] = {}
     for node in tree.walk():
         skill = node.skill_type
@@ -112,46 +80,21 @@ def _states(tree: NodeSpec) -> dict[str, list[str]]:
     return {resource: list(named) for resource, named in states.items()}
 
 
-def _kinds(tree: NodeSpec) -> dict[str, dict[Kind, None]]:
-    """Every kind of value that each key may hold, over the whole tree, keys in the order in which they are met."""
-    kinds: dict[str, dict[Kind, None]] = {}
-    loops: list[NodeSpec] = []
-    for node in tree.walk():
+def _kinds(tree: NodeSpec) -> dict[str, dict[ValueKind, None]]:
+    """Return every kind of value that each key may hold over the whole tree, keys in the order of the nodes."""
+    kinds: dict[str, dict[ValueKind, None]] = {}
+    nodes = list(tree.walk())
+    for node in nodes:
         for wire in (*node.reads.values(), *node.writes.values()):
             kinds.setdefault(wire.key, {})
-        if node.skill_type is not None:
-            for port, wire in node.writes.items():
-                kinds[wire.key].update(dict.fromkeys(written_kinds(node, port)))
-        elif node.kind == "for_each" and "items" in node.reads and "item" in node.writes:
-            loops.append(node)
+        for port, wire in node.writes.items() if node.skill_type is not None else ():
+            kinds[wire.key].update(dict.fromkeys(kind_of(node).written_kinds(node, port, lambda key: [*kinds[key]])))
     growing = True
-    while growing:  # kinds of items may come from what another loop gathers
+    while growing:  # the kinds of one loop's items may come from what another loop gathers
         growing = False
-        for node in loops:
-            for key, kind in loop_writes(node, kinds):
+        for node in nodes:
+            for key, kind in kind_of(node).derived_kinds(node, lambda key: [*kinds[key]]):
                 if kind not in kinds[key]:
                     kinds[key][kind] = None
                     growing = True
     return kinds
-
-
-def loop_writes(node: NodeSpec, kinds: Mapping[str, Mapping[Kind, None]]) -> list[tuple[str, Kind]]:
-    """What a for_each may write, given what keys may hold: its item, and the tuples it gathers."""
-    found = [(node.writes["item"].key, item_kind(k)) for k in kinds[node.reads["items"].key]]
-    for port, target in node.writes.items():
-        source = node.reads.get(port)
-        if source is not None:
-            found.append((target.key, gathered_kind(kinds[source.key])))
-            found += [(target.key, gathered_kind({k: None})) for k in kinds[source.key]]
-    return found
-
-
-def item_kind(items: Kind) -> Kind:
-    """The kind of the items of a tuple."""
-    return Kind(items.element)
-
-
-def gathered_kind(kinds: Mapping[Kind, None]) -> Kind:
-    """The kind of a tuple of values of these kinds."""
-    types = {k.data_type for k in kinds}
-    return Kind(tuple, types.pop() if len(types) == 1 else object)

@@ -17,12 +17,10 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Composite
 
-from glotouch_bt.mission.tree import BuiltTree, ForEach
+from glotouch_bt.mission.nodes import MissionDecorator
+from glotouch_bt.mission.tree import BuiltTree
 from glotouch_bt.robot import BadInput
 from glotouch_bt.skill import Skill
-
-FORGETFUL: Mapping[type, str] = {py_trees.decorators.Retry: "failures", py_trees.decorators.Repeat: "success"}
-"""Nodes of py_trees that count, and the attribute they count in. Our own say it themselves, as `progress`."""
 
 
 def tree_state(tree: BuiltTree, finished: Sequence[Behaviour]) -> dict[str, Any]:
@@ -44,10 +42,7 @@ def _node_state(node: Behaviour, tree: BuiltTree) -> dict[str, Any]:
         state["feedback"] = node.feedback_message
     if isinstance(node, Composite) and node.current_child is not None:
         state["child"] = tree.paths[node.current_child.id]
-    counted = FORGETFUL.get(type(node))
-    if counted is not None:
-        state["count"] = getattr(node, counted)
-    elif hasattr(node, "progress"):
+    if isinstance(node, MissionDecorator):
         state["progress"] = node.progress
     if getattr(node, "reason", None) is not None:
         state["reason"] = node.reason
@@ -124,7 +119,7 @@ def start_at(tree: BuiltTree, state: Mapping[str, Any], path: str) -> None:
         _set_node(node, state["nodes"][other], nodes)
     chain = [*reversed(list(_ancestors(nodes[path]))), nodes[path]]
     for above, below in itertools.pairwise(chain):
-        if isinstance(above, ForEach):
+        if isinstance(above, MissionDecorator):
             above.enter()
         elif above.status is not Status.RUNNING:
             above.initialise()
@@ -158,10 +153,7 @@ def _set_node(node: Behaviour, state: Mapping[str, Any], nodes: Mapping[str, Beh
     node.feedback_message = state.get("feedback", "")
     if isinstance(node, Composite):
         node.current_child = nodes[state["child"]] if "child" in state else None
-    counted = FORGETFUL.get(type(node))
-    if counted is not None:
-        setattr(node, counted, state["count"])
-    elif "progress" in state:
+    if isinstance(node, MissionDecorator):
         node.progress = state["progress"]
     if hasattr(node, "reason"):
         node.reason = state.get("reason")

@@ -1,4 +1,4 @@
-"""A mission's tree for people: indented text, or an SVG drawing."""
+"""Draw a mission's tree: as indented text, or as SVG."""
 
 from __future__ import annotations
 
@@ -6,61 +6,25 @@ from dataclasses import dataclass
 from html import escape
 
 from glotouch_bt.mission.load import Mission
+from glotouch_bt.mission.nodes import kind_of
 from glotouch_bt.mission.spec import NodeSpec
 
-_SIGNS = {
-    "sequence": "→",
-    "selector": "?",
-    "parallel": "⇉",
-    "retry": "↻",
-    "repeat": "↻",
-    "for_each": "∀",
-    "timeout": "⏱",
-    "invert": "¬",
-    "succeed": "✓",
-    "fail": "✗",
-    "condition": "◇",
-    "subtree": "▤",
-    "skill": "■",
-}
-_FILLS = {"skill": "#e3eefb", "condition": "#fdf3d8", "subtree": "#eeeeee"}
 CHAR_PX, BOX_H, GAP_X, GAP_Y, MARGIN = 7.3, 46, 14, 34, 16
 
 
 def details(node: NodeSpec) -> str:
-    """What is set on a node that differs from the defaults, and how its ports are wired, in one line."""
-    model = node.params if node.kind == "skill" else node.settings
-    parts: list[str] = []
-    if model is not None:
-        for name, field in type(model).model_fields.items():
-            value = getattr(model, name)
-            if name in model.model_fields_set and value != field.default and not hasattr(value, "model_fields"):
-                parts.append(f"{name}={_plain(value)}")
-    if node.kind == "repeat" and hasattr(getattr(node.settings, "until", None), "port"):
-        parts.insert(0, f"until {node.reads['until'].key}")
-    if node.kind == "skill":
-        reads = ", ".join(p if p in node.constants else w.key for p, w in node.reads.items())
-        writes = ", ".join(w.key for w in node.writes.values())
-        parts.append(f"{reads or '·'} → {writes or '·'}")
-    return "  ".join(parts)
-
-
-def _plain(value: object) -> str:
-    if isinstance(value, dict):
-        return ", ".join(f"{k}→{v}" for k, v in value.items())
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    """Return what is set on a node and differs from the defaults, and how its ports are wired, in one line."""
+    return "  ".join(kind_of(node).details(node))
 
 
 def as_text(mission: Mission) -> str:
-    """The tree, one node a line."""
+    """Return the tree, one node a line."""
     lines = [f"{mission.name}  ({mission.description})" if mission.description else mission.name]
 
     def add(node: NodeSpec, indent: str, last: bool) -> None:
-        kind = "" if node.kind in ("skill", node.name) else f" [{node.kind}]"
-        if node.kind == "skill" and node.skill != node.name:
-            kind = f" [{node.skill}]"
-        more = details(node)
-        lines.append(f"{indent}{'└─' if last else '├─'} {_SIGNS[node.kind]} {node.name}{kind}  {more}".rstrip())
+        kind = kind_of(node)
+        label = "" if kind.label(node) == node.name else f" [{kind.label(node)}]"
+        lines.append(f"{indent}{'└─' if last else '├─'} {kind.sign} {node.name}{label}  {details(node)}".rstrip())
         for i, child in enumerate(node.children):
             add(child, indent + ("   " if last else "│  "), i == len(node.children) - 1)
 
@@ -83,10 +47,10 @@ class _Box:
 
 
 def _layout(node: NodeSpec, left: float, depth: int) -> tuple[_Box, float]:
-    """A box with its subtree from x = `left`; returns it and the x where the subtree ends."""
+    """Lay out a subtree from x = `left`; returns its box and the x where the subtree ends."""
     text = details(node)
     text = text if len(text) <= 34 else text[:33] + "…"
-    width = max(len(f"{_SIGNS[node.kind]} {node.name}") * CHAR_PX * 1.08, len(text) * CHAR_PX * 0.82, 60) + 18
+    width = max(len(f"{kind_of(node).sign} {node.name}") * CHAR_PX * 1.08, len(text) * CHAR_PX * 0.82, 60) + 18
     children: list[_Box] = []
     x = left
     for child in node.children:
@@ -101,7 +65,7 @@ def _layout(node: NodeSpec, left: float, depth: int) -> tuple[_Box, float]:
 
 
 def as_svg(mission: Mission) -> str:
-    """The tree as one self-contained SVG picture: parents above children, children left to right in tick order."""
+    """Return the tree as one self-contained SVG picture, children from left to right in tick order."""
     root, right = _layout(mission.tree, MARGIN, 0)
     shapes: list[str] = []
     depth = 0.0
@@ -115,14 +79,14 @@ def as_svg(mission: Mission) -> str:
             path = f"M{x0:.1f} {y0:.1f}C{x0:.1f} {bend:.1f} {x1:.1f} {bend:.1f} {x1:.1f} {y1:.1f}"
             shapes.append(f'<path d="{path}" fill="none" stroke="#8a94a3"/>')
         title_y = box.y + (19 if box.lines[1] else 27)
-        fill = _FILLS.get(box.node.kind, "#ffffff")
-        radius = 3 if box.node.kind == "skill" else 14
+        kind = kind_of(box.node)
+        radius = 14 if box.node.skill_type is None else 3
         shapes.append(
             f"<g><title>{escape(box.node.kind)}: {escape(details(box.node))} ({escape(str(box.node.place))})</title>"
             f'<rect x="{box.x:.1f}" y="{box.y:.1f}" width="{box.width:.1f}" height="{BOX_H}" rx="{radius}" '
-            f'fill="{fill}" stroke="#44505f"/>'
+            f'fill="{kind.fill}" stroke="#44505f"/>'
             f'<text x="{box.middle:.1f}" y="{title_y:.1f}" text-anchor="middle" font-weight="600">'
-            f"{_SIGNS[box.node.kind]} {escape(box.lines[0])}</text>"
+            f"{kind.sign} {escape(box.lines[0])}</text>"
             f'<text x="{box.middle:.1f}" y="{box.y + 36:.1f}" text-anchor="middle" font-size="10.5" fill="#5b6675">'
             f"{escape(box.lines[1])}</text></g>"
         )

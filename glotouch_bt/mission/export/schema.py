@@ -7,8 +7,9 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from glotouch_bt.mission.nodes import NODES
 from glotouch_bt.mission.read import Declaration, WorldFile
-from glotouch_bt.mission.spec import KINDS, UNITS, units_for
+from glotouch_bt.mission.spec import UNITS, units_for
 from glotouch_bt.skill import Skill
 
 _REFERENCE = {"type": "string", "pattern": r"^\$[A-Za-z][A-Za-z0-9_]*$", "description": "a mission parameter"}
@@ -20,7 +21,7 @@ _NAME = {"type": "string", "description": "shown name"}
 def mission_schema(skills: Mapping[str, type[Skill]]) -> dict[str, Any]:
     """The schema (draft 2020-12) of mission files written with these skills."""
     definitions: dict[str, Any] = {}
-    nodes = {name: _kind(name, definitions) for name in KINDS} | {
+    nodes = {name: _kind(name, definitions) for name in NODES} | {
         name: _skill(name, skills[name], definitions) for name in skills
     }
     definitions["node"] = {
@@ -103,8 +104,8 @@ def _opened(made: dict[str, Any], references: bool) -> dict[str, Any]:
 
 
 def _kind(name: str, definitions: dict[str, Any]) -> dict[str, Any]:
-    kind = KINDS[name]
-    made = _model(kind.settings, definitions, references=True)
+    kind = NODES[name]
+    made = _model(kind.Settings, definitions, references=True)
     made["description"] = kind.description
     made.pop("title", None)
     properties = made.setdefault("properties", {})
@@ -115,7 +116,7 @@ def _kind(name: str, definitions: dict[str, Any]) -> dict[str, Any]:
     made["required"] = [*made.get("required", []), "do"]
     if kind.children == "many":
         return {"description": kind.description, "anyOf": [_NODES, made]}
-    return made if kind.settings.model_fields else {"description": kind.description, "anyOf": [made, _NODE]}
+    return made if kind.Settings.model_fields else {"description": kind.description, "anyOf": [made, _NODE]}
 
 
 def _skill(name: str, skill: type[Skill], definitions: dict[str, Any]) -> dict[str, Any]:

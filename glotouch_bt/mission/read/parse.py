@@ -6,32 +6,18 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 
+from glotouch_bt.mission.nodes import NODES, NodeKind, SubtreeSettings
 from glotouch_bt.mission.read.fields import named_by, validate
 from glotouch_bt.mission.read.literals import is_literal, read_literal
 from glotouch_bt.mission.read.parameters import stl_usable, substitute
 from glotouch_bt.mission.read.scope import Scope
 from glotouch_bt.mission.read.subtrees import entries_of, find_subtree, handed_on, open_subtree
-from glotouch_bt.mission.spec import (
-    KINDS,
-    ConditionSettings,
-    Kind,
-    Map,
-    Node,
-    NodeSpec,
-    Place,
-    RepeatSettings,
-    Scalar,
-    Seq,
-    SubtreeSettings,
-    Wire,
-    compared,
-)
+from glotouch_bt.mission.spec import Findings, Map, Node, NodeSpec, Place, Scalar, Seq, Wire
 from glotouch_bt.robot import BadInput
 from glotouch_bt.skill import Skill
 
 KEY = re.compile(r"[a-z][a-z0-9_]*")
 MAX_NODES, DEEPEST_NODE = 3000, 100
-BTCPP = {kind.btcpp: name for name, kind in KINDS.items() if kind.btcpp}
 TITLE, CHILD = {"name": ""}, {"name": "", "do": ""}
 
 
@@ -59,13 +45,13 @@ def _node(node: Node, scope: Scope) -> NodeSpec:
         key, body = node.entries[0]
         return _named(str(key.value), key.place, body, scope)
     if isinstance(node, Seq):
-        return _composite("sequence", node.place, node, scope)
+        return _node_of_kind(NODES["sequence"], node.place, node, scope)
     if isinstance(node, Map) and node.entries:
         names = ", ".join(node.keys())
         what = f"a node has one name, here are {len(node.entries)}: {names} (is the indentation right?)"
         scope.findings.add(node.entries[1][0].place, "not_a_node", what)
         key, body = node.entries[0]
-        return _named(str(key.value), key.place, body, scope) if key.value in {*KINDS, *scope.skills} else _lost(node)
+        return _named(str(key.value), key.place, body, scope) if key.value in {*NODES, *scope.skills} else _lost(node)
     if not (isinstance(node, Scalar) and node.poisoned):
         scope.findings.add(node.place, "not_a_node", "not a node", valid="a skill or node name, then its settings")
     return _lost(node)
@@ -76,16 +62,12 @@ def _lost(node: Node) -> NodeSpec:
 
 
 def _named(name: str, place: Place, body: Node, scope: Scope) -> NodeSpec:
-    if name in KINDS:
-        kind = KINDS[name]
-        if kind.children == "many":
-            return _composite(name, place, body, scope)
-        if kind.children == "one":
-            return _decorator(name, kind, place, body, scope)
-        return _subtree(place, body, scope) if name == "subtree" else _condition(place, body, scope)
+    if name in NODES:
+        return NODES[name].read(_Reader(scope), place, body)
     known = name
     if name not in scope.skills:
-        known = scope.findings.unknown(place, "unknown_skill", "skill or node", name, [*KINDS, *scope.skills], BTCPP)
+        also = {kind.btcpp: name for name, kind in NODES.items() if kind.btcpp}
+        known = scope.findings.unknown(place, "unknown_skill", "skill or node", name, [*NODES, *scope.skills], also)
         if known not in scope.skills:
             return NodeSpec("unknown", name, place)
     try:
@@ -121,60 +103,66 @@ def _title(taken: Mapping[str, tuple[Place, Node]], default: str, scope: Scope) 
     return default
 
 
-def _composite(kind: str, place: Place, body: Node, scope: Scope) -> NodeSpec:
-    if isinstance(body, Seq):
+class _Reader:
+    """What node kinds use of this module."""
+
+    def __init__(self, scope: Scope) -> None:
+        self._scope = scope
+
+    @property
+    def findings(self) -> Findings:
+        return self._scope.findings
+
+    def node(self, kind: NodeKind, place: Place, body: Node) -> NodeSpec:
+        return _node_of_kind(kind, place, body, self._scope)
+
+    def subtree(self, place: Place, body: Node) -> NodeSpec:
+        return _subtree(place, body, self._scope)
+
+    def wire(self, port: str, key: str, place: Place) -> Wire | None:
+        return _keyed(port, key, place, self._scope)
+
+
+def _node_of_kind(kind: NodeKind, place: Place, body: Node, scope: Scope) -> NodeSpec:
+    bare = kind.children == "one" and not kind.Settings.model_fields  # `succeed: {orbit_probe: ...}` needs no `do`
+    if (kind.children == "many" and isinstance(body, Seq)) or (
+        bare and not (isinstance(body, Map) and ("do" in body or not body.entries))
+    ):
         taken: dict[str, tuple[Place, Node]] = {"do": (place, body)}
         rest = Map((), place)
     else:
-        taken, rest = _take(_settings_map(kind, place, body, scope), "name", "do")
-    settings = validate(KINDS[kind].settings, rest, f"node {kind!r}", scope.findings, where=place, beside=CHILD)
+        own = ("name",) if kind.children == "none" else ("name", "do")
+        taken, rest = _take(_settings_map(kind.name, place, body, scope), *own)
+    rest, unit = kind.convert_units(rest, scope.findings)
+    beside = TITLE if kind.children == "none" else CHILD
+    settings = validate(kind.Settings, rest, f"node {kind.name!r}", scope.findings, where=place, beside=beside)
+    children = (
+        () if kind.children == "none" else _children(kind, taken["do"][1] if "do" in taken else None, place, scope)
+    )
+    if kind.children != "none" and not children:
+        children = (_lost(body),)
+    spec = NodeSpec(kind.name, "", place, children, settings)
+    spec.name = _title(taken, kind.default_name(spec), scope)
+    kind.wire(spec, rest, unit, _Reader(scope))
+    return spec
+
+
+def _children(kind: NodeKind, below: Node | None, place: Place, scope: Scope) -> tuple[NodeSpec, ...]:
+    """Read what stands under `do`; none, and a finding, if nothing does."""
     children: tuple[NodeSpec, ...] = ()
-    below = taken["do"][1] if "do" in taken else None
+    if kind.children == "one":
+        if below is None or (isinstance(below, Scalar) and below.value is None):
+            scope.findings.add(place, "no_children", f"{kind.name} has no child", valid="do: a node")
+            return ()
+        return (parse_tree(below, scope),)
     if isinstance(below, Seq):
         children = tuple(parse_tree(i, scope) for i in below.items)
     elif isinstance(below, Map):
         children = (parse_tree(below, scope),)
     if not children:
-        scope.findings.add(place, "no_children", f"{kind} has no children", valid=f"{kind}: [node, node, ...]")
-        children = (_lost(body),)
-    return NodeSpec(kind, _title(taken, kind, scope), place, children, settings)
-
-
-def _decorator(name: str, kind: Kind, place: Place, body: Node, scope: Scope) -> NodeSpec:
-    bare = not kind.settings.model_fields  # `succeed: {orbit_probe: ...}` needs no `do`
-    if bare and not (isinstance(body, Map) and ("do" in body or not body.entries)):
-        taken: dict[str, tuple[Place, Node]] = {"do": (place, body)}
-        rest = Map((), place)
-    else:
-        taken, rest = _take(_settings_map(name, place, body, scope), "name", "do")
-    until = rest.get("until") if name == "repeat" else None
-    unit = ""
-    if isinstance(until, Map):
-        plain_until, unit = compared(until, scope.findings)
-        rest = replace(rest, entries=tuple((k, plain_until if v is until else v) for k, v in rest.entries))
-    settings = validate(kind.settings, rest, f"node {name!r}", scope.findings, where=place, beside=CHILD)
-    below = taken["do"][1] if "do" in taken else None
-    if below is None or (isinstance(below, Scalar) and below.value is None):
-        scope.findings.add(place, "no_children", f"{name} has no child", valid="do: a node")
-        children: tuple[NodeSpec, ...] = (_lost(body),)
-    else:
-        children = (parse_tree(below, scope),)
-    spec = NodeSpec(name, _title(taken, name, scope), place, children, settings)
-    if name == "repeat":
-        _check_repeat(spec, rest, unit, scope)
-    elif name == "for_each":
-        _wire_for_each(spec, rest, scope)
-    return spec
-
-
-def _wire(name: str, given: Map, scope: Scope, *, path: tuple[str, ...] | None = None) -> Wire | None:
-    """The key written under a setting, checked to be a key."""
-    node: Node | None = given
-    for step in path or (name,):
-        node = node.get(step) if isinstance(node, Map) else None
-    if not isinstance(node, Scalar) or not isinstance(node.value, str) or node.poisoned:
-        return None
-    return _keyed(name, node.value, node.place, scope)
+        what = f"{kind.name} has no children"
+        scope.findings.add(place, "no_children", what, valid=f"{kind.name}: [node, node, ...]")
+    return children
 
 
 def _keyed(port: str, key: str, place: Place, scope: Scope) -> Wire | None:
@@ -182,62 +170,6 @@ def _keyed(port: str, key: str, place: Place, scope: Scope) -> Wire | None:
         scope.findings.add(place, "wrong_key", f"{key!r} is not a port key", valid="small letters, digits and _")
         return None
     return Wire(port, scope.key(key), place)
-
-
-def _check_repeat(spec: NodeSpec, given: Map, unit: str, scope: Scope) -> None:
-    settings = spec.settings
-    if not isinstance(settings, RepeatSettings):
-        return
-    if (settings.times is None) == (settings.until is None):
-        scope.findings.add(spec.place, "wrong_value", "repeat needs either times or until, and not both")
-        return
-    if isinstance(settings.until, str):
-        wire = _wire("until", given, scope)
-    else:
-        wire = _wire("until", given, scope, path=("until", "port"))
-        below = given.get("until")
-        if isinstance(settings.until, ConditionSettings) and isinstance(below, Map):
-            _check_comparison(settings.until, below.place, scope)
-    if wire:
-        spec.reads = {"until": replace(wire, unit=unit)}
-
-
-def _wire_for_each(spec: NodeSpec, given: Map, scope: Scope) -> None:
-    items, item = _wire("items", given, scope), _wire("item", given, scope)
-    reads = {"items": items} if items else {}
-    writes = {"item": item} if item else {}
-    collect = given.get("collect")
-    if isinstance(collect, Map):
-        for key, value in collect.entries:
-            source = _keyed(f"collect.{key.value}", str(key.value), key.place, scope)
-            if source and isinstance(value, Scalar) and isinstance(value.value, str) and not value.poisoned:
-                target = _keyed(f"collect.{key.value}", value.value, value.place, scope)
-                if target:
-                    if target.key in {w.key for w in writes.values()}:
-                        what = f"two things are written to {value.value!r}"
-                        scope.findings.add(target.place, "written_twice", what)
-                    reads[source.port], writes[target.port] = source, target
-    spec.reads, spec.writes = reads, writes
-
-
-def _check_comparison(settings: ConditionSettings, place: Place, scope: Scope) -> None:
-    asked = [n for n in ("equals", "at_least", "at_most", "is_set") if getattr(settings, n) is not None]
-    if len(asked) != 1:
-        found = " and ".join(asked) or "none"
-        what = f"a condition needs exactly one comparison, found {found}"
-        scope.findings.add(place, "wrong_value", what, valid="equals, at_least, at_most, is_set")
-
-
-def _condition(place: Place, body: Node, scope: Scope) -> NodeSpec:
-    taken, rest = _take(_settings_map("condition", place, body, scope), "name")
-    rest, unit = compared(rest, scope.findings)
-    settings = validate(ConditionSettings, rest, "node 'condition'", scope.findings, where=place, beside=TITLE)
-    if settings is not None:
-        _check_comparison(settings, place, scope)
-    default = f"{settings.port}?" if settings is not None else "condition"
-    wire = _wire("port", rest, scope)
-    reads = {"port": replace(wire, unit=unit)} if wire else {}
-    return NodeSpec("condition", _title(taken, default, scope), place, (), settings, reads=reads)
 
 
 def _skill(name: str, skill: type[Skill], place: Place, body: Node, scope: Scope) -> NodeSpec:

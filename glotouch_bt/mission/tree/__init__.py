@@ -1,7 +1,6 @@
-"""TODO door of glotouch_bt/mission/tree."""
+"""From a checked tree to py_trees nodes, and from their failures to the chain that explains a failed mission."""
 
 from glotouch_bt.mission.tree.build import BuiltTree, build_tree
-from glotouch_bt.mission.tree.decorators import ForEach, holds
 from glotouch_bt.mission.tree.failure_chain import Failure, ReasonBook, sensed
 
-__all__ = ["BuiltTree", "Failure", "ForEach", "ReasonBook", "build_tree", "holds", "sensed"]
+__all__ = ["BuiltTree", "Failure", "ReasonBook", "build_tree", "sensed"]

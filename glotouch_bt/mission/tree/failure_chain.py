@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
-from py_trees.decorators import Retry
 
 from glotouch_bt.robot import Observation
 from glotouch_bt.skill import Reason, Skill
@@ -123,8 +122,6 @@ def _words(node: Behaviour, causes: tuple[Failure, ...]) -> tuple[str, str]:
     if isinstance(node, Sequence) and causes:
         step = next(i for i, c in enumerate(node.children, start=1) if c.status is Status.FAILURE)
         return "step_failed", f"step {step} of {len(node.children)}, {below.replace(' failed', ', failed')}"
-    if isinstance(node, Retry):
-        return "retries_ran_out", node.feedback_message or below
     return "child_failed" if causes else "failed", node.feedback_message or below
 
 

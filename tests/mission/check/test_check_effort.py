@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from glotouch_bt.mission.check import rules as judge
-from glotouch_bt.mission.check.counterexample import MAX_STEPS, Patience
+from glotouch_bt.mission.check.counterexample import MAX_STEPS, StepBudget
 from glotouch_bt.mission.load import load_mission
 from glotouch_bt.mission.spec.findings import MissionFaults
 
@@ -22,14 +22,14 @@ tree:
 
 def test_forty_mistakes_behind_an_exploration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The probe is put back for ever: each time but the first it is wrong, and long after the start."""
-    kept: list[Patience] = []
+    kept: list[StepBudget] = []
 
-    class Kept(Patience):
+    class Kept(StepBudget):
         def __init__(self) -> None:
             super().__init__()
             kept.append(self)
 
-    monkeypatch.setattr(judge, "Patience", Kept)
+    monkeypatch.setattr(judge, "StepBudget", Kept)
     path = tmp_path / "m.yaml"
     path.write_text(HEAD + 40 * "    - tool_return\n")
     with pytest.raises(MissionFaults) as caught:

@@ -19,16 +19,17 @@ from hypothesis import strategies as st
 from py_trees.common import Status
 
 from glotouch_bt.mission.check.counterexample import Goal, shortest_path
-from glotouch_bt.mission.check.data_flow import Flow
-from glotouch_bt.mission.check.requirements import all_demands
-from glotouch_bt.mission.check.state_sets import EMPTY, START, Configurations
-from glotouch_bt.mission.check.state_variables import Variables
+from glotouch_bt.mission.check.data_flow import DataFlow
+from glotouch_bt.mission.check.requirements import all_requirements
+from glotouch_bt.mission.check.state_sets import EMPTY, START, StateSets
+from glotouch_bt.mission.check.state_variables import StateVariables
+from glotouch_bt.mission.nodes import ConditionSettings, condition, repeat
+from glotouch_bt.mission.nodes.timeout import ClockTimeout
 from glotouch_bt.mission.read.parse import parse_tree
 from glotouch_bt.mission.read.scope import Scope
 from glotouch_bt.mission.read.yaml_source import parse_yaml
 from glotouch_bt.mission.spec.findings import Findings
-from glotouch_bt.mission.spec.node import ConditionSettings, NodeSpec, number_names
-from glotouch_bt.mission.tree import build, decorators
+from glotouch_bt.mission.spec.node import NodeSpec, number_names
 from glotouch_bt.mission.tree.build import build_tree
 from glotouch_bt.skill import UNCHANGED, Context, In, Out, Skill, SkillFailed, SkillRun
 
@@ -210,7 +211,7 @@ def read(tree: Any) -> NodeSpec:
     return spec
 
 
-def broken_off(self: decorators.ClockTimeout) -> Status:
+def broken_off(self: ClockTimeout) -> Status:
     """What runs is broken off when the oracle wants: how long anything takes is not the checker's business."""
     if self.decorated.status is Status.RUNNING and World.oracle.choose(2):
         World.hanging = False
@@ -221,24 +222,24 @@ def broken_off(self: decorators.ClockTimeout) -> Status:
 @contextmanager
 def free_comparisons() -> Iterator[None]:
     """A comparison of what is written says what the oracle wants."""
-    true = decorators.holds
+    true = condition.holds
 
-    def chosen(condition: ConditionSettings, value: Any) -> bool:
-        if value is None or condition.is_set is not None:
-            return true(condition, value)
+    def chosen(settings: ConditionSettings, value: Any) -> bool:
+        if value is None or settings.is_set is not None:
+            return true(settings, value)
         World.steps += 1
         if World.steps > MAX_STEPS:
             raise TooLong
         return World.oracle.choose(2) == 0
 
-    def condition(settings: ConditionSettings, value: Any) -> bool:
+    def counted(settings: ConditionSettings, value: Any) -> bool:
         World.looks += 1
         return chosen(settings, value)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(decorators, "holds", condition)
-        patch.setattr(decorators.ClockTimeout, "update", broken_off)
-        patch.setattr(build, "holds", chosen)
+        patch.setattr(condition, "holds", counted)
+        patch.setattr(ClockTimeout, "update", broken_off)
+        patch.setattr(repeat, "holds", chosen)
         yield
 
 
@@ -287,16 +288,16 @@ def by_ticking(spec: NodeSpec) -> tuple[dict[tuple[str, str, str], int], set[tup
     return World.seen, ends, False
 
 
-def by_sets(spec: NodeSpec) -> tuple[Flow, set[tuple[str, str, str]], set[tuple[Status, str, bool, bool]]]:
-    variables = Variables(spec)
-    flow = Flow(spec, variables, all_demands(spec, variables))
+def by_sets(spec: NodeSpec) -> tuple[DataFlow, set[tuple[str, str, str]], set[tuple[Status, str, bool, bool]]]:
+    variables = StateVariables(spec)
+    flow = DataFlow(spec, variables, all_requirements(spec, variables))
     wrong: set[tuple[str, str, str]] = set()
-    for demand, asked in flow.asked.items():
-        if not demand.stops:
+    for requirement, looked in flow.looked.items():
+        if not requirement.stops:
             continue
-        for value in variables.sets.values(asked, demand.variable) - demand.good:
-            state = variables.state_names("hand")[value] if demand.of_resource else "unset"
-            wrong.add((demand.node.name, demand.port, state))
+        for value in variables.sets.values(looked, requirement.variable) - requirement.good:
+            state = variables.state_names("hand")[value] if requirement.of_resource else "unset"
+            wrong.add((requirement.node.name, requirement.port, state))
     ends = set()
     for status, end in ((Status.SUCCESS, flow.end.success), (Status.FAILURE, flow.end.failure)):
         for state in variables.state_names("hand") if "hand" in variables.resources else ["empty"]:
@@ -345,14 +346,18 @@ def test_the_path_shown_is_the_shortest_there_is(tree: Any) -> None:
     flow, _, _ = by_sets(spec)
     variables = flow.variables
     loops = any(n.kind == "for_each" for n in spec.walk())
-    for demand, asked in flow.asked.items():
-        for value in variables.sets.values(asked, demand.variable) - demand.good if demand.stops else ():
-            path = shortest_path(flow, Goal(demand.node, demand.port, demand.variable, frozenset({value})))
-            assert path, (demand.node.name, demand.port)
-            assert path[-1] == demand.node.name
-            state = variables.state_names("hand")[value] if demand.of_resource else "unset"
+    for requirement, looked in flow.looked.items():
+        for value in (
+            variables.sets.values(looked, requirement.variable) - requirement.good if requirement.stops else ()
+        ):
+            path = shortest_path(
+                flow, Goal(requirement.node, requirement.port, requirement.variable, frozenset({value}))
+            )
+            assert path, (requirement.node.name, requirement.port)
+            assert path[-1] == requirement.node.name
+            state = variables.state_names("hand")[value] if requirement.of_resource else "unset"
             if whole and not loops:
-                assert len(path) - 1 == seen[demand.node.name, demand.port, state], path
+                assert len(path) - 1 == seen[requirement.node.name, requirement.port, state], path
 
 
 @settings(max_examples=200, deadline=None)
@@ -361,8 +366,8 @@ def test_the_path_shown_is_the_shortest_there_is(tree: Any) -> None:
     steps=st.lists(st.tuples(st.integers(0, 4), st.integers(0, 3), st.integers(0, 7), st.integers(0, 9)), max_size=12),
 )
 def test_diagrams_are_sets(sizes: list[int], steps: list[tuple[int, int, int, int]]) -> None:
-    """Every operation of `Configurations` against plain sets of tuples."""
-    algebra = Configurations(sizes)
+    """Every operation of `StateSets` against plain sets of tuples."""
+    algebra = StateSets(sizes)
     kept: list[tuple[int, set[tuple[int, ...]]]] = [(EMPTY, set()), (START, {(0,) * len(sizes)})]
     for operation, variable, bits, which in steps:
         variable %= len(sizes)

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from glotouch_bt.mission.load import load_mission
+from glotouch_bt.mission.nodes import ConditionSettings
 from glotouch_bt.mission.spec.findings import Finding, MissionFaults
-from glotouch_bt.mission.spec.node import ConditionSettings
 
 HEAD = "mission: m\nworld: container_five\n"
 Load = Callable[..., Any]

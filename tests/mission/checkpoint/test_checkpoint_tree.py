@@ -17,20 +17,18 @@ from glotouch_bt.mission.checkpoint.store import CheckpointFile
 from glotouch_bt.mission.checkpoint.writer import CheckpointWriter, ResumePoint
 from glotouch_bt.mission.execution.runner import Outcome, run_mission
 from glotouch_bt.mission.load import Mission
-from glotouch_bt.mission.record.run_summary import NullRecord
-from glotouch_bt.mission.spec.node import (
-    KINDS,
+from glotouch_bt.mission.nodes import (
+    NODES,
     ConditionSettings,
     ForEachSettings,
-    NodeSpec,
+    NoSettings,
     ParallelSettings,
-    Plain,
     RepeatSettings,
     RetrySettings,
     TimeoutSettings,
-    Wire,
-    number_names,
 )
+from glotouch_bt.mission.record.run_summary import NullRecord
+from glotouch_bt.mission.spec.node import NodeSpec, Wire, number_names
 from glotouch_bt.mission.spec.source import Place
 from glotouch_bt.robot import HOLD, BadInput, Observation
 from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun
@@ -123,7 +121,7 @@ def condition(port: str, **how: Any) -> NodeSpec:
 
 
 def node(kind: str, children: list[NodeSpec], **fields: Any) -> NodeSpec:
-    fields.setdefault("settings", Plain())
+    fields.setdefault("settings", NoSettings())
     return NodeSpec(kind, kind, HERE, tuple(children), **fields)
 
 
@@ -266,7 +264,7 @@ def test_a_resumed_tree_goes_on_as_the_one_that_was_not_broken_off(case: tuple[N
 def test_every_kind_of_node_is_in_the_random_trees_or_named_here() -> None:
     """A new kind of node must be thought of: does it remember something from tick to tick?"""
     tried = {"sequence", "selector", "retry", "timeout", "repeat", "invert", "succeed", "fail", "for_each", "condition"}
-    assert set(KINDS) - tried - {"subtree"} == {"parallel"}, "parallels have a test of their own"
+    assert set(NODES) - tried - {"subtree"} == {"parallel"}, "parallels have a test of their own"
 
 
 def parallel(*children: NodeSpec) -> NodeSpec:

@@ -77,7 +77,7 @@ def test_the_reason_chain_ends_with_the_root_cause(go: Any) -> None:
     assert outcome.reasons == [
         "sequence: step 1 of 1, 'explore', failed",
         "explore: all 2 alternatives failed",
-        "retry: final failure [status: 2 failure from 2]",
+        "retry: failed 2 of 2 attempts",
         "probe: no_touch: probe was told to fail (change the script)",
     ]
     last = outcome.chain[-1].as_dict()

@@ -10,7 +10,7 @@ import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from glotouch_bt.mission.tree.decorators import ForEach
+from glotouch_bt.mission.nodes.for_each import ForEach, ForEachSettings
 
 TABLE = [
     ("one skill", "  act: {script: RRS}", "RRS"),
@@ -162,7 +162,8 @@ def test_for_each_takes_the_least_first_and_gathers_in_order() -> None:
             keys.set("mark", item.imag)
             return Status.FAILURE if item.real == 0.2 else Status.SUCCESS
 
-    made = ForEach("each", Child("child"), keys, "items", "item", {"mark": "marks"}, True, "real")
+    settings = ForEachSettings(items="items", item="item", on_failure="continue", least_first="real")
+    made = ForEach("each", Child("child"), keys, "items", "item", {"mark": "marks"}, settings)
     while made.status not in (Status.SUCCESS, Status.FAILURE):
         made.tick_once()
     assert taken == [1, 2, 0]

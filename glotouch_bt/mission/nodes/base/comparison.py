@@ -1,0 +1,79 @@
+"""The comparison of a key's value with a constant, as a condition and the `until` of a repeat make it."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from pydantic import Field
+from pydantic.config import JsonDict
+
+from glotouch_bt.mission.spec import Findings, Place, Settings
+
+ANY_UNIT: JsonDict = {"any_unit": True}
+"""Marks a number that may be written in any unit; it is compared in the unit of the key."""
+_SIGNS = (("equals", "=="), ("at_least", ">="), ("at_most", "<="))
+
+
+class ConditionSettings(Settings):
+    """Compare a port's value; a port that nobody has written yet fails every comparison but `is_set: false`."""
+
+    port: str = Field(description="key to look at")
+    equals: bool | int | float | str | None = Field(default=None, description="succeed if equal")
+    at_least: float | None = Field(
+        default=None, description="succeed if the number is at least this", json_schema_extra=ANY_UNIT
+    )
+    at_most: float | None = Field(
+        default=None, description="succeed if the number is at most this", json_schema_extra=ANY_UNIT
+    )
+    is_set: bool | None = Field(default=None, description="succeed if somebody wrote it (false: nobody)")
+
+    def check(self, place: Place, findings: Findings) -> None:
+        """Report a comparison that is missing, or more than one."""
+        asked = [n for n in ("equals", "at_least", "at_most", "is_set") if getattr(self, n) is not None]
+        if len(asked) != 1:
+            found = " and ".join(asked) or "none"
+            what = f"a condition needs exactly one comparison, found {found}"
+            findings.add(place, "wrong_value", what, valid="equals, at_least, at_most, is_set")
+
+
+def holds(comparison: ConditionSettings, value: Any) -> bool:
+    """Return the result of a comparison; an unset key (None) fails all but `is_set: false`."""
+    if comparison.is_set is not None:
+        return (value is not None) == comparison.is_set
+    if value is None:
+        return False
+    if comparison.equals is not None:
+        return isinstance(value, bool) == isinstance(comparison.equals, bool) and bool(value == comparison.equals)
+    if comparison.at_least is not None:
+        return bool(value >= comparison.at_least)
+    return comparison.at_most is not None and bool(value <= comparison.at_most)
+
+
+def in_words(comparison: ConditionSettings) -> str:
+    """Return the comparison for people: `found at_least 1`."""
+    for word in ("equals", "at_least", "at_most", "is_set"):
+        wanted = getattr(comparison, word)
+        if wanted is not None:
+            return f"{comparison.port} {word} {f'{wanted:g}' if isinstance(wanted, float) else wanted}"
+    return comparison.port
+
+
+def in_code(comparison: ConditionSettings, key: str) -> str:
+    """Return the comparison in BehaviorTree.CPP's script language; `is_set(key)` is ours."""
+    for word, sign in _SIGNS:
+        wanted = getattr(comparison, word)
+        if wanted is not None:
+            shown = f"'{wanted}'" if isinstance(wanted, str) else json.dumps(wanted)
+            return f"{key} {sign} {shown}"
+    return f"{'' if comparison.is_set else '!'}is_set({key})"
+
+
+def compared_type(comparison: ConditionSettings) -> Any:
+    """Return the type a comparison's port must have."""
+    if comparison.at_least is not None or comparison.at_most is not None:
+        return int | float
+    if comparison.equals is None:
+        return object
+    number = isinstance(comparison.equals, (int, float)) and not isinstance(comparison.equals, bool)
+    return int | float if number else type(comparison.equals)

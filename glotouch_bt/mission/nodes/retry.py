@@ -1,0 +1,81 @@
+"""`retry`: the child again after a failure."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from pydantic import Field
+
+from glotouch_bt.mission.nodes.base import BtcppForm, BuildContext, LoopKind, MissionDecorator
+from glotouch_bt.mission.spec import NodeSpec, Settings
+
+
+class RetrySettings(Settings):
+    """Try again after a failure."""
+
+    attempts: int = Field(description="how often in all", ge=1, le=10_000)
+
+
+class Retry(MissionDecorator):
+    """Run the child until it succeeds. FAILURE when all attempts have failed."""
+
+    def __init__(self, name: str, child: Behaviour, attempts: int) -> None:
+        super().__init__(name, child)
+        self._attempts, self._failures = attempts, 0
+
+    @property
+    def progress(self) -> dict[str, Any]:
+        """Number of failed attempts."""
+        return {"failures": self._failures}
+
+    @progress.setter
+    def progress(self, kept: dict[str, Any]) -> None:
+        """Go on from there."""
+        self._failures = kept["failures"]
+
+    def initialise(self) -> None:
+        """Start counting."""
+        super().initialise()
+        self._failures = 0
+
+    def update(self) -> Status:
+        """Count a failed attempt."""
+        if self.decorated.status is not Status.FAILURE:
+            return self.decorated.status
+        self._failures += 1
+        if self._failures < self._attempts:
+            return Status.RUNNING
+        tried = f"{self._attempts} attempt{'s' if self._attempts > 1 else ''}"
+        return self.fail("retries_ran_out", f"failed {self._failures} of {tried}")
+
+
+class RetryKind(LoopKind):
+    """Run the child again after a failure, up to a number of attempts."""
+
+    name = "retry"
+    description = "try the child again when it fails"
+    Settings = RetrySettings
+    btcpp, sign = "RetryUntilSuccessful", "↻"
+    repeat_on = False
+
+    def max_passes(self, node: NodeSpec) -> int:
+        """Return its `attempts`."""
+        return node.settings.attempts if isinstance(node.settings, RetrySettings) else 1
+
+    def no_effect(self, node: NodeSpec, *, fails: bool, succeeds: bool) -> str:
+        """One attempt, or a child that never fails."""
+        del succeeds
+        if node.settings is not None and self.max_passes(node) == 1:
+            return "one attempt is none again"
+        return "" if fails else f"{node.children[0].name!r} never fails"
+
+    def build(self, node: NodeSpec, children: list[Behaviour], made: BuildContext) -> Behaviour:
+        """Return the loop."""
+        del made
+        return Retry(node.name, children[0], self.max_passes(node))
+
+    def btcpp_form(self, node: NodeSpec) -> BtcppForm:
+        """Return it with its attempts."""
+        return BtcppForm(self.btcpp, {"num_attempts": str(self.max_passes(node))})

@@ -1,0 +1,36 @@
+"""`subtree`: a tree from another file, with parameters and ports of its own."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from glotouch_bt.mission.nodes.base import BtcppForm, NodeKind, NodeReader
+from glotouch_bt.mission.spec import Node, NodeSpec, Place, Settings
+
+
+class SubtreeSettings(Settings):
+    """Another file's tree with parameters and ports of its own."""
+
+    file: str = Field(description="path of the subtree's file, relative to this one")
+    parameters: dict[str, bool | int | float | str] = Field(
+        default_factory=dict, description="values of its parameters"
+    )
+    ports: dict[str, str] = Field(default_factory=dict, description="its key: our key; all its other keys are private")
+
+
+class SubtreeKind(NodeKind):
+    """Return the result of the other tree, which is read as its only child."""
+
+    name = "subtree"
+    description = "a tree from another file"
+    Settings = SubtreeSettings
+    children = "none"
+    btcpp, sign, fill = "SubTree", "▤", "#eeeeee"
+
+    def read(self, reader: NodeReader, place: Place, body: Node) -> NodeSpec:
+        """Read the other file."""
+        return reader.subtree(place, body)
+
+    def btcpp_form(self, node: NodeSpec) -> BtcppForm | None:
+        """Let its tree stand in its place."""
+        return None
