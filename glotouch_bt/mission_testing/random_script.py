@@ -8,7 +8,8 @@ from typing import Any, Literal, get_args, get_origin
 import numpy as np
 
 from glotouch_bt.mission import Mission
-from glotouch_bt.mission.spec import ConditionSettings, NodeSpec, TimeoutSettings
+from glotouch_bt.mission.nodes import kind_of
+from glotouch_bt.mission.spec import NodeSpec
 from glotouch_bt.mission_testing.casting import leaves_of
 from glotouch_bt.mission_testing.coverage import expected_endings
 from glotouch_bt.mission_testing.leaf import promised
@@ -30,16 +31,16 @@ class ScriptMaker:
     def __post_init__(self) -> None:
         numbers, texts, seconds = {0.0, 1.0, 2.0}, {"a", "b"}, [1.0]
         for node in self.mission.tree.walk():
-            until = getattr(node.settings, "until", None)
-            for s in (node.settings, until):
-                if isinstance(s, ConditionSettings):
-                    for value in (s.equals, s.at_least, s.at_most):
-                        if isinstance(value, str):
-                            texts.add(value)
-                        elif value is not None and not isinstance(value, bool):
-                            numbers |= {value - 1.0, 0.95 * value, float(value), 1.05 * value, value + 1.0}
-            if isinstance(node.settings, TimeoutSettings):
-                seconds.append(node.settings.seconds)
+            kind = kind_of(node)
+            _, compared = kind.comparison(node) or ("", None)
+            for value in (compared.equals, compared.at_least, compared.at_most) if compared else ():
+                if isinstance(value, str):
+                    texts.add(value)
+                elif value is not None and not isinstance(value, bool):
+                    numbers |= {value - 1.0, 0.95 * value, float(value), 1.05 * value, value + 1.0}
+            limit_s = kind.time_limit_s(node)
+            if limit_s is not None:
+                seconds.append(limit_s)
         self._numbers, self._texts, self._seconds = sorted(numbers), sorted(texts), 2.5 * max(seconds)
         endings = expected_endings(self.mission.tree, self.mission.name)
         self._breakable = {path for path, expected in endings if "PREEMPTED" in expected}
