@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-import fcl
 import numpy as np
 import numpy.typing as npt
 
+from glotouch_bt.lazy import lazy_module
 from glotouch_bt.motion.kinematics import Kinematics
 from glotouch_bt.motion.shapes import (
     OWN_OBSTACLES,
@@ -27,6 +27,11 @@ from glotouch_bt.motion.shapes import (
     world_obstacles,
 )
 from glotouch_bt.robot import Array, ParamError, Pose, UnknownName, World
+
+if TYPE_CHECKING:
+    import fcl
+else:
+    fcl = lazy_module("fcl")
 
 _LEAVING_M = 2e-4
 """Tolerance for a part that starts below the margin: it may not come nearer than its start by more than this."""

@@ -6,12 +6,19 @@ Frames: B arm base, P mid-point between the pads.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
-from scipy.linalg.lapack import dgesv
+import scipy
 
+from glotouch_bt.lazy import lazy_module
 from glotouch_bt.robot import Array, Joint, Link, MotionRefused, ParamError, Pose, RobotDescription
+
+if TYPE_CHECKING:
+    import pinocchio as pin
+else:
+    pin = lazy_module("pinocchio")
 
 _POSITION_TOLERANCE_M = 1e-8
 """Position error at which inverse kinematics stops."""
@@ -174,7 +181,7 @@ class Kinematics:
             if posture_gain != 0.0:
                 pull = posture_gain * (self.home - q)
                 error[:, 2] = j @ pull
-        x = j.T @ dgesv(j @ j.T + self._ridge, error, overwrite_a=1, overwrite_b=1)[2]
+        x = j.T @ scipy.linalg.lapack.dgesv(j @ j.T + self._ridge, error, overwrite_a=1, overwrite_b=1)[2]
         if twist_B is not None and posture_gain != 0.0:
             x[:, 1] += pull - x[:, 2]
         return np.asarray(x, dtype=np.float64)

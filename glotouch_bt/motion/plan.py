@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from glotouch_bt.motion.kinematics import Kinematics, known_pose
 from glotouch_bt.motion.paths import Piece, quats_to_matrices
@@ -41,7 +41,7 @@ class MotionPlan:
     progress: Progress
     knots_q: Array
     knots_s: Array
-    spline: CubicSpline
+    spline: scipy.interpolate.CubicSpline
     limits: ProfileLimits
     q: Array
     dq: Array
@@ -118,7 +118,7 @@ def plan_piece(
     if piece.curvature_1_m > 0:
         speed_m_s = min(speed_m_s, float(np.sqrt(acceleration_m_s2 / piece.curvature_1_m)))
     progress = rest_to_rest(length, speed_m_s, acceleration_m_s2, jerk_m_s3, period_s)
-    spline = CubicSpline(s, q, bc_type=((1, tangents[0]), (1, tangents[-1])))
+    spline = scipy.interpolate.CubicSpline(s, q, bc_type=((1, tangents[0]), (1, tangents[-1])))
     limits = ProfileLimits(speed_m_s, acceleration_m_s2, jerk_m_s3)
     plan = _along(piece, s, q, spline, limits, progress)
     share = np.abs(plan.dq) / kinematics.velocity
@@ -167,7 +167,12 @@ def _knots(
 
 
 def _along(
-    piece: Piece, knots_s: Array, knots_q: Array, spline: CubicSpline, limits: ProfileLimits, progress: Progress
+    piece: Piece,
+    knots_s: Array,
+    knots_q: Array,
+    spline: scipy.interpolate.CubicSpline,
+    limits: ProfileLimits,
+    progress: Progress,
 ) -> MotionPlan:
     v, a = progress.v[:, None], progress.a[:, None]
     q, first, second = (np.asarray(spline(progress.s, order), dtype=np.float64) for order in range(3))

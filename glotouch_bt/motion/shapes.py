@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import fcl
 import numpy as np
 
+from glotouch_bt.lazy import lazy_module
 from glotouch_bt.robot import Array, Gripper, Pose, Probe, RobotDescription, World
+
+if TYPE_CHECKING:
+    import fcl
+else:
+    fcl = lazy_module("fcl")
 
 HOLDER_GAP_M = 0.003
 """Gap between the lower face of the handle and the top of the holder block."""

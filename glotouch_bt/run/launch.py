@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from glotouch_bt.faults import FaultInjector, FaultPlan, ListeningRecord, injector_in, read_plan, wrong_models
+from glotouch_bt.lazy import load_all
 from glotouch_bt.mission import Mission, load_mission, split_settings
 from glotouch_bt.mission.checkpoint import FILE as CHECKPOINTS
 from glotouch_bt.mission.checkpoint import CheckpointFile, CheckpointWriter, ResumePoint
@@ -63,6 +64,7 @@ def launch(
         mission = load_mission(request.mission, request.settings, objects=request.objects)
     conditions = load_conditions(request.conditions)
     plan = _fault_plan(request, mission)
+    load_all()
     backend = load_backend(request.backend)
     options = split_settings(mission, request.settings)
     folder = RunFolder(request.out) if request.out else RunFolder.named(mission.name, request.seed)

@@ -6,8 +6,9 @@ import math
 from pathlib import Path
 from typing import ClassVar, Literal
 
-from glotouch_bt.perception import target_model
-from glotouch_bt.perception.recognition import MATCHERS, PadSpec, Ranking
+from glotouch_bt import perception
+from glotouch_bt.perception import recognition
+from glotouch_bt.perception.recognition import Ranking
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import HOLD, BadInput, ParamError
 from glotouch_bt.robot.scene import Mesh, load_folder, load_mesh
@@ -67,10 +68,12 @@ class Match(Skill):
         gripper = self.context.arm.description.gripper
         mesh = self._target()
         try:
-            model = target_model(mesh, PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m))
+            model = perception.target_model(
+                mesh, recognition.PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
+            )
         except ParamError as e:
             raise SkillFailed("too_low", f"{mesh.name} cannot be felt: {e}", advice="sweep lower") from e
-        ranking = MATCHERS[self.params.matcher](model, touchsets)
+        ranking = recognition.MATCHERS[self.params.matcher](model, touchsets)
         self.ranking = ranking
         self.event("ranking", target=mesh.name, ranking=ranking, gates=ranking.gates, matcher=self.params.matcher)
         if not ranking.accepted:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from glotouch_bt import perception
 from glotouch_bt.motion import Motion, hand_pose_B
-from glotouch_bt.perception import target_model
-from glotouch_bt.perception.recognition import Belief, PadSpec, TargetModel, believe, expected_gain
+from glotouch_bt.perception import recognition
 from glotouch_bt.perception.touch import Candidate, Layer, TouchSequence, TouchSet
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import HOLD, Array, MotionRefused, ParamError
@@ -26,6 +26,9 @@ from glotouch_skills.common.planning import (
     pads_height_m,
 )
 from glotouch_skills.recognise.match import load_target
+
+if TYPE_CHECKING:
+    from glotouch_bt.perception.recognition import Belief, TargetModel
 
 MAX_IN_VAIN = 4
 """Closures without a plateau, after which a candidate is left alone: it is not where it was traced."""
@@ -117,7 +120,7 @@ class TouchNext(Skill):
             down = None
         self.touchsets, self.decided = touchsets, False
         yield HOLD  # thinking takes longer than a control period; on hardware the arm holds meanwhile
-        belief = believe(self._target_model(), touchsets)
+        belief = recognition.believe(self._target_model(), touchsets)
         self._hopeless = frozenset(t.candidate.index for t in touchsets if _in_vain(t) >= MAX_IN_VAIN)
         why = self._enough(belief)
         chosen = None if why else self._choose(belief, down)
@@ -153,9 +156,9 @@ class TouchNext(Skill):
         if self._model is None:
             gripper = self.context.arm.description.gripper
             mesh = load_target(self.params.target, self.context.world.objects.folder)
-            pads = PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
+            pads = recognition.PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
             try:
-                self._model = target_model(mesh, pads)
+                self._model = perception.target_model(mesh, pads)
             except ParamError as e:
                 raise SkillFailed("too_low", f"{mesh.name} cannot be felt: {e}", advice="sweep lower") from e
         return self._model
@@ -186,7 +189,7 @@ class TouchNext(Skill):
         if not found:
             return None
         closures = [c for o in found for c in (o.closure, *o.after)]
-        gains = np.split(expected_gain(belief, closures), np.cumsum([1 + len(o.after) for o in found])[:-1])
+        gains = np.split(recognition.expected_gain(belief, closures), np.cumsum([1 + len(o.after) for o in found])[:-1])
         rates = best_rates(found, gains)
         worth = np.array([g.max() for g in gains]) >= p.min_gain_nats
         quick = np.array([1.0 / o.seconds for o in found])

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from glotouch_bt.perception import target_model
-from glotouch_bt.perception.recognition import PadSpec, TargetModel
+from glotouch_bt import perception
+from glotouch_bt.perception import recognition
 from glotouch_bt.robot import HOLD, Array, ParamError
 from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import GRAVITY_M_S2
 from glotouch_skills.common.planning import SHIFTS_M, GraspPlan
 from glotouch_skills.recognise import load_target
+
+if TYPE_CHECKING:
+    from glotouch_bt.perception.recognition import TargetModel
 
 HEIGHT_SLACK_M = 0.006
 """It may be held so much higher or lower on its body than planned: it was lifted at an edge, or stands on something."""
@@ -86,7 +89,9 @@ class ObjectCheck(Skill):
             self.fits = True
             return
         try:
-            model = target_model(mesh, PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m))
+            model = perception.target_model(
+                mesh, recognition.PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
+            )
         except ParamError as e:
             raise SkillFailed("too_low", f"{mesh.name} cannot be felt: {e}", advice="sweep lower") from e
         widths = widths_m(model, float(made.position_K_m[2]))

@@ -29,7 +29,7 @@ from glotouch_bt.mission.spec import (
     units_for,
 )
 from glotouch_bt.robot import BadInput
-from glotouch_bt.robot.scene import load_mesh
+from glotouch_bt.robot.scene import is_sound_stl, load_mesh
 
 Value = bool | int | float | str
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -257,7 +257,8 @@ def stl_usable(name: str, folder: Path | None, place: Place, findings: Findings)
 def _fault_of_solid(path: Path, stamp: tuple[int, int] | None) -> str:
     """Why a file is no good solid, or empty; a mission names it in many places. `stamp`: of the file as it is."""
     try:
-        load_mesh(path)
+        if stamp is None or not is_sound_stl(path):
+            load_mesh(path)
     except BadInput as e:
         return str(e)
     return ""

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from glotouch_bt.perception.recognition.model import PadSpec, hand_axes, image_feature, pool
 from glotouch_bt.perception.touch import Layer, TouchSet
@@ -126,10 +126,10 @@ def contact_tops(maps_m: list[Array], pad: PadSpec) -> list[float]:
         alive = good.mean(axis=(1, 2)) >= 0.5
         middle = [float(np.median(m[g])) if a else 0.0 for m, g, a in zip(stack, good, alive, strict=True)]
         filled = np.where(good, stack, np.array(middle)[:, None, None])
-        smooth = ndimage.median_filter(filled, size=(1, 3, 3), mode="nearest")
+        smooth = scipy.ndimage.median_filter(filled, size=(1, 3, 3), mode="nearest")
         flat = np.zeros((3, 3, 3))
         flat[1] = [[0, 1, 0], [1, 1, 1], [0, 1, 0]]
-        labels, n = ndimage.label((smooth > THRESHOLD_M) & alive[:, None, None], structure=flat)
+        labels, n = scipy.ndimage.label((smooth > THRESHOLD_M) & alive[:, None, None], structure=flat)
         if n == 0:
             continue
         count = np.bincount(labels.ravel(), minlength=n + 1)

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
+import scipy
 
 from glotouch_bt.perception.touch import Contact, Contour, signed_distance
 from glotouch_bt.robot import Array, ParamError, frozen_array
@@ -171,8 +171,8 @@ class SearchMap:
         return self.found >= self.expected
 
     @cached_property
-    def _tree(self) -> cKDTree:
-        return cKDTree(self.path_K_m)
+    def _tree(self) -> scipy.spatial.cKDTree:
+        return scipy.spatial.cKDTree(self.path_K_m)
 
 
 def _frozen(a: Array) -> Array:

@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csgraph, csr_array
+import scipy
 
 from glotouch_bt.perception.search.map import GRID_STEP_M, Exclusion, Mask, SearchMap
 from glotouch_bt.robot import Array
@@ -59,7 +59,9 @@ class _Grid:
             self.free &= _free_of(half_m, e)
         keep = self.free[lattice.a] & self.free[lattice.b]
         n = len(self.nodes)
-        self.graph: Any = csr_array((lattice.length[keep], (lattice.a[keep], lattice.b[keep])), shape=(n, n))
+        self.graph: Any = scipy.sparse.csr_array(
+            (lattice.length[keep], (lattice.a[keep], lattice.b[keep])), shape=(n, n)
+        )
 
     def nearest_free(self, point: Array) -> int:
         """Index of the free node nearest to a point (2,); -1 if there is none."""
@@ -144,7 +146,7 @@ class Routes:
                 self._tables = grid, np.full(n, np.inf), np.full(n, -1, dtype=np.int32)
             else:
                 # the stubs know no single start index
-                solve: Any = csgraph.dijkstra
+                solve: Any = scipy.sparse.csgraph.dijkstra
                 distance, before = solve(grid.graph, directed=False, indices=node, return_predecessors=True)
                 distance = distance + np.linalg.norm(grid.nodes[node] - self.start_K_m)
                 self._tables = grid, distance, before

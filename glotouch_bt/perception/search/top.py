@@ -14,7 +14,7 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+import scipy
 
 from glotouch_bt.robot import Array, ParamError
 
@@ -149,8 +149,8 @@ def _nearest(place: Array, a: Array, b: Array) -> Array:
 def _hull(points: Array) -> Array:
     """Corners of the convex hull, anticlockwise; the two ends of points in a row."""
     try:
-        return np.asarray(points[ConvexHull(points).vertices])
-    except (QhullError, ValueError):
+        return np.asarray(points[scipy.spatial.ConvexHull(points).vertices])
+    except (scipy.spatial.QhullError, ValueError):
         along = np.linalg.svd(points - points.mean(axis=0))[2][0]
         return np.asarray(points[[int(np.argmin(points @ along)), int(np.argmax(points @ along))]])
 

@@ -1,7 +1,7 @@
 """TODO door of glotouch_bt/robot/scene."""
 
 from glotouch_bt.robot.scene.conditions import Conditions
-from glotouch_bt.robot.scene.meshes import Mesh, load_folder, load_mesh
+from glotouch_bt.robot.scene.meshes import Mesh, is_sound_stl, load_folder, load_mesh
 from glotouch_bt.robot.scene.placement import Placement, draw_layout
 from glotouch_bt.robot.scene.streams import stream
 from glotouch_bt.robot.scene.world import Container, Holder, ObjectSet, Probe, World
@@ -16,6 +16,7 @@ __all__ = [
     "Probe",
     "World",
     "draw_layout",
+    "is_sound_stl",
     "load_folder",
     "load_mesh",
     "stream",

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull
+import scipy
 
 from glotouch_bt.robot.errors import BadInput
 from glotouch_bt.robot.geometry import Array
@@ -33,7 +33,7 @@ class Placement:
 def outline(mesh: Mesh) -> Array:
     """Convex outline (n, 2) of the whole mesh seen from above, anticlockwise, in the mesh frame, m."""
     xy = np.asarray(mesh.vertices_m)[:, :2]
-    return np.asarray(xy[ConvexHull(xy).vertices], dtype=np.float64)
+    return np.asarray(xy[scipy.spatial.ConvexHull(xy).vertices], dtype=np.float64)
 
 
 def transformed(outline_m: Array, place: Placement) -> Array:
@@ -114,7 +114,7 @@ def place_objects(
     """
     outlines = [outline(m) for m in meshes]
     half = 0.5 * np.array(interior_m)
-    areas = [ConvexHull(o).volume for o in outlines]  # in the plane, scipy's volume is the area
+    areas = [scipy.spatial.ConvexHull(o).volume for o in outlines]  # in the plane, scipy's volume is the area
     order = sorted(range(len(meshes)), key=lambda i: (-areas[i], i))
     failed = 0
     for _ in range(RESTARTS):

@@ -8,14 +8,17 @@ jaws' width and y_P towards the left jaw, from the middle of the mesh's footprin
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
+import scipy
 
-from glotouch_bt.perception.recognition import TargetModel
 from glotouch_bt.perception.recognition.model import FINE, STRIDE, Array32, gel_shift, hand_axes, mirrored
 from glotouch_bt.robot import Array, Gripper
+
+if TYPE_CHECKING:
+    from glotouch_bt.perception.recognition import TargetModel
 
 Index = npt.NDArray[np.intp]
 AREA_SCALE = 0.15
@@ -143,7 +146,7 @@ def _column(fine: Array32, yaws: Index, near: Index, heights: Index, gripper: Gr
     rows, cols = FINE
     step_l, step_z = model.pad.window_m[0] / cols, model.pad.window_m[1] / rows
     wide = 2 * int(np.ceil(gripper.finger.half_m[0] / step_l)) + 1
-    reach = ndimage.maximum_filter1d(fine[yaws], wide, axis=1, mode="constant", cval=-np.inf)
+    reach = scipy.ndimage.maximum_filter1d(fine[yaws], wide, axis=1, mode="constant", cval=-np.inf)
     above = np.maximum.accumulate(reach[:, :, ::-1], axis=2)[:, :, ::-1]
     at_l = cols // 2 + STRIDE * near
     at_z = np.maximum(rows // 2 + STRIDE * heights - int(np.ceil(gripper.fingertip_below_P_m / step_z)), 0)
@@ -152,5 +155,5 @@ def _column(fine: Array32, yaws: Index, near: Index, heights: Index, gripper: Gr
 
 def _blurred(worth: Array) -> Array:
     """The mean over poses a little off: 10 degrees, 2.3 mm, 2.7 mm to either side."""
-    turned = ndimage.uniform_filter1d(worth, 3, axis=0, mode="nearest")
-    return np.asarray(ndimage.uniform_filter(turned, (1, 3, 3), mode="nearest"))
+    turned = scipy.ndimage.uniform_filter1d(worth, 3, axis=0, mode="nearest")
+    return np.asarray(scipy.ndimage.uniform_filter(turned, (1, 3, 3), mode="nearest"))

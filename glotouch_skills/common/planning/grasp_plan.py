@@ -7,15 +7,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from glotouch_bt.perception.recognition import Match, TargetModel
+from glotouch_bt.perception.recognition import Match
 from glotouch_bt.perception.touch import Candidate, Layer, TouchSet, evidence_weight, patch_statistics
 from glotouch_bt.robot import Array, Gripper, ParamError
 from glotouch_bt.robot.scene import Mesh
 from glotouch_skills.common.planning.grasp_holds import AREA_SCALE, LEVER_SCALE_M, Holds, holds_of
 from glotouch_skills.common.planning.squeeze_motion import lowest_pads_m
+
+if TYPE_CHECKING:
+    from glotouch_bt.perception.recognition import TargetModel
 
 STALENESS = 0.7
 """What a felt hold is worth after each later sequence: squeezing turns and shifts the object."""

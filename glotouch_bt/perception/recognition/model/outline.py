@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
-from scipy.spatial import ConvexHull
+import scipy
 
 from glotouch_bt.perception.touch import Contour, ContourKind, fit_contour, fit_kind
 from glotouch_bt.robot import Array, ParamError
+
+if TYPE_CHECKING:
+    import trimesh
 
 TIP_RADIUS_M, SHAFT_RADIUS_M, SHAFT_M = 0.006, 0.004, 0.100
 """The probe of CONDITIONS (its shaft's lower part)."""
@@ -155,7 +158,7 @@ def first_hit(solid: trimesh.Trimesh, origins_m: Array, directions: Array) -> Ar
 
 def minimum_rectangle(points_m: Array) -> tuple[float, float, float, Array]:
     """(long, short, yaw of the long side, centre (2,)) of the rectangle of least area round points (k, 2)."""
-    hull = points_m[ConvexHull(points_m).vertices]
+    hull = points_m[scipy.spatial.ConvexHull(points_m).vertices]
     edges = np.roll(hull, -1, axis=0) - hull
     angles = np.arctan2(edges[:, 1], edges[:, 0])
     c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
+import scipy
 
 from glotouch_bt.robot import Array, ParamError
 
@@ -138,8 +138,8 @@ def patch_of(depth_m: Array, pad: PadSpec, threshold_m: float = 6e-5, smallest_m
     if good.mean() < 0.5:
         return none
     filled = np.where(good, depth_m, float(np.median(depth_m[good])))
-    smooth = ndimage.median_filter(filled, size=3, mode="nearest")
-    labels, n = ndimage.label(smooth > threshold_m)
+    smooth = scipy.ndimage.median_filter(filled, size=3, mode="nearest")
+    labels, n = scipy.ndimage.label(smooth > threshold_m)
     cell = pad.window_m[0] / cols * pad.window_m[1] / rows
     if n == 0:
         return none

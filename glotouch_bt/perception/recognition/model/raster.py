@@ -8,13 +8,17 @@ reversed.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import trimesh
-from scipy import ndimage
+import scipy
 
 from glotouch_bt.perception.recognition.model.outline import first_hit
 from glotouch_bt.perception.recognition.model.pads import FINE, Array32
 from glotouch_bt.robot import Array, ParamError
+
+if TYPE_CHECKING:
+    import trimesh
 
 
 def hand_axes(phi_rad: Array) -> tuple[Array, Array]:
@@ -53,8 +57,10 @@ def side_images(solid: trimesh.Trimesh, phi_rad: Array, l_m: Array, z_m: Array) 
 
 def window_max(reach: Array32) -> Array32:
     """Largest reach in the pad's window (15 columns x 21 rows) round each cell: separable running maximum."""
-    a = ndimage.maximum_filter1d(reach, FINE[1], axis=1, mode="constant", cval=-np.inf)
-    return np.asarray(ndimage.maximum_filter1d(a, FINE[0], axis=2, mode="constant", cval=-np.inf), dtype=np.float32)
+    a = scipy.ndimage.maximum_filter1d(reach, FINE[1], axis=1, mode="constant", cval=-np.inf)
+    return np.asarray(
+        scipy.ndimage.maximum_filter1d(a, FINE[0], axis=2, mode="constant", cval=-np.inf), dtype=np.float32
+    )
 
 
 def mirrored(table: Array32) -> Array32:

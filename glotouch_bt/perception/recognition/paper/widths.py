@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
+import scipy
 
 from glotouch_bt.perception.recognition.model import FINE, STRIDE, Array32, PadSpec, TargetModel, mirrored
 from glotouch_bt.perception.recognition.paper.params import PaperParams
@@ -55,14 +55,14 @@ def width_tables(model: TargetModel, scales: tuple[float, ...]) -> tuple[WidthTa
 def _table(model: TargetModel, scale: float) -> WidthTable:
     rows, cols = (_odd(n / scale) for n in FINE)
     edge_z, edge_l = (n // 2 for n in FINE)
-    reach = ndimage.maximum_filter1d(model.fine_m, cols, axis=1, mode="constant", cval=-np.inf)
-    reach = ndimage.maximum_filter1d(reach, rows, axis=2, mode="constant", cval=-np.inf)
+    reach = scipy.ndimage.maximum_filter1d(model.fine_m, cols, axis=1, mode="constant", cval=-np.inf)
+    reach = scipy.ndimage.maximum_filter1d(reach, rows, axis=2, mode="constant", cval=-np.inf)
     reach = reach[:, edge_l:-edge_l:STRIDE, edge_z:-edge_z:STRIDE]
     reach = np.where(np.isfinite(reach), reach, np.nan).astype(np.float32) * np.float32(scale)
     other = mirrored(reach)
     width, middle = reach + other, np.float32(0.5) * (reach - other)
     supported = np.isfinite(width)
-    near = ndimage.maximum_filter(np.where(supported, width, np.float32(0)), size=(1, 3, 3), mode="constant")
+    near = scipy.ndimage.maximum_filter(np.where(supported, width, np.float32(0)), size=(1, 3, 3), mode="constant")
     width = np.where(supported, width, near)
     for a in (width, supported, middle):
         a.setflags(write=False)

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 
 from glotouch_bt.perception.recognition.model import (
     TIP_RADIUS_M,
@@ -25,6 +25,9 @@ from glotouch_bt.perception.recognition.model import (
 from glotouch_bt.perception.touch import Candidate, Layer, TouchSequence, TouchSet, fit_contour
 from glotouch_bt.robot import Array
 from glotouch_bt.robot.scene import Mesh
+
+if TYPE_CHECKING:
+    import trimesh
 
 
 @dataclass(frozen=True, kw_only=True)

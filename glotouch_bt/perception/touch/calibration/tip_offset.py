@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+import scipy
 
 from glotouch_bt.robot import Array, ParamError
 
@@ -141,9 +141,9 @@ def wrench_delay(
     edge = round(longest_s * rate_Hz + 4 * width)
     if x.ndim != 1 or f.shape != x.shape or len(x) < 4 * edge:
         raise ParamError("position_m, force_N", (x.shape, f.shape), f"both (n,) with n >= {4 * edge}")
-    smooth = gaussian_filter1d(x, width)
+    smooth = scipy.ndimage.gaussian_filter1d(x, width)
     acceleration = np.gradient(np.gradient(smooth)) * rate_Hz**2
-    felt = _centred(gaussian_filter1d(f, width)[edge:-edge])
+    felt = _centred(scipy.ndimage.gaussian_filter1d(f, width)[edge:-edge])
     samples = np.arange(len(x), dtype=np.float64)
     delays = np.linspace(0.0, longest_s, steps)
     errors, change = np.zeros(steps), np.zeros(steps)

@@ -7,7 +7,7 @@ sqrt(1.11 f_c / 500) = 0.26 (noise bandwidth of the order-2 Butterworth: pi / (2
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import butter, sosfilt
+import scipy
 
 from glotouch_bt.robot import Array, ParamError
 
@@ -31,7 +31,7 @@ class LowPass:
         if not 0 < cutoff_Hz < 0.5 * rate_Hz:
             raise ParamError("cutoff_Hz", cutoff_Hz, f"in (0, {0.5 * rate_Hz}), half the sampling rate")
         self.cutoff_Hz, self.rate_Hz = cutoff_Hz, rate_Hz
-        self._sos: Array = np.asarray(butter(2, cutoff_Hz, fs=rate_Hz, output="sos"), dtype=np.float64)
+        self._sos: Array = np.asarray(scipy.signal.butter(2, cutoff_Hz, fs=rate_Hz, output="sos"), dtype=np.float64)
         self._state: Array = np.zeros((2, channels))
         self._operators: dict[int, Array] = {}
 
@@ -39,7 +39,7 @@ class LowPass:
         """Filter the next block (n, channels); the state carries over to the next call."""
         n = len(block)
         if n > LONGEST_OPERATOR:
-            out, state = sosfilt(self._sos, block, axis=0, zi=self._state[None])
+            out, state = scipy.signal.sosfilt(self._sos, block, axis=0, zi=self._state[None])
             self._state = np.asarray(state[0])
             return np.asarray(out)
         operator = self._operators.get(n)
@@ -55,7 +55,7 @@ class LowPass:
         A linear filter over a block is a matrix; its columns are the responses to each unit state and unit input.
         """
         columns = np.eye(2 + n)
-        out, state = sosfilt(self._sos, columns[2:], axis=0, zi=columns[None, :2])
+        out, state = scipy.signal.sosfilt(self._sos, columns[2:], axis=0, zi=columns[None, :2])
         return np.concatenate([state[0], out])
 
     @property
@@ -69,4 +69,4 @@ class LowPass:
         """Standard deviation of filtered white noise over that of the white noise (energy of the impulse response)."""
         impulse = np.zeros(int(20 * self.rate_Hz / self.cutoff_Hz) + 1)
         impulse[0] = 1.0
-        return float(np.sqrt(np.sum(np.square(sosfilt(self._sos, impulse)))))
+        return float(np.sqrt(np.sum(np.square(scipy.signal.sosfilt(self._sos, impulse)))))

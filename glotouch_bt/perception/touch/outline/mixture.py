@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import ndtr
+import scipy
 
 from glotouch_bt.perception.touch.outline.deviation import Hypothesis, polar
 from glotouch_bt.perception.touch.outline.polygons import (
@@ -168,7 +168,7 @@ class OutlineBelief:
         off = np.asarray(tip_K_m, dtype=np.float64)[:2] - self.centre_K_m
         mean, sd, weights = self._components(self.centre_K_m, np.array([math.atan2(off[1], off[0])]))
         spread = np.hypot(sd[:, 0], 1.5 * self.touches.contact_sd_m)
-        below = float(weights @ ndtr((float(np.linalg.norm(off)) - mean[:, 0]) / spread))
+        below = float(weights @ scipy.special.ndtr((float(np.linalg.norm(off)) - mean[:, 0]) / spread))
         return 2.0 * min(below, 1.0 - below)
 
     def _components(self, origin: Array, bearing: Array) -> tuple[Array, Array, Array]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import ConvexHull, QhullError
+import scipy
 
 from glotouch_bt.robot import Array, ParamError
 
@@ -18,8 +18,8 @@ def convex_hull(points_m: Array) -> Array:
         ParamError: The points span no area.
     """
     try:
-        return np.asarray(points_m[ConvexHull(points_m).vertices], dtype=np.float64)
-    except (QhullError, ValueError) as error:
+        return np.asarray(points_m[scipy.spatial.ConvexHull(points_m).vertices], dtype=np.float64)
+    except (scipy.spatial.QhullError, ValueError) as error:
         raise ParamError("points_m", np.shape(points_m), "at least three points that span an area") from error
 
 

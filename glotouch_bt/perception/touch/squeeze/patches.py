@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from glotouch_bt.perception.touch.values import Layer
 from glotouch_bt.robot import Array
@@ -47,8 +47,8 @@ def patch_statistics(depth_m: Array, *, threshold_m: float = THRESHOLD_M, min_ta
     alive = np.isfinite(depth)
     touched = alive & (np.nan_to_num(depth, nan=0.0) > threshold_m)
     # A dead taxel must not cut a patch in two: bridge it for the labelling only.
-    bridged = touched | (~alive & ndimage.binary_dilation(touched))
-    labels, count = ndimage.label(bridged)
+    bridged = touched | (~alive & scipy.ndimage.binary_dilation(touched))
+    labels, count = scipy.ndimage.label(bridged)
     sizes = np.bincount(labels[touched], minlength=count + 1)
     sizes[0] = 0
     large = sizes >= min_taxels

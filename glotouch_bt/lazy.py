@@ -1,0 +1,58 @@
+"""Third-party modules that are loaded on first use, so that `glotouch check` and `glotouch --help` start quickly.
+
+scipy loads its own subpackages on first use, so `import scipy` needs no help.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+_MODULES: list[str] = []
+_DOORS: list[tuple[str, str]] = []
+_SCIPY = ("interpolate", "linalg.lapack", "ndimage", "signal", "sparse.csgraph", "spatial", "special")
+
+
+def lazy_module(name: str) -> ModuleType:
+    """Return a module that is loaded on the first access to one of its attributes.
+
+    Raises:
+        ModuleNotFoundError: It is not installed.
+    """
+    _MODULES.append(name)
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.find_spec(name)
+    if spec is None or spec.loader is None:
+        raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+    spec.loader = importlib.util.LazyLoader(spec.loader)
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def lazy_door(package: str, **files: str) -> Callable[[str], Any]:
+    """Return a module `__getattr__` for the door of `package` that imports each name from its file on first access."""
+
+    _DOORS.extend((package, file) for file in sorted(set(files.values())))
+
+    def load(name: str) -> Any:
+        if name not in files:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        return getattr(importlib.import_module(f"{package}.{files[name]}"), name)
+
+    return load
+
+
+def load_all() -> None:
+    """Load every lazy module now. A run does so before it starts, so that no import delays a control period."""
+    for package, file in _DOORS:
+        importlib.import_module(f"{package}.{file}")
+    for name in _MODULES:
+        dir(sys.modules[name])  # any access to an attribute loads it
+    for name in _SCIPY:
+        importlib.import_module(f"scipy.{name}")
