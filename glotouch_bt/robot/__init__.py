@@ -1,4 +1,4 @@
-"""The interface between missions and robots. Imports nothing else of this project.
+"""The interface between missions and robots. Imports only `lazy` of this project.
 
 `Robot.cycle(command) -> observation` is the contract; see `interface`. Values are frozen and carry units and frames in
 their names; see `observation` for the frames.

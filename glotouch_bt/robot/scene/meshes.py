@@ -24,11 +24,17 @@ if TYPE_CHECKING:
 else:
     trimesh = lazy_module("trimesh")
 
-SMALLEST_M, LARGEST_M = 0.005, 0.30
+MIN_SIZE_M = 0.005
+"""Least size of an object along any axis of its file."""
+MAX_SIZE_M = 0.30
+"""Largest size of an object along any axis of its file."""
 MIN_VOLUME_M3 = 1e-7
+"""Least volume of an object; less means that its faces lie upon each other."""
 MERGE_DECIMALS = (8, 6, 5)
-"""Of a metre: corners this near are one. Files of 32 bit floats and exporters that scale miss by up to a
-micrometre."""
+"""Decimals of a metre to which corners are rounded to join them, in turn until the mesh is closed. Files of 32 bit floats
+and exporters that scale miss by up to a micrometre."""
+_UNITS_M = {"millimetres": 0.001, "centimetres": 0.01, "inches": 0.0254}
+"""Units in which files are exported by mistake, in metres."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +81,7 @@ def is_sound_stl(path: Path) -> bool:
         return False
     size = np.ptp(corners.reshape(-1, 3), axis=0)
     volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
-    if size.max() > LARGEST_M or size.min() < SMALLEST_M or abs(volume) < MIN_VOLUME_M3:
+    if size.max() > MAX_SIZE_M or size.min() < MIN_SIZE_M or abs(volume) < MIN_VOLUME_M3:
         return False
     vertices, inverse = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
     start = inverse.reshape(-1, 3)
@@ -131,14 +137,16 @@ def load_mesh(path: Path) -> Mesh:
 
 
 def _require_size(path: Path, mesh: trimesh.Trimesh) -> None:
-    largest = float(mesh.extents.max())
-    if largest > LARGEST_M:
+    thickness, largest = float(mesh.extents.min()), float(mesh.extents.max())
+    if largest > MAX_SIZE_M:
+        fitting = {u: f for u, f in _UNITS_M.items() if thickness * f >= MIN_SIZE_M and largest * f <= MAX_SIZE_M}
+        hint = "; ".join(f"in {u}? then scale it by {f:g} to {largest * f:.3g} m" for u, f in fitting.items())
         raise BadInput(
-            f"{path}: is {largest:.3g} m large; STL files must be in METRES and at most {LARGEST_M} m"
-            + (f" (in millimetres? then scale it by 0.001 to {largest * 1e-3:.3g} m)" if largest > 1.0 else "")
+            f"{path}: is {largest:.3g} m large; STL files must be in METRES and at most {MAX_SIZE_M} m"
+            + (f" ({hint})" if hint else "")
         )
-    if float(mesh.extents.min()) < SMALLEST_M:
-        raise BadInput(f"{path}: is only {float(mesh.extents.min()):.3g} m thick; at least {SMALLEST_M} m is needed")
+    if thickness < MIN_SIZE_M:
+        raise BadInput(f"{path}: is only {thickness:.3g} m thick; at least {MIN_SIZE_M} m is needed")
 
 
 def _close(path: Path, mesh: trimesh.Trimesh) -> None:

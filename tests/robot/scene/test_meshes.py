@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from glotouch_bt.robot import BadInput
-from glotouch_bt.robot.scene.meshes import load_folder, load_mesh
+from glotouch_bt.robot.scene.meshes import is_sound_stl, load_folder, load_mesh
 
 SIZE = np.array([0.06, 0.04, 0.05])
 
@@ -76,16 +76,41 @@ def test_a_hollow_and_overlapping_shells_are_one_object(tmp_path: Path) -> None:
     [
         (block().triangles[:-1], "not watertight"),
         (np.concatenate([block().triangles, block((0.08, 0.0, 0.025)).triangles]), "2 separate bodies"),
-        (1000 * block().triangles, "millimetres"),
+        (1000 * block().triangles, r"\(in millimetres\? then scale it by 0\.001 to 0\.06 m\)"),
+        (
+            block().triangles / 0.0254,
+            r"\(in centimetres\? .* to 0\.0236 m; in inches\? then scale it by 0\.0254 to 0\.06 m\)",
+        ),
+        (8 * block().triangles, r"at most 0\.3 m \(in inches\? then scale it by 0\.0254 to 0\.0122 m\)"),
+        (600 * block((0, 0, 0)).triangles * (1, 1, 1e-3), r"at most 0\.3 m$"),
         (0.05 * block().triangles, "thick"),
         (block().triangles[:3], "fewer than 4"),
         (np.where(np.arange(12)[:, None, None] == 3, np.nan, block().triangles), r"not (finite|watertight)"),
     ],
 )
 def test_what_cannot_be_used_is_named(triangles, words: str, tmp_path: Path) -> None:
+    path = write(tmp_path / "bad.stl", triangles)
     with pytest.raises(BadInput, match=words) as caught:
-        load_mesh(write(tmp_path / "bad.stl", triangles))
+        load_mesh(path)
     assert "bad.stl" in str(caught.value)
+    assert not is_sound_stl(path)
+
+
+@pytest.mark.parametrize("solid", [block(), block((0.3, -0.2, 7.0)), trimesh.creation.icosphere(3, 0.05)])
+def test_the_quick_check_accepts_a_closed_solid(solid: trimesh.Trimesh, tmp_path: Path) -> None:
+    path = write(tmp_path / "good.stl", solid.triangles)
+    assert is_sound_stl(path)
+    load_mesh(path)
+
+
+def test_the_quick_check_leaves_doubtful_solids_to_load_mesh(tmp_path: Path) -> None:
+    turned = block().triangles.copy()
+    turned[3] = turned[3][::-1]
+    overlapping = np.concatenate([block().triangles, block((0.03, 0.01, 0.03)).triangles])
+    for triangles in (turned, overlapping):
+        path = write(tmp_path / "doubtful.stl", triangles)
+        assert not is_sound_stl(path)
+        load_mesh(path)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,41 @@
+"""Start-up time: checking a mission loads no heavy module, and a run loads all of them before it starts."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+# flake
+HEAVY = (
+    "pinocchio",
+    "fcl",
+    "trimesh",
+    "scipy.signal",
+    "scipy.ndimage",
+    "scipy.spatial",
+    "mcap",
+    "mujoco",
+    "matplotlib",
+)
+LOADED = "[m for m in HEAVY if m in sys.modules and type(sys.modules[m]).__name__ != '_LazyModule']"
+
+
+def loaded_after(code: str) -> list[str]:
+    """Return the modules of HEAVY that are loaded after `code` has run in a process of its own."""
+    script = f"import sys\n{code}\nHEAVY = {HEAVY!r}\nprint(*{LOADED})"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    return done.stdout.split()
+
+
+def test_check_loads_no_heavy_module() -> None:
+    assert loaded_after("from glotouch_bt.mission import load_mission; load_mission('retrieve')") == []
+
+
+def test_the_command_line_loads_no_mission_code() -> None:
+    assert loaded_after("import glotouch_bt.cli; assert 'glotouch_bt.mission' not in sys.modules") == []
+
+
+def test_load_all_loads_what_missions_need() -> None:
+    code = "from glotouch_bt.mission import load_mission; load_mission('retrieve')\n"
+    loaded = loaded_after(code + "from glotouch_bt.lazy import load_all; load_all()")
+    assert set(loaded) == set(HEAVY) - {"mcap", "mujoco", "matplotlib"}
