@@ -31,7 +31,7 @@ MAX_SIZE_M = 0.30
 MIN_VOLUME_M3 = 1e-7
 """Least volume of an object; less means that its faces lie upon each other."""
 MERGE_DECIMALS = (8, 6, 5)
-"""Decimals of a metre to which corners are rounded to join them, in turn until the mesh is closed. Files of 32 bit floats
+"""Decimals of a metre to which corners are rounded, in turn until the mesh is closed. Files of 32 bit floats
 and exporters that scale miss by up to a micrometre."""
 _UNITS_M = {"millimetres": 0.001, "centimetres": 0.01, "inches": 0.0254}
 """Units in which files are exported by mistake, in metres."""
