@@ -39,7 +39,7 @@ def paths_of(root: NodeSpec, title: str) -> dict[str, NodeSpec]:
 
 def leaves_of(root: NodeSpec, title: str) -> dict[str, NodeSpec]:
     """The skills by their path."""
-    return {p: n for p, n in paths_of(root, title).items() if n.kind == "skill"}
+    return {p: n for p, n in paths_of(root, title).items() if n.skill_type is not None}
 
 
 def fitting(pattern: str, leaves: Mapping[str, NodeSpec]) -> dict[str, NodeSpec]:

@@ -6,15 +6,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from glotouch_bt.mission import Mission
+from glotouch_bt.mission.nodes import kind_of
 from glotouch_bt.mission.read import shown
 from glotouch_bt.mission.spec import NodeSpec
 from glotouch_bt.mission_testing.casting import paths_of
 from glotouch_bt.mission_testing.scripted import ScriptedRun
 
 SUCCESS, FAILURE, PREEMPTED = "SUCCESS", "FAILURE", "PREEMPTED"
-BREAKS_OFF = ("timeout", "parallel")
-"""Nodes that may break off what runs below them."""
-
 Plain = dict[str, dict[str, dict[str, list[str]]]]
 
 
@@ -110,7 +108,7 @@ def expected_endings(root: NodeSpec, title: str) -> Iterator[tuple[str, tuple[st
     """(path, endings) of every leaf."""
     paths = paths_of(root, title)
     for path, node in paths.items():
-        if node.kind != "skill" or node.skill_type is None:
+        if node.skill_type is None:
             continue
         codes = tuple(node.skill_type.FAILURES) or (FAILURE,)
         preempted = (PREEMPTED,) if _below(path, paths) else ()
@@ -118,4 +116,4 @@ def expected_endings(root: NodeSpec, title: str) -> Iterator[tuple[str, tuple[st
 
 
 def _below(path: str, paths: Mapping[str, NodeSpec]) -> bool:
-    return any(node.kind in BREAKS_OFF and path.startswith(above + "/") for above, node in paths.items())
+    return any(kind_of(node).preempts and path.startswith(above + "/") for above, node in paths.items())

@@ -205,7 +205,7 @@ def run_scripted(
         injector.conclude(outcome.status, "", "; ".join(outcome.reasons), outcome.end_s)
     if isinstance(outcome.error, ScriptError | KeyboardInterrupt):
         raise outcome.error
-    leaves = {p: n for p, n in paths.items() if n.kind == "skill"}
+    leaves = {p: n for p, n in paths.items() if n.skill_type is not None}
     return ScriptedRun(mission.name, leaves, heard, stage, outcome)
 
 

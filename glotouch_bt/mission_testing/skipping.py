@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from glotouch_bt.mission.nodes import kind_of
 from glotouch_bt.mission.spec import NodeSpec
 from glotouch_bt.robot import Command, FakeRobot, Observation
 from glotouch_bt.robot.supervision import SupervisionLimits
@@ -12,7 +13,7 @@ PATIENT = SupervisionLimits(late_periods=1e12, tolerated=10**9)
 
 def may_skip(root: NodeSpec) -> bool:
     """Only one leaf runs at a time, so that nothing but it and the timeouts above it can change while it waits."""
-    return all(node.kind != "parallel" for node in root.walk())
+    return not any(kind_of(node).concurrent for node in root.walk())
 
 
 class SkippingRobot(FakeRobot):

@@ -13,6 +13,7 @@ import yaml
 
 from glotouch_bt.mission import Mission, load_mission
 from glotouch_bt.mission.checkpoint import FILE, CheckpointFile, ResumePoint, Row
+from glotouch_bt.mission.nodes import kind_of
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import Recorder, read_chunks
 from glotouch_bt.mission.spec import NodeSpec
@@ -240,18 +241,10 @@ def _require_inputs(mission: Mission, path: str, state: Mapping[str, Any]) -> No
     have = {name.removeprefix("port ") for name in state if name.startswith("port ")}
     missing: list[str] = []
     inside = _paths(mission)[path]
-    for above, spec in _paths(mission).items():
-        if spec.kind == "for_each" and path.startswith(f"{above}/"):
-            have.add(spec.writes["item"].key)
-            if spec.reads["items"].key not in have:
-                missing.append(f"{spec.reads['items'].key!r} (of {spec.name!r})")
-    for spec in inside.walk():
-        for port, wire in spec.reads.items():
-            optional = spec.skill_type is None or not spec.skill_type.INPUT_PORTS[port].required
-            if wire.key not in have and not optional and port not in spec.constants:
-                missing.append(f"{wire.key!r} (read by {spec.name!r})")
-        if spec.kind == "for_each" and spec.reads["items"].key not in have:
-            missing.append(f"{spec.reads['items'].key!r} (of {spec.name!r})")
+    around = [spec for above, spec in _paths(mission).items() if path.startswith(f"{above}/")]
+    for spec in (*around, *inside.walk()):
+        needed = kind_of(spec).required_keys(spec)
+        missing += [f"{key!r} (read by {spec.name!r})" for key in needed if key not in have]
         have |= {wire.key for wire in spec.writes.values()}
     if missing:
         raise BadInput(f"--from {inside.name}: the checkpoint has no {', '.join(dict.fromkeys(missing))}")

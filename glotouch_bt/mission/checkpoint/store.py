@@ -22,7 +22,7 @@ from glotouch_bt.mission.checkpoint.codec import decode
 from glotouch_bt.robot import BadInput, GlotouchError
 
 FILE = "checkpoint.sqlite"
-FORMAT = 1
+FORMAT = 2
 _MARK = 0x474C4F54  # "GLOT", SQLite's application_id
 _TABLES = """
 CREATE TABLE run (key TEXT PRIMARY KEY, value TEXT NOT NULL);

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Literal
 
 from py_trees.behaviour import Behaviour
@@ -35,6 +35,9 @@ from glotouch_bt.mission.nodes.base import (
 )
 from glotouch_bt.mission.spec import Map, NodeSpec, Scalar, Settings
 
+Pairs = Mapping[str, tuple[str, str]]
+"""Source key and target key of each port that gathers."""
+
 
 class ForEachSettings(Settings):
     """Do the child for each item of a tuple."""
@@ -56,6 +59,8 @@ class ForEach(MissionDecorator):
     key of its tuple.
     """
 
+    kept = ("_items", "_order", "_next", "_succeeded", "_gathered")
+
     def __init__(
         self,
         name: str,
@@ -74,23 +79,6 @@ class ForEach(MissionDecorator):
         self._next = 0
         self._succeeded = 0
         self._gathered: dict[str, dict[int, Any]] = {}
-
-    @property
-    def progress(self) -> dict[str, Any]:
-        """Its items, their order, and what was gathered of them."""
-        return {
-            "items": self._items,
-            "order": list(self._order),
-            "next": self._next,
-            "succeeded": self._succeeded,
-            "gathered": {source: dict(row) for source, row in self._gathered.items()},
-        }
-
-    @progress.setter
-    def progress(self, kept: dict[str, Any]) -> None:
-        """Go on from there."""
-        self._items, self._order = kept["items"], kept["order"]
-        self._next, self._succeeded, self._gathered = kept["next"], kept["succeeded"], kept["gathered"]
 
     def enter(self) -> None:
         """Begin, or go on with the present item: write it."""
@@ -167,7 +155,7 @@ class ForEachKind(NodeKind):
     description = "do the child for every item of a tuple"
     Settings = ForEachSettings
     btcpp, sign = "ForEach", "∀"
-    revisits = branches_on_unset = True
+    revisits = branches_on_unset = needs_settings = True
 
     def wire(self, node: NodeSpec, given: Map, unit: str, reader: NodeReader) -> None:
         """Wire the items, the item, and for each gathered key the port `collect.KEY`: its source and its target."""
@@ -187,19 +175,11 @@ class ForEachKind(NodeKind):
                     reads[port], writes[port] = source, target
         node.reads, node.writes = reads, writes
 
-    def is_unknown(self, node: NodeSpec) -> bool:
-        """Without settings nobody knows over what it goes."""
-        return node.settings is None
-
     @staticmethod
     def _is_wired(node: NodeSpec) -> bool:
         return "items" in node.reads and "item" in node.writes
 
-    @staticmethod
-    def _goes_on(node: NodeSpec) -> bool:
-        return isinstance(node.settings, ForEachSettings) and node.settings.on_failure == "continue"
-
-    def gathers(self, node: NodeSpec) -> dict[str, tuple[str, str]]:
+    def gathers(self, node: NodeSpec) -> Pairs:
         """Return those of `collect`."""
         return {p: (node.reads[p].key, w.key) for p, w in node.writes.items() if p in node.reads}
 
@@ -211,19 +191,19 @@ class ForEachKind(NodeKind):
     def written_kinds(self, node: NodeSpec, port: str, held: Callable[[str], list[ValueKind]]) -> list[ValueKind]:
         """Return the kinds of the item, or of a tuple of what is gathered."""
         if port == "item" and "items" in node.reads:
-            return [_item_kind(k) for k in held(node.reads["items"].key)]
+            return [k.item for k in held(node.reads["items"].key)]
         if port in node.reads:
-            return [_gathered_kind([k]) for k in held(node.reads[port].key)]
+            return [ValueKind.tuple_of([k]) for k in held(node.reads[port].key)]
         return super().written_kinds(node, port, held)
 
     def derived_kinds(self, node: NodeSpec, held: Callable[[str], list[ValueKind]]) -> list[tuple[str, ValueKind]]:
         """Return those of the item and of the tuples it gathers."""
         if not self._is_wired(node):
             return []
-        found = [(node.writes["item"].key, _item_kind(k)) for k in held(node.reads["items"].key)]
+        found = [(node.writes["item"].key, k.item) for k in held(node.reads["items"].key)]
         for source, target in self.gathers(node).values():
-            found.append((target, _gathered_kind(held(source))))
-            found += [(target, _gathered_kind([k])) for k in held(source)]
+            found.append((target, ValueKind.tuple_of(held(source))))
+            found += [(target, ValueKind.tuple_of([k])) for k in held(source)]
         return found
 
     def effects(self, node: NodeSpec, variables: VariableTable) -> Iterator[tuple[int, set[int]]]:
@@ -235,10 +215,6 @@ class ForEachKind(NodeKind):
     def required_keys(self, node: NodeSpec) -> list[str]:
         """Return the key of the items."""
         return [node.reads["items"].key]
-
-    def prepared_keys(self, node: NodeSpec) -> list[str]:
-        """Return the key of the item."""
-        return [node.writes["item"].key]
 
     def exits(self, flow: DataFlowAnalysis, node: NodeSpec, entry: int) -> ExitStates:
         """Follow any number of items, until nothing new is found."""
@@ -268,7 +244,7 @@ class ForEachKind(NodeKind):
             after_none, after_some = (_one_item(flow, node, s, kinds, pairs) for s in (none, some))
             succeeded = sets.union(after_none.success, after_some.success)
             running = sets.union(running, after_none.running, after_some.running)
-            if self._goes_on(node):
+            if self.catches_failure(node):
                 ends_none, ends_some = after_none.failure, sets.union(succeeded, after_some.failure)
             else:
                 failure = sets.union(failure, after_none.failure, after_some.failure)
@@ -287,9 +263,8 @@ class ForEachKind(NodeKind):
             yield Position((), values, "goal")
             return
         variables, found = search.variables, search.may_hold(node, "items", values)
-        for source, target in self.gathers(node).values():
-            kind = _gathered_kind([variables.kind(source, v) for v in variables.written(source)[1:]])
-            values = search.assign(values, variables.keys[target], variables.value(target, kind))
+        for variable, value in _empty_tuples(variables, self.gathers(node)):
+            values = search.assign(values, variable, value)
         # A loop without items waits for a step like a leaf: otherwise a loop around it would never come to one.
         if UNSET in found:
             yield Position(search.push(stack, node, False), values)
@@ -306,7 +281,7 @@ class ForEachKind(NodeKind):
         for source, _ in self.gathers(node).values():
             values = search.assign(values, variables.keys[source], UNSET)
         item = node.writes["item"].key
-        kind = _item_kind(variables.kind(node.reads["items"].key, items_kind))
+        kind = variables.kind(node.reads["items"].key, items_kind).item
         values = search.assign(values, variables.keys[item], variables.value(item, kind))
         yield from search.enter(node.children[0], search.push(stack, node, (items_kind, won)), values)
 
@@ -314,7 +289,7 @@ class ForEachKind(NodeKind):
         self, search: PathSearch, node: NodeSpec, stack: Stack, succeeded: bool, values: Values, memory: Any
     ) -> Iterator[Position]:
         """Gather; then end, or enter the child with the next item."""
-        if memory is None or (not succeeded and not self._goes_on(node)):
+        if memory is None or (not succeeded and not self.catches_failure(node)):
             yield from search.leave(stack, succeeded, values)
             return
         items_kind, won = memory
@@ -334,7 +309,7 @@ class ForEachKind(NodeKind):
         for source, target in pairs:
             value = found[source]
             if value is not None:
-                kind = _gathered_kind([variables.kind(source, value)])
+                kind = ValueKind.tuple_of([variables.kind(source, value)])
                 values = search.assign(values, variables.keys[target], variables.value(target, kind))
         return values
 
@@ -364,7 +339,7 @@ class ForEachKind(NodeKind):
 
     def catches_failure(self, node: NodeSpec) -> bool:
         """True with `on_failure: continue`."""
-        return self._goes_on(node)
+        return isinstance(node.settings, ForEachSettings) and node.settings.on_failure == "continue"
 
     def build(self, node: NodeSpec, children: list[Behaviour], made: BuildContext) -> Behaviour:
         """Return the loop."""
@@ -385,55 +360,41 @@ class ForEachKind(NodeKind):
         return BtcppForm(self.btcpp, {**attributes, "on_failure": node.settings.on_failure}, custom=True)
 
 
-def _item_kind(items: ValueKind) -> ValueKind:
-    """Return the kind of the items of a tuple."""
-    return ValueKind(items.element)
-
-
-def _gathered_kind(kinds: Iterable[ValueKind]) -> ValueKind:
-    """Return the kind of a tuple of values of these kinds."""
-    types = {k.data_type for k in kinds}
-    return ValueKind(tuple, types.pop() if len(types) == 1 else object)
-
-
-def _cleared(flow: DataFlowAnalysis, entry: int, pairs: Mapping[str, tuple[str, str]]) -> int:
-    """Return the states with an empty tuple in each key that gathers."""
-    variables = flow.variables
+def _empty_tuples(variables: VariableTable, pairs: Pairs) -> Iterator[tuple[int, int]]:
+    """Yield (variable, value) of each key that gathers, when the loop begins."""
     for source, target in pairs.values():
-        kind = _gathered_kind([variables.kind(source, v) for v in variables.written(source)[1:]])
-        entry = flow.sets.assign(entry, variables.keys[target], variables.value(target, kind))
+        kind = ValueKind.tuple_of(variables.written_kinds(source)[1:])
+        yield variables.keys[target], variables.value(target, kind)
+
+
+def _cleared(flow: DataFlowAnalysis, entry: int, pairs: Pairs) -> int:
+    """Return the states with an empty tuple in each key that gathers."""
+    for variable, value in _empty_tuples(flow.variables, pairs):
+        entry = flow.sets.assign(entry, variable, value)
     return entry
 
 
-def _one_item(
-    flow: DataFlowAnalysis,
-    node: NodeSpec,
-    entry: int,
-    kinds: list[ValueKind],
-    pairs: Mapping[str, tuple[str, str]],
-) -> ExitStates:
+def _one_item(flow: DataFlowAnalysis, node: NodeSpec, entry: int, kinds: list[ValueKind], pairs: Pairs) -> ExitStates:
     """Return the states after one item of one of these kinds of items."""
     if entry == EMPTY:
         return ExitStates()
     sets, variables = flow.sets, flow.variables
+    keys = variables.keys
     for source, _ in pairs.values():
-        entry = sets.assign(entry, variables.keys[source], UNSET)
+        entry = sets.assign(entry, keys[source], UNSET)
     item = node.writes["item"].key
-    values = {variables.value(item, _item_kind(k)) for k in kinds}
-    after = flow.child(node, sets.union(*(sets.assign(entry, variables.keys[item], v) for v in values)))
+    values = {variables.value(item, k.item) for k in kinds}
+    after = flow.child(node, sets.union(*(sets.assign(entry, keys[item], v) for v in values)))
     whole, part = after.success, EMPTY
     for port, (source, _) in pairs.items():
         flow.look(node, port, after.success)
-        part = sets.union(part, flow.where(whole, variables.keys[source], (UNSET,)))
-        whole = flow.where(whole, variables.keys[source], variables.written(source))
+        part = sets.union(part, flow.where(whole, keys[source], (UNSET,)))
+        whole = flow.where(whole, keys[source], variables.written(source))
     for source, target in pairs.values():
-        gathered = [
-            sets.assign(
-                sets.where(whole, variables.keys[source], (value,)),
-                variables.keys[target],
-                variables.value(target, _gathered_kind([variables.kind(source, value)])),
-            )
-            for value in variables.written(source)
-        ]
-        whole = sets.union(*gathered)
+        gathered = EMPTY
+        for value in variables.written(source):
+            made = variables.value(target, ValueKind.tuple_of([variables.kind(source, value)]))
+            having = sets.where(whole, keys[source], (value,))
+            gathered = sets.union(gathered, sets.assign(having, keys[target], made))
+        whole = gathered
     return ExitStates(sets.union(whole, part), after.failure, after.running)

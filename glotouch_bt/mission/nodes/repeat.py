@@ -56,19 +56,11 @@ class RepeatSettings(Settings):
 class CountedLoop(MissionDecorator):
     """Counts passes of its child."""
 
+    kept = ("_passes",)
+
     def __init__(self, name: str, child: Behaviour, limit: int) -> None:
         super().__init__(name, child)
         self._limit, self._passes = limit, 0
-
-    @property
-    def progress(self) -> dict[str, Any]:
-        """Number of passes made."""
-        return {"passes": self._passes}
-
-    @progress.setter
-    def progress(self, kept: dict[str, Any]) -> None:
-        """Go on from there."""
-        self._passes = kept["passes"]
 
     def initialise(self) -> None:
         """Start counting passes."""
@@ -122,7 +114,7 @@ class RepeatKind(LoopKind):
     description = "do the child again and again"
     Settings = RepeatSettings
     btcpp, sign = "Repeat", "↻"
-    repeat_on = True
+    repeat_on = needs_settings = True
 
     def convert_units(self, given: Map, findings: Findings) -> tuple[Map, str]:
         """Convert the constant of `until`."""
@@ -147,10 +139,6 @@ class RepeatKind(LoopKind):
         path = ("until",) if isinstance(settings.until, str) else ("until", "port")
         if wire := wire_setting("until", given, reader, *path):
             node.reads = {"until": replace(wire, unit=unit)}
-
-    def is_unknown(self, node: NodeSpec) -> bool:
-        """Without settings nobody knows how often, or until when."""
-        return node.settings is None
 
     def comparison(self, node: NodeSpec) -> tuple[str, ConditionSettings] | None:
         """Return that of `until`."""

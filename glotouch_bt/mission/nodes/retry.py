@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from pydantic import Field
@@ -21,19 +19,11 @@ class RetrySettings(Settings):
 class Retry(MissionDecorator):
     """Run the child until it succeeds. FAILURE when all attempts have failed."""
 
+    kept = ("_failures",)
+
     def __init__(self, name: str, child: Behaviour, attempts: int) -> None:
         super().__init__(name, child)
         self._attempts, self._failures = attempts, 0
-
-    @property
-    def progress(self) -> dict[str, Any]:
-        """Number of failed attempts."""
-        return {"failures": self._failures}
-
-    @progress.setter
-    def progress(self, kept: dict[str, Any]) -> None:
-        """Go on from there."""
-        self._failures = kept["failures"]
 
     def initialise(self) -> None:
         """Start counting."""

@@ -85,7 +85,7 @@ def _in_py_trees(mistake: Mistake) -> tuple[str, str]:
     for finding in findings.sorted():
         if finding.code in IN_PYTHON and finding.code == mistake.code:
             return "NameError or TypeError", "build"
-    if mistake.code == "not_a_node" or any(n.kind == "unknown" or not _complete(n) for n in spec.walk()):
+    if mistake.code == "not_a_node" or any(n.is_unread or not _complete(n) for n in spec.walk()):
         return "cannot be written without our format", "build"
     _stub(spec)
     context = Context(None, None, None, None, SimpleNamespace(now_s=0.0))  # type: ignore[arg-type]
@@ -124,7 +124,7 @@ def _spec(text: str) -> tuple[NodeSpec, Findings]:
 
 def _complete(node: NodeSpec) -> bool:
     """It can be built: its settings are usable. (Faulty parameters of skills are replaced: a stub has none.)"""
-    return node.kind == "skill" or node.settings is not None
+    return node.skill_type is not None or node.settings is not None
 
 
 def _stub(spec: NodeSpec) -> None:

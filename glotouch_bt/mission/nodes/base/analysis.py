@@ -36,6 +36,17 @@ class ValueKind:
     unit: str = ""
     value: bool | int | float | str | None = None
 
+    @property
+    def item(self) -> ValueKind:
+        """The kind of a tuple's items."""
+        return ValueKind(self.element)
+
+    @staticmethod
+    def tuple_of(kinds: Iterable[ValueKind]) -> ValueKind:
+        """Return the kind of a tuple of values of these kinds."""
+        types = {k.data_type for k in kinds}
+        return ValueKind(tuple, types.pop() if len(types) == 1 else object)
+
 
 @dataclass(frozen=True, eq=False)
 class Requirement:
@@ -111,6 +122,9 @@ class VariableTable(Protocol):
 
     def written(self, key: str) -> range:
         """Return all values of a key's variable but UNSET."""
+
+    def written_kinds(self, key: str) -> list[ValueKind]:
+        """Return what these values stand for, ANYTHING first."""
 
     def state(self, resource: str, name: str) -> int:
         """Return the value of a resource's variable that stands for a state."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import py_trees
 from py_trees.behaviour import Behaviour
@@ -62,8 +62,11 @@ class MissionDecorator(Decorator):
     """A decorator that gives a reason when it fails and can be checkpointed.
 
     Attributes:
+        kept: Names of the attributes that a checkpoint keeps, beside its status.
         reason: Why it failed last, or None.
     """
+
+    kept: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, name: str, child: Behaviour) -> None:
         super().__init__(name, child)
@@ -71,12 +74,14 @@ class MissionDecorator(Decorator):
 
     @property
     def progress(self) -> dict[str, Any]:
-        """What it must keep in a checkpoint besides its status."""
-        return {}
+        """What a checkpoint keeps, by name."""
+        return {name.lstrip("_"): getattr(self, name) for name in self.kept}
 
     @progress.setter
-    def progress(self, kept: dict[str, Any]) -> None:
+    def progress(self, found: dict[str, Any]) -> None:
         """Go on from there."""
+        for name in self.kept:
+            setattr(self, name, found[name.lstrip("_")])
 
     def initialise(self) -> None:
         """Forget the last failure."""

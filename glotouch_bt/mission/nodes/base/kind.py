@@ -79,6 +79,7 @@ class NodeKind:
         interrupts: It may preempt its child at any moment, and then fails.
         revisits: It may enter a child again after having left it.
         continue_on: The result of a child after which the next one runs: True for success.
+        needs_settings: With faulty settings nothing can be said of what it does.
         branches_on_unset: It behaves differently when a key it reads is not written.
     """
 
@@ -93,7 +94,13 @@ class NodeKind:
     interrupts: ClassVar[bool] = False
     revisits: ClassVar[bool] = False
     continue_on: ClassVar[bool] = True
+    needs_settings: ClassVar[bool] = False
     branches_on_unset: ClassVar[bool] = False
+
+    @property
+    def preempts(self) -> bool:
+        """True if it may preempt what runs below it."""
+        return self.concurrent or self.interrupts
 
     def outcome(self, succeeded: bool) -> bool:
         """Return True if the node succeeds, given whether its child did."""
@@ -127,8 +134,7 @@ class NodeKind:
 
     def is_unknown(self, node: NodeSpec) -> bool:
         """True if the node is so faulty that nothing can be said of what it does."""
-        del node
-        return False
+        return self.needs_settings and node.settings is None
 
     # -- what it reads and writes ------------------------------------------------------------------------------------
 
@@ -156,7 +162,7 @@ class NodeKind:
         for wire in node.writes.values():
             yield variables.keys[wire.key], set(variables.written(wire.key))
 
-    def gathers(self, node: NodeSpec) -> dict[str, tuple[str, str]]:
+    def gathers(self, node: NodeSpec) -> Mapping[str, tuple[str, str]]:
         """Return (source key, target key) of each port that gathers the values of one key in a tuple."""
         del node
         return {}
@@ -168,11 +174,6 @@ class NodeKind:
 
     def required_keys(self, node: NodeSpec) -> list[str]:
         """Return the keys without which the node cannot begin."""
-        del node
-        return []
-
-    def prepared_keys(self, node: NodeSpec) -> list[str]:
-        """Return the keys that the node writes before its child begins."""
         del node
         return []
 
@@ -267,9 +268,7 @@ class _UnknownKind(NodeKind):
     """A node that could not be read; it stands in the tree so that the rest can be checked."""
 
     name, description, children = "unknown", "could not be read", "none"
-
-    def is_unknown(self, node: NodeSpec) -> bool:
-        return True
+    needs_settings = True
 
 
 NODES: dict[str, NodeKind] = {}
