@@ -1,12 +1,14 @@
-"""Skills described for people and programs: parameters with units and ranges, typed ports."""
+"""Describe skills and node kinds for people and programs: parameters with units and ranges, typed ports."""
 
 from __future__ import annotations
 
 import inspect
-from typing import Any
+from types import UnionType
+from typing import Any, Literal, Union, get_args, get_origin
 
-from pydantic_core import PydanticUndefined
+from pydantic import BaseModel
 
+from glotouch_bt.mission.nodes import NODES, ConditionSettings
 from glotouch_bt.mission.read import unit_of
 from glotouch_bt.skill import Skill
 
@@ -14,27 +16,12 @@ _LIMITS = (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
 
 
 def describe_skill(name: str, skill: type[Skill]) -> dict[str, Any]:
-    """A skill as JSON data: name, description, parameters, inputs, outputs, states of resources, failures."""
+    """Return a skill as JSON data: name, description, parameters, inputs, outputs, states of resources, failures."""
     keys = skill.default_keys()
-    parameters: list[dict[str, Any]] = []
-    for field_name, field in skill.Params.model_fields.items():
-        limits = [f"{sign} {getattr(m, word):g}" for m in field.metadata for word, sign in _LIMITS if hasattr(m, word)]
-        required = field.default is PydanticUndefined
-        parameters.append(
-            {
-                "name": field_name,
-                "type": getattr(field.annotation, "__name__", str(field.annotation)),
-                "unit": unit_of(field),
-                "required": required,
-                "default": None if required else field.default,
-                "range": ", ".join(limits),
-                "description": field.description or "",
-            }
-        )
     return {
         "name": name,
         "description": inspect.cleandoc(skill.__doc__ or ""),
-        "parameters": parameters,
+        "parameters": _fields(skill.Params),
         "inputs": [{**_port(p, info, keys), "required": bool(info.required)} for p, info in skill.INPUT_PORTS.items()],
         "outputs": [_port(p, info, keys) for p, info in skill.OUTPUT_PORTS.items()],
         "needs": {r: sorted(s) for r, s in skill.PRECONDITIONS.items()},
@@ -44,6 +31,53 @@ def describe_skill(name: str, skill: type[Skill]) -> dict[str, Any]:
         "failures": skill.failure_codes(),
         "pause": skill.PAUSE,
     }
+
+
+def describe_nodes() -> list[dict[str, Any]]:
+    """Return every node kind as JSON data: name, description, children (none, one, many), BT.CPP name, settings."""
+    return [
+        {
+            "name": kind.name,
+            "description": kind.description,
+            "children": kind.children,
+            "btcpp": kind.btcpp,
+            "settings": _fields(kind.Settings),
+        }
+        for kind in NODES.values()
+    ]
+
+
+def _fields(model: type[BaseModel]) -> list[dict[str, Any]]:
+    """Return the fields of a model: name, type, unit, required, default, range, description."""
+    found: list[dict[str, Any]] = []
+    for name, field in model.model_fields.items():
+        limits = [f"{sign} {getattr(m, word):g}" for m in field.metadata for word, sign in _LIMITS if hasattr(m, word)]
+        found.append(
+            {
+                "name": name,
+                "type": _type_in_words(field.annotation),
+                "unit": unit_of(field),
+                "required": field.is_required(),
+                "default": None if field.is_required() else field.get_default(call_default_factory=True),
+                "range": ", ".join(limits),
+                "description": field.description or "",
+            }
+        )
+    return found
+
+
+def _type_in_words(annotation: Any) -> str:
+    """Return a type as a mission's author writes it: `int`, `'all' or 'one'`, `mapping`."""
+    options = get_args(annotation)
+    if get_origin(annotation) is Literal:
+        return " or ".join(repr(o) for o in options)
+    if get_origin(annotation) is dict:
+        return "mapping"
+    if options and get_origin(annotation) in (Union, UnionType):
+        return " or ".join(_type_in_words(o) for o in options if o is not type(None))
+    if isinstance(annotation, type) and issubclass(annotation, ConditionSettings):
+        return "condition"
+    return getattr(annotation, "__name__", str(annotation))
 
 
 def _port(name: str, info: Any, keys: dict[str, str]) -> dict[str, Any]:
