@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 export MPLBACKEND := Agg
 
-.PHONY: demo test check format pins clean
+.PHONY: demo test check format docs reference results-page pins clean
 
 demo: $(VENV)
 	$(BIN)/glotouch run retrieve --set target=apple --seed 0
@@ -34,6 +34,18 @@ $(VENV)/.dev: $(VENV) requirements-dev.txt
 format:
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+
+# The documentation as a site in build/site; a broken link is an error. Open build/site/index.html, no server needed.
+docs: $(VENV)/.dev
+	$(BIN)/python docs/generate --check
+	DISABLE_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --strict --quiet
+
+# The pages of docs/reference and the generated sections, from the code; docs/results.md, from docs/results/*/summary.json.
+reference: $(VENV)/.dev
+	$(BIN)/python docs/generate reference architecture
+
+results-page: $(VENV)/.dev
+	$(BIN)/python docs/generate results
 
 # Renew the pinned, hashed requirements (no registry address is written).
 PIP_COMPILE = $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras --no-emit-options --no-header

@@ -1,4 +1,4 @@
-"""docs/compose.md, run as written: its files into an empty folder, its commands in order, their output compared."""
+"""Run docs/tutorial.md as written: write its files into an empty folder, run its commands in order, compare their output."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-BLOCK = re.compile(r"^```(?P<language>\w+)(?: file=(?P<file>\S+))?\n(?P<body>.*?)^```$", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r'^```(?P<language>\w+)(?: title="(?P<file>[^"]+)")?\n(?P<body>.*?)^```$', re.MULTILINE | re.DOTALL)
 COMMANDS = {"pip": "pip", "pytest": "pytest", "glotouch": "glotouch_bt.cli"}
 MAX_DURATION_S = 120.0
 
@@ -65,7 +65,7 @@ def test_the_page_is_true(tmp_path: Path) -> None:
     environment = own_environment(tmp_path / "venv")
     reader = tmp_path / "bell"
     reader.mkdir()
-    for step in steps((ROOT / "docs/compose.md").read_text()):
+    for step in steps((ROOT / "docs/tutorial.md").read_text()):
         if step.file:
             (reader / step.file).parent.mkdir(parents=True, exist_ok=True)
             (reader / step.file).write_text(step.body)
@@ -102,7 +102,7 @@ def test_what_counts_as_the_same_output(expected: str, found: str, same: bool) -
 
 
 def test_the_page_has_files_and_commands() -> None:
-    found = steps((ROOT / "docs/compose.md").read_text())
+    found = steps((ROOT / "docs/tutorial.md").read_text())
     assert sum(bool(s.file) for s in found) >= 6
     assert sum(not s.file for s in found) >= 9
     assert sys.version_info >= (3, 11)

@@ -1,0 +1,127 @@
+"""Pages on the program itself: the command line and the Python API."""
+
+from __future__ import annotations
+
+import inspect
+import typing
+from enum import Enum
+from typing import Any
+
+import typer
+from markdown_text import NOTE, cell, code, prose, table
+
+import glotouch_bt
+from glotouch_bt.cli import app
+
+CLI = """# Command line
+
+Exit codes: 0 done, 1 the mission failed (with reasons) or a check found mistakes in a mission, 2 bad input, 3 a safety stop or a backend
+failure, 130 Ctrl-C. Results go to stdout, progress and messages to stderr. `--debug` shows the traceback of an error.
+"""
+API = """# Python API
+
+These names are public: `import glotouch_bt as gt`. Everything else may change without notice. Writers of skills, backends and mission
+tests also import from the doors of `glotouch_bt.skill`, `glotouch_bt.robot`, `glotouch_bt.conformance` and `glotouch_bt.mission_testing`.
+"""
+
+
+def pages() -> dict[str, str]:
+    """Return both pages by their path below docs/."""
+    return {"reference/cli.md": NOTE + cli().rstrip() + "\n", "reference/api.md": NOTE + api().rstrip() + "\n"}
+
+
+def cli() -> str:
+    """Return the page on the commands, from the program's own help."""
+    root: Any = typer.main.get_command(app)
+    found = list(_commands(root, "glotouch"))
+    rows = [(f"[`{name}`](#{_anchor(name)})", (c.help or "").split("\n")[0]) for name, c in found]
+    text = [CLI, table(("command", "what it does"), rows)]
+    for name, command in found:
+        arguments = [p for p in command.params if p.param_type_name == "argument"]
+        usage = " ".join([name, *(_argument(p) for p in arguments), "[OPTIONS]"])
+        text.append(f"## {name}\n\n    {usage}\n\n{prose(command.help or '')}\n")
+        options = [
+            (code(_option(p)), _shown_default(p), getattr(p, "help", "") or "")
+            for p in command.params
+            if p.name != "help" and not getattr(p, "hidden", False)
+        ]
+        text.append(table(("argument, option", "default", "meaning"), options))
+    return "\n".join(t for t in text if t)
+
+
+def _commands(group: Any, above: str) -> typing.Iterator[tuple[str, Any]]:
+    for name, command in group.commands.items():
+        if getattr(command, "hidden", False):
+            continue
+        full = f"{above} {name}"
+        if hasattr(command, "commands"):
+            yield from _commands(command, full)
+        else:
+            yield full, command
+
+
+def _anchor(name: str) -> str:
+    return name.replace(" ", "-")
+
+
+def _argument(p: Any) -> str:
+    name = p.metavar or p.name.upper()
+    return f"{name}{'...' if p.nargs == -1 else ''}" if p.required else f"[{name}{'...' if p.nargs == -1 else ''}]"
+
+
+def _option(p: Any) -> str:
+    if p.param_type_name == "argument":
+        return _argument(p)
+    kind = "" if p.is_flag else p.metavar or _kind(p.type_descriptor.annotation)
+    return " ".join(w for w in ("/".join([*p.opts, *p.secondary_opts]), kind) if w)
+
+
+def _kind(annotation: Any) -> str:
+    """Return what an option takes: the choices of an enumeration, or the type in capitals."""
+    inner = (typing.get_args(annotation) or (annotation,))[0]
+    if inspect.isclass(inner) and issubclass(inner, Enum):
+        return "|".join(str(m.value) for m in inner)
+    return str(getattr(inner, "__name__", inner)).upper()
+
+
+def _shown_default(p: Any) -> str:
+    value = getattr(p.default, "value", p.default)
+    if callable(value) or value in (None, False, (), []) or "Sentinel" in type(value).__name__:
+        return ""
+    return code(value)
+
+
+def api() -> str:
+    """Return the page on the names of `glotouch_bt.__all__`."""
+    text = [API]
+    for name in sorted(getattr(glotouch_bt, "__all__", ()), key=str.lower):
+        found = getattr(glotouch_bt, name)
+        if inspect.isclass(found):
+            text.append(f"## {name}\n\n    {_signature('class ' + name, found)}\n\n{prose(found.__doc__ or '')}\n")
+            rows = [(code(m + _call(f)), prose(f.__doc__ or "").split("\n\n")[0]) for m, f in _members(found)]
+            text.append(table(("member", "what it does"), rows))
+        elif callable(found):
+            text.append(f"## {name}\n\n    {_signature(name, found)}\n\n{prose(found.__doc__ or '')}\n")
+        elif inspect.ismodule(found) or not isinstance(found, str):
+            text.append(f"## {name}\n\n{cell(prose(getattr(found, '__doc__', '') or ''))}\n")
+    return "\n".join(t for t in text if t)
+
+
+def _signature(name: str, found: Any) -> str:
+    try:
+        shown = str(inspect.signature(found))
+    except (TypeError, ValueError):
+        shown = ""
+    for prefix in ("glotouch_bt.", "collections.abc.", "pathlib.", "numpy.typing."):
+        shown = shown.replace(prefix, "")
+    return f"{name}{shown}".replace("'", "")
+
+
+def _members(kind: type) -> list[tuple[str, Any]]:
+    """Public methods and properties that have a text of their own."""
+    own = [(n, m) for n, m in vars(kind).items() if not n.startswith("_")]
+    return [(n, m) for n, m in own if (callable(m) or isinstance(m, property | classmethod)) and m.__doc__]
+
+
+def _call(member: Any) -> str:
+    return "" if isinstance(member, property) else "()"

@@ -1,0 +1,312 @@
+"""Pages on what a mission may say: language, nodes, skills, worlds, conditions, faults, findings, record."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+from markdown_text import NOTE, code, codes, fields, prose, table
+from mcap.reader import make_reader
+
+from glotouch_bt.faults import CATALOGUE
+from glotouch_bt.mission.export import describe_skill, mission_schema
+from glotouch_bt.mission.read import Declaration, SkillShelf, WorldFile, shipped
+from glotouch_bt.mission.record import Recorder
+from glotouch_bt.mission.record.mcap_schemas import CHANNELS as CHANNELS_OF_RECORD
+from glotouch_bt.mission.spec import KINDS, UNITS
+from glotouch_bt.robot import HOLD, FakeRobot
+
+MISSION = """# Mission files
+
+A mission is one YAML file. `glotouch check FILE` reports every mistake in it with file, line and column; nothing moves.
+`glotouch schema` prints a JSON Schema of this page for editors.
+
+```yaml
+mission: ring
+world: container_five
+parameters:
+  x: {type: float, unit: mm, default: -48, range: [-120, 120]}
+tree:
+  sequence:
+    - retry: {attempts: 2, do: {press: {x_m: $x, force_N: 5 N}}}
+    - condition: {port: height_m, at_least: 20 mm}
+```
+"""
+TREE = """## Trees
+
+A node is a name (`tool_return`), or a name with settings (`retry: {attempts: 3, do: ...}`). Names are those of
+[nodes](nodes.md) and of installed [skills](skills.md). A YAML list is a sequence. Every node takes `name:`, the name that
+messages, records and fault plans use. A second node of the same name is called `squeeze 2`.
+
+A skill reads and writes **ports**. A port is wired to a **key** of its own name; `in: {port: key}` and `out: {port: key}` wire
+it to another key. An input port also takes a value: `in: {grip_m: 40 mm}`. `$name` stands for a mission parameter.
+"""
+SUBTREES = """## Subtrees
+
+`subtree: {file: subtrees/explore.yaml, parameters: {...}, ports: {its_key: our_key}}` inserts the tree of another file. The
+path is relative to the mission; shipped files are found as well. All keys that `ports` does not name are private. A mission may
+also hold its subtrees itself, in `subtrees: {NAME: {parameters: ..., tree: ...}}`, used as `file: NAME`. The `mission.yaml` of a run
+folder is written this way, so it needs no other file.
+"""
+UNITS_TEXT = """## Units
+
+A number without a unit is in SI units; a number with a unit is converted: `speed_m_s: 40 mm/s`. The suffix of a name gives its
+unit: `grip_m`, `force_N`, `speed_m_s`. A number of another quantity is refused (`wrong_unit`).
+"""
+RECORD = """# The record of a run: run.mcap
+
+Every run writes one [MCAP](https://mcap.dev) file. It carries Foxglove's schemas and has been read back with independent MCAP and protobuf
+readers, but not yet opened in Foxglove itself. All times are the robot's clock in nanoseconds; log time equals publish time. The file holds
+no wall-clock time, so the same inputs give the same bytes. Chunks are compressed with zstd and end every 50 control cycles (0.5 s). The
+record of a killed process can be read up to its last chunk.
+
+Frames: B arm base, K container, P mid-point of the pads, S wrist sensor. Numbers that are not finite are `null` in JSON. Arrays in events
+are nested lists, rounded to 1e-9 (large ones to 1e-6); dataclasses are objects of their fields.
+
+Attachments: `run.json` (mission, seed, conditions, container; also the metadata record `run`) and `result.json` without its wall times.
+
+`glotouch report RUN` draws a record. In Python, `glotouch_bt.report.read_run(folder)` returns its arrays and events.
+"""
+TOPIC_NOTES = {
+    "/wrench": "50 Hz; newest sample, force in N and torque in Nm, in S",
+    "/pose": "50 Hz; P in B",
+    "/tf": "25 Hz; P in B, and K in B once",
+    "/joints": "25 Hz; rad and rad/s",
+    "/gripper": "50 Hz; as last reported",
+    "/tactile/left": "at most 10 Hz; depth map, 32FC1, metres, row 0 nearest the wrist",
+    "/tactile/right": "as left",
+    "/tree/ticks": "on change; `node` is the path in the tree",
+    "/tree/ports": "on write; arrays of more than 64 numbers as {shape, min, max}",
+    "/scene": "on change; walls, contacts and outlines, in K",
+    "/packed/samples": "every force sample (1 kHz)",
+    "/packed/cycles": "every control cycle; the first row precedes the first command",
+    "/packed/tactile": "every pair of depth maps",
+}
+PACKED = """## Full-rate data: /packed/*
+
+Schema `glotouch.Packed` (protobuf):
+
+    message Packed {
+      int64 start_ns = 1;    // robot clock of the first row
+      uint32 rows = 2;
+      string layout = 3;     // "name:shape:step:order name:shape:step:order ..."
+      bytes data = 4;
+    }
+
+`data` holds the columns one after the other. A column of shape `1`, `7` or `35x20` has w numbers in a row and takes
+4 * rows * w bytes: for each of the w numbers, four byte planes of `rows` bytes, least significant plane first. To unpack a column, join
+the planes to little-endian int32, sum cumulatively along the rows `order` times (modulo 2^32) and multiply by `step`. The int32 value
+-2^31 is NaN. `glotouch_bt.mission.record.mcap_packing.unpack` does this. Stamps are relative to `start_ns`.
+
+A command column is NaN in a cycle that gave no such command. The steps are far below the noise of the sensors. The runner rounds each
+observation to them before any skill sees it; this is why a replay repeats a run to the bit.
+"""
+EVENTS = """## Events: /events/KIND
+
+Each event has `kind` and `data`. Skills write what they found (`contact`, `candidate`, `touchset`, `ranking`, `plan`, `grasp`, `lift`, ...).
+The executive writes `failure` (a skill failed; also one that the tree recovers from), `guard` (supervision), `fault` (injected),
+`pause`, `paused`, `resumed`, `ending`, `stuck`.
+"""
+
+
+def pages() -> dict[str, str]:
+    """Return every page of this module by its path below docs/."""
+    made = {
+        "missions": missions,
+        "nodes": nodes,
+        "skills": skills,
+        "worlds": worlds,
+        "conditions": conditions,
+        "faults": faults,
+        "findings": findings,
+        "record": record,
+    }
+    return {f"reference/{name}.md": NOTE + make().rstrip() + "\n" for name, make in made.items()}
+
+
+def _own_skills() -> list[dict[str, Any]]:
+    """Descriptions of the skills that ship with the project."""
+    shelf = SkillShelf()
+    return [describe_skill(n, shelf[n]) for n in sorted(shelf) if shelf[n].__module__.startswith("glotouch_skills.")]
+
+
+def missions() -> str:
+    """Return the page on mission files."""
+    schema = mission_schema(SkillShelf())
+    meaning = {
+        "mission": "name: letters, digits, `_` and `-`",
+        "description": "one sentence for people",
+        "world": "a [world](worlds.md): a path, a shipped name, or the world itself",
+        "parameters": "values that `--set NAME=VALUE` may change, used as `$NAME`",
+        "timeout_s": "longest duration of the mission on the robot's clock",
+        "leaves": "states that a successful run must end in, for example `{hand: object}`",
+        "subtrees": "subtrees held in the mission itself",
+        "tree": "the tree",
+    }
+    keys = [(code(k), "yes" if k in schema["required"] else "", meaning[k]) for k in schema["properties"]]
+    by_si: dict[str, list[str]] = {}
+    for unit, (si, _) in UNITS.items():
+        by_si.setdefault(si, []).append(unit)
+    ships = []
+    for name in shipped(""):
+        loaded = yaml.safe_load(shipped("")[name].read_text())
+        given = codes(loaded.get("parameters") or {})
+        ships.append((code(name), loaded.get("description", ""), given))
+    return "\n".join(
+        (
+            MISSION,
+            table(("key", "required", "meaning"), keys),
+            "## Parameters\n",
+            "`glotouch run FILE --set x=30` overrides a default. A parameter that no node uses is reported.\n",
+            fields(Declaration),
+            TREE,
+            SUBTREES,
+            UNITS_TEXT,
+            table(("SI unit", "accepted"), ((code(si) or "(ratio)", codes(units)) for si, units in by_si.items())),
+            "## Shipped missions\n",
+            table(("mission", "goal", "parameters"), ships),
+        )
+    )
+
+
+def nodes() -> str:
+    """Return the page on node kinds."""
+    text = ["# Nodes\n", "A mission's tree is built from these nodes and from [skills](skills.md).\n"]
+    children = {"none": "none", "one": "one, `do:`", "many": "a list"}
+    rows = [(f"[`{n}`](#{n})", k.description, children[k.children], k.btcpp) for n, k in KINDS.items()]
+    text.append(table(("node", "result", "children", "BehaviorTree.CPP"), rows))
+    for name, kind in KINDS.items():
+        text.append(f"## {name}\n\n{kind.description[0].upper()}{kind.description[1:]}.\n")
+        text.append(fields(kind.settings) or "No settings.\n")
+    return "\n".join(text)
+
+
+def skills() -> str:
+    """Return the page on the shipped skills."""
+    found = _own_skills()
+    first = [(f"[`{s['name']}`](#{s['name']})", prose(s["description"]).split("\n\n")[0].split("\n")[0]) for s in found]
+    intro = "Skills of the package `glotouch_skills`. `glotouch skills` also lists those of other installed packages.\n"
+    text = ["# Skills\n", intro, table(("skill", "what it does"), first)]
+    for s in found:
+        text.append(f"## {s['name']}\n\n{prose(s['description'])}\n")
+        rows = [
+            (code(p["name"]), p["type"], p["unit"], _default(p), p["range"], p["description"]) for p in s["parameters"]
+        ]
+        text.append(table(("parameter", "type", "unit", "default", "valid", "meaning"), rows))
+        ports = [
+            (code(p["name"]), way, p["type"], "yes" if p.get("required") else "", p["description"])
+            for way, many in (("in", s["inputs"]), ("out", s["outputs"]))
+            for p in many
+        ]
+        text.append(table(("port", "direction", "type", "required", "meaning"), ports))
+        hand = [(code(r), "before", codes(states)) for r, states in s["needs"].items()]
+        hand += [(code(r), "after success", code(state)) for r, state in s["leaves"].items()]
+        hand += [(code(r), "after failure", codes(states)) for r, states in s["after_failure"].items()]
+        text.append(table(("resource", "when", "state"), hand))
+        text.append(_failures(s["failures"]))
+        uses = f" Uses {codes(s['uses'])} alone." if s["uses"] else ""
+        text.append(f"On a pause: `{s['pause']}`.{uses}\n")
+    return "\n".join(t for t in text if t)
+
+
+def _failures(found: Any) -> str:
+    """Return the failures of a skill: a mapping of codes to meanings, or rows with an advice."""
+    if isinstance(found, dict):
+        return table(("failure", "meaning"), ((code(c), m) for c, m in found.items()))
+    return table(("failure", "meaning", "advice"), ((code(f["code"]), f["meaning"], f.get("advice")) for f in found))
+
+
+def _default(p: dict[str, Any]) -> str:
+    if p["required"]:
+        return "required"
+    return code(f"{p['default']:g}" if isinstance(p["default"], float) else p["default"])
+
+
+def worlds() -> str:
+    """Return the page on worlds."""
+    text = [
+        "# Worlds\n",
+        "A world is what the robot is told: the container, the probe, its holder and a folder of STL files. The true world of a "
+        "simulation is drawn from the seed and the [conditions](conditions.md) around it. Positions are in B, the arm's base frame; "
+        "K is the centre of the container's floor.\n",
+        "```yaml\n" + shipped("worlds")["container_five"].read_text().rstrip() + "\n```\n",
+        fields(WorldFile),
+    ]
+    for name, field in WorldFile.model_fields.items():
+        kind = field.annotation
+        if hasattr(kind, "model_fields"):
+            text.append(f"## {name}\n\n{prose(kind.__doc__ or '')}\n\n{fields(kind)}")
+    rows = [(code(n), yaml.safe_load(p.read_text()).get("description", "")) for n, p in shipped("worlds").items()]
+    return "\n".join([*text, "## Shipped worlds\n", table(("world", "description"), rows)])
+
+
+def conditions() -> str:
+    """Return the page on conditions: every field of the shipped profiles side by side."""
+    files = shipped("conditions")
+    notes = dict(re.findall(r"^(\w+): .*?#\s*(.*)$", files["nominal"].read_text(), re.MULTILINE))
+    read = {n: yaml.safe_load(p.read_text()) for n, p in files.items()}
+    names = [n for n in ("ideal", "nominal", "harsh") if n in read]
+    keys = [k for k in read["nominal"] if k != "name"]
+    rows = [(code(k), notes.get(k, ""), *(read[n].get(k, "") for n in names)) for k in keys]
+    text = (
+        "# Conditions\n\nConditions are the disturbances a simulated run is made under. `run --conditions NAME` takes a shipped profile or "
+        "a YAML file with these keys. `sd` is one standard deviation; `[low, high]` is a uniform range. Values are drawn per run from "
+        "the seed. Skills are never told them. A field that a profile leaves out is zero, or the default of "
+        "`glotouch_bt.robot.Conditions`.\n\n"
+    )
+    return text + table(("field", "unit, meaning", *names), rows)
+
+
+def faults() -> str:
+    """Return the page on faults."""
+    text = [
+        "# Faults\n",
+        "`glotouch run MISSION --faults FILE` injects these faults; [Inject a fault](../guides/faults.md) shows how to write the file. "
+        "*Recoverable*: a mission can still reach its goal. Faults of the world need a simulation.\n",
+    ]
+    for channel in dict.fromkeys(k.channel for k in CATALOGUE.values()):
+        kinds = [k for k in CATALOGUE.values() if k.channel == channel]
+        rows = [(f"[`{k.name}`](#{k.name})", k.summary, k.seen_by, "yes" if k.recoverable else "no") for k in kinds]
+        text.append(f"## {channel}\n\n" + table(("fault", "effect", "should be noticed by", "recoverable"), rows))
+        for k in kinds:
+            rows = [
+                (code(p["name"]), p["unit"], code(p["default"]), p["valid"], p["description"]) for p in k.parameters()
+            ]
+            given = table(("parameter", "unit", "default", "valid", "meaning"), rows) or "No parameters.\n"
+            text.append(f"### {k.name}\n\n{given}")
+    return "\n".join(text)
+
+
+def findings() -> str:
+    """Return the page on the findings of `glotouch check`."""
+    from glotouch_bt.mission.spec.explanations import WARNINGS, WHY
+
+    rows = [(code(c), "warning" if c in WARNINGS else "error", why) for c, why in sorted(WHY.items())]
+    return "# Findings of `glotouch check`\n\n" + table(("code", "severity", "why it matters"), rows)
+
+
+def record() -> str:
+    """Return the page on the record; topics and columns are read from a record that is written here."""
+    robot, command = FakeRobot(), replace(HOLD, tactile=True)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "run.mcap"
+        recorder = Recorder(path, {"mission": "none"})
+        for _ in range(50):
+            recorder.block(robot.cycle(command), command)
+        recorder.close()
+        layouts = {}
+        with path.open("rb") as f:
+            for _, channel, message in make_reader(f).iter_messages():
+                if found := re.search(rb"stamp_s:1:[\w.: -]*", message.data):
+                    layouts[channel.topic] = found[0].decode().split()
+    topics = [(code(t), s, TOPIC_NOTES[t]) for t, s in CHANNELS_OF_RECORD.items()]
+    topics.append((code("/events/KIND"), "glotouch.Event", "on event; see below"))
+    text = [RECORD, "## Topics\n", table(("topic", "schema", "rate, content"), topics), EVENTS, PACKED]
+    for topic, columns in layouts.items():
+        rows = [(code(n), shape, step, order) for n, shape, step, order in (c.split(":") for c in columns)]
+        text.append(f"### {topic}\n\n" + table(("column", "shape", "step", "order"), rows))
+    return "\n".join(text)
