@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 export MPLBACKEND := Agg
 
-.PHONY: demo test check format docs reference results-page pins clean
+.PHONY: demo dev test check format docs reference results-page pins clean
 
 demo: $(VENV)
 	$(BIN)/glotouch run retrieve --set target=apple --seed 0
@@ -31,6 +31,9 @@ $(VENV)/.dev: $(VENV) requirements-dev.txt
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.txt
 	touch $(VENV)/.dev
 
+# Everything that development needs, pytest included.
+dev: $(VENV)/.dev
+
 format:
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
@@ -38,7 +41,7 @@ format:
 # The documentation as a site in build/site; a broken link is an error. Open build/site/index.html, no server needed.
 docs: $(VENV)/.dev
 	$(BIN)/python docs/generate --check
-	DISABLE_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 # The pages of docs/reference and the generated sections, from the code; docs/results.md, from docs/results/*/summary.json.
 reference: $(VENV)/.dev

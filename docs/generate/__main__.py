@@ -36,7 +36,9 @@ def main(words: list[str]) -> int:
                 continue
             stale += 1
             if check:
-                changes = difflib.unified_diff(old.splitlines(), text.splitlines(), f"docs/{name}", "generated", lineterm="", n=1)
+                changes = difflib.unified_diff(
+                    old.splitlines(), text.splitlines(), f"docs/{name}", "generated", lineterm="", n=1
+                )
                 sys.stdout.write("\n".join(list(changes)[:40]) + "\n")
             else:
                 path.parent.mkdir(parents=True, exist_ok=True)

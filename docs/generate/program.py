@@ -15,13 +15,15 @@ from glotouch_bt.cli import app
 
 CLI = """# Command line
 
-Exit codes: 0 done, 1 the mission failed (with reasons) or a check found mistakes in a mission, 2 bad input, 3 a safety stop or a backend
-failure, 130 Ctrl-C. Results go to stdout, progress and messages to stderr. `--debug` shows the traceback of an error.
+Exit codes: 0 done, 1 the mission failed (with reasons) or a check found mistakes in a mission, 2 bad input, 3 a
+safety stop or a backend failure, 130 Ctrl-C. Results go to stdout, progress and messages to stderr. `--debug` shows
+the traceback of an error.
 """
 API = """# Python API
 
-These names are public: `import glotouch_bt as gt`. Everything else may change without notice. Writers of skills, backends and mission
-tests also import from the doors of `glotouch_bt.skill`, `glotouch_bt.robot`, `glotouch_bt.conformance` and `glotouch_bt.mission_testing`.
+These names are public: `import glotouch_bt as gt`. Everything else may change without notice. Writers of skills,
+backends and mission tests also import from the doors of `glotouch_bt.skill`, `glotouch_bt.robot`,
+`glotouch_bt.conformance` and `glotouch_bt.mission_testing`.
 """
 
 

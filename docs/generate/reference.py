@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 import tempfile
 from dataclasses import replace
@@ -11,6 +12,7 @@ from typing import Any
 import yaml
 from markdown_text import NOTE, code, codes, fields, prose, table
 from mcap.reader import make_reader
+from pydantic import BaseModel
 
 from glotouch_bt.faults import CATALOGUE
 from glotouch_bt.mission.export import describe_skill, mission_schema
@@ -22,8 +24,8 @@ from glotouch_bt.robot import HOLD, FakeRobot
 
 MISSION = """# Mission files
 
-A mission is one YAML file. `glotouch check FILE` reports every mistake in it with file, line and column; nothing moves.
-`glotouch schema` prints a JSON Schema of this page for editors.
+A mission is one YAML file. `glotouch check FILE` reports every mistake in it with file, line and column; nothing
+moves. `glotouch schema` prints a JSON Schema of this page for editors.
 
 ```yaml
 mission: ring
@@ -39,37 +41,42 @@ tree:
 TREE = """## Trees
 
 A node is a name (`tool_return`), or a name with settings (`retry: {attempts: 3, do: ...}`). Names are those of
-[nodes](nodes.md) and of installed [skills](skills.md). A YAML list is a sequence. Every node takes `name:`, the name that
-messages, records and fault plans use. A second node of the same name is called `squeeze 2`.
+[nodes](nodes.md) and of installed [skills](skills.md). A YAML list is a sequence. Every node takes `name:`, the
+name that messages, records and fault plans use. A second node of the same name is called `squeeze 2`.
 
-A skill reads and writes **ports**. A port is wired to a **key** of its own name; `in: {port: key}` and `out: {port: key}` wire
-it to another key. An input port also takes a value: `in: {grip_m: 40 mm}`. `$name` stands for a mission parameter.
+A skill reads and writes **ports**. A port is wired to a **key** of its own name; `in: {port: key}` and `out: {port:
+key}` wire it to another key. An input port also takes a value: `in: {grip_m: 40 mm}`. `$name` stands for a mission
+parameter.
 """
 SUBTREES = """## Subtrees
 
-`subtree: {file: subtrees/explore.yaml, parameters: {...}, ports: {its_key: our_key}}` inserts the tree of another file. The
-path is relative to the mission; shipped files are found as well. All keys that `ports` does not name are private. A mission may
-also hold its subtrees itself, in `subtrees: {NAME: {parameters: ..., tree: ...}}`, used as `file: NAME`. The `mission.yaml` of a run
-folder is written this way, so it needs no other file.
+`subtree: {file: subtrees/explore.yaml, parameters: {...}, ports: {its_key: our_key}}` inserts the tree of another
+file. The path is relative to the mission; shipped files are found as well. All keys that `ports` does not name are
+private. A mission may also hold its subtrees itself, in `subtrees: {NAME: {parameters: ..., tree: ...}}`, used as
+`file: NAME`. The `mission.yaml` of a run folder is written this way, so it needs no other file.
 """
 UNITS_TEXT = """## Units
 
-A number without a unit is in SI units; a number with a unit is converted: `speed_m_s: 40 mm/s`. The suffix of a name gives its
-unit: `grip_m`, `force_N`, `speed_m_s`. A number of another quantity is refused (`wrong_unit`).
+A number without a unit is in SI units; a number with a unit is converted: `speed_m_s: 40 mm/s`. The suffix of a
+name gives its unit: `grip_m`, `force_N`, `speed_m_s`. A number of another quantity is refused (`wrong_unit`).
 """
 RECORD = """# The record of a run: run.mcap
 
-Every run writes one [MCAP](https://mcap.dev) file. It carries Foxglove's schemas and has been read back with independent MCAP and protobuf
-readers, but not yet opened in Foxglove itself. All times are the robot's clock in nanoseconds; log time equals publish time. The file holds
-no wall-clock time, so the same inputs give the same bytes. Chunks are compressed with zstd and end every 50 control cycles (0.5 s). The
-record of a killed process can be read up to its last chunk.
+Every run writes one [MCAP](https://mcap.dev) file. It carries Foxglove's schemas and has been read back with
+independent MCAP and protobuf readers, but not yet opened in Foxglove itself. All times are the robot's clock in
+nanoseconds; log time equals publish time. The file holds no wall-clock time, so the same inputs give the same
+bytes. Chunks are compressed with zstd and end every 50 control cycles (0.5 s). The record of a killed process can
+be read up to its last chunk.
 
-Frames: B arm base, K container, P mid-point of the pads, S wrist sensor. Numbers that are not finite are `null` in JSON. Arrays in events
-are nested lists, rounded to 1e-9 (large ones to 1e-6); dataclasses are objects of their fields.
+Frames: B arm base, K container, P mid-point of the pads, S wrist sensor. Numbers that are not finite are `null` in
+JSON. Arrays in events are nested lists, rounded to 1e-9 (large ones to 1e-6); dataclasses are objects of their
+fields.
 
-Attachments: `run.json` (mission, seed, conditions, container; also the metadata record `run`) and `result.json` without its wall times.
+Attachments: `run.json` (mission, seed, conditions, container; also the metadata record `run`) and `result.json`
+without its wall times.
 
-`glotouch report RUN` draws a record. In Python, `glotouch_bt.report.read_run(folder)` returns its arrays and events.
+`glotouch report RUN` draws a record. In Python, `glotouch_bt.report.read_run(folder)` returns its arrays and
+events.
 """
 TOPIC_NOTES = {
     "/wrench": "50 Hz; newest sample, force in N and torque in Nm, in S",
@@ -98,18 +105,19 @@ Schema `glotouch.Packed` (protobuf):
     }
 
 `data` holds the columns one after the other. A column of shape `1`, `7` or `35x20` has w numbers in a row and takes
-4 * rows * w bytes: for each of the w numbers, four byte planes of `rows` bytes, least significant plane first. To unpack a column, join
-the planes to little-endian int32, sum cumulatively along the rows `order` times (modulo 2^32) and multiply by `step`. The int32 value
+4 * rows * w bytes: for each of the w numbers, four byte planes of `rows` bytes, least significant plane first. To
+unpack a column, join the planes to little-endian int32, sum cumulatively along the rows `order` times (modulo 2^32)
+and multiply by `step`. The int32 value
 -2^31 is NaN. `glotouch_bt.mission.record.mcap_packing.unpack` does this. Stamps are relative to `start_ns`.
 
-A command column is NaN in a cycle that gave no such command. The steps are far below the noise of the sensors. The runner rounds each
-observation to them before any skill sees it; this is why a replay repeats a run to the bit.
+A command column is NaN in a cycle that gave no such command. The steps are far below the noise of the sensors. The
+runner rounds each observation to them before any skill sees it; this is why a replay repeats a run to the bit.
 """
 EVENTS = """## Events: /events/KIND
 
-Each event has `kind` and `data`. Skills write what they found (`contact`, `candidate`, `touchset`, `ranking`, `plan`, `grasp`, `lift`, ...).
-The executive writes `failure` (a skill failed; also one that the tree recovers from), `guard` (supervision), `fault` (injected),
-`pause`, `paused`, `resumed`, `ending`, `stuck`.
+Each event has `kind` and `data`. Skills write what they found (`contact`, `candidate`, `touchset`, `ranking`,
+`plan`, `grasp`, `lift`, ...). The executive writes `failure` (a skill failed; also one that the tree recovers
+from), `guard` (supervision), `fault` (injected), `pause`, `paused`, `resumed`, `ending`, `stuck`.
 """
 
 
@@ -230,15 +238,16 @@ def worlds() -> str:
     """Return the page on worlds."""
     text = [
         "# Worlds\n",
-        "A world is what the robot is told: the container, the probe, its holder and a folder of STL files. The true world of a "
-        "simulation is drawn from the seed and the [conditions](conditions.md) around it. Positions are in B, the arm's base frame; "
+        "A world is what the robot is told: the container, the probe, its holder and a folder of STL files. The true "
+        "world of a simulation is drawn from the seed and the [conditions](conditions.md). Positions are in B, the "
+        "arm's base frame; "
         "K is the centre of the container's floor.\n",
         "```yaml\n" + shipped("worlds")["container_five"].read_text().rstrip() + "\n```\n",
         fields(WorldFile),
     ]
     for name, field in WorldFile.model_fields.items():
         kind = field.annotation
-        if hasattr(kind, "model_fields"):
+        if inspect.isclass(kind) and issubclass(kind, BaseModel):
             text.append(f"## {name}\n\n{prose(kind.__doc__ or '')}\n\n{fields(kind)}")
     rows = [(code(n), yaml.safe_load(p.read_text()).get("description", "")) for n, p in shipped("worlds").items()]
     return "\n".join([*text, "## Shipped worlds\n", table(("world", "description"), rows)])
@@ -253,10 +262,10 @@ def conditions() -> str:
     keys = [k for k in read["nominal"] if k != "name"]
     rows = [(code(k), notes.get(k, ""), *(read[n].get(k, "") for n in names)) for k in keys]
     text = (
-        "# Conditions\n\nConditions are the disturbances a simulated run is made under. `run --conditions NAME` takes a shipped profile or "
-        "a YAML file with these keys. `sd` is one standard deviation; `[low, high]` is a uniform range. Values are drawn per run from "
-        "the seed. Skills are never told them. A field that a profile leaves out is zero, or the default of "
-        "`glotouch_bt.robot.Conditions`.\n\n"
+        "# Conditions\n\nConditions are the disturbances of a simulated run. `run --conditions NAME` takes a shipped "
+        "profile or a YAML file with these keys. `sd` is one standard deviation; `[low, high]` is a uniform range. "
+        "Values are drawn per run from the seed. Skills are never told them. A field that a profile leaves out is zero, "
+        "or the default of `glotouch_bt.robot.Conditions`.\n\n"
     )
     return text + table(("field", "unit, meaning", *names), rows)
 
@@ -265,19 +274,19 @@ def faults() -> str:
     """Return the page on faults."""
     text = [
         "# Faults\n",
-        "`glotouch run MISSION --faults FILE` injects these faults; [Inject a fault](../guides/faults.md) shows how to write the file. "
-        "*Recoverable*: a mission can still reach its goal. Faults of the world need a simulation.\n",
+        "`glotouch run MISSION --faults FILE` injects these faults; [Inject a fault](../guides/faults.md) shows how to "
+        "write the file. *Recoverable*: a mission can still reach its goal. Faults of the world need a simulation.\n",
     ]
     for channel in dict.fromkeys(k.channel for k in CATALOGUE.values()):
         kinds = [k for k in CATALOGUE.values() if k.channel == channel]
         rows = [(f"[`{k.name}`](#{k.name})", k.summary, k.seen_by, "yes" if k.recoverable else "no") for k in kinds]
         text.append(f"## {channel}\n\n" + table(("fault", "effect", "should be noticed by", "recoverable"), rows))
         for k in kinds:
-            rows = [
+            given = [
                 (code(p["name"]), p["unit"], code(p["default"]), p["valid"], p["description"]) for p in k.parameters()
             ]
-            given = table(("parameter", "unit", "default", "valid", "meaning"), rows) or "No parameters.\n"
-            text.append(f"### {k.name}\n\n{given}")
+            parameters = table(("parameter", "unit", "default", "valid", "meaning"), given) or "No parameters.\n"
+            text.append(f"### {k.name}\n\n{parameters}")
     return "\n".join(text)
 
 

@@ -1,4 +1,4 @@
-"""Robot over the vendors' SDKs, which live in a driver process of their own. See `backend` and docs/hardware.md."""
+"""Robot over the vendors' SDKs, which run in a driver process. See `backend` and docs/guides/hardware.md."""
 
 from glotouch_backends.flexiv_xense.client import FlexivXenseBackend
 

@@ -40,7 +40,7 @@ def mission_tests(
     code = int(pytest.main(words))
     if code == int(pytest.ExitCode.NO_TESTS_COLLECTED):
         raise BadInput(
-            f"no tests in {', '.join(tests or ['this folder'])} (docs/compose.md shows how they are written)"
+            f"no tests in {', '.join(tests or ['this folder'])} (docs/tutorial.md shows how they are written)"
         )
     return code if code in (0, 1) else 2
 

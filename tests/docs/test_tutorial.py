@@ -1,4 +1,4 @@
-"""Run docs/tutorial.md as written: write its files into an empty folder, run its commands in order, compare their output."""
+"""Run docs/tutorial.md as written: its files in an empty folder, its commands in order, their output compared."""
 
 from __future__ import annotations
 

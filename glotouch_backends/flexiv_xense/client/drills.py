@@ -25,7 +25,7 @@ from glotouch_backends.flexiv_xense.driver import WallClock
 CLOCK = WallClock()
 VICTIMS = ("driver", "executive")
 ALLOWED_S = {"driver": 0.6, "executive": 0.4}
-"""docs/hardware.md, "What stops the arm"."""
+"""docs/guides/hardware.md, "What stops the arm"."""
 OPEN_S, AFTER_S, PATIENCE_S = 180.0, 15.0, 60.0
 
 

@@ -117,7 +117,7 @@ def _real(options: Options, known: Mapping[str, object]) -> Options:
     if not options.robot:
         raise BadInput(
             "real devices need their addresses: --set robot=Rizon4-XXXXXX --set gripper=ADDRESS "
-            "--set left_pad=SERIAL --set right_pad=SERIAL (see docs/hardware.md), or --set devices=simulated"
+            "--set left_pad=SERIAL --set right_pad=SERIAL (see docs/guides/hardware.md), or --set devices=simulated"
         )
     if bool(options.left_pad) != bool(options.right_pad):
         raise BadInput("options left_pad and right_pad: both or none")

@@ -2,7 +2,7 @@
 
 A column is rounded to a stated step, differenced along time until it is small, and written byte plane by byte plane, so
 that the chunk compression of the file finds mostly zeros. The message is a Protocol Buffers message of one schema
-(`PACKED_DESCRIPTOR`), so any MCAP tool can open it; docs/record.md says how to unpack it by hand.
+(`PACKED_DESCRIPTOR`), so any MCAP tool can open it; docs/reference/record.md says how to unpack it by hand.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The channels of a record and the schemas of their messages. The table for people is docs/record.md.
+"""The channels of a record and the schemas of their messages. The table for people is docs/reference/record.md.
 
 Messages with a `foxglove.` name follow the Foxglove schemas (docs.foxglove.dev/docs/sdk/schemas), JSON encoding.
 """

@@ -1,7 +1,7 @@
 """The record of a run: everything sensed, commanded, ticked and decided, in one MCAP file with Foxglove's schemas.
 
 A control cycle costs two list appends; every `batch_cycles` the pending cycles are encoded at once and flushed, so a
-file whose writer died is readable up to the last batch. Channels, schemas and packing: docs/record.md.
+file whose writer died is readable up to the last batch. Channels, schemas and packing: docs/reference/record.md.
 
 Times are the robot's clock (log time = publish time); no wall clock enters, so the same inputs give the same bytes.
 """

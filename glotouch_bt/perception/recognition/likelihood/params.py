@@ -1,4 +1,4 @@
-"""Spreads of the likelihood: one frozen set for every object. How they were measured: docs/recognition.md."""
+"""Spreads of the likelihood: one frozen set for every object. Sources: docs/explanation/recognition.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The matching loss as the paper writes it, each term switchable. Pure. Readings: docs/recognition_paper.md.
+"""The matching loss as the paper writes it, each term switchable. Pure. Readings: docs/explanation/paper_matcher.md.
 
 ranking = paper_matcher(PaperParams())(model, touchsets)
 """

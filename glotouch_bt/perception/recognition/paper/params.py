@@ -1,4 +1,4 @@
-"""Weights, scales and search ranges of the paper's matching loss. Reasons: docs/recognition_paper.md."""
+"""Weights, scales and search ranges of the paper's matching loss. Reasons: docs/explanation/paper_matcher.md."""
 
 from __future__ import annotations
 

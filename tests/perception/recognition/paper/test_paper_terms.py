@@ -158,7 +158,7 @@ def test_depth_term() -> None:
 
 
 def test_fewer_valid_patches_lower_the_depth_term() -> None:
-    """A fault of the formula, kept: docs/recognition_paper.md."""
+    """A fault of the formula, kept: docs/explanation/paper_matcher.md."""
     many, few = observed([0.4], [1.0]), observed([0.4], [0.25])
     assert depth_loss(few, 0.1, 0.05, PaperParams()) == pytest.approx(0.25 * depth_loss(many, 0.1, 0.05, PaperParams()))
 
