@@ -264,7 +264,7 @@ def conditions() -> str:
     text = (
         "# Conditions\n\nConditions are the disturbances of a simulated run. `run --conditions NAME` takes a shipped "
         "profile or a YAML file with these keys. `sd` is one standard deviation; `[low, high]` is a uniform range. "
-        "Values are drawn per run from the seed. Skills are never told them. A field that a profile leaves out is zero, "
+        "Values are drawn per run from the seed. Skills are never told them. A field that a profile leaves out is zero "
         "or the default of `glotouch_bt.robot.Conditions`.\n\n"
     )
     return text + table(("field", "unit, meaning", *names), rows)
