@@ -19,7 +19,8 @@ from glotouch_bt.mission.export import describe_skill, mission_schema
 from glotouch_bt.mission.read import Declaration, SkillShelf, WorldFile, shipped
 from glotouch_bt.mission.record import Recorder
 from glotouch_bt.mission.record.mcap_schemas import CHANNELS as CHANNELS_OF_RECORD
-from glotouch_bt.mission.spec import KINDS, UNITS
+from glotouch_bt.mission.nodes import NODES
+from glotouch_bt.mission.spec import UNITS
 from glotouch_bt.robot import HOLD, FakeRobot
 
 MISSION = """# Mission files
@@ -185,11 +186,11 @@ def nodes() -> str:
     """Return the page on node kinds."""
     text = ["# Nodes\n", "A mission's tree is built from these nodes and from [skills](skills.md).\n"]
     children = {"none": "none", "one": "one, `do:`", "many": "a list"}
-    rows = [(f"[`{n}`](#{n})", k.description, children[k.children], k.btcpp) for n, k in KINDS.items()]
+    rows = [(f"[`{n}`](#{n})", k.description, children[k.children], k.btcpp) for n, k in NODES.items()]
     text.append(table(("node", "result", "children", "BehaviorTree.CPP"), rows))
-    for name, kind in KINDS.items():
+    for name, kind in NODES.items():
         text.append(f"## {name}\n\n{kind.description[0].upper()}{kind.description[1:]}.\n")
-        text.append(fields(kind.settings) or "No settings.\n")
+        text.append(fields(kind.Settings) or "No settings.\n")
     return "\n".join(text)
 
 
