@@ -16,10 +16,10 @@ from pydantic import BaseModel
 
 from glotouch_bt.faults import CATALOGUE
 from glotouch_bt.mission.export import describe_skill, mission_schema
+from glotouch_bt.mission.nodes import NODES
 from glotouch_bt.mission.read import Declaration, SkillShelf, WorldFile, shipped
 from glotouch_bt.mission.record import Recorder
 from glotouch_bt.mission.record.mcap_schemas import CHANNELS as CHANNELS_OF_RECORD
-from glotouch_bt.mission.nodes import NODES
 from glotouch_bt.mission.spec import UNITS
 from glotouch_bt.robot import HOLD, FakeRobot
 
