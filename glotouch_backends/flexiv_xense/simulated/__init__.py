@@ -15,6 +15,6 @@ __all__ = [
     "ROBOT_SN",
     "RemoteVendor",
     "SimulatedVendor",
-    "open_vendor",
     "open_remote_vendor",
+    "open_vendor",
 ]

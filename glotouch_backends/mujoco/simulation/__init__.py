@@ -5,4 +5,4 @@ from glotouch_backends.mujoco.simulation.disturber import MujocoDisturber
 from glotouch_backends.mujoco.simulation.referee import MujocoReferee, Simulated
 from glotouch_backends.mujoco.simulation.snapshot import SnapshotStore
 
-__all__ = ["MujocoDisturber", "MujocoReferee", "Simulated", "SnapshotStore", "ControlTrace"]
+__all__ = ["ControlTrace", "MujocoDisturber", "MujocoReferee", "Simulated", "SnapshotStore"]

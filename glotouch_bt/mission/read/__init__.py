@@ -19,9 +19,9 @@ from glotouch_bt.mission.read.worlds import WorldFile, load_conditions, load_wor
 from glotouch_bt.mission.read.yaml_source import parse_yaml, read_yaml
 
 __all__ = [
+    "RESUME_CHECK_GROUP",
     "Declaration",
     "Parameter",
-    "RESUME_CHECK_GROUP",
     "Reading",
     "Scope",
     "SkillShelf",
