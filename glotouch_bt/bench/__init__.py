@@ -1,7 +1,16 @@
-"""TODO door of glotouch_bt/bench."""
+"""Experiments that measure the method: one file or folder a bench, each with its trials, figures and plots."""
 
-from glotouch_bt.bench.retrieve import Campaign, run_campaign, targets_of
+from glotouch_bt.bench.retrieve import RetrieveCampaign, run_campaign, targets_of
 from glotouch_bt.bench.speed import SpeedStudy, run_study
 from glotouch_bt.bench.statistics import Rate, bootstrap_mean, wilson
 
-__all__ = ["Campaign", "Rate", "SpeedStudy", "bootstrap_mean", "run_campaign", "run_study", "targets_of", "wilson"]
+__all__ = [
+    "Rate",
+    "RetrieveCampaign",
+    "SpeedStudy",
+    "bootstrap_mean",
+    "run_campaign",
+    "run_study",
+    "targets_of",
+    "wilson",
+]

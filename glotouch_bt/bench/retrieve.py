@@ -1,4 +1,4 @@
-"""`bench retrieve`: the whole mission over targets and seeds, every trial counted."""
+"""`bench retrieve`: the whole mission over targets and seeds; every trial counts."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ COLUMNS = (
 
 
 @dataclass(frozen=True)
-class Campaign:
-    """What shall be tried.
+class RetrieveCampaign:
+    """Settings of the campaign.
 
     Attributes:
         mission: Path or shipped name; it must take a parameter `target`.
@@ -33,9 +33,9 @@ class Campaign:
         conditions: Path or shipped name.
         objects: Folder of STL files instead of the world's.
         backend: Registered name.
-        out: Folder of the campaign; each trial's run folder goes below it.
+        out: Folder of the campaign; it receives a run folder for each trial.
         settings: Further `--set` values, for every trial.
-        resume: Trials whose result is in `out` already are not run again.
+        resume: Skip trials whose result is in `out` already.
     """
 
     mission: str
@@ -49,7 +49,7 @@ class Campaign:
     resume: bool = False
 
     def requests(self) -> list[tuple[str, RunRequest]]:
-        """(target, request) of every trial, seeds outermost, so that a broken-off campaign covers all targets alike."""
+        """Return (target, request) of every trial, seeds outermost: an interrupted campaign covers all targets."""
         return [
             (
                 target,
@@ -69,7 +69,7 @@ class Campaign:
 
 
 def targets_of(folder: Path) -> tuple[str, ...]:
-    """Names of the usable STLs of a folder.
+    """Return the names of the usable STLs of a folder.
 
     Raises:
         BadInput: None, or an unusable one.
@@ -78,7 +78,7 @@ def targets_of(folder: Path) -> tuple[str, ...]:
 
 
 def run_trial(target: str, request: RunRequest, resume: bool = False) -> dict[str, Any]:
-    """One trial in this process, as a row. Whatever goes wrong is a row, never an exception of the campaign."""
+    """Run one trial in this process and return its row. A failure becomes a row, never an exception."""
     row: dict[str, Any] = {"target": target, "seed": request.seed, "folder": request.out and request.out.name}
     if resume and request.out is not None and (request.out / "result.json").is_file():
         return row | _columns(json.loads((request.out / "result.json").read_text()))
@@ -92,14 +92,14 @@ def run_trial(target: str, request: RunRequest, resume: bool = False) -> dict[st
 
 
 def _columns(result: Mapping[str, Any]) -> dict[str, Any]:
-    """A result as a row."""
+    """Convert a result to columns of a row."""
     code = {"success": 0, "failure": 1}.get(str(result["status"]), 3)
     found = {"candidates": len(result["candidates"]), "cause": cause(result), "exit_code": code}
     return {k: result[k] for k in COLUMNS if k in result} | found
 
 
 def cause(result: Mapping[str, Any]) -> str:
-    """Why a trial is no success: the root reason's node and code, `wrong_object`, or empty for a success."""
+    """Return the cause of failure: node and code of the root reason, or `wrong_object`; empty for a success."""
     if result["status"] == "success":
         if result["correct"]:
             return ""
@@ -112,12 +112,12 @@ def cause(result: Mapping[str, Any]) -> str:
 
 
 def run_campaign(
-    campaign: Campaign, executor: Executor, on_row: Callable[[dict[str, Any], int, int], None] | None = None
+    campaign: RetrieveCampaign, executor: Executor, on_row: Callable[[dict[str, Any], int, int], None] | None = None
 ) -> dict[str, Any]:
-    """Run every trial on the executor; writes trials.csv and summary.json, returns the summary (DESIGN 7).
+    """Run every trial on the executor, write trials.csv and summary.json, and return the summary.
 
     Args:
-        campaign: What to try.
+        campaign: Settings.
         executor: Any `concurrent.futures` executor (processes here, a cluster elsewhere).
         on_row: Called with (row, done, total) after each trial.
     """
@@ -147,12 +147,12 @@ def run_campaign(
 
 
 def succeeded(row: Mapping[str, Any]) -> bool:
-    """The mission said success AND the right object really hangs in the gripper."""
+    """Return True if the mission succeeded and the right object is really in the gripper."""
     return row.get("status") == "success" and bool(row.get("correct"))
 
 
 def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Rates with Wilson and means with bootstrap intervals over all rows; failures count."""
+    """Return rates with Wilson and means with bootstrap intervals over all rows; failures count."""
     n = len(rows)
     wrong = sum(bool(r.get("retrieved")) and not r.get("correct") for r in rows)
     targets = sorted({r["target"] for r in rows})

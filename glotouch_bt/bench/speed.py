@@ -1,11 +1,10 @@
-"""`bench speed`: what a mission costs beside the physics it causes.
+"""`bench speed`: wall time of a mission against that of its bare physics steps.
 
-Each seed's mission is run as `glotouch run` runs it (same tree, same record, same report); then the solver steps it
-caused are repeated with nothing round them. Both must end in the same state, bit for bit: the denominator of
-`over_physics` is the very same physics, and nothing but the robot's controls moved the world.
+Each mission runs as with `glotouch run` (same tree, record and report). Its solver steps are then repeated alone. Both
+must end in the same state, bit for bit, so the denominator of `over_physics` is exactly the same physics.
 
-Times are wall times of this process (`time.perf_counter`), missions one after the other: run it alone on a core. The
-same factors by processor time (`time.process_time`) stand beside them: where they differ, the core was shared.
+Times are wall times of this process (`time.perf_counter`), missions one after the other. Run it alone on a core. The
+factors by processor time (`time.process_time`) are given too: where they differ, the core was shared.
 """
 
 from __future__ import annotations
@@ -32,23 +31,23 @@ COLUMNS = (
     "over_physics", "cpu_s", "bare_cpu_s", "robot_s", "tree_s", "record_s", "open_s", "report_s",
 )  # fmt: skip
 TARGET_REALTIME = 15.0
-"""Least simulated time over wall time. Source: the project's speed requirement."""
+"""Required ratio of simulated time to wall time. Source: the project's speed requirement."""
 TARGET_OVER_PHYSICS = 2.0
-"""Largest wall time over that of the bare steps. Source: as above."""
+"""Largest ratio of wall time to bare step time. Source: the project's speed requirement."""
 
 
 @dataclass(frozen=True)
 class SpeedStudy:
-    """What shall be measured.
+    """Settings of the study.
 
     Attributes:
         mission: Path or shipped name.
         settings: Mission parameters.
-        seeds: One mission a seed.
+        seeds: One mission each.
         conditions: Path or shipped name.
         objects: Folder of STL files instead of the world's.
         backend: Registered name; it must know the option `trace` and have a referee.
-        out: Folder of the study; each mission's folder goes below it.
+        out: Folder of the study; it receives a folder for each mission.
     """
 
     mission: str
@@ -61,15 +60,15 @@ class SpeedStudy:
 
 
 @dataclass
-class Clockwork:
-    """Stopwatches round the parts of a control cycle, s; one entry a cycle, in the order of time.
+class CycleTimes:
+    """Durations of the parts of each control cycle, s; one entry a cycle.
 
     Attributes:
         robot: Inside `Robot.cycle`: physics, sensors, gripper.
-        tree: Between two cycles, without the record: the tree's tick, so skills, motion, touch, matching.
+        tree: Between two cycles, without the record: the tick with skills, motion, touch and matching.
         record: Inside the record.
         whole: From one command to the next.
-        leaf: Tree time by leaf: up to an event the one that wrote it, then the one that runs after the tick.
+        leaf: Tree time by leaf: up to an event the leaf that wrote it, then the leaf running after the tick.
     """
 
     robot: list[float] = field(default_factory=list)
@@ -80,15 +79,15 @@ class Clockwork:
 
 
 class TimedRobot(Robot):
-    """A robot that is timed; everything is passed on.
+    """Wrapper that times a robot.
 
     Args:
         robot: The robot.
-        clockwork: Filled, together with the `TimedRecord` of the same run.
+        times: Filled, together with the `TimedRecord` of the same run.
     """
 
-    def __init__(self, robot: Robot, clockwork: Clockwork) -> None:
-        self._robot, self._clockwork = robot, clockwork
+    def __init__(self, robot: Robot, times: CycleTimes) -> None:
+        self._robot, self._times = robot, times
         self.description, self.limits, self.period_s = robot.description, robot.limits, robot.period_s
         self._left = 0.0
         self._booked = 0.0
@@ -96,7 +95,7 @@ class TimedRobot(Robot):
         self.running = ""
 
     def observe(self) -> Observation:
-        """See `Robot`; the first tick is counted from here."""
+        """See `Robot`; the first tick is timed from here."""
         self._left = time.perf_counter()
         return self._robot.observe()
 
@@ -108,11 +107,11 @@ class TimedRobot(Robot):
             return self._robot.cycle(command)
         finally:
             self._left = time.perf_counter()
-            self._clockwork.robot.append(self._left - entered)
+            self._times.robot.append(self._left - entered)
 
     def account(self, now: float) -> None:
-        """Book the time since the last cycle to tree and record."""
-        c = self._clockwork
+        """Assign the time since the last cycle to tree and record."""
+        c = self._times
         outside = now - self._left
         tree = outside - self.writing
         c.tree.append(tree)
@@ -122,9 +121,9 @@ class TimedRobot(Robot):
         self.writing = self._booked = 0.0
 
     def book(self, leaf: str, now: float) -> None:
-        """Give a leaf the tree time of this tick that nobody has got yet."""
+        """Assign the unassigned tree time of this tick to a leaf."""
         spent = now - self._left - self.writing
-        self._clockwork.leaf[leaf] = self._clockwork.leaf.get(leaf, 0.0) + spent - self._booked
+        self._times.leaf[leaf] = self._times.leaf.get(leaf, 0.0) + spent - self._booked
         self._booked = spent
 
     def start(self, request: Request) -> Ticket:
@@ -141,7 +140,7 @@ class TimedRobot(Robot):
 
 
 class TimedRecord:
-    """A record whose writing is booked as such, and that tells the timed robot which leaf runs."""
+    """Wrapper that times a record and tells the timed robot which leaf runs."""
 
     def __init__(self, record: Record, robot: TimedRobot) -> None:
         self._record, self._robot = record, robot
@@ -179,14 +178,14 @@ class TimedRecord:
 
 @dataclass(frozen=True)
 class SpeedTrial:
-    """One measured mission: its row of the table, and the stopwatches."""
+    """One measured mission: its row and its cycle times."""
 
     row: Mapping[str, Any]
-    clockwork: Clockwork
+    times: CycleTimes
 
 
 def run_trial(study: SpeedStudy, seed: int) -> SpeedTrial:
-    """One mission and the replay of its steps.
+    """Run one mission and replay its steps.
 
     Raises:
         BadInput: The backend cannot repeat its steps, or the mission cannot be run.
@@ -196,12 +195,12 @@ def run_trial(study: SpeedStudy, seed: int) -> SpeedTrial:
     mission = load_mission(study.mission, study.settings, objects=study.objects)
     conditions = load_conditions(study.conditions)
     backend = load_backend(study.backend)
-    clockwork = Clockwork()
+    times = CycleTimes()
     with backend.open(mission.world, conditions, seed, {"trace": True}) as robot:
         referee = backend.referee(robot)
         if referee is None:
             raise BadInput(f"backend {study.backend!r} cannot repeat its steps; bench speed needs a simulation")
-        timed = TimedRobot(robot, clockwork)
+        timed = TimedRobot(robot, times)
         began, cpu = time.perf_counter(), time.process_time()
         with Recorder(folder.path / "run.mcap", _description(study, seed, mission.world.container)) as recorder:
             outcome = run_mission(mission, timed, TimedRecord(recorder, timed))
@@ -219,10 +218,10 @@ def run_trial(study: SpeedStudy, seed: int) -> SpeedTrial:
         "steps": bare.steps, "same_end_state": bare.same_end_state, "realtime_factor": sim_s / wall_s,
         "bare_factor": sim_s / bare.wall_s, "over_physics": wall_s / bare.wall_s, "cpu_s": cpu_s,
         "bare_cpu_s": bare.cpu_s,
-        "robot_s": sum(clockwork.robot), "tree_s": sum(clockwork.tree),
-        "record_s": sum(clockwork.record) + ended - ticked, "open_s": began - opening, "report_s": report_s,
+        "robot_s": sum(times.robot), "tree_s": sum(times.tree),
+        "record_s": sum(times.record) + ended - ticked, "open_s": began - opening, "report_s": report_s,
     }  # fmt: skip
-    return SpeedTrial(row, clockwork)
+    return SpeedTrial(row, times)
 
 
 def _description(study: SpeedStudy, seed: int, container: object) -> dict[str, object]:
@@ -237,7 +236,7 @@ def _description(study: SpeedStudy, seed: int, container: object) -> dict[str, o
 
 
 def _report_s(folder: Path) -> float:
-    """Wall time of the run's report."""
+    """Return the wall time of writing the run's report."""
     from glotouch_bt.report import write_report
 
     began = time.perf_counter()
@@ -246,10 +245,10 @@ def _report_s(folder: Path) -> float:
 
 
 def run_study(study: SpeedStudy, on_row: Callable[[Mapping[str, Any], int, int], None] | None = None) -> dict[str, Any]:
-    """Every seed one after the other; writes trials.csv and summary.json, returns the summary (DESIGN 7).
+    """Run every seed in turn, write trials.csv and summary.json, and return the summary.
 
     Args:
-        study: What to measure.
+        study: Settings.
         on_row: Called with (row, done, total) after each mission.
     """
     study.out.mkdir(parents=True, exist_ok=True)
@@ -274,13 +273,13 @@ def run_study(study: SpeedStudy, on_row: Callable[[Mapping[str, Any], int, int],
 
 
 def spread(values: Sequence[float]) -> dict[str, float]:
-    """Median, least and greatest of some trials."""
+    """Return median, minimum and maximum."""
     x = np.asarray(values, dtype=np.float64)
     return {"median": float(np.median(x)), "min": float(x.min()), "max": float(x.max()), "n": len(x)}
 
 
 def quantiles_us(times_s: Sequence[float]) -> dict[str, float]:
-    """p50, p99 and the greatest of many durations, in microseconds."""
+    """Return p50, p99 and maximum of durations, in microseconds."""
     x = 1e6 * np.asarray(times_s, dtype=np.float64)
     if x.size == 0:
         return {"p50": 0.0, "p99": 0.0, "max": 0.0}
@@ -289,13 +288,12 @@ def quantiles_us(times_s: Sequence[float]) -> dict[str, float]:
 
 
 def summarise(trials: Sequence[SpeedTrial]) -> dict[str, Any]:
-    """Factors as median with range over the trials, cycle times over all cycles, and where the time went.
+    """Return factors (median and range over trials), cycle times over all cycles, and a breakdown of the time.
 
-    Keys: realtime_factor, bare_factor (the same of the bare steps), over_physics; control_cycle_us (command to
-    command), robot_cycle_us, tick_us, record_us; breakdown_s, the mean seconds a mission: `physics` (the bare steps),
-    `robot` (the rest of Robot.cycle), `tree` (the tick), `record`, `rest`; then `open` and `report`, which are not part
-    of the wall time; by_cpu, the factors by processor time; leaves_s (tree time by leaf); same_end_state; targets and
-    whether they are met.
+    Keys: realtime_factor, bare_factor (of the bare steps), over_physics; control_cycle_us (command to command),
+    robot_cycle_us, tick_us, record_us; breakdown_s, mean seconds a mission: `physics` (bare steps), `robot` (rest of
+    Robot.cycle), `tree`, `record`, `rest`; `open` and `report` are not part of the wall time; by_cpu, factors by
+    processor time; leaves_s (tree time by leaf); same_end_state; targets and whether they are met.
     """
     rows = [t.row for t in trials]
 
@@ -303,13 +301,13 @@ def summarise(trials: Sequence[SpeedTrial]) -> dict[str, Any]:
         return float(np.mean([r[key] for r in rows]))
 
     def cycles(part: str) -> dict[str, float]:
-        return quantiles_us([v for t in trials for v in getattr(t.clockwork, part)])
+        return quantiles_us([v for t in trials for v in getattr(t.times, part)])
 
     realtime = spread([r["realtime_factor"] for r in rows])
     over = spread([r["over_physics"] for r in rows])
     leaves: dict[str, float] = {}
     for t in trials:
-        for name, seconds in t.clockwork.leaf.items():
+        for name, seconds in t.times.leaf.items():
             leaves[name or "start"] = leaves.get(name or "start", 0.0) + seconds / len(trials)
     parts = {
         "physics": mean("bare_s"),

@@ -1,4 +1,4 @@
-"""Intervals: a figure without one is not a figure."""
+"""Rates and means with 95 % intervals."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Mean(TypedDict):
 
 
 def wilson(successes: int, n: int) -> Rate:
-    """Wilson score interval at 95 % (E. B. Wilson, JASA 22, 1927). n = 0 gives the whole range.
+    """Return a rate with the Wilson score interval at 95 % (E. B. Wilson, JASA 22, 1927). n = 0 gives the whole range.
 
     Raises:
         ValueError: Not 0 <= successes <= n.
@@ -44,7 +44,7 @@ def wilson(successes: int, n: int) -> Rate:
 
 
 def bootstrap_mean(values: npt.ArrayLike, resamples: int = 2000, seed: int = 0) -> Mean:
-    """Percentile bootstrap of the mean at 95 % (B. Efron, Ann. Statist. 7, 1979); seeded."""
+    """Return a mean with the percentile bootstrap interval at 95 % (B. Efron, Ann. Statist. 7, 1979); seeded."""
     x = np.asarray(values, dtype=np.float64)
     if x.size == 0:
         return {"mean": float("nan"), "lo": float("nan"), "hi": float("nan"), "n": 0}

@@ -53,7 +53,7 @@ def retrieve(
     json_: Json = False,
 ) -> None:
     """The whole mission for every target on every seed."""
-    from glotouch_bt.bench import Campaign, run_campaign, targets_of
+    from glotouch_bt.bench import RetrieveCampaign, run_campaign, targets_of
     from glotouch_bt.commands.terminal import bench_tables as console_bench
     from glotouch_bt.mission import load_mission
     from glotouch_bt.robot import BadInput
@@ -64,7 +64,7 @@ def retrieve(
     if "target" in settings:
         raise BadInput("--set target: the targets of a campaign are given by --target")
     world = load_mission(mission, settings | ({"target": names[0]} if names else {}), objects=objects).world
-    campaign = Campaign(
+    campaign = RetrieveCampaign(
         mission=mission,
         targets=names or targets_of(world.objects.folder),
         seeds=tuple(range(seed, seed + trials)),
@@ -157,11 +157,11 @@ def search(
     json_: Json = False,
 ) -> None:
     """How soon every object is found, by policy: the mission, and its planar stand-in on the same and more layouts."""
-    from glotouch_bt.bench.search import Campaign, run_campaign
+    from glotouch_bt.bench.search import SearchCampaign, run_campaign
     from glotouch_bt.commands.terminal import bench_tables as console_bench
 
     check_names(conditions, backend)
-    campaign = Campaign(
+    campaign = SearchCampaign(
         policies=tuple(p.strip() for p in policies.split(",") if p.strip()),
         seeds=tuple(range(seed, seed + trials)),
         planar_seeds=tuple(range(seed, seed + planar)),
@@ -207,11 +207,11 @@ def match(
     json_: Json = False,
 ) -> None:
     """Which touched object is the target: the matchers and the paper's ablation on TouchSets of the real skills."""
-    from glotouch_bt.bench.match import Campaign, chosen, run_campaign
+    from glotouch_bt.bench.match import MatchCampaign, chosen, run_campaign
     from glotouch_bt.commands.terminal import bench_tables as console_bench
 
     check_names(conditions, backend)
-    campaign = Campaign(
+    campaign = MatchCampaign(
         seeds=tuple(range(seed, seed + phases)),
         conditions=conditions,
         objects=objects,
@@ -249,11 +249,13 @@ def contact(
     json_: Json = False,
 ) -> None:
     """Calibration square traced by probe and by bare gripper, bolted down and free: errors and the paper's."""
-    from glotouch_bt.bench.contact import Campaign, run_campaign
+    from glotouch_bt.bench.contact import ContactCampaign, run_campaign
     from glotouch_bt.commands.terminal import bench_tables as console_bench
 
     check_names(conditions, "mujoco")
-    campaign = Campaign(tuple(range(seed, seed + trials)), conditions, per_side, "mujoco", bench_folder(out, "contact"))
+    campaign = ContactCampaign(
+        tuple(range(seed, seed + trials)), conditions, per_side, "mujoco", bench_folder(out, "contact")
+    )
 
     def show(row: dict[str, Any], done: int, total: int) -> None:
         said = row["cause"] or f"centre {row['centre_error_mm']:.2f} mm"

@@ -84,8 +84,8 @@ def bench_faults(
     from glotouch_bt.mission import load_mission
     from glotouch_bt.robot import GlotouchError
     from glotouch_bt.validation.faults import (
-        Campaign,
         Exhaustive,
+        FaultCampaign,
         chosen_cases,
         chosen_skills,
         few_objects,
@@ -111,7 +111,7 @@ def bench_faults(
     box, names = few_objects(world.objects, few, folder / "objects")
     settings = {"target": names[0], "expected_objects": str(len(names))} | settings
     load_mission(mission, settings, objects=box)
-    campaign = Campaign(
+    campaign = FaultCampaign(
         mission=mission,
         settings=settings,
         cases=cases,

@@ -27,11 +27,11 @@ def _result(request: RunRequest) -> dict[str, Any]:
 
 
 @pytest.fixture
-def campaign(tmp_path: Path) -> retrieve.Campaign:
-    return retrieve.Campaign("retrieve", ("a", "b"), (0, 1, 2, 3, 4), "nominal", None, "fake", tmp_path / "out")
+def campaign(tmp_path: Path) -> retrieve.RetrieveCampaign:
+    return retrieve.RetrieveCampaign("retrieve", ("a", "b"), (0, 1, 2, 3, 4), "nominal", None, "fake", tmp_path / "out")
 
 
-def test_every_trial_is_counted_and_named(campaign: retrieve.Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_trial_is_counted_and_named(campaign: retrieve.RetrieveCampaign, monkeypatch: pytest.MonkeyPatch) -> None:
     def launch(request: RunRequest) -> Any:
         if request.seed == 4:
             raise RuntimeError("a bug")
@@ -64,7 +64,7 @@ def test_a_mission_that_says_success_with_an_empty_hand_is_no_success() -> None:
 
 
 def test_a_resumed_campaign_keeps_what_was_run_and_passes_settings_on(
-    campaign: retrieve.Campaign, monkeypatch: pytest.MonkeyPatch
+    campaign: retrieve.RetrieveCampaign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[RunRequest] = []
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from glotouch_bt.bench import speed
-from glotouch_bt.bench.speed import Clockwork, SpeedStudy, SpeedTrial, TimedRecord, TimedRobot
+from glotouch_bt.bench.speed import CycleTimes, SpeedStudy, SpeedTrial, TimedRecord, TimedRobot
 from glotouch_bt.robot import Backend, BadInput, Command, Observation, Robot
 from glotouch_bt.robot.simulation.referee import BareSteps, Referee
 
@@ -133,7 +133,7 @@ def test_a_backend_without_a_trace_is_refused(
 
 def test_time_goes_to_the_part_that_spent_it(house: ModuleType, clock: Clock) -> None:
     """A cycle of 10 s, then a tick: 3 s up to an event of `match` that takes 5 s to write, then 4 s of `grasp`."""
-    clockwork = Clockwork()
+    times = CycleTimes()
 
     class Plain(house.NullRobot):  # type: ignore[name-defined,misc]
         def cycle(self, command: object) -> Observation:
@@ -154,7 +154,7 @@ def test_time_goes_to_the_part_that_spent_it(house: ModuleType, clock: Clock) ->
         def port(self, *given: object) -> None:
             clock.now += 0.5
 
-    robot = TimedRobot(Plain(0), clockwork)
+    robot = TimedRobot(Plain(0), times)
     record = TimedRecord(Writer(), robot)
     robot.observe()
     observation = robot.cycle(Command())
@@ -167,11 +167,11 @@ def test_time_goes_to_the_part_that_spent_it(house: ModuleType, clock: Clock) ->
     )
     record.port(0.0, "plan", None)
     robot.cycle(Command())
-    assert clockwork.robot == [10.0, 10.0]
-    assert clockwork.tree == [0.0, 7.0]
-    assert clockwork.record == [0.0, 8.5]
-    assert clockwork.whole == [0.0, 25.5]
-    assert clockwork.leaf == {"": 0.0, "match": 3.0, "grasp": 4.0}
+    assert times.robot == [10.0, 10.0]
+    assert times.tree == [0.0, 7.0]
+    assert times.record == [0.0, 8.5]
+    assert times.whole == [0.0, 25.5]
+    assert times.leaf == {"": 0.0, "match": 3.0, "grasp": 4.0}
 
 
 def test_a_cycle_that_raises_is_timed_too(house: ModuleType, clock: Clock) -> None:
@@ -180,12 +180,12 @@ def test_a_cycle_that_raises_is_timed_too(house: ModuleType, clock: Clock) -> No
             clock.now += 1.5
             raise BadInput("no")
 
-    clockwork = Clockwork()
-    robot = TimedRobot(Broken(0), clockwork)
+    times = CycleTimes()
+    robot = TimedRobot(Broken(0), times)
     robot.observe()
     with pytest.raises(BadInput):
         robot.cycle(Command())
-    assert clockwork.robot == [1.5]
+    assert times.robot == [1.5]
 
 
 def test_medians_and_quantiles() -> None:
@@ -196,9 +196,9 @@ def test_medians_and_quantiles() -> None:
 
 def test_targets_are_met_or_not() -> None:
     row = dict.fromkeys(speed.COLUMNS, 1.0) | {"same_end_state": True, "status": "success"}
-    good = speed.summarise([SpeedTrial(row | {"realtime_factor": 15.0, "over_physics": 2.0}, Clockwork())])
+    good = speed.summarise([SpeedTrial(row | {"realtime_factor": 15.0, "over_physics": 2.0}, CycleTimes())])
     assert all(t["met"] for t in good["targets"].values())
-    slow = speed.summarise([SpeedTrial(row | {"realtime_factor": 14.9, "over_physics": 2.1}, Clockwork())])
+    slow = speed.summarise([SpeedTrial(row | {"realtime_factor": 14.9, "over_physics": 2.1}, CycleTimes())])
     assert not any(t["met"] for t in slow["targets"].values())
 
 

@@ -95,7 +95,7 @@ def a_trial(simulator: str, policy: str, travel_m: list[float]) -> dict[str, Any
 def test_search(as_json: bool, command: CliRunner, monkeypatch: pytest.MonkeyPatch) -> None:
     started: list[Any] = []
 
-    def run(campaign: search.Campaign, pool: NoPool, show: search.OnRow) -> dict[str, Any]:
+    def run(campaign: search.SearchCampaign, pool: NoPool, show: search.OnRow) -> dict[str, Any]:
         started.append((campaign, pool.workers))
         rows = [a_trial("mujoco", p, [0.5, 1.5]) for p in campaign.policies]
         rows += [a_trial("planar", p, [0.6, 4.0]) for p in campaign.policies]
@@ -119,9 +119,9 @@ def test_search(as_json: bool, command: CliRunner, monkeypatch: pytest.MonkeyPat
 
 @pytest.mark.parametrize("as_json", [False, True])
 def test_contact(as_json: bool, command: CliRunner, monkeypatch: pytest.MonkeyPatch) -> None:
-    started: list[contact.Campaign] = []
+    started: list[contact.ContactCampaign] = []
 
-    def run(campaign: contact.Campaign, _pool: NoPool, show: Any) -> dict[str, Any]:
+    def run(campaign: contact.ContactCampaign, _pool: NoPool, show: Any) -> dict[str, Any]:
         started.append(campaign)
         good = {"seed": 100, "cause": "", **dict.fromkeys((*METRICS, *MORE), 1.25)}
         rows = [good | {"tool": tool, "square": "fixed"} for tool in TOOLS]

@@ -21,7 +21,7 @@ from glotouch_bt.run.launch import RunRequest
 from glotouch_bt.validation.faults import exhaustive as faults_exhaustive
 from glotouch_bt.validation.faults import start as faults_start
 from glotouch_bt.validation.faults import trial as faults_trial
-from glotouch_bt.validation.faults.campaign import Campaign, run_campaign
+from glotouch_bt.validation.faults.campaign import FaultCampaign, run_campaign
 from glotouch_bt.validation.faults.cases import CASES, SKILLS, Case, chosen_cases
 from glotouch_bt.validation.faults.exhaustive import Exhaustive, run_exhaustive
 from glotouch_bt.validation.faults.trial import drawn_after_s, verdict
@@ -117,7 +117,7 @@ def made_up(request: RunRequest, *other: Any) -> Any:
 def test_a_campaign_counts_every_trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(faults_trial, "_launched", made_up)
     monkeypatch.setattr(faults_trial, "durations", lambda folder: dict.fromkeys(("squeeze", "grasp", "lift"), 5.0))
-    campaign = Campaign(
+    campaign = FaultCampaign(
         mission="retrieve",
         settings={},
         cases=chosen_cases(["wrench_bias", "exception"]),

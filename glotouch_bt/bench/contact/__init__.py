@@ -1,6 +1,6 @@
-"""TODO door of glotouch_bt/bench/contact."""
+"""`bench contact`: trace a calibration square and compare it with the truth."""
 
-from glotouch_bt.bench.contact.bench import METRICS, Campaign, run_campaign
+from glotouch_bt.bench.contact.bench import METRICS, ContactCampaign, run_campaign
 from glotouch_bt.bench.contact.square import TOOLS
 
-__all__ = ["METRICS", "TOOLS", "Campaign", "run_campaign"]
+__all__ = ["METRICS", "TOOLS", "ContactCampaign", "run_campaign"]

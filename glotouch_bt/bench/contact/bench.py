@@ -1,8 +1,8 @@
-"""`bench contact`: a calibration square traced by the probe and by the bare gripper (paper, contact-mode validation).
+"""`bench contact`: trace a calibration square with the probe and the bare gripper (paper, contact-mode validation).
 
-Both modes run the mission's own sweep and trace. All errors are taken in the arm's base frame B: what the robot
-believes in K is brought there by the registration it was given, so that only touching is judged. The headline is the
-square bolted to the floor; the same free to be pushed is the second table.
+Both modes run the mission's own sweep and trace. Errors are computed in the base frame B: estimates in K are transformed
+with the registration given to the robot, so registration errors do not count. The first table has the square bolted to
+the floor, the second has it free.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ COLUMNS = (
 
 
 @dataclass(frozen=True)
-class Campaign:
-    """What shall be tried.
+class ContactCampaign:
+    """Settings of the campaign.
 
     Attributes:
         seeds: Seeds of the trials; each draws the square's pose and every disturbance.
         conditions: Path or shipped name.
         per_side: Contacts made for each side of the square.
         backend: Registered name; it must know the option `fixed`.
-        out: Folder of the campaign; each trial's run folder goes below it.
+        out: Folder of the campaign; it receives a run folder for each trial.
     """
 
     seeds: tuple[int, ...]
@@ -77,7 +77,7 @@ class Campaign:
 
 
 def run_trial(tool: Tool, fixed: bool, request: RunRequest) -> dict[str, Any]:
-    """One trial in this process, as a row. Whatever goes wrong is a row, never an exception of the campaign."""
+    """Run one trial in this process and return its row. A failure becomes a row, never an exception."""
     row: dict[str, Any] = {"tool": tool, "square": "fixed" if fixed else "free", "seed": request.seed}
     row["folder"] = request.out and request.out.name
     try:
@@ -102,7 +102,7 @@ def _fault(e: Exception) -> dict[str, Any]:
 
 
 def score(record: RunRecord, traced: TracedSquare) -> dict[str, Any]:
-    """The paper's five figures and ours, in mm and degrees."""
+    """Return the paper's five errors and ours, in mm and degrees."""
     before, true = true_square(record, "start"), true_square(record)
     contact = polygon_distance(traced.points_B_m, true.corners_B_m)
     ball = polygon_distance(traced.tips_B_m, true.corners_B_m) - traced.tip_radius_m
@@ -130,18 +130,18 @@ def score(record: RunRecord, traced: TracedSquare) -> dict[str, Any]:
 
 
 def true_tip_P_m(record: RunRecord) -> Array:
-    """(3,) where the ball really was in P at the end of the run."""
+    """Return the true position (3,) of the ball in P at the end of the run."""
     hand = Pose(record.samples["position_B_P"][-1], record.samples["quat_B_P"][-1])
     return hand.inverse().apply(np.array(record.truth["tip_B_m"], dtype=np.float64))
 
 
 def run_campaign(
-    campaign: Campaign, executor: Executor, on_row: Callable[[dict[str, Any], int, int], None] | None = None
+    campaign: ContactCampaign, executor: Executor, on_row: Callable[[dict[str, Any], int, int], None] | None = None
 ) -> dict[str, Any]:
-    """Run every trial on the executor; writes trials.csv, summary.json and two plots, returns the summary (DESIGN 7).
+    """Run every trial on the executor, write trials.csv, summary.json and two plots and return the summary.
 
     Args:
-        campaign: What to try.
+        campaign: Settings.
         executor: Any `concurrent.futures` executor.
         on_row: Called with (row, done, total) after each trial.
     """
@@ -172,7 +172,7 @@ def run_campaign(
 
 
 def summarise(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Means with bootstrap intervals over the traced trials of each tool, and how many were traced at all."""
+    """Return means with bootstrap intervals over the traced trials of each tool, and the rate of traced trials."""
 
     def of(square: str, tool: Tool) -> dict[str, Any]:
         group = [r for r in rows if r["square"] == square and r["tool"] == tool]
@@ -193,5 +193,5 @@ def summarise(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _quarter_deg(angle_rad: float) -> float:
-    """An angle of a square: -45..45 degrees."""
+    """Return an angle modulo the square's symmetry, in -45..45 degrees."""
     return float(np.degrees((angle_rad + np.pi / 4) % (np.pi / 2) - np.pi / 4))

@@ -1,4 +1,4 @@
-"""Pictures of `bench contact`: traces against the truth, and the errors beside the paper's."""
+"""Plots of `bench contact`: traces against the truth, and errors beside the paper's."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LABELS = {
 
 
 def plot_errors(rows: Sequence[Mapping[str, Any]], paper: Mapping[str, Mapping[str, float]], path: Path) -> None:
-    """Box plot of each error, bolted and free, with the paper's mean as a mark."""
+    """Draw a box plot of each error, bolted and free, with the paper's mean as a mark."""
     figure = Figure(figsize=(11, 4.4), layout="constrained")
     for column, square in enumerate(("fixed", "free")):
         axes = figure.add_subplot(1, 2, column + 1)
@@ -53,7 +53,7 @@ def plot_errors(rows: Sequence[Mapping[str, Any]], paper: Mapping[str, Mapping[s
 
 
 def plot_traces(rows: Sequence[Mapping[str, Any]], out: Path) -> None:
-    """A grid of traced squares: truth, contacts and fit, each about the true centre, in mm. Writes traces.png."""
+    """Write traces.png: a grid of traced squares with truth, contacts and fit, centred on the truth, in mm."""
     figure = Figure(figsize=(3.1 * SHOWN, 3.2 * len(TOOLS)), layout="constrained")
     for line, tool in enumerate(TOOLS):
         good = [r for r in rows if (r["square"], r["tool"]) == ("fixed", tool) and not r["cause"]][:SHOWN]

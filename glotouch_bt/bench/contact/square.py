@@ -1,4 +1,4 @@
-"""The calibration square: its true outline, the square fitted to a run's contacts, and how far points are from it."""
+"""The calibration square: its true outline, the fit to a run's contacts, and point-to-outline distances."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TOOLS: tuple[Tool, ...] = ("probe", "gripper")
 
 @dataclass(frozen=True)
 class TrueSquare:
-    """The upright block as it stands.
+    """True pose and size of the upright block.
 
     Attributes:
         pose_B: Its frame in B, the origin at its middle.
@@ -48,13 +48,13 @@ class TrueSquare:
 
 @dataclass(frozen=True)
 class TracedSquare:
-    """What a run believes, in B.
+    """The square as a run estimated it, in B.
 
     Attributes:
         points_B_m: (k, 2) contact points.
-        tips_B_m: (k, 2) where the tool's reference point was.
+        tips_B_m: (k, 2) positions of the tool's reference point.
         centre_B_m, side_m, yaw_rad: The fitted square: centre (2,), sides (2,) longer first, direction of the longer.
-        tip_radius_m: 0 for a tool that is no ball.
+        tip_radius_m: Radius of the ball; 0 for the fingers.
     """
 
     points_B_m: Array
@@ -73,15 +73,15 @@ def rectangle(centre_m: Array, sides_m: Array, yaw_rad: float) -> Array:
 
 
 def fit_square(places_m: Array, radius_m: float) -> Contour:
-    """The rectangle through contacts: ball centres (k, 2) with the ball's radius, or contact points with 0."""
+    """Fit a rectangle to ball centres (k, 2) with the ball's radius, or to contact points with radius 0."""
     return fit_kind(places_m, radius_m, "box")
 
 
 def traced_square(record: RunRecord, tool: Tool, fixed: bool) -> TracedSquare:
-    """The contacts of the traced candidate and the square through them.
+    """Return the contacts of the traced candidate and the square fitted to them.
 
-    A trace moves its contacts along with an object it pushed. The bolted square was not pushed: its contacts are taken
-    as they were felt.
+    A trace moves its contacts along with an object it pushed. The bolted square cannot move, so its contacts are used
+    uncorrected.
 
     Raises:
         BadInput: The record holds no candidate.
@@ -109,7 +109,7 @@ def traced_square(record: RunRecord, tool: Tool, fixed: bool) -> TracedSquare:
 
 
 def true_square(record: RunRecord, when: Literal["start", "end"] = "end") -> TrueSquare:
-    """The square as it really stood."""
+    """Return the true square at the start or the end of a run."""
     item = record.truth[when][0]
     pose = Pose(np.array(item["pose_B_O"]["position_m"], float), np.array(item["pose_B_O"]["quat"], float))
     world = load_world(WORLD)
@@ -118,7 +118,7 @@ def true_square(record: RunRecord, when: Literal["start", "end"] = "end") -> Tru
 
 
 def polygon_distance(points_m: Array, polygon_m: Array) -> Array:
-    """(n,) signed distance of points (n, 2) from a convex polygon (m, 2), counter-clockwise; negative inside."""
+    """Return signed distances (n,) of points (n, 2) from a counter-clockwise convex polygon (m, 2); negative inside."""
     start = np.asarray(polygon_m, dtype=np.float64)
     edge = np.roll(start, -1, axis=0) - start
     offset = np.asarray(points_m, dtype=np.float64)[:, None] - start
@@ -129,5 +129,5 @@ def polygon_distance(points_m: Array, polygon_m: Array) -> Array:
 
 
 def _planar(pose_B_K: Pose, points_K_m: Array) -> Array:
-    """Points (n, 2) on K's floor, as (n, 2) in B."""
+    """Transform points (n, 2) on K's floor to B, (n, 2)."""
     return pose_B_K.apply(np.column_stack([points_K_m, np.zeros(len(points_K_m))]))[:, :2]

@@ -1,4 +1,4 @@
-"""`bench detection`: the contact guard's operating curve, in synthetic signals and in a simulation."""
+"""`bench detection`: false alarms and sensitivity of the contact guard, on synthetic and simulated signals."""
 
 from glotouch_bt.bench.detection.bench import DetectionStudy, run_study, table
 

@@ -1,4 +1,4 @@
-"""`bench detection`: what is run, and what is written about it."""
+"""Run `bench detection` and write its summary, table and plot."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ COLUMNS = ("part", "conditions", "seed", "kind", "push", "force_N", "count", "n"
 
 @dataclass(frozen=True)
 class DetectionStudy:
-    """What shall be measured.
+    """Settings of the study.
 
     Attributes:
         conditions: Paths or shipped names.
-        seeds: Trials: of synthetic pushes (one each), shares of the synthetic hours, simulated robots.
-        hours: Synthetic signal of each kind of move.
-        minutes: Simulated free motion under guard, over all robots.
-        pushes: Simulated pushes of 0.6 N, over all robots.
-        robots: Simulated robots, on the first seeds.
+        seeds: Seeds of the synthetic pushes (one push each), of the synthetic hours, and of the simulated robots.
+        hours: Hours of synthetic signal for each kind of move.
+        minutes: Minutes of simulated guarded free motion, over all robots.
+        pushes: Number of simulated pushes of 0.6 N, over all robots.
+        robots: Number of simulated robots; they use the first seeds.
         backend: Registered name.
         out: Folder for summary.json, trials.csv and detection.png.
     """
@@ -53,7 +53,7 @@ class DetectionStudy:
 
 
 def run_study(study: DetectionStudy, on_line: Callable[[str], None] = lambda _: None) -> dict[str, Any]:
-    """Run all, write the folder, return the summary: by condition, `synthetic` and `simulated` (see the keys)."""
+    """Run everything, write the folder and return the summary: `synthetic` and `simulated` results by condition."""
     study.out.mkdir(parents=True, exist_ok=True)
     rows: list[dict[str, Any]] = []
     summary: dict[str, Any] = {"guard": asdict(GuardParams()), "seeds": list(study.seeds), "conditions": {}}
@@ -73,7 +73,7 @@ def run_study(study: DetectionStudy, on_line: Callable[[str], None] = lambda _: 
 def _simulated(
     study: DetectionStudy, name: str, rows: list[dict[str, Any]], on_line: Callable[[str], None]
 ) -> tuple[dict[str, Any], RobotDescription]:
-    """Free motion and pushes with the prober on a simulated robot; also the robot's description."""
+    """Measure free motion and pushes with the prober on simulated robots; also return the robot's description."""
     free: list[FreeMotion] = []
     found = early = pushed = 0
     late: list[float] = []
@@ -115,7 +115,7 @@ def _synthetic(
     rows: list[dict[str, Any]],
     on_line: Callable[[str], None],
 ) -> dict[str, Any]:
-    """False alarms, with the inertia taken out and not, and the share of pushes found against their force."""
+    """Measure false alarms with and without inertia compensation, and the share of pushes detected against force."""
     conditions, probe, gripper = load_conditions(name), load_world(WORLD).probe, description.gripper
     tip_P = np.array([0.0, 0.0, probe.grasp_to_tip_m])
     hand = Hand(Carried.hand(gripper, probe), tip_P, gripper.pose_E_P)
@@ -141,7 +141,7 @@ def _synthetic(
 
 
 def _smallest(found: Mapping[str, Any]) -> float | None:
-    """Least force from which on at least 99 % are found."""
+    """Return the smallest force above which at least 99 % of pushes are detected."""
     good: float | None = None
     for force in sorted(found, key=float, reverse=True):
         if found[force]["rate"] < 0.99:
@@ -155,7 +155,7 @@ def _row(part: str, conditions: str, **values: Any) -> dict[str, Any]:
 
 
 def table(summary: Mapping[str, Any]) -> Sequence[str]:
-    """The summary as lines for a terminal."""
+    """Format the summary as lines for a terminal."""
     lines = []
     for name, both in summary["conditions"].items():
         s, t = both["simulated"], both["synthetic"]
@@ -164,14 +164,14 @@ def table(summary: Mapping[str, Any]) -> Sequence[str]:
             f"{name}",
             f"  simulated: {f['count']} false contacts in {60 * f['hours']:.1f} min under guard, {s['moves']} moves "
             f"(95 %: at most {f['hi']:.2f} an hour)",
-            f"  simulated: a push of 0.6 N found {p['rate']:.1%} of {p['n']} (95 %: at least {p['lo']:.1%})",
+            f"  simulated: a push of 0.6 N detected in {p['rate']:.1%} of {p['n']} (95 %: at least {p['lo']:.1%})",
         ]
         for kind, r in t["false_alarms"].items():
             raw = t["uncompensated"][kind]
             lines.append(
                 f"  synthetic {kind}: {r['count']} false in {r['hours']:.1f} h (95 %: {r['lo']:.2f}-{r['hi']:.2f} "
-                f"an hour); inertia left in: {raw['rate']:.0f} an hour"
+                f"an hour); without inertia compensation: {raw['rate']:.0f} an hour"
             )
         smallest = ", ".join(f"{k} {v if v is not None else 'none'} N" for k, v in t["smallest_N"].items())
-        lines.append(f"  found from: {smallest}")
+        lines.append(f"  detected from: {smallest}")
     return lines

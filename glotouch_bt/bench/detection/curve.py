@@ -1,4 +1,4 @@
-"""The operating curve in synthetic signals: false alarms in free motion, and the force that is found."""
+"""The guard's operating curve on synthetic signals: false alarms in free motion, and detected forces."""
 
 from __future__ import annotations
 
@@ -15,14 +15,17 @@ from glotouch_bt.perception.touch import GuardParams
 from glotouch_bt.robot import Array, Conditions
 
 Push = Literal["step", "slow"]
-"""step: the whole force from one sample to the next; slow: it grows evenly for `SLOW_S`."""
-SLOW_S, HELD_S = 0.5, 0.3
-"""How long a slow push grows, and how long every push is held after that."""
+"""`step`: the whole force within one sample. `slow`: a linear ramp of `SLOW_S`."""
+SLOW_S = 0.5
+"""Ramp time of a slow push."""
+HELD_S = 0.3
+"""Time every push is held at full force."""
 PUSH_AFTER_S = 0.5
+"""Time from the start of a move to the push."""
 
 
 class PerHour(TypedDict):
-    """Events per hour with their exact 95 % Poisson interval."""
+    """Events per hour with the exact 95 % Poisson interval."""
 
     rate: float
     lo: float
@@ -32,7 +35,7 @@ class PerHour(TypedDict):
 
 
 def per_hour(count: int, hours: float) -> PerHour:
-    """Garwood's interval (Biometrika 28, 1936): half the chi-square quantiles of 2k and 2k + 2 degrees of freedom."""
+    """Return the rate with its interval (Garwood, Biometrika 28, 1936): half the chi-square quantiles of 2k and 2k + 2 degrees of freedom."""
     if hours <= 0:
         return {"rate": float("nan"), "lo": 0.0, "hi": float("inf"), "count": count, "hours": hours}
     lo = 0.5 * float(chi2.ppf(0.025, 2 * count)) if count else 0.0
@@ -42,14 +45,14 @@ def per_hour(count: int, hours: float) -> PerHour:
 
 @dataclass(frozen=True)
 class Pace:
-    """Acceleration and jerk while a guard listens."""
+    """Acceleration and jerk of a guarded move."""
 
     acceleration_m_s2: float
     jerk_m_s3: float
 
 
 def draw_move(kind: MoveKind, pace: Pace, rng: np.random.Generator) -> FreeMove:
-    """A move as exploration makes them: sweeps of 50-350 mm at 40-50 mm/s, steps of 10-30, 20-110 mm down."""
+    """Draw a move like those of exploration: sweeps of 50-350 mm at 40-50 mm/s, steps of 10-30 mm, 20-110 mm down."""
     bearing = rng.uniform(0.0, 2 * np.pi)
     across = np.array([np.cos(bearing), np.sin(bearing), 0.0])
     low, high, slowest, fastest = {
@@ -78,7 +81,7 @@ def false_alarms(
     hours: float,
     compensate: bool = True,
 ) -> dict[MoveKind, PerHour]:
-    """Contacts reported per hour of listening in free motion, by kind of move; `hours` of each kind over all seeds."""
+    """Return contacts reported per hour of guarded free motion, by kind of move; `hours` for each kind."""
     found: dict[MoveKind, PerHour] = {}
     for kind in get_args(MoveKind):
         count, heard_s = 0, 0.0
@@ -96,7 +99,7 @@ def false_alarms(
 
 
 def force_of(push: Push, force_N: float, against_B: Array) -> Array:
-    """(n, 3) force on the ball in B, from the start of a move."""
+    """Return the force (n, 3) on the ball in B, from the start of a move."""
     before = np.zeros(round(PUSH_AFTER_S * RATE_HZ))
     growing = np.linspace(0.0, 1.0, round(SLOW_S * RATE_HZ)) if push == "slow" else np.zeros(0)
     held = np.ones(round(HELD_S * RATE_HZ))
@@ -113,7 +116,7 @@ def found_share(
     force_N: float,
     seeds: Sequence[int],
 ) -> Rate:
-    """Share of pushes of `force_N` that are found while they last, one a seed; an alarm before the push is a miss."""
+    """Return the share of pushes of `force_N` detected while they last, one push a seed. An earlier alarm is a miss."""
     hits = 0
     for seed in seeds:
         rng = np.random.default_rng([seed, 7])

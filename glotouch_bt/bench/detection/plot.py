@@ -1,4 +1,4 @@
-"""The operating curve as a picture."""
+"""Plot of the operating curve."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ COLOURS = {"sweep": "tab:blue", "step": "tab:green", "down": "tab:red"}
 
 
 def plot_curves(summary: Mapping[str, Any], path: Path) -> None:
-    """Share of pushes found against their force, a panel a condition; Wilson 95 % bands. Writes a PNG."""
+    """Write a PNG of the share of detected pushes against force, one panel a condition, with Wilson 95 % bands."""
     from matplotlib.figure import Figure
 
     conditions = summary["conditions"]

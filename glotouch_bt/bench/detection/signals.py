@@ -1,8 +1,8 @@
-"""What a wrist sensor reports of one guarded move, made without a simulator: hours of signal in seconds.
+"""Synthetic wrist signals of guarded moves, without a simulator: hours of signal in seconds.
 
 Modelled: white noise, drift, latency, and the inertia of the carried tool, whose true mass and centre of mass differ
-from the believed ones by the condition's payload error. Not modelled: the arm's own vibration and what its servo adds;
-the simulated half of the study has them.
+from the configured ones by the condition's payload error. Not modelled: vibration of the arm and its servo; the
+simulated half of the study has them.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from glotouch_bt.robot import Array, Conditions, GripperState, Observation, Pose
 
 RATE_HZ, PERIOD_S = 1000.0, 0.01
 REST = 120
-"""Samples at rest before the move, for the baseline."""
+"""Number of samples at rest before the move, for the baseline."""
 R_B_S = np.diag([1.0, -1.0, -1.0])
-"""The hand points down."""
+"""Rotation of the sensor frame when the hand points down."""
 
 MoveKind = Literal["sweep", "step", "down"]
-"""sweep: across, what opposes the motion counts; step: across, any touch counts; down: along the probe."""
+"""`sweep`: sideways, forces against the motion count. `step`: sideways, any force counts. `down`: along the probe."""
 
 
 @dataclass(frozen=True)
 class Hand:
-    """What the signals are of.
+    """The hand and tool that the signals belong to.
 
     Attributes:
-        carried: What hangs below the wrist, as believed.
+        carried: Configured mass and centre of mass below the wrist.
         tip_P_m: (3,) the ball's centre in P.
         pose_E_P: P in E.
     """
@@ -51,8 +51,8 @@ class FreeMove:
     """One straight move from rest to rest.
 
     Attributes:
-        kind: Who listens how.
-        length_m, speed_m_s, acceleration_m_s2, jerk_m_s3: Of its profile.
+        kind: Kind of move, which selects the guard.
+        length_m, speed_m_s, acceleration_m_s2, jerk_m_s3: Motion profile.
         direction_B: (3,) unit.
     """
 
@@ -65,20 +65,20 @@ class FreeMove:
 
 
 def wrong(carried: Carried, conditions: Conditions, rng: np.random.Generator) -> Carried:
-    """What is truly carried, if `carried` is believed."""
+    """Draw the true payload for a configured one."""
     mass = carried.mass_kg * (1.0 + conditions.payload_mass_error * rng.standard_normal())
     return Carried(mass, carried.com_S_m + conditions.payload_com_error_m * rng.standard_normal(3))
 
 
 class Wrist:
-    """One trial's sensor: its drift and the tool's true mass last over all moves.
+    """Wrist sensor of one trial; drift and true payload persist over its moves.
 
     Args:
-        hand: As believed.
+        hand: As configured.
         conditions: Disturbances.
-        params: The guard's; its latency is what is believed.
-        compensate: Take the inertia of the measured motion out, as the prober does.
-        rng: Of this trial.
+        params: Parameters of the guard, with the configured latency.
+        compensate: Subtract the inertial wrench of the measured motion, as the prober does.
+        rng: Random stream of this trial.
     """
 
     def __init__(
@@ -90,12 +90,11 @@ class Wrist:
         self._drift_sd = conditions.force_drift_N_per_sqrt_min * np.sqrt(1.0 / RATE_HZ / 60.0)
 
     def listen(self, move: FreeMove, touch_B_N: Array | None = None) -> tuple[Onset | None, float]:
-        """One move under guard; its onset and how long it listened, s.
+        """Simulate one guarded move; return its onset and the guarded time, s.
 
         Args:
             move: The move.
-            touch_B_N: (k, 3) force on the ball in B from the move's first sample on, or None; what is longer than the
-                move is cut off.
+            touch_B_N: (k, 3) force on the ball in B from the first sample of the move, or None; truncated to the move.
         """
         profile = rest_to_rest(move.length_m, move.speed_m_s, move.acceleration_m_s2, move.jerk_m_s3, PERIOD_S)
         n = round(len(profile.a) * PERIOD_S * RATE_HZ)
@@ -124,20 +123,20 @@ class Wrist:
         return guard(_block(wrench[REST:], move, along)), n / RATE_HZ
 
     def _sensed(self, true: Array) -> Array:
-        """(n, 6) reported for true wrenches (n, 6)."""
+        """Return the reported wrenches (n, 6) for true wrenches (n, 6)."""
         noise = self._rng.standard_normal((len(true), 6)) * self._sd
         noise[:, :3] += np.cumsum(self._rng.standard_normal((len(true), 3)) * self._drift_sd, axis=0)
         return np.asarray(_late(true, self._c.wrench_latency_s) + noise)
 
 
 def _late(values: Array, latency_s: float) -> Array:
-    """The same series (n, ...) a whole number of samples later, its first value before."""
+    """Delay a series (n, ...) by a whole number of samples, repeating its first value."""
     k = round(latency_s * RATE_HZ)
     return values if k == 0 else np.concatenate([np.repeat(values[:1], k, axis=0), values[:-k]])
 
 
 def _block(wrench: Array, move: FreeMove, along_m_s2: Array) -> Observation:
-    """All samples of the move as one block."""
+    """Pack all samples of the move into one block."""
     n = len(wrench)
     stamps = np.arange(1, n + 1) / RATE_HZ
     way = np.cumsum(np.cumsum(along_m_s2)) / RATE_HZ**2

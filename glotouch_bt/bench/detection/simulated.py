@@ -1,4 +1,4 @@
-"""The guard at work in a simulation: the real prober in free motion, and pushed at the ball by a known force."""
+"""The contact guard in simulation: the real prober in free motion, and with a known force on the ball."""
 
 from __future__ import annotations
 
@@ -21,23 +21,25 @@ from glotouch_bt.skill import Context
 from glotouch_bt.skill.probing import HeldTool, Probed, Prober
 
 WORLD, CORNER_K = "container_five", (0.075, 0.13, 0.0)
-"""One object of the world, out of the way, in a corner of the container."""
-LOW_M, HIGH_M = 0.03, 0.12
-"""Heights of the ball above the floor in free motion."""
+"""World, and the pose of its only object, in a corner out of the way."""
+LOW_M = 0.03
+"""Lowest height of the ball above the floor in free motion."""
+HIGH_M = 0.12
+"""Greatest height of the ball above the floor in free motion."""
 CLEAR_M = 0.03
-"""Kept from walls, and from the half in which the object stands."""
+"""Clearance from the walls and from the half with the object."""
 
 
 @dataclass(frozen=True)
 class PushTrial:
-    """One push at the ball.
+    """Result of one push on the ball.
 
     Attributes:
-        force_N: Its size.
-        kind: `across` or `down`, how the ball moved.
-        found: The prober reported a contact while it lasted.
-        early: The prober reported one before it.
-        late_s: From the push's beginning to the onset the prober dated; NaN if not found.
+        force_N: Magnitude.
+        kind: Motion of the ball, `across` or `down`.
+        found: The prober reported a contact during the push.
+        early: The prober reported a contact before the push.
+        late_s: Delay from the start of the push to the dated onset; NaN if not found.
     """
 
     force_N: float
@@ -48,11 +50,11 @@ class PushTrial:
 
 
 class Rig:
-    """A simulated robot with the probe in its hand.
+    """A simulated robot that holds the probe.
 
     Args:
         conditions: Path or shipped name.
-        seed: Of the trial.
+        seed: Seed of the trial.
         backend: Registered name.
 
     Raises:
@@ -79,7 +81,7 @@ class Rig:
         self.prober = Prober(self.context, self.tool, GuardParams(), carried=carried)
 
     def event(self, kind: str, stamp_s: float, data: Mapping[str, object]) -> None:
-        """Nobody reads along."""
+        """Discard the event."""
 
     def _pick_up(self) -> HeldTool:
         pickup = SkillShelf()["tool_pickup"]
@@ -100,7 +102,7 @@ class Rig:
         return tool
 
     def go(self, motion: Motion[Any], before: Callable[[Observation], None] | None = None) -> Any:
-        """Drive a motion to its end; `before` is called with the newest observation before each period."""
+        """Run a motion to its end; call `before` with the newest observation before each period."""
         try:
             command = next(motion)
             while True:
@@ -112,7 +114,7 @@ class Rig:
             return end.value
 
     def place(self, low_m: float = LOW_M) -> Array:
-        """(3,) a random place of the ball in the empty half of the container, in K."""
+        """Draw a position (3,) of the ball in the empty half of the container, in K."""
         half = 0.5 * np.array(self.world.container.interior_m[:2]) - CLEAR_M
         x, y = self.rng.uniform(-half, [half[0], CORNER_K[1] - 3 * CLEAR_M])
         return np.array([x, y, self.rng.uniform(low_m, HIGH_M)])
@@ -120,12 +122,12 @@ class Rig:
 
 @dataclass(frozen=True)
 class FreeMotion:
-    """Guarded moves in free space.
+    """Counts of guarded moves in free space.
 
     Attributes:
-        false_contacts: How many of them reported one.
-        moves: How many there were.
-        guarded_s, total_s: Simulated time while a guard listened, and in all.
+        false_contacts: Number of moves that reported a contact.
+        moves: Number of moves.
+        guarded_s, total_s: Guarded and total simulated time.
     """
 
     false_contacts: int
@@ -135,7 +137,7 @@ class FreeMotion:
 
 
 def free_motion(rig: Rig, guarded_for_s: float) -> FreeMotion:
-    """Sweeps, steps and ways up and down at exploration speeds, 40-50 mm/s, until so much of it was under guard."""
+    """Make sweeps, steps and vertical moves at exploration speeds, 40-50 mm/s, for `guarded_for_s` of guarded time."""
     rig.go(rig.prober.hop(rig.place(), HIGH_M, 0.10))
     began = rig.context.observation.now_s
     false, moves, guarded_s = 0, 0, 0.0
@@ -161,7 +163,7 @@ def free_motion(rig: Rig, guarded_for_s: float) -> FreeMotion:
 
 
 def push_once(rig: Rig, force_N: float, kind: str, grows_s: float) -> PushTrial:
-    """A guarded move of 50 mm, across or down, against which a force grows on the ball from a random time on."""
+    """Make a guarded move of 50 mm, across or down, while a force ramps up on the ball from a random time."""
     while True:
         start = np.array([*rig.place()[:2], HIGH_M])
         bearing = rig.rng.uniform(0.0, 2 * np.pi)

@@ -1,6 +1,6 @@
-"""`bench match`: TouchSets recorded by the real skills, and how well matchers tell the target from them."""
+"""`bench match`: how well matchers tell the target from other objects, on TouchSets of the real skills."""
 
-from glotouch_bt.bench.match.bench import Campaign, run_campaign
+from glotouch_bt.bench.match.bench import MatchCampaign, run_campaign
 from glotouch_bt.bench.match.methods import chosen
 
-__all__ = ["Campaign", "chosen", "run_campaign"]
+__all__ = ["MatchCampaign", "chosen", "run_campaign"]

@@ -1,4 +1,4 @@
-"""Acquire TouchSets: run the mission that squeezes every candidate, read its record, label it with the truth."""
+"""Acquire TouchSets: run a mission that squeezes every candidate, read its record and label it with the truth."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from glotouch_bt.robot import Array, BadInput, Pose
 from glotouch_bt.run import RunRequest, launch
 
 NEAREST_M = 0.025
-"""A candidate whose contour's centre is farther than this from every object's middle is of none (as in `search`)."""
+"""A candidate whose contour centre is farther than this from every object's centre belongs to no object."""
 
 
 @dataclass(frozen=True)
 class TrueStand:
-    """One object at the start and at the end: (x, y, yaw) in K, and how far it leans at the end."""
+    """Pose of one object at the start and the end: (x, y, yaw) in K, and its tilt at the end."""
 
     name: str
     start: Planar
@@ -32,10 +32,10 @@ class TrueStand:
 
 
 def acquire_layout(request: RunRequest, dataset: Path) -> Layout:
-    """Run the mission, write the layout's files, return the layout. A mission that fails leaves what was felt before.
+    """Run the mission, write the layout's files and return the layout. A failed mission keeps the TouchSets it made.
 
     Raises:
-        BadInput: The request is wrong, or the backend tells no truth.
+        BadInput: The request is wrong, or the backend has no referee.
         BackendError: The backend did not open.
     """
     done = launch(request)
@@ -45,9 +45,9 @@ def acquire_layout(request: RunRequest, dataset: Path) -> Layout:
 
 
 def layout_of(record: RunRecord) -> Layout:
-    """The TouchSets of a recorded run, labelled. Depth maps are exact to the record's micrometre.
+    """Return the labelled TouchSets of a recorded run. Depth maps are exact to the record's micrometre.
 
-    Those on which no closure came to rest are left out, for `match` never sees them.
+    TouchSets without a stable closure are left out, because `match` never receives them.
 
     Raises:
         BadInput: The record has no truth beside it.
@@ -69,7 +69,7 @@ def layout_of(record: RunRecord) -> Layout:
 
 
 def label(touchset: TouchSet, stands: list[TrueStand]) -> Touched:
-    """With the nearest object, where it stood at first or last; none within `NEAREST_M` is no object."""
+    """Label a TouchSet with the nearest object, at its first or last pose; None beyond `NEAREST_M`."""
     centre = np.asarray(touchset.candidate.contour.centre_K_m)
     gaps = [min(float(np.hypot(*(centre - p[:2]))) for p in (s.start, s.end)) for s in stands]
     if not gaps or min(gaps) > NEAREST_M:
@@ -79,7 +79,7 @@ def label(touchset: TouchSet, stands: list[TrueStand]) -> Touched:
 
 
 def true_stands(truth: Mapping[str, Any], pose_B_K: Pose) -> list[TrueStand]:
-    """The objects of a truth.json in the container frame the robot was told."""
+    """Return the objects of a truth.json in the container frame given to the robot."""
     to_K = pose_B_K.inverse()
 
     def in_K(entry: Mapping[str, Any]) -> Pose:
@@ -102,11 +102,11 @@ def _tilt(pose: Pose) -> float:
 
 
 def from_json(hint: Any, value: Any) -> Any:
-    """A recorded value as what it was: `mission.mcap_json.to_json` backwards, by the type that is wanted.
+    """Convert recorded JSON back to a value: the inverse of `record.to_json`, guided by the type.
 
     Args:
         hint: A dataclass, or the type of one of its fields.
-        value: Plain JSON; null stands for NaN where a number is wanted. Unknown keys are passed over.
+        value: Plain JSON; null means NaN where a number is expected. Unknown keys are ignored.
     """
     if dataclasses.is_dataclass(hint) and isinstance(hint, type):
         hints = get_type_hints(hint)
@@ -128,5 +128,5 @@ def from_json(hint: Any, value: Any) -> Any:
 
 
 def _is_default(field: dataclasses.Field[Any], value: Mapping[str, Any]) -> bool:
-    """An empty list tells nothing of an array's shape; the field's default does."""
+    """Tell an empty array field from one with data: an empty list has no shape, the default has."""
     return value[field.name] == [] and field.default_factory is not dataclasses.MISSING

@@ -1,4 +1,4 @@
-"""`bench match`: TouchSets acquired by the real skills, or recorded before; every matcher decides on all of them."""
+"""Run `bench match`: acquire TouchSets with the real skills, or read recorded ones, and let every matcher decide."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ from glotouch_bt.robot.scene import load_folder, stream
 from glotouch_bt.run import RunRequest
 
 IN_THE_BOX = 5
-"""Objects of a layout; a folder with more of them lends as many, drawn anew by every seed."""
+"""Objects in a layout. From a larger folder, each seed draws this many."""
 LAYOUT_COLUMNS = ("seed", "conditions", "ended", "objects", "touched", "nameless", "closures", "stable", "sim_s")
 OnRow = Callable[[Mapping[str, Any], int, int], None]
 
 
 @dataclass(frozen=True)
-class Campaign:
-    """What shall be tried.
+class MatchCampaign:
+    """Settings of the campaign.
 
     Attributes:
-        seeds: One layout each; with `dataset`, how many of its layouts are taken, from the first.
+        seeds: One layout each; with `dataset`, their number is the number of layouts to read.
         conditions: Path or shipped name.
         objects: Folder of STL files instead of the world's.
-        strangers: Folder of STL files that are not in the box, as targets; None to try none.
-        dataset: Folder of recorded TouchSets, instead of acquiring; `seeds` and `conditions` are then its own.
-        methods: Names of what is compared.
+        strangers: Folder of STL files that are never in the box, used as absent targets; or None.
+        dataset: Folder of recorded TouchSets to use instead of acquiring; it defines `seeds` and `conditions`.
+        methods: Names of the matchers to compare.
         backend: Registered name of a simulation.
         out: Folder of the campaign.
         mission: Path or shipped name of a mission that squeezes every candidate.
@@ -59,7 +59,7 @@ class Campaign:
 
     @property
     def folder(self) -> Path:
-        """Where the STLs are.
+        """Return the folder of the STLs.
 
         Raises:
             BadInput: No such folder.
@@ -67,7 +67,7 @@ class Campaign:
         return load_mission(self.mission, {}, objects=self.objects).world.objects.folder
 
     def check(self) -> None:
-        """All that can be known to be wrong before anything is written.
+        """Check the settings before anything is written.
 
         Raises:
             BadInput: A folder holds nothing usable.
@@ -79,7 +79,7 @@ class Campaign:
             layout_files(self.dataset)
 
     def request(self, seed: int) -> RunRequest:
-        """The mission that acquires a layout; makes the folder of its objects if that is not the given one."""
+        """Return the mission request for a layout; create its folder of objects if it is a drawn subset."""
         box = objects_of(self.folder, seed, self.out / "objects") if self.objects else None
         count = len(list((box or self.folder).glob("*.[sS][tT][lL]")))
         return RunRequest(
@@ -89,7 +89,7 @@ class Campaign:
 
 
 def objects_of(folder: Path, seed: int, copies: Path) -> Path:
-    """The folder itself, or one below `copies` with `IN_THE_BOX` of its STLs, drawn by the seed."""
+    """Return the folder, or one below `copies` with `IN_THE_BOX` of its STLs drawn by the seed."""
     files = sorted(p for p in folder.iterdir() if p.suffix.lower() == ".stl")
     if len(files) <= IN_THE_BOX:
         return folder
@@ -100,8 +100,8 @@ def objects_of(folder: Path, seed: int, copies: Path) -> Path:
     return mine
 
 
-def layout_task(campaign: Campaign, seed: int, file: Path | None) -> dict[str, Any]:
-    """Acquire (or read) one layout and decide on it. What goes wrong in acquiring is a row; a wrong input raises.
+def layout_task(campaign: MatchCampaign, seed: int, file: Path | None) -> dict[str, Any]:
+    """Acquire or read one layout and decide on it. A failed acquisition is a row; bad input raises.
 
     Raises:
         BadInput: The recording or an STL cannot be used.
@@ -129,20 +129,20 @@ def layout_task(campaign: Campaign, seed: int, file: Path | None) -> dict[str, A
 
 
 def timing_task(files: Sequence[Path], folder: Path, names: Sequence[str]) -> dict[str, Any]:
-    """`time_matching` on recorded layouts."""
+    """Run `time_matching` on recorded layouts."""
     return time_matching([read_layout(f) for f in files], folder, names)
 
 
-def run_campaign(campaign: Campaign, executor: Executor, on_row: OnRow | None = None) -> dict[str, Any]:
-    """Decide on every layout; writes CSVs, plots and summary.json, returns the summary (DESIGN 7).
+def run_campaign(campaign: MatchCampaign, executor: Executor, on_row: OnRow | None = None) -> dict[str, Any]:
+    """Decide on every layout, write CSVs, plots and summary.json, and return the summary.
 
     Args:
-        campaign: What to try.
+        campaign: Settings.
         executor: Any `concurrent.futures` executor.
-        on_row: Called with (row, done, total) after each layout; the row says how many decisions were right.
+        on_row: Called with (row, done, total) after each layout; the row has the number of correct decisions.
 
     Raises:
-        BadInput: Something given cannot be used.
+        BadInput: A setting cannot be used.
     """
     campaign.check()
     campaign.out.mkdir(parents=True, exist_ok=True)
@@ -198,7 +198,7 @@ def _progress(done: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _finite(value: Any) -> Any:
-    """With null for what is not a number, as JSON has it."""
+    """Replace non-finite numbers by None, for JSON."""
     if isinstance(value, Mapping):
         return {k: _finite(v) for k, v in value.items()}
     if isinstance(value, list | tuple):

@@ -1,7 +1,7 @@
-"""Touches to confidence: recorded closures are shown to the matcher one after another until it is sure.
+"""Closures to confidence: feed recorded closures to the matcher one after another until it is confident.
 
-Every candidate's contour and top are known from the beginning. This replays a recording, so a closure feels what it
-felt when it was recorded, whatever is shown before it; a skill that chooses for itself is not bound to it.
+Every candidate's contour and top are known from the start. A replayed closure always gives its recorded result,
+whatever was fed before it; a real skill that chooses its closures would move the objects differently.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ CLOSURE_COLUMNS = (
 
 @dataclass(frozen=True, order=True)
 class Shown:
-    """One recorded closure by its places: touched candidate, sequence, layer."""
+    """Index of one recorded closure: touched candidate, sequence, layer."""
 
     candidate: int
     sequence: int
@@ -33,11 +33,11 @@ class Shown:
 
 
 Choice = Callable[[Sequence[Shown], Sequence[TouchSet], Belief], int]
-"""(what is left, everything recorded, the belief after what was shown) -> which of what is left comes next."""
+"""(remaining closures, all TouchSets, belief so far) -> index of the next closure."""
 
 
 def recorded_closures(touchsets: Sequence[TouchSet]) -> list[Shown]:
-    """All closures in the order they were made."""
+    """Return all closures in the order they were made."""
     return [
         Shown(i, j, k)
         for i, t in enumerate(touchsets)
@@ -47,7 +47,7 @@ def recorded_closures(touchsets: Sequence[TouchSet]) -> list[Shown]:
 
 
 def partial(touchset: TouchSet, shown: Sequence[Shown]) -> TouchSet:
-    """The TouchSet with those closures alone; sequences without any are left out."""
+    """Return the TouchSet reduced to the given closures; empty sequences are left out."""
     kept: dict[int, list[int]] = {}
     for s in sorted(shown):
         kept.setdefault(s.sequence, []).append(s.layer)
@@ -59,12 +59,12 @@ def partial(touchset: TouchSet, shown: Sequence[Shown]) -> TouchSet:
 
 
 def in_order(left: Sequence[Shown], whole: Sequence[TouchSet], belief: Belief) -> int:
-    """The fixed scheme: candidate after candidate, as recorded."""
+    """Choose the next closure of the fixed scheme: candidate after candidate, as recorded."""
     return 0
 
 
 def in_turn(left: Sequence[Shown], whole: Sequence[TouchSet], belief: Belief) -> int:
-    """One closure of each candidate in turn."""
+    """Choose one closure of each candidate in turn."""
     total = [len(t.layers) for t in whole]
     remain = [sum(s.candidate == i for s in left) for i in range(len(whole))]
     done = [n - m if m else np.inf for n, m in zip(total, remain, strict=True)]
@@ -72,26 +72,26 @@ def in_turn(left: Sequence[Shown], whole: Sequence[TouchSet], belief: Belief) ->
     return next(i for i, s in enumerate(left) if s.candidate == turn)
 
 
-def most_telling(left: Sequence[Shown], whole: Sequence[TouchSet], belief: Belief) -> int:
-    """The recorded closure with the greatest expected information gain."""
+def most_informative(left: Sequence[Shown], whole: Sequence[TouchSet], belief: Belief) -> int:
+    """Choose the closure with the greatest expected information gain."""
     return int(np.argmax(expected_gain(belief, [closure_of(whole[s.candidate], s) for s in left])))
 
 
 def closure_of(touchset: TouchSet, shown: Shown) -> Closure:
-    """Where a recorded closure was made."""
+    """Return the position and yaw of a recorded closure."""
     layer = touchset.sequences[shown.sequence].layers[shown.layer]
     return Closure(touchset.candidate.index, layer.yaw_rad, layer.height_m, np.asarray(layer.position_K_m))
 
 
-ORDERS: dict[str, Choice] = {"recorded": in_order, "in_turn": in_turn, "adaptive": most_telling}
+ORDERS: dict[str, Choice] = {"recorded": in_order, "in_turn": in_turn, "adaptive": most_informative}
 
 
 def closures_to_confidence(layout: Layout, models: Mapping[str, TargetModel]) -> list[dict[str, Any]]:
-    """A row an order and target: after how many closures the best is accepted with P > `CONFIDENT`, and if rightly.
+    """Return a row for each order and target: closures until acceptance with P > `CONFIDENT`, and correctness.
 
-    A target that is never sure has `confident` False and all its closures counted; `right` and `accepted` are then of
-    the last ranking.
-    Each is replayed once more with the target's own TouchSets taken away (`present` False): whatever is taken is wrong.
+    A target that never reaches it has `confident` False and all closures counted; `right` and `accepted` then describe
+    the last ranking. Each is replayed again without the target's own TouchSets (`present` False), where any acceptance
+    is wrong.
     """
     rows = []
     for target, model in models.items():
@@ -128,5 +128,5 @@ def _until_sure(whole: Sequence[TouchSet], model: TargetModel, choose: Choice) -
 
 
 def sure(ranking: Ranking) -> bool:
-    """Accepted, and with the wanted confidence."""
+    """Return True if the best is accepted with P > `CONFIDENT`."""
     return bool(ranking.accepted) and ranking.best.probability > CONFIDENT

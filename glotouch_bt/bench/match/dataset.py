@@ -1,7 +1,7 @@
 """A recorded dataset: a folder with one npz file a TouchSet and one JSON of truth a layout.
 
-`s0020.json` says what stood in the box of seed 20 and which object each `s0020-c<index>.npz` really is. Poses are
-(x, y, yaw) of the mesh's frame in the container frame the robot was told: an error against them is one the grasp has.
+`s0020.json` lists the objects in the box of seed 20 and the true object of each `s0020-c<index>.npz`. Poses are
+(x, y, yaw) of the mesh frame in the container frame given to the robot, so errors against them are grasp errors.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ Planar = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Touched:
-    """One candidate's TouchSet and what it really is.
+    """One candidate's TouchSet with its true object.
 
     Attributes:
-        touchset: What the pads felt.
-        name: The true object's STL stem; None if no object stood where the candidate was found.
-        pose_K_O: Where that object stood when all squeezing was over; None with `name`.
-        tilt_rad: Angle between its z axis and the container's then; None with `name`.
+        touchset: The TouchSet.
+        name: STL stem of the true object; None for a false candidate.
+        pose_K_O: Pose of that object after all squeezing; None if `name` is.
+        tilt_rad: Tilt of its z axis against the container's then; None if `name` is.
     """
 
     touchset: TouchSet
@@ -40,14 +40,14 @@ class Touched:
 
 @dataclass(frozen=True)
 class Layout:
-    """All that was felt in one box.
+    """All labelled TouchSets of one box.
 
     Attributes:
-        seed: Of the trial.
-        conditions: Stem of the profile.
-        objects: Names of what stood in the box.
-        touched: One a squeezed candidate, in the order of squeezing.
-        ended: How the mission ended: "success", or its root reason's code.
+        seed: Seed of the trial.
+        conditions: Name of the profile.
+        objects: Names of the objects in the box.
+        touched: One entry a squeezed candidate, in the order of squeezing.
+        ended: "success", or the root failure code.
         sim_s: Robot time of the mission.
     """
 
@@ -59,12 +59,12 @@ class Layout:
     sim_s: float = float("nan")
 
     def of(self, name: str) -> tuple[int, ...]:
-        """Places in `touched` of an object; empty if it was never squeezed."""
+        """Return the indices in `touched` of an object; empty if it was never squeezed."""
         return tuple(i for i, t in enumerate(self.touched) if t.name == name)
 
 
 def write_layout(folder: Path, layout: Layout) -> Path:
-    """Write one layout's files into a folder, which is made; the JSON comes last, so a layout is whole or not there.
+    """Write one layout's files into a folder, created if needed. The JSON comes last and marks the layout complete.
 
     Raises:
         BadInput: A file cannot be written.
@@ -95,7 +95,7 @@ def write_layout(folder: Path, layout: Layout) -> Path:
 
 
 def layout_files(folder: Path) -> list[Path]:
-    """The JSON files of a dataset's layouts, by seed.
+    """Return the JSON files of a dataset's layouts, by seed.
 
     Raises:
         BadInput: No such folder, or no layout in it.
@@ -107,10 +107,10 @@ def layout_files(folder: Path) -> list[Path]:
 
 
 def read_layout(file: Path) -> Layout:
-    """One layout.
+    """Read one layout.
 
     Raises:
-        BadInput: The JSON or one of its npz files is unreadable, of another version, or says something impossible.
+        BadInput: The JSON or one of its npz files is unreadable, of another version, or inconsistent.
     """
     try:
         content = json.loads(file.read_text())
@@ -141,7 +141,7 @@ def _touched(file: Path, entry: Mapping[str, Any]) -> Touched:
 
 
 def read_dataset(folder: Path, first: int | None = None) -> list[Layout]:
-    """The layouts of a dataset, by seed; at most `first` of them.
+    """Read the layouts of a dataset, by seed; at most `first` of them.
 
     Raises:
         BadInput: As `layout_files` and `read_layout`, or two layouts have the same seed.

@@ -1,4 +1,4 @@
-"""The matchers a study compares, by the names its tables use."""
+"""The matchers to compare, by name."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ Method = Callable[[TargetModel, Sequence[TouchSet]], Ranking]
 
 DEFAULT = "likelihood"
 PAPER_TOP1: Mapping[str, float] = {"paper_width": 0.683, "paper_depth": 0.783, "paper_full": 0.900}
-"""The paper's progressive ablation (row Top-1 on its own objects and robot)."""
+"""Row Top-1 of the paper's ablation, on its own objects and robot."""
 
 
 def methods() -> dict[str, Method]:
-    """Every method by name, in the order of the tables: the paper's ablation, then the matchers of `recognition`."""
+    """Return every method by name: the paper's ablation, then the matchers of `recognition`."""
     steps = dict(zip(PAPER_TOP1, PaperParams().ablation().values(), strict=True))
     made: dict[str, Method] = {name: paper_matcher(params) for name, params in steps.items()}
     return made | {name: matcher for name, matcher in MATCHERS.items() if name != "paper"}
 
 
 def chosen(names: Sequence[str]) -> tuple[str, ...]:
-    """`names` in the order of the tables; all if there are none.
+    """Return `names` in table order; all methods if `names` is empty.
 
     Raises:
         BadInput: One is unknown.

@@ -17,7 +17,7 @@ Row = Mapping[str, Any]
 
 
 def plot_all(folder: Path, summary: Mapping[str, Any], trials: Sequence[Row], closures: Sequence[Row]) -> None:
-    """top1.png, losses.png, reliability.png and closures.png into a folder."""
+    """Write top1.png, losses.png, reliability.png and closures.png into a folder."""
     title = f"{summary['layouts']} layouts, {summary['conditions']}"
     figure, (axes,) = _figure(7.5, 4.2)
     _top1(axes, summary)
@@ -49,7 +49,7 @@ def _figure(width: float, height: float, panels: int = 1) -> tuple[Figure, list[
 
 
 def _top1(axes: Axes, summary: Mapping[str, Any]) -> None:
-    """Row and column Top-1 of each method with Wilson whiskers; the paper's row figures beside."""
+    """Draw row and column Top-1 of each method with Wilson whiskers, and the paper's row figures."""
     names = list(summary["methods"])
     for k, (key, label) in enumerate((("row_top1", "row"), ("col_top1", "column"))):
         rates = [summary["methods"][n][key] for n in names]
@@ -83,7 +83,7 @@ def _losses(axes: Axes, names: Sequence[str], matrix: Sequence[Sequence[float | 
 
 
 def _reliability(axes: Axes, summary: Mapping[str, Any]) -> None:
-    """Share right against said probability; the area of a dot goes with its bin's count."""
+    """Draw the share correct against the stated probability; dot area is proportional to the bin's count."""
     for name, colour in zip(summary["methods"], COLOURS * (1 + len(summary["methods"]) // len(COLOURS)), strict=False):
         ece = summary["methods"][name]["ece"]
         if not ece["bins"]:
@@ -92,7 +92,7 @@ def _reliability(axes: Axes, summary: Mapping[str, Any]) -> None:
         axes.plot(p, hit, "-", color=colour, lw=1, alpha=0.6)
         axes.scatter(p, hit, s=8 + 120 * n / n.sum(), color=colour, label=f"{name}, ECE {ece['value']:.3f}")
     axes.plot([0, 1], [0, 1], "k:", lw=1)
-    axes.set(xlabel="probability of the likeliest answer", ylabel="share right", xlim=(0, 1.02), ylim=(-0.02, 1.04))
+    axes.set(xlabel="probability of the likeliest answer", ylabel="share correct", xlim=(0, 1.02), ylim=(-0.02, 1.04))
     axes.set_title("targets present and absent alike", fontsize=9)
     axes.grid(alpha=0.3)
     if axes.collections:
@@ -100,7 +100,7 @@ def _reliability(axes: Axes, summary: Mapping[str, Any]) -> None:
 
 
 def _scores(axes: Axes, trials: Sequence[Row], summary: Mapping[str, Any]) -> None:
-    """1 - p_absent by kind of trial."""
+    """Draw 1 - p_absent by kind of trial."""
     edges = np.linspace(0, 1, 21).tolist()
     for kind, colour in zip(("present", "absent", "stranger"), COLOURS, strict=False):
         p = np.array([1 - t["p_absent"] for t in trials if t["kind"] == kind])
@@ -116,7 +116,7 @@ def _scores(axes: Axes, trials: Sequence[Row], summary: Mapping[str, Any]) -> No
 
 
 def _closures(axes: Axes, closures: Sequence[Row]) -> None:
-    """Share of decisions that are sure and right after so many closures."""
+    """Draw the share of confident and correct decisions against the number of closures."""
     most = max((c["recorded"] for c in closures), default=1)
     at = np.arange(most + 1)
     for order, colour in zip(dict.fromkeys(c["order"] for c in closures), COLOURS, strict=False):
@@ -126,7 +126,7 @@ def _closures(axes: Axes, closures: Sequence[Row]) -> None:
         mean = np.mean([c["closures"] for c in mine])
         axes.step(at, 100 * share, where="post", color=colour, label=f"{order}, mean {mean:.1f} closures")
     axes.set(
-        xlabel="closures in the whole box", ylabel="accepted, P > .95 and right [%]", ylim=(0, 104), xlim=(0, most)
+        xlabel="closures in the whole box", ylabel="accepted, P > .95 and correct [%]", ylim=(0, 104), xlim=(0, most)
     )
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8, loc="lower right")

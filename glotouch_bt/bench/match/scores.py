@@ -1,4 +1,4 @@
-"""How good probabilities and scores are: calibration, separation, and rates whose trials share a layout. Pure."""
+"""Calibration, separation and rates of decisions whose trials share a layout. Pure."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ RESAMPLES = 1000
 
 
 def reliability(confidence: npt.ArrayLike, right: npt.ArrayLike, bins: int = BINS) -> list[dict[str, float]]:
-    """Mean confidence, share right and count of each bin of equal width over [0, 1] that holds anything.
+    """Return mean confidence, share correct and count of each non-empty bin of equal width over [0, 1].
 
-    A confidence on an edge counts with the bin below it, as in (lo, hi]; 0 with the first (Guo et al., ICML 2017).
+    Bins are (lo, hi]; 0 belongs to the first (Guo et al., ICML 2017).
     """
     p, hit = np.asarray(confidence, dtype=np.float64), np.asarray(right, dtype=np.float64)
     at = bin_of(p, bins)
@@ -36,19 +36,19 @@ def reliability(confidence: npt.ArrayLike, right: npt.ArrayLike, bins: int = BIN
 
 
 def bin_of(confidence: Array, bins: int) -> npt.NDArray[np.int64]:
-    """The bin of each confidence."""
+    """Return the bin of each confidence."""
     return np.clip(np.ceil(confidence * bins).astype(np.int64) - 1, 0, bins - 1)
 
 
 def calibration_error(confidence: npt.ArrayLike, right: npt.ArrayLike, bins: int = BINS) -> float:
-    """Expected calibration error: |share right - mean confidence| of a trial's bin, mean over trials; NaN of none."""
+    """Return the expected calibration error: mean |share correct - mean confidence| of the trials' bins; NaN if empty."""
     found = reliability(confidence, right, bins)
     n = sum(b["n"] for b in found)
     return sum(b["n"] * abs(b["right"] - b["confidence"]) for b in found) / n if n else float("nan")
 
 
 def auroc(positive: npt.ArrayLike, negative: npt.ArrayLike) -> float:
-    """Probability that a positive scores above a negative, ties half (Mann-Whitney); NaN if one side is empty.
+    """Return P(a positive scores above a negative), ties half (Mann-Whitney); NaN if one side is empty.
 
     Scores may be infinite; NaN scores count as lowest.
     """
@@ -64,11 +64,11 @@ def _scores(values: npt.ArrayLike) -> Array:
 
 
 def shared_rate(right: Sequence[bool], layout: npt.ArrayLike) -> dict[str, Any]:
-    """A rate of trials that come in layouts: Wilson as if all were independent, and what does not need that.
+    """Return a rate of trials grouped by layout, with intervals that do and do not assume independence.
 
     Returns:
-        `rate`, `lo`, `hi`, `n` (Wilson 95 %), `by_layout` (percentile bootstrap over whole layouts; of no width if all
-        trials agree, so read it with the next) and `whole_layouts` (Wilson of layouts with every trial right).
+        `rate`, `lo`, `hi`, `n` (Wilson 95 %), `by_layout` (percentile bootstrap over layouts; zero width if all trials
+        agree) and `whole_layouts` (Wilson interval of layouts with every trial correct).
     """
     hit = np.asarray(right, dtype=np.float64)
     draws = Draws.of(layout)
@@ -82,9 +82,9 @@ def shared_rate(right: Sequence[bool], layout: npt.ArrayLike) -> dict[str, Any]:
 def shared_auroc(
     positive: npt.ArrayLike, negative: npt.ArrayLike, layouts: tuple[npt.ArrayLike, npt.ArrayLike]
 ) -> dict[str, Any]:
-    """`auroc` as `value`, with its interval over whole layouts; `layouts` are those of the positives and negatives.
+    """Return `auroc` as `value` with its interval over layouts; `layouts` are those of the positives and negatives.
 
-    Pairs in order are counted between every two layouts once; a draw weighs the counts.
+    Ordered pairs are counted once for every two layouts; each bootstrap draw weights the counts.
     """
     a, b = _scores(positive), _scores(negative)
     of_a, of_b = (np.asarray(x) for x in layouts)
@@ -98,7 +98,7 @@ def shared_auroc(
 
 
 def shared_calibration(confidence: npt.ArrayLike, right: npt.ArrayLike, layout: npt.ArrayLike) -> dict[str, Any]:
-    """`calibration_error` as `value`, with its interval over whole layouts, and the bins of `reliability`."""
+    """Return `calibration_error` as `value` with its interval over layouts, and the bins of `reliability`."""
     p, hit = np.asarray(confidence, dtype=np.float64), np.asarray(right, dtype=np.float64)
     draws = Draws.of(layout)
     binned = (bin_of(p, BINS)[None] == np.arange(BINS)[:, None]) * (hit - p)[None]  # (bins, trials)
@@ -110,12 +110,12 @@ def shared_calibration(confidence: npt.ArrayLike, right: npt.ArrayLike, layout: 
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """Whole layouts drawn with replacement: percentile bootstrap whose units are layouts (B. Efron, 1979). Seeded.
+    """Layouts drawn with replacement: percentile bootstrap over layouts (B. Efron, 1979). Seeded.
 
     Attributes:
-        names: (l,) the layouts.
-        member: (l, n) 1 where a trial is of a layout.
-        weight: (draws, l) how often each was drawn.
+        names: (l,) layouts.
+        member: (l, n) 1 where a trial belongs to a layout.
+        weight: (draws, l) number of times each was drawn.
     """
 
     names: npt.NDArray[Any]
@@ -124,7 +124,7 @@ class Draws:
 
     @classmethod
     def of(cls, layout: npt.ArrayLike, resamples: int = RESAMPLES, seed: int = 0) -> Draws:
-        """`layout` is the layout of each trial (n,)."""
+        """Draw for trials whose layouts are `layout` (n,)."""
         groups = np.asarray(layout)
         names = np.unique(groups)
         count = len(names)
@@ -133,11 +133,11 @@ class Draws:
         return cls(names, (groups[None] == names[:, None]).astype(np.float64), weight.astype(np.float64))
 
     def sums(self, values: Array) -> Array:
-        """(l,) sum of the trials' values in each layout."""
+        """Return the sum (l,) of the trials' values in each layout."""
         return np.asarray(self.member @ values)
 
     def interval(self, over: Array, under: Array) -> dict[str, Any]:
-        """95 % of over / under (draws,); draws of 0 / 0 are left out."""
+        """Return the 95 % interval of over / under (draws,); draws of 0 / 0 are left out."""
         use = under > 0
         lo, hi = np.percentile(over[use] / under[use], [2.5, 97.5]) if use.any() else (np.nan, np.nan)
         return {"lo": float(lo), "hi": float(hi), "layouts": len(self.names)}

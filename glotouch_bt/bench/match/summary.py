@@ -1,4 +1,4 @@
-"""Figures of `bench match` from its rows (DESIGN section 7), each with its intervals."""
+"""Summary of `bench match` from its rows, with intervals."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ Row = Mapping[str, Any]
 def summarise(
     trials: Sequence[Row], pairs: Sequence[Row], closures: Sequence[Row], names: Sequence[str]
 ) -> dict[str, Any]:
-    """Everything that can be said from the rows of `trials.py` and `closures.py`.
+    """Return the summary of the rows of `trials.py` and `closures.py`.
 
-    Top-level `ece`, `auroc`, `absent_lifted` are of the default method, or of the last one compared.
+    Top-level `ece`, `auroc`, `absent_lifted` belong to the default method, or to the last one compared.
     """
     head = DEFAULT if DEFAULT in names else names[-1]
     per = {
@@ -46,7 +46,7 @@ def summarise(
 
 
 def of_method(trials: Sequence[Row], pairs: Sequence[Row]) -> dict[str, Any]:
-    """One method's figures; row decisions of objects that were never squeezed are counted apart."""
+    """Return one method's figures; objects that were never squeezed are counted separately."""
     present, absent, untouched, stranger = (
         [t for t in trials if t["kind"] == kind] for kind in ("present", "absent", "untouched", "stranger")
     )
@@ -82,7 +82,7 @@ def _share(trials: Sequence[Row], right: Sequence[bool]) -> dict[str, Any]:
 
 
 def column_decisions(pairs: Sequence[Row]) -> list[dict[str, Any]]:
-    """Each TouchSet of an object named by the STL of least loss; one that fits nothing (infinite loss) is wrong."""
+    """Name each TouchSet by the STL of lowest loss; an infinite loss is wrong."""
     groups: dict[tuple[int, int], list[Row]] = {}
     for p in pairs:
         if p["object"] is not None:
@@ -96,12 +96,12 @@ def column_decisions(pairs: Sequence[Row]) -> list[dict[str, Any]]:
 
 
 def object_names(pairs: Sequence[Row]) -> list[str]:
-    """The STLs of the boxes, sorted."""
+    """Return the sorted STL names of all boxes."""
     return sorted({p["target"] for p in pairs if not p["stranger"]})
 
 
 def loss_matrix(pairs: Sequence[Row]) -> list[list[float]]:
-    """Mean loss of each STL (row) against each object's TouchSets (column); infinite ones are left out, NaN is none."""
+    """Return the mean finite loss of each STL (row) against each object's TouchSets (column); NaN if there is none."""
     names = object_names(pairs)
     return [[_mean(p["loss"] for p in pairs if p["target"] == t and p["object"] == o) for o in names] for t in names]
 
@@ -112,7 +112,7 @@ def _mean(values: Any) -> float:
 
 
 def separation(present: Sequence[Row], other: Sequence[Row]) -> dict[str, Any]:
-    """AUROC of decisions whose target is there against those whose is not, by 1 - p_absent and by the best's loss."""
+    """Return the AUROC of present against absent targets, by 1 - p_absent and by the best loss."""
     out: dict[str, Any] = {"n_present": len(present), "n_not": len(other)}
     layouts = [t["seed"] for t in present], [t["seed"] for t in other]
     there, gone = ([1 - t["p_absent"] for t in rows] for rows in (present, other))
@@ -122,7 +122,7 @@ def separation(present: Sequence[Row], other: Sequence[Row]) -> dict[str, Any]:
 
 
 def calibration(trials: Sequence[Row]) -> dict[str, Any]:
-    """ECE and reliability of the likeliest answer, a candidate or "none of them", over present and absent targets."""
+    """Return ECE and reliability of the most probable answer (a candidate or none) over present and absent targets."""
     confidence = [max(t["p_best"], t["p_absent"]) for t in trials]
     return shared_calibration(confidence, [_answer_is_right(t) for t in trials], [t["seed"] for t in trials])
 
@@ -133,12 +133,12 @@ def _answer_is_right(trial: Row) -> bool:
 
 
 def taken(rows: Sequence[Row]) -> dict[str, Any]:
-    """How often something was taken for a target that was not there."""
+    """Return the rate of accepting something for an absent target."""
     return _share(rows, [r["confident"] for r in rows])
 
 
 def confidence(rows: Sequence[Row]) -> dict[str, Any]:
-    """How many closures until sure, how often sure, and how often right."""
+    """Return closures to confidence, and the rates of confident and correct decisions."""
     sure = [r["confident"] for r in rows]
     return {
         "closures": bootstrap_mean([r["closures"] for r in rows]),

@@ -1,4 +1,4 @@
-"""What matching costs on one core with nothing else to do: a new STL, one whose tables are on disk, a pair."""
+"""Cost of matching on one idle core: a new STL, an STL from the cache, and a (target, TouchSet) pair."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ REPEATS = 3
 
 
 def time_matching(layouts: Sequence[Layout], objects: Path, names: Sequence[str]) -> dict[str, Any]:
-    """Medians over the STLs of the folder, each as wall time and (`_cpu`) processor time.
+    """Return medians over the STLs of the folder, as wall time and (`_cpu`) processor time.
 
-    `new_stl_s` is a mesh never seen (it bears another content hash) to its model, kept on disk; `load_stl_ms` is that
-    model mapped from another place on the disk. To both, what a first ranking takes longer than a second is added:
-    tables made at first use. `pair_ms` is a ranking of a box over its TouchSets, when everything is warm.
+    `new_stl_s`: build and save the model of an uncached mesh. `load_stl_ms`: map a saved model. Both include the tables
+    built at first use: the first ranking's extra time over a second one. `pair_ms`: one ranking of a box divided by its
+    TouchSets, with everything warm.
     """
     touched = [x for x in layouts if x.touched][:REPEATS]
     if not touched:
@@ -64,7 +64,7 @@ def time_matching(layouts: Sequence[Layout], objects: Path, names: Sequence[str]
 
 
 def _clocks() -> Array:
-    """(wall, processor) time, s."""
+    """Return (wall, processor) time, s."""
     return np.array([time.perf_counter(), time.process_time()])
 
 
@@ -75,5 +75,5 @@ def _spent(method: Method, model: TargetModel, touchsets: Sequence[TouchSet]) ->
 
 
 def _first_use(method: Method, model: TargetModel, touchsets: Sequence[TouchSet]) -> Array:
-    """By how much the first ranking takes longer than the second; not less than nothing."""
+    """Return the extra time of the first ranking over the second, at least 0."""
     return np.asarray(np.maximum(_spent(method, model, touchsets) - _spent(method, model, touchsets), 0.0))

@@ -1,9 +1,9 @@
-"""A TouchSet as one npz file: recorded once, matched many times.
+"""A TouchSet as one npz file.
 
 A file holds columns, `<part>.<field>`: `candidate`, `contour`, `contact`, `sequence` and `layer` rows, in the order of
 the TouchSet, plus `sequence.layers` (how many layers each sequence has) and `version`. Floats are stored as float64,
-bit for bit; nothing is pickled. A field that a later release adds to a value is written as a column of its own, and a
-file without it is read with the field's default.
+bit for bit; nothing is pickled. A field added by a later release becomes a new column; a file without it is read with
+the field's default.
 """
 
 from __future__ import annotations
@@ -28,8 +28,7 @@ SHAPES: Mapping[str, tuple[int | None, ...]] = {
     "contact.pushed_K_m": (2,), "sequence.position_K_m": (2,), "layer.position_K_m": (2,),
     "layer.left_m": (None, None), "layer.right_m": (None, None),
 }  # fmt: skip
-"""Shape of one row of an array field; None is any length. A field that is not named here is a number or a word, or a
-later release's array of any shape."""
+"""Shape of one row of an array field; None is any length. Other fields are scalars, strings, or arrays of any shape."""
 
 Column = npt.NDArray[Any]
 Columns = Mapping[str, Column]
@@ -96,14 +95,14 @@ def _touchset(columns: Columns) -> TouchSet:
 
 
 def _plain(cls: type[Any]) -> list[tuple[Field[Any], Any]]:
-    """The fields of a value that are columns, with their types: all but values and tuples of values."""
+    """Return the fields stored as columns, with their types: all but nested values and tuples of them."""
     hints = get_type_hints(cls)
     nested = {"contour", "contacts", "layers", "rings"}
     return [(f, hints[f.name]) for f in fields(cls) if f.name not in nested]
 
 
 def _columns(part: str, items: Sequence[Any]) -> dict[str, Column]:
-    """One column a field."""
+    """Build one column a field."""
     out: dict[str, Column] = {}
     for field, hint in _plain(type(items[0])) if items else []:
         name = f"{part}.{field.name}"
@@ -118,7 +117,7 @@ def _columns(part: str, items: Sequence[Any]) -> dict[str, Column]:
 
 
 def _rows(cls: type[T], part: str, columns: Columns, count: int | None = None, **given: Any) -> tuple[T, ...]:
-    """The values of one part; `count` is how many there must be, `given` what is not in a column."""
+    """Build the values of one part: `count` of them if given, with the fields of `given` set."""
     present: dict[str, list[Any]] = {}
     for field, hint in _plain(cls):
         name = f"{part}.{field.name}"
@@ -138,7 +137,7 @@ def _rows(cls: type[T], part: str, columns: Columns, count: int | None = None, *
 
 
 def _check(name: str, hint: Any, column: Column) -> None:
-    """One row a value, of the field's type and shape."""
+    """Check that a column has one row a value, of the field's type and shape."""
     kinds = "f"
     if hint is bool:
         kinds = "b"
@@ -163,7 +162,7 @@ _KINDS = {"f": "floats", "b": "truth values", "i": "whole numbers", "U": "words"
 
 
 def _is_word(hint: Any) -> bool:
-    """True for str, for a Literal of words, and for either or None."""
+    """Return True for str, a Literal of strings, or an optional one."""
     options = [a for h in (get_args(hint) or (hint,)) for a in (get_args(h) or (h,)) if a is not type(None)]
     return all(o is str or isinstance(o, str) for o in options)
 
@@ -173,7 +172,7 @@ def _is_array(hint: Any) -> bool:
 
 
 def _value(hint: Any, row: Any) -> Any:
-    """A row as the field's own type."""
+    """Convert a row to the field's own type."""
     if hint in (float, int, bool):
         return hint(row)
     if _is_word(hint):

@@ -1,4 +1,4 @@
-"""Every decision one recorded layout gives rise to, as rows: present targets, absent ones, strangers; and the pairs."""
+"""All decisions on one recorded layout as rows: present targets, absent targets, strangers, and all pairs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from glotouch_bt.robot.scene import Mesh, load_folder
 Kind = Literal["present", "absent", "untouched", "stranger"]
 SYMMETRY_STEPS = 72
 SYMMETRIC_M = 0.7e-3
-"""Two yaws of a mesh are one if no vertex is farther than this from the turned mesh's nearest, on average."""
+"""Mean surface distance below which a rotated mesh counts as symmetric, m."""
 
 TRIAL_COLUMNS = (
     "method", "kind", "seed", "target", "candidates", "best", "best_object", "right", "accepted", "p_best", "p_absent",
@@ -36,8 +36,8 @@ class Decided:
     """The rows of one layout.
 
     Attributes:
-        trials: One a decision, `TRIAL_COLUMNS`.
-        pairs: One an (STL, TouchSet) pair of the full box, `PAIR_COLUMNS`.
+        trials: One row a decision, `TRIAL_COLUMNS`.
+        pairs: One row an (STL, TouchSet) pair of the full box, `PAIR_COLUMNS`.
     """
 
     trials: list[dict[str, Any]]
@@ -46,7 +46,7 @@ class Decided:
 
 @lru_cache(maxsize=4)
 def meshes_of(folder: Path) -> dict[str, Mesh]:
-    """The usable STLs of a folder by name.
+    """Return the usable STLs of a folder by name.
 
     Raises:
         BadInput: None, or an unusable one.
@@ -55,7 +55,7 @@ def meshes_of(folder: Path) -> dict[str, Mesh]:
 
 
 def models_of(layout: Layout, folder: Path, names: Sequence[str] = ()) -> dict[str, TargetModel]:
-    """Models of `names` (default: of what stood in the box), for pads like those that felt the layout.
+    """Return models of `names` (default: the objects in the box) for the pads that touched the layout.
 
     Raises:
         BadInput: The folder has no STL of that name.
@@ -68,7 +68,7 @@ def models_of(layout: Layout, folder: Path, names: Sequence[str] = ()) -> dict[s
 
 
 def pad_of(layout: Layout) -> PadSpec:
-    """The pads that felt a layout."""
+    """Return the pads that touched a layout."""
     for t in layout.touched:
         for layer in t.touchset.layers:
             rows, columns = layer.left_m.shape
@@ -77,11 +77,10 @@ def pad_of(layout: Layout) -> PadSpec:
 
 
 def decide(layout: Layout, objects: Path, strangers: Path | None, names: Sequence[str]) -> Decided:
-    """Every decision of a layout by every method.
+    """Make every decision of a layout with every method.
 
-    Present: each touched object's STL against all TouchSets. Absent: the same with its own TouchSets taken away.
-    Untouched: the STL of an object that stands in the box and was not squeezed, against all TouchSets. Stranger: that
-    of an object that is not in the box.
+    Present: a touched object's STL against all TouchSets. Absent: the same without its own TouchSets.
+    Untouched: the STL of an object in the box that was never squeezed. Stranger: the STL of an object outside it.
 
     Raises:
         BadInput: An STL is missing or unusable.
@@ -120,7 +119,7 @@ def decide(layout: Layout, objects: Path, strangers: Path | None, names: Sequenc
 def _trial(
     method: Method, model: TargetModel, touched: Sequence[Touched], target: str, mesh: Mesh | None = None
 ) -> tuple[dict[str, Any], Ranking]:
-    """One decision; `mesh` is the target's if it is among `touched` (a stranger may have the name of an object)."""
+    """Make one decision; `mesh` is the target's if it is in `touched` (a stranger may share an object's name)."""
     began = time.perf_counter()
     ranking = method(model, [t.touchset for t in touched])
     took = time.perf_counter() - began
@@ -143,7 +142,7 @@ def _trial(
 
 
 def signed_margin(ranking: Ranking, mine: set[int]) -> float:
-    """Least loss of the wrong candidates less the least of the right ones: positive if the right one leads.
+    """Return the lowest loss of the wrong candidates minus that of the right ones: positive if the right one leads.
 
     NaN if there are no wrong ones, or if neither side has a finite loss.
     """
@@ -163,10 +162,10 @@ def _pairs(head: Mapping[str, Any], layout: Layout, ranking: Ranking) -> list[di
 
 
 def pose_errors(match: Match, truth: Planar | None, mesh: Mesh) -> dict[str, float]:
-    """Distance of the fitted mesh axis from the true one, and the yaw between them up to the mesh's own symmetry.
+    """Return the position and yaw errors of a fitted pose, up to the mesh's own symmetry.
 
-    The position is compared at the origin of the mesh's frame, the middle of its bounding box. For a solid of
-    revolution the yaw error is 0 whatever the fit.
+    Positions are compared at the mesh origin, the centre of its bounding box. The yaw error of a solid of revolution is
+    always 0.
     """
     if truth is None or not all(math.isfinite(v) for v in match.pose_K_O):
         return {"position_error_mm": math.nan, "yaw_error_deg": math.nan}
@@ -182,14 +181,14 @@ _symmetry: dict[str, Array] = {}
 
 
 def symmetries_rad(mesh: Mesh) -> Array:
-    """Yaws, 0 first, in steps of 5 deg, by which the mesh may be turned about its own middle and look the same."""
+    """Return the yaws of symmetry about the mesh centre, in steps of 5 deg, 0 first."""
     if mesh.digest not in _symmetry:
         _symmetry[mesh.digest] = _symmetries(mesh)
     return _symmetry[mesh.digest]
 
 
 def _symmetries(mesh: Mesh) -> Array:
-    """By the distance of turned surface points from the surface; both are taken about the surface's own middle."""
+    """Compare rotated surface points with the surface, both about the surface centroid."""
     import trimesh
     from scipy.spatial import cKDTree
 
@@ -206,7 +205,7 @@ def _symmetries(mesh: Mesh) -> Array:
         turned[:, :2] = probe[:, :2] @ np.array([[math.cos(a), math.sin(a)], [-math.sin(a), math.cos(a)]])
         gaps[k] = np.mean(tree.query(turned)[0])
     same = gaps < SYMMETRIC_M + 0.6 * spacing
-    if not same.all():  # a slight turn of anything looks much the same: only the best of its neighbours is a symmetry
+    if not same.all():  # small rotations always match nearly: keep only local minima
         same &= (gaps <= np.roll(gaps, 1)) & (gaps <= np.roll(gaps, -1))
     same[0] = True
     return np.asarray(angles[same])

@@ -1,7 +1,7 @@
-"""TODO door of glotouch_bt/bench/search."""
+"""`bench search`: how soon exploration finds every object, by search policy."""
 
-from glotouch_bt.bench.search.bench import Campaign, run_campaign
+from glotouch_bt.bench.search.bench import SearchCampaign, run_campaign
 from glotouch_bt.bench.search.plots import COLOURS
 from glotouch_bt.bench.search.summary import quantiles
 
-__all__ = ["COLOURS", "Campaign", "quantiles", "run_campaign"]
+__all__ = ["COLOURS", "SearchCampaign", "quantiles", "run_campaign"]

@@ -1,4 +1,4 @@
-"""`bench search`: how soon exploration finds everything, by policy, in the physics and in the plane."""
+"""Run `bench search`: exploration by each policy, in MuJoCo and in the planar simulator."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from glotouch_bt.robot import BadInput
 from glotouch_bt.run import RunRequest
 
 CHUNK = 25
-"""Planar layouts a task."""
+"""Number of planar layouts in one task."""
 COLUMNS = (
     "simulator", "policy", "seed", "ended", *(f"discovered_{d:g}_m" for d in MEAN_AT_M),
     *(f"complete_{d:g}_m" for d in COMPLETE_AT_M), "travel_m", "before_m", "contacts", "false_candidates",
@@ -42,21 +42,21 @@ OnRow = Callable[[Mapping[str, Any], int, int], None]
 
 
 @dataclass(frozen=True)
-class Campaign:
-    """What shall be tried.
+class SearchCampaign:
+    """Settings of the campaign.
 
     Attributes:
-        policies: Names of search policies; the first is the one whose candidates are reported.
-        seeds: Seeds of the mission's trials; the plane explores the same layouts.
-        planar_seeds: Seeds of further layouts for the plane alone.
+        policies: Names of search policies; candidate errors are reported for the first.
+        seeds: Seeds of the mission trials; the planar simulator explores the same layouts.
+        planar_seeds: Seeds of further layouts for the planar simulator alone.
         conditions: Path or shipped name.
         objects: Folder of STL files instead of the world's.
         backend: Registered name of a simulation.
-        out: Folder of the campaign; each mission's run folder goes below it.
+        out: Folder of the campaign; it receives a run folder for each mission.
         mission: Path or shipped name; it must take a parameter `policy`.
-        resume: Missions whose folders are complete are scored as they are instead of being run again.
-        recorded: Folders below which recorded runs are scored beside those that are run now.
-        planar_budget_m: Planar explorations are broken off here; the mission goes on until it is done.
+        resume: Score missions whose folders are complete instead of running them again.
+        recorded: Folders searched for recorded runs, which are scored too.
+        planar_budget_m: Travel at which planar explorations stop.
     """
 
     policies: tuple[str, ...]
@@ -79,11 +79,11 @@ class Campaign:
             raise BadInput("nothing to try: give --trials, --planar or --recorded")
 
     def folder(self, policy: str, seed: int) -> Path:
-        """The run folder of a trial."""
+        """Return the run folder of a trial."""
         return self.out / f"{policy}-s{seed}"
 
     def request(self, policy: str, seed: int) -> RunRequest:
-        """The mission of a trial."""
+        """Return the mission request of a trial."""
         return RunRequest(
             mission=self.mission,
             backend=self.backend,
@@ -96,15 +96,15 @@ class Campaign:
 
     @property
     def object_count(self) -> int:
-        """How many objects a layout holds."""
+        """Return the number of objects in a layout."""
         return len(scene(self.mission, self.objects)[1])
 
 
-def run_campaign(campaign: Campaign, executor: Executor, on_row: OnRow | None = None) -> dict[str, Any]:
-    """Run every trial; writes trials.csv, candidates.csv, plots and summary.json, returns the summary (DESIGN 7).
+def run_campaign(campaign: SearchCampaign, executor: Executor, on_row: OnRow | None = None) -> dict[str, Any]:
+    """Run every trial, write trials.csv, candidates.csv, plots and summary.json, and return the summary.
 
     Args:
-        campaign: What to try.
+        campaign: Settings.
         executor: Any `concurrent.futures` executor.
         on_row: Called with (row, done, total) after each trial.
 
@@ -135,8 +135,8 @@ def run_campaign(campaign: Campaign, executor: Executor, on_row: OnRow | None = 
     return summary
 
 
-def _run(campaign: Campaign, executor: Executor, on_row: OnRow | None) -> list[dict[str, Any]]:
-    """Missions first, seeds outermost, so that a broken-off campaign has all policies on the same layouts."""
+def _run(campaign: SearchCampaign, executor: Executor, on_row: OnRow | None) -> list[dict[str, Any]]:
+    """Run missions first, seeds outermost: an interrupted campaign has all policies on the same layouts."""
     runs = [f for top in campaign.recorded for f in recorded_folders(top, Path(campaign.conditions).stem)]
     plane = tuple(dict.fromkeys(campaign.seeds + campaign.planar_seeds))
     budget = campaign.planar_budget_m
@@ -171,7 +171,7 @@ def _run(campaign: Campaign, executor: Executor, on_row: OnRow | None) -> list[d
 
 
 def _finite(value: Any) -> Any:
-    """With null for what is not a number, as JSON has it."""
+    """Replace non-finite numbers by None, for JSON."""
     if isinstance(value, dict):
         return {k: _finite(v) for k, v in value.items()}
     return None if isinstance(value, float) and not math.isfinite(value) else value
@@ -181,7 +181,7 @@ def _span(seeds: Sequence[int]) -> dict[str, int] | None:
     return {"first": seeds[0], "count": len(seeds)} if seeds else None
 
 
-def _write_csv(campaign: Campaign, rows: Sequence[Mapping[str, Any]], objects: int) -> None:
+def _write_csv(campaign: SearchCampaign, rows: Sequence[Mapping[str, Any]], objects: int) -> None:
     with (campaign.out / "trials.csv").open("w", newline="") as f:
         table = csv.DictWriter(f, COLUMNS, extrasaction="ignore")
         table.writeheader()

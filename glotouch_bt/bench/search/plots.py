@@ -19,15 +19,16 @@ from glotouch_bt.report import RunRecord, read_run
 from glotouch_bt.robot import Array
 
 COLOURS = ("#2567c9", "#e08a1e", "#16937a", "#8a55c7", "#c4437f", "#6b7787")
-LONGEST_M = 6.0
+MAX_TRAVEL_M = 6.0
+"""Right end of the travel axis."""
 
 
 def plot_discovered(path: Path, rows: Sequence[Mapping[str, Any]], policies: Sequence[str], objects: int) -> None:
-    """Mean number of objects discovered against travel with 95 % bands: physics solid, plane dashed, paper dots."""
+    """Draw mean discovered objects against travel, 95 % bands: MuJoCo solid, planar dashed, paper dots."""
     figure = Figure(figsize=(7.5, 4.6), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots()
-    at = np.linspace(0.0, LONGEST_M, 121)
+    at = np.linspace(0.0, MAX_TRAVEL_M, 121)
     for name, colour in zip(policies, COLOURS * (1 + len(policies) // len(COLOURS)), strict=False):
         for planar, style in ((False, "-"), (True, "--")):
             mine = [r for r in rows if r["policy"] == name and (r["simulator"] == "planar") == planar]
@@ -37,7 +38,7 @@ def plot_discovered(path: Path, rows: Sequence[Mapping[str, Any]], policies: Seq
     for (name, figures), marker in zip(PAPER.items(), ("x", "+"), strict=True):
         budgets = {float(k): v for k, v in figures["mean_discovered"].items()}
         axes.plot(list(budgets), list(budgets.values()), "k" + marker, ms=8, label=f"paper, {name}")
-    axes.set(xlabel="planar travel of the probe [m]", ylabel="objects discovered", xlim=(0, LONGEST_M))
+    axes.set(xlabel="planar travel of the probe [m]", ylabel="objects discovered", xlim=(0, MAX_TRAVEL_M))
     axes.set_ylim(0, objects * 1.04)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8, loc="lower right")
@@ -54,7 +55,7 @@ def _band(axes: Axes, at: Array, rows: Sequence[Mapping[str, Any]], colour: str,
 
 
 def plot_layout(path: Path, run: Path, sections: Mapping[str, FeltSection]) -> None:
-    """True outlines, the ball's way, contacts and fitted outlines of one run."""
+    """Draw true outlines, the ball's path, contacts and fitted outlines of one run."""
     record = read_run(run)
     pose_B_K, interior = record.pose_B_K, record.interior_m
     if record.truth is None or pose_B_K is None or interior is None:
@@ -90,7 +91,7 @@ def _pieces(record: RunRecord) -> list[Array]:
 
 
 def _outline(contour: Mapping[str, Any]) -> Array:
-    """(n, 2) closed polyline of a recorded contour."""
+    """Return the closed polyline (n, 2) of a recorded contour."""
     boundary = contour.get("boundary_K_m") or []
     if boundary:
         return np.array([*boundary, boundary[0]])

@@ -1,4 +1,4 @@
-"""What an exploration found, held against the truth. Planar; frames: K, the container as the robot is told it."""
+"""Score an exploration against the truth. Planar, in the container frame K given to the robot."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from glotouch_bt.perception.touch import ContourKind
 from glotouch_bt.robot import Array
 
 DISCOVERED_M = 0.025
-"""A candidate is of an object if its centre is this near to the object's."""
+"""Largest distance between a candidate's centre and its object's."""
 ELONGATED = 1.2
-"""A felt outline has a yaw if its least rectangle is at least this much longer than wide."""
+"""Least aspect ratio of the minimum-area rectangle for which a yaw is scored."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """A candidate as it is scored.
+    """A candidate to score.
 
     Attributes:
         travel_m: Planar travel when it was added.
-        centre_K_m: (2,).
-        kind: Of its contour.
-        yaw_rad: Of its long side.
-        height_m: Of its top above the floor, or None if that was not touched.
+        centre_K_m: (2,) centre of its contour.
+        kind: Kind of its contour.
+        yaw_rad: Direction of its long side.
+        height_m: Height of its top above the floor; None if not touched.
     """
 
     travel_m: float
@@ -39,11 +39,11 @@ class Found:
 
 @dataclass(frozen=True)
 class TrueLayout:
-    """Objects as they stood before and after the exploration.
+    """True objects before and after the exploration.
 
     Attributes:
-        sections: Felt section of each.
-        before, after: (k, 3) x m, y m, yaw rad of their mesh frames in K.
+        sections: Probe section of each object.
+        before, after: (k, 3) x m, y m, yaw rad of the mesh frames in K.
     """
 
     sections: tuple[FeltSection, ...]
@@ -52,7 +52,7 @@ class TrueLayout:
 
     @property
     def centres_K_m(self) -> Array:
-        """(k, 2) true centres afterwards."""
+        """Return the true centres (k, 2) afterwards."""
         return np.array([_place(s.centre_m, p) for s, p in zip(self.sections, self.after, strict=True)]).reshape(-1, 2)
 
 
@@ -62,7 +62,7 @@ def _place(point_m: Array, pose: Array) -> Array:
 
 
 def assign(found: Sequence[Found], layout: TrueLayout) -> list[int | None]:
-    """For each candidate in order, the nearest object within `DISCOVERED_M` that no earlier one was of; or None."""
+    """Assign each candidate, in order, the nearest unassigned object within `DISCOVERED_M`, or None."""
     centres = layout.centres_K_m
     left = set(range(len(centres)))
     out: list[int | None] = []
@@ -77,7 +77,7 @@ def assign(found: Sequence[Found], layout: TrueLayout) -> list[int | None]:
 
 
 def errors(found: Found, i: int, layout: TrueLayout) -> dict[str, Any]:
-    """Errors of a candidate of object i against its true place at the end; None where there is nothing to compare."""
+    """Return the errors of a candidate of object i against its final true pose; None where not defined."""
     section, after = layout.sections[i], layout.after[i]
     yaw: float | None = None
     if found.kind == "box" and section.elongation >= ELONGATED:
@@ -96,14 +96,14 @@ def errors(found: Found, i: int, layout: TrueLayout) -> dict[str, Any]:
 
 
 def score(found: Sequence[Found], layout: TrueLayout, measured: Sequence[Found] | None = None) -> dict[str, Any]:
-    """`discovered_m` (travel at each object's discovery), `false_candidates`, and `candidates` (errors of each).
+    """Return `discovered_m` (travel at each discovery), `false_candidates`, and `candidates` (errors of each).
 
-    An object counts as discovered when its candidate was traced; if that was too far off, when it was refined.
+    An object is discovered when its candidate was traced, or when it was refined if the trace was too far off.
 
     Args:
-        found: As they were when traced: this says whose they are.
+        found: Candidates when traced; they decide the assignment.
         layout: The truth.
-        measured: As they were at the end, in the same order; the errors are theirs. None: the same.
+        measured: The same candidates at the end, for the errors; None to use `found`.
     """
     final = measured if measured is not None else found
     whose = assign([*found, *final], layout)
@@ -121,5 +121,5 @@ def score(found: Sequence[Found], layout: TrueLayout, measured: Sequence[Found] 
 
 
 def discovered_at(row: Mapping[str, Any], travel_m: float) -> int:
-    """How many objects a trial had discovered when it had travelled so far."""
+    """Return the number of objects discovered within `travel_m`."""
     return sum(t <= travel_m for t in row["discovered_m"])

@@ -1,4 +1,4 @@
-"""Figures of `bench search` from its rows (DESIGN section 7), each with its interval."""
+"""Summary of `bench search` from its rows, with intervals."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ PAPER = {
     "random_descent": {"mean_discovered": {"1": 1.23, "3": 3.17, "5": 4.02}, "complete": {"5": 0.30}},
     "global_search": {"mean_discovered": {"1": 1.35, "3": 3.30, "5": 4.44}, "complete": {"5": 0.55}},
 }
-"""The paper's table of its global-search ablation, on its own 100 layouts."""
+"""The paper's global-search ablation, on its own 100 layouts."""
 ERRORS = ("centre_error_mm", "height_error_mm", "yaw_error_deg", "displaced_mm")
 
 Row = Mapping[str, Any]
 
 
 def summarise(rows: Sequence[Row], policies: Sequence[str], objects: int) -> dict[str, Any]:
-    """Everything that can be said from the rows; what was simulated only in the plane goes under `planar`.
+    """Return the summary of the rows; results of the planar simulator go under `planar`.
 
     Args:
-        rows: One a trial, see `search_trial`.
-        policies: In the order to report; the first one's candidates are the ones reported at the top.
-        objects: How many objects a layout holds.
+        rows: One row a trial, see `trial`.
+        policies: In the order to report; candidate errors at the top level are the first policy's.
+        objects: Number of objects in a layout.
     """
     real = [r for r in rows if r["simulator"] != "planar"]
     plane = [r for r in rows if r["simulator"] == "planar"]
@@ -58,7 +58,7 @@ def summarise(rows: Sequence[Row], policies: Sequence[str], objects: int) -> dic
 
 
 def discovery(rows: Sequence[Row], objects: int) -> dict[str, Any]:
-    """Mean discovered and rate of completion at each budget; a trial that broke off counts as far as it came."""
+    """Return mean discoveries and completion rate at each travel budget; an aborted trial counts up to its end."""
     n = len(rows)
     ends = [r["discovered_m"][objects - 1] for r in rows if len(r["discovered_m"]) >= objects]
     return {
@@ -72,16 +72,16 @@ def discovery(rows: Sequence[Row], objects: int) -> dict[str, Any]:
 
 
 def candidate_errors(rows: Sequence[Row]) -> dict[str, Any]:
-    """Median and 95 % point of each error over all candidates that are of an object."""
+    """Return median and 95th percentile of each error over all assigned candidates."""
     every = [c for r in rows for c in r["candidates"]]
     return {key: quantiles([c[key] for c in every if c[key] is not None]) for key in ERRORS}
 
 
 def validation(real: Sequence[Row], plane: Sequence[Row], objects: int) -> dict[str, Any]:
-    """The planar stand-in against the physics on the layouts that both explored.
+    """Compare the planar simulator with MuJoCo on the layouts that both explored.
 
-    `travel_to_complete` compares, layout by layout, where both completed; `discovered` the paired difference, planar
-    minus physics; `contact_gap_mm` how far the ball was from the true felt section where the physics stopped a sweep.
+    `travel_to_complete` compares layouts that both completed. `discovered` is the paired difference, planar minus
+    MuJoCo. `contact_gap_mm` is the distance of the ball from the true probe section where a MuJoCo sweep stopped.
     """
     by_seed = {r["seed"]: r for r in plane}
     pairs = [(r, by_seed[r["seed"]]) for r in real if r["seed"] in by_seed]
@@ -107,7 +107,7 @@ def validation(real: Sequence[Row], plane: Sequence[Row], objects: int) -> dict[
 
 
 def correlation(a: npt.ArrayLike, b: npt.ArrayLike, resamples: int = 2000, seed: int = 0) -> dict[str, Any]:
-    """Pearson's r of pairs with its bootstrap 95 % interval; NaN for fewer than 3 pairs or none that differ."""
+    """Return Pearson's r with its bootstrap 95 % interval; NaN for fewer than 3 pairs or constant values."""
     x, y = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
     nothing = {"r": float("nan"), "lo": float("nan"), "hi": float("nan"), "n": len(x)}
     if len(x) < 3 or np.ptp(x) == 0 or np.ptp(y) == 0:
@@ -121,7 +121,7 @@ def correlation(a: npt.ArrayLike, b: npt.ArrayLike, resamples: int = 2000, seed:
 
 
 def quantiles(values: npt.ArrayLike, resamples: int = 1000, seed: int = 0) -> dict[str, Any]:
-    """Median and 95 % point, each with the percentile bootstrap's 95 % interval (B. Efron, Ann. Statist. 7, 1979)."""
+    """Return median and 95th percentile, each with its percentile bootstrap 95 % interval (B. Efron, 1979)."""
     x = np.asarray(values, dtype=np.float64)
     none = {"value": float("nan"), "lo": float("nan"), "hi": float("nan")}
     if x.size == 0:

@@ -1,8 +1,8 @@
-"""One trial of `bench search`: the mission in a simulation, or the planar stand-in, as a row of the same columns.
+"""One trial of `bench search` as a row: the mission in MuJoCo, or the exploration in the planar simulator.
 
-Travel is the planar length of the ball's motion from the start of the first sweep to the end of the exploration:
-sweeps, hops, retreats and the whole tracing. What the tip travels before (floor touch, calibration) is `before_m`; what
-it travels after (touching the tops, putting the probe back) is not counted: nothing is discovered by it.
+Travel is the planar path length of the ball from the first sweep to the end of the exploration: sweeps, hops,
+retreats and tracing. Travel before it (floor touch, calibration) is `before_m`. Travel after it (touching the tops, returning
+the probe) discovers nothing and is not counted.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from glotouch_bt.run import RunRequest, launch
 SWEEP_NODE, TRACE_NODE, REFINE_NODE, PICKUP_NODE = "guarded_sweep", "orbit_probe", "refine_outline", "tool_pickup"
 TOP_NODE = "touch_top"
 STILL_M = 0.0003
-"""The tip must have moved so far for its travel to grow: a standing arm sways by less."""
+"""Smallest step that counts as travel; a standing arm sways by less."""
 EMPTY_ROW: dict[str, Any] = {
     "ended": "", "discovered_m": [], "false_candidates": 0, "candidates": [], "travel_m": 0.0, "before_m": None,
     "contacts": 0,
@@ -36,12 +36,12 @@ EMPTY_ROW: dict[str, Any] = {
 
 
 def mission_trial(request: RunRequest, policy: str, resume: bool = False) -> dict[str, Any]:
-    """Run the mission and score its record. Whatever goes wrong is a row: what was discovered until then counts.
+    """Run the mission and score its record. A failed run is a row with what it discovered.
 
     Args:
-        request: What to run, and where its record goes.
-        policy: For the row.
-        resume: A record that is there already, of the same mission, seed and conditions, is scored instead.
+        request: The mission to run, and its folder.
+        policy: Name of the policy, for the row.
+        resume: Score an existing record of the same mission, seed and conditions instead.
 
     Raises:
         BadInput: The request itself is wrong.
@@ -62,7 +62,7 @@ def mission_trial(request: RunRequest, policy: str, resume: bool = False) -> dic
 
 
 def recorded_folders(top: Path, conditions: str) -> list[Path]:
-    """Folders of ended, simulated runs below `top` under these conditions, by name; what is no such run is passed over.
+    """Return the folders of finished simulated runs below `top` under these conditions, by name.
 
     Raises:
         BadInput: There is none.
@@ -82,12 +82,12 @@ def recorded_folders(top: Path, conditions: str) -> list[Path]:
 
 
 def recorded_trial(folder: Path, mission: str, objects: Path | None, policy: str) -> dict[str, Any]:
-    """The row of a run that was recorded before, by any mission that explores.
+    """Return the row of a recorded run of any mission that explores.
 
     Args:
-        folder: Of the run.
-        mission, objects: Whose meshes the sections are cut from.
-        policy: If the run does not say its own.
+        folder: Folder of the run.
+        mission, objects: Source of the meshes.
+        policy: Name of the policy if the run does not record it.
     """
     record = read_run(folder)
     policy = str((record.run.get("parameters") or {}).get("policy", policy))
@@ -97,7 +97,7 @@ def recorded_trial(folder: Path, mission: str, objects: Path | None, policy: str
 
 
 def _result_of(request: RunRequest) -> Mapping[str, Any] | None:
-    """The result of a run of this request that ended, or None."""
+    """Return the result of a finished run of this request, or None."""
     try:
         result: Mapping[str, Any] = json.loads(((request.out or Path()) / "result.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -108,7 +108,7 @@ def _result_of(request: RunRequest) -> Mapping[str, Any] | None:
 
 
 def _ended(result: Any) -> str:
-    """The mission's status, or what its root reason says."""
+    """Return "success", or the code of the root reason."""
     if result["status"] == "success":
         return "complete"
     chain = result["reason_chain"]
@@ -117,14 +117,14 @@ def _ended(result: Any) -> str:
 
 @lru_cache(maxsize=2)
 def sections_of(mission: str, objects: Path | None) -> dict[str, FeltSection]:
-    """Felt sections of a mission's objects, by name."""
+    """Return the probe sections of a mission's objects, by name."""
     world, meshes = scene(mission, objects)
     return {m.name: felt_section(m, world.probe) for m in meshes}
 
 
 @lru_cache(maxsize=2)
 def scene(mission: str, objects: Path | None) -> tuple[World, Sequence[Mesh]]:
-    """The mission's world and its meshes.
+    """Return the mission's world and meshes.
 
     Raises:
         BadInput: There is no such mission, or a mesh is unusable.
@@ -134,9 +134,9 @@ def scene(mission: str, objects: Path | None) -> tuple[World, Sequence[Mesh]]:
 
 
 def score_run(record: RunRecord, sections: dict[str, FeltSection]) -> dict[str, Any]:
-    """What a recorded run discovered at which travel, held against its truth.
+    """Score the discoveries of a recorded run against its truth.
 
-    `contact_gap_mm` are the distances of the ball from touching the true felt section where the sweeps were stopped.
+    `contact_gap_mm` are the distances of the ball from the true probe section where sweeps stopped.
 
     Raises:
         BadInput: The record has no truth beside it.
@@ -145,9 +145,9 @@ def score_run(record: RunRecord, sections: dict[str, FeltSection]) -> dict[str, 
     if record.truth is None or pose_B_K is None:
         raise BadInput(f"{record.path}: no truth is written beside this record; only a simulation can be scored")
     layout = true_layout(record.truth, pose_B_K, sections)
-    way = Way.of(record)
+    way = TipPath.of(record)
     heights = {e.data["candidate"]: float(e.data["height_m"]) for e in record.of_kind("top")}
-    # An object traced in parts counts from its last part on; only if that was too far off, from its refinement on.
+    # An object traced in parts counts from its last part; if that was too far off, from its refinement.
     last: dict[int, tuple[float, Any]] = {}
     final: dict[int, tuple[float, Any]] = {}
     for e in record.of_kind("candidate"):
@@ -170,7 +170,7 @@ def _found(travel_m: float, candidate: Any, height_m: float | None) -> Found:
 
 
 def true_layout(truth: Any, pose_B_K: Pose, sections: dict[str, FeltSection]) -> TrueLayout:
-    """The objects of a truth.json in the container frame the robot was told."""
+    """Return the objects of a truth.json in the container frame given to the robot."""
     to_K = pose_B_K.inverse()
 
     def planar(objects: Any) -> Array:
@@ -182,9 +182,9 @@ def true_layout(truth: Any, pose_B_K: Pose, sections: dict[str, FeltSection]) ->
 
 
 def _gaps(record: RunRecord, layout: TrueLayout) -> list[float]:
-    """Distance, mm, of the ball from touching the nearest object at the first side contact of a sweep with each.
+    """Return the gap, mm, between ball and nearest object at the first sweep contact with each object.
 
-    Objects are where they stood at the beginning; later contacts find them pushed.
+    Objects are at their initial poses; later contacts find them pushed.
     """
     out: dict[int, float] = {}
     for e in record.of_kind("contact"):
@@ -202,13 +202,13 @@ def _gaps(record: RunRecord, layout: TrueLayout) -> list[float]:
 
 
 @dataclass(frozen=True)
-class Way:
-    """The tip's planar way in a record.
+class TipPath:
+    """Planar path of the tip in a record.
 
     Attributes:
-        stamp_s, length_m: (n,) the travel since the probe was picked up at each control cycle.
-        begin_s, end_s: Of the exploration, until all is found.
-        start_K_m: Where the tip was at its beginning.
+        stamp_s, length_m: (n,) travel since the probe was picked up, at each control cycle.
+        begin_s, end_s: Start and end of the exploration.
+        start_K_m: Position of the tip at its start.
     """
 
     stamp_s: Array
@@ -218,8 +218,8 @@ class Way:
     start_K_m: list[float]
 
     @classmethod
-    def of(cls, record: RunRecord) -> Way:
-        """Read it from a record; empty if nothing was explored."""
+    def of(cls, record: RunRecord) -> TipPath:
+        """Read the path from a record; empty if nothing was explored."""
         ticks = [t for t in record.ticks if t.node.rsplit("/", 1)[-1] in (SWEEP_NODE, TRACE_NODE)]
         later = [t for t in record.ticks if t.node.rsplit("/", 1)[-1] == REFINE_NODE]
         held = [e.stamp_s for e in record.of_kind("tool") if e.data.get("held")]
@@ -236,24 +236,24 @@ class Way:
         return cls(stamps[use], length, begin, ticks[-1].stamp_s, at.tolist())
 
     def travel_m(self, stamp_s: float) -> float:
-        """Travel from the beginning of the exploration to a time, refining included."""
+        """Return the travel from the start of the exploration to a time, refining included."""
         if not np.isfinite(self.begin_s):
             return 0.0
         return float(np.interp(stamp_s, self.stamp_s, self.length_m)) - self.before_m
 
     @property
     def total_m(self) -> float:
-        """Travel of the whole exploration."""
+        """Return the travel of the whole exploration."""
         return self.travel_m(self.end_s)
 
     @property
     def before_m(self) -> float:
-        """Travel with the probe in the hand before it."""
+        """Return the travel with the probe in hand before the exploration."""
         return float(np.interp(self.begin_s, self.stamp_s, self.length_m)) if np.isfinite(self.begin_s) else 0.0
 
 
 def _travelled(places: Array) -> Array:
-    """(n,) length of the way so far along places (n, 2), in steps of at least `STILL_M`."""
+    """Return the cumulative path length (n,) along places (n, 2), in steps of at least `STILL_M`."""
     out = np.zeros(len(places))
     total, last = 0.0, places[0]
     for k, p in enumerate(places):
@@ -267,7 +267,7 @@ def _travelled(places: Array) -> Array:
 def planar_trials(
     mission: str, objects: Path | None, policy: str, seeds: Sequence[int], budget_m: float
 ) -> list[dict[str, Any]]:
-    """The same explorations in the plane, one row a seed."""
+    """Run the same explorations in the planar simulator, one row a seed."""
     world, meshes = scene(mission, objects)
     rows = []
     for seed in seeds:
@@ -278,7 +278,7 @@ def planar_trials(
         found = _planar(explored.found)
         row |= {"ended": explored.ended, "travel_m": explored.travel_m, "contacts": explored.contacts}
         scored = score(found, layout)
-        if len(scored["discovered_m"]) < len(meshes):  # else nothing more is discovered by refining
+        if len(scored["discovered_m"]) < len(meshes):  # otherwise refining discovers nothing more
             measured = _planar(refine_all(planar, explored, budget_m=budget_m))
             scored = score(found, TrueLayout(planar.sections, planar.start_poses, planar.poses), measured)
         rows.append(row | scored)

@@ -1,14 +1,14 @@
 """TODO door of glotouch_bt/validation/faults."""
 
-from glotouch_bt.validation.faults.campaign import Campaign, few_objects, run_campaign
+from glotouch_bt.validation.faults.campaign import FaultCampaign, few_objects, run_campaign
 from glotouch_bt.validation.faults.cases import chosen_cases, chosen_skills
 from glotouch_bt.validation.faults.exhaustive import Exhaustive, run_exhaustive
 from glotouch_bt.validation.faults.trial import VERDICTS
 
 __all__ = [
     "VERDICTS",
-    "Campaign",
     "Exhaustive",
+    "FaultCampaign",
     "chosen_cases",
     "chosen_skills",
     "few_objects",

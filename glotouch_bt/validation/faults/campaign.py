@@ -33,7 +33,7 @@ OnRow = Callable[[Mapping[str, Any], int, int], None]
 
 
 @dataclass(frozen=True)
-class Campaign:
+class FaultCampaign:
     """What shall be tried.
 
     Attributes:
@@ -93,7 +93,7 @@ def few_objects(objects: ObjectSet, count: int, folder: Path) -> tuple[Path, tup
     return folder, names
 
 
-def run_campaign(campaign: Campaign, executor: Executor, on_row: OnRow | None = None) -> dict[str, Any]:
+def run_campaign(campaign: FaultCampaign, executor: Executor, on_row: OnRow | None = None) -> dict[str, Any]:
     """Run twins, then trials; writes trials.csv, matrix.png and summary.json, returns the summary.
 
     Args:
@@ -149,7 +149,7 @@ def run_campaign(campaign: Campaign, executor: Executor, on_row: OnRow | None = 
     return _written(campaign, rows, not_reached)
 
 
-def _written(campaign: Campaign, rows: list[dict[str, Any]], not_reached: int) -> dict[str, Any]:
+def _written(campaign: FaultCampaign, rows: list[dict[str, Any]], not_reached: int) -> dict[str, Any]:
     with (campaign.out / "trials.csv").open("w", newline="", encoding="utf-8") as f:
         table = csv.DictWriter(f, COLUMNS, extrasaction="ignore")
         table.writeheader()

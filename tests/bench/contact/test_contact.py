@@ -69,7 +69,7 @@ def test_a_trial_that_failed_counts() -> None:
 
 
 def test_every_mode_is_tried_on_every_seed(tmp_path: Path) -> None:
-    campaign = contact.Campaign((3, 4), "nominal", 5, "mujoco", tmp_path)
+    campaign = contact.ContactCampaign((3, 4), "nominal", 5, "mujoco", tmp_path)
     asked = [(tool, fixed, r.seed, r.settings["contacts"]) for tool, fixed, r in campaign.requests()]
     assert len(asked) == len(set(asked)) == 8
     assert {a[3] for a in asked} == {"20"}
@@ -78,7 +78,7 @@ def test_every_mode_is_tried_on_every_seed(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_one_seed_for_real(tmp_path: Path) -> None:
     """The bolted square by the probe is far better than the targets; the whole folder is written."""
-    campaign = contact.Campaign((1,), "nominal", 3, "mujoco", tmp_path)
+    campaign = contact.ContactCampaign((1,), "nominal", 3, "mujoco", tmp_path)
     with ThreadPoolExecutor(1) as pool:
         summary = contact.run_campaign(campaign, pool)
     assert summary["probe"]["traced"]["rate"] == 1.0, summary["not_traced"]

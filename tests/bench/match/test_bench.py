@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from glotouch_bt import cli
 from glotouch_bt.bench.match import bench, closures, trials
-from glotouch_bt.bench.match.bench import Campaign, objects_of, run_campaign
+from glotouch_bt.bench.match.bench import MatchCampaign, objects_of, run_campaign
 from glotouch_bt.bench.match.dataset import write_layout
 from glotouch_bt.bench.match.methods import chosen
 from glotouch_bt.commands import bench as bench_command
@@ -43,12 +43,12 @@ def campaign(tmp_path, **changes):
         "seeds": (3, 4), "conditions": "nominal", "objects": None, "strangers": Path("there"), "dataset": None,
         "methods": chosen(()), "backend": "mujoco", "out": tmp_path / "o",
     }  # fmt: skip
-    return Campaign(**given | changes)
+    return MatchCampaign(**given | changes)
 
 
 def test_a_recorded_dataset(quick, monkeypatch, tmp_path):
     """Two layouts; in the second, the large one is missing and something of no name is there."""
-    monkeypatch.setattr(Campaign, "check", lambda self: None)
+    monkeypatch.setattr(MatchCampaign, "check", lambda self: None)
     write_layout(tmp_path / "set", a_layout(3))
     write_layout(tmp_path / "set", a_layout(9, ("small", "middle", None), (0.04, 0.06, 0.05)))
     shown = []
@@ -79,8 +79,8 @@ def test_a_recorded_dataset(quick, monkeypatch, tmp_path):
 
 
 def test_layouts_that_cannot_be_acquired_are_rows(quick, monkeypatch, tmp_path):
-    monkeypatch.setattr(Campaign, "check", lambda self: None)
-    monkeypatch.setattr(Campaign, "request", lambda self, seed: seed)
+    monkeypatch.setattr(MatchCampaign, "check", lambda self: None)
+    monkeypatch.setattr(MatchCampaign, "request", lambda self, seed: seed)
 
     def acquire(seed, dataset):
         if seed == 4:
@@ -98,9 +98,9 @@ def test_layouts_that_cannot_be_acquired_are_rows(quick, monkeypatch, tmp_path):
 
 
 def test_nothing_acquired_at_all(quick, monkeypatch, tmp_path):
-    monkeypatch.setattr(Campaign, "check", lambda self: None)
+    monkeypatch.setattr(MatchCampaign, "check", lambda self: None)
     monkeypatch.setattr(bench, "acquire_layout", lambda *_: a_layout(names=()))
-    monkeypatch.setattr(Campaign, "request", lambda self, seed: seed)
+    monkeypatch.setattr(MatchCampaign, "request", lambda self, seed: seed)
     with ThreadPoolExecutor(1) as pool:
         summary = run_campaign(campaign(tmp_path), pool)
     assert summary["methods"]["likelihood"]["row_top1"]["rate"] is None
@@ -163,7 +163,7 @@ def test_bad_input_is_exit_2_before_anything_is_written(words, message, command,
 
 @pytest.mark.parametrize("as_json", [False, True])
 def test_the_command(as_json, command, quick, monkeypatch, tmp_path):
-    monkeypatch.setattr(Campaign, "check", lambda self: None)
+    monkeypatch.setattr(MatchCampaign, "check", lambda self: None)
     write_layout(tmp_path / "set", a_layout(3))
     words = ["--dataset", "set", "--strangers", "there", "--out", "o", "--workers", "1"] + ["--json"] * as_json
     done = command.invoke(cli.app, ["bench", "match", *words])

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from glotouch_bt.bench.search.bench import Campaign, run_campaign
+from glotouch_bt.bench.search.bench import SearchCampaign, run_campaign
 from glotouch_bt.bench.search.scoring import Found, TrueLayout, discovered_at, score
 from glotouch_bt.bench.search.summary import correlation, quantiles, summarise
 from glotouch_bt.bench.search.trial import Way, _result_of, recorded_folders
@@ -148,13 +148,13 @@ def test_a_record_without_exploration_has_no_travel():
 
 def test_unknown_policies_are_named():
     with pytest.raises(BadInput, match="no_such"):
-        Campaign(("no_such",), (1,), (), "nominal", None, "mujoco", Path("x"))
+        SearchCampaign(("no_such",), (1,), (), "nominal", None, "mujoco", Path("x"))
     with pytest.raises(BadInput, match="nothing to try"):
-        Campaign(("random_descent",), (), (), "nominal", None, "mujoco", Path("x"))
+        SearchCampaign(("random_descent",), (), (), "nominal", None, "mujoco", Path("x"))
 
 
 def test_a_campaign_in_the_plane_writes_all_there_is(tmp_path):
-    campaign = Campaign(
+    campaign = SearchCampaign(
         ("nearest_frontier",), (), (3, 4), "nominal", None, "mujoco", tmp_path / "out", planar_budget_m=1.0
     )
     seen = []
