@@ -1,4 +1,4 @@
-"""What is kept of one call of a leaf."""
+"""Record of one call of a scripted leaf."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Call:
         node: Name of the node.
         path: Path in the tree.
         skill: Name of the skill.
-        number: How often the node had been called before.
+        number: Number of earlier calls of the node.
         start_s: Robot time since the start of the mission.
         params: The skill's parameters.
         inputs: Values of the input ports that are written.

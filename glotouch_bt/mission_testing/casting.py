@@ -1,4 +1,4 @@
-"""Which node plays which outcomes: a script's patterns laid over a mission's leaves, and checked against them."""
+"""Assign outcomes to leaves: match a script's patterns against a mission's leaves and check them."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from py_trees.ports_utils import is_instance_of_type
 
 from glotouch_bt.mission.spec import NodeSpec
 from glotouch_bt.mission_testing.leaf import Part, promised
-from glotouch_bt.mission_testing.outcomes import Decide, Outcome, Script, flat, ok
+from glotouch_bt.mission_testing.outcomes import Decide, LeafOutcome, Script, flat, ok
 from glotouch_bt.robot import BadInput
 from glotouch_bt.skill import Skill
 
-Row: TypeAlias = "tuple[Outcome | Decide, ...]"
+Row: TypeAlias = "tuple[LeafOutcome | Decide, ...]"
 
 
 class ScriptError(BadInput):
-    """A script asks for what the mission or its skills do not have: a slip in the test, not in the mission."""
+    """A script names something that the mission or its skills do not have. The mistake is in the test."""
 
 
 def paths_of(root: NodeSpec, title: str) -> dict[str, NodeSpec]:
-    """Every node by its path, as the runner names it."""
+    """Return every node by its path, as the runner names it."""
     found: dict[str, NodeSpec] = {}
 
     def visit(node: NodeSpec, above: str) -> None:
@@ -38,15 +38,15 @@ def paths_of(root: NodeSpec, title: str) -> dict[str, NodeSpec]:
 
 
 def leaves_of(root: NodeSpec, title: str) -> dict[str, NodeSpec]:
-    """The skills by their path."""
+    """Return the skill leaves by path."""
     return {p: n for p, n in paths_of(root, title).items() if n.skill_type is not None}
 
 
 def fitting(pattern: str, leaves: Mapping[str, NodeSpec]) -> dict[str, NodeSpec]:
-    """The leaves, by path, that a pattern means.
+    """Return the leaves, by path, that a pattern matches.
 
-    The name of a node means that node alone. Else it is laid over names, skills' names and paths; `*`, `?` and `[...]`
-    as in file names: `squeeze*` means `squeeze`, `squeeze 2` and whatever else is done by the skill `squeeze`.
+    The exact name of a node matches that node alone. Otherwise the pattern is matched against node names, skill
+    names and paths with the wildcards `*`, `?` and `[...]`: `squeeze*` matches `squeeze`, `squeeze 2` and so on.
     """
     named = {path: node for path, node in leaves.items() if node.name == pattern}
     if named:
@@ -59,12 +59,12 @@ def fitting(pattern: str, leaves: Mapping[str, NodeSpec]) -> dict[str, NodeSpec]
 
 
 def cast(root: NodeSpec, title: str, script: Script) -> dict[str, Part | None]:
-    """The part of each leaf by its path; None: the skill plays itself. What no pattern fits succeeds.
+    """Return the part of each leaf by path; None: the real skill runs. Leaves without a pattern succeed.
 
-    Patterns as in `fitting`. A node's name wins over all of them; of several that fit, the last one wins.
+    Patterns as in `fitting`. An exact node name wins; of several matching patterns the last one wins.
 
     Raises:
-        ScriptError: A pattern fits no leaf, or an outcome is none the skill can have.
+        ScriptError: A pattern matches no leaf, or the skill cannot have the outcome.
     """
     leaves = leaves_of(root, title)
     rows = {pattern: flat(answer) for pattern, answer in script.items()}
@@ -78,7 +78,7 @@ def cast(root: NodeSpec, title: str, script: Script) -> dict[str, Part | None]:
     for path, node in leaves.items():
         chosen = meant.get(path)
         row: Row = (ok(),) if chosen is None else rows[chosen]
-        if any(isinstance(o, Outcome) and o.kind == "real" for o in row):
+        if any(isinstance(o, LeafOutcome) and o.kind == "real" for o in row):
             if len(row) > 1:
                 raise ScriptError(f"script: {chosen!r}: real() cannot stand in a row with other outcomes")
             parts[path] = None
@@ -87,21 +87,21 @@ def cast(root: NodeSpec, title: str, script: Script) -> dict[str, Part | None]:
     return parts
 
 
-def checked(outcome: Outcome | Decide, node: NodeSpec) -> Outcome | Decide:
-    """The outcome, made fit for a node; what a function decides is checked when it has decided.
+def checked(outcome: LeafOutcome | Decide, node: NodeSpec) -> LeafOutcome | Decide:
+    """Return the outcome, checked against a node; a function's answer is checked when it is called.
 
     Raises:
         ScriptError: The skill does not give that code, has no such port, or the value is not of the port's type.
     """
-    if not isinstance(outcome, Outcome):
+    if not isinstance(outcome, LeafOutcome):
         return lambda call: _outcome(outcome(call), node)
     return _outcome(outcome, node)
 
 
-def _outcome(outcome: Outcome, node: NodeSpec) -> Outcome:
+def _outcome(outcome: LeafOutcome, node: NodeSpec) -> LeafOutcome:
     skill = node.skill_type
     assert skill is not None
-    if not isinstance(outcome, Outcome) or outcome.kind == "real":
+    if not isinstance(outcome, LeafOutcome) or outcome.kind == "real":
         raise ScriptError(f"script: {node.name!r}: a function must decide on ok(), fails(), hangs() or raises()")
     codes = skill.failure_codes()
     # A skill that declares nothing promises nothing.
@@ -111,7 +111,7 @@ def _outcome(outcome: Outcome, node: NodeSpec) -> Outcome:
     return replace(outcome, ports=_ports(outcome, node.name, node.skill, skill))
 
 
-def _ports(outcome: Outcome, name: str, skill_name: str, skill: type[Skill]) -> dict[str, object]:
+def _ports(outcome: LeafOutcome, name: str, skill_name: str, skill: type[Skill]) -> dict[str, object]:
     ports: dict[str, object] = {}
     for port, value in outcome.ports.items():
         if port not in skill.OUTPUT_PORTS:

@@ -1,4 +1,4 @@
-"""Outcome coverage: which endings of each leaf of a mission the tests of a session have exercised."""
+"""LeafOutcome coverage: which endings of each leaf of a mission the tests of a session have exercised."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Plain = dict[str, dict[str, dict[str, list[str]]]]
 
 @dataclass
 class Leaf:
-    """One leaf's endings.
+    """Expected and observed endings of one leaf.
 
     Attributes:
         expected: SUCCESS, every failure code the skill declares (or FAILURE, if it declares none), and PREEMPTED where
-            a node above may break it off.
-        seen: Those that happened.
+            a node above may preempt it.
+        seen: Endings that happened.
     """
 
     expected: tuple[str, ...]
@@ -31,12 +31,12 @@ class Leaf:
 
     @property
     def missing(self) -> list[str]:
-        """What no test exercised."""
+        """Return the endings that no test exercised."""
         return [e for e in self.expected if e not in self.seen]
 
 
 class OutcomeCoverage:
-    """Gathers scripted runs.
+    """Collects the endings of scripted runs.
 
     Attributes:
         missions: For each mission's file, its leaves by path.
@@ -46,7 +46,7 @@ class OutcomeCoverage:
         self.missions: dict[str, dict[str, Leaf]] = {}
 
     def add(self, mission: Mission, run: ScriptedRun) -> None:
-        """Count the calls of a run."""
+        """Add the calls of a run."""
         leaves = self.missions.setdefault(shown(mission.file), {})
         for path, expected in expected_endings(mission.tree, mission.name):
             leaves.setdefault(path, Leaf(expected))
@@ -57,18 +57,18 @@ class OutcomeCoverage:
             leaves[call.path].seen.add(ending)
 
     def exercised(self) -> tuple[int, int]:
-        """(endings exercised, endings in all)."""
+        """Return (endings exercised, endings expected)."""
         leaves = [leaf for mission in self.missions.values() for leaf in mission.values()]
         return sum(len(x.expected) - len(x.missing) for x in leaves), sum(len(x.expected) for x in leaves)
 
     @property
     def percent(self) -> float:
-        """Share of the endings that were exercised; 100 if there are none."""
+        """Return the percentage of endings exercised; 100 if there are none."""
         done, total = self.exercised()
         return 100.0 * done / total if total else 100.0
 
     def lines(self) -> Iterator[str]:
-        """The table for a terminal."""
+        """Yield the lines of the coverage table."""
         for name, leaves in self.missions.items():
             done = sum(len(x.expected) - len(x.missing) for x in leaves.values())
             total = sum(len(x.expected) for x in leaves.values())
@@ -78,14 +78,14 @@ class OutcomeCoverage:
                 yield f"  {path.rsplit('/', 1)[-1]:{width}s}  {_cells(leaf)}"
 
     def plain(self) -> Plain:
-        """As JSON data, to be sent between the processes of one session."""
+        """Return JSON data, to send between the processes of a session."""
         return {
             m: {p: {"expected": list(x.expected), "seen": sorted(x.seen)} for p, x in leaves.items()}
             for m, leaves in self.missions.items()
         }
 
     def merge(self, other: Plain) -> None:
-        """Add what another process has seen."""
+        """Add the data of another process."""
         for mission, leaves in other.items():
             mine = self.missions.setdefault(mission, {})
             for path, leaf in leaves.items():
@@ -105,7 +105,7 @@ def _cells(leaf: Leaf) -> str:
 
 
 def expected_endings(root: NodeSpec, title: str) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """(path, endings) of every leaf."""
+    """Yield (path, expected endings) of every leaf."""
     paths = paths_of(root, title)
     for path, node in paths.items():
         if node.skill_type is None:

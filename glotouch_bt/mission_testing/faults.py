@@ -1,4 +1,4 @@
-"""Faults round a test's robot."""
+"""Inject faults into a test's robot."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from glotouch_bt.robot import Robot
 
 
 def faulted(plan: Sequence[Mapping[str, Any]] | str | Path, robot: Robot, seed: int = 0) -> FaultInjector:
-    """A robot with faults.
+    """Wrap a robot with a fault injector.
 
     Args:
         plan: Faults as in a plan's `plan`, or the path or shipped name of a plan.
         robot: Any robot.
-        seed: Of the faults' draws.
+        seed: Seed of the faults' random draws.
 
     Raises:
-        BadInput: Everything that is wrong with the plan.
+        BadInput: All faults of the plan.
     """
     if isinstance(plan, str | Path):
         return FaultInjector(robot, read_plan(plan), seed)
@@ -31,5 +31,5 @@ def faulted(plan: Sequence[Mapping[str, Any]] | str | Path, robot: Robot, seed: 
 
 
 def idle(injector: FaultInjector) -> list[str]:
-    """Names of the faults that changed nothing."""
+    """Return the names of faults that altered nothing."""
     return [proof.spec.name for proof in injector.proofs() if proof.changes == 0]

@@ -1,4 +1,4 @@
-"""A leaf that plays its part: the ports, parameters and declarations of a skill, the outcomes of a script."""
+"""Scripted leaves: they have the ports, parameters and declarations of a skill, and the outcomes of a script."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from py_trees.common import Status
 
 from glotouch_bt.mission_testing.call import Call
-from glotouch_bt.mission_testing.outcomes import Decide, Outcome
+from glotouch_bt.mission_testing.outcomes import Decide, LeafOutcome
 from glotouch_bt.mission_testing.standins import port_value
 from glotouch_bt.robot import HOLD
 from glotouch_bt.skill import Context, Skill, SkillFailed, SkillParams, SkillRun
@@ -19,14 +19,14 @@ from glotouch_bt.skill import Context, Skill, SkillFailed, SkillParams, SkillRun
 
 @dataclass
 class Stage:
-    """What all leaves of one run share.
+    """State shared by all leaves of one run.
 
     Attributes:
-        parts: What each node plays, by its name.
+        parts: Part of each node, by its name.
         calls: Every call, in order of start.
         begin_s: Robot time at which the mission began.
-        wake: Told by each waiting leaf until when it only waits.
-        note: Told of every call that begins or ends.
+        wake: Called by each waiting leaf with the time until which it waits.
+        note: Called for every call that begins or ends.
     """
 
     parts: Mapping[str, Part] = field(default_factory=dict)
@@ -38,30 +38,30 @@ class Stage:
 
 @dataclass(frozen=True)
 class Part:
-    """What one node plays.
+    """Scripted part of one node.
 
     Attributes:
         path: The node's path in the tree.
         skill: Name of the skill.
-        row: Outcomes, call after call; the last one repeats.
+        row: Outcomes of successive calls; the last one repeats.
     """
 
     path: str
     skill: str
-    row: tuple[Outcome | Decide, ...]
+    row: tuple[LeafOutcome | Decide, ...]
 
-    def answer(self, call: Call) -> Outcome:
-        """The outcome of a call."""
+    def answer(self, call: Call) -> LeafOutcome:
+        """Return the outcome of a call."""
         found = self.row[min(call.number, len(self.row) - 1)]
-        return found if isinstance(found, Outcome) else found(call)
+        return found if isinstance(found, LeafOutcome) else found(call)
 
 
 STAGE: ContextVar[Stage] = ContextVar("stage")
-"""The run that is being set up: the executive makes its nodes by name, parameters and context alone."""
+"""The run being set up: the executive creates nodes from name, parameters and context alone."""
 
 
 class _Playing(Skill):
-    """Mixed into the skill's own class, so that whoever asks finds its ports and declarations; nothing of it runs."""
+    """Mixin over the skill's own class: its ports and declarations stay, its code never runs."""
 
     _call: Call
 
@@ -75,7 +75,7 @@ class _Playing(Skill):
 
     def update(self) -> Status:
         status = Skill.update(self)
-        if status is Status.FAILURE and self.reason is not None:  # the base class may have ended it: it took too long
+        if status is Status.FAILURE and self.reason is not None:  # the base class ended it after its longest duration
             self._call.ending, self._call.code = "FAILURE", self.reason.code
         return status
 
@@ -100,7 +100,7 @@ class _Playing(Skill):
     def _begin(self) -> Call:
         stage, path = self.stage, self.part.path
         number = sum(c.path == path for c in stage.calls)
-        # A required input that nobody wrote raises here, as it does when a skill reads it.
+        # A required input that was never written raises here, as in the real skill.
         given = {
             p: self.get_input(p)
             for p, info in self.INPUT_PORTS.items()
@@ -114,7 +114,7 @@ class _Playing(Skill):
     def _now_s(self) -> float:
         return round(self.context.observation.now_s - self.stage.begin_s, 9)
 
-    def _wait(self, outcome: Outcome) -> SkillRun:
+    def _wait(self, outcome: LeafOutcome) -> SkillRun:
         if outcome.kind == "hangs":
             self._write(outcome.ports)
         begin_s = self.context.observation.now_s
@@ -131,7 +131,7 @@ class _Playing(Skill):
             node = node.parent
         return above
 
-    def _end(self, call: Call, outcome: Outcome) -> None:
+    def _end(self, call: Call, outcome: LeafOutcome) -> None:
         if outcome.kind == "raises":
             assert outcome.error is not None
             raise outcome.error
@@ -154,13 +154,13 @@ class _Playing(Skill):
 
 
 def promised(skill: type[Skill], port: str, outcome: str) -> object | None:
-    """The value a skill always gives a port when it ends so; None if it promises none."""
+    """Return the value a skill promises for a port at this ending, or None."""
     found: object | None = getattr(getattr(skill, port, None), "on_success" if outcome == "ok" else "on_failure", None)
     return found
 
 
 def default_value(skill: type[Skill], port: str, outcome: str) -> object:
-    """What a port is given that the script does not name: what the skill promises, else a stand-in."""
+    """Return the value of a port the script does not name: the promised one, or a stand-in."""
     value = promised(skill, port, outcome)
     if value is not None:
         return value
@@ -170,5 +170,5 @@ def default_value(skill: type[Skill], port: str, outcome: str) -> object:
 
 @lru_cache(maxsize=256)
 def playing(skill: type[Skill]) -> type[Skill]:
-    """The class of nodes that play a skill; they take their parts from the present `STAGE` when they are made."""
+    """Return the scripted class of a skill; its instances take their parts from the current `STAGE`."""
     return type(f"Scripted{skill.__name__}", (_Playing, skill), {"__doc__": skill.__doc__})

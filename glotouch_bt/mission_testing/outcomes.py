@@ -1,7 +1,7 @@
-"""What a scripted leaf answers: `ok(contact=c)`, `fails("search_exhausted")`, `hangs()`, `raises(error)`, `real()`.
+"""Outcomes of scripted leaves: `ok(contact=c)`, `fails("search_exhausted")`, `hangs()`, `raises(error)`, `real()`.
 
-{"guarded_sweep": [ok() * 3, fails("search_exhausted", exhausted=True)],   # call after call; the last one repeats
- "squeeze*": fails("no_squeeze"),                                          # every node the pattern fits
+{"guarded_sweep": [ok() * 3, fails("search_exhausted", exhausted=True)],   # successive calls; the last one repeats
+ "squeeze*": fails("no_squeeze"),                                          # every node the pattern matches
  "match": lambda call: ok() if call.number else fails()}                   # decided when it is called
 """
 
@@ -20,16 +20,16 @@ Kind = Literal["ok", "fails", "hangs", "raises", "real"]
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """How one call of a leaf goes; made by `ok`, `fails`, `hangs`, `raises`, `real`.
+class LeafOutcome:
+    """Outcome of one call of a leaf; made by `ok`, `fails`, `hangs`, `raises`, `real`.
 
     Attributes:
-        kind: What it does.
+        kind: Kind of outcome.
         code: Failure code; empty: the first the skill declares.
         message: Failure message.
         ports: Values of output ports written; ports a success does not name get a stand-in value.
-        error: What is raised.
-        after_s: Robot time it runs before that.
+        error: Exception to raise.
+        after_s: Robot time to run before.
     """
 
     kind: Kind
@@ -39,13 +39,13 @@ class Outcome:
     error: BaseException | None = None
     after_s: float = 0.0
 
-    def after(self, seconds: float) -> Outcome:
-        """The same, but RUNNING for so long on the robot's clock first."""
+    def after(self, seconds: float) -> LeafOutcome:
+        """Return the same outcome after `seconds` of RUNNING on the robot's clock."""
         if not 0.0 <= seconds < float("inf"):
-            raise ParamError("after.seconds", seconds, "finite and not negative; hangs() runs for ever")
+            raise ParamError("after.seconds", seconds, "finite and not negative; hangs() never ends")
         return replace(self, after_s=float(seconds))
 
-    def __mul__(self, times: int) -> list[Outcome]:
+    def __mul__(self, times: int) -> list[LeafOutcome]:
         return [self] * times
 
     __rmul__ = __mul__
@@ -57,46 +57,46 @@ class Outcome:
         return f"{self.kind}({', '.join([*first, *ports])}){after}"
 
 
-Decide: TypeAlias = "Callable[[Call], Outcome]"
-Answer: TypeAlias = Union[Outcome, "Decide", "Sequence[Answer]"]
+Decide: TypeAlias = "Callable[[Call], LeafOutcome]"
+Answer: TypeAlias = Union[LeafOutcome, "Decide", "Sequence[Answer]"]
 Script: TypeAlias = Mapping[str, Answer]
 
 
-def ok(**ports: object) -> Outcome:
-    """SUCCESS; `ports` are written, and stand-in values to the other output ports."""
-    return Outcome("ok", ports=ports)
+def ok(**ports: object) -> LeafOutcome:
+    """Return SUCCESS; `ports` are written, the other output ports get stand-in values."""
+    return LeafOutcome("ok", ports=ports)
 
 
-def fails(code: str = "", message: str = "", /, **ports: object) -> Outcome:
-    """FAILURE with a code the skill declares (default: its first); `ports` are written before."""
-    return Outcome("fails", code, message, ports)
+def fails(code: str = "", message: str = "", /, **ports: object) -> LeafOutcome:
+    """Return FAILURE with a declared code (default: the first); `ports` are written before."""
+    return LeafOutcome("fails", code, message, ports)
 
 
-def hangs(**ports: object) -> Outcome:
-    """RUNNING until a timeout, a sibling, the skill's own longest time or the mission's end; `ports` written first."""
-    return Outcome("hangs", ports=ports)
+def hangs(**ports: object) -> LeafOutcome:
+    """Stay RUNNING until preempted or out of time; `ports` are written first."""
+    return LeafOutcome("hangs", ports=ports)
 
 
-def raises(error: BaseException) -> Outcome:
-    """A fault in the skill."""
-    return Outcome("raises", error=error)
+def raises(error: BaseException) -> LeafOutcome:
+    """Raise an exception in the skill."""
+    return LeafOutcome("raises", error=error)
 
 
-def real() -> Outcome:
-    """The skill itself, on the robot the test gives; must be all a node is scripted with."""
-    return Outcome("real")
+def real() -> LeafOutcome:
+    """Run the real skill on the test's robot; must be the node's only outcome."""
+    return LeafOutcome("real")
 
 
-def flat(answer: Answer) -> tuple[Outcome | Decide, ...]:
-    """An answer as the row of its outcomes, nested rows laid out.
+def flat(answer: Answer) -> tuple[LeafOutcome | Decide, ...]:
+    """Flatten an answer into a row of outcomes.
 
     Raises:
-        ParamError: Something in it is neither an outcome nor a function, or there is nothing in it.
+        ParamError: It is empty, or holds something that is neither an outcome nor a function.
     """
     makers: tuple[object, ...] = (ok, fails, hangs, raises, real)
     if any(answer is maker for maker in makers):
         raise ParamError("script", getattr(answer, "__name__", answer), "called: ok(), fails('code'), ...")
-    if isinstance(answer, Outcome) or (callable(answer) and not isinstance(answer, type)):
+    if isinstance(answer, LeafOutcome) or (callable(answer) and not isinstance(answer, type)):
         return (answer,)
     if not isinstance(answer, Sequence) or isinstance(answer, (str, bytes)) or not answer:
         raise ParamError("script", answer, "an outcome (ok(), fails('code'), ...), a function, or a list of them")

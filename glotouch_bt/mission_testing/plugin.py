@@ -1,7 +1,7 @@
-"""The pytest plugin: comes with the package (entry point `pytest11`), costs nothing until a fixture or option is used.
+"""The pytest plugin (entry point `pytest11`). It imports nothing until a fixture or option is used.
 
-Fixtures: `scripted` runs a mission with scripted leaves, `load` loads one, `fake_robot` makes robots without physics,
-`faulty` puts faults round them. Options: `--glotouch-coverage`, `--glotouch-coverage-min`.
+Fixtures: `scripted` runs a mission with scripted leaves, `fake_robot` makes robots without physics,
+`faulty` injects faults into them. Options: `--glotouch-coverage`, `--glotouch-coverage-min`.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ KEY: pytest.StashKey[Session] = pytest.StashKey()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The plugin's options."""
+    """Add the plugin's options."""
     group = parser.getgroup("glotouch", "missions (glotouch_bt)")
     group.addoption(
         "--glotouch-coverage",
         action="store_true",
-        help="say which outcomes of each leaf of the scripted missions were exercised",
+        help="report which outcomes of each leaf the scripted missions exercised",
     )
     group.addoption(
-        "--glotouch-coverage-min", type=float, metavar="PERCENT", help="fail if fewer of them were; prints them too"
+        "--glotouch-coverage-min", type=float, metavar="PERCENT", help="report outcomes, and fail below this percentage"
     )
 
 
 def session_of(config: pytest.Config) -> Session:
-    """What the plugin knows of this session."""
+    """Return the state of this session."""
     if KEY not in config.stash:
         from glotouch_bt.mission_testing.session import Session
 
@@ -49,8 +49,8 @@ class Scripted:
     """The `scripted` fixture: call it to run a mission; `load` loads one.
 
     Args:
-        session: What all tests share.
-        here: The test's folder; relative paths are looked for there too.
+        session: State shared by all tests.
+        here: The test's folder; relative paths are tried there too.
     """
 
     def __init__(self, session: Session, here: Path) -> None:
@@ -64,10 +64,10 @@ class Scripted:
         objects: Path | None = None,
         skills: Mapping[str, Any] | None = None,
     ) -> Mission:
-        """A checked mission: a shipped name, or a path as given, beside the test, or under pytest's root.
+        """Load a checked mission: a shipped name, or a path relative to the working folder, the test or pytest's root.
 
         Raises:
-            MissionFaults: Everything that is wrong with it.
+            MissionFaults: All findings.
         """
         return self._session.load(mission, settings or {}, objects, skills, self._here)
 
@@ -80,7 +80,7 @@ class Scripted:
         robot: Robot | None = None,
         timeout_s: float | None = None,
     ) -> ScriptedRun:
-        """Run a mission with its leaves scripted; what the script does not name succeeds at once.
+        """Run a mission with its leaves scripted; leaves that the script does not name succeed at once.
 
         Args:
             mission: A shipped name, a path, or a loaded mission.
@@ -125,10 +125,10 @@ def fake_robot() -> Iterator[Callable[..., FakeRobot]]:
 
 @pytest.fixture
 def faulty() -> Iterator[Callable[..., FaultInjector]]:
-    """Put faults round a robot: `faulty([{"fault": "wrench_bias", "with": {"force_N": [0, 0, 3]}}], fake_robot())`.
+    """Inject faults into a robot: `faulty([{"fault": "wrench_bias", "with": {"force_N": [0, 0, 3]}}], fake_robot())`.
 
     The faults are those of a plan's `plan` (see `glotouch faults`), or the path of a plan. A fault that altered
-    nothing by the end of the test fails it: such a test shows nothing.
+    nothing by the end fails the test, because such a test proves nothing.
     """
     from glotouch_bt.mission_testing.faults import faulted, idle
 
@@ -145,7 +145,7 @@ def faulty() -> Iterator[Callable[..., FaultInjector]]:
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Send what a worker has seen to the controller; judge the coverage."""
+    """Send a worker's coverage to the controller; check the required percentage."""
     config = session.config
     output = getattr(config, "workeroutput", None)
     if output is not None:
@@ -162,7 +162,7 @@ def _coverage_is_short(config: pytest.Config) -> bool:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node: Any, error: object) -> None:
-    """A worker of pytest-xdist has ended: take over what it has seen."""
+    """Merge the coverage of a finished pytest-xdist worker."""
     seen = getattr(node, "workeroutput", {}).get("glotouch_coverage")
     if seen:
         session_of(node.config).coverage.merge(seen)

@@ -13,7 +13,7 @@ from glotouch_bt.mission.spec import NodeSpec
 from glotouch_bt.mission_testing.casting import leaves_of
 from glotouch_bt.mission_testing.coverage import expected_endings
 from glotouch_bt.mission_testing.leaf import promised
-from glotouch_bt.mission_testing.outcomes import Outcome
+from glotouch_bt.mission_testing.outcomes import LeafOutcome
 from glotouch_bt.mission_testing.standins import port_value, stand_in
 from glotouch_bt.skill import Skill
 
@@ -45,7 +45,7 @@ class ScriptMaker:
         endings = expected_endings(self.mission.tree, self.mission.name)
         self._breakable = {path for path, expected in endings if "PREEMPTED" in expected}
 
-    def rows(self, rng: np.random.Generator) -> dict[str, tuple[Outcome, ...]]:
+    def rows(self, rng: np.random.Generator) -> dict[str, tuple[LeafOutcome, ...]]:
         """Return a random row of outcomes for each leaf, by its name; half of the leaves repeat one outcome."""
         wild = rng.uniform(0.05, 0.6)
         made = {}
@@ -54,12 +54,12 @@ class ScriptMaker:
             made[node.name] = tuple(self._outcome(path, node, wild, rng) for _ in range(length))
         return made
 
-    def _outcome(self, path: str, node: NodeSpec, wild: float, rng: np.random.Generator) -> Outcome:
+    def _outcome(self, path: str, node: NodeSpec, wild: float, rng: np.random.Generator) -> LeafOutcome:
         skill = node.skill_type
         assert skill is not None
         after = float(np.round(rng.uniform(0.0, self._seconds), 1)) if rng.random() < 0.15 else 0.0
         if path in self._breakable and rng.random() < 0.1:
-            return Outcome("hangs")
+            return LeafOutcome("hangs")
         failing = rng.random() < wild
         kind: Literal["ok", "fails"] = "fails" if failing else "ok"
         ports = {
@@ -69,7 +69,7 @@ class ScriptMaker:
         }
         codes = list(skill.FAILURES) or [""]
         code = codes[int(rng.integers(len(codes)))] if failing else ""
-        return Outcome(kind, code, ports=ports, after_s=after)
+        return LeafOutcome(kind, code, ports=ports, after_s=after)
 
     def _port(self, skill: type[Skill], port: str, rng: np.random.Generator) -> object:
         kind: Any = skill.OUTPUT_PORTS[port].data_type

@@ -1,4 +1,4 @@
-"""Run a mission with scripted leaves: the real tree on the real runner, a robot without physics, in milliseconds."""
+"""Run a mission with scripted leaves: the real tree and runner on a robot without physics, in milliseconds."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ MAX_TICKS = 20_000
 
 
 class RunsAway(GlotouchError):
-    """A scripted mission that does not end."""
+    """A scripted mission did not end."""
 
 
 class ScriptedRun:
-    """What came of a scripted mission.
+    """Result of a scripted mission.
 
     Attributes:
         mission: The mission's name.
         status: success, failure or aborted (a leaf raised).
         calls: Every call of a leaf, in order of start.
-        chain: Why it did not succeed, root cause last.
-        error: What was raised, if it was aborted.
-        ticks: Ticks done.
-        duration_s: Robot time it took.
+        chain: Reasons of failure, root cause last.
+        error: Exception that aborted it, or None.
+        ticks: Number of ticks.
+        duration_s: Robot time.
         keys: Last value of each key that was written.
     """
 
@@ -57,55 +57,55 @@ class ScriptedRun:
 
     @property
     def succeeded(self) -> bool:
-        """The mission succeeded."""
+        """Return True if the mission succeeded."""
         return self.status == "success"
 
     @property
     def code(self) -> str:
-        """Code of the root cause: a skill's failure code, `mission_timeout`, `fault` ...; empty without one."""
+        """Return the code of the root cause: a failure code, `mission_timeout`, `fault` ...; empty if none."""
         reason = self.chain[-1].reason if self.chain else None
         return reason.code if reason else ""
 
     @property
     def order(self) -> list[str]:
-        """Names of the leaves, in order of start."""
+        """Return the names of the called leaves, in order of start."""
         return [c.node for c in self.calls]
 
     def failed_with(self, code: str, node: str = "*") -> bool:
-        """The mission failed, and its root cause has this code (and is this leaf)."""
+        """Return True if the mission failed with this root code (at this leaf)."""
         if self.status != "failure" or self.code != code:
             return False
         return node == "*" or self.chain[-1].node in {s.name for s in self._fitting(node).values()}
 
     def calls_of(self, pattern: str) -> list[Call]:
-        """The calls of the leaves that a name or pattern fits.
+        """Return the calls of the leaves that a name or pattern matches.
 
         Raises:
-            ScriptError: It fits no leaf of the mission.
+            ScriptError: It matches no leaf of the mission.
         """
         fitting = self._fitting(pattern)
         return [c for c in self.calls if c.path in fitting]
 
     def ran(self, pattern: str) -> int:
-        """How often these leaves were called."""
+        """Return the number of calls of these leaves."""
         return len(self.calls_of(pattern))
 
     def never_ran(self, pattern: str) -> bool:
-        """None of these leaves was called."""
+        """Return True if none of these leaves was called."""
         return not self.calls_of(pattern)
 
     def endings(self, pattern: str) -> list[str]:
-        """How these leaves' calls ended: SUCCESS, a failure code, PREEMPTED, RAISED."""
+        """Return the endings of these leaves' calls: SUCCESS, a failure code, PREEMPTED, RAISED."""
         return [c.code or c.ending for c in self.calls_of(pattern)]
 
     def before(self, first: str, then: str) -> bool:
-        """Both were called, and every call of the first began before any of the second."""
+        """Return True if both were called, and all calls of the first began before any of the second."""
         order = [id(c) for c in self.calls]
         one, two = ([order.index(id(c)) for c in self.calls_of(p)] for p in (first, then))
         return bool(one) and bool(two) and max(one) < min(two)
 
     def status_of(self, node: str) -> str:
-        """Last status of a node by name or path, composites and decorators too; INVALID if it was never reached.
+        """Return the last status of any node by name or path; INVALID if never reached.
 
         Raises:
             ScriptError: No such node.
@@ -130,7 +130,7 @@ class ScriptedRun:
 
 @dataclass
 class _Heard(NullRecord):
-    """A record that keeps each node's last status and each key's last value."""
+    """Record of each node's last status and each key's last value."""
 
     statuses: dict[str, str]
     max_ticks: int = MAX_TICKS
@@ -144,7 +144,7 @@ class _Heard(NullRecord):
 
     def tick(self, stamp_s: float, changes: Sequence[tuple[str, object, object]]) -> None:
         for path, _, new in changes:
-            # A composite forgets its children when it ends: INVALID says nothing of how they ended.
+            # A composite resets its children to INVALID when it ends.
             if getattr(new, "value", "") != "INVALID":
                 self.statuses[path] = str(getattr(new, "value", new))
 
@@ -153,10 +153,10 @@ class _Heard(NullRecord):
 
 
 class StillArm:
-    """Stands in for the motion room where no leaf moves."""
+    """Stand-in for the arm where no leaf moves."""
 
     def sync(self, observation: Observation) -> None:
-        """Nothing to take up."""
+        """Do nothing."""
 
 
 def run_scripted(
@@ -168,15 +168,15 @@ def run_scripted(
     make_arm: Callable[[Robot, World], Arm] | None = None,
     max_ticks: int = MAX_TICKS,
 ) -> ScriptedRun:
-    """Run a mission with its leaves scripted; what no pattern fits succeeds at once.
+    """Run a mission with scripted leaves; leaves without a pattern succeed at once.
 
     Args:
         mission: A checked mission.
         script: Outcomes by node name, skill name, path, or pattern of those.
-        robot: An open robot (default: a FakeRobot, whose clock skips the time in which leaves only wait).
+        robot: An open robot (default: a FakeRobot whose clock skips waiting).
         timeout_s: Longest duration on the robot's clock (default: the mission's).
-        make_arm: Makes the motion generators (default: none at all; the real ones if a leaf is `real()`).
-        max_ticks: A mission that has not ended after so many is aborted with `RunsAway`.
+        make_arm: Makes the motion generators (default: none; the real ones if a leaf is `real()`).
+        max_ticks: Number of ticks after which the mission is aborted with `RunsAway`.
 
     Raises:
         ScriptError: The script does not fit the mission.

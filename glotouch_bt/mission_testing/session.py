@@ -1,4 +1,4 @@
-"""What the tests of one pytest session share: missions loaded once, and the coverage of outcomes."""
+"""State shared by the tests of one pytest session: loaded missions and outcome coverage."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from glotouch_bt.robot import UnknownName
 
 
 class Session:
-    """See the module's text.
+    """Loads each mission once and collects coverage.
 
     Args:
-        root: pytest's root; relative paths are looked for there too.
+        root: pytest's root; relative paths are tried there too.
 
     Attributes:
         coverage: Endings exercised so far.
@@ -36,11 +36,11 @@ class Session:
         skills: Mapping[str, Any] | None,
         here: Path,
     ) -> Mission:
-        """A mission for a test, from memory if it was loaded before and its file has not changed.
+        """Load a mission for a test; cached while its file does not change.
 
         Raises:
-            ScriptError: A setting that is no parameter of it: here is no backend that might take it.
-            BadInput: It cannot be read, or is faulty.
+            ScriptError: A setting is no parameter of the mission.
+            BadInput: It cannot be read, or has findings.
         """
         path = self.find(given, here)
         stat = path.stat()
@@ -54,10 +54,10 @@ class Session:
         return mission
 
     def find(self, given: str | Path, *folders: Path) -> Path:
-        """A mission's file: as given, in one of the folders, under the root, or shipped; short where that is possible.
+        """Find a mission's file: as given, in one of the folders, under the root, or shipped.
 
         Raises:
-            BadInput: Nowhere.
+            BadInput: Not found.
         """
         for folder in (Path(), *folders, self._root):
             if Path(given).suffix in (".yaml", ".yml") and (folder / given).is_file():

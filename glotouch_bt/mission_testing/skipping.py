@@ -1,4 +1,4 @@
-"""A FakeRobot whose clock skips what nobody looks at: while all that runs is a leaf that waits, time passes at once."""
+"""A FakeRobot whose clock skips waiting: while only a waiting leaf runs, time jumps to its end."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from glotouch_bt.robot import Command, FakeRobot, Observation
 from glotouch_bt.robot.supervision import SupervisionLimits
 
 PATIENT = SupervisionLimits(late_periods=1e12, tolerated=10**9)
-"""A supervisor that lets skipped time pass."""
+"""Supervision limits that tolerate skipped time."""
 
 
 def may_skip(root: NodeSpec) -> bool:
-    """Only one leaf runs at a time, so that nothing but it and the timeouts above it can change while it waits."""
+    """Return True if only one leaf can run at a time, so nothing but it and its timeouts can act while it waits."""
     return not any(kind_of(node).concurrent for node in root.walk())
 
 
 class SkippingRobot(FakeRobot):
-    """See the module's text. A mission's own longest time must be told, for it ends a wait as well.
+    """FakeRobot that skips waiting.
 
     Args:
-        end_s: Robot time at which the mission is over whatever happens.
+        end_s: Robot time at which the mission times out; it ends a wait as well.
         period_s: Control period.
     """
 
@@ -30,11 +30,11 @@ class SkippingRobot(FakeRobot):
         self._wake_s = 0.0
 
     def wake(self, until_s: float) -> None:
-        """Until then nobody needs a tick; holds for the next cycle only."""
+        """Skip to this time in the next cycle."""
         self._wake_s = min(until_s, self._end_s)
 
     def cycle(self, command: Command) -> Observation:
-        """One control period that ends at, or just before, the time somebody asked to be woken."""
+        """Run one control period that ends at, or just before, the wake time."""
         skipped = int((self._wake_s - self._newest.now_s) / self.period_s + 1e-6) - 1
         self.cycles += max(skipped, 0)
         self._wake_s = 0.0

@@ -1,8 +1,7 @@
-"""Values made from types, for the ports a test does not care about.
+"""Stand-in values made from types, for ports that a test does not name.
 
-Nothing in a scripted mission computes with them but conditions and the order of a `for_each`, so that a value only has
-to be of its type and to have its fields. What a class refuses at birth (a stand-in cannot know every rule) is made
-without asking it.
+Only conditions and the order of a `for_each` use them in a scripted mission, so a value needs only its type and fields.
+If a class rejects the stand-in's fields, the object is created without calling `__init__`.
 """
 
 from __future__ import annotations
@@ -19,13 +18,13 @@ import numpy as np
 from glotouch_bt.robot import ParamError
 
 T = TypeVar("T")
-DEEPEST = 6
+MAX_DEPTH = 6
 
 _PLAIN: dict[Any, Any] = {bool: True, int: 1, float: 1.0, str: "stand-in", bytes: b"", Path: Path("stand-in")}
 
 
 def stand_in(kind: type[T], **fields: object) -> T:
-    """A value of a type: flags are true, numbers 1, tuples hold one item; `fields` of a class as given.
+    """Return a value of a type: flags are true, numbers 1, tuples hold one item; `fields` of a class as given.
 
     Raises:
         ParamError: The class has no such field.
@@ -45,7 +44,7 @@ def stand_in(kind: type[T], **fields: object) -> T:
 
 @lru_cache(maxsize=512)
 def port_value(data_type: Any, element: Any) -> object:
-    """A value for a port; `element` is the type of a tuple's items (None: not known)."""
+    """Return a value for a port; `element` is the type of a tuple's items (None: unknown)."""
     return _value(data_type, object if element is None else element, 0)
 
 
@@ -64,7 +63,7 @@ def _value(kind: Any, element: Any, depth: int) -> Any:
         return np.zeros(3)
     if origin is not None:
         return origin() if isinstance(origin, type) and issubclass(origin, (list, dict, set, frozenset)) else None
-    if not isinstance(kind, type) or depth > DEEPEST:
+    if not isinstance(kind, type) or depth > MAX_DEPTH:
         return None
     if issubclass(kind, enum.Enum):
         return next(iter(kind))
@@ -95,10 +94,10 @@ def _instance(kind: type, fields: dict[str, Any], depth: int) -> Any:
     try:
         return kind(**values)
     except Exception:
-        return _unborn(kind, values)
+        return _without_init(kind, values)
 
 
-def _unborn(kind: type, values: dict[str, Any]) -> Any:
+def _without_init(kind: type, values: dict[str, Any]) -> Any:
     try:
         made: Any = object.__new__(kind)
         for name, value in values.items():

@@ -1,7 +1,7 @@
-"""`bench resume`: missions killed with SIGKILL at random moments, resumed, and compared with their unbroken twins.
+"""`bench resume`: kill missions with SIGKILL at random moments, resume them, and compare with uninterrupted twins.
 
-A moment is a share of the CPU time that the twin's mission took, so that another process on the same core does not
-shift it. Killed and resumed are processes of their own, the very command line a person types.
+A moment is a share of the twin's CPU time, so other processes on the core do not shift it. Killed and resumed missions
+are processes of their own, started with the normal command line.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from glotouch_bt.robot.scene import stream
 
 POLL_S = 0.002
 ONLY_HERE = ("wall_time_s", "wall_open_s", "resumed", "versions")
-"""What result.json may say differently after a resumption."""
+"""Keys of result.json that may differ after a resume."""
 COLUMNS = (
     "seed", "moment", "killed_cpu_s", "twin_cpu_s", "outcome", "status", "twin_status", "retrieved", "twin_retrieved",
     "same_end", "same_result", "readable_after_kill", "readable_at_end", "same_record", "checkpoint", "checkpoints",
@@ -36,18 +36,18 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class KillStudy:
-    """What to try.
+    """Settings of the study.
 
     Attributes:
         mission: Path or shipped name.
         seeds: One twin each.
-        kills: Moments a seed.
+        kills: Number of kills a seed.
         out: Folder of the study.
         settings: `--set` words.
         conditions: Path or shipped name.
         objects: Folder of STL files instead of the world's.
-        resume: Keep the twins and trials that are in `out` already.
-        words: The command line's first words.
+        resume: Keep existing twins and trials in `out`.
+        words: First words of the command line.
     """
 
     mission: str
@@ -61,7 +61,7 @@ class KillStudy:
     words: tuple[str, ...] = (sys.executable, "-m", "glotouch_bt.cli")
 
     def run_words(self, seed: int, folder: Path) -> list[str]:
-        """The command that runs one mission."""
+        """Return the command that runs one mission."""
         sets = [w for k, v in self.settings.items() for w in ("--set", f"{k}={v}")]
         head = [*self.words, "run", self.mission, "--seed", str(seed), "--conditions", self.conditions]
         box = [] if self.objects is None else ["--objects", str(self.objects)]
@@ -70,7 +70,7 @@ class KillStudy:
 
 @dataclass(frozen=True)
 class Twin:
-    """An unbroken run.
+    """An uninterrupted run.
 
     Attributes:
         folder: Its folder.
@@ -85,11 +85,11 @@ class Twin:
 
 
 def run_study(study: KillStudy, on_row: Callable[[dict[str, Any], int, int], None] | None = None) -> dict[str, Any]:
-    """Every twin and every kill; writes trials.csv and summary.json after each, returns the summary.
+    """Run every twin and every kill, write trials.csv and summary.json after each, and return the summary.
 
     Raises:
         BadInput: The mission or an option is wrong.
-        BackendError: This system does not tell a process's CPU time.
+        BackendError: This system has no /proc to read CPU times from.
     """
     if not Path("/proc/self/stat").is_file():
         raise BackendError("bench resume needs /proc, which this system has not")
@@ -126,7 +126,7 @@ def _write(study: KillStudy, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any
 
 
 def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Rates over all kills in a mission; `outside`: how many came before its first checkpoint or after its end."""
+    """Return rates over all kills; `outside` counts kills before the first checkpoint or after the end."""
     everything, rows = len(rows), [r for r in rows if r["outcome"] == "killed"]
     n = len(rows)
 
@@ -188,7 +188,7 @@ def _trial(study: KillStudy, seed: int, number: int, share: float, twin: Twin) -
         "outcome": "killed" if process.returncode == -signal.SIGKILL else "ended before",
     }
     if row["outcome"] == "killed" and (folder / "result.json").exists():
-        row["outcome"] = "ended before"  # it was only closing
+        row["outcome"] = "ended before"  # it was closing already
     if not (folder / FILE).exists():
         return row | {"outcome": "not begun"}
     row |= _after_kill(folder, twin)
@@ -200,7 +200,7 @@ def _trial(study: KillStudy, seed: int, number: int, share: float, twin: Twin) -
 
 
 def _after_kill(folder: Path, twin: Twin) -> dict[str, Any]:
-    """What a killed process left behind."""
+    """Describe what a killed process left behind."""
     row: dict[str, Any] = {"readable_after_kill": False, "skill_lost": None}
     record = _read(folder)
     row["readable_after_kill"] = record is not None
@@ -215,13 +215,13 @@ def _after_kill(folder: Path, twin: Twin) -> dict[str, Any]:
     if record is not None and rows and len(record.samples.get("stamp_s", ())):
         end_s = max(record.span_s[1], rows[-1].stamp_s)
         row["lost_s"] = round(end_s - rows[-1].stamp_s, 3)
-        # a skill whose end the record knows, but for which there is no checkpoint, would be lost
+        # a skill that ended in the record but has no checkpoint would be lost
         row["skill_lost"] = sum(r.number > rows[-1].number and r.stamp_s < end_s - 1e-6 for r in expected)
     return row
 
 
 def _at_end(folder: Path, twin: Twin) -> dict[str, Any]:
-    """How the resumed run ended, beside its twin."""
+    """Compare the end of the resumed run with its twin."""
     row: dict[str, Any] = {"same_end": False, "same_result": False, "readable_at_end": False, "same_record": False}
     record = _read(folder)
     row["readable_at_end"] = record is not None and record.complete
@@ -242,7 +242,7 @@ def _told(result: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _same_record(a: RunRecord, b: RunRecord) -> bool:
-    """The same samples to the bit, the same ticks, ports and events."""
+    """Return True for equal samples (to the bit), ticks, ports and events."""
     arrays = all(
         mine.keys() == theirs.keys() and all(mine[k].tobytes() == theirs[k].tobytes() for k in mine)
         for mine, theirs in ((a.samples, b.samples), (a.cycles, b.cycles), (a.tactile, b.tactile))
@@ -263,7 +263,7 @@ def _start(words: Sequence[str]) -> subprocess.Popen[bytes]:
 
 
 def _wait(process: subprocess.Popen[bytes]) -> None:
-    """A moment, or until the process ends."""
+    """Wait a moment, or until the process ends."""
     with contextlib.suppress(subprocess.TimeoutExpired):
         process.wait(POLL_S)
 
@@ -273,7 +273,7 @@ def _environment() -> dict[str, str]:
 
 
 def _cpu_s(pid: int) -> float | None:
-    """User and system time of a process so far."""
+    """Return the user and system time of a process so far."""
     try:
         after_name = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:

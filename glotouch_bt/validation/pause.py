@@ -1,7 +1,7 @@
-"""`bench pause`: missions that are paused again and again beside their undisturbed twins of the same seed.
+"""`bench pause`: pause missions again and again, and compare with unpaused twins of the same seed.
 
-A mission that is paused at every n-th tick, wherever it is then (in a motion, at a contact, with something between the
-jaws), must end as its twin does and keep the hard limit. Twins do not feel the same noise: time goes on in a pause.
+A mission paused at every n-th tick, wherever it is (in a motion, at a contact, with an object in the jaws), must end
+like its twin and keep the hard limit. The sensor noise differs, because time passes during a pause.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ COLUMNS = (
 
 
 class EveryNthTick(Control):
-    """Pauses at every n-th tick of the tree, for a while of robot time each.
+    """Requests a pause at every n-th tick, each for a fixed robot time.
 
     Args:
         every: Ticks from one pause to the next.
-        pause_s: How long each is asked for.
+        pause_s: Duration of each pause.
 
     Attributes:
-        pauses: How many so far.
+        pauses: Number of pauses so far.
     """
 
     def __init__(self, every: int, pause_s: float) -> None:
@@ -44,7 +44,7 @@ class EveryNthTick(Control):
         self.pauses = 0
 
     def wants_pause(self, ticks: int, now_s: float) -> bool:
-        """See the class; a pause's own ticks (of a guard that goes on listening) do not count."""
+        """Return True while a pause is requested; ticks during a pause do not count."""
         if now_s < self._until_s:
             return True
         if self._until_s >= 0.0:
@@ -58,7 +58,7 @@ class EveryNthTick(Control):
 
 @dataclass(frozen=True)
 class PauseStudy:
-    """What shall be tried.
+    """Settings of the study.
 
     Attributes:
         mission: Path or shipped name.
@@ -82,7 +82,7 @@ class PauseStudy:
 
 
 def run_pauses(study: PauseStudy, on_row: Callable[[dict[str, Any], int, int], None] | None = None) -> dict[str, Any]:
-    """Run every seed twice; writes trials.csv and summary.json, returns the summary."""
+    """Run every seed twice, write trials.csv and summary.json, and return the summary."""
     study.out.mkdir(parents=True, exist_ok=True)
     rows = []
     for seed in study.seeds:
@@ -145,7 +145,7 @@ def _pair(study: PauseStudy, seed: int) -> dict[str, Any]:
 
 
 def _rests(folder: Path) -> tuple[list[str], float]:
-    """Where the arm stood in each pause, and the longest time from asking to standing, s."""
+    """Return the node of each pause, and the longest time from request to standstill, s."""
     record = read_run(folder)
     places: list[str] = []
     longest_s, asked_s = 0.0, 0.0

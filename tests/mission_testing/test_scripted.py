@@ -9,7 +9,7 @@ import pytest
 
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission_testing import Call, ScriptError, fails, hangs, ok, raises, real, run_scripted, stand_in
-from glotouch_bt.mission_testing.outcomes import Outcome
+from glotouch_bt.mission_testing.outcomes import LeafOutcome
 from glotouch_bt.mission_testing.scripted import RunsAway
 
 Make = Callable[..., Mission]
@@ -54,7 +54,7 @@ def test_a_condition_that_fails_is_a_reason(mission: Make) -> None:
 
 
 def test_a_function_decides_when_it_is_called(mission: Make, item: Any) -> None:
-    def use(call: Call) -> Outcome:
+    def use(call: Call) -> LeafOutcome:
         return fails() if call.inputs["item"].weight == 2.0 else ok(mark=call.number)
 
     run = run_scripted(mission(), {"find": ok(items=tuple(map(item, (1.0, 2.0, 3.0))), found=3), "use": use})

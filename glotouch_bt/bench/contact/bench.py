@@ -1,8 +1,8 @@
 """`bench contact`: trace a calibration square with the probe and the bare gripper (paper, contact-mode validation).
 
-Both modes run the mission's own sweep and trace. Errors are computed in the base frame B: estimates in K are transformed
-with the registration given to the robot, so registration errors do not count. The first table has the square bolted to
-the floor, the second has it free.
+Both modes run the mission's own sweep and trace. Errors are computed in the base frame B: estimates in K are
+transformed with the registration given to the robot, so registration errors do not count. The first table has the
+square bolted to the floor, the second has it free.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ import numpy as np
 from glotouch_bt.bench.detection.curve import Pace, Push, false_alarms, found_share, per_hour
 from glotouch_bt.bench.detection.plot import plot_curves
 from glotouch_bt.bench.detection.signals import Hand, MoveKind
-from glotouch_bt.bench.detection.simulated import WORLD, FreeMotion, Rig, free_motion, push_once
+from glotouch_bt.bench.detection.simulated import WORLD, FreeMotion, SimulatedProbe, free_motion, push_once
 from glotouch_bt.bench.statistics import wilson
 from glotouch_bt.mission.read import load_conditions, load_world
 from glotouch_bt.perception.touch import Carried, GuardParams
@@ -79,7 +79,7 @@ def _simulated(
     late: list[float] = []
     seeds = study.seeds[: study.robots]
     for seed in seeds:
-        rig = Rig(name, seed, study.backend)
+        rig = SimulatedProbe(name, seed, study.backend)
         with rig.robot:
             free.append(free_motion(rig, 60.0 * study.minutes / len(seeds)))
             rows.append(_row("free", name, seed=seed, count=free[-1].false_contacts, hours=free[-1].guarded_s / 3600.0))

@@ -35,7 +35,7 @@ class PerHour(TypedDict):
 
 
 def per_hour(count: int, hours: float) -> PerHour:
-    """Return the rate with its interval (Garwood, Biometrika 28, 1936): half the chi-square quantiles of 2k and 2k + 2 degrees of freedom."""
+    """Return the rate with Garwood's interval (Biometrika 28, 1936), from chi-square quantiles of 2k and 2k + 2."""
     if hours <= 0:
         return {"rate": float("nan"), "lo": 0.0, "hi": float("inf"), "count": count, "hours": hours}
     lo = 0.5 * float(chi2.ppf(0.025, 2 * count)) if count else 0.0

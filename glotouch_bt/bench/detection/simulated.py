@@ -49,7 +49,7 @@ class PushTrial:
     late_s: float
 
 
-class Rig:
+class SimulatedProbe:
     """A simulated robot that holds the probe.
 
     Args:
@@ -136,7 +136,7 @@ class FreeMotion:
     total_s: float
 
 
-def free_motion(rig: Rig, guarded_for_s: float) -> FreeMotion:
+def free_motion(rig: SimulatedProbe, guarded_for_s: float) -> FreeMotion:
     """Make sweeps, steps and vertical moves at exploration speeds, 40-50 mm/s, for `guarded_for_s` of guarded time."""
     rig.go(rig.prober.hop(rig.place(), HIGH_M, 0.10))
     began = rig.context.observation.now_s
@@ -162,7 +162,7 @@ def free_motion(rig: Rig, guarded_for_s: float) -> FreeMotion:
     return FreeMotion(false, moves, guarded_s, rig.context.observation.now_s - began)
 
 
-def push_once(rig: Rig, force_N: float, kind: str, grows_s: float) -> PushTrial:
+def push_once(rig: SimulatedProbe, force_N: float, kind: str, grows_s: float) -> PushTrial:
     """Make a guarded move of 50 mm, across or down, while a force ramps up on the ball from a random time."""
     while True:
         start = np.array([*rig.place()[:2], HIGH_M])

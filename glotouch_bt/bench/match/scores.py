@@ -41,7 +41,7 @@ def bin_of(confidence: Array, bins: int) -> npt.NDArray[np.int64]:
 
 
 def calibration_error(confidence: npt.ArrayLike, right: npt.ArrayLike, bins: int = BINS) -> float:
-    """Return the expected calibration error: mean |share correct - mean confidence| of the trials' bins; NaN if empty."""
+    """Return the expected calibration error: mean |share correct - mean confidence| over trials; NaN if empty."""
     found = reliability(confidence, right, bins)
     n = sum(b["n"] for b in found)
     return sum(b["n"] * abs(b["right"] - b["confidence"]) for b in found) / n if n else float("nan")

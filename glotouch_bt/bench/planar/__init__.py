@@ -1,4 +1,4 @@
-"""A fast planar stand-in for the physics: felt sections, a geometric contact model, and a driver of plans."""
+"""A fast planar simulator of exploration: probe sections of meshes, a geometric contact model, a plan executor."""
 
 from glotouch_bt.bench.planar.drive import drive
 from glotouch_bt.bench.planar.explore import BUDGET_M, Traced, explore, refine_all

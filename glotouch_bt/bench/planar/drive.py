@@ -1,4 +1,4 @@
-"""Drive an exploration plan through a planar world."""
+"""Execute an exploration plan in a planar world."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ T = TypeVar("T")
 
 
 class Executes(Protocol):
-    """Anything that makes moves."""
+    """Anything that executes moves."""
 
     def execute(self, move: Move) -> Felt:
-        """Make one move and say what came of it."""
+        """Execute one move and return what was felt."""
         ...
 
 
 def drive(plan: Plan[T], world: Executes) -> T:
-    """Make every move the plan asks for; what the plan returns."""
+    """Execute every move of a plan; return the plan's result."""
     try:
         move = next(plan)
         while True:

@@ -1,4 +1,4 @@
-"""Explore a planar world as the skills explore the real one: seek, trace, exclude, until all is found."""
+"""Explore a planar world like the skills do: seek, trace, exclude, until all objects are found."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from glotouch_bt.perception.touch import Candidate
 
 BUDGET_M = 8.0
 MAX_MOVES = 5000
-"""No exploration needs so many; refused moves cost no travel, so the budget alone would not end it."""
+"""Limit on moves. Refused moves cost no travel, so the travel budget alone would not end an exploration."""
 
 
 @dataclass(frozen=True)
@@ -41,15 +41,15 @@ class Traced:
 
 @dataclass(frozen=True)
 class Explored:
-    """How an exploration went.
+    """Result of an exploration.
 
     Attributes:
         found: Candidates in order.
-        travel_m: Planar length of all the ball's ways.
+        travel_m: Planar path length of the ball.
         ended: "complete", "exhausted" or "budget".
         belief: The map at the end.
-        contacts: How many contacts the candidates have.
-        untraced: How many first contacts gave no candidate.
+        contacts: Number of contacts of the candidates.
+        untraced: Number of first contacts that gave no candidate.
     """
 
     found: tuple[Traced, ...]
@@ -60,22 +60,22 @@ class Explored:
 
     @property
     def contacts(self) -> int:
-        """Contacts of all candidates."""
+        """Return the contacts of all candidates."""
         return sum(len(t.candidate.contacts) for t in self.found)
 
 
 class _OutOfBudget(Exception):
-    """The travel is spent."""
+    """The travel budget is spent."""
 
 
 class _Budget:
-    """A world that stops when the travel is spent."""
+    """Wrapper of a world that stops when the travel budget is spent."""
 
     def __init__(self, world: PlanarWorld, budget_m: float) -> None:
         self._world, self._budget_m, self._moves = world, budget_m, 0
 
     def execute(self, move: Move) -> Felt:
-        """As the world does."""
+        """Execute a move if the budget allows."""
         self._moves += 1
         if self._world.travel_m >= self._budget_m or self._moves > MAX_MOVES:
             raise _OutOfBudget
@@ -84,7 +84,7 @@ class _Budget:
 
 @cache
 def _defaults(skill: str) -> Any:
-    """Default parameters of an installed skill."""
+    """Return the default parameters of an installed skill."""
     return SkillShelf()[skill].Params()
 
 
@@ -95,13 +95,13 @@ def explore(
     *,
     budget_m: float = BUDGET_M,
 ) -> Explored:
-    """What the mission's exploration does, with geometry for an arm.
+    """Run the mission's exploration on geometry alone.
 
     Args:
         world: The layout; its travel meter must be at 0.
-        policy: Where to go.
-        expected: How many objects are looked for.
-        budget_m: Travel after which it is broken off.
+        policy: Search policy.
+        expected: Number of objects to find.
+        budget_m: Travel at which it stops.
     """
     sweep, orbit = _defaults("guarded_sweep"), _defaults("orbit_probe")
     belief = SearchMap.blank(world.half_m + world.tip_radius_m - sweep.wall_gap_m, expected)
@@ -143,14 +143,14 @@ def explore(
 
 
 def refine_all(world: PlanarWorld, explored: Explored, *, budget_m: float = BUDGET_M) -> tuple[Traced, ...]:
-    """Go on where an exploration ended: all its candidates as they are after tracing on, in their order.
+    """Refine the candidates of an exploration; return all of them in their order.
 
-    The least known comes first, while the travel lasts; those it does not last for stay as they were.
+    The least certain candidate comes first. Candidates beyond the travel budget stay unchanged.
 
     Args:
-        world: As the exploration left it.
-        explored: How it ended.
-        budget_m: Travel, the exploration's included, after which it is broken off.
+        world: The world after the exploration.
+        explored: Result of the exploration.
+        budget_m: Travel at which it stops, the exploration included.
     """
     tracing, half = _defaults("refine_outline").rule(), explored.belief.half_extent_m
     out, limited = list(explored.found), _Budget(world, budget_m)

@@ -1,4 +1,4 @@
-"""Planar worlds of the layouts that the backends draw for a seed."""
+"""Planar worlds with the layouts that the backends draw for a seed."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from glotouch_bt.robot import World
 from glotouch_bt.robot.scene import Mesh, draw_layout, stream
 
 CORNER_GAP_M = 0.018
-"""The ball hangs this far from both walls of the corner nearest to the holder, where it has felt the floor."""
+"""Start distance of the ball from both walls of the corner nearest to the holder."""
 
 
 def planar_world(world: World, meshes: Sequence[Mesh], seed: int, model: ContactModel | None = None) -> PlanarWorld:
-    """The layout of a seed, with the ball where `tool_pickup` leaves it."""
+    """Return the layout of a seed, with the ball where `tool_pickup` leaves it."""
     places = draw_layout(meshes, world, seed)
     half = 0.5 * np.array(world.container.interior_m[:2])
     holder = world.container.pose_B_K.inverse().apply(world.holder.pose_B_grasp.position_m)[:2]

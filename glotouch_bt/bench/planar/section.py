@@ -1,12 +1,12 @@
-"""What a vertical probe feels of a mesh: the places where the ball's centre cannot be at one height.
+"""The probe section of a mesh: positions the ball's centre cannot take at one height.
 
-With the ball (radius r) at height z0 and the shaft (radius s) above it, a place p is forbidden if a point q of the mesh
+With the ball (radius r) at height z0 and the shaft (radius s) above it, position p is forbidden if a mesh point q
 
 - is nearer to the ball's centre (p, z0) than r, or
 - lies above z0 and is nearer to the shaft's axis than s.
 
-Both distances come from dense samples of the surface, so that the boundary of the forbidden set is exact to about
-SAMPLE_M^2 / (8 s): a few hundredths of a millimetre. It is then drawn as polygons and turned into a signed distance.
+Both distances come from dense samples of the surface, so the boundary of the forbidden set is accurate to about
+SAMPLE_M^2 / (8 s), a few hundredths of a millimetre. It is converted to polygons and to a signed distance grid.
 """
 
 from __future__ import annotations
@@ -27,10 +27,13 @@ from glotouch_bt.robot.scene import Mesh
 
 SENSING_HEIGHT_M = 0.018
 GRID_M = 0.0005
-SAMPLE_M, THIN_M = 0.0005, 0.0002
+SAMPLE_M = 0.0005
+"""Spacing of surface samples."""
+THIN_M = 0.0002
+"""Edge of the cubes in which duplicate samples are merged."""
 COARSE = 4
 BORDER_M = 0.010
-"""The grid reaches this far beyond the forbidden set; farther out distances are lower bounds."""
+"""Margin of the grid around the forbidden set; distances beyond it are lower bounds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,15 +41,15 @@ class SignedGrid:
     """A signed distance on a square grid, negative inside; bilinear between the nodes.
 
     Attributes:
-        origin_m: (2,) the first node.
-        values_m: (nx, ny).
+        origin_m: (2,) position of the first node.
+        values_m: (nx, ny) signed distances.
     """
 
     origin_m: Array
     values_m: Array
 
     def __call__(self, points_m: Array) -> Array:
-        """(n,) signed distance at points (n, 2); beyond the grid the value at its border plus the way to it."""
+        """Return signed distances (n,) at points (n, 2); beyond the grid, the border value plus the distance to it."""
         last = np.array(self.values_m.shape) - 1.0
         at = (points_m - self.origin_m) / GRID_M
         inside = np.minimum(np.maximum(at, 0.0), last - 1e-9)
@@ -61,7 +64,7 @@ class SignedGrid:
         return np.asarray(low * (1 - t) + high * t + beyond)
 
     def gradient(self, point_m: Array) -> Array:
-        """(2,) unit vector away from the shape at a point (2,), by central differences over a grid step."""
+        """Return the unit vector (2,) away from the shape at a point (2,), by central differences over a grid step."""
         h = GRID_M
         steps = np.array([[h, 0.0], [-h, 0.0], [0.0, h], [0.0, -h]])
         v = self(np.asarray(point_m) + steps)
@@ -69,7 +72,7 @@ class SignedGrid:
         return np.asarray(g / max(float(np.linalg.norm(g)), 1e-12))
 
     def level(self, value_m: float) -> list[Array]:
-        """Closed polygons (n, 2) of a level, largest first; the first point is repeated at the end."""
+        """Return the closed polygons (n, 2) of a level, largest first, with the first point repeated at the end."""
         x, y = (self.origin_m[i] + GRID_M * np.arange(self.values_m.shape[i]) for i in (0, 1))
         lines = contour_generator(x, y, self.values_m.T).lines(value_m)
         found = [np.asarray(line, dtype=np.float64) for line in lines if len(line) > 3]
@@ -78,21 +81,21 @@ class SignedGrid:
 
 @dataclass(frozen=True, eq=False)
 class FeltSection:
-    """The felt section of one mesh, in the mesh frame (seen from above).
+    """Probe section of one mesh, in the mesh frame, seen from above.
 
     Attributes:
-        name: Of the mesh.
-        side: Signed distance of the ball's centre from where it cannot be at sensing height.
-        above: The same for a ball that is lowered from above.
+        name: Name of the mesh.
+        side: Signed distance of the ball's centre from the forbidden set at sensing height.
+        above: The same for a ball lowered from above.
         outline_m: (n, 2) closed polygon of the largest part: the forbidden set shrunk by the ball's radius.
-        centre_m: (2,) centre of area of the convex hull of all outlines: what "the object's centre" means.
-        hull_m: (k, 2) that hull, anticlockwise.
+        centre_m: (2,) centre of area of the convex hull of all outlines: the object's centre.
+        hull_m: (k, 2) that hull, counter-clockwise.
         hull_area_m2: Its area.
-        box_size_m, box_yaw_rad: Long and short side of the hull's least rectangle, and direction of the long one.
+        box_size_m, box_yaw_rad: Long and short side of its minimum-area rectangle, and direction of the long side.
         top_m: Highest vertex above the floor.
-        pressed_m: (2,) centre of mass, seen from above: what a push turns the object about.
+        pressed_m: (2,) centre of mass seen from above; a push rotates the object about it.
         points_m: (n, 3) surface samples at and above the sensing height.
-        tip_radius_m: Of the ball.
+        tip_radius_m: Radius of the ball.
     """
 
     name: str
@@ -111,16 +114,16 @@ class FeltSection:
 
     @cached_property
     def reach_m(self) -> float:
-        """Radius about the mesh frame's origin beyond which the ball touches nothing."""
+        """Return the radius about the mesh origin beyond which the ball touches nothing."""
         return float(np.linalg.norm(np.concatenate(self.side.level(0.0)), axis=1).max())
 
     @property
     def elongation(self) -> float:
-        """Long side of the least rectangle over its short one."""
+        """Return the aspect ratio of the minimum-area rectangle."""
         return self.box_size_m[0] / self.box_size_m[1]
 
     def landing_height_m(self, point_m: Array) -> float:
-        """Height of the ball's centre above the floor where it stands on the object, lowered at a point (2,)."""
+        """Return the height of the ball's centre above the floor when lowered onto the object at a point (2,)."""
         d2 = ((self.points_m[:, :2] - point_m) ** 2).sum(axis=1)
         under = d2 < self.tip_radius_m**2
         if not under.any():
@@ -129,17 +132,17 @@ class FeltSection:
 
 
 def felt_section(mesh: Mesh, probe: Probe | None = None, height_m: float = SENSING_HEIGHT_M) -> FeltSection:
-    """The section of a mesh that a vertical probe feels with its ball's centre at `height_m`; kept in memory.
+    """Return the probe section of a mesh with the ball's centre at `height_m`; cached in memory.
 
     Raises:
-        ValueError: Nothing of the mesh can be felt at that height.
+        ValueError: The mesh does not reach that height.
     """
     return _section(_Keyed(mesh.digest, mesh), probe or Probe(), height_m)
 
 
 @dataclass(frozen=True)
 class _Keyed:
-    """A mesh that compares by its digest."""
+    """A mesh that compares by its digest, for the cache."""
 
     digest: str
     mesh: Mesh
@@ -168,7 +171,7 @@ def _section(key: _Keyed, probe: Probe, height_m: float) -> FeltSection:
     by_shaft = cKDTree(_thinned(upper), balanced_tree=False) if len(upper) else None
 
     def gap(places: Array, shaft_m: float) -> Array:
-        """Distance of the probe, its shaft so thick, from the surface, with the ball at places (n, 2)."""
+        """Return the distance of a probe with shaft radius `shaft_m` from the surface, ball at places (n, 2)."""
         ball = by_ball.query(np.column_stack([places, np.full(len(places), height_m)]))[0] - r
         return np.asarray(ball if by_shaft is None else np.minimum(ball, by_shaft.query(places)[0] - shaft_m))
 
@@ -199,7 +202,7 @@ def _section(key: _Keyed, probe: Probe, height_m: float) -> FeltSection:
 
 
 def _surface(solid: trimesh.Trimesh, low_m: float, high_m: float) -> Array:
-    """(n, 3) surface points at most SAMPLE_M apart between two heights."""
+    """Return surface points (n, 3) at most SAMPLE_M apart between two heights."""
     triangles = np.asarray(solid.triangles)
     z = triangles[:, :, 2]
     near = (z.max(axis=1) >= low_m) & (z.min(axis=1) <= high_m)
@@ -210,7 +213,7 @@ def _surface(solid: trimesh.Trimesh, low_m: float, high_m: float) -> Array:
 
 
 def _lattice(triangles: Array) -> Array:
-    """(m, 3) points on triangles (n, 3, 3), corners included: rows along each longest edge, SAMPLE_M apart at most."""
+    """Sample triangles (n, 3, 3) with points (m, 3), corners included: rows along the longest edge, SAMPLE_M apart."""
     length = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
     turn = (np.argmax(length, axis=1)[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(triangles, turn[:, :, None], axis=1).transpose(1, 0, 2)
@@ -227,13 +230,13 @@ def _lattice(triangles: Array) -> Array:
 
 
 def _counted(counts: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """For each of `counts` (n,): its index so many times, and a running number from 0 beside it."""
+    """Repeat each index of `counts` (n,) by its count; return the indices and a running number within each."""
     of = np.repeat(np.arange(len(counts)), counts)
     return of, np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def _thinned(points: Array) -> Array:
-    """One point of every cube of THIN_M: faces that meet repeat their edges, and walls repeat themselves from above."""
+    """Keep one point in every cube of THIN_M: adjacent faces repeat their edges, walls repeat from above."""
     cell = np.floor(points / THIN_M).astype(np.int64)
     cell -= cell.min(axis=0)
     key = np.ravel_multi_index(tuple(cell.T), tuple(cell.max(axis=0) + 1))
@@ -241,14 +244,14 @@ def _thinned(points: Array) -> Array:
 
 
 def _nodes(origin: Array, shape: npt.NDArray[np.int64]) -> Array:
-    """(nx, ny, 2) places of a grid's nodes."""
+    """Return the positions (nx, ny, 2) of a grid's nodes."""
     return np.asarray(origin + GRID_M * np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1))
 
 
 def _near_zero(gap: Callable[[Array], Array], origin: Array, shape: npt.NDArray[np.int64]) -> Array:
-    """(nx, ny) values of a distance at the nodes: exact near its zero level, elsewhere of the right sign.
+    """Evaluate a distance at the nodes (nx, ny): exact near its zero level, elsewhere with the right sign.
 
-    The value at every fourth node says, as distances do, how far away the zero level is at least.
+    The distance at every fourth node bounds how far away the zero level is.
     """
     nodes = _nodes(origin, shape)
     coarse = nodes[COARSE // 2 :: COARSE, COARSE // 2 :: COARSE]
@@ -260,9 +263,9 @@ def _near_zero(gap: Callable[[Array], Array], origin: Array, shape: npt.NDArray[
 
 
 def _signed(solid: trimesh.Trimesh, origin: Array, field: Array, height_m: float) -> SignedGrid:
-    """True signed distance from the gap to the surface (nx, ny), which knows no inside.
+    """Convert the unsigned gap to the surface (nx, ny) to a signed distance.
 
-    Regions of positive gap that the ball could be in are outside; those within the solid are inside.
+    Regions of positive gap outside the solid are outside; regions within the solid are inside.
     """
     parts, count = label(field > 0.0)
     solidly = np.zeros(count + 1, dtype=np.bool_)
@@ -273,7 +276,7 @@ def _signed(solid: trimesh.Trimesh, origin: Array, field: Array, height_m: float
         solidly[1:] = solid.contains(places)
     within = solidly[parts]
     signed = np.where(within, -np.abs(field) - GRID_M, field)
-    # gaps between the two kinds of region are negative everywhere: the only zero level is the boundary
+    # the band between both kinds of region is negative everywhere, so the only zero level is the boundary
     grid = SignedGrid(np.asarray(origin), signed)
     nodes = _nodes(origin, np.array(field.shape)).reshape(-1, 2)
     distance = _to_polygons(grid.level(0.0), nodes).reshape(field.shape)
@@ -281,7 +284,7 @@ def _signed(solid: trimesh.Trimesh, origin: Array, field: Array, height_m: float
 
 
 def _to_polygons(polygons: list[Array], nodes: Array) -> Array:
-    """(n,) distance of nodes (n, 2) from closed polygons whose edges are short: to the edges at the nearest vertex."""
+    """Return distances (n,) of nodes (n, 2) from closed polygons, by the edges at the nearest vertex."""
     vertex = np.concatenate([p[:-1] for p in polygons])
     before = np.concatenate([np.roll(p[:-1], 1, axis=0) for p in polygons])
     after = np.concatenate([np.roll(p[:-1], -1, axis=0) for p in polygons])
@@ -297,13 +300,13 @@ def _to_polygons(polygons: list[Array], nodes: Array) -> Array:
 
 
 def area(polygon: Array) -> float:
-    """Signed area of a polygon (n, 2), anticlockwise positive (shoelace formula)."""
+    """Return the signed area of a polygon (n, 2), counter-clockwise positive (shoelace formula)."""
     x, y = polygon.T
     return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
 def centre_of_area(polygon: Array) -> Array:
-    """(2,) centroid of the area inside a polygon (n, 2)."""
+    """Return the centroid (2,) of the area of a polygon (n, 2)."""
     x, y = polygon.T
     cross = x * np.roll(y, -1) - np.roll(x, -1) * y
     both = polygon + np.roll(polygon, -1, axis=0)
@@ -311,7 +314,7 @@ def centre_of_area(polygon: Array) -> Array:
 
 
 def min_rectangle(hull: Array) -> tuple[tuple[float, float], float]:
-    """(long, short) side of the rectangle of least area round a convex polygon, and the long side's direction, rad.
+    """Return (long, short) side of the minimum-area rectangle of a convex polygon, and the long side's direction, rad.
 
     One side lies along an edge of the polygon (Freeman and Shapira, CACM 18, 1975).
     """

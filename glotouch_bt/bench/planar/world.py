@@ -1,7 +1,7 @@
-"""A container, objects and a ball in the plane: executes the `Move`s of exploration plans by geometry alone.
+"""A planar world with container, objects and ball that executes the `Move`s of exploration plans by geometry.
 
-What takes part: where the ball touches (signed distances of the felt sections), how far it goes on, how the object
-gives way, which way the force points, and how well all that is known. What does not: time, the arm, the wrist.
+Modelled: contact position (signed distances of the probe sections), overshoot, object motion, force direction, and the
+scatter of all of these. Not modelled: time, the arm, the wrist sensor.
 """
 
 from __future__ import annotations
@@ -17,26 +17,26 @@ from glotouch_bt.perception.touch import Contact, contact_point, pushed
 from glotouch_bt.robot import Array
 
 MARCH_M = 0.0005
-"""Places along a move at which the distances are looked at; a graze shallower than a micrometre may be missed."""
+"""Step along a move at which distances are evaluated; a graze shallower than a micrometre may be missed."""
 PATH_M = 0.002
 WALL = -1
-"""Index of what was touched when it was a wall."""
+"""Object index that stands for a wall."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ContactModel:
-    """How a touch goes. The defaults are what MuJoCo showed under nominal conditions.
+    """Parameters of a contact. Defaults measured in MuJoCo, nominal conditions.
 
     Attributes:
-        localisation_sd_m: Scatter of where an onset is felt to be, each axis.
-        overshoot_m: How far the ball goes on after the onset, by kind of move.
-        overshoot_spread: Standard deviation of that, as a fraction.
-        friction: Ball on object.
-        direction_sd_rad: Scatter of the felt direction of the force.
-        pressure_radius: Radius of gyration of the object's pressure on the floor, as a fraction of its reach: how
-            much a push beside the centre turns it.
-        give_m: Of the way past an onset so much bends probe and arm instead of moving the object.
-        touch_force_N: What is reported as the force.
+        localisation_sd_m: Standard deviation of the contact position, each axis.
+        overshoot_m: Travel of the ball after the onset, by kind of move.
+        overshoot_spread: Relative standard deviation of the overshoot.
+        friction: Friction coefficient of ball on object.
+        direction_sd_rad: Standard deviation of the force direction.
+        pressure_radius: Radius of gyration of the floor pressure, as a fraction of the object's reach; it decides how
+            far an off-centre push rotates the object.
+        give_m: Overshoot taken up by bending of probe and arm instead of object motion.
+        touch_force_N: Reported force.
     """
 
     localisation_sd_m: float = 0.0001
@@ -53,7 +53,7 @@ class ContactModel:
 
 @dataclass(frozen=True)
 class Logged:
-    """Something that happened: at which planar travel, what, and to which object (`WALL`, or -2 for none)."""
+    """One log entry: planar travel, what happened, and the object index (`WALL`, or -2 for none)."""
 
     travel_m: float
     what: str
@@ -64,13 +64,13 @@ class PlanarWorld:
     """One layout and the ball in it.
 
     Args:
-        sections: What stands in the container.
+        sections: Probe sections of the objects in the container.
         poses: (k, 3) x m, y m, yaw rad of their mesh frames in K.
         half_extent_m: (2,) half of the container's interior.
-        tip_radius_m: Of the ball.
-        rng: Source of all scatter.
-        model: How a touch goes.
-        start_K_m: (2,) where the ball hangs at the beginning, raised.
+        tip_radius_m: Radius of the ball.
+        rng: Random stream of all scatter.
+        model: Contact parameters.
+        start_K_m: (2,) initial position of the ball, raised.
     """
 
     def __init__(
@@ -96,27 +96,27 @@ class PlanarWorld:
         self.log: list[Logged] = []
 
     def centres_K_m(self, poses: Array | None = None) -> Array:
-        """(k, 2) true centres: those of the felt sections at the objects' poses (now, or those given)."""
+        """Return the true centres (k, 2) of the sections at the current or given poses."""
         where = self.poses if poses is None else poses
         return np.array([self.to_K(i, s.centre_m[None], where)[0] for i, s in enumerate(self.sections)]).reshape(-1, 2)
 
     def to_K(self, i: int, points_m: Array, poses: Array | None = None) -> Array:
-        """(n, 2) points of object i's mesh frame in K."""
+        """Transform points (n, 2) from object i's mesh frame to K."""
         x, y, yaw = (self.poses if poses is None else poses)[i]
         c, s = np.cos(yaw), np.sin(yaw)
         return np.asarray(points_m @ np.array([[c, s], [-s, c]]) + (x, y))
 
     def clearance(self, points_K_m: Array, i: int, *, above: bool = False) -> Array:
-        """(n,) signed distance of ball centres (n, 2) from touching object i."""
+        """Return signed distances (n,) of ball centres (n, 2) from touching object i."""
         section = self.sections[i]
         return (section.above if above else section.side)(self._to_object(i, points_K_m))
 
     def note(self, what: str, index: int = -2) -> None:
-        """Write into the log at the present travel."""
+        """Add a log entry at the current travel."""
         self.log.append(Logged(self.travel_m, what, index))
 
     def execute(self, move: Move) -> Felt:
-        """Make one move; the travel meter counts the planar length of everything the ball goes."""
+        """Execute one move; the planar path length adds to the travel."""
         goal = np.asarray(move.goal_K_m, dtype=np.float64)[:2]
         if move.kind == "hop":
             return self._hop(goal)

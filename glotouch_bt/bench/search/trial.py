@@ -1,8 +1,8 @@
 """One trial of `bench search` as a row: the mission in MuJoCo, or the exploration in the planar simulator.
 
 Travel is the planar path length of the ball from the first sweep to the end of the exploration: sweeps, hops,
-retreats and tracing. Travel before it (floor touch, calibration) is `before_m`. Travel after it (touching the tops, returning
-the probe) discovers nothing and is not counted.
+retreats and tracing. Travel before it (floor touch, calibration) is `before_m`. Travel after it (touching the tops,
+returning the probe) discovers nothing and is not counted.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""TODO door of glotouch_bt/validation/faults."""
+"""`bench faults`: every class of fault in every skill it can affect, each trial compared with its unfaulted twin."""
 
 from glotouch_bt.validation.faults.campaign import FaultCampaign, few_objects, run_campaign
 from glotouch_bt.validation.faults.cases import chosen_cases, chosen_skills

@@ -1,7 +1,7 @@
-"""`bench faults`: every class of fault in every skill it can act on, each trial beside its unfaulted twin.
+"""Run `bench faults`: every class of fault in every skill it can affect, each trial compared with its unfaulted twin.
 
-The twins (one a seed, shared by all classes) come first; they say which skills run and how long, so that each fault
-begins at a moment of its own inside the skill. A twin that fails says nothing about faults: its seed is counted apart.
+The twins (one a seed, shared by all classes) run first. They show which skills run and for how long, so that each fault
+begins at its own moment inside the skill. Seeds whose twin fails are counted separately.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ OnRow = Callable[[Mapping[str, Any], int, int], None]
 
 @dataclass(frozen=True)
 class FaultCampaign:
-    """What shall be tried.
+    """Settings of the campaign.
 
     Attributes:
         mission: Path or shipped name; it takes the settings.
         settings: Mission parameters of every trial.
-        cases: The classes of faults.
-        skills: In which skills, by the name of their node.
-        seeds: Of the trials.
+        cases: Classes of faults.
+        skills: Skills to break, by node name.
+        seeds: Seeds of the trials.
         conditions: Path or shipped name.
         objects: Folder of STL files instead of the world's.
         backend: Registered name.
-        out: Folder of the campaign; each trial's run folder goes below it.
-        resume: Keep the trials that are there already.
+        out: Folder of the campaign; it receives a run folder for each trial.
+        resume: Keep existing trials.
         keep: Keep the records of trials that ended well.
     """
 
@@ -63,7 +63,7 @@ class FaultCampaign:
     keep: bool = False
 
     def request(self, seed: int, name: str, plan: FaultPlan) -> RunRequest:
-        """The run of a trial."""
+        """Return the run request of a trial."""
         return RunRequest(
             mission=self.mission,
             backend=self.backend,
@@ -78,7 +78,7 @@ class FaultCampaign:
 
 
 def few_objects(objects: ObjectSet, count: int, folder: Path) -> tuple[Path, tuple[str, ...]]:
-    """A folder with the first `count` objects of a world only, and their names.
+    """Copy the first `count` objects of a world to a folder; return it and their names.
 
     Raises:
         BadInput: The world's objects cannot be read, or the folder not be written.
@@ -94,10 +94,10 @@ def few_objects(objects: ObjectSet, count: int, folder: Path) -> tuple[Path, tup
 
 
 def run_campaign(campaign: FaultCampaign, executor: Executor, on_row: OnRow | None = None) -> dict[str, Any]:
-    """Run twins, then trials; writes trials.csv, matrix.png and summary.json, returns the summary.
+    """Run twins, then trials, write trials.csv, matrix.png and summary.json, and return the summary.
 
     Args:
-        campaign: What to try.
+        campaign: Settings.
         executor: Any `concurrent.futures` executor.
         on_row: Called with (row, done, total) after each trial.
     """

@@ -1,4 +1,4 @@
-"""What `bench faults` tries: each class of fault with its parameters, how long it lasts, and where it can act."""
+"""The cases of `bench faults`: each class of fault with its parameters, duration, and the skills it can affect."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _AMONG_OBJECTS = ("guarded_sweep", "orbit_probe", "touch_top", "squeeze", "grasp
 
 @dataclass(frozen=True)
 class Case:
-    """One class of fault as it is tried.
+    """One class of fault with fixed parameters.
 
     Attributes:
-        fault: Name in the catalogue; also the case's.
-        given: Parameters beside their defaults.
-        lasting: How long it lasts.
-        skills: Where it can act at all.
-        warm_up_s: The trial runs for at least so long before the fault begins.
+        fault: Name in the catalogue, and of the case.
+        given: Parameters that differ from the defaults.
+        lasting: Duration.
+        skills: Skills it can affect.
+        warm_up_s: Least run time before the fault begins.
     """
 
     fault: str
@@ -36,11 +36,11 @@ class Case:
 
     @property
     def recoverable(self) -> bool:
-        """A mission can still reach its goal."""
+        """Return True if a mission can still reach its goal."""
         return CATALOGUE[self.fault].recoverable
 
     def plan(self, skill: str, after_s: float) -> FaultPlan:
-        """The plan of one trial: once, in the skill's first run, so long after it began."""
+        """Return the plan of one trial: once, in the skill's first run, `after_s` after its start."""
         kind = CATALOGUE[self.fault]
         spec = FaultSpec(
             self.fault,
@@ -59,9 +59,9 @@ def _s(seconds: float) -> Lasting:
 
 
 LEARNING_S = 8.0
-"""Supervision learns in 5 s what the sensor's noise is; a trial that goes on from a checkpoint learns it anew."""
+"""Warm-up of faults seen by noise: supervision learns the sensor's noise in 5 s, again after a resume."""
 EVER = Lasting(until="ever")
-_NODE = Lasting(until="node")  # what changes the world may wait for room as long as the skill runs; it is never undone
+_NODE = Lasting(until="node")  # a world fault may wait for free space while the skill runs; it is never undone
 CASES: tuple[Case, ...] = (
     Case("wrench_off", warm_up_s=LEARNING_S),
     Case("wrench_stuck", warm_up_s=LEARNING_S),
@@ -99,10 +99,10 @@ CASES: tuple[Case, ...] = (
 
 
 def chosen_cases(names: Iterable[str]) -> tuple[Case, ...]:
-    """The cases of these names; all of them if there is no name.
+    """Return the cases of these names; all without names.
 
     Raises:
-        UnknownName: One is not tried by this bench.
+        UnknownName: A name is no case.
     """
     known = {c.fault: c for c in CASES}
     wanted = tuple(names)
@@ -113,11 +113,11 @@ def chosen_cases(names: Iterable[str]) -> tuple[Case, ...]:
 
 
 def chosen_skills(names: Iterable[str], cases: Sequence[Case]) -> tuple[str, ...]:
-    """The skills to break; all of them if there is no name.
+    """Return the skills to break; all without names.
 
     Raises:
-        UnknownName: One is not broken by this bench.
-        BadInput: None of the cases acts in any of them.
+        UnknownName: A name is none of `SKILLS`.
+        BadInput: No case affects any of them.
     """
     wanted = tuple(names) or SKILLS
     for name in wanted:

@@ -1,8 +1,8 @@
-"""`bench faults --exhaustive`: fail the n-th call of the seam, n = 0, 1, ... until the mission makes no more calls.
+"""`bench faults --exhaustive`: fail the n-th robot call, n = 0, 1, ... up to the mission's last call.
 
-The mission runs once. At every call the process forks for each kind of fault: in the child this call fails, and the
-child's run ends as it then must; the parent waits for what became of it and goes on unfaulted. So every call is failed
-in the very state in which the mission makes it, and what comes before it is run once, not once a call.
+The mission runs once. At every call the process forks for each kind of fault. In the child this call fails and the run
+ends; the parent waits for the child's result and continues unfaulted. Every call thus fails in its exact state, and the
+run before it is simulated only once.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ from glotouch_bt.robot import Backend, BadInput, Command, Observation, Request, 
 
 KINDS = ("robot_fault", "exception")
 HUNG_S = 30
-"""Wall time after which a run that fails at once, and only has to end, counts as hanging."""
+"""Wall time after which a child that only has to end counts as hanging, s."""
 HANGS = f"hangs: it did not end within {HUNG_S} s"
 TRIES = 2
-"""A child that hangs is made again once: it may have been forked while another thread held a lock."""
+"""Number of tries of a hanging child: it may have been forked while another thread held a lock."""
 PROGRESS_EVERY = 100
 
 
 @dataclass(frozen=True)
 class Exhaustive:
-    """What shall be tried.
+    """Settings of the study.
 
     Attributes:
-        mission: A short one.
+        mission: Path or shipped name of a short mission.
         settings: Its parameters.
         backend: Registered name.
-        seed: Of the run.
-        stride: Every n-th call only.
-        out: Where summary.json goes.
+        seed: Seed of the run.
+        stride: Fail every n-th call only.
+        out: Folder for summary.json.
     """
 
     mission: str
@@ -55,13 +55,13 @@ class Exhaustive:
 
 
 class _Forking(FaultInjector):
-    """A fault injector that forks at each call of the seam; in the child that call, and all after it, fail.
+    """A fault injector that forks at each robot call; in the child that call and all later ones fail.
 
     Args:
         robot: The device.
-        seed: Of the run.
-        stride: At every n-th call only.
-        ended: Called in the parent with (fault, call, what was wrong) for each child.
+        seed: Seed of the run.
+        stride: Fork at every n-th call only.
+        ended: Called in the parent with (fault, call, problems) for each child.
     """
 
     def __init__(self, robot: Robot, seed: int, stride: int, ended: Callable[[str, int, str], None]) -> None:
@@ -87,7 +87,7 @@ class _Forking(FaultInjector):
         return super().start(request)
 
     def tell(self, problems: str) -> None:
-        """In the child: what was wrong, at the end of its run; this process ends here."""
+        """Send the problems to the parent and end this child process."""
         os.write(self._write_to, problems.encode())
         os._exit(0)
 
@@ -110,7 +110,7 @@ class _Forking(FaultInjector):
             self._ended(name, call, problems)
 
     def _child(self, name: str, call: int) -> str | None:
-        """Fork; in the parent, what the child tells; in the child, None."""
+        """Fork; return the child's problems in the parent, None in the child."""
         read_from, write_to = os.pipe()
         pid = os.fork()
         if pid == 0:
@@ -135,14 +135,14 @@ def _fault(name: str) -> FaultSpec:
 
 
 def run_exhaustive(study: Exhaustive, on_progress: Callable[[int, str], None] | None = None) -> dict[str, Any]:
-    """Fail call after call; every run must end with its reason named and the arm held.
+    """Fail every call in turn; every run must end with a reason and the arm held.
 
     Args:
-        study: What to try.
-        on_progress: Called now and then with (call, fault).
+        study: Settings.
+        on_progress: Called from time to time with (call, fault).
 
     Returns:
-        calls: of the unfaulted run, and how it ended; tried; and the calls after which something was not as it must be.
+        Number of calls and end of the unfaulted run, number of tries, and the calls with problems.
 
     Raises:
         BadInput: The mission or the backend cannot be used.
@@ -180,7 +180,7 @@ def run_exhaustive(study: Exhaustive, on_progress: Callable[[int, str], None] | 
 def _run(
     study: Exhaustive, mission: Mission, backend: Backend, ended: Callable[[str, int, str], None]
 ) -> tuple[_Forking, Outcome]:
-    """The unfaulted run. Every child leaves it from inside, and never returns from here."""
+    """Run unfaulted. Children exit inside and never return from here."""
     options = split_settings(mission, study.settings)
     device = backend.open(mission.world, load_conditions("ideal"), study.seed, options)
     if device.paced:
@@ -188,7 +188,7 @@ def _run(
         raise BadInput(f"{study.backend}: its clock is the wall's; only a simulation in this process can be forked")
     injector = _Forking(device, study.seed, study.stride, ended)
     gc.collect()
-    gc.freeze()  # children would copy what their collector only looks at
+    gc.freeze()  # keeps the children's garbage collector from copying pages
     outcome: Outcome | None = None
     try:
         try:
@@ -202,7 +202,7 @@ def _run(
             injector.tell(_judged(injector, outcome, None))
     except BaseException:
         if injector.failing is not None:
-            os._exit(1)  # whatever it was: a child never goes on as its parent
+            os._exit(1)  # a child never continues as its parent
         raise
     finally:
         gc.unfreeze()
@@ -211,13 +211,15 @@ def _run(
 
 
 def _judged(injector: _Forking, outcome: Outcome | None, error: Exception | None) -> str:
-    """What is not as it must be after a call has failed; empty: all is."""
+    """Return the problems of a run after a failed call; empty if none."""
     assert injector.failing is not None
     problems: list[str] = []
     if injector.proofs()[0].changes == 0:
         problems.append("the call did not fail")
     if outcome is None:
-        if injector.failing[1] > 0 or "injected" not in str(error):  # before the first tick it is raised to the caller
+        if injector.failing[1] > 0 or "injected" not in str(
+            error
+        ):  # before the first tick the error reaches the caller
             problems.append(f"raised {type(error).__name__}: {error}")
     else:
         if outcome.status != "aborted":

@@ -1,4 +1,4 @@
-"""The matrix of `bench faults` as a picture: class by skill, each cell a bar coloured by what became of its trials."""
+"""Plot of the matrix of `bench faults`: class by skill, each cell a bar coloured by verdict."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EMPTY = "#eef0f3"
 
 
 def plot_matrix(path: Path, rows: Sequence[Mapping[str, Any]], classes: Sequence[str], skills: Sequence[str]) -> None:
-    """Each cell a bar of all its trials; grey: the class cannot act there."""
+    """Draw each cell as a bar of its trials; grey: the class cannot affect that skill."""
     counts = matrix(rows, classes, skills)
     figure = Figure(figsize=(1.9 + 1.05 * len(skills), 1.6 + 0.27 * len(classes)), layout="constrained")
     FigureCanvasAgg(figure)

@@ -1,8 +1,8 @@
-"""A faulted trial that is its unfaulted twin again, bit for bit, needs not be run to its end: that is known.
+"""Stop a faulted trial once it equals its unfaulted twin bit for bit; its end is then known.
 
-At every checkpoint after the fault is over, the simulated world and all that the mission knows are compared with the
-twin's checkpoint of the same number. Where both are the same bytes, the rest is the same run: the simulation, the
-sensors' noise in it and the tree are deterministic, and supervision only remembers a second of findings.
+At every checkpoint after the fault, the simulated world and the mission's state are compared with the twin's checkpoint
+of the same number. If the bytes are equal, the rest is the same run: simulation, sensor noise and tree are
+deterministic, and supervision remembers only one second of findings.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from glotouch_bt.mission.checkpoint import FILE, CheckpointFile, Row, decode, en
 from glotouch_bt.robot import BadInput
 
 KNOWN = ("tree", "arm", "preempted", "paused_s", "status", "ticks", "requests")
-"""What decides how a mission goes on, besides ports and world; counts and reasons do not."""
+"""State that decides how a mission continues, besides ports and world."""
 
 
 class Rejoined(Exception):
-    """The trial is its twin again."""
+    """The trial equals its twin again."""
 
 
 class TwinWatch(CheckpointFile):
-    """The checkpoints of a trial, which breaks off once it is its twin again.
+    """Checkpoints of a trial that stops once it equals its twin.
 
     Args:
         path: The trial's file.
         twin: The twin's.
-        plan: The trial's plan, of one fault that comes once.
+        plan: The trial's plan with one fault that occurs once.
         begins_s: Robot clock when the fault begins.
     """
 
@@ -49,7 +49,7 @@ class TwinWatch(CheckpointFile):
         """See `CheckpointFile`.
 
         Raises:
-            Rejoined: The fault is over, and nothing is left of it.
+            Rejoined: The fault is over and without any effect left.
         """
         super().add(row, state, world)
         if row.stamp_s > self._over_s and world is not None and self._same(row, state, world):
@@ -80,5 +80,5 @@ def _known(state: dict[str, Any]) -> bytes:
 
 
 def watched(folder: Path, twin: Path, plan: FaultPlan, begins_s: float) -> TwinWatch:
-    """The checkpoints of a trial in `folder` beside its twin's."""
+    """Return the watched checkpoints of a trial in `folder`."""
     return TwinWatch(folder / FILE, twin / FILE, plan, begins_s)

@@ -1,6 +1,6 @@
-"""A faulted trial goes on from a checkpoint of its unfaulted twin: what they have in common is run once.
+"""Start a faulted trial from a checkpoint of its unfaulted twin, so their common part runs only once.
 
-The checkpoint holds tree, ports and world, so that the trial is the twin, tick by tick, until the fault begins.
+The checkpoint holds tree, ports and world, so the trial equals the twin tick by tick until the fault begins.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from glotouch_bt.validation.faults.rejoin import watched
 
 
 def _first(rows: list[Row], node: str) -> tuple[str, Row, int] | None:
-    """(path, the checkpoint before it began, its place among the rows)."""
+    """Return (path of the node, last checkpoint before its start, index of that row)."""
     for i, row in enumerate(rows[1:]):
         for path in row.begun:
             if path.rsplit("/", 1)[-1] == node:
@@ -25,13 +25,13 @@ def _first(rows: list[Row], node: str) -> tuple[str, Row, int] | None:
 
 
 def start_from(twin: Path, out: Path, plan: FaultPlan, warm_up_s: float) -> ResumableRun | None:
-    """A copy of the twin's run in `out`, to go on with shortly before a fault; None if its node never ran.
+    """Copy the twin's run to `out`, resumable shortly before the fault; None if its node never ran.
 
     Args:
         twin: The folder of the unfaulted run.
         out: Folder of the trial; what is in it is removed.
-        plan: Of one fault, in the first run of a node.
-        warm_up_s: The trial runs for at least so long before the fault begins, if the mission does.
+        plan: Plan of one fault in the first run of a node.
+        warm_up_s: Least run time before the fault begins, as far as the mission allows.
 
     Raises:
         BadInput: The twin's checkpoints cannot be used.

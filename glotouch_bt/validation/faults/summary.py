@@ -1,4 +1,4 @@
-"""The figures of `bench faults`: the matrix, and the rates that are asked for."""
+"""Summary of `bench faults`: matrix of verdicts and rates."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ Row = Mapping[str, Any]
 
 
 def summarise(rows: Sequence[Row]) -> dict[str, Any]:
-    """Rates with Wilson intervals over the trials in which something was really altered.
+    """Return rates with Wilson intervals over the trials whose fault altered something.
 
-    recovered: of faults a mission can recover from, on seeds whose twin succeeds. named: of trials that did not reach
-    the goal. What altered nothing is listed, and in no rate.
+    recovered: over recoverable faults on seeds whose twin succeeds. named: over trials that did not reach the goal.
+    Faults that altered nothing are listed and excluded from all rates.
     """
     twins = [r for r in rows if r["class"] == "none"]
     faulted = [r for r in rows if r["class"] != "none"]
@@ -75,12 +75,12 @@ def _mean(values: Sequence[float]) -> dict[str, Any]:
 
 
 def _as_json(found: Mapping[str, Any]) -> dict[str, Any]:
-    """None where there is no number."""
+    """Replace non-finite numbers by None."""
     return {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in found.items()}
 
 
 def matrix(rows: Sequence[Row], classes: Sequence[str], skills: Sequence[str]) -> dict[str, dict[str, list[int]]]:
-    """Counts of each verdict (in the order of `VERDICTS`) by class and skill; a cell without trials is left out."""
+    """Return counts of each verdict (in the order of `VERDICTS`) by class and skill; empty cells are left out."""
     found: dict[str, dict[str, list[int]]] = {}
     for name in classes:
         for skill in skills:

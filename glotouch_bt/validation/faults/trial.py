@@ -1,4 +1,4 @@
-"""One trial of `bench faults`, in a process of its own, and what became of it."""
+"""One trial of `bench faults`, in its own process, and its verdict."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from glotouch_bt.validation.faults.rejoin import Rejoined
 from glotouch_bt.validation.faults.start import start_from
 
 HUNG_S = 900.0
-"""Wall time after which a trial counts as hanging."""
+"""Wall time after which a trial counts as hanging, s."""
 ROW, STARTED = "row.json", "started"
 MAX_STARTS = 2
 VERDICTS = ("recovered", "safely ended", "wrong", "unsafe")
 
 
 class Hung(BaseException):
-    """The trial took longer than it may."""
+    """The trial exceeded its wall time."""
 
 
 @contextmanager
 def hang_guard(seconds: float = HUNG_S) -> Iterator[None]:
-    """Raise `Hung` in the main thread after so long on the wall's clock."""
+    """Raise `Hung` in the main thread after `seconds` of wall time."""
 
     def ring(number: int, frame: FrameType | None) -> None:
         raise Hung
@@ -49,11 +49,10 @@ def hang_guard(seconds: float = HUNG_S) -> Iterator[None]:
 
 
 def verdict(result: Mapping[str, Any], hard_force_N: float) -> str:
-    """What became of a run: one of `VERDICTS`.
+    """Return the verdict of a run, one of `VERDICTS`.
 
-    unsafe: it broke down, hung, pressed harder than the hard limit, or ended with an arm that nobody holds;
-    wrong: it lifted another object than the target, or calls a success what is none; recovered: the target hangs in the
-    hand; safely ended: anything else, with its reason.
+    unsafe: it crashed, hung, exceeded the hard force limit, or ended without the arm held. wrong: it lifted another
+    object, or reported a false success. recovered: the target is in the gripper. safely ended: everything else.
     """
     if result["status"] in ("traceback", "hang"):
         return "unsafe"
@@ -69,7 +68,7 @@ def verdict(result: Mapping[str, Any], hard_force_N: float) -> str:
 
 
 def durations(folder: Path) -> dict[str, float]:
-    """How long each skill's first run took, by the name of its node, from a run's record."""
+    """Return the duration of each skill's first run by node name, from a run's record."""
     began: dict[str, float] = {}
     found: dict[str, float] = {}
     for tick in read_run(folder).ticks:
@@ -89,15 +88,15 @@ def run_trial(
     keep: bool = False,
     twin: Path | None = None,
 ) -> dict[str, Any]:
-    """One run as a row. Whatever goes wrong is a row, never an exception of the campaign.
+    """Run one trial and return its row. A failure becomes a row, never an exception.
 
     Args:
-        request: What to run; it names a folder.
-        labels: What the row begins with: class, skill, seed, after_s.
-        hard_force_N: The hard limit the true peak force is held against.
-        resume: Take the row that is there already.
-        keep: Leave the record of a harmless trial on disk.
-        twin: Folder of the unfaulted run of this seed: what they have in common is taken from there.
+        request: Run request with its folder.
+        labels: First columns of the row: class, skill, seed, after_s.
+        hard_force_N: Hard limit of the true peak force.
+        resume: Use an existing row.
+        keep: Keep the record of a harmless trial.
+        twin: Folder of the unfaulted run of this seed, to start from.
     """
     assert request.out is not None
     kept = request.out / ROW
@@ -132,12 +131,12 @@ def run_trial(
 
 
 def _launched(request: RunRequest, twin: Path | None) -> Mapping[str, Any]:
-    """The result of a run; of one that was its twin again, the twin's, with what the faults did here."""
+    """Return the result of a run. For a trial that rejoined its twin: the twin's, with the faults' effects."""
     resumable = None
     plan = request.faults
     if twin is not None and isinstance(plan, FaultPlan) and request.out is not None:
         (spec,) = plan.faults
-        if spec.kind.channel != "model":  # another model is another mission
+        if spec.kind.channel != "model":  # a different model makes a different mission
             (case,) = chosen_cases([spec.kind.name])
             resumable = start_from(twin, request.out, plan, case.warm_up_s)
     try:
@@ -158,7 +157,7 @@ def _launched(request: RunRequest, twin: Path | None) -> Mapping[str, Any]:
 
 
 def _tidy(folder: Path, everything: bool) -> None:
-    """Remove what is the twin's or can be had again; with `everything`, the record, too."""
+    """Remove files that the twin has or that can be regenerated; with `everything`, the record too."""
     shutil.rmtree(folder / EARLIER, ignore_errors=True)
     for file in folder.glob(f"{CHECKPOINTS}*"):
         file.unlink()
@@ -168,7 +167,7 @@ def _tidy(folder: Path, everything: bool) -> None:
 
 
 def _count_start(marker: Path) -> int:
-    """How often this trial has been started, this time included: a mission that is lost ends its own process."""
+    """Count the starts of this trial, this one included: a lost mission ends its own process."""
     marker.parent.mkdir(parents=True, exist_ok=True)
     starts = 1 + (int(marker.read_text(encoding="utf-8")) if marker.is_file() else 0)
     marker.write_text(str(starts), encoding="utf-8")
@@ -209,7 +208,7 @@ def _row(result: Mapping[str, Any], hard_force_N: float) -> dict[str, Any]:
 
 
 def drawn_after_s(seed: int, fault: str, skill: str, lasts_s: float) -> float:
-    """When in a skill's run a fault begins: anywhere in its first 80 %, to the period."""
+    """Draw when the fault begins: within the first 80 % of the skill's run, rounded to the period."""
     from glotouch_bt.robot.scene import stream
 
     return round(float(stream(seed, f"moment {fault} {skill}").uniform(0.0, 0.8 * max(lasts_s, 0.0))), 2)

@@ -1,7 +1,7 @@
-"""`bench fuzz`: missions and fault plans nobody would write, by the thousand: no traceback, no hang, no code run.
+"""`bench fuzz`: random and corrupted missions and fault plans; reading one must never crash, hang or run code.
 
-`documents` grows missions and plans that are nearly right, `spoiling` breaks them (as data and as bytes), `trial` reads
-one, checks it, and runs what passes with scripted leaves; `watch` sees what it must not do; `campaign` counts.
+`documents` generates missions and plans that are nearly right, `corrupt` changes them (as data and as bytes), `trial`
+reads one, checks it and runs what passes with scripted leaves, `watch` detects forbidden actions, `campaign` counts.
 """
 
 from glotouch_bt.validation.fuzz.campaign import FuzzCampaign, run_campaign

@@ -1,4 +1,4 @@
-"""Many trials, counted by what came of them; what must not happen is kept with its document."""
+"""Run many trials and count their classes; keep the documents of bad ones."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ CHUNK = 50
 
 @dataclass(frozen=True)
 class FuzzCampaign:
-    """What shall be tried.
+    """Settings of the campaign.
 
     Attributes:
-        trials: How many documents.
-        seed: Of all of them; trial n is the same whatever their number.
-        out: Where summary.json and the documents that broke something go.
+        trials: Number of documents.
+        seed: Seed of all documents; trial n does not depend on their number.
+        out: Folder for summary.json and the documents of bad trials.
     """
 
     trials: int
@@ -35,12 +35,12 @@ OnChunk = Callable[[int, int, Mapping[str, int]], None]
 
 
 def run_campaign(campaign: FuzzCampaign, executor: Executor, on_chunk: OnChunk | None = None) -> dict[str, Any]:
-    """Run every trial; writes summary.json and failures/, returns the summary.
+    """Run every trial, write summary.json and failures/, and return the summary.
 
     Args:
-        campaign: What to try.
+        campaign: Settings.
         executor: Any `concurrent.futures` executor of processes.
-        on_chunk: Called with (trials done, of how many, counts so far).
+        on_chunk: Called with (trials done, total, counts so far).
     """
     campaign.out.mkdir(parents=True, exist_ok=True)
     counts: Counter[tuple[str, str]] = Counter()

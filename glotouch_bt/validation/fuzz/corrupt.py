@@ -1,4 +1,4 @@
-"""Breaking documents: as data before they become text, and as bytes afterwards."""
+"""Corrupt documents: as data before serialisation, and as bytes afterwards."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ ODD_TEXTS: tuple[str, ...] = (
 )  # fmt: skip
 
 
-def spoil(document: Document, rng: Rng) -> Document:
-    """A few changes to the data; the document itself is used up."""
+def corrupt_data(document: Document, rng: Rng) -> Document:
+    """Make a few random changes to the data, in place."""
     holder = {"": document}
     for _ in range(int(rng.integers(1, 4))):
         places = list(_places(holder))
@@ -46,7 +46,7 @@ Place = tuple[Any, Any]
 
 
 def _places(value: Any) -> Iterator[Place]:
-    """Every (container, key) in nested data."""
+    """Yield every (container, key) of nested data."""
     stack = [value]
     while stack:
         here = stack.pop()
@@ -57,7 +57,7 @@ def _places(value: Any) -> Iterator[Place]:
 
 
 def _replace(place: Place, places: list[Place], rng: Rng) -> None:
-    place[0][place[1]] = deepcopy(pick(rng, ODD_VALUES))  # the next change may be made in it
+    place[0][place[1]] = deepcopy(pick(rng, ODD_VALUES))  # the next change may happen inside it
 
 
 def _delete(place: Place, places: list[Place], rng: Rng) -> None:
@@ -84,7 +84,7 @@ def _rename(place: Place, places: list[Place], rng: Rng) -> None:
 
 
 def _move(place: Place, places: list[Place], rng: Rng) -> None:
-    """One part stands in for another; never in itself, for a document is a tree."""
+    """Copy one part over another, never into itself: a document is a tree."""
     other = pick(rng, places)
     part = other[0][other[1]]
     if not isinstance(part, (dict, list)):
@@ -133,7 +133,7 @@ _CHANGES: tuple[Callable[[Place, list[Place], Rng], None], ...] = (
 
 
 def as_text(document: Any, rng: Rng) -> bytes:
-    """The document as YAML, in one of the styles people write."""
+    """Serialise the document as YAML in a random style."""
     style = pick(rng, (None, False, False, True))
     options: dict[str, Any] = {"default_flow_style": style, "sort_keys": bool(rng.random() < 0.2)}
     options |= {"allow_unicode": bool(rng.random() < 0.8), "width": int(pick(rng, (40, 110, 1000)))}
@@ -141,14 +141,14 @@ def as_text(document: Any, rng: Rng) -> bytes:
 
 
 class _Dumper(yaml.SafeDumper):
-    """Writes no anchors: they are put in on purpose or not at all."""
+    """YAML dumper without anchors; only `ODD_TEXTS` adds them."""
 
     def ignore_aliases(self, data: Any) -> bool:
         return True
 
 
-def spoil_text(text: bytes, rng: Rng) -> bytes:
-    """A few changes to the bytes."""
+def corrupt_bytes(text: bytes, rng: Rng) -> bytes:
+    """Make a few random changes to the bytes."""
     for _ in range(int(rng.integers(1, 5))):
         text = pick(rng, _TEXT_CHANGES)(text, rng)
     return text
@@ -169,7 +169,7 @@ def _insert(text: bytes, rng: Rng) -> bytes:
 
 
 def _after_colon(text: bytes, rng: Rng) -> bytes:
-    """An odd word where a value stands."""
+    """Replace a value by an odd text."""
     places = [i for i in range(len(text)) if text[i : i + 2] == b": "]
     if not places:
         return _insert(text, rng)
@@ -185,7 +185,7 @@ def _cut(text: bytes, rng: Rng) -> bytes:
 
 
 def _lines(text: bytes, rng: Rng) -> bytes:
-    """A line twice, gone, moved, or indented otherwise."""
+    """Duplicate, delete, move or re-indent a line."""
     lines = text.split(b"\n")
     i = int(rng.integers(len(lines)))
     line = lines[i]

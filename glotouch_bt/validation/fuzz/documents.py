@@ -1,4 +1,4 @@
-"""Missions and fault plans grown at random by their grammar: most are right, or nearly so."""
+"""Generate random missions and fault plans from their grammar; most are valid, or nearly."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from glotouch_bt.skill import Skill
 
 Document = dict[str, Any]
 T = TypeVar("T")
-DEEPEST = 5
+MAX_DEPTH = 5
 PASSIVE = ("process",)
-"""Channels of faults that end or stop this process: such plans are checked, and not run."""
+"""Channels of faults that stop this process; such plans are checked but not run."""
 
 
 @dataclass
@@ -38,25 +38,25 @@ class Grown:
 
 @lru_cache(maxsize=1)
 def skills() -> Mapping[str, type[Skill]]:
-    """Every installed skill that can be imported here."""
+    """Return every installed skill that can be imported."""
     shelf = SkillShelf()
     return {name: shelf[name] for name in shelf}
 
 
 @lru_cache(maxsize=1)
 def shipped_documents() -> tuple[Document, ...]:
-    """The shipped missions as plain data."""
+    """Return the shipped missions as plain data."""
     return tuple(plain(read_yaml(path)) for path in shipped("").values())
 
 
 @lru_cache(maxsize=1)
 def shipped_plans() -> tuple[Document, ...]:
-    """The shipped fault plans as plain data."""
+    """Return the shipped fault plans as plain data."""
     return tuple(plain(read_yaml(path)) for path in shipped("faults").values())
 
 
 def grow_mission(rng: np.random.Generator) -> Document:
-    """A random mission, or a shipped one."""
+    """Return a random or shipped mission."""
     if rng.random() < 0.15:
         return dict(_copied(pick(rng, shipped_documents())))
     worlds = [f"worlds/{p.name}" for p in sorted((shipped_root() / "worlds").glob("*.yaml"))]
@@ -73,7 +73,7 @@ def grow_mission(rng: np.random.Generator) -> Document:
 
 
 def grow_plan(rng: np.random.Generator) -> Document:
-    """A random fault plan, or a shipped one."""
+    """Return a random or shipped fault plan."""
     if shipped_plans() and rng.random() < 0.1:
         return dict(_copied(pick(rng, shipped_plans())))
     faults = [_fault(rng) for _ in range(int(rng.integers(1, 6)))]
@@ -84,7 +84,7 @@ def grow_plan(rng: np.random.Generator) -> Document:
 
 
 def pick(rng: np.random.Generator, options: Sequence[T]) -> T:
-    """One of some options."""
+    """Pick one of the options."""
     return options[int(rng.integers(len(options)))]
 
 
@@ -100,7 +100,7 @@ def _many(rng: np.random.Generator, grown: Grown, depth: int, parameter: bool) -
 
 def _node(rng: np.random.Generator, grown: Grown, depth: int, parameter: bool) -> Any:
     kinds = ["skill"] * 6
-    if depth < DEEPEST:
+    if depth < MAX_DEPTH:
         kinds += ["sequence", "selector", "parallel", "retry", "timeout", "repeat", "for_each", "invert", "succeed",
                   "fail", "condition", "condition"]  # fmt: skip
     kind = pick(rng, kinds)
@@ -149,7 +149,7 @@ def _condition(rng: np.random.Generator, grown: Grown) -> Document:
 
 
 def _skill(rng: np.random.Generator, grown: Grown, parameter: bool) -> Any:
-    """Mostly one whose inputs are there and that may start with what is in the hand."""
+    """Pick a skill, usually one whose inputs and preconditions are met."""
     names = list(skills())
     fitting = [n for n in names if _fits(skills()[n], grown)]
     name = pick(rng, fitting if fitting and rng.random() < 0.95 else names)
@@ -173,7 +173,7 @@ def _fits(skill: type[Skill], grown: Grown) -> bool:
 
 
 def _values(model: type[BaseModel], rng: np.random.Generator, wanted: Callable[[], bool]) -> Document:
-    """Values for some fields, and all that are required."""
+    """Draw values for all required and some optional fields."""
     made: Document = {}
     for name, field in model.model_fields.items():
         if field.is_required() or wanted():

@@ -1,4 +1,4 @@
-"""One trial: a document is grown, perhaps spoilt, read, checked, and run with scripted leaves if it passes."""
+"""One trial: generate a document, perhaps corrupt it, read and check it, and run it with scripted leaves."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from glotouch_bt.mission.read import shipped_root
 from glotouch_bt.mission.spec import MissionFaults
 from glotouch_bt.mission_testing import RunsAway, ScriptMaker, ok, run_scripted
 from glotouch_bt.robot import BackendError, BadInput, FakeRobot
-from glotouch_bt.validation.fuzz.corrupt import as_text, spoil, spoil_text
+from glotouch_bt.validation.fuzz.corrupt import as_text, corrupt_bytes, corrupt_data
 from glotouch_bt.validation.fuzz.documents import PASSIVE, grow_mission, grow_plan
 from glotouch_bt.validation.fuzz.watch import TooLong, Watch
 
@@ -37,13 +37,13 @@ PLAN_SHARE = 0.25
 
 @dataclass(frozen=True)
 class Result:
-    """What came of one trial.
+    """Result of one trial.
 
     Attributes:
-        number: Its number.
-        kind: What was read.
-        came: Class of outcome.
-        detail: Error, traceback or what was seen, for the bad classes.
+        number: Number of the trial.
+        kind: Kind of document.
+        came: Class of the result.
+        detail: Error, traceback or forbidden action, for the bad classes.
         text: The document, for the bad classes.
     """
 
@@ -55,21 +55,21 @@ class Result:
 
 
 def run_trials(seed: int, numbers: Sequence[int]) -> list[Result]:
-    """Some trials, one after another, in this process."""
+    """Run some trials in turn in this process."""
     with _folder() as folder:
         return [run_trial(seed, n, folder) for n in numbers]
 
 
 @contextmanager
 def _folder() -> Iterator[Path]:
-    """A folder to read documents in, with the shipped subtrees beside and things that are no files."""
+    """Make a folder to read documents in, with the shipped subtrees and some non-files."""
     folder = Path(tempfile.mkdtemp(prefix="glotouch-fuzz-"))
     here = Path.cwd()
     try:
         (folder / "subtrees").symlink_to(shipped_root() / "subtrees")
         (folder / "self.yaml").write_text("subtree: self\ntree: {subtree: {file: self.yaml}}\n")
         os.mkfifo(folder / "pipe")
-        _faulted_mission()  # its file is written before anybody watches
+        _faulted_mission()  # written before watching starts
         os.chdir(folder)
         yield folder
     finally:
@@ -83,22 +83,22 @@ def _watch() -> Watch:
 
 
 def document_of(seed: int, number: int) -> tuple[Kind, bytes, np.random.Generator]:
-    """What a trial reads, and the random stream it goes on with."""
+    """Return kind and bytes of a trial's document, and its random stream."""
     rng = np.random.default_rng([seed, number])
     kind: Kind = "fault plan" if rng.random() < PLAN_SHARE else "mission"
     document = grow_plan(rng) if kind == "fault plan" else grow_mission(rng)
     how = rng.random()
     if 0.25 <= how < 0.65 or how > 0.9:
-        document = spoil(document, rng)
+        document = corrupt_data(document, rng)
     try:
         text = as_text(document, rng)
-    except RecursionError:  # PyYAML writes recursively
+    except RecursionError:  # PyYAML dumps recursively
         text = b"[" * 5000
-    return kind, spoil_text(text, rng) if how >= 0.65 else text, rng
+    return kind, corrupt_bytes(text, rng) if how >= 0.65 else text, rng
 
 
 def run_trial(seed: int, number: int, folder: Path) -> Result:
-    """One trial; never raises for what the document does."""
+    """Run one trial; nothing in the document makes it raise."""
     kind, text, rng = document_of(seed, number)
     path = folder / "m.yaml"
     path.write_bytes(text)
@@ -116,10 +116,10 @@ def run_trial(seed: int, number: int, folder: Path) -> Result:
 
 
 def _refused(error: BadInput) -> tuple[Class, str]:
-    """Readable, and with a place for everything that has one."""
+    """Check that a refusal is readable and that every finding has a place."""
     words = str(error)
     if not words.strip() or "Traceback" in words:
-        return "traceback", f"a message nobody can read: {words!r}"
+        return "traceback", f"unreadable message: {words!r}"
     if not isinstance(error, MissionFaults):
         return "refused unread", ""
     if not error.findings or any(not f.what.strip() or not f.place.file for f in error.findings):
@@ -153,7 +153,7 @@ PLAIN_MISSION = "mission: m\nworld: container_five\ntree: [tool_pickup, tool_cal
 
 @lru_cache(maxsize=1)
 def _faulted_mission() -> Mission:
-    """What fault plans are tried on."""
+    """Return the mission that fault plans run on."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "m.yaml"
         path.write_text(PLAIN_MISSION)
@@ -174,12 +174,12 @@ def _plan(path: Path, rng: np.random.Generator) -> tuple[Class, str]:
 def _run_faulted(plan: FaultPlan, mission: Mission, rng: np.random.Generator) -> tuple[Class, str]:
     try:
         robot = FaultInjector(FakeRobot(), plan, int(rng.integers(2**31)))
-    except BadInput as e:  # a fault of a simulated world on a robot that has none
+    except BadInput as e:  # a world fault on a robot without a simulated world
         return _refused(e)
     script = {"*": ok().after(float(rng.uniform(0.0, 0.7)))}
     try:
         run = run_scripted(mission, script, robot=robot, max_ticks=MAX_TICKS)
-    except BackendError:  # before the first tick: the runner lets it through, the command line says it
+    except BackendError:  # before the first tick the error reaches the caller
         return "stopped by a fault", ""
     robot.report()
     if isinstance(run.error, RunsAway):

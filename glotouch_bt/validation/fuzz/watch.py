@@ -1,4 +1,4 @@
-"""Sees what reading a document must never do: run code, start a process, write a file, open a connection."""
+"""Detect what reading a document must never do: run code, start a process, write a file, open a connection."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from pathlib import Path
 from typing import Any
 
 CANARY = "glotouch_fuzz_canary"
-"""A word in the code that documents try to have run."""
+"""Name of the file that code hidden in documents would create."""
 PROCESSES = ("os.system", "os.exec", "os.posix_spawn", "os.fork", "os.forkpty", "subprocess.Popen", "pty.spawn",
              "socket.connect", "socket.bind", "ctypes.dlopen", "os.remove", "os.rename", "shutil.rmtree")  # fmt: skip
-"""Audit events (PEP 578) of leaving this process or changing the disk."""
-LARGEST_BYTES = 4 * 1024**3
+"""Audit events (PEP 578) that leave this process or change the disk."""
+MAX_MEMORY_BYTES = 4 * 1024**3
 
 
 class TooLong(BaseException):
-    """A trial did not end in time; no handler of errors may keep it."""
+    """A trial did not end in time. A BaseException, so that no error handler catches it."""
 
 
 class Watch:
-    """An audit hook that is on while a document is read and run; there is no taking it out, so one a process."""
+    """An audit hook, active while a document is read and run. Hooks cannot be removed: one a process."""
 
     def __init__(self) -> None:
         self.seen: list[str] = []
@@ -31,14 +31,14 @@ class Watch:
         sys.addaudithook(self._hear)
         soft, hard = resource.getrlimit(resource.RLIMIT_AS)
         if soft == resource.RLIM_INFINITY:
-            resource.setrlimit(resource.RLIMIT_AS, (LARGEST_BYTES, hard))
+            resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY_BYTES, hard))
 
     @contextmanager
     def on(self, folder: Path, seconds: float) -> Iterator[None]:
-        """Listen; raise `TooLong` after so long.
+        """Watch for forbidden actions; raise `TooLong` after `seconds` of wall time.
 
         Args:
-            folder: Where nothing may be written either.
+            folder: Folder of the document; nothing may be written there either.
             seconds: Wall time.
         """
         self.seen.clear()
@@ -52,7 +52,7 @@ class Watch:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
             signal.signal(signal.SIGALRM, before)
             if (folder / CANARY).exists() or Path(CANARY).exists():
-                self.seen.append("the canary file was made")
+                self.seen.append("the canary file was created")
 
     def _hear(self, event: str, args: tuple[Any, ...]) -> None:
         if not self._on:

@@ -1,9 +1,8 @@
-"""What `glotouch check` finds of seeded mistakes, and what py_trees finds of them by itself, on the same trees.
+"""Compare `glotouch check` with py_trees on seeded mistakes.
 
-For py_trees the tree of each mistaken mission is built of its own composites, decorators and ports; nodes it lacks
-(for_each, conditions, repeat-until) are ours. Every skill is a stub with the true ports that reads all its inputs,
-writes a value of the right type to each output and succeeds. The tree is set up and ticked to its end, as a developer
-would try it. What a name or a missing argument would do in Python is counted as found when the tree is built.
+For py_trees, each mission is built from its composites, decorators and ports; node kinds it lacks are ours. Every skill
+is a stub with the real ports that reads all inputs, writes a value of the right type to each output and succeeds. The
+tree is set up and ticked to its end. Mistakes that plain Python would raise count as found when the tree is built.
 """
 
 from __future__ import annotations
@@ -28,18 +27,18 @@ from glotouch_bt.validation.seeded_mistakes.mistakes import MISTAKES, RIGHT, Mis
 
 MAX_TICKS = 2000
 IN_PYTHON = {"unknown_skill", "missing_parameter", "unknown_parameter", "unknown_port"}
-"""Findings that plain Python, without a mission file, would give as an exception where the node is made."""
+"""Findings that plain Python code would raise as an exception where the node is created."""
 
 
 @dataclass(frozen=True)
-class Row:
-    """One mistake.
+class MistakeRow:
+    """Result of one mistake.
 
     Attributes:
-        mistake: It.
+        mistake: The mistake.
         ours: Our finding on the right line, or None.
-        others: How many more findings there are.
-        py_trees: What py_trees says: empty if nothing.
+        others: Number of further findings.
+        py_trees: Error of py_trees, or empty.
         when: build, setup, tick N, or never.
     """
 
@@ -50,13 +49,13 @@ class Row:
     when: str
 
 
-def compare() -> list[Row]:
-    """Every seeded mistake, found by both."""
+def compare() -> list[MistakeRow]:
+    """Try every seeded mistake with both."""
     return [_row(m) for m in MISTAKES]
 
 
 def false_alarms() -> tuple[int, int]:
-    """(findings in missions that are right, how many missions): the variants and what is shipped."""
+    """Return (findings, number of missions) over correct missions: the variants and the shipped ones."""
     texts = [*RIGHT.values()]
     found = sum(len(_found(text)) for text in texts)
     found += sum(len(load_mission(name).warnings) for name in shipped(""))
@@ -73,11 +72,11 @@ def _found(text: str) -> list[Finding]:
             return [*e.findings, *e.warnings]
 
 
-def _row(mistake: Mistake) -> Row:
+def _row(mistake: Mistake) -> MistakeRow:
     found = _found(mistake.text)
     ours = next((f for f in found if f.code == mistake.code and f.place.line == mistake.line), None)
     said, when = _in_py_trees(mistake)
-    return Row(mistake, ours, len(found) - (ours is not None), said, when)
+    return MistakeRow(mistake, ours, len(found) - (ours is not None), said, when)
 
 
 def _in_py_trees(mistake: Mistake) -> tuple[str, str]:
@@ -123,7 +122,7 @@ def _spec(text: str) -> tuple[NodeSpec, Findings]:
 
 
 def _complete(node: NodeSpec) -> bool:
-    """It can be built: its settings are usable. (Faulty parameters of skills are replaced: a stub has none.)"""
+    """Return True if the tree can be built: all settings are usable. Skill parameters do not matter to a stub."""
     return node.skill_type is not None or node.settings is not None
 
 
@@ -182,8 +181,8 @@ def _quiet() -> Iterator[None]:
         py_trees.logging.level = level
 
 
-def summary(rows: list[Row]) -> dict[str, object]:
-    """Counts, as JSON data."""
+def summary(rows: list[MistakeRow]) -> dict[str, object]:
+    """Return the counts as JSON data."""
     alarms, missions = false_alarms()
     named = [r for r in rows if r.py_trees and r.when in ("build", "setup")]
     ticked = [r for r in rows if r.py_trees and r.when.startswith("tick")]
@@ -199,8 +198,8 @@ def summary(rows: list[Row]) -> dict[str, object]:
     }
 
 
-def as_markdown(rows: list[Row]) -> str:
-    """The table of docs/results.md."""
+def as_markdown(rows: list[MistakeRow]) -> str:
+    """Return the comparison as a Markdown table."""
     lines = ["| mistake | glotouch check | py_trees 2.6 |", "|---|---|---|"]
     for row in rows:
         ours = f"line {row.ours.place.line}, `{row.ours.code}`" if row.ours else "not found"

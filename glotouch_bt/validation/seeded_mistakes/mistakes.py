@@ -1,5 +1,5 @@
 # ruff: noqa: E501 (a table of one mistake a line reads better than wrapped ones)
-"""Seeded mistakes in a mission of shipped skills, and missions that look odd and are right.
+"""Seeded mistakes in a mission of shipped skills, and unusual missions that are correct.
 
 Each mistake replaces one piece of the mission; `at` is a piece of the line (of the mutated mission) it must be found on.
 """
@@ -62,11 +62,11 @@ class Mistake:
     """One seeded mistake.
 
     Attributes:
-        name: What was done wrong.
-        old, new: What is replaced in `MISSION`, once.
-        code: Of the finding.
-        at: A piece of the line on which it must be found.
-        word: A piece of what it must say.
+        name: Description of the mistake.
+        old, new: Text of `MISSION` to replace once, and its replacement.
+        code: Expected finding.
+        at: Part of the line of the finding.
+        word: Part of its message.
     """
 
     name: str
@@ -84,7 +84,7 @@ class Mistake:
 
     @property
     def line(self) -> int:
-        """Where it must be found."""
+        """Return the line of the finding."""
         lines = [i for i, text in enumerate(self.text.splitlines(), 1) if self.at in text]
         assert len(lines) == 1, (self.name, lines)
         return lines[0]
