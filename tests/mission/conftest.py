@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 
 from glotouch_bt.mission.load import Mission, load_mission
+from glotouch_bt.mission.nodes import NODES, register
 from glotouch_bt.mission.spec.findings import Finding, MissionFaults
 from glotouch_bt.mission.tree.build import BuiltTree, build_tree
 from glotouch_bt.robot import HOLD, Array, GripperState, Limits, Observation
 from glotouch_bt.robot.fake import FAKE_ARM
 from glotouch_bt.skill import Context, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from tests.mission.nodes.quorum import QuorumKind
 
 
 class Item:
@@ -185,6 +187,14 @@ class ClockRobot:
 @pytest.fixture
 def registry() -> dict[str, type[Skill]]:
     return REGISTRY
+
+
+@pytest.fixture(scope="module")
+def quorum() -> Iterator[None]:
+    """A decorator of the tests' own, registered while a module runs."""
+    register(QuorumKind())
+    yield
+    del NODES["quorum"]
 
 
 @pytest.fixture

@@ -33,6 +33,7 @@ from glotouch_bt.mission.spec.node import NodeSpec, number_names
 from glotouch_bt.mission.tree.build import build_tree
 from glotouch_bt.skill import UNCHANGED, Context, In, Out, Skill, SkillFailed, SkillRun
 
+pytestmark = pytest.mark.usefixtures("quorum")
 MAX_RUNS = 600
 MAX_STEPS = 16
 ITEMS = 2
@@ -192,6 +193,9 @@ def decorated(inner: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
         inner.map(lambda c: {"timeout": {"seconds": 1.0, "do": c}}),
         inner.map(lambda c: {"retry": {"attempts": 2, "do": c}}),
         inner.map(lambda c: {"repeat": {"times": 2, "do": c}}),
+        st.tuples(inner, st.sampled_from([(1, 2), (2, 2), (2, 3)])).map(
+            lambda c: {"quorum": {"successes": c[1][0], "of": c[1][1], "do": c[0]}}
+        ),
         inner.map(lambda c: {"repeat": {"until": {"port": "b", "at_least": 1}, "limit": 2, "do": c}}),
         st.tuples(inner, st.sampled_from(["stop", "continue"])).map(
             lambda c: {"for_each": {"items": "list", "item": "a", "on_failure": c[1], "do": c[0]}}

@@ -33,7 +33,9 @@ from glotouch_bt.mission.spec.source import Place
 from glotouch_bt.robot import HOLD, BadInput, Observation
 from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun
 from tests.mission.conftest import ClockRobot
+from tests.mission.nodes.quorum import QuorumSettings
 
+pytestmark = pytest.mark.usefixtures("quorum")
 HERE = Place("m.yaml", 1, 1)
 
 
@@ -157,6 +159,7 @@ def trees(inner: st.SearchStrategy[NodeSpec]) -> st.SearchStrategy[NodeSpec]:
         ),
         inner.map(lambda c: node("repeat", [c], settings=RepeatSettings(times=2))),
         inner.map(until),
+        inner.map(lambda c: node("quorum", [c], settings=QuorumSettings(successes=2, of=3))),
         inner.map(lambda c: node("invert", [c])),
         inner.map(lambda c: node("succeed", [c])),
         inner.map(lambda c: node("fail", [c])),
@@ -264,6 +267,7 @@ def test_a_resumed_tree_goes_on_as_the_one_that_was_not_broken_off(case: tuple[N
 def test_every_kind_of_node_is_in_the_random_trees_or_named_here() -> None:
     """A new kind of node must be thought of: does it remember something from tick to tick?"""
     tried = {"sequence", "selector", "retry", "timeout", "repeat", "invert", "succeed", "fail", "for_each", "condition"}
+    tried.add("quorum")
     assert set(NODES) - tried - {"subtree"} == {"parallel"}, "parallels have a test of their own"
 
 
