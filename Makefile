@@ -4,13 +4,18 @@ VENV := .venv
 BIN := $(VENV)/bin
 export MPLBACKEND := Agg
 
-.PHONY: demo dev test check format docs reference results-page pins clean
+.PHONY: demo dev test test-integration check format docs reference results-page pins clean
 
 demo: $(VENV)
 	$(BIN)/glotouch run retrieve --set target=apple --seed 0
 
+# Quick tests: no whole mission in MuJoCo.
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --ignore=tests/integration
+
+# Whole missions, backends and conformance in MuJoCo and on simulated devices.
+test-integration: $(VENV)/.dev
+	$(BIN)/python -m pytest -n 2 tests/integration
 
 check: $(VENV)/.dev
 	$(BIN)/ruff format --check .
