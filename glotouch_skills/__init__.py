@@ -1,5 +1,1 @@
-"""Skills: one file each. A skill names no backend; see `base` for what a skill is."""
-
-from glotouch_bt.skill import Context, In, Journal, Out, Reason, Skill, SkillFailed, SkillParams, SkillRun, param
-
-__all__ = ["Context", "In", "Journal", "Out", "Reason", "Skill", "SkillFailed", "SkillParams", "SkillRun", "param"]
+"""Skills of touch missions, one file each, named as in a mission; they name no backend."""

@@ -10,10 +10,19 @@ from glotouch_bt.motion import Motion, finger_outline_half_m
 from glotouch_bt.perception.touch import Candidate, GuardParams, signed_distance
 from glotouch_bt.perception.touch.detection import Polygon
 from glotouch_bt.robot import Array, MotionRefused, SetPayload, Tare
-from glotouch_bt.skill import In, Skill, SkillFailed, SkillParams, SkillRun, come_to_rest, param
+from glotouch_bt.skill import (
+    MOTION_REFUSED,
+    Failure,
+    In,
+    Skill,
+    SkillParams,
+    SkillRun,
+    come_to_rest,
+    param,
+)
 from glotouch_bt.skill.probing import HeldTool, Prober
-from glotouch_skills.common.hand import finish, rise_clear
-from glotouch_skills.common.probe import HELD_TOLERANCE_M, feel_floor
+from glotouch_skills.common.hand import REQUEST_FAILED, finish, rise_clear
+from glotouch_skills.common.probe import FEEL_FLOOR_FAILURES, HELD_TOLERANCE_M, feel_floor
 
 GRIPPING_N = 1.0
 DIRECTIONS = 24
@@ -45,30 +54,34 @@ class Recheck(Skill):
     it is: jaws that hold nothing more are noticed.
 
     SUCCESS: what could be looked at is as it was.
-    FAILURE `tool_lost`: the probe is not in the jaws any more, or meets no floor.
-    FAILURE `tool_slipped`: the floor is felt elsewhere.
-    FAILURE `object_lost`: the jaws held an object and hold nothing now.
-    FAILURE `candidate_moved`: nothing, or something else, was met where a candidate was traced.
-    FAILURE `hard_contact`: the wrench passed a hard limit.
-    FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
-    FAILURE `not_at_rest`: the arm does not come to rest.
-    FAILURE `motion_refused`: the hand cannot rise.
     """
 
     Params = RecheckParams
     params: RecheckParams
 
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "tool_lost": "the probe is not in the jaws any more",
-        "tool_slipped": "the floor is felt elsewhere with it",
-        "object_lost": "the jaws held an object and hold nothing now",
-        "candidate_moved": "a candidate is not where it was traced",
-        "hard_contact": "the wrench passed a hard limit",
-        "request_failed": "the sensor could not be zeroed, or the payload not be set",
-        "not_at_rest": "the arm does not come to rest",
-        "motion_refused": "the hand cannot rise",
-    }
+
+    TOOL_LOST = Failure(
+        "tool_lost",
+        "the probe is not in the jaws any more, or meets no floor",
+        advice="put the probe into its holder, then resume --from tool_pickup",
+    )
+    TOOL_SLIPPED = Failure(
+        "tool_slipped",
+        "the floor is felt elsewhere with the probe",
+        advice="put the probe into its holder, then resume --from tool_pickup",
+    )
+    OBJECT_LOST = Failure(
+        "object_lost",
+        "the jaws held an object and hold nothing now",
+        advice="start again where the object is sought or squeezed: resume --from NODE",
+    )
+    CANDIDATE_MOVED = Failure(
+        "candidate_moved",
+        "nothing, or something else, was met where a candidate was traced",
+        advice="what was found is not to be trusted any more: resume --from guarded_sweep, or run it again",
+    )
+    FAILURES: ClassVar = (*FEEL_FLOOR_FAILURES, REQUEST_FAILED, MOTION_REFUSED.with_meaning("the hand cannot rise"))
 
     tool = In(HeldTool, "the probe as it was taken", required=False)
     candidates = In(tuple, "what was traced", element=Candidate, required=False)
@@ -90,10 +103,8 @@ class Recheck(Skill):
         elif held_m is not None and context.observation.gripper.force_N > GRIPPING_N:
             found["object"] = True
         elif held_m is not None:
-            raise SkillFailed(
-                "object_lost",
+            raise self.OBJECT_LOST(
                 f"the jaws held something {held_m * 1e3:.1f} mm wide and hold nothing now",
-                advice="start again where the object is sought or squeezed: resume --from NODE",
                 aperture_m=context.observation.gripper.aperture_m,
             )
         else:
@@ -107,10 +118,8 @@ class Recheck(Skill):
     def _require_tool(self, tool: HeldTool) -> None:
         apart = self.context.arm.aperture_m
         if not self._as_wide_as(tool):
-            raise SkillFailed(
-                "tool_lost",
+            raise self.TOOL_LOST(
                 f"the jaws are {apart * 1e3:.1f} mm apart, with the probe they were {tool.aperture_m * 1e3:.1f}",
-                advice="put the probe into its holder, then resume --from tool_pickup",
                 aperture_m=apart,
             )
 
@@ -127,17 +136,11 @@ class Recheck(Skill):
         p = self.params
         floor_m = yield from feel_floor(self.context, tool, p.corner_gap_m, p.speed_m_s)
         if floor_m is None:
-            raise SkillFailed(
-                "tool_lost",
-                "nothing was met where the floor is",
-                advice="put the probe into its holder, then resume --from tool_pickup",
-            )
+            raise self.TOOL_LOST("nothing was met where the floor is")
         off = floor_m - tool.floor_z_K_m
         if abs(off) > p.slip_m:
-            raise SkillFailed(
-                "tool_slipped",
+            raise self.TOOL_SLIPPED(
                 f"the floor was felt {off * 1e3:.1f} mm from where it was: the probe slipped, or the box was moved",
-                advice="put the probe into its holder, then resume --from tool_pickup",
                 off_m=off,
             )
         yield from rise_clear(self.context.arm, p.speed_m_s)
@@ -193,11 +196,8 @@ class Recheck(Skill):
             if abs(off) <= self.params.moved_m:
                 return
         how = "nothing was met there" if off is None else f"something was met {off * 1e3:.1f} mm from its outline"
-        raise SkillFailed(
-            "candidate_moved",
-            f"candidate {candidate.index} is not where it was traced: {how}",
-            advice="what was found is not to be trusted any more: resume --from guarded_sweep, or run it again",
-            candidate=candidate.index,
+        raise self.CANDIDATE_MOVED(
+            f"candidate {candidate.index} is not where it was traced: {how}", candidate=candidate.index
         )
 
     def _ways(self, tool: HeldTool, min_m: float) -> list[tuple[Candidate, Array, Array]]:

@@ -103,9 +103,9 @@ def _outcome(outcome: LeafOutcome, node: NodeSpec) -> LeafOutcome:
     assert skill is not None
     if not isinstance(outcome, LeafOutcome) or outcome.kind == "real":
         raise ScriptError(f"script: {node.name!r}: a function must decide on ok(), fails(), hangs() or raises()")
-    codes = skill.failure_codes()
+    codes = skill.failures(general=True)
     # A skill that declares nothing promises nothing.
-    if outcome.kind == "fails" and outcome.code and skill.FAILURES and outcome.code not in codes:
+    if outcome.kind == "fails" and outcome.code and skill.failures() and outcome.code not in codes:
         hint, known = _hint(outcome.code, codes), ", ".join(codes)
         raise ScriptError(f"script: {node.skill!r} never fails with {outcome.code!r}{hint} (it declares: {known})")
     return replace(outcome, ports=_ports(outcome, node.name, node.skill, skill))

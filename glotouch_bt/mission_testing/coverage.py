@@ -110,7 +110,7 @@ def expected_endings(root: NodeSpec, title: str) -> Iterator[tuple[str, tuple[st
     for path, node in paths.items():
         if node.skill_type is None:
             continue
-        codes = tuple(node.skill_type.FAILURES) or (FAILURE,)
+        codes = tuple(node.skill_type.failures()) or (FAILURE,)
         preempted = (PREEMPTED,) if _below(path, paths) else ()
         yield path, (SUCCESS, *codes, *preempted)
 

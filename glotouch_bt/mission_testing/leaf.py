@@ -144,8 +144,9 @@ class _Playing(Skill):
         call.outputs = {**written, **outcome.ports}
         self._write(call.outputs)
         if outcome.kind == "fails":
-            code = outcome.code or next(iter(kind.FAILURES), "scripted")
-            raise SkillFailed(code, outcome.message or kind.failure_codes().get(code, "scripted"))
+            code = outcome.code or next(iter(kind.failures()), "scripted")
+            declared = kind.failures(general=True).get(code)
+            raise SkillFailed(code, outcome.message or (declared.meaning if declared else "scripted"))
         call.ending = "SUCCESS"
 
     def _write(self, ports: Mapping[str, object]) -> None:

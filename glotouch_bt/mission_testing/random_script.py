@@ -67,7 +67,7 @@ class ScriptMaker:
             for p in skill.OUTPUT_PORTS
             if promised(skill, p, kind) is None and (not failing or rng.random() < 0.3)
         }
-        codes = list(skill.FAILURES) or [""]
+        codes = list(skill.failures()) or [""]
         code = codes[int(rng.integers(len(codes)))] if failing else ""
         return LeafOutcome(kind, code, ports=ports, after_s=after)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 from glotouch_bt.robot import HOLD, Command, Observation, Request, Ticket, World
-from glotouch_bt.skill.failures import SkillFailed
+from glotouch_bt.skill.failures import NOT_AT_REST
 
 if TYPE_CHECKING:
     from glotouch_bt.motion import Arm
@@ -78,9 +78,4 @@ def come_to_rest(context: Context) -> SkillRun:
             context.arm.sync(observation)
             context.preempted = False
             return
-    raise SkillFailed(
-        "not_at_rest",
-        "the arm still moves after the skill before was broken off",
-        advice="something pushes it, or the servo does not settle",
-        joint_rad_s=float(abs(context.observation.dq).max()),
-    )
+    raise NOT_AT_REST(NOT_AT_REST.meaning, joint_rad_s=float(abs(context.observation.dq).max()))

@@ -1,10 +1,12 @@
 """What a skill is: a py_trees leaf with typed ports whose body is a generator of commands.
 
     class Approach(Skill):
-        "Advance until touch. SUCCESS: touched. FAILURE no_touch: the travel ran out."
+        "Advance until touch. SUCCESS: touched."
 
         class Params(SkillParams):
             travel_m: float = param("Longest free travel", unit="m", default=0.05, ge=0.0, le=0.3)
+
+        NO_TOUCH = Failure("no_touch", "the travel ran out", advice="sweep lower")
 
         start = In(Contact, "where to start")
         contact = Out(Contact, "first touch, in K")
@@ -13,7 +15,7 @@
             observation = yield HOLD                    # one yield = one control period
             result = yield from self.context.arm.guarded_line(...)
             if result.stop is None:
-                raise SkillFailed("no_touch", f"no touch in {self.params.travel_m} m", advice="sweep lower")
+                raise self.NO_TOUCH(f"no touch in {self.params.travel_m} m")
             self.contact = ...
 
 `run` returns: SUCCESS. `SkillFailed` or `MotionRefused`: FAILURE with its reason. Anything else reaches the runner,
@@ -35,7 +37,15 @@ from py_trees.ports import PortInformation, PortsMixin
 
 from glotouch_bt.robot import HOLD, Command, MotionRefused, Observation
 from glotouch_bt.skill.context import Context, SkillRun, come_to_rest
-from glotouch_bt.skill.failures import GENERAL_FAILURES, Reason, SkillFailed, UndeclaredFailure
+from glotouch_bt.skill.failures import (
+    GENERAL_FAILURES,
+    MOTION_REFUSED,
+    SKILL_TIMEOUT,
+    Failure,
+    Reason,
+    SkillFailed,
+    UndeclaredFailure,
+)
 from glotouch_bt.skill.params import SkillParams
 from glotouch_bt.skill.ports import In, Out, Port
 
@@ -58,7 +68,7 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
             or what they are after SUCCESS.
         RESTORED_BY: Of what it leaves, what should not outlast a mission unsaid, and the skill that puts it back.
         USES: What it has for itself while it runs: no two skills that use the same may run at once.
-        FAILURES: Codes it may fail with, each in a few words (beside `GENERAL_FAILURES`).
+        FAILURES: Failures of the shared motions that it uses; its own are class attributes.
         PAUSE: What a pause does to it: `hold` (a motion stops where it is along its path, and its guard goes on
             listening), `retreat` (the same, and a guarded motion also backs off a few millimetres the way it came),
             `finish` (the present motion is made to its end). All under `arm.pause_signal.finishing()`, as all that
@@ -72,15 +82,18 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
     FAILURE_STATES: ClassVar[Mapping[str, frozenset[str]]] = NOTHING
     RESTORED_BY: ClassVar[Mapping[str, str]] = NOTHING
     USES: ClassVar[frozenset[str]] = frozenset()
-    FAILURES: ClassVar[Mapping[str, str]] = NOTHING
+    FAILURES: ClassVar[tuple[Failure, ...]] = ()
     PAUSE: ClassVar[Literal["hold", "retreat", "finish"]] = "hold"
     MAX_DURATION_S: ClassVar[float] = 900.0
 
+    _failures: ClassVar[Mapping[str, Failure]] = NOTHING
     Params: ClassVar[type[SkillParams]] = SkillParams
     INPUT_PORTS: ClassVar[dict[str, PortInformation]] = {}
     OUTPUT_PORTS: ClassVar[dict[str, PortInformation]] = {}
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
+        own = {f.code: f for c in reversed(cls.__mro__) for f in vars(c).values() if isinstance(f, Failure)}
+        cls._failures = {**own, **{f.code: f for f in cls.FAILURES if f.code not in own}}
         ports = {n: p for c in reversed(cls.__mro__) for n, p in vars(c).items() if isinstance(p, Port)}
         cls.INPUT_PORTS = {
             n: PortInformation(p.data_type, required=p.required, description=p.description)
@@ -158,7 +171,7 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
         except SkillFailed as e:
             return self._fail(e.reason)
         except MotionRefused as e:
-            return self._fail(Reason("motion_refused", str(e), advice="move the target or clear the way"))
+            return self._fail(MOTION_REFUSED(str(e)).reason)
         if not isinstance(command, Command):
             raise TypeError(f"run() yielded {command!r}; it yields a Command, such as HOLD")
         self.context.command = command
@@ -167,16 +180,15 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
     def _too_long(self) -> Status:
         self.context.preempted = True  # it may be broken off in a motion
         message = f"it took longer than {self.MAX_DURATION_S:g} s, the longest a {type(self).__name__} may take"
-        evidence = {"limit_s": self.MAX_DURATION_S, "since_s": self._begun_s}
-        return self._fail(Reason("skill_timeout", message, evidence, "it hangs, or its task is larger than foreseen"))
+        return self._fail(SKILL_TIMEOUT(message, limit_s=self.MAX_DURATION_S, since_s=self._begun_s).reason)
 
     @classmethod
-    def failure_codes(cls) -> dict[str, str]:
-        """Every code it may fail with, each in a few words."""
-        return {**cls.FAILURES, **GENERAL_FAILURES}
+    def failures(cls, *, general: bool = False) -> dict[str, Failure]:
+        """Return the declared failures by code, the skill's own first; with `general`, also those of any skill."""
+        return {**cls._failures, **({f.code: f for f in GENERAL_FAILURES} if general else {})}
 
     def _fail(self, reason: Reason) -> Status:
-        if self.FAILURES and reason.code not in self.failure_codes():
+        if self._failures and reason.code not in self.failures(general=True):
             warnings.warn(f"{type(self).__name__} does not declare {reason.code!r}", UndeclaredFailure, stacklevel=2)
         self.reason = dataclasses.replace(reason, node=self.name)
         self.feedback_message = reason.message

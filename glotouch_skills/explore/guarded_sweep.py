@@ -8,7 +8,7 @@ import numpy as np
 
 from glotouch_bt.perception.search import SearchMap, search_policy, seek
 from glotouch_bt.perception.touch import Contact
-from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
 from glotouch_skills.common.probe import Explorer, ExploringSpeeds
 
@@ -33,9 +33,6 @@ class GuardedSweep(Skill):
     """Sweep, as the policy says, until an object that is not traced yet is touched; retreat from it.
 
     SUCCESS: something was touched; `contact` says where, the probe has retreated from it.
-    FAILURE `search_exhausted`: nothing is left to explore, or to reach.
-    FAILURE `hard_contact`: the wrench passed a hard limit on the way.
-    FAILURE `tool_lost`: the jaws are not as far apart as when they took the tool.
     """
 
     PAUSE = "retreat"
@@ -44,12 +41,13 @@ class GuardedSweep(Skill):
 
     PRECONDITIONS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "search_exhausted": "nothing is left to explore, or to reach",
-        "hard_contact": "the wrench passed a hard limit on the way",
-        "tool_lost": "the jaws are not as far apart as when they took the tool",
-        "motion_refused": "the way is not clear",
-    }
+
+    SEARCH_EXHAUSTED = Failure(
+        "search_exhausted",
+        "nothing is left to explore, or to reach",
+        advice="check expected_objects; a lower height_m meets flatter objects",
+    )
+    FAILURES: ClassVar = (*Explorer.FAILURES, MOTION_REFUSED)
 
     tool = In(HeldTool, "the held probe")
     previous = In(SearchMap, "what has been explored so far", key="map", required=False)
@@ -71,10 +69,8 @@ class GuardedSweep(Skill):
         self.map = sought.belief
         if sought.contact is None:
             self.exhausted = True
-            raise SkillFailed(
-                "search_exhausted",
+            raise self.SEARCH_EXHAUSTED(
                 f"nothing unexplored is left; {belief.found} of {p.expected_objects} objects were found",
-                advice="check expected_objects; a lower height_m meets flatter objects",
                 found=belief.found,
             )
         self.contact = sought.contact

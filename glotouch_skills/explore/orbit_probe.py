@@ -9,7 +9,7 @@ import numpy as np
 
 from glotouch_bt.perception.search import Move, Plan, SearchMap, admit, joins, of_another, part_of, trace
 from glotouch_bt.perception.touch import Candidate, Contact
-from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillRun, param
+from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
 from glotouch_skills.common.probe import Explorer, TracingParams
 
@@ -41,10 +41,6 @@ class OrbitProbe(Skill):
     is found soon; `refine_outline` makes it exact once all are found.
 
     SUCCESS: `candidates` has a new one, or knows one better that was traced in part; the map keeps out of its envelope.
-    FAILURE `known_object`: the contact belongs to an object traced before; its place is dropped from the search.
-    FAILURE `not_traced`: too few contacts were made to fit an outline.
-    FAILURE `hard_contact`: the wrench passed a hard limit on the way.
-    FAILURE `tool_lost`: the jaws are not as far apart as when they took the tool.
     """
 
     PAUSE = "retreat"
@@ -53,13 +49,18 @@ class OrbitProbe(Skill):
 
     PRECONDITIONS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "known_object": "the contact belongs to an object traced before",
-        "not_traced": "too few contacts were made to fit an outline",
-        "hard_contact": "the wrench passed a hard limit on the way",
-        "tool_lost": "the jaws are not as far apart as when they took the tool",
-        "motion_refused": "the way is not clear",
-    }
+
+    KNOWN_OBJECT = Failure(
+        "known_object",
+        "the contact belongs to an object traced before; its place is dropped from the search",
+        advice="sweep on: its place is dropped from the search",
+    )
+    NOT_TRACED = Failure(
+        "not_traced",
+        "too few contacts were made to fit an outline",
+        advice="raise the sensing height if the object is flat",
+    )
+    FAILURES: ClassVar = (*Explorer.FAILURES, MOTION_REFUSED)
 
     tool = In(HeldTool, "the held probe")
     contact = In(Contact, "first contact with the object")
@@ -77,10 +78,8 @@ class OrbitProbe(Skill):
         self.candidates, self.found, self.complete = known, len(known), belief.complete
         if belief.knows(first):
             self.map = belief.with_dropped(first.point_K_m)
-            raise SkillFailed(
-                "known_object",
+            raise self.KNOWN_OBJECT(
                 "the contact lies on an object that is traced already",
-                advice="sweep on: its place is dropped from the search",
                 x_K_m=float(first.point_K_m[0]),
                 y_K_m=float(first.point_K_m[1]),
             )
@@ -104,11 +103,8 @@ class OrbitProbe(Skill):
         admitted = admit(belief, known, first, traced, p.height_m, p.exclusion_m, part_of=old)
         self.map = admitted.belief
         if admitted.index is None:
-            raise SkillFailed(
-                "not_traced",
-                f"{len(traced.contacts)} contacts: no outline fits; {traced.ended}",
-                advice="raise the sensing height if the object is flat",
-                contacts=len(traced.contacts),
+            raise self.NOT_TRACED(
+                f"{len(traced.contacts)} contacts: no outline fits; {traced.ended}", contacts=len(traced.contacts)
             )
         self.event(
             "candidate",

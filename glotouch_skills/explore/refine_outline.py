@@ -9,7 +9,7 @@ import numpy as np
 
 from glotouch_bt.perception.search import TraceParams, elsewhere_m, refined, trace_more
 from glotouch_bt.perception.touch import Candidate
-from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillRun, param
+from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
 from glotouch_skills.common.probe import Explorer, TracingParams
 
@@ -33,9 +33,6 @@ class RefineOutline(Skill):
     """From a candidate known well enough to find it again to one known well enough to squeeze and to grasp.
 
     SUCCESS: `refined` is the candidate with what its new contacts say. An outline known well already is left as it is.
-    FAILURE `not_met`: nothing was touched where it should stand, or the trace ended on another object; `refined` is the
-    candidate as it was.
-    FAILURE `hard_contact`, `tool_lost`: as for `orbit_probe`.
     """
 
     PAUSE = "retreat"
@@ -44,12 +41,14 @@ class RefineOutline(Skill):
 
     PRECONDITIONS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "not_met": "nothing was touched where it should stand, or the trace ended on another object",
-        "hard_contact": "the wrench passed a hard limit on the way",
-        "tool_lost": "the jaws are not as far apart as when they took the tool",
-        "motion_refused": "the way is not clear",
-    }
+
+    NOT_MET = Failure(
+        "not_met",
+        "nothing was touched where the object should stand, or the trace ended on another object; `refined` "
+        "is the candidate as it was",
+        advice="it was pushed away, or is gone",
+    )
+    FAILURES: ClassVar = (*Explorer.FAILURES, MOTION_REFUSED)
 
     tool = In(HeldTool, "the held probe")
     candidate = In(Candidate, "the object as traced so far")
@@ -68,15 +67,10 @@ class RefineOutline(Skill):
         better = refined(before, traced)
         if better is None:
             if traced.missing:
-                raise SkillFailed(
-                    "not_met",
-                    f"candidate {before.index} was not met again where it had been traced",
-                    advice="it was pushed away, or is gone",
-                )
+                raise self.NOT_MET(f"candidate {before.index} was not met again where it had been traced")
             return
         if off_m := elsewhere_m(before, better):
-            raise SkillFailed(
-                "not_met",
+            raise self.NOT_MET(
                 f"candidate {before.index} was lost among others: what was traced stands {off_m * 1e3:.0f} mm away",
                 advice="it stands too near to them to be traced from the side",
                 off_m=off_m,

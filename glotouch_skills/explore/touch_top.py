@@ -11,7 +11,7 @@ from glotouch_bt.motion import Motion
 from glotouch_bt.perception.search import BallMove, Met, Top, TopPlan, TopRule, rounds, top_plan
 from glotouch_bt.perception.touch import Candidate, GuardParams
 from glotouch_bt.robot import Array, MotionRefused
-from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool, Prober
 
 RIM_PLACES, RIM_INSET_M = 4, 0.003
@@ -37,9 +37,6 @@ class TouchTop(Skill):
     """From a traced candidate to its height: touch down in the middle, pass above it, touch whatever is higher.
 
     SUCCESS: `measured` is the candidate with the height of the highest place found.
-    FAILURE `no_top`: nothing was met above where its sides had been touched: it is gone, or was moved. `measured` is
-    the candidate, at least as high as that.
-    FAILURE `motion_refused`: the ball cannot be brought above it; `measured` as for `no_top`.
     """
 
     PAUSE = "retreat"
@@ -48,11 +45,17 @@ class TouchTop(Skill):
 
     PRECONDITIONS: ClassVar = {"hand": frozenset({"probe", "fingers"})}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "no_top": "nothing was met above where its sides had been touched",
-        "hard_contact": "the wrench passed a hard limit on the way",
-        "motion_refused": "the ball cannot be brought above it",
-    }
+
+    NO_TOP = Failure(
+        "no_top",
+        "nothing was met above the height at which the sides were touched: the object was moved or is gone; "
+        "`measured` is the candidate, at least that high",
+        advice="trace it again: it was moved or is gone",
+    )
+    FAILURES: ClassVar = (
+        *Prober.FAILURES,
+        MOTION_REFUSED.with_meaning("the ball cannot be brought above the object; `measured` as for no_top"),
+    )
 
     tool = In(HeldTool, "the held probe")
     candidate = In(Candidate, "the object, as traced")
@@ -65,10 +68,8 @@ class TouchTop(Skill):
         self.measured = replace(candidate, height_m=max(candidate.height_m, touched_m))
         top = yield from self._drive(Prober(self.context, tool, GuardParams()), self._plan(candidate, touched_m))
         if top.ball_K_m is None:
-            raise SkillFailed(
-                "no_top",
+            raise self.NO_TOP(
                 f"nothing higher than {touched_m * 1e3:.0f} mm was met where candidate {candidate.index} was traced",
-                advice="trace it again: it was moved or is gone",
                 sides_m=touched_m,
             )
         height = float(top.ball_K_m[2]) - tool.tip_radius_m - tool.floor_z_K_m

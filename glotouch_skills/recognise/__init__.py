@@ -1,5 +1,1 @@
-"""TODO door of glotouch_skills/recognise."""
-
-from glotouch_skills.recognise.match import load_target
-
-__all__ = ["load_target"]
+"""Skills that squeeze what was found and decide which candidate is the target."""

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.robot import HOLD
-from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.planning import GraspPlan
 
 
@@ -23,14 +23,18 @@ class Reject(Skill):
     and taken once more; after that it is left alone, too.
 
     SUCCESS: `touchsets` holds the others; `rejected` names what is left alone.
-    FAILURE `wrong_object`: too many objects were taken in vain.
     """
 
     Params = RejectParams
     params: RejectParams
 
     PRECONDITIONS: ClassVar = {"hand": frozenset({"empty"})}
-    FAILURES: ClassVar = {"wrong_object": "too many objects were taken in vain"}
+
+    WRONG_OBJECT = Failure(
+        "wrong_object",
+        "too many objects were taken in vain",
+        advice="the target may not be there, or another object is much like it",
+    )
 
     made = In(GraspPlan, "how it was taken")
     impossible = In(bool, "it cannot be the target")
@@ -53,10 +57,8 @@ class Reject(Skill):
         self.touchsets = tuple(t for t in self.felt if t.candidate.index != index)
         self.event("reject", candidate=index, rejected=rejected)
         if len(doubted) > self.params.most:
-            raise SkillFailed(
-                "wrong_object",
+            raise self.WRONG_OBJECT(
                 f"{len(doubted)} objects were taken and put back; candidate {index} was the last",
-                advice="the target may not be there, or another object is much like it",
                 taken=len(doubted),
                 most=self.params.most,
             )

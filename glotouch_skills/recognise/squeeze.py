@@ -10,7 +10,7 @@ from glotouch_bt.motion import Motion
 from glotouch_bt.perception.touch import Candidate, Layer, TouchSequence, TouchSet
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import Array, MotionRefused
-from glotouch_bt.skill import UNCHANGED, In, Out, Skill, SkillFailed, SkillRun
+from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Out, Skill, SkillRun
 from glotouch_skills.common.hand import keeping_clear_of
 from glotouch_skills.common.planning import (
     MIN_GAP_M,
@@ -34,8 +34,6 @@ class Squeeze(Skill):
     its short side. Layers go from low to high: the first closure centres the object where it cannot topple.
 
     SUCCESS: at least one stable layer; `touchset` holds all of them.
-    FAILURE `nothing_felt`: no closure reached a plateau on anything.
-    FAILURE `no_squeeze`: the object does not fit between the open jaws, or its neighbours leave the fingers no room.
     """
 
     Params = SqueezeParams
@@ -45,11 +43,18 @@ class Squeeze(Skill):
     POSTCONDITIONS: ClassVar = {"hand": "empty"}
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "nothing_felt": "no closure reached a plateau on anything",
-        "no_squeeze": "it does not fit between the open jaws, or its neighbours leave the fingers no room",
-        "motion_refused": "the hand cannot be brought over it",
-    }
+
+    NOTHING_FELT = Failure(
+        "nothing_felt",
+        "no closure reached a plateau on anything",
+        advice="the object may have moved away; trace it again",
+    )
+    NO_SQUEEZE = Failure(
+        "no_squeeze",
+        "the object does not fit between the open jaws, or its neighbours leave the fingers no room",
+        advice="neighbours or walls leave the jaws no room; take away what stands beside it, or trace it again",
+    )
+    FAILURES: ClassVar = (MOTION_REFUSED.with_meaning("the hand cannot be brought over the object"),)
 
     candidate = In(Candidate, "what to squeeze")
     known = In(tuple, "all candidates, to keep clear of", key="candidates", element=Candidate, required=False)
@@ -78,18 +83,13 @@ class Squeeze(Skill):
         stable = sum(layer.stable for layer in touchset.layers)
         self.event("touchset", touchset=touchset, refusals=refusals)
         if not sequences:
-            raise SkillFailed(
-                "no_squeeze",
+            raise self.NO_SQUEEZE(
                 f"no squeeze of candidate {candidate.index} is possible: {'; '.join(refusals[:3])}",
-                advice="neighbours or walls leave the jaws no room; take away what stands beside it, or trace it again",
                 refusals=len(refusals),
             )
         if stable == 0:
-            raise SkillFailed(
-                "nothing_felt",
-                f"no closure on candidate {candidate.index} reached a plateau",
-                advice="the object may have moved away; trace it again",
-                closures=len(touchset.layers),
+            raise self.NOTHING_FELT(
+                f"no closure on candidate {candidate.index} reached a plateau", closures=len(touchset.layers)
             )
         self.touchset = touchset
 

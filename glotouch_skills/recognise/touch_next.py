@@ -7,25 +7,37 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from glotouch_bt import perception
 from glotouch_bt.motion import Motion, hand_pose_B
 from glotouch_bt.perception import recognition
 from glotouch_bt.perception.touch import Candidate, Layer, TouchSequence, TouchSet
 from glotouch_bt.perception.touch.calibration import JawZero
-from glotouch_bt.robot import HOLD, Array, MotionRefused, ParamError
-from glotouch_bt.skill import UNCHANGED, Context, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.robot import HOLD, Array, MotionRefused
+from glotouch_bt.skill import (
+    MOTION_REFUSED,
+    UNCHANGED,
+    Context,
+    Failure,
+    In,
+    Out,
+    Skill,
+    SkillParams,
+    SkillRun,
+    param,
+)
 from glotouch_skills.common.hand import CLEARANCE_M, keeping_clear_of, require_clear
 from glotouch_skills.common.planning import (
+    TOO_LOW,
     ClosureParams,
     Option,
     Squeezing,
     Standing,
     best_rates,
     disturbance,
+    load_target,
+    load_target_model,
     options,
     pads_height_m,
 )
-from glotouch_skills.recognise.match import load_target
 
 if TYPE_CHECKING:
     from glotouch_bt.perception.recognition import Belief, TargetModel
@@ -51,8 +63,6 @@ class TouchNext(Skill):
     Repeat it until `decided`. SUCCESS: one closure was tried, or `decided` is now true: one candidate, or none of them,
     is the target with the wanted confidence, or nothing more can be learned; the hand is then high again. `match` says
     which.
-    FAILURE `no_candidates`: there is nothing to touch.
-    FAILURE `too_low`: the target is lower than the probe and the pads reach.
     """
 
     Params = TouchNextParams
@@ -62,11 +72,13 @@ class TouchNext(Skill):
     POSTCONDITIONS: ClassVar = {"hand": "empty"}
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "no_candidates": "there is nothing to touch",
-        "too_low": "the target is lower than the probe and the pads reach",
-        "motion_refused": "the hand cannot rise",
-    }
+
+    NO_CANDIDATES = Failure(
+        "no_candidates",
+        "there is nothing to touch",
+        advice="explore first; candidates that were put back are not touched again",
+    )
+    FAILURES: ClassVar = (TOO_LOW, MOTION_REFUSED.with_meaning("the hand cannot rise"))
 
     candidates = In(tuple, "what may be touched", element=Candidate)
     felt = In(tuple, "what was felt so far", key="touchsets", element=TouchSet, required=False)
@@ -102,12 +114,7 @@ class TouchNext(Skill):
         candidates: tuple[Candidate, ...] = self.candidates
         wanted = [c for c in candidates if c.index not in (self.rejected or ())]
         if not wanted:
-            raise SkillFailed(
-                "no_candidates",
-                "there is no candidate to touch",
-                advice="explore first; candidates that were put back are not touched again",
-                candidates=len(candidates),
-            )
+            raise self.NO_CANDIDATES("there is no candidate to touch", candidates=len(candidates))
         touchsets: tuple[TouchSet, ...] = self.felt or ()
         if {t.candidate.index for t in touchsets} != {c.index for c in wanted}:
             felt = {t.candidate.index: t for t in touchsets}
@@ -154,13 +161,8 @@ class TouchNext(Skill):
             SkillFailed: `too_low`.
         """
         if self._model is None:
-            gripper = self.context.arm.description.gripper
             mesh = load_target(self.params.target, self.context.world.objects.folder)
-            pads = recognition.PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
-            try:
-                self._model = perception.target_model(mesh, pads)
-            except ParamError as e:
-                raise SkillFailed("too_low", f"{mesh.name} cannot be felt: {e}", advice="sweep lower") from e
+            self._model = load_target_model(mesh, self.context.arm.description.gripper)
         return self._model
 
     def _enough(self, belief: Belief) -> str:

@@ -1,1 +1,1 @@
-"""TODO door of glotouch_skills/take."""
+"""Skills that grasp the target, lift it, check it, and put it back."""

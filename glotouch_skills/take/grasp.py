@@ -9,7 +9,7 @@ import numpy as np
 from glotouch_bt.motion import Motion, hand_pose_B
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import MotionRefused, Pose
-from glotouch_bt.skill import UNCHANGED, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill import UNCHANGED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import CLEARANCE_M, close_gently, glide, keeping_clear_of, require_clear
 from glotouch_skills.common.planning import GraspPlan
 
@@ -32,8 +32,6 @@ class Grasp(Skill):
     Grasps of the plan that were made before (and did not last) come last.
 
     SUCCESS: the jaws stopped on something; `grip_m` is their aperture, `made` the grasp.
-    FAILURE `no_grasp`: no grasp of the plan could be made: no room, the fingers stood on something on the way down,
-    or the jaws closed on nothing. The hand has risen again, jaws open.
     """
 
     Params = GraspParams
@@ -43,7 +41,13 @@ class Grasp(Skill):
     POSTCONDITIONS: ClassVar = {"hand": "object"}
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {"no_grasp": "no grasp of the plan could be made; the hand has risen, jaws open"}
+
+    NO_GRASP = Failure(
+        "no_grasp",
+        "no grasp of the plan could be made: no room, the fingers met something on the way down, or the jaws "
+        "closed on nothing; the hand has risen, jaws open",
+        advice="the object or a neighbour was moved; squeeze it again",
+    )
 
     plan = In(GraspPlan, "where and how wide")
     known = In(tuple, "all candidates, to keep clear of", key="candidates", element=Candidate, required=False)
@@ -68,12 +72,7 @@ class Grasp(Skill):
                 except MotionRefused as refusal:
                     tried.append(str(refusal))
                     self.event("note", text=f"a grasp was given up: {refusal}")
-        raise SkillFailed(
-            "no_grasp",
-            f"none of {len(tried)} grasps could be made; the last: {tried[-1]}",
-            advice="the object or a neighbour was moved; squeeze it again",
-            grasps=len(tried),
-        )
+        raise self.NO_GRASP(f"none of {len(tried)} grasps could be made; the last: {tried[-1]}", grasps=len(tried))
 
     def _attempt(self, plan: GraspPlan) -> Motion[float]:
         """One grasp; the aperture of the closed jaws.

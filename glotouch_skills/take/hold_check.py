@@ -8,7 +8,7 @@ import numpy as np
 
 from glotouch_bt.perception.touch import patch_statistics
 from glotouch_bt.robot import TactileFrame
-from glotouch_bt.skill import UNCHANGED, In, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill import UNCHANGED, Failure, In, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import weigh_N
 
 
@@ -28,8 +28,6 @@ class HoldCheck(Skill):
     whatever the others say: it hangs by another place now.
 
     SUCCESS: it is held.
-    FAILURE `lost`: it is not in the hand any more.
-    FAILURE `slipped`: it hangs in the jaws, but by another place than it was taken.
     """
 
     Params = HoldCheckParams
@@ -38,10 +36,17 @@ class HoldCheck(Skill):
     PRECONDITIONS: ClassVar = {"hand": frozenset({"object"})}
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "lost": "it is not in the hand any more",
-        "slipped": "it hangs in the jaws by another place than it was taken",
-    }
+
+    LOST = Failure(
+        "lost",
+        "the object is not in the hand any more",
+        advice="grasp nearer to the centre of mass, or harder",
+    )
+    SLIPPED = Failure(
+        "slipped",
+        "the object hangs in the jaws by another place than it was taken",
+        advice="grasp it elsewhere",
+    )
 
     grip_m = In(float, "aperture when the jaws had closed, m")
     before_N = In(float, "weight when it was lifted, N", key="weight")
@@ -62,20 +67,16 @@ class HoldCheck(Skill):
         steady = abs(moved) <= p.slip_m
         against = [not heavy, not steady, touched == 0]
         if sum(against) >= 2:
-            raise SkillFailed(
-                "lost",
+            raise self.LOST(
                 f"{weight:.2f} N of {self.before_N:.2f} N hang in the hand, the jaws moved by {moved * 1e3:.1f} mm, "
                 f"{'unknown' if touched is None else touched} of 2 gels are touched",
-                advice="grasp nearer to the centre of mass, or harder",
                 weight_N=weight,
                 moved_m=moved,
                 gels_touched=-1 if touched is None else touched,
             )
         if not steady:
-            raise SkillFailed(
-                "slipped",
+            raise self.SLIPPED(
                 f"the jaws moved by {moved * 1e3:.1f} mm while it was lifted ({p.slip_m * 1e3:g} mm are allowed)",
-                advice="grasp it elsewhere",
                 moved_m=moved,
                 slip_limit_m=p.slip_m,
             )

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import weigh_N
 
 
@@ -23,7 +23,6 @@ class Lift(Skill):
     """Raise the hand and check weight and aperture at the top.
 
     SUCCESS: something with weight hangs in the closed jaws; the arm holds it up.
-    FAILURE `lost`: the jaws are empty at the top.
     """
 
     Params = LiftParams
@@ -33,10 +32,9 @@ class Lift(Skill):
     # `lost` is a verdict by weight and aperture: something light may still be between the pads.
     FAILURE_STATES: ClassVar = {"hand": frozenset({"object", "empty"})}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "lost": "the jaws are empty at the top",
-        "motion_refused": "the arm cannot be raised so far",
-    }
+
+    LOST = Failure("lost", "the jaws are empty at the top", advice="grasp nearer to the centre of mass, or harder")
+    FAILURES: ClassVar = (MOTION_REFUSED.with_meaning("the arm cannot be raised so far"),)
 
     grip_m = In(float, "aperture of the closed jaws")
     weight_N = Out(float, "weight in the hand, N", key="weight")
@@ -49,10 +47,8 @@ class Lift(Skill):
         state = self.context.observation.gripper
         self.event("lift", weight_N=weight, aperture_m=state.aperture_m)
         if weight < p.min_weight_N or state.aperture_m < p.min_aperture_m:
-            raise SkillFailed(
-                "lost",
+            raise self.LOST(
                 f"{weight:.2f} N hang in the hand and the jaws are {state.aperture_m * 1e3:.1f} mm apart",
-                advice="grasp nearer to the centre of mass, or harder",
                 weight_N=weight,
                 aperture_m=state.aperture_m,
             )

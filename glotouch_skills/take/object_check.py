@@ -6,13 +6,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from glotouch_bt import perception
-from glotouch_bt.perception import recognition
-from glotouch_bt.robot import HOLD, Array, ParamError
-from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.robot import HOLD, Array
+from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import GRAVITY_M_S2
-from glotouch_skills.common.planning import SHIFTS_M, GraspPlan
-from glotouch_skills.recognise import load_target
+from glotouch_skills.common.planning import SHIFTS_M, TOO_LOW, GraspPlan, load_target, load_target_model
 
 if TYPE_CHECKING:
     from glotouch_bt.perception.recognition import TargetModel
@@ -39,10 +36,6 @@ class ObjectCheck(Skill):
     """Compare the width in the jaws with what the plan said, and the weight with the mesh's volume.
 
     SUCCESS: it can be the target; `fits` is true.
-    FAILURE `not_as_felt`: the target is this wide somewhere at that height, but not where the plan took it: what was
-    felt of it before does not hold any more, or never did. It may be touched again.
-    FAILURE `wrong_object`: the target is nowhere this wide at that height, or cannot weigh this much.
-    FAILURE `too_low`: the target is lower than the pads reach, so that nothing is known of its widths.
     """
 
     Params = ObjectCheckParams
@@ -51,11 +44,19 @@ class ObjectCheck(Skill):
     PRECONDITIONS: ClassVar = {"hand": frozenset({"object"})}
     POSTCONDITIONS: ClassVar = {"hand": "object"}
     USES: ClassVar = frozenset({"arm"})  # it holds the arm while it thinks
-    FAILURES: ClassVar = {
-        "not_as_felt": "the target is this wide elsewhere, but not where the plan took it",
-        "wrong_object": "the target is nowhere this wide, or cannot weigh this much",
-        "too_low": "the target is lower than the pads reach",
-    }
+
+    NOT_AS_FELT = Failure(
+        "not_as_felt",
+        "the target is this wide somewhere at that height, but not where the plan took it: what was felt of "
+        "it no longer holds, or never did; it may be touched again",
+        advice="put it back and touch it again",
+    )
+    WRONG_OBJECT = Failure(
+        "wrong_object",
+        "the target is nowhere this wide at that height, or cannot weigh this much",
+        advice="put it back and try the next candidate",
+    )
+    FAILURES: ClassVar = (TOO_LOW,)
 
     made = In(GraspPlan, "how it was taken")
     grip_m = In(float, "aperture when the jaws had closed, m")
@@ -77,10 +78,8 @@ class ObjectCheck(Skill):
         self.event("object_check", grip_m=self.grip_m, off_m=off, weight_N=self.weight_N, light_N=light, heavy_N=heavy)
         if not light <= self.weight_N <= heavy:
             self.impossible = True
-            raise SkillFailed(
-                "wrong_object",
+            raise self.WRONG_OBJECT(
                 f"{mesh.name} weighs {light:.2f} to {heavy:.1f} N, of wood or steel; this weighs {self.weight_N:.2f} N",
-                advice="put it back and try the next candidate",
                 weight_N=self.weight_N,
                 light_N=light,
                 heavy_N=heavy,
@@ -88,29 +87,20 @@ class ObjectCheck(Skill):
         if off <= p.width_m:
             self.fits = True
             return
-        try:
-            model = perception.target_model(
-                mesh, recognition.PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
-            )
-        except ParamError as e:
-            raise SkillFailed("too_low", f"{mesh.name} cannot be felt: {e}", advice="sweep lower") from e
+        model = load_target_model(mesh, gripper)
         widths = widths_m(model, float(made.position_K_m[2]))
         least = float(misfit_m(widths, self.grip_m, give).min(initial=gripper.stroke_m))
         if least <= p.width_m:
-            raise SkillFailed(
-                "not_as_felt",
+            raise self.NOT_AS_FELT(
                 f"the jaws stopped at {self.grip_m * 1e3:.1f} mm where {made.aperture_m * 1e3:.1f} mm were planned; "
                 f"{mesh.name} is that wide elsewhere",
-                advice="put it back and touch it again",
                 off_m=off,
                 limit_m=p.width_m,
             )
         self.impossible = True
-        raise SkillFailed(
-            "wrong_object",
+        raise self.WRONG_OBJECT(
             f"the jaws stopped at {self.grip_m * 1e3:.1f} mm; wherever {mesh.name} is held at this height, they would "
             f"stop at least {least * 1e3:.1f} mm from there",
-            advice="put it back and try the next candidate",
             off_m=off,
             min_m=least,
             limit_m=p.width_m,

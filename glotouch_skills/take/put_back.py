@@ -9,7 +9,7 @@ import numpy as np
 from glotouch_bt.motion import JawRestDetector, hand_pose_B
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import Pose
-from glotouch_bt.skill import UNCHANGED, In, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import glide, keeping_clear_of, let_go, rise_clear
 from glotouch_skills.common.planning import GraspPlan
 
@@ -39,8 +39,6 @@ class PutBack(Skill):
     It is let go of when it stands: just above where it was taken, or where it meets something on the way down.
 
     SUCCESS: the jaws are open and high.
-    FAILURE `in_the_way`: it met something high above its place; it is still held, and high.
-    FAILURE `motion_refused`: the place cannot be reached; it is still held, or the jaws were caught.
     """
 
     Params = PutBackParams
@@ -50,10 +48,15 @@ class PutBack(Skill):
     POSTCONDITIONS: ClassVar = {"hand": "empty"}
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED})}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "in_the_way": "it met something high above its place and is still held",
-        "motion_refused": "the place cannot be reached",
-    }
+
+    IN_THE_WAY = Failure(
+        "in_the_way",
+        "the object met something high above its place; it is still held, and high",
+        advice="something else stands there now; set it down by hand",
+    )
+    FAILURES: ClassVar = (
+        MOTION_REFUSED.with_meaning("the place cannot be reached, with the object still held, or the jaws were caught"),
+    )
 
     made = In(GraspPlan, "how it was taken", required=False)
     known = In(tuple, "all candidates, to keep clear of", key="candidates", element=Candidate, required=False)
@@ -83,11 +86,8 @@ class PutBack(Skill):
         above = float(arm.pose_B_P.position_m[2] - place.position_m[2])
         if not reached and above > p.drop_m:
             yield from rise_clear(arm, p.speed_m_s)
-            raise SkillFailed(
-                "in_the_way",
-                f"it met something {above * 1e3:.0f} mm above its place and is still held",
-                advice="something else stands there now; set it down by hand",
-                above_m=above,
+            raise self.IN_THE_WAY(
+                f"it met something {above * 1e3:.0f} mm above its place and is still held", above_m=above
             )
         yield from let_go(arm, opening)
         yield from rise_clear(arm, p.speed_m_s)

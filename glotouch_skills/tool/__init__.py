@@ -1,5 +1,1 @@
-"""TODO door of glotouch_skills/tool."""
-
-from glotouch_skills.tool.tool_pickup import ToolPickup
-
-__all__ = ["ToolPickup"]
+"""Skills of the hand and the wrist sensor: take, measure, check and put away the probe."""

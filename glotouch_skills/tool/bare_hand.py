@@ -9,9 +9,9 @@ import numpy as np
 from glotouch_bt.motion import finger_outline_half_m, yaw_near_home
 from glotouch_bt.perception.touch.detection import Polygon
 from glotouch_bt.robot import Pose, SetPayload, Tare
-from glotouch_bt.skill import Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill import MOTION_REFUSED, Failure, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
-from glotouch_skills.common.hand import finish
+from glotouch_skills.common.hand import REQUEST_FAILED, finish
 from glotouch_skills.common.probe import corner_place
 
 TRAVEL_M_S = 0.1
@@ -32,9 +32,6 @@ class BareHand(Skill):
     """Close the empty jaws, go over an empty corner, turn to the yaw kept while touching, zero the wrist sensor.
 
     SUCCESS: `tool` is the hand: it touches with the outline of its fingers.
-    FAILURE `probe_held`: the probe is in the jaws.
-    FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
-    FAILURE `motion_refused`: the hand cannot be turned there.
     """
 
     Params = BareHandParams
@@ -43,11 +40,9 @@ class BareHand(Skill):
     PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
     POSTCONDITIONS: ClassVar = {"hand": "fingers"}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "probe_held": "the probe is in the jaws",
-        "request_failed": "the sensor could not be zeroed, or the payload not be set",
-        "motion_refused": "the hand cannot be turned there",
-    }
+
+    PROBE_HELD = Failure("probe_held", "the probe is in the jaws", advice="return it first with tool_return")
+    FAILURES: ClassVar = (REQUEST_FAILED, MOTION_REFUSED.with_meaning("the hand cannot be turned there"))
 
     tool = Out(HeldTool, "the fingers as a tool")
 
@@ -55,7 +50,7 @@ class BareHand(Skill):
         """See the class."""
         arm = self.context.arm
         if arm.scene.holding_tool:
-            raise SkillFailed("probe_held", "the probe is in the jaws", advice="return it first with tool_return")
+            raise self.PROBE_HELD("the probe is in the jaws")
         state = yield from arm.jaws(self.params.aperture_m)
         here = arm.pose_B_P
         yaw = yaw_near_home(arm, np.deg2rad(self.params.yaw_deg))

@@ -6,9 +6,9 @@ from typing import ClassVar
 
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Probe
-from glotouch_bt.skill import UNCHANGED, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import GRAVITY_M_S2, RISE_M_S, rise_clear, weigh_N
-from glotouch_skills.common.probe import HELD_TOLERANCE_M, nothing_in_hand, return_probe
+from glotouch_skills.common.probe import HELD_TOLERANCE_M, RETURN_PROBE_FAILURES, nothing_in_hand, return_probe
 
 MIN_HELD_M, MIN_HELD_N = 0.003, 1.0
 """Jaws farther apart than this that still press hold something."""
@@ -29,10 +29,6 @@ class Stow(Skill):
     hand is empty from now on; an object in the jaws is kept, for it must not fall from here.
 
     SUCCESS: the hand is high and empty, the wrist zeroed.
-    FAILURE `object_held`: the hand is high; the jaws hold something that is not the probe, and keep it.
-    FAILURE `tool_lost`: the probe was dropped on its way into the holder; the hand is empty and above it.
-    FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
-    FAILURE `motion_refused`: the hand cannot rise, or the holder not be reached.
     """
 
     Params = StowParams
@@ -42,12 +38,16 @@ class Stow(Skill):
     POSTCONDITIONS: ClassVar = {"hand": "empty"}
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "untared"})}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "tool_lost": "the probe was dropped on its way into the holder",
-        "object_held": "the jaws hold something that is not the probe, and keep it",
-        "request_failed": "the sensor could not be zeroed, or the payload not be set",
-        "motion_refused": "the hand cannot rise, or the holder not be reached",
-    }
+
+    OBJECT_HELD = Failure(
+        "object_held",
+        "the jaws hold something that is not the probe, and keep it; the hand is high",
+        advice="take it out of the jaws by hand",
+    )
+    FAILURES: ClassVar = (
+        *RETURN_PROBE_FAILURES,
+        MOTION_REFUSED.with_meaning("the hand cannot rise, or the holder cannot be reached"),
+    )
 
     def run(self) -> SkillRun:
         """See the class."""
@@ -66,10 +66,8 @@ class Stow(Skill):
             self.event("tool", held=False)
             return
         if not arm.scene.holding_tool and apart > MIN_HELD_M and pressed > MIN_HELD_N:
-            raise SkillFailed(
-                "object_held",
+            raise self.OBJECT_HELD(
                 f"the jaws are {apart * 1e3:.1f} mm apart and press with {pressed:.0f} N: they keep what they hold",
-                advice="take it out of the jaws by hand",
                 aperture_m=apart,
                 force_N=pressed,
             )

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import ClassVar
 
 from glotouch_bt.robot import Tare as TareRequest
-from glotouch_bt.skill import Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import RISE_M_S, finish, rise_clear
+from glotouch_bt.skill import MOTION_REFUSED, Skill, SkillParams, SkillRun, param
+from glotouch_skills.common.hand import REQUEST_FAILED, RISE_M_S, finish, rise_clear
 
 
 class TareParams(SkillParams):
@@ -20,8 +20,6 @@ class Tare(Skill):
     """Rise to free air if need be, stand still, zero the wrist sensor with what the controller knows is in the hand.
 
     SUCCESS: the sensor reads nothing now.
-    FAILURE `request_failed`: the sensor could not be zeroed.
-    FAILURE `motion_refused`: the hand cannot rise.
     """
 
     Params = TareParams
@@ -30,10 +28,7 @@ class Tare(Skill):
     # An object in the hand, whose weight the controller does not know, would be zeroed away.
     PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "probe"})}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "request_failed": "the sensor could not be zeroed",
-        "motion_refused": "the hand cannot rise",
-    }
+    FAILURES: ClassVar = (REQUEST_FAILED, MOTION_REFUSED.with_meaning("the hand cannot rise"))
 
     def run(self) -> SkillRun:
         """See the class."""

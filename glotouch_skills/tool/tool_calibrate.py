@@ -11,7 +11,7 @@ from glotouch_bt.motion import Motion
 from glotouch_bt.perception.touch import GuardParams
 from glotouch_bt.perception.touch.calibration import TipCalibration, WallTouch, solve_tip, wrench_delay
 from glotouch_bt.robot import Array, MotionRefused, Observation
-from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool, Prober
 from glotouch_skills.common.hand import may_touch
 from glotouch_skills.common.probe import corner_place, corner_walls, quiet_corner
@@ -55,9 +55,6 @@ class ToolCalibrate(Skill):
     the hand's acceleration is the sensor's latency.
 
     SUCCESS: `tool` says where the ball is in the hand, how well that is known, and the sensor's latency.
-    FAILURE `no_wall`: the ball met nothing where a wall should be.
-    FAILURE `slipped`: the touches agree with no one place of the ball in the hand.
-    FAILURE `motion_refused`: the corner cannot be reached, or the hand not be turned there.
     """
 
     PAUSE = "retreat"
@@ -66,12 +63,21 @@ class ToolCalibrate(Skill):
 
     PRECONDITIONS: ClassVar = {"hand": frozenset({"probe"})}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "no_wall": "the ball met nothing where a wall should be",
-        "slipped": "the touches agree with no one place of the ball in the hand",
-        "hard_contact": "the wrench passed a hard limit on the way",
-        "motion_refused": "the corner cannot be reached, or the hand not be turned there",
-    }
+
+    NO_WALL = Failure(
+        "no_wall",
+        "the ball met nothing where a wall should be",
+        advice="check the container's pose and that the probe is held by its handle",
+    )
+    SLIPPED = Failure(
+        "slipped",
+        "no single place of the ball in the hand explains the touches",
+        advice="raise grip_N of tool_pickup, or lower speed_m_s",
+    )
+    FAILURES: ClassVar = (
+        *Prober.FAILURES,
+        MOTION_REFUSED.with_meaning("the corner cannot be reached, or the hand cannot be turned there"),
+    )
 
     before = In(HeldTool, "the probe in the jaws", key="tool")
     tool = Out(HeldTool, "the probe, measured")
@@ -154,11 +160,7 @@ class ToolCalibrate(Skill):
             out[wall] = sides[wall]
             probed = yield from prober.move(place + (p.gap_m - tool.tip_radius_m + p.search_m) * out, p.speed_m_s)
             if probed.contact is None:
-                raise SkillFailed(
-                    "no_wall",
-                    f"the ball met nothing up to {p.search_m * 1e3:.0f} mm past the {name}",
-                    advice="check the container's pose and that the probe is held by its handle",
-                )
+                raise self.NO_WALL(f"the ball met nothing up to {p.search_m * 1e3:.0f} mm past the {name}")
             self.event("contact", contact=probed.contact)
             approach_B = self.context.world.container.pose_B_K.rotation @ out
             found.append(
@@ -178,12 +180,7 @@ class ToolCalibrate(Skill):
         """The tool with what was found, if the touches agree."""
         worst = float(np.abs(found.residuals_m).max())
         if worst > LARGEST_RESIDUAL_M:
-            raise SkillFailed(
-                "slipped",
-                f"touches of the walls disagree by {worst * 1e3:.2f} mm",
-                advice="raise grip_N of tool_pickup, or lower speed_m_s",
-                residual_m=worst,
-            )
+            raise self.SLIPPED(f"touches of the walls disagree by {worst * 1e3:.2f} mm", residual_m=worst)
         latency = max(tool.latency_s + found.late_s, 0.0)
         measured = dataclasses.replace(
             tool,

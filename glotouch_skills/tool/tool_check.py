@@ -7,13 +7,20 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.skill import UNCHANGED, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill import (
+    MOTION_REFUSED,
+    UNCHANGED,
+    Failure,
+    In,
+    Out,
+    Skill,
+    SkillParams,
+    SkillRun,
+    param,
+)
 from glotouch_bt.skill.probing import HeldTool
 from glotouch_skills.common.hand import GRAVITY_M_S2, rise_clear, weigh
-from glotouch_skills.common.probe import HELD_TOLERANCE_M, feel_floor
-
-TAKE_ANEW = "put it back into its holder and take it anew"
-PUT_IT_THERE = "it lies in the container or beside it; take it out by hand and put it into its holder"
+from glotouch_skills.common.probe import FEEL_FLOOR_FAILURES, HELD_TOLERANCE_M, feel_floor
 
 
 class ToolCheckParams(SkillParams):
@@ -37,11 +44,6 @@ class ToolCheck(Skill):
     A hand that let go of it on purpose (`tool_return`, `stow`) need not look.
 
     SUCCESS: the probe is held as it was taken.
-    FAILURE `tool_lost`: it is not in the hand.
-    FAILURE `tool_slipped`: it is held, but the ball is not where it was: it hangs askew, or the floor was felt too high
-    or too low.
-    FAILURE `hard_contact`: the wrench passed a hard limit on the way to the floor.
-    FAILURE `motion_refused`: the hand cannot rise, or the corner not be reached.
     """
 
     Params = ToolCheckParams
@@ -52,12 +54,22 @@ class ToolCheck(Skill):
     POSTCONDITIONS: ClassVar = {"hand": "probe"}
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED})}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "tool_lost": "the probe is not in the hand",
-        "tool_slipped": "it is held, but the ball is not where it was",
-        "hard_contact": "the wrench passed a hard limit on the way to the floor",
-        "motion_refused": "the hand cannot rise, or the corner not be reached",
-    }
+
+    TOOL_LOST = Failure(
+        "tool_lost",
+        "the probe is not in the hand",
+        advice="it lies in the container or beside it; take it out by hand and put it into its holder",
+    )
+    TOOL_SLIPPED = Failure(
+        "tool_slipped",
+        "the probe is held, but its ball is not where it was: it hangs askew, or the floor was felt too high "
+        "or too low",
+        advice="put it back into its holder and take it anew",
+    )
+    FAILURES: ClassVar = (
+        *FEEL_FLOOR_FAILURES,
+        MOTION_REFUSED.with_meaning("the hand cannot rise, or the corner cannot be reached"),
+    )
 
     taken = In(HeldTool, "the probe as it was taken", key="tool")
     tool = Out(HeldTool, "the probe, the jaws as far apart as they are said to be now")
@@ -69,7 +81,7 @@ class ToolCheck(Skill):
         arm, tool, p = self.context.arm, self.taken, self.params
         if not arm.scene.holding_tool:
             self.tool_lost = True
-            raise SkillFailed("tool_lost", "the probe is not in the hand any more", advice=PUT_IT_THERE)
+            raise self.TOOL_LOST("the probe is not in the hand any more")
         yield from rise_clear(arm, p.speed_m_s)
         felt = yield from weigh(arm)  # the tare was taken with the probe in the hand
         missing_N = -felt.weight_N
@@ -89,21 +101,17 @@ class ToolCheck(Skill):
             self.tool_lost = True
             why = "" if light and other else ", and nothing was met where the floor is"
             arm.scene.hold_tool(False)
-            raise SkillFailed(
-                "tool_lost",
+            raise self.TOOL_LOST(
                 f"the probe is not in the hand: {missing_N:.2f} N of its {weight_N:.2f} N are missing, the jaws are "
                 f"{apart * 1e3:.1f} mm apart and were {tool.aperture_m * 1e3:.1f} with it" + why,
-                advice=PUT_IT_THERE,
                 missing_N=missing_N,
                 aperture_m=apart,
                 taken_m=tool.aperture_m,
             )
         off = floor_m - tool.floor_z_K_m
         if not np.abs(off) <= p.slip_m:
-            raise SkillFailed(
-                "tool_slipped",
+            raise self.TOOL_SLIPPED(
                 f"the floor was felt {off * 1e3:.1f} mm from where it was: the probe slipped in the jaws",
-                advice=TAKE_ANEW,
                 off_m=float(off),
             )
         self.tool = replace(tool, aperture_m=apart)
@@ -111,11 +119,9 @@ class ToolCheck(Skill):
     def _refuse_askew(self, moment_Nm: float, level_Nm: float) -> None:
         """Refuse a probe that turned in the jaws; held level, its weight would turn the hand with `level_Nm`."""
         if not moment_Nm <= self.params.askew * level_Nm:
-            raise SkillFailed(
-                "tool_slipped",
+            raise self.TOOL_SLIPPED(
                 f"the probe hangs askew: its weight turns the hand with {moment_Nm * 1e3:.1f} mNm, hanging straight it "
                 f"would not, and level with {level_Nm * 1e3:.1f}",
-                advice=TAKE_ANEW,
                 moment_Nm=moment_Nm,
                 level_Nm=level_Nm,
             )

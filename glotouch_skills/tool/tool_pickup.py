@@ -10,11 +10,12 @@ import numpy as np
 from glotouch_bt.motion import Motion, yaw_near_home
 from glotouch_bt.perception.touch.calibration import JawZero, measured_zero
 from glotouch_bt.robot import Pose, SetPayload, Tare
-from glotouch_bt.skill import UNCHANGED, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
 from glotouch_skills.common.hand import (
     DOWN_B,
     GRAVITY_M_S2,
+    REQUEST_FAILED,
     UP_B,
     finish,
     may_touch,
@@ -22,7 +23,7 @@ from glotouch_skills.common.hand import (
     weigh_N,
     why_stopped,
 )
-from glotouch_skills.common.probe import FLOOR_SEARCH_M, feel_floor
+from glotouch_skills.common.probe import FEEL_FLOOR_FAILURES, FLOOR_SEARCH_M, feel_floor
 
 MET_N = 8.0
 """Change of force at which the open hand goes no farther down over the handle; unhindered it is below 2 N."""
@@ -50,14 +51,6 @@ class ToolPickup(Skill):
     Started with the probe in the jaws (it was broken off before), it goes on from there and never lets go of it.
 
     SUCCESS: the probe is held and its floor height is known.
-    FAILURE `no_probe`: the jaws closed on nothing (or on something of another width).
-    FAILURE `probe_not_lifted`: the hand came up without the probe's weight; if the jaws are as far apart as its handle
-        is wide, it counts as held all the same, and may be put back.
-    FAILURE `hard_contact`: the open hand met something on its way to the handle; or the probe is held, and is stuck in
-        its holder, or met something hard on the way to the floor.
-    FAILURE `no_floor`: the ball met nothing where the container's floor should be; the probe is held.
-    FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
-    FAILURE `motion_refused`: the holder cannot be reached.
     """
 
     PAUSE = "retreat"
@@ -69,14 +62,33 @@ class ToolPickup(Skill):
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "empty", "probe"})}
     RESTORED_BY: ClassVar = {"hand": "tool_return"}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "no_probe": "the jaws closed on nothing, or on something of another width",
-        "probe_not_lifted": "the hand came up without the probe's weight",
-        "no_floor": "the ball met nothing where the container's floor should be",
-        "hard_contact": "the wrench passed a limit on the way to the handle, out of the holder, or to the floor",
-        "request_failed": "the sensor could not be zeroed, or the payload not be set",
-        "motion_refused": "the holder cannot be reached",
-    }
+
+    NO_PROBE = Failure(
+        "no_probe",
+        "the jaws closed on nothing, or on something of another width than the handle",
+        advice="check that the probe stands in its holder and that the holder's pose is right",
+    )
+    PROBE_NOT_LIFTED = Failure(
+        "probe_not_lifted",
+        "the hand came up without the probe's weight; jaws as far apart as the handle is wide stay closed, "
+        "and the probe counts as held",
+        advice="raise grip_N, or check the handle",
+    )
+    NO_FLOOR = Failure(
+        "no_floor",
+        "the ball met nothing where the container's floor should be; the probe is held",
+        advice="check the container's pose and that the probe is held by its handle",
+    )
+    HARD_CONTACT = Failure(
+        "hard_contact",
+        "the force on the hand passed a limit on the way to the handle, out of the holder, or to the floor",
+        advice="check the holder's pose, and that nothing blocks the probe",
+    )
+    FAILURES: ClassVar = (
+        REQUEST_FAILED,
+        *FEEL_FLOOR_FAILURES,
+        MOTION_REFUSED.with_meaning("the holder cannot be reached"),
+    )
 
     tool = Out(HeldTool, "the probe in the jaws")
     jaw_zero = Out(JawZero, "what the jaws report too much, by the handle's width")
@@ -98,11 +110,9 @@ class ToolPickup(Skill):
         if weight_N < 0.5 * probe.mass_kg * GRAVITY_M_S2:
             apart = arm.aperture_m
             arm.scene.hold_tool(self._handle_wide(apart))  # what they may hold is not dropped: the wrist may be wrong
-            raise SkillFailed(
-                "probe_not_lifted",
+            raise self.PROBE_NOT_LIFTED(
                 f"the hand carries {weight_N:.2f} N; the probe weighs {probe.mass_kg * GRAVITY_M_S2:.2f} N; the jaws "
                 f"are {apart * 1e3:.1f} mm apart, the handle is {probe.handle_m[1] * 1e3:.1f}",
-                advice="raise grip_N, or check the handle",
                 weight_N=weight_N,
             )
         payload = SetPayload(probe.mass_kg, np.array([0.0, 0.0, probe.com_below_grasp_m]))
@@ -146,8 +156,7 @@ class ToolPickup(Skill):
             moved = yield from arm.line(grasp, 0.05, guard=guard)
             if (why := why_stopped(moved)) is not None:
                 yield from arm.line(above, 0.05)
-                raise SkillFailed(
-                    "hard_contact",
+                raise self.HARD_CONTACT(
                     f"the open hand met something on its way down over the handle: {why}",
                     advice="check the holder's pose",
                     travelled_m=moved.travelled_m,
@@ -156,10 +165,8 @@ class ToolPickup(Skill):
             if not self._handle_wide(state.aperture_m):
                 yield from arm.jaws(opening, speed_m_s=0.1)
                 yield from arm.line(above, 0.05)
-                raise SkillFailed(
-                    "no_probe",
+                raise self.NO_PROBE(
                     f"the jaws closed to {state.aperture_m * 1e3:.1f} mm, the handle is {handle * 1e3:.1f}",
-                    advice="check that the probe stands in its holder and that the holder's pose is right",
                     aperture_m=state.aperture_m,
                 )
         arm.scene.hold_tool(True)
@@ -179,20 +186,13 @@ class ToolPickup(Skill):
         speed_m_s = min(self.params.speed_m_s, OUT_M_S)
         moved = yield from arm.shift(up * UP_B, speed_m_s, check=False, guard=guard)
         if (why := why_stopped(moved)) is not None:
-            raise SkillFailed(
-                "hard_contact",
-                f"the probe does not come out of its holder: {why}",
-                advice="check the holder's pose, and that nothing blocks the probe",
-                travelled_m=moved.travelled_m,
-            )
+            raise self.HARD_CONTACT(f"the probe does not come out of its holder: {why}", travelled_m=moved.travelled_m)
 
     def _feel_floor(self, tool: HeldTool) -> Motion[HeldTool]:
         """Learn the floor's height in the corner nearest to the holder."""
         floor_z = yield from feel_floor(self.context, tool, self.params.corner_gap_m, self.params.speed_m_s)
         if floor_z is None:
-            raise SkillFailed(
-                "no_floor",
-                f"the ball met no floor {FLOOR_SEARCH_M * 1e3:.0f} mm below where the registration puts it",
-                advice="check the container's pose and that the probe is held by its handle",
+            raise self.NO_FLOOR(
+                f"the ball met no floor {FLOOR_SEARCH_M * 1e3:.0f} mm below where the registration puts it"
             )
         return dataclasses.replace(tool, floor_z_K_m=floor_z)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from glotouch_bt.skill import UNCHANGED, In, Skill, SkillParams, SkillRun, param
+from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, In, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
-from glotouch_skills.common.probe import return_probe
+from glotouch_skills.common.probe import RETURN_PROBE_FAILURES, return_probe
 
 
 class ToolReturnParams(SkillParams):
@@ -22,9 +22,6 @@ class ToolReturn(Skill):
     The probe is let go of nowhere but in the holder, also when the skill is broken off.
 
     SUCCESS: the jaws are empty and above the holder.
-    FAILURE `tool_lost`: the probe was dropped on its way into the holder; the hand is empty and above it.
-    FAILURE `request_failed`: the sensor could not be zeroed, or the payload not be set.
-    FAILURE `motion_refused`: the holder cannot be reached from here.
     """
 
     Params = ToolReturnParams
@@ -35,11 +32,10 @@ class ToolReturn(Skill):
     POSTCONDITIONS: ClassVar = {"hand": "empty"}
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "untared"})}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "tool_lost": "the probe was dropped on its way into the holder",
-        "request_failed": "the sensor could not be zeroed, or the payload not be set",
-        "motion_refused": "the holder cannot be reached from here",
-    }
+    FAILURES: ClassVar = (
+        *RETURN_PROBE_FAILURES,
+        MOTION_REFUSED.with_meaning("the holder cannot be reached from here, or the probe does not go into it"),
+    )
 
     tool = In(HeldTool, "the probe in the jaws")
 

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.skill import Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill import MOTION_REFUSED, Failure, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import RISE_M_S, STAND_S, rise_clear
 
 
@@ -27,9 +27,6 @@ class WristCheck(Skill):
     """Rise to free air if need be, stand still, and look at the tared wrist: it must read nothing.
 
     SUCCESS: force and torque are within bounds.
-    FAILURE `off_zero`: they are not. The tare drifted, was taken while something touched the hand, or the hand does not
-    carry what the controller believes (a lost probe reads as its weight, upwards).
-    FAILURE `motion_refused`: the hand cannot rise.
     """
 
     Params = WristCheckParams
@@ -37,10 +34,14 @@ class WristCheck(Skill):
 
     PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "probe"})}
     USES: ClassVar = frozenset({"arm"})
-    FAILURES: ClassVar = {
-        "off_zero": "the wrist does not read nothing in free air",
-        "motion_refused": "the hand cannot rise",
-    }
+
+    OFF_ZERO = Failure(
+        "off_zero",
+        "the wrist reads a force or torque in free air: the tare drifted or was taken during a contact, or "
+        "the payload is not what the controller believes (a lost probe reads as its weight, upwards)",
+        advice="zero it again with tare; if it drifts on, the sensor is faulty",
+    )
+    FAILURES: ClassVar = (MOTION_REFUSED.with_meaning("the hand cannot rise"),)
 
     def run(self) -> SkillRun:
         """See the class."""
@@ -51,11 +52,9 @@ class WristCheck(Skill):
         mean = np.concatenate([b.wrench_S for b in blocks]).mean(axis=0)
         force, torque = float(np.linalg.norm(mean[:3])), float(np.linalg.norm(mean[3:]))
         if not (force <= p.force_N and torque <= p.torque_Nm):  # false for NaN, too
-            raise SkillFailed(
-                "off_zero",
+            raise self.OFF_ZERO(
                 f"in free air the wrist reads {force:.2f} N and {torque:.3f} Nm; "
                 f"{p.force_N:g} N and {p.torque_Nm:g} Nm are allowed",
-                advice="zero it again with tare; if it drifts on, the sensor is faulty",
                 force_N=force,
                 force_limit_N=p.force_N,
                 torque_Nm=torque,

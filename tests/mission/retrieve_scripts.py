@@ -33,7 +33,7 @@ def retrieve(scripted: Any) -> Run:
 
 def each_code(skill: str) -> pytest.MarkDecorator:
     """For every way a skill declares to fail."""
-    return pytest.mark.parametrize("code", list(SHELF[skill].FAILURES))
+    return pytest.mark.parametrize("code", list(SHELF[skill].failures()))
 
 
 def candidates(*qualities: float) -> tuple[Candidate, ...]:

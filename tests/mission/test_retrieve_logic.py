@@ -170,7 +170,7 @@ def test_nothing_found_at_all_is_not_enough(retrieve: Run) -> None:
     assert run.never_ran("squeeze*")
 
 
-@pytest.mark.parametrize("code", [c for c in SHELF["guarded_sweep"].FAILURES if c != "search_exhausted"])
+@pytest.mark.parametrize("code", [c for c in SHELF["guarded_sweep"].failures() if c != "search_exhausted"])
 def test_a_sweep_that_breaks_off_is_taken_up_with_the_probe_in_order(retrieve: Run, code: str) -> None:
     run = retrieve({"guarded_sweep": [fails(code, exhausted=False), ok()]})
     assert run.succeeded
@@ -205,7 +205,7 @@ def test_what_was_found_is_no_use_if_the_hand_cannot_be_cleared(retrieve: Run) -
 
 
 @pytest.mark.parametrize(
-    ("skill", "code"), [(s, c) for s in ("refine_outline", "touch_top") for c in SHELF[s].FAILURES]
+    ("skill", "code"), [(s, c) for s in ("refine_outline", "touch_top") for c in SHELF[s].failures()]
 )
 def test_what_cannot_be_measured_stays_as_it_was(retrieve: Run, skill: str, code: str) -> None:
     run = retrieve({"orbit_probe": found(3), skill: fails(code)})
@@ -222,8 +222,8 @@ def test_each_outline_is_refined_before_its_top_is_touched(retrieve: Run) -> Non
 
 @pytest.mark.parametrize(
     ("node", "code"),
-    [(LAST_CHECK, c) for c in SHELF["tool_check"].FAILURES]
-    + [("tool_return", c) for c in SHELF["tool_return"].FAILURES],
+    [(LAST_CHECK, c) for c in SHELF["tool_check"].failures()]
+    + [("tool_return", c) for c in SHELF["tool_return"].failures()],
 )
 def test_a_probe_lost_while_measuring_is_given_up(retrieve: Run, node: str, code: str) -> None:
     run = retrieve({node: fails(code)})

@@ -45,7 +45,9 @@ def test_what_is_not_recognised_is_not_taken(retrieve: Run) -> None:
 # --- taking ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("node", "code"), [(s, c) for s in ("grasp", "lift", "hold_check") for c in SHELF[s].FAILURES])
+@pytest.mark.parametrize(
+    ("node", "code"), [(s, c) for s in ("grasp", "lift", "hold_check") for c in SHELF[s].failures()]
+)
 def test_what_is_not_held_is_put_back_and_taken_anew(retrieve: Run, node: str, code: str) -> None:
     run = retrieve({node: [fails(code), fails(code), ok()]})
     assert run.succeeded

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import pytest
 
 from glotouch_bt.mission.load import Mission, load_mission
 from glotouch_bt.robot import HOLD
-from glotouch_bt.skill import In, Out, Skill, SkillParams, SkillRun, param
+from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,8 @@ class Find(Skill):
     """Find items."""
 
     Params = FindParams
-    FAILURES: ClassVar = {"nothing": "nothing is there", "blocked": "the way is blocked"}
+    NOTHING = Failure("nothing", "nothing is there")
+    BLOCKED = Failure("blocked", "the way is blocked")
     items = Out(tuple, "what was found", element=Item)
     found = Out(int, "how many")
     complete = Out(bool, "all of them", always=True)
@@ -44,7 +45,7 @@ class Find(Skill):
 class Use(Skill):
     """Use one item."""
 
-    FAILURES: ClassVar = {"broken": "it broke"}
+    BROKEN = Failure("broken", "it broke")
     item = In(Item, "what to use")
     all_items = In(tuple, "all", key="items", required=False)
     mark = Out(float, "how well it went")

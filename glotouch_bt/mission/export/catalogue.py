@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import asdict
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
@@ -28,7 +29,7 @@ def describe_skill(name: str, skill: type[Skill]) -> dict[str, Any]:
         "leaves": dict(skill.POSTCONDITIONS),
         "after_failure": {r: sorted(s) for r, s in skill.FAILURE_STATES.items()},
         "uses": sorted(skill.USES),
-        "failures": skill.failure_codes(),
+        "failures": [asdict(f) for f in skill.failures(general=True).values()],
         "pause": skill.PAUSE,
     }
 

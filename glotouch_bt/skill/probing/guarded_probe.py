@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -24,13 +25,19 @@ from glotouch_bt.perception.touch import (
 )
 from glotouch_bt.robot import Array, MotionRefused, Observation, Pose
 from glotouch_bt.skill.context import Context
-from glotouch_bt.skill.failures import SkillFailed
+from glotouch_bt.skill.failures import Failure
 from glotouch_bt.skill.probing.held_tool import HeldTool
 
 REST_S, LONGEST_REST_S = 0.12, 0.6
 """The wrench and the twist must have been steady for so long before a guard listens; waited for at most so long."""
 LISTENING_ACCELERATION_M_S2, LISTENING_JERK_M_S3 = 0.5, 20.0
 """Limits while a guard listens. With its inertia taken out, the hand leaves below 0.05 N at the tip (simulation)."""
+
+HARD_CONTACT = Failure(
+    "hard_contact",
+    "the wrench passed a hard limit during a guarded move",
+    advice="something hard or heavy is in the way; go slower",
+)
 
 
 @dataclass(frozen=True)
@@ -58,6 +65,8 @@ class Prober:
     Attributes:
         resting_up_N: Force straight up on the wrist at each rest so far.
     """
+
+    FAILURES: ClassVar = (HARD_CONTACT,)
 
     def __init__(
         self,
@@ -160,10 +169,8 @@ class Prober:
         if stop is None:
             return Probed(None, path_K)
         if isinstance(stop, HardTrip):
-            raise SkillFailed(
-                "hard_contact",
+            raise HARD_CONTACT(
                 f"{stop.quantity} {stop.value:.1f} passed its limit {stop.limit:.1f} during a guarded move",
-                advice="something hard or heavy is in the way; go slower",
                 quantity=stop.quantity,
                 value=stop.value,
                 limit=stop.limit,

@@ -13,7 +13,7 @@ from glotouch_skills.common.hand.line_guard import (
     why_stopped,
 )
 from glotouch_skills.common.hand.retract import CAUGHT_N, RISE_M_S, rise_clear
-from glotouch_skills.common.hand.wait_for import finish
+from glotouch_skills.common.hand.wait_for import REQUEST_FAILED, finish
 from glotouch_skills.common.hand.weighing import GRAVITY_M_S2, STAND_S, weigh, weigh_N
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "CLEARANCE_M",
     "DOWN_B",
     "GRAVITY_M_S2",
+    "REQUEST_FAILED",
     "RISE_M_S",
     "STAND_S",
     "UP_B",

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from glotouch_bt.robot import HOLD, Ticket
-from glotouch_bt.skill import SkillFailed, SkillRun
+from glotouch_bt.skill import Failure, SkillRun
 
 TIMEOUT_PERIODS = 500
+REQUEST_FAILED = Failure(
+    "request_failed",
+    "the device did not zero the sensor or set the payload",
+    advice="see the device's own log; the skill may be tried again",
+)
 
 
 def finish(ticket: Ticket, what: str) -> SkillRun:
@@ -19,9 +24,4 @@ def finish(ticket: Ticket, what: str) -> SkillRun:
             break
         yield HOLD
     if not ticket.done or ticket.error:
-        raise SkillFailed(
-            "request_failed",
-            f"{what} did not finish: {ticket.error or 'timed out'}",
-            advice="see the device's own log; the skill may be tried again",
-            limit_periods=TIMEOUT_PERIODS,
-        )
+        raise REQUEST_FAILED(f"{what} did not finish: {ticket.error or 'timed out'}", limit_periods=TIMEOUT_PERIODS)

@@ -18,6 +18,8 @@ NEAR_M, SUNK_M, OFF_M = 0.02, 0.04, 0.01
 """The ball goes down slowly from so far above the floor, listening from so far above it (a probe may have sunk in the
 jaws by the length of its handle), and is raised so far off it again."""
 
+FEEL_FLOOR_FAILURES = Prober.FAILURES
+
 
 def feel_floor(context: Context, tool: HeldTool, corner_gap_m: float, speed_m_s: float) -> Motion[float | None]:
     """Lower the ball in the corner nearest to the holder; the floor's height in K, or None if nothing was met.

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from glotouch_bt.motion import Motion
 from glotouch_bt.perception.search import Felt, Move, Plan, T
 from glotouch_bt.perception.touch import Contact, GuardParams
 from glotouch_bt.robot import Array, MotionRefused
-from glotouch_bt.skill import Context, SkillFailed
+from glotouch_bt.skill import Context, Failure
 from glotouch_bt.skill.probing import HeldTool, Prober
 from glotouch_skills.common.hand import GRAVITY_M_S2, rise_clear, weigh_N
 
@@ -25,6 +26,12 @@ LIGHTER = 0.5
 """A share of the probe's weight that is missing all at once: it is weighed in free air."""
 OFF_TOP_M = 0.006
 """The ball is raised so far off what it landed on."""
+
+TOOL_LOST = Failure(
+    "tool_lost",
+    "the jaws are not as far apart as when they took the tool, or the hand is lighter by the weight of the probe",
+    advice="the tool lies in the container or beside it; take it out by hand",
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +56,8 @@ class Explorer:
         speeds: How fast and how high.
         journal: Called with (kind, data) of every event: "contact", "sweep" (the path at sensing height), "note".
     """
+
+    FAILURES: ClassVar = (*Prober.FAILURES, TOOL_LOST)
 
     def __init__(self, context: Context, tool: HeldTool, speeds: ExploringSpeeds, journal: Callable[..., None]) -> None:
         self._prober = Prober(context, tool, GuardParams())
@@ -107,10 +116,8 @@ class Explorer:
         """The jaws must be as far apart as when they took the tool; without it nothing would ever be touched."""
         apart, taken = self._arm.aperture_m, self._tool.aperture_m
         if abs(apart - taken) > HELD_TOLERANCE_M:
-            raise SkillFailed(
-                "tool_lost",
+            raise TOOL_LOST(
                 f"the jaws are {apart * 1e3:.1f} mm apart, with the tool in them they were {taken * 1e3:.1f}",
-                advice="the tool lies in the container or beside it; take it out by hand",
                 aperture_m=apart,
             )
 
@@ -129,8 +136,7 @@ class Explorer:
         yield from rise_clear(self._arm)
         missing_N = -(yield from weigh_N(self._arm)) - before_N
         if missing_N > LIGHTER * self._weight_N:
-            raise SkillFailed(
-                "tool_lost",
+            raise TOOL_LOST(
                 f"the hand is lighter by {missing_N:.2f} N than a moment ago, the probe weighs {self._weight_N:.2f} N",
                 advice="look with tool_check",
                 missing_N=missing_N,

@@ -8,10 +8,11 @@ import numpy as np
 
 from glotouch_bt.motion import Motion, MoveResult
 from glotouch_bt.robot import MotionRefused, Observation, Pose, SetPayload, Tare
-from glotouch_bt.skill import Context, SkillFailed, SkillRun
+from glotouch_bt.skill import Context, Failure, SkillRun
 from glotouch_skills.common.hand import (
     CAUGHT_N,
     DOWN_B,
+    REQUEST_FAILED,
     UP_B,
     Pressed,
     StraightGuard,
@@ -33,6 +34,13 @@ STANDS_N = 6.0
 the holder, which gives nothing: 37 N/mm in the simulation, and the arm goes on for two periods."""
 OVER_STOWED_M = 0.08
 """The empty hand rises so far from the stowed probe's handle."""
+
+TOOL_LOST = Failure(
+    "tool_lost",
+    "the probe was dropped on its way into the holder; the hand is empty and above it",
+    advice="it stands in its holder or lies beside it; put it there by hand",
+)
+RETURN_PROBE_FAILURES = (TOOL_LOST, REQUEST_FAILED)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -125,10 +133,8 @@ def _lower(context: Context, goal: Pose, speed_m_s: float, aperture_m: float, ma
         return moved
     arm.scene.hold_tool(False)
     yield from _rise(context, speed_m_s)
-    raise SkillFailed(
-        "tool_lost",
+    raise TOOL_LOST(
         f"the probe was dropped on its way into the holder: {moved.stop}",
-        advice="it stands in its holder or lies beside it; put it there by hand",
         aperture_m=moved.stop.apart_m,
         taken_m=aperture_m,
     )
