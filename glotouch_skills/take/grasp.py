@@ -10,7 +10,7 @@ from glotouch_bt.motion import Motion, hand_pose_B
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import MotionRefused, Pose
 from glotouch_bt.skill import UNCHANGED, Failure, In, Out, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import CLEARANCE_M, close_gently, glide, keeping_clear_of, require_clear
+from glotouch_skills.common.hand import CLEARANCE_M, close_compliantly, glide, keeping_clear_of, require_clear
 from glotouch_skills.common.planning import GraspPlan
 
 
@@ -93,7 +93,7 @@ class Grasp(Skill):
             yield from arm.line(above, p.travel_speed_m_s, check=False)
             raise MotionRefused("grasp", "the fingers stood on something on the way down")
         try:
-            state = yield from close_gently(arm, p.closing_speed_m_s, p.force_N)
+            state = yield from close_compliantly(arm, p.closing_speed_m_s, p.force_N)
         except MotionRefused:
             yield from arm.line(above, p.travel_speed_m_s, check=False)
             raise

@@ -10,7 +10,7 @@ from glotouch_bt.motion import JawRestDetector, hand_pose_B
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import Pose
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import glide, keeping_clear_of, let_go, rise_clear
+from glotouch_skills.common.hand import glide, keeping_clear_of, release, rise_clear
 from glotouch_skills.common.planning import GraspPlan
 
 OVER_M = 0.03
@@ -89,7 +89,7 @@ class PutBack(Skill):
             raise self.IN_THE_WAY(
                 f"it met something {above * 1e3:.0f} mm above its place and is still held", above_m=above
             )
-        yield from let_go(arm, opening)
+        yield from release(arm, opening)
         yield from rise_clear(arm, p.speed_m_s)
         self.event("put_back", candidate=made.candidate, above_m=above)
 

@@ -17,11 +17,11 @@ from glotouch_skills.common.hand import (
     GRAVITY_M_S2,
     REQUEST_FAILED,
     UP_B,
+    describe_stop,
     finish,
     may_touch,
     straight_guard,
     weigh_N,
-    why_stopped,
 )
 from glotouch_skills.common.probe import FEEL_FLOOR_FAILURES, FLOOR_SEARCH_M, feel_floor
 
@@ -154,7 +154,7 @@ class ToolPickup(Skill):
         with may_touch(arm, "hand", "probe", "holder"):
             guard = yield from straight_guard(arm, DOWN_B, MET_N)
             moved = yield from arm.line(grasp, 0.05, guard=guard)
-            if (why := why_stopped(moved)) is not None:
+            if (why := describe_stop(moved)) is not None:
                 yield from arm.line(above, 0.05)
                 raise self.HARD_CONTACT(
                     f"the open hand met something on its way down over the handle: {why}",
@@ -185,7 +185,7 @@ class ToolPickup(Skill):
         guard = yield from straight_guard(arm, UP_B, STUCK_N)
         speed_m_s = min(self.params.speed_m_s, OUT_M_S)
         moved = yield from arm.shift(up * UP_B, speed_m_s, check=False, guard=guard)
-        if (why := why_stopped(moved)) is not None:
+        if (why := describe_stop(moved)) is not None:
             raise self.HARD_CONTACT(f"the probe does not come out of its holder: {why}", travelled_m=moved.travelled_m)
 
     def _feel_floor(self, tool: HeldTool) -> Motion[HeldTool]:

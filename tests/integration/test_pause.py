@@ -18,7 +18,7 @@ from glotouch_bt.robot import Array, Command, Observation, Pose
 from glotouch_bt.robot.simulation.referee import Referee
 from glotouch_bt.skill import Skill, SkillRun
 from glotouch_bt.validation.pause import EveryNthTick
-from glotouch_skills.common.hand.compliant_close import close_gently
+from glotouch_skills.common.hand.compliant_close import close_compliantly
 from glotouch_skills.common.probe.free_corner import corner_place
 
 PAUSE_S = 20.0
@@ -105,7 +105,7 @@ class Squeezes(Told):
         yield from arm.transit(Pose.pointing_down((x, y, z + 0.1), yaw), arm.pose_B_P.position_m[2], 0.2, check=False)
         yield from arm.line(Pose.pointing_down((x, y, z), yaw), 0.05, check=False)
         self.say("closing")
-        yield from close_gently(arm, 0.03, 10.0, seen_by=self.seen)
+        yield from close_compliantly(arm, 0.03, 10.0, seen_by=self.seen)
         self.say("closed")
         yield from arm.hold(0.3)
         yield from arm.jaws(OPEN_M)

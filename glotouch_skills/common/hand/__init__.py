@@ -1,7 +1,7 @@
-"""TODO door of glotouch_skills/common/hand."""
+"""Motions of the hand and the jaws that several skills share: rise, glide, close, release, weigh."""
 
 from glotouch_skills.common.hand.clearance_rules import keeping_clear_of, may_touch
-from glotouch_skills.common.hand.compliant_close import close_gently, let_go
+from glotouch_skills.common.hand.compliant_close import close_compliantly, release
 from glotouch_skills.common.hand.hand import CLEARANCE_M, glide, require_clear
 from glotouch_skills.common.hand.line_guard import (
     DOWN_B,
@@ -9,8 +9,8 @@ from glotouch_skills.common.hand.line_guard import (
     Pressed,
     StraightGuard,
     Strayed,
+    describe_stop,
     straight_guard,
-    why_stopped,
 )
 from glotouch_skills.common.hand.retract import CAUGHT_N, RISE_M_S, rise_clear
 from glotouch_skills.common.hand.wait_for import REQUEST_FAILED, finish
@@ -28,16 +28,16 @@ __all__ = [
     "Pressed",
     "StraightGuard",
     "Strayed",
-    "close_gently",
+    "close_compliantly",
     "finish",
     "glide",
     "keeping_clear_of",
-    "let_go",
+    "release",
     "may_touch",
     "require_clear",
     "rise_clear",
     "straight_guard",
     "weigh",
     "weigh_N",
-    "why_stopped",
+    "describe_stop",
 ]

@@ -1,5 +1,7 @@
-"""What the scene is told for as long as it holds: intended contact, and objects to keep clear of; taken back however a
-skill ends."""
+"""Temporary rules of the clearance scene: allowed contacts, and candidates to keep clear of.
+
+Each is a context manager, so that a rule ends however the skill ends.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +13,12 @@ from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.perception.touch.outline import envelope
 
 MIN_HEIGHT_M = 0.01
-"""An obstacle is at least this high, whatever its top touch said."""
+"""Least height of an obstacle, whatever height was touched."""
 
 
 @contextmanager
 def may_touch(arm: Arm, part: str, *obstacles: str) -> Iterator[None]:
-    """Let a part, or a group of parts, touch obstacles of the arm's scene inside the block.
+    """Allow a part, or a group of parts, to touch obstacles of the arm's scene inside the block.
 
     Raises:
         UnknownName: No such part, group or obstacle.
@@ -32,19 +34,19 @@ def may_touch(arm: Arm, part: str, *obstacles: str) -> Iterator[None]:
 
 @contextmanager
 def keeping_clear_of(arm: Arm, candidates: Iterable[Candidate]) -> Iterator[None]:
-    """Have every motion inside the block keep clear of traced candidates."""
+    """Keep every motion inside the block clear of traced candidates."""
     names: list[str] = []
     try:
         for candidate in candidates:
-            room = envelope(candidate)
+            hull = envelope(candidate)
             names.append(f"candidate {candidate.index}")
             arm.scene.add_obstacle(
                 names[-1],
-                room.kind,
-                centre_K_m=room.centre_K_m,
-                size_m=room.size_m,
+                hull.kind,
+                centre_K_m=hull.centre_K_m,
+                size_m=hull.size_m,
                 height_m=max(candidate.height_m, MIN_HEIGHT_M),
-                yaw_rad=room.yaw_rad,
+                yaw_rad=hull.yaw_rad,
             )
         yield
     finally:

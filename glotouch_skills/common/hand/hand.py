@@ -1,4 +1,4 @@
-"""The open hand: which yaw it takes, whether it has room, and how it goes down beside things it cannot see."""
+"""Moves of the open hand among objects: check its clearance, and descend until the fingers touch."""
 
 from __future__ import annotations
 
@@ -12,20 +12,24 @@ from glotouch_bt.robot import MotionRefused, Pose
 from glotouch_bt.skill import Context
 
 CLEARANCE_M = 0.004
-"""Room kept from neighbours: they may have been pushed a few millimetres since they were traced."""
+"""Distance kept from neighbours: they may have been pushed a few millimetres since they were traced."""
 BUMP_N = 2.5
-"""Force on the fingertips that means they stand on something: above the hand's inertia, far below what harms."""
+"""Force that counts as a touch of the fingertips: above the hand's inertial force, far below what harms."""
 BUMP_CUTOFF_HZ = 100.0
-"""A bump is far above the noise: a faster filter stops the hand sooner."""
+"""Cutoff of the force filter. The threshold is far above the noise, so a faster filter can stop the hand sooner."""
 BASELINE_S = 0.1
-CAREFUL_ACCELERATION_M_S2, CAREFUL_JERK_M_S3 = 0.6, 20.0
+"""Time for which the force at rest is measured first."""
+GLIDE_ACCELERATION_M_S2 = 0.6
+"""Acceleration limit of a guarded descent."""
+GLIDE_JERK_M_S3 = 20.0
+"""Jerk limit of a guarded descent."""
 
 
 def require_clear(arm: Arm, pose_B_P: Pose, aperture_m: float, margin_m: float | None = None) -> None:
-    """Make sure that the open hand has room at a pose before anything moves towards it.
+    """Check that the open hand is clear of everything at a pose, before any motion towards it.
 
     Raises:
-        MotionRefused: Out of reach, or some part would hit something; the pair is named.
+        MotionRefused: Out of reach, or a part would collide; the pair is named.
     """
     q = arm.kinematics.ik(pose_B_P, arm.q)
     blocked = arm.scene.describe_violation(q, aperture_m, margin_m)
@@ -34,9 +38,9 @@ def require_clear(arm: Arm, pose_B_P: Pose, aperture_m: float, margin_m: float |
 
 
 def glide(context: Context, pose_B_P: Pose, speed_m_s: float) -> Motion[bool]:
-    """Straight to a pose among objects, stopping if the fingers meet one. True if the pose was reached.
+    """Move straight to a pose among objects and stop if the fingers touch one; return True if the pose was reached.
 
-    Orientation must be that of the present pose. Stops within a millimetre or two of the touch.
+    The orientation must be the present one. The hand stops within 1 to 2 mm of the touch.
 
     Raises:
         MotionRefused: Before moving.
@@ -58,8 +62,8 @@ def glide(context: Context, pose_B_P: Pose, speed_m_s: float) -> Motion[bool]:
     result = yield from arm.line(
         pose_B_P,
         speed_m_s,
-        acceleration_m_s2=CAREFUL_ACCELERATION_M_S2,
-        jerk_m_s3=CAREFUL_JERK_M_S3,
+        acceleration_m_s2=GLIDE_ACCELERATION_M_S2,
+        jerk_m_s3=GLIDE_JERK_M_S3,
         guard=guard,
     )
     return result.stop is None

@@ -1,4 +1,4 @@
-"""A guard for straight moves that may neither press nor stray: into the probe's holder and out of it, and any rise."""
+"""A guard for straight moves that must neither press nor leave their line: into and out of the holder, and upwards."""
 
 from __future__ import annotations
 
@@ -10,12 +10,17 @@ from glotouch_bt.motion import Arm, Motion, MoveResult
 from glotouch_bt.robot import Array, GuardTripped, Observation
 from glotouch_skills.common.hand.weighing import STAND_S
 
-ASTRAY_M, FARTHER_M = 0.0015, 0.0005
-"""The slot of the probe's holder is 4 mm wider than the shaft to each side, and an arm that goes astray needs half of
-that to stop. A hand that is so far beside its setpoint at the start may go so much farther."""
-UP_B, DOWN_B = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0])
-GIVES_M_N = 1.5e-4
-"""The arm gives so much a newton at most (simulated). What is farther beside its setpoint does not follow."""
+MAX_OFF_LINE_M = 0.0015
+"""Distance from the line that ends the move. The holder's slot is 4 mm wider than the shaft on each side, and a
+straying arm needs half of that to stop."""
+MAX_FARTHER_M = 0.0005
+"""A hand that starts farther off its line than `MAX_OFF_LINE_M` may go this much farther."""
+UP_B = np.array([0.0, 0.0, 1.0])
+"""Upwards in B."""
+DOWN_B = np.array([0.0, 0.0, -1.0])
+"""Downwards in B."""
+ARM_COMPLIANCE_M_N = 1.5e-4
+"""Largest compliance of the servoed arm (simulated). A hand farther off its line than this explains does not follow."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +28,7 @@ class Pressed:
     """The move ended because something pressed.
 
     Attributes:
-        force_N: How much more than at rest.
+        force_N: Change of the force since rest.
     """
 
     force_N: float
@@ -34,11 +39,12 @@ class Pressed:
 
 @dataclass(frozen=True)
 class Strayed:
-    """The move ended because the hand left its way.
+    """The move ended because the hand left its line.
 
     Attributes:
-        off_m: How far beside the line it is; max_off_m: how far it may be.
-        force_N: How much more than at rest was felt.
+        off_m: Distance from the line.
+        max_off_m: Largest allowed distance.
+        force_N: Change of the force since rest.
         stamp_s: Robot clock.
     """
 
@@ -54,12 +60,13 @@ class Strayed:
 
 @dataclass(frozen=True)
 class StraightGuard:
-    """Trips on a force, and on a distance from the commanded line: that is free of the servo's lag along it.
+    """Trip on a force, or on a distance from the commanded line, which the servo's lag along the line does not change.
 
     Attributes:
-        free_S_N: (3,) force at rest; a period's mean is compared with it.
-        max_N: Largest difference.
-        start_B_m, along_B: (3,) each, a point of the commanded line and its direction.
+        free_S_N: (3,) force at rest, to compare each period's mean with.
+        max_N: Largest change of the force.
+        start_B_m: (3,) point of the commanded line.
+        along_B: (3,) its direction.
         max_off_m: Largest distance of P from it.
     """
 
@@ -78,28 +85,28 @@ class StraightGuard:
         return Strayed(off, self.max_off_m, force, seen.now_s) if off > self.max_off_m else None
 
     def off_m(self, seen: Observation) -> float:
-        """How far P is beside the line, newest sample."""
+        """Return the distance of P from the line, newest sample."""
         way = seen.position_B_P[-1] - self.start_B_m
         return float(np.linalg.norm(way - (way @ self.along_B) * self.along_B))
 
 
 def straight_guard(arm: Arm, along_B: Array, max_N: float) -> Motion[StraightGuard]:
-    """Stand a moment and take what is felt now as a free hand's force; for a move from here along `along_B` (3,)."""
+    """Measure the force at rest and return a guard for a move from here along `along_B` (3,)."""
     blocks = yield from arm.hold(STAND_S)
     free = np.concatenate([b.wrench_S[:, :3] for b in blocks]).mean(axis=0)
     unit = along_B / np.linalg.norm(along_B)
-    guard = StraightGuard(free, max_N, arm.pose_B_P.position_m, unit, ASTRAY_M)
-    return replace(guard, max_off_m=max(ASTRAY_M, guard.off_m(blocks[-1]) + FARTHER_M))
+    guard = StraightGuard(free, max_N, arm.pose_B_P.position_m, unit, MAX_OFF_LINE_M)
+    return replace(guard, max_off_m=max(MAX_OFF_LINE_M, guard.off_m(blocks[-1]) + MAX_FARTHER_M))
 
 
-def why_stopped(moved: MoveResult) -> str | None:
-    """What ended a straight move before its end, in words; None: nothing did.
+def describe_stop(moved: MoveResult) -> str | None:
+    """Return what ended a straight move early, in words, or None.
 
     Raises:
-        GuardTripped: The hand is where no force can have pushed it: the arm does not follow its setpoints, and no other
+        GuardTripped: No force explains the distance from the line: the arm does not follow its setpoints, and no other
             move will help.
     """
     stop = moved.stop
-    if isinstance(stop, Strayed) and stop.off_m > stop.force_N * GIVES_M_N + FARTHER_M:
+    if isinstance(stop, Strayed) and stop.off_m > stop.force_N * ARM_COMPLIANCE_M_N + MAX_FARTHER_M:
         raise GuardTripped("following", str(stop), stop.off_m, stop.max_off_m, stop.stamp_s)
     return None if stop is None else f"after {moved.travelled_m * 1e3:.0f} mm {stop}"

@@ -1,27 +1,28 @@
-"""Straight up until what hangs lowest in the hand is clear of everything in the container."""
+"""Raise the hand straight up until its lowest part is clear of everything in the container."""
 
 from __future__ import annotations
 
 from glotouch_bt.motion import Arm, Motion
 from glotouch_bt.robot import MotionRefused
-from glotouch_skills.common.hand.line_guard import UP_B, straight_guard, why_stopped
+from glotouch_skills.common.hand.line_guard import UP_B, describe_stop, straight_guard
 
 CLEAR_M = 0.13
-"""Height over the container's floor that clears its walls (80 mm) and any object, as the skills' own headroom."""
+"""Height above the container's floor that clears its walls (80 mm) and any object."""
 RISE_M_S = 0.10
+"""Default speed of rising."""
 NEAR_ENOUGH_M = 0.002
+"""Do not rise by less than this."""
 CAUGHT_N = 15.0
-"""Change of force at which the hand rises no farther, half of the robot's hard limit: it is caught. What it takes up
-weighs 4 N at most (CONDITIONS)."""
+"""Change of force that stops the rise: half of the robot's hard limit. The heaviest object of CONDITIONS weighs 4 N."""
 
 
 def rise_clear(arm: Arm, speed_m_s: float = RISE_M_S) -> Motion[float]:
-    """Up, if it is lower; the hand is not turned and its jaws are left as they are. How far it rose, m.
+    """Rise to `CLEAR_M` if the hand is lower, without turning it or moving its jaws; return the height gained, m.
 
     The lowest point is the ball while the probe is held, else the fingertips.
 
     Raises:
-        MotionRefused: The arm does not reach so high there, or the hand is caught under something.
+        MotionRefused: The arm cannot reach that height there, or the hand is caught under something.
         GuardTripped: The arm does not follow its setpoints.
     """
     world = arm.world
@@ -34,6 +35,6 @@ def rise_clear(arm: Arm, speed_m_s: float = RISE_M_S) -> Motion[float]:
         return 0.0
     guard = yield from straight_guard(arm, UP_B, CAUGHT_N)
     moved = yield from arm.shift(short * UP_B, speed_m_s, check=False, guard=guard, what="rise")
-    if (why := why_stopped(moved)) is not None:
+    if (why := describe_stop(moved)) is not None:
         raise MotionRefused("rise", why)
     return short

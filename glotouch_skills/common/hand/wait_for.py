@@ -1,4 +1,4 @@
-"""Waiting for a slow request without blocking a tick."""
+"""Wait for a slow request without blocking a tick."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from glotouch_bt.robot import HOLD, Ticket
 from glotouch_bt.skill import Failure, SkillRun
 
 TIMEOUT_PERIODS = 500
+"""Longest wait for a request, in control periods."""
 REQUEST_FAILED = Failure(
     "request_failed",
     "the device did not zero the sensor or set the payload",

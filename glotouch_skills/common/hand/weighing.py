@@ -1,4 +1,4 @@
-"""What hangs in the hand, by the tared wrist."""
+"""Weigh what hangs in the hand, by the tared wrist."""
 
 from __future__ import annotations
 
@@ -9,17 +9,20 @@ import numpy as np
 from glotouch_bt.motion import Arm, Motion
 
 GRAVITY_M_S2 = 9.81
-STAND_S, WEIGH_S = 0.1, 0.25
-"""The hand stands still before it weighs: the end of a stop is felt as a force, too."""
+"""Standard gravity, rounded."""
+STAND_S = 0.1
+"""Stand still for this long first: the end of a stop is felt as a force, too."""
+WEIGH_S = 0.25
+"""Average the wrench over this time."""
 
 
 @dataclass(frozen=True)
 class Weighed:
-    """What hangs in the hand beyond what was tared.
+    """Load in the hand beyond what was tared.
 
     Attributes:
-        weight_N: From the force straight down.
-        moment_Nm: Of the moment about the sensor, the part about level axes: weight times how far aside it hangs.
+        weight_N: Force straight down.
+        moment_Nm: Moment about the sensor's horizontal axes: weight times horizontal offset.
     """
 
     weight_N: float
@@ -27,7 +30,7 @@ class Weighed:
 
 
 def weigh(arm: Arm) -> Motion[Weighed]:
-    """Stand still, and feel what hangs in the hand; the tare was taken with the hand upright."""
+    """Stand still and measure the load in the hand; the tare was taken with the hand upright."""
     yield from arm.hold(STAND_S)
     blocks = yield from arm.hold(WEIGH_S)
     wrench_S = np.concatenate([b.wrench_S for b in blocks]).mean(axis=0)
@@ -37,5 +40,5 @@ def weigh(arm: Arm) -> Motion[Weighed]:
 
 
 def weigh_N(arm: Arm) -> Motion[float]:
-    """Weight in the hand, N, from the force straight down; the tare was taken with the hand empty and upright."""
+    """Return the weight in the hand, N; the tare was taken with the hand empty and upright."""
     return (yield from weigh(arm)).weight_N

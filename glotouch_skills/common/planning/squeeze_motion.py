@@ -11,7 +11,7 @@ from glotouch_bt.perception.touch import Candidate, Layer, Yielding, make_layer,
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose
 from glotouch_bt.skill import Context, SkillParams, param
-from glotouch_skills.common.hand import close_gently, glide, let_go
+from glotouch_skills.common.hand import close_compliantly, glide, release
 from glotouch_skills.common.planning.squeeze_plan import Stance
 
 HAND_CLEARANCE_M = 0.005
@@ -129,7 +129,7 @@ class Squeezing:
         p, arm = self._p, self._context.arm
         gripper = arm.description.gripper
         closing: list[Observation] = []
-        yield from close_gently(arm, p.closing_speed_m_s, p.force_N, tactile=True, seen_by=closing.append)
+        yield from close_compliantly(arm, p.closing_speed_m_s, p.force_N, tactile=True, on_observation=closing.append)
         command = Command(gripper=GripperTarget(0.0, p.closing_speed_m_s, p.force_N), tactile=True)
         blocks: list[Observation] = []
         for _ in range(round(p.settle_s / arm.period_s)):
@@ -149,7 +149,7 @@ class Squeezing:
             pad_shape=gripper.pad_shape,
             yielding=yielding,
         )
-        yield from let_go(arm, self.at.opening_m)
+        yield from release(arm, self.at.opening_m)
         true_m = layer.aperture_m - self._zero.error_m
         return replace(layer, aperture_m=true_m, zero_sd_m=self._zero.sd_m), yielding
 

@@ -17,9 +17,9 @@ from glotouch_skills.common.hand import (
     Pressed,
     StraightGuard,
     Strayed,
+    describe_stop,
     finish,
     straight_guard,
-    why_stopped,
 )
 from glotouch_skills.common.probe.plan_driver import HELD_TOLERANCE_M
 
@@ -104,11 +104,11 @@ def return_probe(
     near = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, NEAR_M]))
     if float(arm.pose_B_P.position_m[2]) > float(near.position_m[2]):
         moved = yield from _lower(context, near, insert_speed_m_s, aperture_m, STANDS_N)
-        if (why := why_stopped(moved)) is not None:
+        if (why := describe_stop(moved)) is not None:
             yield from _rise(context, insert_speed_m_s)  # what is pressed on is not left pressed on
             raise MotionRefused("into the holder", why)
     moved = yield from _lower(context, grasp, min(LAST_M_S, insert_speed_m_s), aperture_m, STANDS_N)
-    why = why_stopped(moved)
+    why = describe_stop(moved)
     if isinstance(moved.stop, Strayed):
         yield from _rise(context, insert_speed_m_s)
         raise MotionRefused("into the holder", str(why))
@@ -126,8 +126,8 @@ def _lower(context: Context, goal: Pose, speed_m_s: float, aperture_m: float, ma
     """
     arm = context.arm
     straight = yield from straight_guard(arm, DOWN_B, max_N)
-    let_go = not arm.scene.holding_tool or np.linalg.norm(goal.position_m - arm.pose_B_P.position_m) < THERE_M
-    guard = straight if let_go else Lowering(straight, aperture_m)  # let go of, where the skill was broken off
+    released = not arm.scene.holding_tool or np.linalg.norm(goal.position_m - arm.pose_B_P.position_m) < THERE_M
+    guard = straight if released else Lowering(straight, aperture_m)  # let go of, where the skill was broken off
     moved = yield from arm.line(goal, speed_m_s, check=False, guard=guard)
     if not isinstance(moved.stop, Dropped):
         return moved

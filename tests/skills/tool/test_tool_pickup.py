@@ -9,7 +9,7 @@ import pytest
 from py_trees.common import Status
 
 from glotouch_bt.robot import GuardTripped
-from glotouch_skills.common.hand.line_guard import ASTRAY_M
+from glotouch_skills.common.hand.line_guard import MAX_OFF_LINE_M
 from glotouch_skills.tool.tool_pickup import MET_N, STUCK_N, ToolPickup
 
 STOWED = np.array([0.45, -0.32, -0.06])
@@ -137,7 +137,7 @@ def test_an_arm_that_goes_astray_in_the_holder_is_stopped(make) -> None:
     with pytest.raises(GuardTripped, match="beside its setpoint"):
         b.run(skill)
     assert b.arm.scene.holding_tool
-    assert ASTRAY_M < max(far_m) < 0.003
+    assert MAX_OFF_LINE_M < max(far_m) < 0.003
 
 
 def test_no_floor(make) -> None:

@@ -13,14 +13,14 @@ from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import Array, MotionRefused, Pose, World
 from glotouch_bt.robot.fake import FakeRobot
 from glotouch_skills.common.hand.compliant_close import (
-    GENTLE_N,
-    GIVE_UP_N,
-    LEANING_N,
+    FOLLOW_FORCE_N,
+    GENTLE_FORCE_N,
+    MAX_CLOSING_FORCE_N,
+    MAX_HAND_FORCE_N,
+    MAX_REST_FORCE_N,
     RAMP_N_S,
-    WEDGED_N,
-    YIELD_N,
-    close_gently,
-    let_go,
+    close_compliantly,
+    release,
 )
 
 STIFFNESS_N_M = 2500.0
@@ -55,12 +55,12 @@ class Post(FakeRobot):
 def test_the_hand_comes_to_the_post(bench: Any, world: World, off_mm: float) -> None:
     robot = Post(off_mm * 1e-3)
     b = bench().on(world, robot)
-    state = b.go(close_gently(b.arm, SPEED_M_S, 10.0))
+    state = b.go(close_compliantly(b.arm, SPEED_M_S, 10.0))
     assert state.aperture_m == pytest.approx(WIDTH_M, abs=1e-4)
     y_B = b.arm.pose_B_P.rotation[:, 1]
     assert robot.middle_B is not None
     rest = abs((robot.middle_B - b.arm.pose_B_P.position_m) @ y_B)
-    assert rest * STIFFNESS_N_M <= YIELD_N + 1.0
+    assert rest * STIFFNESS_N_M <= FOLLOW_FORCE_N + 1.0
     assert max(robot.felt_N) < 8.0, "without giving way 12 mm would be 30 N"
 
 
@@ -80,10 +80,10 @@ def test_full_force_comes_only_when_the_jaws_rest(bench: Any, world: World, forc
     robot = Stuck(0.010)
     b = bench().on(world, robot)
     seen: list[Any] = []
-    b.go(close_gently(b.arm, SPEED_M_S, force_N, seen_by=seen.append))
-    assert max(robot.felt_N) <= 2 * GENTLE_N + 1e-9
+    b.go(close_compliantly(b.arm, SPEED_M_S, force_N, on_observation=seen.append))
+    assert max(robot.felt_N) <= 2 * GENTLE_FORCE_N + 1e-9
     forces = np.array([c.gripper.force_N for c in b.commands if c.gripper is not None])
-    assert forces[0] == min(force_N, GENTLE_N)
+    assert forces[0] == min(force_N, GENTLE_FORCE_N)
     assert forces[-1] == pytest.approx(force_N)
     assert np.all(np.diff(forces) > 0.0)
     assert np.all(np.diff(forces) <= RAMP_N_S * b.arm.period_s + 1e-9), "a ramp: what wedges is felt before it presses"
@@ -94,29 +94,31 @@ def test_what_presses_the_hand_away_ends_the_closure(bench: Any, world: World) -
     robot = Post(0.002, up_N_m=40e3)
     b = bench().on(world, robot)
     with pytest.raises(MotionRefused, match="pressed"):
-        b.go(close_gently(b.arm, SPEED_M_S, 10.0))
-    assert max(robot.felt_N) < 1.3 * WEDGED_N < GIVE_UP_N, "it is known while the jaws are gentle"
+        b.go(close_compliantly(b.arm, SPEED_M_S, 10.0))
+    assert max(robot.felt_N) < 1.3 * MAX_CLOSING_FORCE_N < MAX_HAND_FORCE_N, "it is known while the jaws are gentle"
     assert b.arm.aperture_m == pytest.approx(RIZON4_XENSE.gripper.stroke_m, abs=1e-3)
 
 
-@pytest.mark.parametrize(("leaning_N", "refused"), [(0.5 * LEANING_N, False), (1.2 * LEANING_N, True), (np.nan, True)])
+@pytest.mark.parametrize(
+    ("rest_force_N", "refused"), [(0.5 * MAX_REST_FORCE_N, False), (1.2 * MAX_REST_FORCE_N, True), (np.nan, True)]
+)
 def test_what_leans_on_the_hand_between_gentle_jaws_is_not_pressed(
-    bench: Any, world: World, leaning_N: float, refused: bool
+    bench: Any, world: World, rest_force_N: float, refused: bool
 ) -> None:
     class Leaning(Post):
         def _pushed(self, stamp: Array, position: Array, quat: Array) -> Array:
             out = super()._pushed(stamp, position, quat)
-            out[:, 2] = leaning_N * (self._aperture < WIDTH_M + 2e-4)
+            out[:, 2] = rest_force_N * (self._aperture < WIDTH_M + 2e-4)
             return out
 
     b = bench().on(world, Leaning(0.0))
     if refused:
         with pytest.raises(MotionRefused, match="pressed"):
-            b.go(close_gently(b.arm, SPEED_M_S, 10.0))
+            b.go(close_compliantly(b.arm, SPEED_M_S, 10.0))
     else:
-        b.go(close_gently(b.arm, SPEED_M_S, 10.0))
+        b.go(close_compliantly(b.arm, SPEED_M_S, 10.0))
     closing = [c.gripper.force_N for c in b.commands if c.gripper is not None and c.gripper.aperture_m == 0.0]
-    assert max(closing) == (GENTLE_N if refused else 10.0)
+    assert max(closing) == (GENTLE_FORCE_N if refused else 10.0)
 
 
 class Sprag(FakeRobot):
@@ -154,7 +156,7 @@ def test_a_foot_under_a_fingertip_frees_the_hand_when_it_lets_go(bench: Any, wor
     b.go(b.arm.jaws(0.0))
     robot.start_here()
     z = float(b.arm.pose_B_P.position_m[2])
-    b.go(let_go(b.arm, 0.07))
+    b.go(release(b.arm, 0.07))
     assert b.arm.aperture_m == pytest.approx(0.07, abs=1e-3)
     assert max(robot.felt_N) < held_N + 10.0
     assert float(b.arm.pose_B_P.position_m[2]) > z, "the way it was pushed"
