@@ -70,4 +70,5 @@ def bench_pause(
     console.print_table(f"{mission}, a pause of {pause:g} s at every {every}th tick, {conditions}", head, rows)
     same = summary["same"]
     sys.stdout.write(f"as the twin: {round(same['rate'] * same['n'])} of {same['n']}; ")
-    sys.stdout.write(f"hard limit broken: {summary['hard_limit_broken']} times; summary: {study.out}\n")
+    broken = summary["hard_limit_broken"]
+    sys.stdout.write(f"hard limit broken: {broken} time{'' if broken == 1 else 's'}; summary: {study.out}\n")

@@ -119,7 +119,8 @@ def _fault_in_words(fault: Mapping[str, Any]) -> str:
     told = (
         "nobody saw it" if seen is None else f"seen by {seen['by']} ({seen['code']}) after {fault['latency_s']:.2f} s"
     )
-    return f"fault {fault['name']}: began {fault['applied']} times, {told}"
+    applied = fault["applied"]
+    return f"fault {fault['name']}: began {applied} time{'' if applied == 1 else 's'}, {told}"
 
 
 def print_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

@@ -107,7 +107,6 @@ class ConditionKind(NodeKind):
 
     def build(self, node: NodeSpec, children: list[Behaviour], made: BuildContext) -> Behaviour:
         """Return the comparison."""
-        del children
         assert isinstance(node.settings, ConditionSettings)
         key = node.reads["port"].key
         return PortCondition(node.name, made.keys(node.name, key), key, node.settings)

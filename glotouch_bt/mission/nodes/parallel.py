@@ -98,12 +98,10 @@ class ParallelKind(NodeKind):
 
     def no_effect(self, node: NodeSpec, *, fails: bool, succeeds: bool) -> str:
         """One child."""
-        del fails, succeeds
         return "it has one child" if len(node.children) == 1 and not node.children[0].is_unread else ""
 
     def build(self, node: NodeSpec, children: list[Behaviour], made: BuildContext) -> Behaviour:
         """Return a parallel; with `all` a child that has succeeded is not ticked again."""
-        del made
         policy = ParallelPolicy.SuccessOnOne() if self._one(node) else ParallelPolicy.SuccessOnAll(synchronise=True)
         return py_trees.composites.Parallel(node.name, policy=policy, children=children)
 

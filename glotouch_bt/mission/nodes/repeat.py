@@ -194,7 +194,6 @@ class RepeatKind(LoopKind):
 
     def no_effect(self, node: NodeSpec, *, fails: bool, succeeds: bool) -> str:
         """One pass."""
-        del fails, succeeds
         once = isinstance(node.settings, RepeatSettings) and node.settings.times == 1
         return "one pass is no repetition" if once else ""
 

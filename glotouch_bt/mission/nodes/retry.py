@@ -56,14 +56,12 @@ class RetryKind(LoopKind):
 
     def no_effect(self, node: NodeSpec, *, fails: bool, succeeds: bool) -> str:
         """One attempt, or a child that never fails."""
-        del succeeds
         if node.settings is not None and self.max_passes(node) == 1:
             return "one attempt is none again"
         return "" if fails else f"{node.children[0].name!r} never fails"
 
     def build(self, node: NodeSpec, children: list[Behaviour], made: BuildContext) -> Behaviour:
         """Return the loop."""
-        del made
         return Retry(node.name, children[0], self.max_passes(node))
 
     def btcpp_form(self, node: NodeSpec) -> BtcppForm:

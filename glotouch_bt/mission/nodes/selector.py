@@ -19,12 +19,10 @@ class SelectorKind(CompositeKind):
 
     def build(self, node: NodeSpec, children: list[Behaviour], made: BuildContext) -> Behaviour:
         """Return a selector that remembers its running child."""
-        del made
         return py_trees.composites.Selector(node.name, memory=True, children=children)
 
     def no_effect(self, node: NodeSpec, *, fails: bool, succeeds: bool) -> str:
         """One child is no alternative."""
-        del fails, succeeds
         return "it has one child" if len(node.children) == 1 and not node.children[0].is_unread else ""
 
     def catches_failure(self, node: NodeSpec) -> bool:

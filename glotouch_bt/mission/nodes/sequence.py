@@ -19,5 +19,4 @@ class SequenceKind(CompositeKind):
 
     def build(self, node: NodeSpec, children: list[Behaviour], made: BuildContext) -> Behaviour:
         """Return a sequence that remembers its running child."""
-        del made
         return py_trees.composites.Sequence(node.name, memory=True, children=children)

@@ -75,7 +75,6 @@ class TimeoutKind(NodeKind):
 
     def no_effect(self, node: NodeSpec, *, fails: bool, succeeds: bool) -> str:
         """Only skills take time."""
-        del fails, succeeds
         idle = not any(n.skill_type is not None or n.is_unread for n in node.children[0].walk())
         return "nothing below it takes time" if idle else ""
 

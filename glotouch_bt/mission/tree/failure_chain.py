@@ -1,4 +1,4 @@
-"""Why a mission failed: failures are noted as they happen and composed up the tree, the root cause last."""
+"""The chain of failures that explains a failed mission, from the root of the tree down to the root cause."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class Failure:
 
     Attributes:
         node: Its name.
-        text: What went wrong, one clause.
+        text: What went wrong, in one clause.
         reason: Its code, numbers and advice.
         causes: Failures below that led to it, in order of time.
-        skill: It is a skill's, or came from outside the tree.
-        sensed: What the robot sensed when a skill failed (`sensed`).
+        skill: True for a skill's failure, and for one from outside the tree.
+        sensed: What the robot sensed when a skill failed (see `sensed`).
     """
 
     node: str
@@ -35,16 +35,16 @@ class Failure:
     sensed: Mapping[str, float] = field(default_factory=dict)
 
     def main(self) -> Failure | None:
-        """The cause to follow: the first that ends in a skill's reason, else the first."""
+        """Return the cause to follow: the first one that ends in a skill's failure, else the first one."""
         return next((c for c in self.causes if c.root().skill), self.causes[0] if self.causes else None)
 
     def root(self) -> Failure:
-        """The deepest failure along the main causes."""
+        """Return the deepest failure along the main causes."""
         below = self.main()
         return self if below is None else below.root()
 
     def chain(self) -> list[Failure]:
-        """Along the main causes, the root cause last."""
+        """Return this failure and its main causes, the root cause last."""
         below = self.main()
         return [self, *(below.chain() if below else ())]
 
@@ -52,9 +52,9 @@ class Failure:
         return f"{self.node}: {self.text}"
 
     def as_dict(self) -> dict[str, object]:
-        """As JSON data: {node, code, message, evidence, advice, sensed, others}.
+        """Return it as JSON data: {node, code, message, evidence, advice, sensed, others}.
 
-        `others`: failures that led to it too, besides the one the chain goes on with.
+        `others`: the causes besides the one that the chain continues with.
         """
         main = self.main()
         return {
@@ -69,29 +69,29 @@ class Failure:
 
 
 class ReasonBook:
-    """Keeps the last failure of each node. A node's children are noted before the node itself (tick order).
+    """The last failure of each node. A node's children must be noted before the node itself (tick order).
 
-    Composites forget the status of a child when they move on, so that a failure must be written down when it happens.
+    Composites forget the status of a child when they move on, so each failure must be noted when it happens.
     """
 
     def __init__(self) -> None:
         self._last: dict[object, Failure] = {}
 
     def noted(self) -> dict[object, Failure]:
-        """The last failure of each node that has failed, by node id."""
+        """Return the last failure of each node that has failed, by node id."""
         return dict(self._last)
 
     def take_up(self, noted: Mapping[object, Failure]) -> None:
-        """Begin with what another book has noted."""
+        """Start with the failures that another book has noted."""
         self._last = dict(noted)
 
     def note(self, node: Behaviour, sensed: Mapping[str, float] | None = None) -> None:
-        """Write down why a node has just failed, and what was sensed then."""
+        """Note why a node has just failed, and what the robot sensed then."""
         failure = self._explain(node)
         self._last[node.id] = replace(failure, sensed=sensed) if sensed and failure.skill else failure
 
     def of(self, node: Behaviour) -> Failure:
-        """The last failure of a node."""
+        """Return the last failure of a node."""
         return self._last.get(node.id) or self._explain(node)
 
     def _explain(self, node: Behaviour) -> Failure:
@@ -107,7 +107,7 @@ class ReasonBook:
         return Failure(node.name, own.message, own, causes, skill=False)
 
     def _causes(self, node: Behaviour) -> tuple[Failure, ...]:
-        """What failed below it: of a selector every branch, of the others what failed last."""
+        """Return what failed below a node: of a selector every branch, of others the last failure."""
         if isinstance(node, Selector):
             return tuple(self._last[c.id] for c in node.children if c.id in self._last)
         failed = [c for c in node.children if c.status is Status.FAILURE]
@@ -115,7 +115,7 @@ class ReasonBook:
 
 
 def _words(node: Behaviour, causes: tuple[Failure, ...]) -> tuple[str, str]:
-    """Code and clause of a node that failed because of its children."""
+    """Return code and clause of a node that failed because of its children."""
     below = f"{causes[0].node!r} failed" if causes else node.feedback_message or "failed"
     if isinstance(node, Selector):
         return "alternatives_failed", f"all {len(node.children)} alternatives failed"
@@ -126,9 +126,9 @@ def _words(node: Behaviour, causes: tuple[Failure, ...]) -> tuple[str, str]:
 
 
 def sensed(observation: Observation) -> dict[str, float]:
-    """What stands beside a failure: {stamp_s, force_N, torque_Nm, aperture_m, x_B_m, y_B_m, z_B_m}, newest sample.
+    """Return what the robot senses at a failure: {stamp_s, force_N, torque_Nm, aperture_m, x_B_m, y_B_m, z_B_m}.
 
-    Force and torque are norms of the wrist's wrench; x, y, z is P in B.
+    All of the newest sample. Force and torque are norms of the wrist's wrench; x, y, z is P in B.
     """
     wrench, p = observation.wrench_S[-1], observation.position_B_P[-1]
     return {

@@ -114,12 +114,10 @@ class NodeKind:
 
     def convert_units(self, given: Map, findings: Findings) -> tuple[Map, str]:
         """Return the settings with comparisons in SI units, and the unit of what is compared."""
-        del findings
         return given, ""
 
     def default_name(self, node: NodeSpec) -> str:
         """Return the shown name of a node that the mission does not name."""
-        del node
         return self.name
 
     def wire(self, node: NodeSpec, given: Map, unit: str, reader: NodeReader) -> None:
@@ -140,12 +138,10 @@ class NodeKind:
 
     def requirements(self, node: NodeSpec, variables: VariableTable) -> Iterator[Requirement]:
         """Yield every read of a key or resource: keys in the order of its ports, then resources."""
-        del node, variables
         yield from ()
 
     def comparison(self, node: NodeSpec) -> tuple[str, ConditionSettings] | None:
         """Return the port that the node compares with a constant, and the comparison; None if it does not."""
-        del node
         return None
 
     def written_kinds(self, node: NodeSpec, port: str, held: Callable[[str], list[ValueKind]]) -> list[ValueKind]:
@@ -154,7 +150,6 @@ class NodeKind:
 
     def derived_kinds(self, node: NodeSpec, held: Callable[[str], list[ValueKind]]) -> list[tuple[str, ValueKind]]:
         """Return the kinds that the node writes because of what other keys may hold, each with its key."""
-        del node, held
         return []
 
     def effects(self, node: NodeSpec, variables: VariableTable) -> Iterator[tuple[int, set[int]]]:
@@ -164,17 +159,14 @@ class NodeKind:
 
     def gathers(self, node: NodeSpec) -> Mapping[str, tuple[str, str]]:
         """Return (source key, target key) of each port that gathers the values of one key in a tuple."""
-        del node
         return {}
 
     def ordered_by(self, node: NodeSpec) -> tuple[str, str] | None:
         """Return the key of a tuple, and the field of its items by which the node orders them; None: it does not."""
-        del node
         return None
 
     def required_keys(self, node: NodeSpec) -> list[str]:
         """Return the keys without which the node cannot begin."""
-        del node
         return []
 
     # -- what it does, for the checker ---------------------------------------------------------------------------------
@@ -197,20 +189,17 @@ class NodeKind:
 
     def memory(self, values: Values) -> Any:
         """Return what the node remembers while its first child runs, in a path search."""
-        del values
 
     def leave(
         self, search: PathSearch, node: NodeSpec, stack: Stack, succeeded: bool, values: Values, memory: Any
     ) -> Iterator[Position]:
         """Yield the next positions after a child of the node has ended; `stack` holds the nodes above it."""
-        del node, memory
         yield from search.leave(stack, self.outcome(succeeded), values)
 
     def step(
         self, search: PathSearch, node: NodeSpec, stack: Stack, values: Values, memory: Any
     ) -> Iterator[tuple[str, Position]]:
         """Yield (words, next position) for every outcome of a leaf; nothing if they are not known."""
-        del search, node, stack, values, memory
         yield from ()
 
     def max_runs(self, node: NodeSpec) -> RunCount:
@@ -221,34 +210,28 @@ class NodeKind:
 
     def no_effect(self, node: NodeSpec, *, fails: bool, succeeds: bool) -> str:
         """Return why the node changes nothing, given how its first child may end; empty if it does something."""
-        del node, fails, succeeds
         return ""
 
     def loses_gathered(self, node: NodeSpec) -> bool:
         """Return True if a failure of its child loses what it gathered, and the mission does not say that it may."""
-        del node
         return False
 
     def time_limit_s(self, node: NodeSpec) -> float | None:
         """Return the longest time its child may take, robot clock (s); None: no limit of its own."""
-        del node
         return None
 
     def catches_failure(self, node: NodeSpec) -> bool:
         """True if a failure below the node need not end the mission."""
-        del node
         return self.outcome(False)
 
     # -- building and showing ------------------------------------------------------------------------------------------
 
     def build(self, node: NodeSpec, children: list[Behaviour], made: BuildContext) -> Behaviour:
         """Return the py_trees node."""
-        del made
         return OutcomeDecorator(node.name, children[0], self.outcome)
 
     def label(self, node: NodeSpec) -> str:
         """Return what the node is, for people."""
-        del node
         return self.name
 
     def details(self, node: NodeSpec) -> list[str]:

@@ -56,7 +56,6 @@ class LoopKind(NodeKind):
 
     def exhausted(self, node: NodeSpec) -> bool:
         """Return True if the loop succeeds when `max_passes` have been made (default: as its last pass ends)."""
-        del node
         return self.repeat_on
 
     def once(self, flow: DataFlowAnalysis, node: NodeSpec, entry: int) -> Pass:
