@@ -1,1 +1,1 @@
-"""Backends: one package each, found through entry points."""
+"""Backends, one package each, registered as entry points; and the robot description that they share."""

@@ -1,8 +1,8 @@
-"""The Flexiv Rizon 4 with a Xense-like parallel gripper, as numbers. Shared by the simulator and the hardware backend.
+"""The Flexiv Rizon 4 with a Xense-like parallel gripper, as numbers; shared by the simulator and the hardware backend.
 
-Kinematics and inertia: the vendor's own description (flexivrobotics/flexiv_description, config/Rizon4), which an
-independent model of the arm agrees with (google-deepmind/mujoco_menagerie, flexiv_rizon4); the armature is from there.
-Position ranges: the vendor's RDK v1.5 URDF, 0.0873 rad (5 degrees) inside those of the description at each end.
+Kinematics and inertia: the vendor's description (flexivrobotics/flexiv_description, config/Rizon4). An independent
+model agrees with it (google-deepmind/mujoco_menagerie, flexiv_rizon4) and gives the armature.
+Position ranges: the vendor's RDK v1.5 URDF, at each end 0.0873 rad (5 degrees) inside those of the description.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from glotouch_bt.robot import Box, Capsule, Gripper, Joint, Link, Pose, RobotDes
 
 Y, Z = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
-# Inertia: vendor numbers, deliberately coarse ("blurred" in the vendor's words); about the centre of mass:
-# (ixx, iyy, izz, ixy, ixz, iyz). Every one of them is positive definite and obeys the triangle inequality (tested).
-# Capsules: from one joint's origin to the next, radii of the housings rounded up; they are ours, not the vendor's.
+# Inertia (ixx, iyy, izz, ixy, ixz, iyz) about the centre of mass: vendor numbers, coarse on purpose ("blurred" in the
+# vendor's words); a test checks that each is positive definite and obeys the triangle inequality.
+# Capsules: from one joint's origin to the next, with the housing's radius rounded up. Source: ours.
 _BASE = Link(
     name="base",
     mass_kg=3.8,
@@ -88,9 +88,9 @@ _TABLE = (
     ((-0.015, 0.073, 0.11), (0.0, -pi / 2, 0.0), Z, -2.9671, 2.9671, 4.8869, 39.0, 0.13),
 )
 
-# A parallel gripper of the Xense kind. Stroke, force, speed, gel window and gel depth are those of the conditions every
-# figure is measured under. Masses, boxes and the 0.20 m from the flange to the pads are ours: 0.884 kg of hand
-# (0.944 with the probe), fingers that reach 0.131 m below the body.
+# A parallel gripper of the Xense kind. Stroke, force, speed, gel window and gel depth are those of the measured
+# conditions. Source of the masses, the boxes and the 0.20 m from flange to pads: ours; the hand has 0.884 kg (0.944 kg
+# with the probe), and the fingers reach 0.131 m below the body.
 XENSE_GRIPPER = Gripper(
     pose_E_P=Pose(np.array([0.0, 0.0, 0.20])),
     mass_kg=0.704,

@@ -1,4 +1,4 @@
-"""Robot over MuJoCo: the arm, the tactile gripper, a really grasped probe and free objects. See `backend`."""
+"""Backend over MuJoCo: the arm, the tactile gripper, a graspable probe and free objects. See `backend`."""
 
 from glotouch_backends.mujoco.backend import MujocoBackend, build_world
 from glotouch_backends.mujoco.robot import MAX_HELD_DISTANCE_M

@@ -1,6 +1,6 @@
-"""Pictures of the simulated world. Needs an OpenGL of some kind (MUJOCO_GL=egl works without a display).
+"""Pictures of the simulated world. Needs OpenGL (MUJOCO_GL=egl works without a display).
 
-Imported only when a picture is asked for; a mission needs none of this.
+Only what draws imports this module; a mission does not.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy.typing as npt
 from glotouch_backends.mujoco.robot import MujocoRobot
 from glotouch_bt.robot import BackendError, UnknownName
 
-# (look-at point: K or holder or hand, distance m, azimuth deg, elevation deg)
+# (body to look at, distance m, azimuth deg, elevation deg)
 CAMERAS: dict[str, tuple[str, float, float, float]] = {
     "overview": ("container", 1.7, 140.0, -25.0),
     "container": ("container", 0.65, 160.0, -45.0),
@@ -23,11 +23,11 @@ CAMERAS: dict[str, tuple[str, float, float, float]] = {
 
 
 def render(robot: MujocoRobot, width: int = 960, height: int = 720, camera: str = "overview") -> npt.NDArray[np.uint8]:
-    """A picture (height, width, 3), RGB, of the world as it is now.
+    """Return a picture (height, width, 3), RGB, of the present world.
 
     Raises:
-        UnknownName: No such camera.
-        BackendError: No OpenGL here.
+        UnknownName: There is no such camera.
+        BackendError: OpenGL is not available.
     """
     if camera not in CAMERAS:
         raise UnknownName("camera", camera, CAMERAS)
@@ -42,10 +42,10 @@ def render(robot: MujocoRobot, width: int = 960, height: int = 720, camera: str 
     for g in np.flatnonzero(
         (robot.model.geom_group == 3) & np.isin(robot.model.geom_bodyid, robot.handles.object_bodies)
     ):
-        robot.model.geom_rgba[g, 3] = 0.0  # hulls and feet: only the true mesh is shown
+        robot.model.geom_rgba[g, 3] = 0.0  # hide hulls and feet, show the true mesh
     try:
         with mujoco.Renderer(robot.model, height, width) as renderer:
             renderer.update_scene(robot.data, view, option)
             return np.array(renderer.render())
-    except Exception as e:  # every OpenGL platform fails in its own way
+    except Exception as e:  # each OpenGL platform raises its own error
         raise BackendError(f"no picture: OpenGL is not available ({e})") from e

@@ -1,4 +1,4 @@
-"""The simulated robot: one `cycle` is ten steps of MuJoCo and as little Python as possible around them."""
+"""The simulated robot: one `cycle` is ten MuJoCo steps with little Python between them."""
 
 from __future__ import annotations
 
@@ -40,11 +40,12 @@ from glotouch_bt.robot import (
     World,
 )
 
-MAX_HELD_DISTANCE_M = 0.02  # the probe counts as held while its handle is this near the pads' mid-point
+MAX_HELD_DISTANCE_M = 0.02
+"""The probe counts as held while its handle is within this distance of P. Source: ours."""
 
 
 class MujocoRobot(Robot):
-    """See `Robot`. Made by `MujocoBackend.open`; the truth in it is for the referee only."""
+    """See `Robot`. Created by `MujocoBackend.open`; only the referee may read its truth."""
 
     def __init__(
         self,
@@ -86,7 +87,7 @@ class MujocoRobot(Robot):
         self._arm_ctrl, self._jaw_ctrl = self._ctrl[:, handles.arm_ctrl], self._ctrl[:, handles.jaw_ctrl]
         self._samples = np.zeros((STEPS, model.nsensordata))
         self._external = np.zeros((STEPS, 4, 6))  # torque, force
-        # Views of one step each, made once: the loop round mj_step only copies. Memoryviews copy three times faster.
+        # Views of one step each, made once, so that the loop around mj_step only copies (memoryviews copy 3x faster).
         rows = [
             (c.data, s.data, e.data)
             for c, s, e in zip(self._ctrl, self._samples, self._external.reshape(STEPS, -1), strict=True)
@@ -181,7 +182,7 @@ class MujocoRobot(Robot):
     def hold(self) -> None:
         """See `Robot`.
 
-        Time passes only in `cycle`, and a cycle without a motion brakes along the path to rest: nothing is left to do.
+        Time passes only in `cycle`, and a cycle without a motion brakes the arm to rest, so nothing is left to do.
         """
 
     def close(self) -> None:
@@ -196,13 +197,13 @@ class MujocoRobot(Robot):
         return self._keeper.take(self)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """See `Robot`. What `trace` remembers begins anew."""
+        """See `Robot`. The control trace starts again."""
         self._keeper.put_back(self, snapshot)
         if self.trace is not None:
             self.trace = ControlTrace(self.model, self.data)
 
     def _advance(self) -> None:
-        """Ten steps, looking at the wrench after each chunk."""
+        """Do the period's solver steps; check the wrench after each chunk."""
         model, data, step = self.model, self.data, mujoco.mj_step
         ctrl_now, sensed, external_now = self._ctrl_now, self._sensed, self._external_now
         trace = self.trace
@@ -214,25 +215,25 @@ class MujocoRobot(Robot):
                 step(model, data)
                 sample[:] = sensed
                 external[:] = external_now
-            # The sensor gives the force of hand on arm; the hand feels its opposite.
+            # The sensor reads the force of the hand on the arm; the hand feels its opposite.
             if self._guard.tripped is None and self._guard.check(-wrenches - self._expected, data.time):
                 self._stop_here()
 
     def _stop_here(self) -> None:
-        """Freeze the arm at its present posture, from the next step on; the jaws keep their grip."""
+        """Freeze the arm at its present posture from the next step on; the jaws keep their grip."""
         q = np.array(self.data.qpos[self.handles.arm_qpos])
         self._servo.reset(q)
         self._arm_ctrl[:] = q
 
     def _carry(self) -> Array:
-        """Joint torques (dof,) that carry the believed payload: J^T of its weight."""
+        """Return the joint torques (dof,) that carry the believed payload: J^T times its weight."""
         mass, com_P = self._payload_load or (0.0, np.zeros(3))
         h, (origin, rotation) = self.handles, self._pads_now
         mujoco.mj_jac(self.model, self.data, self._jacobian, None, origin + rotation @ com_P, h.hand_bodies.start)
         return self._jacobian[2, h.arm_dof] * (mass * GRAVITY_M_S2)
 
     def _observe(self, command: Command) -> Observation:
-        """The observation of the samples just taken."""
+        """Return the observation of the samples just taken."""
         s, rows = self._s, self._samples.copy()
         now_s = self._cycles * self.period_s
         wrench, quat = rows[:, s.force.start : s.torque.stop], rows[:, s.quat]
@@ -265,16 +266,16 @@ class MujocoRobot(Robot):
         )
 
     def _note_peak(self) -> None:
-        """Largest true contact force so far, on the hand and on the probe while it is in the hand."""
+        """Update the largest true contact force on the hand, and on the probe while it is held."""
         x, y, z = (self._probe_now - self._samples[-1, self._s.position]).tolist()
         self._counted[3] = x * x + y * y + z * z < MAX_HELD_DISTANCE_M**2
         force = (self._counted @ self._external)[:, 3:]
         flat = force.ravel()
-        if flat @ flat > self.peak_force_N**2:  # else not one of them can be a new peak
+        if flat @ flat > self.peak_force_N**2:  # otherwise no sample can be a new peak
             self.peak_force_N = max(self.peak_force_N, float((force * force).sum(axis=1).max()) ** 0.5)
 
     def _set_payload(self) -> None:
-        """Advance a payload request by one period; the block of the period in which it is done is compensated."""
+        """Advance a payload request by one period; the block of its last period is compensated already."""
         if self._payload is None:
             return
         self._payload.periods -= 1
@@ -286,7 +287,7 @@ class MujocoRobot(Robot):
             self._payload = None
 
     def _add_to_tare(self, measured: Array, up_S: Array) -> None:
-        """Give a block to a tare under way; the block of the period in which it is done is tared."""
+        """Add a block to a pending tare; the block of its last period is tared already."""
         if self._tare is not None and self._tare.add(measured):
             self._wrist.tare(self._tare.mean, up_S)
             self._tare.ticket.done = True

@@ -1,4 +1,4 @@
-"""The true world of one trial: what the conditions make of the nominal one. Skills never see it."""
+"""Ground truth of one trial: the nominal world changed by the conditions. Skills never see it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from glotouch_bt.robot.scene import Mesh, Placement, draw_layout, load_folder, s
 
 @dataclass(frozen=True)
 class ObjectTruth:
-    """One object: its mesh, where it is put (in the true K), its mass and its friction on the floor."""
+    """One object: its mesh, its place in the true K, its mass, and its friction on the floor."""
 
     mesh: Mesh
     place: Placement
@@ -23,13 +23,13 @@ class ObjectTruth:
 
 @dataclass(frozen=True)
 class Truth:
-    """All that was drawn for a trial.
+    """All random draws of a trial.
 
     Attributes:
         pose_B_K: True container frame.
-        pose_handle_shaft: The probe's shaft frame (origin at the handle's centre) in its handle's frame: identity plus
-            the grasp offset, so that the ball is not exactly where the nominal grasp says.
-        pad_friction: PadContacts on anything.
+        pose_handle_shaft: The shaft frame (origin at the handle's centre) in the handle's frame: identity plus the
+            grasp offset, so that the ball is not exactly at its nominal place.
+        pad_friction: Friction of the pads.
         objects: In the order of the world's object set.
         fixed: The objects are bolted to the container's floor instead of standing on it.
     """
@@ -42,7 +42,7 @@ class Truth:
 
 
 def rotation_vector(v: Array) -> Pose:
-    """The pure rotation by the vector v (3,), rad."""
+    """Return the pure rotation by the vector v (3,), rad."""
     angle = float(np.linalg.norm(v))
     axis = v / angle if angle > 0.0 else np.array([0.0, 0.0, 1.0])
     quat = np.array([np.cos(0.5 * angle), *(np.sin(0.5 * angle) * axis)])
@@ -57,7 +57,7 @@ def _true_container(world: World, conditions: Conditions, rng: np.random.Generat
 
 
 def _true_shaft(world: World, conditions: Conditions, rng: np.random.Generator) -> Pose:
-    """Tilt about the handle's centre, then a shift across the shaft."""
+    """Draw a tilt about the handle's centre and a shift across the shaft."""
     shift = conditions.tip_offset_sd_m * rng.standard_normal(2)
     tilt = np.deg2rad(conditions.tip_tilt_sd_deg) * rng.standard_normal(2)
     return Pose(np.array([shift[0], shift[1], 0.0])) @ rotation_vector(np.array([tilt[0], tilt[1], 0.0]))
@@ -66,16 +66,16 @@ def _true_shaft(world: World, conditions: Conditions, rng: np.random.Generator) 
 def draw_truth(
     world: World, conditions: Conditions, seed: int, layout: Mapping[str, tuple[float, float, float]] | None = None
 ) -> Truth:
-    """Draw the trial.
+    """Draw the ground truth of a trial.
 
     Args:
         world: The nominal world.
         conditions: The disturbances.
-        seed: Source of all draws, one stream a purpose.
-        layout: (x m, y m, yaw rad) in K for some objects by name, instead of a random place; if given it must name all.
+        seed: Seed of all draws, with one random stream a purpose.
+        layout: (x m, y m, yaw rad) in K of every object by name, instead of random places.
 
     Raises:
-        BadInput: Meshes that cannot be used, that do not fit, or that the layout leaves out.
+        BadInput: A mesh is not usable, the objects do not fit, or the layout leaves one out.
     """
     meshes = load_folder(world.objects.folder, world.objects.names)
     if layout is None:

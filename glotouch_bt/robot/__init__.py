@@ -4,7 +4,17 @@
 their names; see `observation` for the frames.
 """
 
-from glotouch_bt.robot.command import HOLD, Command, GripperTarget, JointSetpoint, Request, SetPayload, Tare, Ticket
+from glotouch_bt.robot.command import (
+    HOLD,
+    Command,
+    GripperTarget,
+    JointSetpoint,
+    PendingTicket,
+    Request,
+    SetPayload,
+    Tare,
+    Ticket,
+)
 from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription
 from glotouch_bt.robot.errors import (
     BackendError,
@@ -19,7 +29,15 @@ from glotouch_bt.robot.errors import (
     UnknownName,
 )
 from glotouch_bt.robot.fake import FakeRobot
-from glotouch_bt.robot.geometry import Array, Pose, frozen_array, matrix_to_quat, quat_to_matrix
+from glotouch_bt.robot.geometry import (
+    Array,
+    Pose,
+    cross_matrix,
+    frozen_array,
+    matrix_to_quat,
+    quat_to_matrix,
+    rpy_to_matrix,
+)
 from glotouch_bt.robot.interface import Backend, Robot, Snapshot
 from glotouch_bt.robot.limits import Limits
 from glotouch_bt.robot.observation import GripperState, Observation, TactileFrame
@@ -53,6 +71,7 @@ __all__ = [
     "ObjectSet",
     "Observation",
     "ParamError",
+    "PendingTicket",
     "Pose",
     "Probe",
     "Request",
@@ -68,8 +87,10 @@ __all__ = [
     "UnknownName",
     "World",
     "backend_entry_points",
+    "cross_matrix",
     "frozen_array",
     "load_backend",
     "matrix_to_quat",
     "quat_to_matrix",
+    "rpy_to_matrix",
 ]

@@ -98,3 +98,11 @@ class Ticket(Protocol):
     def error(self) -> str | None:
         """Reason of the failure, or None."""
         ...
+
+
+@dataclass
+class PendingTicket:
+    """A `Ticket` that a robot completes."""
+
+    done: bool = False
+    error: str | None = None

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from glotouch_bt.robot.geometry import Pose
+import numpy as np
+
+from glotouch_bt.robot.geometry import Array, Pose
 
 Vec3 = tuple[float, float, float]
 
@@ -105,6 +107,13 @@ class Gripper:
     pad_window_m: tuple[float, float]
     pad_shape: tuple[int, int]
     pad_depth_m: float
+
+    def mass_and_com_E(self) -> tuple[float, Array]:
+        """Return mass kg and centre of mass (3,) in E of the body with both fingers."""
+        (x, _, z), fingers = self.finger.centre_m, 2 * self.finger_mass_kg
+        centre = self.pose_E_P.apply((x, 0.0, z))
+        mass = self.mass_kg + fingers
+        return mass, (self.mass_kg * np.asarray(self.com_E_m) + fingers * centre) / mass
 
     @property
     def fingertip_below_P_m(self) -> float:

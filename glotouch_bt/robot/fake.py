@@ -16,7 +16,7 @@ import numpy.typing as npt
 from glotouch_bt.robot.command import Command, GripperTarget, Request, SetPayload, Tare
 from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription
 from glotouch_bt.robot.errors import BadInput, ParamError, SafetyStop
-from glotouch_bt.robot.geometry import Array, Pose, frozen_array
+from glotouch_bt.robot.geometry import Array, Pose, cross_matrix, frozen_array
 from glotouch_bt.robot.interface import Backend, Robot
 from glotouch_bt.robot.limits import Limits
 from glotouch_bt.robot.observation import GripperState, Observation, TactileFrame
@@ -99,8 +99,7 @@ def forward(description: RobotDescription, q: npt.ArrayLike) -> Pose:
 
 def _about(axis: tuple[float, float, float], angle: float) -> Array:
     """Return the rotation matrix (3, 3) about a unit axis (Rodrigues)."""
-    x, y, z = axis
-    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    k = cross_matrix(axis)
     return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k), dtype=np.float64)
 
 

@@ -60,6 +60,24 @@ def matrix_to_quat(m: Array) -> Array:
     return q if q[0] >= 0 else -q
 
 
+def rpy_to_matrix(rpy_rad: tuple[float, float, float]) -> Array:
+    """Return the rotation matrix (3, 3) of fixed-axis roll, pitch, yaw: Rz(yaw) Ry(pitch) Rx(roll)."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy_rad), np.sin(rpy_rad)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def cross_matrix(p: npt.ArrayLike) -> Array:
+    """Return the matrix (3, 3) that maps v to the cross product of p (3,) and v."""
+    x, y, z = np.asarray(p, dtype=np.float64)
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
 @dataclass(frozen=True)
 class Pose:
     """A frame written in another one.

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from glotouch_backends.flexiv_xense.client.link import OPEN_S, DriverLink
-from glotouch_backends.flexiv_xense.client.options import Options, read_options
+from glotouch_backends.flexiv_xense.client.options import ClientOptions, read_options
 from glotouch_backends.flexiv_xense.client.process import DriverProcess
 from glotouch_backends.flexiv_xense.client.referee import RemoteReferee
 from glotouch_backends.flexiv_xense.client.robot import FlexivXenseRobot
@@ -16,6 +16,7 @@ from glotouch_backends.flexiv_xense.driver import (
     ArmLimits,
     Block,
     Devices,
+    DeviceSettings,
     HandLimits,
     Open,
     Opened,
@@ -33,13 +34,10 @@ def _pose(pose: Pose) -> tuple[float, ...]:
 
 
 def _tool(description: RobotDescription) -> ToolData:
-    """The bare hand: gripper body and both fingers."""
+    """Return the bare hand: gripper body and both fingers."""
     g = description.gripper
-    fingers = 2.0 * g.finger_mass_kg
-    middle = g.pose_E_P.apply((g.finger.centre_m[0], 0.0, g.finger.centre_m[2]))
-    mass = g.mass_kg + fingers
-    com = [(g.mass_kg * c + fingers * m) / mass for c, m in zip(g.com_E_m, middle.tolist(), strict=True)]
-    return ToolData(mass_kg=mass, com_E_m=tuple(com), pose_E_P=_pose(g.pose_E_P))
+    mass, com = g.mass_and_com_E()
+    return ToolData(mass_kg=mass, com_E_m=tuple(com.tolist()), pose_E_P=_pose(g.pose_E_P))
 
 
 def _arm_limits(description: RobotDescription, limits: Limits) -> ArmLimits:
@@ -58,7 +56,7 @@ def _arm_limits(description: RobotDescription, limits: Limits) -> ArmLimits:
 
 
 def _within(description: RobotDescription, opened: Opened) -> RobotDescription:
-    """The description with the device's own joint ranges where those are narrower."""
+    """Return the description with the device's joint ranges where those are narrower."""
     joints = tuple(
         replace(j, lower_rad=max(j.lower_rad, low), upper_rad=min(j.upper_rad, high))
         for j, low, high in zip(description.joints, opened.q_min, opened.q_max, strict=True)
@@ -81,28 +79,29 @@ class FlexivXenseBackend(Backend):
         self._description, self._limits = description, limits or Limits()
 
     def open(self, world: World, conditions: Conditions, seed: int, options: Mapping[str, object]) -> Robot:
-        """See `Backend`; options in `Options`. Conditions and seed are for simulated devices."""
-        return self.connect(world, conditions, seed, read_options(options))
+        """See `Backend`; options in `ClientOptions` and `DeviceSettings`; conditions and seed for simulated devices."""
+        return self.connect(world, conditions, seed, *read_options(options))
 
     def look(self, world: World, conditions: Conditions, options: Mapping[str, object]) -> Robot:
-        """Connect without enabling, switching or commanding anything: for `glotouch doctor`."""
-        return self.connect(world, conditions, 0, read_options(options), move=False)
+        """Connect without enabling, switching or commanding anything, for `glotouch doctor`."""
+        return self.connect(world, conditions, 0, *read_options(options), move=False)
 
     def is_real(self, options: Mapping[str, object]) -> bool:
-        """True if these options mean a real arm."""
-        return read_options(options).devices == "real"
+        """Return True if the options select a real arm."""
+        return read_options(options)[0].devices == "real"
 
     def connect(
         self,
         world: World,
         conditions: Conditions,
         seed: int,
-        options: Options,
+        options: ClientOptions,
+        settings: DeviceSettings,
         *,
         move: bool = True,
         on_progress: Callable[[str], None] | None = None,
     ) -> FlexivXenseRobot:
-        """As `open`, for those who want to see it coming up, or (`move` false) only look: nothing is enabled."""
+        """Open a robot with converted options; report progress, and enable nothing if `move` is False."""
         process: DriverProcess | None = None
         if not options.driver:
             process = DriverProcess(options)
@@ -110,7 +109,7 @@ class FlexivXenseBackend(Backend):
         try:
             if process is not None:
                 if options.devices == "simulated":
-                    process.put_world(world, conditions, seed, options.simulated)
+                    process.put_world(world, conditions, seed, options.world)
                 process.start()
             link = DriverLink(
                 options.driver or (process.address if process else ""),
@@ -118,7 +117,7 @@ class FlexivXenseBackend(Backend):
                 paced=not options.lockstep,
                 keys=Path(options.keys) if options.keys else None,
             )
-            request = self._request(options, process, link.number(), move)
+            request = self._request(options, settings, process, link.number(), move)
             opened = link.ask(request, Opened, limit_s=OPEN_S, on_progress=on_progress or (lambda _: None))
             link.beat()
             first = link.wait(0, Block, limit_s=10.0)
@@ -133,26 +132,16 @@ class FlexivXenseBackend(Backend):
         robot.paced = not options.lockstep
         return robot
 
-    def _request(self, options: Options, process: DriverProcess | None, number: int, move: bool) -> Open:
+    def _request(
+        self, options: ClientOptions, settings: DeviceSettings, process: DriverProcess | None, number: int, move: bool
+    ) -> Open:
         hand = self._description.gripper
         simulated = options.devices == "simulated"
         kind = "real" if not simulated else "simulated" if options.lockstep else "cell"
         return Open(
             number=number,
             protocol=PROTOCOL,
-            devices=Devices(
-                kind=kind,
-                robot=options.robot,
-                api=options.api,
-                network=options.network,
-                gripper=options.gripper,
-                pads=(options.left_pad, options.right_pad) if options.left_pad else (),
-                world="" if process is None else process.world,
-                wrench=options.wrench,
-                feed_forward=options.feed_forward,
-                mirror=options.mirror,
-                link_loss=options.link_loss,
-            ),
+            devices=Devices(kind=kind, settings=settings, world="" if process is None else process.world),
             tool=_tool(self._description),
             arm=_arm_limits(self._description, self._limits),
             hand=HandLimits(
@@ -169,7 +158,7 @@ class FlexivXenseBackend(Backend):
         )
 
     def referee(self, robot: Robot) -> Referee | None:
-        """See `Backend`: only where the devices are simulated."""
+        """See `Backend`; None for real devices."""
         if isinstance(robot, FlexivXenseRobot) and robot.info["devices"] != "real":
             return RemoteReferee(robot.link)
         return None

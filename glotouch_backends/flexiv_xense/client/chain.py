@@ -1,26 +1,14 @@
-"""Forward kinematics and Jacobian of a described arm, by chaining its frames (Lynch and Park, Modern Robotics).
+"""Forward kinematics and Jacobian of a described arm (Lynch and Park, Modern Robotics).
 
-The arm takes Cartesian setpoints with their velocity; the seam gives joint ones with a pose. This is the bridge,
-and the check that both say the same.
+The arm needs Cartesian setpoints with a twist, while our commands are joint setpoints with a pose. The chain gives the
+twist, and checks that joints and pose agree.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from glotouch_bt.robot import Array, Pose, RobotDescription
-
-
-def _fixed(rpy: tuple[float, float, float]) -> Array:
-    """(3, 3) of fixed-axis roll, pitch, yaw: Rz Ry Rx."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
+from glotouch_bt.robot import Array, Pose, RobotDescription, cross_matrix, rpy_to_matrix
 
 
 class Chain:
@@ -31,15 +19,15 @@ class Chain:
     """
 
     def __init__(self, description: RobotDescription) -> None:
-        self._rotations = [_fixed(j.origin_rpy_rad) for j in description.joints]
+        self._rotations = [rpy_to_matrix(j.origin_rpy_rad) for j in description.joints]
         self._origins = [np.array(j.origin_m) for j in description.joints]
         self._axes = [np.array(j.axis) for j in description.joints]
-        crosses = [np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) for x, y, z in self._axes]
+        crosses = [cross_matrix(axis) for axis in self._axes]
         self._crosses = [(k, k @ k) for k in crosses]
         self._last_P = description.pose_last_E @ description.gripper.pose_E_P
 
     def pose_and_twist(self, q: Array, dq: Array) -> tuple[Pose, Array]:
-        """Pose of P in B at `q` (dof,) rad, and its twist (6,), linear then angular, in B, for `dq` (dof,) rad/s."""
+        """Return pose of P at `q` (dof,) rad and its twist (6,) at `dq` (dof,) rad/s, linear then angular; in B."""
         rotation, origin = np.eye(3), np.zeros(3)
         sines, cosines = np.sin(q).tolist(), (1.0 - np.cos(q)).tolist()
         points, axes = [], []

@@ -1,7 +1,7 @@
 """Kill drills on simulated devices: `python -m glotouch_backends.flexiv_xense.client.drills --trials 20 --out DIR`.
 
-A mission runs on the wall's clock; at a random moment the driver, or the executive, is killed (SIGKILL). How long the
-arm then takes to stand still is read from the log of whoever lives on: the simulated cell, or the driver.
+A mission runs on wall time. At a random moment the driver or the executive is killed (SIGKILL). The log of the
+surviving process (the simulated cell or the driver) shows how long the arm took to stand still.
 """
 
 from __future__ import annotations
@@ -25,8 +25,13 @@ from glotouch_backends.flexiv_xense.driver import WallClock
 CLOCK = WallClock()
 VICTIMS = ("driver", "executive")
 ALLOWED_S = {"driver": 0.6, "executive": 0.4}
-"""docs/guides/hardware.md, "What stops the arm"."""
-OPEN_S, AFTER_S, PATIENCE_S = 180.0, 15.0, 60.0
+"""Longest time to standstill after each kill. Source: docs/guides/hardware.md, "What stops the arm"."""
+OPEN_S = 180.0
+"""Longest wait for the devices to open."""
+AFTER_S = 15.0
+"""Longest wait for the standstill after the kill."""
+EXIT_S = 60.0
+"""Longest wait for the executive to end."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +40,11 @@ class Drill:
 
     Attributes:
         victim: driver or executive.
-        moment_s: After the devices were ready.
-        speed_m_s: Of the tool when its standing still began to be waited for.
-        standstill_s: From the kill to standing still; None if that was never seen.
-        peak_force_N: Largest contact force from then on.
-        exit_code: Of the executive (None if it was the victim).
+        moment_s: Time of the kill after the devices were ready.
+        speed_m_s: Speed of the tool when the survivor began to brake.
+        standstill_s: Time from the kill to standstill; None if none was logged.
+        peak_force_N: Largest contact force after the kill.
+        exit_code: Exit code of the executive; None if it was the victim.
     """
 
     victim: str
@@ -51,7 +56,7 @@ class Drill:
 
     @property
     def passed(self) -> bool:
-        """In time, and a surviving executive said so with exit code 3."""
+        """True if the arm stood in time and a surviving executive ended with exit code 3."""
         in_time = self.standstill_s is not None and self.standstill_s <= ALLOWED_S[self.victim]
         return in_time and self.exit_code in (None, 3)
 
@@ -81,7 +86,7 @@ def _children(pid: int) -> list[int]:
 
 
 def _end(pids: list[int]) -> None:
-    """Tell what is left of a trial to end."""
+    """Terminate the remaining processes of a trial."""
     for pid in pids:
         try:
             os.kill(pid, signal.SIGTERM)
@@ -91,7 +96,7 @@ def _end(pids: list[int]) -> None:
 
 def run_drill(victim: str, moment_s: float, mission: str, seed: int, folder: Path, settings: list[str],
               objects: Path | None = None) -> Drill:  # fmt: skip
-    """One mission, one kill."""
+    """Run one mission and kill one process."""
     folder.mkdir(parents=True, exist_ok=True)
     driver_log, cell_log = folder / "driver.jsonl", folder / "cell.jsonl"
     options = ["devices=simulated", "pace=real", f"log={driver_log}", *settings]
@@ -106,14 +111,14 @@ def run_drill(victim: str, moment_s: float, mission: str, seed: int, folder: Pat
         executive.kill()
         raise RuntimeError(f"the devices did not open: {(folder / 'executive.txt').read_text()[-500:]}")
     CLOCK.sleep_until(CLOCK.now_s() + moment_s)
-    if executive.poll() is not None:  # nothing was shown; counts as not passed
+    if executive.poll() is not None:  # the mission ended before the kill; counts as not passed
         return Drill(victim, moment_s, float("nan"), None, None, executive.returncode)
     others = [pid for pid in _children(executive.pid) if pid != opened["pid"]]
     killed_s = time.monotonic()
     os.kill(opened["pid"] if victim == "driver" else executive.pid, signal.SIGKILL)
     if victim == "driver":
         drill = _after_driver(moment_s, cell_log)
-        code: int | None = executive.wait(PATIENCE_S)
+        code: int | None = executive.wait(EXIT_S)
     else:
         drill = _after_executive(moment_s, driver_log, killed_s)
         executive.wait()
@@ -124,7 +129,7 @@ def run_drill(victim: str, moment_s: float, mission: str, seed: int, folder: Pat
 
 
 def _after_driver(moment_s: float, cell_log: Path) -> Drill:
-    """The cell sees the link end in the moment of the kill."""
+    """Read the cell's log; the cell sees the link end at the moment of the kill."""
     still = _await(lambda: _event(cell_log, "standstill"), AFTER_S)
     lost = _event(cell_log, "client lost")
     speed = float("nan") if lost is None else lost["speed_m_s"]
@@ -134,14 +139,14 @@ def _after_driver(moment_s: float, cell_log: Path) -> Drill:
 
 
 def _after_executive(moment_s: float, driver_log: Path, killed_s: float) -> Drill:
-    """The driver's clock is this machine's monotonic one. A silence that had begun before counts from the kill."""
+    """Read the driver's log, which has this machine's monotonic clock. An earlier hold counts from the kill."""
 
     def later(e: Mapping[str, Any]) -> bool:
         return bool(e["monotonic_s"] >= killed_s)
 
     _await(lambda: _event(driver_log, "client lost", later), AFTER_S)
     still, silent = _event(driver_log, "standstill", later), _event(driver_log, "no command", later)
-    if still is None and silent is None:  # it stood already, held in a silence before the kill
+    if still is None and silent is None:  # the arm stood already, held before the kill
         return Drill("executive", moment_s, 0.0, 0.0, 0.0, None)
     speed = 0.0 if silent is None else silent["speed_m_s"]
     if still is None:
@@ -150,11 +155,11 @@ def _after_executive(moment_s: float, driver_log: Path, killed_s: float) -> Dril
 
 
 def main(argv: list[str] | None = None) -> int:
-    """The campaign: half the trials for each victim; writes and prints a summary. 1 if one was too late."""
+    """Kill each victim in turn; write and print a summary. Return 1 if a trial failed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--trials", type=int, default=20, help="kills of each victim")
-    parser.add_argument("--seed", type=int, default=0, help="of the moments, and of the first mission")
-    parser.add_argument("--window", type=float, default=60.0, help="moments lie within so many seconds of readiness")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the moments, and of the first mission")
+    parser.add_argument("--window", type=float, default=60.0, help="latest moment after the devices are ready, s")
     parser.add_argument("--mission", default="retrieve")
     parser.add_argument("--set", dest="settings", action="append", default=["target=apple"], metavar="NAME=VALUE")
     parser.add_argument("--objects", type=Path, help="folder of STL files in metres: fewer make a shorter mission")

@@ -1,4 +1,4 @@
-"""The client's end of the link to the driver: requests with numbers, answers with limits on the wait, heartbeats."""
+"""The client's socket to the driver: numbered requests, answers with bounded waits, heartbeats."""
 
 from __future__ import annotations
 
@@ -28,21 +28,25 @@ from glotouch_bt.robot import BackendError, ParamError, StaleReading
 
 A = TypeVar("A")
 BEAT_S = 0.1
+"""Interval between two heartbeats of the client."""
 MAX_SILENCE_S = 0.5
-"""A paced driver that says nothing for this long is lost; it sends a heartbeat every 0.05 s."""
+"""A paced driver is lost after this time without a message; it sends a heartbeat every 0.05 s. Source: ours."""
 SLOW_REQUEST_S = 10.0
-"""The same while a slow request is under way: the vendor's blocking calls may keep the whole driver waiting."""
+"""The same while a slow request is pending: a blocking vendor call may stop the whole driver. Source: ours."""
 OPEN_S = 120.0
+"""Longest wait for the devices to open. Source: ours."""
 LOCKSTEP_S = 120.0
+"""Longest wait for an answer in lock-step. Source: ours."""
 POLL_S = 0.2
+"""Interval between two checks of the driver's process while waiting."""
 
 
 class DeviceError(BackendError):
-    """A device failed; the message ends with the arm's own event log."""
+    """A device failed; the message ends with the arm's last event."""
 
 
 def failure(answer: Failed) -> BackendError:
-    """Our error for the driver's, with the arm's event log in its text."""
+    """Return our error for the driver's, with the arm's event log in its notes."""
     if answer.kind == "stale":
         error: BackendError = StaleReading(answer.message, answer.age_s, answer.limit_s)
     else:
@@ -57,23 +61,23 @@ def failure(answer: Failed) -> BackendError:
 
 
 class DriverLink:
-    """One client of one driver.
+    """Connection to one driver.
 
     Args:
         address: ipc://PATH or tcp://HOST:PORT.
-        alive: Tells why the driver's process is gone, or None while it runs.
-        paced: The driver must be heard of all the time.
+        alive: Returns why the driver's process has ended, or None while it runs.
+        paced: True if the driver sends heartbeats.
         keys: Folder with client.key_secret and driver.key, for tcp.
 
     Attributes:
-        slow_request: A slow request is under way; see `SLOW_REQUEST_S`.
+        slow_request: True while a slow request is pending; see `SLOW_REQUEST_S`.
     """
 
     def __init__(self, address: str, alive: Callable[[], str | None], *, paced: bool, keys: Path | None = None) -> None:
         self._alive, self._paced = alive, paced
         self._address, self._keys = address, keys
         self._context = zmq.Context()
-        self._name = uuid.uuid4().hex.encode()  # in hex, so that no name ends as a heart's does, or begins with zero
+        self._name = uuid.uuid4().hex.encode()  # hex: it never ends with HEARTBEAT_SUFFIX or begins with a zero byte
         self._socket = self._connect(self._name)
         self.slow_request = False
         self._number = 0
@@ -94,12 +98,12 @@ class DriverLink:
         return socket
 
     def number(self) -> int:
-        """A number for the next request."""
+        """Return a number for the next request."""
         self._number += 1
         return self._number
 
     def beat(self) -> None:
-        """Send heartbeats from now on."""
+        """Start sending heartbeats."""
         self._heart = threading.Thread(target=self._beat_on, daemon=True)
         self._heart.start()
 
@@ -127,8 +131,8 @@ class DriverLink:
         """Send a request and wait for its answer.
 
         Raises:
-            BackendError: The driver is gone or silent, or says that a device failed.
-            ParamError: It refused a command.
+            BackendError: The driver has ended or is silent, or a device failed.
+            ParamError: The driver refused a command.
         """
         self.post(request)
         return self.wait(request.number, answer, limit_s=limit_s, on_progress=on_progress)  # type: ignore[union-attr]
@@ -141,7 +145,7 @@ class DriverLink:
         limit_s: float = LOCKSTEP_S,
         on_progress: Callable[[str], None] | None = None,
     ) -> A:
-        """The answer to a request sent before; errors as in `ask`."""
+        """Wait for the answer to an earlier request; errors as in `ask`."""
         began = heard = time.perf_counter()
         quiet_s = limit_s
         if self._paced and on_progress is None:
@@ -154,7 +158,7 @@ class DriverLink:
                 if gone is not None:
                     raise BackendError(f"the driver has ended: {gone}")
                 if now - heard > quiet_s:
-                    raise BackendError(f"nothing heard of the driver for {now - heard:.2f} s (limit {quiet_s:g} s)")
+                    raise BackendError(f"nothing heard from the driver for {now - heard:.2f} s (limit {quiet_s:g} s)")
                 continue
             heard = now
             if isinstance(answer, OpenProgress) and on_progress is not None:
@@ -178,7 +182,7 @@ class DriverLink:
         return answer
 
     def close(self) -> None:
-        """Idempotent; heartbeats end."""
+        """Close the socket and end the heartbeats. Idempotent."""
         if self._closed:
             return
         self._closed = True
@@ -193,4 +197,4 @@ def _send(socket: zmq.Socket[bytes], body: bytes) -> None:
     try:
         socket.send(body, zmq.NOBLOCK)
     except zmq.Again:
-        return  # nobody takes it; whoever waits for an answer finds out
+        return  # no receiver; waiting for the answer will fail

@@ -1,4 +1,4 @@
-"""The driver's process: started in a session of its own (Ctrl-C must not reach it), reached by a private socket."""
+"""The driver's process: in its own session, so that Ctrl-C does not reach it, and behind a private socket."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
 from pathlib import Path
 
-from glotouch_backends.flexiv_xense.client.options import Options
+from glotouch_backends.flexiv_xense.client.options import ClientOptions
+from glotouch_backends.options import WorldOptions
 from glotouch_bt.robot import BackendError, Conditions, World
 
 END_S = 15.0
@@ -19,15 +19,15 @@ CELL = "glotouch_backends.flexiv_xense.simulated.cell"
 
 
 class DriverProcess:
-    """A driver of our own, and for simulated devices at real pace the cell they live in.
+    """A driver that we start, and for simulated devices at real pace the cell that contains them.
 
     Attributes:
-        address: Where it listens.
-        world: What the driver is told about the simulated world: a file or the cell's address.
-        folder: Private; removed at the end, by the driver if this process is killed.
+        address: Address of the driver's socket.
+        world: File with the simulated world, or the cell's address.
+        folder: Private folder; removed at the end, by the driver if this process is killed.
     """
 
-    def __init__(self, options: Options) -> None:
+    def __init__(self, options: ClientOptions) -> None:
         self._options = options
         self.folder = Path(tempfile.mkdtemp(prefix="glotouch-"))  # mode 0700
         self.address = f"ipc://{self.folder / 'driver'}"
@@ -39,13 +39,13 @@ class DriverProcess:
 
     @property
     def pid(self) -> int:
-        """Of the driver."""
+        """Process id of the driver; 0 before it starts."""
         return self._process.pid if self._process is not None else 0
 
-    def put_world(self, world: World, conditions: Conditions, seed: int, options: Mapping[str, object]) -> None:
-        """Leave the simulated world in a file that only we can read; for pace=real, start the cell with it."""
+    def put_world(self, world: World, conditions: Conditions, seed: int, options: WorldOptions) -> None:
+        """Write the simulated world to a private file; for pace=real, start the cell with it."""
         path = self.folder / "world.pickle"
-        path.write_bytes(pickle.dumps((world, conditions, seed, dict(options))))
+        path.write_bytes(pickle.dumps((world, conditions, seed, options)))
         path.chmod(0o600)
         self.world = str(path)
         if self._options.pace == "real":
@@ -54,7 +54,7 @@ class DriverProcess:
             self.world = address
 
     def start(self) -> None:
-        """Begin the driver; whether it comes up shows when it is talked to."""
+        """Start the driver; the first request shows whether it came up."""
         python = self._options.python
         module = HERE if python == sys.executable else INSTALLED
         arguments = ["--address", self.address, "--log", str(self.driver_log), "--private", str(self.folder)]
@@ -71,7 +71,7 @@ class DriverProcess:
             raise BackendError(f"{command[0]} cannot be started: {e}") from e
 
     def gone(self) -> str | None:
-        """Why the driver has ended, or None while it runs."""
+        """Return why the driver has ended, or None while it runs."""
         if self._process is None or self._process.poll() is None:
             return None
         said = self.driver_log.with_name("driver.txt").read_text(errors="replace").strip().splitlines()
@@ -79,7 +79,7 @@ class DriverProcess:
         return why if not said else f"{why}: {said[-1]}"
 
     def end(self) -> None:
-        """Wait for the driver to end by itself, else end it; then the cell. Idempotent."""
+        """Wait for the driver to end, kill it if it does not, then end the cell. Idempotent."""
         for process in (self._process, self._cell):
             if process is None:
                 continue

@@ -1,4 +1,4 @@
-"""The truth of a simulated world, asked over the link; the driver passes question and answer on unread."""
+"""Ground truth of a simulated world over the link; the driver forwards question and answer undecoded."""
 
 from __future__ import annotations
 
@@ -12,45 +12,45 @@ from glotouch_bt.robot.simulation import BareSteps, TrueObject
 
 
 class RemoteReferee:
-    """See `robot.referee.Referee`.
+    """See `robot.simulation.Referee`.
 
     Args:
-        link: To a driver with simulated devices.
+        link: Connection to a driver with simulated devices.
     """
 
     def __init__(self, link: DriverLink) -> None:
         self._link = link
 
     def _ask(self, method: str, *arguments: object) -> object:
-        # What comes back was written by our own child process, over a socket only we can open.
+        # Pickle is safe here: our own child process wrote the answer, over a socket only we can open.
         question = pickle.dumps((method, arguments))
         answer = self._link.ask(RefereeRequest(number=self._link.number(), question=question), RefereeAnswer)
         return cast("object", pickle.loads(answer.answer))
 
     def objects(self) -> list[TrueObject]:
-        """All objects, now."""
+        """See `Referee`."""
         return cast("list[TrueObject]", self._ask("objects"))
 
     def pose_B_K(self) -> Pose:
-        """The true container frame in B."""
+        """See `Referee`."""
         return cast("Pose", self._ask("pose_B_K"))
 
     def tip_B_m(self) -> Array:
-        """(3,) true centre of the probe's ball."""
+        """See `Referee`."""
         return cast("Array", self._ask("tip_B_m"))
 
     def push_tip(self, force_B_N: Array) -> None:
-        """Pull the probe by a force (3,) at the ball's centre from now on."""
+        """See `Referee`."""
         self._ask("push_tip", force_B_N)
 
     def probe_in_holder(self) -> bool:
-        """True if the probe stands in its holder."""
+        """See `Referee`."""
         return bool(self._ask("probe_in_holder"))
 
     def peak_force_N(self) -> float:
-        """Largest true contact force so far."""
+        """See `Referee`."""
         return float(cast("float", self._ask("peak_force_N")))
 
     def replay_bare_steps(self) -> BareSteps | None:
-        """None: steps are not remembered here."""
+        """Return None: this backend records no steps."""
         return None

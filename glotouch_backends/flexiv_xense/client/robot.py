@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from contextlib import suppress
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -36,6 +35,7 @@ from glotouch_bt.robot import (
     Limits,
     Observation,
     ParamError,
+    PendingTicket,
     Request,
     Robot,
     RobotDescription,
@@ -45,28 +45,23 @@ from glotouch_bt.robot import (
     Ticket,
 )
 
-AGREE_M, AGREE_RAD = 1e-3, 0.01
-"""A setpoint's pose may differ from its joints' by this; more means that the plan is for another arm."""
+MAX_POSE_ERROR_M = 1e-3
+"""Largest distance between a setpoint's pose and the pose of its joints; a larger one means a plan for another arm."""
+MAX_POSE_ERROR_RAD = 0.01
+"""The same for the angle."""
 QUIT_S = 10.0
-
-
-@dataclass
-class SlowTicket:
-    """A `Ticket` the driver completes."""
-
-    done: bool = False
-    error: str | None = None
+"""Longest wait for the answer to a hold."""
 
 
 class FlexivXenseRobot(Robot):
-    """See `Robot`. Made by `FlexivXenseBackend.open`.
+    """See `Robot`. Created by `FlexivXenseBackend.open`.
 
     Attributes:
-        link, process: To the driver, and the driver if it is ours.
-        info: What the devices say about themselves.
-        late_periods: Control periods so far that passed without a command of ours.
-        latency_s: Of the last cycle: from the call to the arm having the setpoint, and from the newest sample's reading
-            to the observation; without the wait for the period's end between them. One machine only.
+        link, process: Connection to the driver, and its process if we started it.
+        info: Facts about the devices, for display.
+        late_periods: Control periods so far without a command of ours.
+        latency_s: Of the last cycle: from the call until the arm has the setpoint, plus from reading the newest sample
+            to the observation, without the wait for the period's end. Valid on one machine only.
     """
 
     def __init__(
@@ -84,7 +79,7 @@ class FlexivXenseRobot(Robot):
         self.late_periods = 0
         self.latency_s = 0.0
         self._chain = Chain(description)
-        self._tickets: dict[int, SlowTicket] = {}
+        self._tickets: dict[int, PendingTicket] = {}
         self._failed: BackendError | None = None
         self._closed = False
         self._observation = self._take(first)
@@ -117,7 +112,7 @@ class FlexivXenseRobot(Robot):
 
     def start(self, request: Request) -> Ticket:
         """See `Robot`."""
-        number, ticket = self.link.number(), SlowTicket()
+        number, ticket = self.link.number(), PendingTicket()
         message: TareRequest | PayloadRequest
         if isinstance(request, Tare):
             if not (math.isfinite(request.duration_s) and request.duration_s > 0):
@@ -136,7 +131,7 @@ class FlexivXenseRobot(Robot):
     def hold(self) -> None:
         """See `Robot`."""
         if self._closed or self._failed is not None:
-            return  # the driver holds by itself: on a fault, and when it hears nothing
+            return  # the driver holds by itself on a fault and without messages
         try:
             self.link.ask(HoldRequest(number=self.link.number()), Accepted, limit_s=QUIT_S)
         except GlotouchError as e:
@@ -147,21 +142,21 @@ class FlexivXenseRobot(Robot):
         if self._closed:
             return
         self._closed = True
-        with suppress(GlotouchError):  # else it is gone already
+        with suppress(GlotouchError):  # the driver may have ended already
             self.link.post(Quit(number=self.link.number()))
         if self.process is not None:
             self.process.end()
         self.link.close()
 
     def rest(self) -> Observation:
-        """One period at rest; for those who only want to look."""
+        """Run one period without a command."""
         return self.cycle(HOLD)
 
     def _setpoint(self, motion: JointSetpoint) -> Setpoint:
-        """What goes over the wire: the pose that is commanded, and the twist its joints' speeds give.
+        """Return the message of a setpoint: its pose, and the twist of its joint velocities.
 
         Raises:
-            ParamError: Not finite, of another shape, or the pose is not what the joints realise.
+            ParamError: Not finite, wrong shape, or the pose does not belong to the joints.
         """
         dof = self.description.dof
         try:
@@ -175,7 +170,7 @@ class FlexivXenseRobot(Robot):
         asked = motion.pose_B_P
         away = float(np.abs(pose.position_m - asked.position_m).max())
         same = abs(float(pose.quat @ asked.quat))
-        if away > AGREE_M or 2.0 * math.acos(min(1.0, same)) > AGREE_RAD:
+        if away > MAX_POSE_ERROR_M or 2.0 * math.acos(min(1.0, same)) > MAX_POSE_ERROR_RAD:
             raise ParamError(
                 "setpoint.pose_B_P", f"{away * 1e3:.2f} mm from where its joints put P", "the pose its joints realise"
             )

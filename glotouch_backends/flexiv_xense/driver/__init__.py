@@ -1,7 +1,7 @@
-"""The driver: a small process that holds the vendors' SDKs, and stops the arm whatever happens to its client.
+"""The driver: a small process that runs the vendors' SDKs and stops the arm if its client fails.
 
-Stands alone on Python 3.10 (numpy, pyzmq, msgspec and the SDKs), where it is installed as `glotouch_driver`; imports
-nothing of the rest of the project. `messages` is what it shares with its client.
+It needs only Python 3.10, numpy, pyzmq, msgspec and the SDKs, is installed as `glotouch_driver`, and imports nothing
+else of this project. Its client imports `messages` from here.
 """
 
 from .clock import Clock, SteppedClock, WallClock
@@ -16,6 +16,7 @@ from .messages import (
     Block,
     Cycle,
     Devices,
+    DeviceSettings,
     Failed,
     HandLimits,
     HoldRequest,
@@ -50,6 +51,7 @@ __all__ = [
     "Block",
     "Clock",
     "Cycle",
+    "DeviceSettings",
     "Devices",
     "Failed",
     "HandLimits",

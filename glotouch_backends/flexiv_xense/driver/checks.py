@@ -1,4 +1,4 @@
-"""Every setpoint is looked at before it is sent: the vendor's interface takes NaN without a word."""
+"""Check of every setpoint before it is sent: the vendor's interface accepts NaN without an error."""
 
 from __future__ import annotations
 
@@ -9,19 +9,20 @@ from .faults import CommandRefused
 from .messages import ArmLimits, Setpoint
 
 STEP_SLACK = 1.02
-"""Of velocities implied by two setpoints, for rounding."""
+"""Implied over allowed joint velocity between two setpoints, for rounding. Source: ours."""
 SPEED_SLACK = 1.1
+"""Commanded over allowed speed of P. Source: ours, rounding and the end of a profile."""
 MAX_START_OFFSET_M = 5e-3
-"""The first setpoint may be this far from where the arm stands (servo error)."""
+"""Largest distance of the first setpoint from the resting arm (servo error). Source: ours."""
 MAX_NORM_ERROR = 1e-3
-"""A quaternion's length may differ from 1 by this."""
+"""Tolerated error of a quaternion's norm. Source: ours."""
 
 
 class SetpointCheck:
-    """Remembers the last setpoint, because speeds are checked between two.
+    """Check setpoints against the limits and against the one before.
 
     Args:
-        limits: Of the arm.
+        limits: Limits of the arm.
         period_s: Time between setpoints.
     """
 
@@ -32,14 +33,14 @@ class SetpointCheck:
         self._fresh = True
 
     def reset_to(self, q: Sequence[float], pose: Sequence[float]) -> None:
-        """The arm is at rest at joints (7,) and TCP pose (7,), not at a setpoint of ours."""
+        """Start again from the arm at rest at joints (7,) and TCP pose (7,)."""
         self._q, self._position, self._fresh = tuple(q), tuple(pose[:3]), True
 
     def check(self, s: Setpoint) -> None:
-        """Take the setpoint as the new last one, if it is sane.
+        """Check a setpoint; if it is valid it becomes the last one.
 
         Raises:
-            CommandRefused: Which value breaks which limit.
+            CommandRefused: A value breaks a limit.
         """
         limits = self._limits
         for name, values, n in (("q", s.q, 7), ("dq", s.dq, 7), ("pose", s.pose, 7), ("twist", s.twist, 6)):
@@ -57,7 +58,7 @@ class SetpointCheck:
             if abs(dq) > top:
                 raise CommandRefused(f"setpoint.dq[joint{i + 1}]", dq, f"within {-top:.4f} .. {top:.4f} rad/s")
             step = (q - self._q[i]) / self._period
-            # Right after a stop the null space has let the joints go where the arm's own controller wanted them.
+            # After a stop the arm's own controller may have moved the joints within the null space.
             if abs(step) > STEP_SLACK * top and not self._fresh:
                 raise CommandRefused(f"setpoint.(q - last q)/period[joint{i + 1}]", step, f"within {top:.4f} rad/s")
         moved = math.dist(s.pose[:3], self._position)
@@ -71,9 +72,9 @@ class SetpointCheck:
 
 
 def rest_pose(setpoint: Setpoint, acceleration_m_s2: float) -> tuple[float, ...]:
-    """The pose (7,) at which P comes to rest when it is slowed evenly from a setpoint's twist.
+    """Return the pose (7,) at which P comes to rest under a uniform deceleration from a setpoint's twist.
 
-    Linear: v^2 / 2a along v. The turn is slowed in the same time (never less than 0.02 s for a turn on the spot).
+    Linear: v^2 / 2a along v. The rotation stops in the same time (at least 0.02 s for a rotation in place).
     """
     v, w = setpoint.twist[:3], setpoint.twist[3:]
     x, y, z, qw, qx, qy, qz = setpoint.pose

@@ -1,7 +1,7 @@
-"""Time as the driver sees it: of the wall, or of a simulated world that moves only when it is told to.
+"""The driver's time: wall time, or the time of a simulated world that advances only on request.
 
-Whoever waits, waits on the clock. So a vendor call that blocks looks the same in both, and a run on simulated devices
-is as fast as the machine allows and the same every time.
+Every wait uses the clock. A blocking vendor call therefore works with both, and a run on simulated devices is as fast
+as the machine allows and reproducible.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ class Clock(Protocol):
     """Seconds since the devices were opened."""
 
     def now_s(self) -> float:
-        """Present time."""
+        """Return the present time."""
         ...
 
     def sleep_until(self, stamp_s: float) -> None:
-        """Return when `now_s` has reached `stamp_s`; at once if it has."""
+        """Block until `now_s` has reached `stamp_s`."""
         ...
 
     def spawn(self, work: Callable[[], None]) -> None:
-        """Run `work`, which must not raise, beside the caller."""
+        """Run `work`, which must not raise, concurrently with the caller."""
         ...
 
 
 class WallClock:
-    """The monotonic clock of this machine.
+    """Monotonic clock of this machine.
 
     Args:
         zero_s: Reading of `time.monotonic` that counts as 0 (default: now).
@@ -56,26 +56,26 @@ class WallClock:
 
 
 class SteppedClock:
-    """A clock that a world of our own makes: time passes while somebody sleeps, and at no other moment.
+    """Clock of a simulated world: time passes only while a thread sleeps on it.
 
-    With nobody conducting, whoever sleeps advances the world. With a conductor (the driver's loop), its sleeps advance
-    the world; a worker started by `spawn` runs only while the conductor has handed over to it: from its start or the
-    end of its sleep to its next sleep or its end. One thread runs at a time, in an order that never depends on the
-    machine's load, so the world needs no locks and the run is the same every time. Any other thread that sleeps waits
-    for the time to come and is not ordered.
+    Without a conductor, every sleeping thread advances the world. With a conductor (the driver's loop), only its sleeps
+    advance the world, and a worker started by `spawn` runs only while the conductor waits for it: from its start or
+    wake-up to its next sleep or its end. One thread runs at a time, in an order that does not depend on the machine's
+    load, so the world needs no locks and every run is the same. Any other thread that sleeps waits for its time without
+    an order.
 
     Args:
-        advance: Moves the world forward to a time.
-        now_s: Where it stands.
+        advance: Advances the world to a time.
+        now_s: Present time of the world.
     """
 
     def __init__(self, advance: Callable[[float], None], now_s: float = 0.0) -> None:
         self._advance, self._now = advance, now_s
         self._turn = threading.Condition()
         self._conductor: int | None = None
-        self._running: int | None = None  # the worker that has been handed over to
+        self._running: int | None = None  # the worker that runs now
         self._workers: set[int] = set()
-        self._sleepers: list[tuple[float, int, int]] = []  # wake time, order of going to sleep, thread
+        self._sleepers: list[tuple[float, int, int]] = []  # wake-up time, order of going to sleep, thread
         self._order = 0
 
     def now_s(self) -> float:
@@ -84,7 +84,7 @@ class SteppedClock:
 
     @contextmanager
     def conducting(self) -> Iterator[None]:
-        """From now on the calling thread's sleeps, and only they, advance the world."""
+        """Make the calling thread the conductor: only its sleeps advance the world."""
         self._conductor = threading.get_ident()
         try:
             yield
@@ -92,7 +92,7 @@ class SteppedClock:
             self._conductor = None
 
     def spawn(self, work: Callable[[], None]) -> None:
-        """See `Clock`. Comes back when the work sleeps for the first time, or is done."""
+        """See `Clock`. Return when the work first sleeps, or ends."""
         conductor = self._conductor
         if conductor is None or threading.get_ident() != conductor:
             work()

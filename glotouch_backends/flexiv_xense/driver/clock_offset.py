@@ -1,7 +1,7 @@
-"""When a reading was made, on this machine's clock, told from the device's own stamp of it.
+"""Conversion of a device's stamps to this machine's clock.
 
-A reading is asked for a little after it was made, now less, now more. The device's stamps tell how far apart readings
-are; how far its clock is from ours is told by the reading that came quickest of late: clocks drift, delays only add.
+The device's stamps give the intervals between readings. The offset between the clocks is the smallest one seen within a
+window, because transport delays only add, and clocks drift.
 """
 
 from __future__ import annotations
@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections import deque
 
 WINDOW_S = 1.0
-"""The quickest reading of so long counts: clocks that drift by 100 ppm are 0.1 ms apart by then."""
+"""Window of the smallest offset. Source: ours; clocks that drift by 100 ppm differ by 0.1 ms after it."""
 PART_S = 0.1
-"""The window moves on in parts of this length."""
+"""The window advances in parts of this length."""
 
 
 class StampConverter:
-    """Dates one device's readings; call it with every new one, in order."""
+    """Convert the stamps of one device; call it with every new reading, in order."""
 
     def __init__(self) -> None:
         self._first_ns: int | None = None
@@ -24,11 +24,11 @@ class StampConverter:
         self._last_s = float("-inf")
 
     def __call__(self, stamp: object, now_s: float) -> float:
-        """Seconds on our clock, later than all before; at most a microsecond later than `now_s`.
+        """Return the time on our clock, s: later than all before, at most a microsecond after `now_s`.
 
         Args:
-            stamp: The device's (seconds, nanoseconds); anything else: it is taken to have been made now.
-            now_s: When it arrived.
+            stamp: The device's (seconds, nanoseconds); for anything else the reading counts as measured now.
+            now_s: Arrival time.
         """
         if not (isinstance(stamp, (tuple, list)) and len(stamp) == 2 and all(isinstance(v, int) for v in stamp)):
             return now_s
@@ -43,7 +43,7 @@ class StampConverter:
         else:
             self._parts[-1] = min(self._parts[-1], ahead_s)
         made_s: float = device_s + min(self._parts)
-        if made_s <= self._last_s:  # the window has just moved on
+        if made_s <= self._last_s:  # the window has just advanced
             made_s = self._last_s + 1e-6
         self._last_s = made_s
         return made_s

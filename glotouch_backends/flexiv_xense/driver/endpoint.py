@@ -1,7 +1,7 @@
-"""The driver's end of the socket: one client at a time, others are told so.
+"""The driver's socket: one client at a time; others get an error.
 
-A Unix socket in a directory only its owner can enter, unless a network address is asked for; that needs keys (CURVE),
-and only clients whose public keys lie in the keys' folder are let in.
+By default it is a Unix socket in a directory that only its owner can enter. A network address needs keys (CURVE), and
+only clients whose public keys lie in the keys' folder can connect.
 """
 
 from __future__ import annotations
@@ -18,16 +18,17 @@ from zmq.auth.thread import ThreadAuthenticator
 from .messages import Answer, Beat, Failed, Request, decode_request, encode
 
 LINGER_MS = 200
+"""Time to deliver pending messages when the socket is closed."""
 HEARTBEAT_SUFFIX = b"+"
-"""A client's heartbeats come from a thread, hence a socket, of their own: its name with this at its end."""
+"""End of the name of a client's heartbeat socket; the rest is the client's name. Heartbeats have their own thread."""
 
 
 class DriverSocket:
-    """See the module's text.
+    """Server socket of the driver.
 
     Args:
         address: ipc://PATH or tcp://HOST:PORT.
-        keys: Folder with driver.key_secret and, in clients/, the clients' public keys; needed for tcp, and only there.
+        keys: Folder with driver.key_secret and, in clients/, the clients' public keys; for tcp only.
 
     Raises:
         ValueError: tcp without keys, or an address of another kind.
@@ -56,7 +57,7 @@ class DriverSocket:
         self._client: bytes | None = None
 
     def receive(self, timeout_s: float) -> Request | None:
-        """The client's next request, waited for at most `timeout_s`; None if none came."""
+        """Return the client's next request, or None after `timeout_s`."""
         if not self._socket.poll(max(0, round(timeout_s * 1e3))):
             return None
         frames: list[bytes] = self._socket.recv_multipart()
@@ -77,12 +78,12 @@ class DriverSocket:
         return request
 
     def wait(self, timeout_s: float) -> bool:
-        """Until something may have come, at most `timeout_s`, exactly. All must have been received before."""
+        """Wait at most `timeout_s` for a message, exactly. All earlier messages must have been received."""
         ready, _, _ = select.select([self._wakes], [], [], timeout_s)
         return bool(ready)
 
     def send(self, answer: Answer) -> None:
-        """To the client; dropped if it is gone."""
+        """Send an answer to the client; drop it if the client is gone."""
         if self._client is not None:
             self._answer(self._client, answer)
 
@@ -93,7 +94,7 @@ class DriverSocket:
             return
 
     def close(self) -> None:
-        """Idempotent."""
+        """Close the socket. Idempotent."""
         if self._guard is not None:
             self._guard.stop()
             self._guard = None

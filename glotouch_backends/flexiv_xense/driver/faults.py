@@ -1,4 +1,4 @@
-"""What can go wrong in the driver, as values the client can turn into its own errors."""
+"""Errors of the driver, with the data from which the client makes its own errors."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from .messages import ArmEvent
 
 
 class DeviceFault(Exception):
-    """A device does not work.
+    """A device failed.
 
     Args:
-        kind: connect (did not come up), fault (the arm's own fault), state (reduced, recovery, stopped by a person),
-            link (lost), stale (repeats old readings), vendor (a call failed), world (a simulation failed).
+        kind: connect (did not come up), fault (the arm reports a fault), state (reduced, recovery, stopped by a
+            person), link (lost), stale (old readings), vendor (a call failed), world (a simulation failed).
         message: What happened and what was expected.
         events: The arm's event log.
         age_s, limit_s: For a stale reading.
@@ -28,7 +28,7 @@ class DeviceFault(Exception):
 
 
 class CommandRefused(Exception):
-    """A command breaks a rule; nothing was sent."""
+    """A command is invalid; nothing was sent."""
 
     def __init__(self, name: str, value: object, rule: str) -> None:
         super().__init__(f"{name} = {value!r}: must be {rule}")
@@ -37,7 +37,7 @@ class CommandRefused(Exception):
 
 @contextmanager
 def vendor_call(what: str, kind: str = "vendor") -> Iterator[None]:
-    """Map whatever a vendor's call raises (their interfaces raise bare Exceptions too), chained."""
+    """Convert any exception of a vendor's call (they raise bare Exceptions too) to a DeviceFault, chained."""
     try:
         yield
     except (DeviceFault, CommandRefused):

@@ -1,11 +1,11 @@
-"""From the vendors' frames, signs and units to ours. This is the only place where that is done.
+"""Conversion of the vendors' frames, signs and units to ours; no other file converts.
 
-Ours (robot.observation): B arm base, E flange = wrist sensor S, P pads' mid-point; a wrench is what the hand FEELS from
-its surroundings, force N then torque Nm, written in S about S's origin.
+Ours (robot.observation): B arm base, E flange = wrist sensor S, P pads' mid-point. A wrench is what the hand FEELS from
+its environment, force N then torque Nm, written in S about S's origin.
 
-Flexiv: "world" is the arm's base B; the TCP is P, because the tool we register says so; the external wrench is what is
-applied ON the TCP, written in the TCP frame about the TCP's origin. It has our sign already: a tool pressed on a
-table feels +z of the world. Quaternions are w x y z in both.
+Flexiv: "world" is the arm's base B. The TCP is P, as registered with the tool. The external wrench is applied ON the
+TCP and written in the TCP frame about its origin; it has our sign: a tool pressed on a table feels +z of the world.
+Quaternions are w x y z in both.
 
 Xense: millimetres, mm/s, N; depth maps in millimetres, positive when the gel is indented.
 """
@@ -22,7 +22,7 @@ MM = 1e-3
 
 
 def rotation(quat: npt.ArrayLike) -> Array:
-    """(3, 3) of a unit quaternion w x y z."""
+    """Return the rotation matrix (3, 3) of a unit quaternion w x y z."""
     w, x, y, z = (float(v) for v in np.asarray(quat, dtype=np.float64))
     return np.array(
         [
@@ -34,7 +34,7 @@ def rotation(quat: npt.ArrayLike) -> Array:
 
 
 def wrench_map(pose_E_P: npt.ArrayLike) -> Array:
-    """(6, 6) that takes a wrench on the TCP, in P about P, to the same wrench in S about S.
+    """Return the matrix (6, 6) that transforms a wrench in P about P to S about S.
 
     With R the rotation and p the origin of P in S: f_S = R f_P, t_S = R t_P + p x f_S (moving a wrench's reference
     point; Lynch and Park, Modern Robotics, 3.4).
@@ -55,7 +55,7 @@ def wrench_map(pose_E_P: npt.ArrayLike) -> Array:
 def payload_on_tool(
     mass_kg: float, com_E_m: npt.ArrayLike, payload_kg: float, com_P_m: npt.ArrayLike, pose_E_P: npt.ArrayLike
 ) -> tuple[float, list[float]]:
-    """Mass and centre of mass (3,) in E of tool and payload together; the payload's is given in P."""
+    """Return mass and centre of mass (3,) in E of tool and payload together; `com_P_m` is the payload's in P."""
     pose = np.asarray(pose_E_P, dtype=np.float64)
     com = rotation(pose[3:]) @ np.asarray(com_P_m, dtype=np.float64) + pose[:3]
     mass = mass_kg + payload_kg
@@ -64,18 +64,18 @@ def payload_on_tool(
 
 
 def depth_map_m(depth_mm: npt.ArrayLike, shape: tuple[int, int], mirrored: bool) -> Array:
-    """A sensor's depth map in metres, at (rows, columns), each the mean of the pixels in it that delivered something.
+    """Return a depth map in metres of shape (rows, columns): each cell is the mean of its live pixels.
 
     Args:
         depth_mm: (h, w), rows from the flange to the fingertip.
         shape: Not larger than (h, w).
-        mirrored: Its columns run along -x_P.
+        mirrored: True if its columns run along -x_P.
     """
     image = np.asarray(depth_mm)
     if mirrored:
         image = image[:, ::-1]
     (h, w), (m, n) = image.shape, shape
-    if h % m or w % n:  # cut what does not fill a last cell, less than one cell of pixels
+    if h % m or w % n:  # crop the remainder, less than one cell
         image = image[: h - h % m, : w - w % n]
     cells = image.reshape(m, h // m, n, w // n)
     mean: Array = cells.mean(axis=(1, 3), dtype=np.float64)

@@ -1,10 +1,10 @@
 """The driver's two loops: in lock-step with the client (simulated devices), or paced by the clock (real ones).
 
-Paced: the arm is read every millisecond and a block is answered on a fixed grid of control periods. What comes late is
-never made up: the arm is held meanwhile.
+The paced loop reads the arm every millisecond and sends a block on a fixed grid of control periods. It never replaces a
+late command:
 
-    no command for HOLD_AFTER_S         the arm is told to come to rest on its way
-    nothing from the client for CLIENT_LOST_S  Stop(), IDLE, devices released, the process ends
+    no command for HOLD_AFTER_S            the arm brakes to rest along its path
+    no message for CLIENT_LOST_S           Stop(), IDLE, devices released, the process ends
 """
 
 from __future__ import annotations
@@ -33,19 +33,25 @@ from .messages import (
 from .session import DriverSession
 
 SAMPLE_S = 0.001
+"""Interval between two readings of the arm."""
 HOLD_AFTER_S = 0.03
+"""Hold the arm after this time without a command. Source: ours, three control periods."""
 CLIENT_LOST_S = 0.5
+"""The client is lost after this time without a message; it sends a heartbeat every 0.1 s. Source: ours."""
 BEAT_S = 0.05
+"""Interval between two heartbeats of the driver."""
 LOCKSTEP_CLIENT_LOST_S = 10.0
+"""The same in lock-step, where the client may compute for long. Source: ours."""
 MAX_STANDSTILL_M_S = 1e-3
+"""The tool stands still below this speed. Source: ours."""
 MAX_BEHIND_S = 0.02
-"""When the loop is later than this, it gives up catching up: samples are missing, and their stamps say so."""
+"""A loop that is later than this skips samples instead of catching up; the stamps show the gap. Source: ours."""
 
 Log = Callable[..., None]
 
 
 class _DriverLoop:
-    """What both loops answer alike."""
+    """Answers that both loops give."""
 
     def __init__(self, session: DriverSession, socket: DriverSocket, log: Log, stopping: Callable[[], bool]) -> None:
         self._session, self._socket, self._log, self._stopping = session, socket, log, stopping
@@ -58,7 +64,7 @@ class _DriverLoop:
         if session.failed is None:
             session.failed = error
             self._log("fault", kind=error.kind, message=error.message)
-            with suppress(DeviceFault):  # it may be the one that failed
+            with suppress(DeviceFault):  # the arm may be the device that failed
                 session.hold()
         cause = "" if error.__cause__ is None else f"{type(error.__cause__).__name__}: {error.__cause__}"
         self._socket.send(
@@ -74,7 +80,7 @@ class _DriverLoop:
         )
 
     def _answer(self, request: Request) -> bool:
-        """Everything but cycles; False ends the loop."""
+        """Answer a request other than a cycle; return False to end the loop."""
         session = self._session
         if isinstance(request, (TareRequest, PayloadRequest)):
             session.start(request)
@@ -100,10 +106,10 @@ class _DriverLoop:
 
 
 class Lockstep(_DriverLoop):
-    """Time passes only in a cycle, exactly one period."""
+    """Loop of simulated devices: one cycle advances the world by exactly one period."""
 
     def run(self, period_s: float) -> None:
-        """Until the client quits or is gone."""
+        """Run until the client quits or is lost."""
         session, socket = self._session, self._socket
         clock, steps = session.clock, round(period_s / SAMPLE_S)
         conducting = getattr(clock, "conducting", nullcontext)
@@ -143,14 +149,14 @@ class Lockstep(_DriverLoop):
 
 
 class _CommandTimeout:
-    """What is done, and written down, when no command has come for a while."""
+    """Hold and log when no command has arrived for a while."""
 
     def __init__(self, session: DriverSession, log: Log) -> None:
         self._session, self._log = session, log
         self._silent = self._still = False
 
     def check(self, silent_s: float) -> None:
-        """Once a sample."""
+        """Check once a sample; `silent_s` is the time since the last command."""
         session = self._session
         if silent_s <= HOLD_AFTER_S:
             self._silent = False
@@ -166,16 +172,16 @@ class _CommandTimeout:
 
 
 class Paced(_DriverLoop):
-    """The clock runs on by itself."""
+    """Loop of real devices: wall time."""
 
     def run(self, period_s: float) -> None:
-        """Until the client quits or is gone."""
+        """Run until the client quits or is lost."""
         session, socket, clock = self._session, self._socket, self._session.clock
         steps = round(period_s / SAMPLE_S)
         socket.send(session.block(0, tactile=False))
         waiting: Cycle | None = None
         gc.collect()
-        gc.freeze()  # a full collection takes longer than a sample may be late
+        gc.freeze()  # a full garbage collection takes longer than a sample may be late
         begin = due = clock.now_s()
         heard = commanded = beaten = begin
         late = tick = 0

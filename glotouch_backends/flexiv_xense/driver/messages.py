@@ -1,26 +1,29 @@
-"""What client and driver say to each other: msgpack over one socket. SI units; frames as in `frames`.
+"""Messages between client and driver: msgpack over one socket. SI units; frames as in `frames`.
 
-The client asks, the driver answers each request once, with the request's number; heartbeats are not numbered. A message
-that cannot be decoded is refused, never guessed at.
+The driver answers each request once, with the request's number; heartbeats have no number. A message that cannot be
+decoded is refused.
 """
 
 from __future__ import annotations
 
+from typing import Literal
+
 import msgspec
 
-PROTOCOL = 1
+PROTOCOL = 2
+"""Version of the messages; client and driver must have the same."""
 COLUMNS = 7 + 7 + 3 + 4 + 6
-"""One sample: q, dq, position of P in B, quaternion of P in B (w x y z), wrench in S."""
+"""Columns of a sample: q, dq, position of P in B, quaternion of P in B (w x y z), wrench in S."""
 
 Numbers = tuple[float, ...]
 
 
 class ToolData(msgspec.Struct, frozen=True, kw_only=True):
-    """What is bolted to the flange.
+    """The tool on the flange: the bare hand.
 
     Attributes:
-        mass_kg, com_E_m: All beyond the flange, without a payload.
-        pose_E_P: (7,) the pads' mid-point in the flange frame, x y z qw qx qy qz; P is the arm's TCP.
+        mass_kg, com_E_m: Mass and centre of mass (3,) beyond the flange, without a payload.
+        pose_E_P: (7,) P, the arm's TCP, in the flange frame: x y z qw qx qy qz.
     """
 
     mass_kg: float
@@ -29,13 +32,13 @@ class ToolData(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ArmLimits(msgspec.Struct, frozen=True, kw_only=True):
-    """What the driver enforces on its own account.
+    """Limits that the driver itself enforces.
 
     Attributes:
         q_min, q_max, dq_max: (7,) rad, rad/s.
-        speed_m_s, acceleration_m_s2: Of P, commanded; a stop may use `stop_acceleration_m_s2`.
-        force_N, torque_Nm: Norms of the contact wrench in S that stop the arm.
-        max_age_s: The oldest a reading may be.
+        speed_m_s, acceleration_m_s2: Commanded motion of P; a stop may use `stop_acceleration_m_s2`.
+        force_N, torque_Nm: Norms of the contact wrench in S at which the arm stops.
+        max_age_s: Largest age of a reading.
     """
 
     q_min: Numbers
@@ -50,7 +53,7 @@ class ArmLimits(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class HandLimits(msgspec.Struct, frozen=True, kw_only=True):
-    """Range of the gripper, and of its pads."""
+    """Ranges of the gripper and its pads."""
 
     stroke_m: float
     speed_m_s: float
@@ -59,41 +62,52 @@ class HandLimits(msgspec.Struct, frozen=True, kw_only=True):
     pad_depth_m: float
 
 
+class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True):
+    """Options of the devices; a user sets each by `--set name=value`.
+
+    Attributes:
+        robot: Serial number of the arm, e.g. "Rizon4-123456".
+        gripper: MAC or IP address, or serial:PORT; "none" or empty for an arm without one.
+        left_pad, right_pad: Serial numbers of the tactile sensors; both or none.
+        network: Addresses of this machine's interfaces through which the arm may be reached; empty: any.
+        api: Flexiv interface; empty: that of the installed version.
+        wrench: raw (no filter delay) or filtered.
+        feed_forward: Send the setpoint's velocity along with its pose.
+        mirror: Pad whose columns run along -x_P.
+        link_loss: Behaviour of the fitted gripper when its link is lost. This describes the device; it sets nothing.
+    """
+
+    robot: str = ""
+    gripper: str = ""
+    left_pad: str = ""
+    right_pad: str = ""
+    network: tuple[str, ...] = ()
+    api: Literal["", "1.9", "2.0"] = ""
+    wrench: Literal["raw", "filtered"] = "raw"
+    feed_forward: bool = True
+    mirror: Literal["right", "left", "none"] = "right"
+    link_loss: Literal["holds", "opens"] = "holds"
+
+
 class Devices(msgspec.Struct, frozen=True, kw_only=True):
-    """Which devices, and where they are.
+    """The devices of a session.
 
     Attributes:
         kind: "real", "simulated" (in this process, in lock-step) or "cell" (simulated, in a process of its own).
-        robot: Serial number of the arm.
-        api: Flexiv interface, "1.9" or "2.0"; empty: by the installed version.
-        network: Addresses of this machine's interfaces the arm may be reached through; empty: any.
-        gripper: MAC or IP address, or "serial:PORT"; empty: none.
-        pads: Serial numbers of the left and right sensor; empty: none.
+        settings: Addresses and options.
         world: Simulated only: the file with the world, or the cell's address.
-        wrench: "raw" or "filtered".
-        feed_forward: Send the setpoint's velocity along with its pose.
-        mirror: Which pad's columns run along -x_P: "right", "left" or "none".
-        link_loss: What the fitted gripper does when its link is lost: "holds" or "opens". A statement, not a wish.
     """
 
     kind: str
-    robot: str = ""
-    api: str = ""
-    network: tuple[str, ...] = ()
-    gripper: str = ""
-    pads: tuple[str, ...] = ()
+    settings: DeviceSettings = DeviceSettings()
     world: str = ""
-    wrench: str = "raw"
-    feed_forward: bool = True
-    mirror: str = "right"
-    link_loss: str = "holds"
 
 
 class Setpoint(msgspec.Struct, frozen=True, array_like=True):
-    """Where the arm shall be at the end of the coming period.
+    """State of the arm at the end of the next period.
 
     Attributes:
-        q, dq: (7,) what the plan says, for the checks.
+        q, dq: (7,) planned joints, for the checks.
         pose: (7,) of P in B, x y z qw qx qy qz.
         twist: (6,) of P, linear and angular, written in B.
     """
@@ -116,7 +130,7 @@ class JawTarget(msgspec.Struct, frozen=True, array_like=True):
 
 
 class Open(msgspec.Struct, frozen=True, kw_only=True, tag=True):
-    """Connect and make ready; the first request."""
+    """Connect to the devices and make them ready; the first request."""
 
     number: int
     protocol: int
@@ -127,11 +141,11 @@ class Open(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     posture: Numbers
     period_s: float
     lockstep: bool
-    move: bool = True  # False: look only; nothing is enabled, switched or commanded
+    move: bool = True  # False: observe only; nothing is enabled, switched or commanded
 
 
 class Cycle(msgspec.Struct, frozen=True, kw_only=True, tag=True):
-    """One control period."""
+    """Run one control period."""
 
     number: int
     setpoint: Setpoint | None = None
@@ -140,7 +154,7 @@ class Cycle(msgspec.Struct, frozen=True, kw_only=True, tag=True):
 
 
 class TareRequest(msgspec.Struct, frozen=True, kw_only=True, tag=True):
-    """Zero the wrist sensor; answered by `Accepted`, done when a block says so."""
+    """Zero the wrist sensor. The answer is `Accepted`; a later block reports the end."""
 
     number: int
     ticket: int
@@ -148,7 +162,7 @@ class TareRequest(msgspec.Struct, frozen=True, kw_only=True, tag=True):
 
 
 class PayloadRequest(msgspec.Struct, frozen=True, kw_only=True, tag=True):
-    """What the hand carries beyond itself, (3,) centre of mass in P; as a tare."""
+    """Set the payload, with its centre of mass (3,) in P. Answered like a tare."""
 
     number: int
     ticket: int
@@ -157,13 +171,13 @@ class PayloadRequest(msgspec.Struct, frozen=True, kw_only=True, tag=True):
 
 
 class HoldRequest(msgspec.Struct, frozen=True, kw_only=True, tag=True):
-    """Stop where you are."""
+    """Stop the arm."""
 
     number: int
 
 
 class RefereeRequest(msgspec.Struct, frozen=True, kw_only=True, tag=True):
-    """Simulated devices only: a question for the world's referee, which alone can read it."""
+    """Simulated devices only: a question to the world's referee, which alone can decode it."""
 
     number: int
     question: bytes
@@ -176,14 +190,14 @@ class Quit(msgspec.Struct, frozen=True, kw_only=True, tag=True):
 
 
 class Beat(msgspec.Struct, frozen=True, tag=True):
-    """I am alive. Both ways."""
+    """Heartbeat, in both directions."""
 
 
 # -- answers -----------------------------------------------------------------------------------------------------------
 
 
 class ArmEvent(msgspec.Struct, frozen=True, array_like=True):
-    """An entry of the arm's event log: level, id, description, what to do."""
+    """An entry of the arm's event log: level, id, description, advice."""
 
     level: str
     id: int
@@ -192,7 +206,7 @@ class ArmEvent(msgspec.Struct, frozen=True, array_like=True):
 
 
 class JawState(msgspec.Struct, frozen=True, array_like=True):
-    """What the gripper last said; the stamp is when it was read."""
+    """Last report of the gripper, with the time at which it was read."""
 
     stamp_s: float
     aperture_m: float
@@ -201,7 +215,7 @@ class JawState(msgspec.Struct, frozen=True, array_like=True):
 
 
 class Maps(msgspec.Struct, frozen=True, array_like=True):
-    """Depth maps, metres, row 0 nearest the flange, columns along +x_P for both; float64 bytes."""
+    """Depth maps in metres as float64 bytes: row 0 nearest the flange, columns along +x_P for both."""
 
     stamp_s: float
     rows: int
@@ -211,14 +225,14 @@ class Maps(msgspec.Struct, frozen=True, array_like=True):
 
 
 class Done(msgspec.Struct, frozen=True, array_like=True):
-    """A slow request has ended; `error` is empty if well."""
+    """A slow request has ended; `error` is empty if it succeeded."""
 
     ticket: int
     error: str = ""
 
 
 class Opened(msgspec.Struct, frozen=True, kw_only=True, tag=True):
-    """Ready. `info` is for people and the doctor; q_min and q_max are the device's own."""
+    """The devices are ready. `info` is for display; q_min and q_max are the device's own limits."""
 
     number: int
     info: dict[str, str]
@@ -226,22 +240,22 @@ class Opened(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     q_max: Numbers
 
 
-class OpenProgress(msgspec.Struct, frozen=True, tag="Progress"):
-    """What opening is busy with."""
+class OpenProgress(msgspec.Struct, frozen=True, tag=True):
+    """Present step of opening."""
 
     text: str
 
 
 class Block(msgspec.Struct, frozen=True, kw_only=True, tag=True):
-    """What was sensed since the last block.
+    """Readings since the last block.
 
     Attributes:
-        stamps: float64 bytes (n,), the driver's clock at which each sample was read.
+        stamps: float64 bytes (n,), driver clock at which each sample was measured.
         samples: float64 bytes (n, COLUMNS).
-        late: Control periods that passed without a command since the last block.
+        late: Control periods without a command since the last block.
         stop: (quantity, value, limit, stamp s) if the hard limit has tripped.
-        sent_s, read_s: `time.monotonic` when the command had been handed to the arm, and when the newest sample was
-            read: for measuring latencies on one machine.
+        sent_s, read_s: `time.monotonic` when the arm had received the command, and when the newest sample was read; for
+            measuring latencies on one machine.
     """
 
     number: int
@@ -257,13 +271,13 @@ class Block(msgspec.Struct, frozen=True, kw_only=True, tag=True):
 
 
 class Accepted(msgspec.Struct, frozen=True, kw_only=True, tag=True):
-    """Begun, or done."""
+    """The request was started or done."""
 
     number: int
 
 
 class Refused(msgspec.Struct, frozen=True, kw_only=True, tag=True):
-    """A command that breaks a rule; nothing was sent to the device, the arm holds."""
+    """The command is invalid; nothing was sent to the device, and the arm holds."""
 
     number: int
     name: str
@@ -272,7 +286,7 @@ class Refused(msgspec.Struct, frozen=True, kw_only=True, tag=True):
 
 
 class Failed(msgspec.Struct, frozen=True, kw_only=True, tag=True):
-    """A device does not work. `kind`: connect, fault, state, link, stale, vendor, world."""
+    """A device failed. `kind`: connect, fault, state, link, stale, vendor, world."""
 
     number: int
     kind: str
@@ -284,7 +298,7 @@ class Failed(msgspec.Struct, frozen=True, kw_only=True, tag=True):
 
 
 class RefereeAnswer(msgspec.Struct, frozen=True, kw_only=True, tag=True):
-    """Its answer."""
+    """Answer of the referee."""
 
     number: int
     answer: bytes

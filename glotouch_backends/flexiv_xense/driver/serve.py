@@ -1,4 +1,4 @@
-"""One session of the driver with one client."""
+"""A session of the driver with one client."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from .messages import PROTOCOL, Beat, Failed, Open, Opened, OpenProgress, Quit
 from .session import DriverSession
 
 MAX_WAIT_FOR_OPEN_S = 60.0
+"""Longest wait for a client."""
 
 
 class Log:
-    """One JSON line an event, with the wall's monotonic clock; written at once, read after a crash."""
+    """Event log: one JSON line an event with the monotonic clock, flushed at once so that a crash loses nothing."""
 
     def __init__(self, path: Path | None) -> None:
         self._file = None if path is None else path.open("a", encoding="utf-8")
@@ -33,16 +34,16 @@ class Log:
             self._file.flush()
 
     def close(self) -> None:
-        """Idempotent."""
+        """Close the file. Idempotent."""
         if self._file is not None:
             self._file.close()
 
 
 def serve(socket: DriverSocket, log: Log, stopping: Callable[[], bool], *, forever: bool = False) -> int:
-    """One session, from its Open to its end; the arm is stopped and released on every path.
+    """Serve one session from its Open to its end; stop and release the devices on every path.
 
     Returns:
-        0: ended as asked; 1: a device did not come up, or broke down outside a cycle; 4: nobody came.
+        0: ended on request; 1: a device did not come up, or failed outside a cycle; 4: no client came.
     """
     request = _first(socket, stopping, forever=forever)
     if request is None:
@@ -78,7 +79,7 @@ def serve(socket: DriverSocket, log: Log, stopping: Callable[[], bool], *, forev
 
 
 def _first(socket: DriverSocket, stopping: Callable[[], bool], *, forever: bool) -> Open | None:
-    """The request that opens a session."""
+    """Wait for the request that opens a session."""
     began = time.monotonic()
     while not stopping():
         request = socket.receive(1.0)

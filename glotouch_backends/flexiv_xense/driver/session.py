@@ -1,4 +1,4 @@
-"""One session with the devices: commands in, samples out, hard limits, slow requests. Knows no socket and no pace."""
+"""A session with the devices: commands, samples, hard limits and slow requests, independent of socket and pace."""
 
 from __future__ import annotations
 
@@ -29,10 +29,11 @@ from .messages import (
 )
 
 MIN_SAMPLES_OVER = 5
-"""So many samples in a row beyond the hard limit stop the arm (5 ms); one alone may be noise."""
+"""Consecutive samples beyond the hard limit that stop the arm (5 ms); a single one may be noise. Source: ours."""
 MAX_BUFFERED_SAMPLES = 60_000
-"""Samples kept while nobody asks (60 s)."""
+"""Samples buffered while the client requests none (60 s)."""
 SPEED_SAMPLES = 20
+"""Samples over which the speed of P is measured."""
 NO_JAWS = JawState(0.0, math.nan, 0.0, False)
 
 
@@ -41,13 +42,13 @@ class DriverSession:
 
     Args:
         devices: Connected and ready.
-        request: What the client opened it with.
+        request: The client's request.
 
     Attributes:
-        failed: What broke the session, if anything did; every later command raises it again.
+        failed: Error that ended the session; every later command raises it again.
         stop: (quantity, value, limit, stamp) once the hard limit has tripped.
         peak_force_N: Largest sensed force so far.
-        recent_peak_N: The same since somebody last set it to zero.
+        recent_peak_N: The same since it was last set to zero.
     """
 
     def __init__(self, devices: Connected, request: Open) -> None:
@@ -63,8 +64,8 @@ class DriverSession:
         self._fresh_s = self._zero_s
         self._over = 0
         self._newest: list[float] | None = None
-        self._last: Setpoint | None = None  # the last one sent, while the arm follows us
-        self._rest: tuple[float, ...] | None = None  # where it shall come to rest, once told to hold
+        self._last: Setpoint | None = None  # the last one sent, while the arm follows setpoints
+        self._rest: tuple[float, ...] | None = None  # pose of rest, once told to hold
         self._queue: deque[TareRequest | PayloadRequest] = deque()
         self._done: list[Done] = []
         self._busy = False
@@ -81,7 +82,7 @@ class DriverSession:
 
     @property
     def ready(self) -> bool:
-        """There is at least one sample for the next block."""
+        """True if there is a sample for the next block."""
         return bool(self._rows)
 
     @property
@@ -91,18 +92,18 @@ class DriverSession:
 
     @property
     def speed_m_s(self) -> float:
-        """Of P, over the last `SPEED_SAMPLES`."""
+        """Speed of P over the last `SPEED_SAMPLES`."""
         (begin, first), (end, last) = self._track[0], self._track[-1]
         return math.dist(first, last) / (end - begin) if end > begin else 0.0
 
     # -- commands ----------------------------------------------------------------------------------------------------
 
     def command(self, cycle: Cycle) -> None:
-        """Send one period's command; nothing is sent once the hard limit has tripped.
+        """Send one period's command; send nothing once the hard limit has tripped.
 
         Raises:
-            CommandRefused: It breaks a rule; nothing was sent, the arm holds.
-            DeviceFault: The device does not take it, or had failed before.
+            CommandRefused: The command is invalid; nothing was sent, and the arm holds.
+            DeviceFault: The device refuses it, or had failed before.
         """
         if self.failed is not None:
             raise self.failed
@@ -126,12 +127,12 @@ class DriverSession:
 
     def _check_command(self, cycle: Cycle) -> None:
         if not self._moves and (cycle.setpoint is not None or cycle.jaws is not None):
-            raise CommandRefused("command", "a motion", "none in a session that only looks")
+            raise CommandRefused("command", "a motion", "none in a read-only session")
         if cycle.jaws is not None:
             self._check_jaws(cycle.jaws)
         if cycle.setpoint is not None:
             if self._busy:
-                raise CommandRefused("command.motion", "a setpoint", "none while a tare or payload is under way")
+                raise CommandRefused("command.motion", "a setpoint", "none while a tare or payload is pending")
             self._check.check(cycle.setpoint)
 
     def _check_jaws(self, jaws: JawTarget) -> None:
@@ -140,27 +141,26 @@ class DriverSession:
         self.devices.gripper.check(jaws)
 
     def hold(self) -> None:
-        """Come to rest on the way of the last setpoint and stay; repeated calls repeat the setpoint.
+        """Brake to rest along the path of the last setpoint and stay; later calls repeat the pose of rest.
 
         Raises:
-            DeviceFault: The arm does not take it.
+            DeviceFault: The arm refuses it.
         """
         if self._last is None or self._busy:
-            return  # it stands, or is being stopped by the request under way
+            return  # the arm stands, or the pending request is stopping it
         if self._rest is None:
             self._rest = rest_pose(self._last, self._limits.stop_acceleration_m_s2)
         self._arm.hold_at(self._rest)
 
     def start(self, request: TareRequest | PayloadRequest) -> None:
-        """Queue a slow request; it begins at once if none is under way."""
-
+        """Queue a slow request; it starts at once if none is pending."""
         self._queue.append(request)
         if not self._busy:
             self._busy = True
             self.clock.spawn(self._work)
 
     def _work(self) -> None:
-        """Beside the loop: all queued requests, one after another."""
+        """Run all queued requests one after another, concurrently with the loop."""
         while self._queue:
             request = self._queue.popleft()
             try:
@@ -183,7 +183,7 @@ class DriverSession:
         return payload_on_tool(t.mass_kg, t.com_E_m, request.mass_kg, request.com_P_m, t.pose_E_P)
 
     def _reset_to_measured(self) -> None:
-        """The arm stands where its own controller has left it, not at a setpoint of ours."""
+        """Continue from the measured pose: the arm's own controller has moved it, not a setpoint of ours."""
         self._last = self._rest = None
         if self._newest is not None:
             self._check.reset_to(self._newest[:7], self._newest[14:21])
@@ -191,10 +191,10 @@ class DriverSession:
     # -- sensing -----------------------------------------------------------------------------------------------------
 
     def sample(self) -> None:
-        """Read the arm once; trips the hard limit.
+        """Read the arm once and check the hard limit.
 
         Raises:
-            DeviceFault: It cannot be read, or repeats an old reading.
+            DeviceFault: The arm cannot be read, or repeats an old reading.
         """
         state = self._arm.state()
         now, self._read_s = self.clock.now_s(), time.monotonic()
@@ -216,7 +216,7 @@ class DriverSession:
         self._enforce_hard_limit(wrench, state.pose, now)
 
     def _enforce_hard_limit(self, wrench: list[float], pose: Sequence[float], now: float) -> None:
-        """The hard limit below the client: stop where the arm is, and stay stopped."""
+        """Stop the arm where it is when a hard limit trips, and keep it stopped."""
         force, torque = math.hypot(*wrench[:3]), math.hypot(*wrench[3:])
         self.peak_force_N = max(self.peak_force_N, force)
         self.recent_peak_N = max(self.recent_peak_N, force)
@@ -234,15 +234,15 @@ class DriverSession:
             limits.force_N if beyond else limits.torque_Nm,
             now - self._zero_s,
         )
-        self._rest = tuple(pose)  # every later hold is here, not where the setpoints led
+        self._rest = tuple(pose)  # later holds use this pose, not the last setpoint's
         if self._moves:
             self._arm.hold_at(self._rest)
 
     def poll(self) -> None:
-        """Once a period: the arm's flags, the gripper.
+        """Check the arm's flags and read the gripper; call once a period.
 
         Raises:
-            DeviceFault: What is wrong.
+            DeviceFault: A device failed.
         """
         if not self._busy and self._moves:
             self._arm.check()
@@ -251,7 +251,7 @@ class DriverSession:
             self._jaws = JawState(state.stamp_s - self._zero_s, state.aperture_m, state.force_N, state.moving)
 
     def block(self, number: int, *, tactile: bool, late: int = 0) -> Block:
-        """Everything sensed since the last block.
+        """Return everything sensed since the last block.
 
         Raises:
             DeviceFault: The pads failed.

@@ -1,4 +1,4 @@
-"""Devices that are not there: the vendors' modules, names and quirks over the MuJoCo world. See `open_vendor`."""
+"""Simulated devices: firmware and control box over the MuJoCo world, behind the vendors' interfaces."""
 
 from glotouch_backends.flexiv_xense.simulated.remote import RemoteVendor, open_remote_vendor
 from glotouch_backends.flexiv_xense.simulated.vendor import (

@@ -1,8 +1,8 @@
-"""The simulated arm with its control box: what the vendor's firmware does between the calls of its API.
+"""The simulated arm: the part of the vendor's firmware that moves the arm and reads its sensors.
 
-ASSUMED, because it is not documented: the latencies and decelerations in this file, that the contact wrench is kept
-below its maximum by bounding what the motors exert at the tool (`_pressing`; an impact's first milliseconds are not
-bounded by it), and that an arm whose client is gone brakes after LINK_LOST_S.
+ASSUMED, because the vendor does not document it: the latencies and decelerations in this file; that the contact wrench
+is limited by bounding the motors' wrench at the tool (`_pressing`), which does not bound the first milliseconds of an
+impact; and that an arm whose client is gone brakes after LINK_LOST_S.
 """
 
 from __future__ import annotations
@@ -18,40 +18,47 @@ from glotouch_backends.flexiv_xense.simulated.kinematics import ControllerKinema
 from glotouch_backends.flexiv_xense.simulated.trajectory import Trajectory, cubic_extremes, shortest
 from glotouch_backends.mujoco.control import BRAKE_REACH_M
 from glotouch_backends.mujoco.model import DAMPING_PER_STIFFNESS_S, JOINT_DAMPING, STEP_S, STIFFNESS_NM_RAD, Handles
-from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, WristSensor, hand_mass, up_in
-from glotouch_bt.robot import Array, Conditions, Pose, RobotDescription, quat_to_matrix
+from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, WristSensor, up_in
+from glotouch_bt.robot import Array, Conditions, Pose, RobotDescription, cross_matrix, quat_to_matrix
 from glotouch_bt.robot.scene import stream
 
-STOP_RAD_S2 = 2.0 / BRAKE_REACH_M  # 2 m/s2 at the hand
+STOP_RAD_S2 = 2.0 / BRAKE_REACH_M
+"""Deceleration of a stop: 2 m/s2 at the hand. ASSUMED."""
 LINK_LOST_S = 0.1
-FILTER_S = 0.010  # time constant of the filtered wrench
-OFFSET_SD = np.array([1.0, 1.0, 1.0, 0.05, 0.05, 0.05])  # reading of a sensor that has not been zeroed, N and Nm
-PARTED = 0.25  # share of the maximum contact wrench below which, for
-PARTED_STEPS = 100  # so long, the motors' wrench is not bounded any more
+"""Time from losing the client to braking. ASSUMED."""
+FILTER_S = 0.010
+"""Time constant of the filtered wrench. ASSUMED."""
+OFFSET_SD = np.array([1.0, 1.0, 1.0, 0.05, 0.05, 0.05])
+"""Standard deviation of the reading of a sensor that has not been zeroed, N and Nm. ASSUMED."""
+PARTED_SHARE = 0.25
+"""Below this share of the maximum contact wrench the contact counts as ended. ASSUMED."""
+PARTED_STEPS = 100
+"""Steps after the end of the contact until the motors' wrench is no longer bounded. ASSUMED."""
 STILL_RAD_S = 1e-3
-NOMINAL_STIFFNESS = np.array([10000.0, 10000.0, 10000.0, 1500.0, 1500.0, 1500.0])  # N/m and Nm/rad
+"""The arm stands still while every joint is below this speed. ASSUMED."""
+NOMINAL_STIFFNESS = np.array([10000.0, 10000.0, 10000.0, 1500.0, 1500.0, 1500.0])
+"""Nominal Cartesian stiffness, N/m and Nm/rad. Source: vendor data of the Rizon 4."""
 
 
 class Sample(NamedTuple):
-    """One millisecond.
+    """Readings of one millisecond.
 
     Attributes:
-        step: Solver steps since the world began.
-        row: (nsensordata,) all that MuJoCo sensed.
-        wrench_S, filtered_S, raw_S: (6,) what all beyond the flange feels, in S at S: tared and without the tool's
-            weight; the same filtered; what the sensor itself says.
+        step: Number of solver steps since the world began.
+        row: (nsensordata,) MuJoCo's sensor data.
+        wrench_S, filtered_S: (6,) wrench on everything beyond the flange, in S about S, tared and without the tool's
+            weight; unfiltered and filtered.
     """
 
     step: int
     row: Array
     wrench_S: Array
     filtered_S: Array
-    raw_S: Array
 
 
 @dataclass(frozen=True)
 class Load:
-    """What the controller believes is bolted to the flange.
+    """The load on the flange as configured in the controller.
 
     Attributes:
         mass_kg: Mass.
@@ -65,15 +72,14 @@ class Load:
 
     @cached_property
     def at_T(self) -> Array:
-        """(6, 6) moves a wrench from S to the tool centre point, axes kept: the torque becomes m - r x f."""
-        x, y, z = self.pose_E_T.position_m
+        """Matrix (6, 6) that moves a wrench from S to the tool centre point: the torque becomes m - r x f."""
         move = np.eye(6)
-        move[3:, :3] = -np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        move[3:, :3] = -cross_matrix(self.pose_E_T.position_m)
         return move
 
     @cached_property
     def in_T(self) -> Array:
-        """(6, 6) moves a wrench from S to the tool centre point and writes it in the tool's axes."""
+        """Matrix (6, 6) that moves a wrench from S to the tool centre point and writes it in the tool's axes."""
         turn = np.zeros((6, 6))
         turn[:3, :3] = turn[3:, 3:] = self.pose_E_T.rotation.T
         return np.asarray(turn @ self.at_T)
@@ -83,7 +89,7 @@ FLANGE = Load(0.0, np.zeros(3), Pose(np.zeros(3)))
 
 
 class SimulatedArm:
-    """Trajectory, servo, wrench and tare of the simulated arm; stepped by the world.
+    """Trajectory, servo, wrench and tare of the simulated arm. The world steps it.
 
     Args:
         description, conditions, seed: As for a backend.
@@ -107,7 +113,7 @@ class SimulatedArm:
         self._per_kp, self._lead = 1.0 / kp, DAMPING_PER_STIFFNESS_S + JOINT_DAMPING / kp
         self._vector, self._product = np.zeros(model.nv), np.zeros(model.nv)
         self._jacobian = np.zeros((6, model.nv))
-        self._hand = hand_mass(description)
+        self._hand = description.gripper.mass_and_com_E()
         self._wrist = WristSensor(description, conditions, seed, steps=1)
         self._offset_S = OFFSET_SD * stream(seed, "unzeroed").standard_normal(6)
         self._bias = np.zeros(6)
@@ -121,32 +127,22 @@ class SimulatedArm:
         self._lost_steps: int | None = None
         first = np.array(data.sensordata)
         self._wrist.fill(-first[self.sensors.force.start : self.sensors.torque.stop])
-        self.sample = Sample(0, first, np.zeros(6), np.zeros(6), np.zeros(6))
+        self.sample = Sample(0, first, np.zeros(6), np.zeros(6))
         self.sense(0, first)
 
-    # --- what the control box is told -------------------------------------------------------------------------------
+    # --- requests of the control box --------------------------------------------------------------------------------
 
     def set_load(self, load: Load) -> None:
-        """Another tool: its weight is taken out of the wrench and carried by the motors from now on."""
+        """Set the load: its weight is subtracted from the wrench and carried by the motors from now on."""
         self.load = load
         self._wrist.set_payload(load.mass_kg, self.description.gripper.pose_E_P.inverse().apply(load.com_E_m))
         self._carry = None
         self.carry()
 
-    def go_to(self, q: Array, dq: Array, max_vel: Array, max_acc: Array) -> None:
-        """Joint setpoint (dof,) with its limits (dof,)."""
-        now = self.trajectory
-
-        def fits(time_s: float) -> bool:
-            fastest, hardest = cubic_extremes(q - now.q, now.dq, dq, time_s)
-            # A target velocity beyond the limit is the caller's wish; it cannot be met by taking longer.
-            return bool((fastest <= np.maximum(max_vel, np.abs(dq)) + 1e-9).all() and (hardest <= max_acc).all())
-
-        now.go(q, dq, shortest(fits))
-
     def go_to_pose(self, pose_B_T: Pose, twist_B: Array, limits: tuple[float, float, float, float]) -> bool:
-        """Cartesian setpoint of the tool centre point, its twist (6,), and the largest linear and angular velocity and
-        acceleration; False if it is out of reach.
+        """Move to a pose of the tool centre point with its twist (6,); return False if it is out of reach.
+
+        `limits` are the linear and angular velocity, then the linear and angular acceleration.
         """
         now, E_P = self.trajectory, self.description.gripper.pose_E_P
         pose_T_P = self.load.pose_E_T.inverse() @ E_P
@@ -180,34 +176,34 @@ class SimulatedArm:
 
     @property
     def stopped(self) -> bool:
-        """It stands, and was not told to go on."""
+        """True if the arm stands still and no motion is commanded."""
         return self.trajectory.at_rest and float(np.abs(self.sample.row[self.sensors.dq]).max()) < STILL_RAD_S
 
     def limit_wrench(self, most: Array | None) -> None:
-        """Bound the contact wrench's components (6,), N and Nm, from now on; None does not."""
+        """Bound the components (6,) of the contact wrench, N and Nm, from now on; None removes the bound."""
         self._max_wrench = most
         self._bounding = 0
         if most is not None:
             self._per_most = max(float(most[:3].min()), 1e-6) ** -2, max(float(most[3:].min()), 1e-6) ** -2
 
     def brake(self) -> None:
-        """Stop where braking leads."""
+        """Brake to rest."""
         self.trajectory.brake(STOP_RAD_S2)
 
     def lose_link(self) -> None:
-        """The client has gone silent: brake after LINK_LOST_S."""
+        """Brake after LINK_LOST_S: the client is gone."""
         self._lost_steps = round(LINK_LOST_S / STEP_S)
 
     def find_link(self) -> None:
-        """The client is back."""
+        """Cancel the pending braking: a client is connected."""
         self._lost_steps = None
 
     def begin_zeroing(self) -> None:
-        """Collect samples from now on."""
+        """Start collecting samples for a tare."""
         self._taring = []
 
     def end_zeroing(self) -> None:
-        """Subtract the mean of what was collected from now on."""
+        """Subtract the mean of the collected samples from now on."""
         if self._taring:
             self._bias = np.mean(self._taring, axis=0)
         self._taring = None
@@ -215,7 +211,7 @@ class SimulatedArm:
     # --- every millisecond ------------------------------------------------------------------------------------------
 
     def control(self, ctrl: Array) -> None:
-        """Fill the servo commands (dof,) of the coming step; the law is that of `mujoco.control.Servo`."""
+        """Fill the servo commands (dof,) of the next step, by the law of `mujoco.control.Servo`."""
         if self._lost_steps is not None:
             self._lost_steps -= 1
             if self._lost_steps == 0:
@@ -234,7 +230,7 @@ class SimulatedArm:
             ctrl += self._carry
 
     def sense(self, step: int, row: Array) -> None:
-        """Take the sensor row of the step just done; `row` is kept."""
+        """Process the sensor row of the last step; `row` is kept."""
         s = self.sensors
         up = up_in(row[s.quat])
         true = -row[s.force.start : s.torque.stop]
@@ -244,18 +240,18 @@ class SimulatedArm:
         wrench = measured - self._bias
         last = self.sample.filtered_S
         filtered = last + (STEP_S / FILTER_S) * (wrench - last)
-        self.sample = Sample(step, row, wrench, filtered, measured)
+        self.sample = Sample(step, row, wrench, filtered)
         if self._max_wrench is not None:
             at_T = self.load.at_T @ wrench
             f, m = at_T[:3], at_T[3:]
             share = max(float(f @ f) * self._per_most[0], float(m @ m) * self._per_most[1])
             if share > 1.0:
                 self._bounding = PARTED_STEPS
-            elif self._bounding and share < PARTED**2:
+            elif self._bounding and share < PARTED_SHARE**2:
                 self._bounding -= 1
 
     def carry(self) -> None:
-        """Renew the motors' share of the load that is not the hand's own; called every control period."""
+        """Update the motors' feed-forward for the load beyond the hand; call once a control period."""
         mass, com = self._hand
         extra = self.load.mass_kg - mass
         moment = self.load.mass_kg * self.load.com_E_m - mass * com
@@ -265,16 +261,17 @@ class SimulatedArm:
         h, d = self._h, self._data
         origin, rotation = d.site_xpos[h.sensor_site], d.site_xmat[h.sensor_site].reshape(3, 3)
         mujoco.mj_jac(self._model, d, self._jacobian[:3], self._jacobian[3:], origin, h.hand_bodies.start)
-        # The weight m g at the centre of mass c is, at the flange, m g z upwards and the torque (m c) x g z.
+        # At the flange, the weight m g at the centre of mass c is m g z upwards and the torque (m c) x g z.
         arm = rotation @ moment
         j = self._jacobian[:, h.arm_dof]
         self._carry = GRAVITY_M_S2 * (extra * j[2] + arm[1] * j[3] - arm[0] * j[4]) * self._per_kp
 
     def _pressing(self, q: Array, most: Array) -> Array:
-        """Servo commands (dof,) towards the setpoint `q` (dof,) with at most the contact wrench `most` (in B, at P).
+        """Return servo commands (dof,) towards the setpoint `q` (dof,) with at most the contact wrench `most` (in B, at
+        P).
 
-        A spring of the nominal stiffness pulls P to where the setpoint puts it, each component of its wrench bounded;
-        the damper works against standstill, and what the redundant freedom is told stays.
+        A spring of nominal stiffness pulls P to the setpoint's pose, with each component of its wrench bounded. The
+        damper acts against motion, and the command of the redundant joint is unchanged.
         """
         row, k = self.sample.row, self.kinematics
         goal, turned, _ = k.at(q)

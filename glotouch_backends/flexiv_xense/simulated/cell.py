@@ -1,11 +1,11 @@
-"""A simulated cell: the world with its devices in a process of its own, living by the wall's clock.
+"""A simulated cell: the world with its devices in a process of its own, on wall time.
 
     python -m glotouch_backends.flexiv_xense.simulated.cell WORLD SOCKET LOG
 
-WORLD is a pickle of (World, Conditions, seed, options), SOCKET the Unix socket to listen at, LOG a file of one JSON
-line per event. As a real arm does, the simulated one goes on living when its client dies, and the log says what it did
-then: how fast the tool was, how long it took to stand still, how far it went, and the largest contact force meanwhile.
-It ends when it is told to (SIGTERM), or ALONE_S after its last client once the process that started it is gone.
+WORLD is a pickle of (World, Conditions, seed, WorldOptions), SOCKET the Unix socket to listen at, LOG a file of one
+JSON line per event. Like a real arm, the simulated one continues when its client dies. The log then says how fast the
+tool was, how long it took to stand still, how far it moved, and the largest contact force. The cell ends on SIGTERM, or
+ALONE_S after its last client once its parent process is gone.
 """
 
 from __future__ import annotations
@@ -31,14 +31,19 @@ from glotouch_backends.flexiv_xense.simulated.world import SimulatedWorld
 from glotouch_backends.mujoco.model import STEP_S
 
 ALONE_S = 20.0
-BEHIND_S = 0.05  # when the world is later than this it stops catching up: it lives slower than the wall for a moment
+"""Time without a client and without the parent process after which the cell ends."""
+MAX_BEHIND_S = 0.05
+"""A world that is later than this does not catch up. Source: ours."""
 STILL_M_S = 1e-3
-STILL_STEPS = 20  # and so long below it
-MADE = ("Robot", "Tool", "XenseTCPGripper", "XenseSerialGripper", "Sensor")
+"""The tool stands still below this speed. Source: ours."""
+STILL_STEPS = 20
+"""Steps below that speed that count as standstill. Source: ours."""
+PROXIED = ("Robot", "Tool", "XenseTCPGripper", "XenseSerialGripper", "Sensor")
+"""Classes whose objects stay in the cell; a client gets a `Reference`."""
 
 
 class CellClock:
-    """World time; whoever sleeps on it lets go of the world's lock meanwhile."""
+    """World time; sleeping on it releases the world's lock."""
 
     def __init__(self, world: SimulatedWorld, turn: threading.Condition) -> None:
         self._world, self._turn = world, turn
@@ -58,7 +63,7 @@ class CellClock:
 
 
 class StandstillMonitor:
-    """From the moment a client is lost: how the arm comes to rest."""
+    """Monitor of the arm after a client is lost: it logs how the arm comes to rest."""
 
     def __init__(self, world: SimulatedWorld, write: Callable[..., None]) -> None:
         self._world, self._write = world, write
@@ -74,14 +79,14 @@ class StandstillMonitor:
         return now, float(np.linalg.norm((j @ w.arm.sample.row[w.handles.sensors.dq])[:3]))
 
     def begin(self, client: int) -> None:
-        """A client is gone."""
+        """Start monitoring: a client is gone."""
         position, speed = self._tool()
         self._since, self._start, self._still = self._world.steps, position, 0
         self._peak_N = self._farthest_m = 0.0
         self._write("client lost", client=client, speed_m_s=speed, force_N=self._world.contact_force_N())
 
-    def look(self) -> None:
-        """After each step."""
+    def check(self) -> None:
+        """Check for standstill; call after each step."""
         if self._since is None:
             return
         position, speed = self._tool()
@@ -97,11 +102,11 @@ class StandstillMonitor:
 
 
 class Cell:
-    """One world, its pace and its clients.
+    """A world, its pace and its clients.
 
     Args:
         world: The world.
-        log: Where events go.
+        log: File for events.
     """
 
     def __init__(self, world: SimulatedWorld, log: IO[str]) -> None:
@@ -111,7 +116,7 @@ class Cell:
         self._makers = self._find_makers()
         self._made: dict[int, tuple[int, Any]] = {}
         self._links: dict[int, int] = {}  # client: open connections
-        self._watch = StandstillMonitor(world, self.write)
+        self._monitor = StandstillMonitor(world, self.write)
         self._parent = os.getppid()
         self._last_client_s = time.monotonic()
         self.ended = False
@@ -129,21 +134,21 @@ class Cell:
         }
 
     def write(self, event: str, **values: object) -> None:
-        """One line of the log."""
+        """Write one line of the log."""
         self._log.write(json.dumps({"t": round(self.world.now_s, 4), "event": event, **values}) + "\n")
         self._log.flush()
 
     # --- time -------------------------------------------------------------------------------------------------------
 
     def live(self) -> None:
-        """Step at the wall's pace until the end."""
+        """Step the world at wall time until the end."""
         gc.collect()
-        gc.freeze()  # a full collection would look at the whole world, for longer than a step may take
+        gc.freeze()  # a full garbage collection takes longer than a step may
         begin, slept = time.monotonic() - self.world.now_s, threading.Event()
         while not self.ended:
             with self.turn:
                 self.world.advance(self.world.now_s + STEP_S)
-                self._watch.look()
+                self._monitor.check()
                 self.turn.notify_all()
                 alone = not self._links
             now = time.monotonic()
@@ -154,14 +159,14 @@ class Cell:
             left = begin + self.world.now_s - now
             if left > 0.0:
                 slept.wait(left)
-            elif left < -BEHIND_S:
+            elif left < -MAX_BEHIND_S:
                 self.write("late", by_s=-left)
                 begin = now - self.world.now_s
 
     # --- clients ----------------------------------------------------------------------------------------------------
 
     def serve(self, listener: Listener) -> None:
-        """Take every connection; each has a thread."""
+        """Accept connections, and serve each in its own thread."""
         while not self.ended:
             try:
                 connection = listener.accept()
@@ -170,7 +175,7 @@ class Cell:
             threading.Thread(target=self._talk, args=(connection,), daemon=True).start()
 
     def _talk(self, connection: Connection[Any, Any]) -> None:
-        """One connection of a client: requests in, results or exceptions out."""
+        """Serve one connection: requests in, results or exceptions out."""
         client = -1
         try:
             client = connection.recv()
@@ -181,7 +186,7 @@ class Cell:
                 try:
                     with self.turn:
                         answer = True, self._do(client, *request)
-                except Exception as e:  # whatever the stand-in raises belongs to its caller
+                except Exception as e:  # errors of the stand-ins go to their caller
                     answer = False, e
                 connection.send(answer)
         except (EOFError, OSError):
@@ -202,7 +207,7 @@ class Cell:
             for key in owned:
                 del self._made[key]
             if robots:
-                self._watch.begin(client)
+                self._monitor.begin(client)
                 self.vendor.box.leave()
 
     def _do(self, client: int, what: str, *arguments: Any) -> Any:
@@ -212,7 +217,7 @@ class Cell:
             name, args, kwargs = arguments
             args = [self._made[a.key][1] if isinstance(a, Reference) else a for a in args]
             made = self._makers[name](*args, **kwargs)
-            if name not in MADE:
+            if name not in PROXIED:
                 return made
             key = len(self._made) + 1
             while key in self._made:
@@ -224,7 +229,7 @@ class Cell:
 
 
 def main(argv: list[str]) -> int:
-    """The process; see the module's text."""
+    """Run the cell; see the module's text."""
     world_file, address, log_file = argv
     world = SimulatedWorld.unpickle(Path(world_file).read_bytes())
     granted = request_realtime(DEVICES_PRIORITY)

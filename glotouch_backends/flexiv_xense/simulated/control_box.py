@@ -1,4 +1,4 @@
-"""State of the simulated control box behind the vendor's calls: who may do what in which mode, faults and the log."""
+"""State of the simulated control box: modes, permissions, faults and the event log."""
 
 from __future__ import annotations
 
@@ -19,19 +19,20 @@ from glotouch_backends.flexiv_xense.simulated.vendor_api import (
 )
 from glotouch_bt.robot import Pose
 
-# ASSUMED durations, in s: the vendor documents only that these block, and "a few seconds" for the brakes.
+# Durations in s. ASSUMED: the vendor documents only that these calls block, and "a few seconds" for the brakes.
 CONNECT_S, UNREACHABLE_S, REQUEST_S, BRAKES_S, SWITCH_S, PRIMITIVE_S = 0.5, 3.1, 0.005, 2.0, 0.05, 0.1
 CLEAR_MINOR_S, CLEAR_CRITICAL_S = 1.0, 10.0
 POLL_S = 0.001
 UNLICENSED = (Mode.NRT_PLAN_EXECUTION, Mode.NRT_SUPER_PRIMITIVE)
-NOT_ZEROED = 301004  # reported from a Rizon 4s by users; its text here is ours
+NOT_ZEROED = 301004
+"""Event when the force sensor was not zeroed. Source: user reports of a Rizon 4s; the text is ours."""
 
 
 class ControlBox:
     """One arm's control box.
 
     Args:
-        serial: Serial number it answers to.
+        serial: Serial number.
         arm: The arm.
         clock: What blocking calls wait on.
     """
@@ -58,7 +59,7 @@ class ControlBox:
     # --- status -----------------------------------------------------------------------------------------------------
 
     def status(self) -> OperationalStatus:
-        """Ready, or why not."""
+        """Return READY, or the reason why not."""
         if self.faulty:
             return OperationalStatus.CRITICAL_FAULT if self.critical else OperationalStatus.MINOR_FAULT
         if not self.estop_released:
@@ -74,7 +75,7 @@ class ControlBox:
         return OperationalStatus.READY
 
     def log(self, level: RobotEvent_Level, number: int, description: str, advice: str = "") -> None:
-        """Add an event."""
+        """Append an event to the log."""
         stamp = datetime.fromtimestamp(EPOCH_S + self.clock.now_s(), UTC).replace(tzinfo=None)
         self.events.append(
             RobotEvent(
@@ -88,21 +89,21 @@ class ControlBox:
         )
 
     def fail(self, number: int, description: str, *, critical: bool = False) -> None:
-        """A fault: the arm stops by itself and takes no command until it is cleared."""
+        """Set a fault: the arm stops and accepts no command until the fault is cleared."""
         level = RobotEvent_Level.CRITICAL if critical else RobotEvent_Level.ERROR
         self.log(level, number, description, "clear the fault")
         self.faulty, self.critical = True, critical
         self.halt()
 
     def halt(self) -> None:
-        """Brake at once, in whatever mode."""
+        """Brake at once in any mode."""
         self.arm.brake()
         self.arm.limit_wrench(None)
         self.mode = Mode.IDLE
         self.primitive_started_s = None
 
     def leave(self) -> None:
-        """The client is gone: what it had begun ends, and the arm brakes once that has been noticed."""
+        """End the client's requests; the arm brakes once the loss is noticed."""
         self.mode = Mode.IDLE
         self.primitive_started_s = None
         self.arm.lose_link()
@@ -110,10 +111,10 @@ class ControlBox:
     # --- requests ---------------------------------------------------------------------------------------------------
 
     def wait(self, seconds: float) -> None:
-        """Block the caller.
+        """Block the caller for a time.
 
         Raises:
-            RuntimeError: The link is gone (afterwards as well as before).
+            RuntimeError: The link is lost, before or after the wait.
         """
         self.need_link()
         self.clock.sleep_until(self.clock.now_s() + seconds)
@@ -125,31 +126,31 @@ class ControlBox:
             self.wait(POLL_S)
 
     def need_link(self) -> None:
-        """Raises RuntimeError if the link is gone."""
+        """Raise RuntimeError if the link is lost."""
         if not self.linked:
             raise RuntimeError("[flexiv::rdk] failed to deliver the request to the connected robot")
 
     def need_mode(self, *modes: Mode) -> None:
-        """Raises RuntimeError (the vendor's logic_error) if the robot is in none of these modes."""
+        """Raise RuntimeError (the vendor's logic_error) if the robot is in none of these modes."""
         self.need_link()
         if self.mode not in modes:
             names = ", ".join(m.name for m in modes)
             raise RuntimeError(f"[flexiv::rdk] robot is in mode {self.mode.name}, the call needs {names}")
 
     def need_ready(self) -> None:
-        """Raises RuntimeError if the robot is not operational."""
+        """Raise RuntimeError if the robot is not operational."""
         self.need_link()
         if self.status() is not OperationalStatus.READY:
             raise RuntimeError(f"[flexiv::rdk] robot is not operational: {self.status().name}")
 
     def stand_still(self) -> None:
-        """Brake if moving, and wait for it."""
+        """Brake if the arm moves, and wait for standstill."""
         if not self.arm.trajectory.at_rest:
             self.arm.brake()
         self.wait_until(lambda: self.arm.stopped)
 
     def switch(self, mode: Mode) -> None:
-        """Stop, change the mode, wait for it."""
+        """Stop and change the mode."""
         if mode is Mode.UNKNOWN or mode in UNLICENSED:
             raise ValueError(f"[flexiv::rdk] requested mode {mode.name} is invalid or unlicensed")
         self.need_ready()
@@ -171,12 +172,12 @@ class ControlBox:
         self.arm.set_load(FLANGE if name == "Flange" else load_of(params))
 
     def start_primitive(self, seconds: float) -> None:
-        """Run the zeroing for a while."""
+        """Start zeroing the force sensor."""
         self.arm.begin_zeroing()
         self.primitive_started_s, self.primitive_s = self.clock.now_s(), seconds
 
     def primitive_done(self) -> bool:
-        """True once its time has passed; ends the zeroing then."""
+        """Return True once the zeroing's time has passed, and end it."""
         if self.primitive_started_s is None:
             return self.zeroed
         if self.clock.now_s() - self.primitive_started_s < self.primitive_s - 1e-9:
@@ -185,7 +186,7 @@ class ControlBox:
         return True
 
     def finish_primitive(self) -> None:
-        """End the zeroing, if one is under way."""
+        """End a running zeroing."""
         if self.primitive_started_s is not None:
             self.arm.end_zeroing()
             self.primitive_started_s = None
@@ -199,6 +200,6 @@ def _flange() -> ToolParams:
 
 
 def load_of(params: ToolParams) -> Load:
-    """Tool parameters as the arm's controller takes them."""
+    """Return tool parameters as a load of the arm."""
     place = np.array(params.tcp_location)
     return Load(float(params.mass), np.array(params.CoM), Pose(place[:3], place[3:]))

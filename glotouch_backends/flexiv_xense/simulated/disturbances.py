@@ -1,4 +1,4 @@
-"""What can be done to simulated devices that cannot well be done to real ones; asked through the world's referee."""
+"""Disturbances of the simulated devices that real ones do not allow; requested through the world's referee."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from glotouch_backends.flexiv_xense.simulated.vendor_api import GripperLink, Pad
 from glotouch_backends.mujoco.simulation import MujocoReferee, Simulated
 from glotouch_bt.robot import UnknownName
 
-COLLISION = 200101  # ours
+COLLISION = 200101
+"""Number of the collision event. Source: ours."""
 
 
 class DisturbingReferee(MujocoReferee):
-    """The referee of a simulated cell, who can also disturb it.
+    """A referee that can also disturb the devices.
 
     Args:
         world: The world.
-        box, gripper, pads: Its devices.
+        box, gripper, pads: The devices.
     """
 
     def __init__(self, world: Simulated, box: ControlBox, gripper: GripperLink, pads: tuple[PadLink, PadLink]) -> None:
@@ -24,14 +25,15 @@ class DisturbingReferee(MujocoReferee):
         self._box, self._gripper, self._pads = box, gripper, pads
 
     def disturb(self, name: str) -> None:
-        """Do it, from now on.
+        """Start a disturbance.
 
         Args:
-            name: fault, estop, reduced: of the arm, which brakes. link: the arm's is lost, it brakes LINK_LOST_S later.
-                frozen: the arm repeats its last state. gripper: its link is lost. pads frozen, pads missing: as named.
+            name: fault, estop, reduced: state of the arm, which brakes. link: the arm's link is lost, and it brakes
+                LINK_LOST_S later. frozen: the arm repeats its last state. gripper: the gripper's link is lost.
+                pads frozen, pads missing: as named.
 
         Raises:
-            UnknownName: None of these.
+            UnknownName: There is no such disturbance.
         """
         ways = {
             "fault": self._fault,

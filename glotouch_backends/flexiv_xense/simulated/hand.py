@@ -1,4 +1,4 @@
-"""The simulated gripper's board and the processing of its two pads: what goes on between the calls of their APIs."""
+"""The simulated gripper's controller and the processing of its two pads."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ from glotouch_backends.mujoco.sensing import Tactile
 from glotouch_bt.robot import Array, Conditions, GripperState, GripperTarget, RobotDescription, TactileFrame, World
 
 PERIOD_S = STEPS * STEP_S
-WANTED_S = 0.1  # the gels are worked out only while somebody has read a sensor within this time
+WANTED_S = 0.1
+"""The gel model runs while a sensor has been read within this time."""
 
 
 class JawStatus(NamedTuple):
-    """What the board says: m, m/s, N."""
+    """Status of the gripper: m, m/s, N."""
 
     aperture_m: float
     speed_m_s: float
@@ -28,15 +29,15 @@ class JawStatus(NamedTuple):
 
 
 class SimulatedHand:
-    """JawTarget and pads, stepped by the world once a period.
+    """Jaws and pads. The world steps them once a period.
 
     Args:
         description, conditions, seed, world, truth: As for the MuJoCo backend.
         model, data, handles: The world.
 
     Attributes:
-        status: The last report of the jaws.
-        frame: The last pair of depth maps that arrived, or None.
+        status: Last report of the jaws.
+        frame: Last pair of depth maps that arrived, or None.
     """
 
     def __init__(
@@ -67,7 +68,7 @@ class SimulatedHand:
         self.frame: TactileFrame | None = None
 
     def go_to(self, position_m: float, speed_m_s: float, force_N: float) -> None:
-        """A new target, from the next period on; the board clamps what it cannot do and drops what is not a number."""
+        """Set a target from the next period on; clamp it to the ranges, and ignore what is not finite."""
         g = self.gripper
         if not all(map(math.isfinite, (position_m, speed_m_s, force_N))):
             return
@@ -79,16 +80,16 @@ class SimulatedHand:
         self._jaws.set(target)
 
     def want_frames(self) -> None:
-        """Somebody reads a sensor."""
+        """Note that a sensor is being read."""
         self._wanted_s = self._now_s
 
     def begin(self) -> Array:
-        """Before a period: the jaws' servo commands (steps, 2) for it."""
+        """Return the jaws' servo commands (steps, 2) of the next period."""
         self._jaws.plan(self._aperture, PERIOD_S, self._rows)
         return self._rows
 
     def end(self, now_s: float, row: Array) -> None:
-        """After a period: take its last sensor row."""
+        """Process the last sensor row of a period."""
         s = self._s
         self._now_s = now_s
         last = row.tolist()

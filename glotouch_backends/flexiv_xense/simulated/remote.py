@@ -1,4 +1,4 @@
-"""The vendors' modules in a client's process while the devices live in a cell: every call goes over a Unix socket."""
+"""The vendors' modules in a client's process while the devices live in a cell: each call goes over a Unix socket."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ RETRY_S = 0.05
 
 
 class CellLink:
-    """Calls into a cell; every thread has a connection of its own.
+    """Calls into a cell; each thread has its own connection.
 
     Args:
         address: The cell's socket.
@@ -30,7 +30,7 @@ class CellLink:
         self._mine = threading.local()
 
     def ask(self, *request: Any) -> Any:
-        """The answer to a request; what was raised there is raised here.
+        """Send a request and return its answer; an exception of the cell is raised here.
 
         Raises:
             RuntimeError: The cell is gone.
@@ -54,7 +54,7 @@ class CellLink:
         return found
 
     def _connect(self) -> Connection[Any, Any]:
-        """A cell that is still building its world is waited for."""
+        """Connect; wait for a cell that is still building its world."""
         until, pause = time.monotonic() + CONNECT_S, threading.Event()
         while True:
             try:
@@ -66,7 +66,7 @@ class CellLink:
 
 
 class RemoteObject:
-    """An object in the cell: every method is a call."""
+    """Proxy of an object in the cell: each method is a call."""
 
     def __init__(self, link: CellLink, reference: Reference) -> None:
         self._link, self._reference = link, reference
@@ -83,7 +83,7 @@ class RemoteObject:
 
 
 def _maker(link: CellLink, name: str) -> Any:
-    """Stands for a class: calling it makes the object in the cell."""
+    """Return a stand-in for a class: calling it creates the object in the cell."""
 
     def make(*args: Any, **kwargs: Any) -> RemoteObject:
         plain = [a._reference if isinstance(a, RemoteObject) else a for a in args]
@@ -94,7 +94,7 @@ def _maker(link: CellLink, name: str) -> Any:
 
 @dataclass(frozen=True)
 class RemoteVendor:
-    """See `driver.vendor.Vendor`."""
+    """See `driver.devices.vendor.Vendor`."""
 
     flexivrdk: Any
     xensesdk: Any
@@ -103,20 +103,20 @@ class RemoteVendor:
     link: CellLink
 
     def referee(self, question: bytes) -> bytes:
-        """As `SimulatedVendor.referee`."""
+        """See `SimulatedVendor.referee`."""
         answer = self.link.ask(REFEREE, question)
         assert isinstance(answer, bytes)
         return answer
 
 
 def open_remote_vendor(address: str) -> RemoteVendor:
-    """The vendors' modules over a cell.
+    """Return the vendors' modules over a cell.
 
     Args:
         address: Its Unix socket.
 
     Raises:
-        OSError: Nobody listens there.
+        OSError: No cell listens there.
     """
     link = CellLink(address)
     arm = {name: getattr(flexivrdk, name) for name in flexivrdk.__all__}

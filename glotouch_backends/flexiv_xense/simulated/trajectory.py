@@ -1,9 +1,9 @@
-"""The arm controller's own motion generator: smooth joint motion out of setpoints that arrive when they please.
+"""The arm controller's motion generator: smooth joint motion from setpoints that arrive at any time.
 
-What the vendor documents is kept: a new setpoint aborts the old one and is planned for from the present commanded
-state, within the velocity and acceleration limits that came with it; when the target is reached its target velocity is
-kept. How the smoothing is done is not documented. ASSUMED: one cubic to the target, in the streaming interval if the
-limits allow, else in the shortest longer time that they allow.
+Documented by the vendor: a new setpoint replaces the old one, and the motion is planned from the present commanded
+    state
+within the limits that came with it; after the target, its velocity is kept. The smoothing is not documented. ASSUMED:
+one cubic to the target, in the streaming interval if the limits allow it, else in the shortest time that they allow.
 """
 
 from __future__ import annotations
@@ -17,13 +17,15 @@ from glotouch_backends.mujoco.control import hermite
 from glotouch_backends.mujoco.model import STEP_S
 from glotouch_bt.robot import Array
 
-STREAM_S = 0.010  # a setpoint is reached no sooner than this: the interval that setpoints are streamed at
+STREAM_S = 0.010
+"""Shortest duration of a motion: the interval between two streamed setpoints."""
 MAX_DURATION_S = 60.0
+"""Longest duration of a motion."""
 basis = lru_cache(maxsize=64)(hermite)
 
 
 def cubic_extremes(delta: Array, v0: Array, v1: Array, time_s: float) -> tuple[Array, Array]:
-    """Largest |velocity| and |acceleration| of the cubic over `delta` in `time_s` from velocity v0 to v1, elementwise.
+    """Return the largest |velocity| and |acceleration| of a cubic over `delta` in `time_s` from v0 to v1, elementwise.
 
     The acceleration is linear in time, so its extremes are at the ends; the velocity's are there or where it is zero.
     """
@@ -37,7 +39,7 @@ def cubic_extremes(delta: Array, v0: Array, v1: Array, time_s: float) -> tuple[A
 
 
 def shortest(fits: Callable[[float], bool]) -> float:
-    """The shortest time, on a grid of 2 %, for which `fits` holds; the streaming interval at least."""
+    """Return the shortest time, on a grid of 2 %, for which `fits` is True; at least the streaming interval."""
     time_s = STREAM_S
     while not fits(time_s) and time_s < MAX_DURATION_S:
         time_s *= 1.02
@@ -48,17 +50,17 @@ class Trajectory:
     """The commanded motion, one solver step at a time.
 
     Args:
-        q: (dof,) where it stands.
+        q: (dof,) start at rest.
 
     Attributes:
-        q, dq, ddq: (dof,) the commanded state now.
+        q, dq, ddq: (dof,) present commanded state.
     """
 
     def __init__(self, q: Array) -> None:
         self.reset(q)
 
     def reset(self, q: Array) -> None:
-        """Stand at `q` at once."""
+        """Set the commanded state to `q` at rest."""
         self.q, self.dq, self.ddq = q.copy(), np.zeros_like(q), np.zeros_like(q)
         self._rows: list[tuple[Array, Array, Array]] = []
         self._next = 0
@@ -66,32 +68,32 @@ class Trajectory:
 
     @property
     def goal_q(self) -> Array:
-        """(dof,) where the last setpoint leads."""
+        """Joints (dof,) at the end of the motion."""
         return self._end[0]
 
     @property
     def at_rest(self) -> bool:
-        """True if it stands and will go on standing."""
+        """True if it is at rest and stays there."""
         return self._next >= len(self._rows) and not self._end[1].any()
 
     def go(self, q: Array, dq: Array, time_s: float) -> None:
-        """To `q` (dof,), arriving with velocity `dq`, in `time_s` (rounded to a whole number of solver steps)."""
+        """Move to `q` (dof,), arriving with velocity `dq`, in `time_s` (rounded to whole solver steps)."""
         n = max(1, round(time_s / STEP_S))
         position, velocity = basis(n * STEP_S, n)
         knots = np.stack([self.q, self.dq, q, dq])
-        # The mean acceleration of this stretch, ramped in from that of the last one: a setpoint has none of its own.
+        # Ramp from the last motion's mean acceleration to this one's: a setpoint has no acceleration of its own.
         along = (np.arange(n) / n)[:, None]
         ddq = self.ddq + along * ((dq - self.dq) / (n * STEP_S) - self.ddq)
         self._rows = list(zip(position @ knots, velocity @ knots, ddq, strict=True))
         self._next, self._end = 0, (q, dq)
 
     def brake(self, deceleration_rad_s2: float) -> None:
-        """To rest, every joint evenly, the fastest one with this deceleration."""
+        """Brake to rest uniformly; the fastest joint has this deceleration."""
         time_s = max(STREAM_S, float(np.abs(self.dq).max()) / deceleration_rad_s2)
         self.go(self.q + 0.5 * time_s * self.dq, np.zeros_like(self.q), time_s)
 
     def advance(self) -> tuple[Array, Array, Array]:
-        """q, dq, ddq (dof,) at the start of the coming step; afterwards the commanded state is that of its end."""
+        """Return q, dq, ddq (dof,) at the start of the next step, and advance to its end."""
         i = self._next
         if i < len(self._rows):
             start = self._rows[i]

@@ -14,18 +14,18 @@ from glotouch_backends.flexiv_xense.simulated.vendor_api import GripperLink, Pad
 from glotouch_backends.flexiv_xense.simulated.world import SimulatedWorld
 
 ROBOT_SN = "Rizon4-000001"
-GRIPPER_ADDRESS = "000000000001"  # as a network address and as a serial port
+GRIPPER_ADDRESS = "000000000001"  # network address and serial port
 PAD_SNS = ("OG000001", "OG000002")  # left, right
 
 
 @dataclass(frozen=True)
 class SimulatedVendor:
-    """What `driver.vendor.Vendor` asks for, and the world behind it.
+    """See `driver.devices.vendor.Vendor`; with the world behind it.
 
     Attributes:
         flexivrdk, xensesdk, xensegripper: Namespaces with the vendors' names.
         clock: Sleeping on it advances the world.
-        world, box, gripper, pads: What is behind them.
+        world, box, gripper, pads: The simulated devices.
     """
 
     flexivrdk: Any
@@ -38,19 +38,19 @@ class SimulatedVendor:
     pads: tuple[PadLink, PadLink]
 
     def referee(self, question: bytes) -> bytes:
-        """Ask the world's referee (or disturber): a pickled (method, arguments) in, the pickled result out."""
+        """Call the world's referee: a pickled (method, arguments) in, the pickled result out."""
         method, arguments = pickle.loads(question)
         referee = DisturbingReferee(self.world, self.box, self.gripper, self.pads)
         return pickle.dumps(getattr(referee, method)(*arguments))
 
 
 def bound(cls: type[Any], **values: object) -> Any:
-    """A subclass of a stand-in that knows one world, under the vendor's name."""
+    """Return a subclass of a stand-in that is bound to one world and has the vendor's name."""
     return type(cls.__name__, (cls,), {"__doc__": cls.__doc__, **values})
 
 
 def modules(box: ControlBox, gripper: GripperLink, pads: tuple[PadLink, PadLink]) -> tuple[Any, Any, Any]:
-    """`flexivrdk`, `xensesdk` and `xensegripper` over these devices."""
+    """Return `flexivrdk`, `xensesdk` and `xensegripper` over these devices."""
     arm = {name: getattr(flexivrdk, name) for name in flexivrdk.__all__}
     arm["Robot"] = bound(flexivrdk.Robot, _boxes={box.serial: box})
     links = {GRIPPER_ADDRESS: gripper}
@@ -67,10 +67,10 @@ def modules(box: ControlBox, gripper: GripperLink, pads: tuple[PadLink, PadLink]
 
 
 def open_vendor(world_blob: bytes) -> SimulatedVendor:
-    """The vendors' modules over a world of its own in this process.
+    """Return the vendors' modules over a new world in this process.
 
     Args:
-        world_blob: Pickle of (World, Conditions, seed, options).
+        world_blob: Pickle of (World, Conditions, seed, WorldOptions).
 
     Raises:
         GlotouchError: The world cannot be built.
@@ -80,7 +80,7 @@ def open_vendor(world_blob: bytes) -> SimulatedVendor:
 
 
 def assemble(world: SimulatedWorld, clock: Clock) -> SimulatedVendor:
-    """The vendors' modules over a world that moves with a clock."""
+    """Return the vendors' modules over a world that advances with a clock."""
     box = ControlBox(ROBOT_SN, world.arm, clock)
     gripper = GripperLink(world.hand, clock)
     pads = PadLink(world.hand, clock, right=False, camera=0), PadLink(world.hand, clock, right=True, camera=1)

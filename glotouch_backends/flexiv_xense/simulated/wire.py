@@ -1,7 +1,7 @@
-"""What a simulated cell and its clients say to each other, pickled over a Unix socket that only we can open.
+"""Messages between a simulated cell and its clients, pickled over a Unix socket that only we can open.
 
-(NEW, class, args, kwargs) makes an object and answers a `Reference`; (CALL, key, method, args, kwargs) calls it;
-(REFEREE, question) asks the truth. An answer is (True, value) or (False, exception).
+(NEW, class, args, kwargs) creates an object and answers with a `Reference`; (CALL, key, method, args, kwargs) calls it;
+(REFEREE, question) asks the referee. An answer is (True, value) or (False, exception).
 """
 
 from __future__ import annotations
@@ -13,6 +13,6 @@ NEW, CALL, REFEREE = "new", "call", "referee"
 
 @dataclass(frozen=True)
 class Reference:
-    """Stands for an object that lives in the cell."""
+    """Reference to an object in the cell."""
 
     key: int

@@ -1,10 +1,9 @@
-"""The world behind the simulated devices: the MuJoCo backend's, stepped one millisecond at a time."""
+"""The world of the simulated devices: the MuJoCo backend's, stepped one millisecond at a time."""
 
 from __future__ import annotations
 
 import math
 import pickle
-from collections.abc import Mapping
 
 import mujoco
 import numpy as np
@@ -15,18 +14,19 @@ from glotouch_backends.mujoco import MAX_HELD_DISTANCE_M, build_world
 from glotouch_backends.mujoco.control import check_sane
 from glotouch_backends.mujoco.model import STEP_S, STEPS
 from glotouch_backends.mujoco.simulation import ControlTrace
+from glotouch_backends.options import WorldOptions
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import BackendError, Conditions, RobotDescription, World
 
 
 class SimulatedWorld:
-    """One trial's world with the firmware of its devices. Nothing here knows the vendors' API.
+    """World of one trial with the firmware of its devices; it does not know the vendors' API.
 
     The same seed gives the same world as the MuJoCo backend and sensors with the same noise.
 
     Args:
         world, conditions, seed: As for a backend.
-        options: `layout` and `fixed` as for the MuJoCo backend; others are not looked at.
+        options: Options of the world.
         description: The robot.
     """
 
@@ -35,7 +35,7 @@ class SimulatedWorld:
         world: World,
         conditions: Conditions,
         seed: int,
-        options: Mapping[str, object],
+        options: WorldOptions,
         description: RobotDescription = RIZON4_XENSE,
     ) -> None:
         self.world, self.conditions, self.seed, self.description = world, conditions, seed, description
@@ -56,17 +56,17 @@ class SimulatedWorld:
 
     @classmethod
     def unpickle(cls, blob: bytes) -> SimulatedWorld:
-        """From a pickle of (World, Conditions, seed, options), written by our own client."""
+        """Build the world from a pickle of (World, Conditions, seed, WorldOptions) that our client wrote."""
         world, conditions, seed, options = pickle.loads(blob)
         return cls(world, conditions, seed, options)
 
     @property
     def now_s(self) -> float:
-        """Time since the world began."""
+        """World time."""
         return self.steps * STEP_S
 
     def advance(self, stamp_s: float) -> None:
-        """Step until `stamp_s` has come.
+        """Step the world to `stamp_s`.
 
         Raises:
             BackendError: MuJoCo failed; cause chained.
@@ -78,7 +78,7 @@ class SimulatedWorld:
             raise BackendError(f"MuJoCo failed at t={self.now_s:.3f} s: {e}") from e
 
     def _step(self) -> None:
-        """One millisecond."""
+        """Step one millisecond."""
         i = self.steps % STEPS
         if i == 0:
             self.arm.carry()
@@ -96,18 +96,18 @@ class SimulatedWorld:
             self._after_period()
 
     def _after_period(self) -> None:
-        """What the MuJoCo backend does once a control period."""
+        """Update what the MuJoCo backend updates once a control period."""
         check_sane(self.data.warning.number, self._samples, self.data.time)
         self._note_peak()
         self.hand.end(self.now_s, self._samples[-1])
 
     def contact_force_N(self) -> float:
-        """True contact force in the last step, on the hand and on the probe while it is in the hand."""
+        """Return the true contact force of the last step on the hand, and on the probe while it is held."""
         force = (self._counted @ np.asarray(self._external_now))[3:]
         return math.sqrt(float(force @ force))
 
     def _note_peak(self) -> None:
-        """Largest true contact force so far, on the hand and on the probe while it is in the hand."""
+        """Update the largest true contact force on the hand, and on the probe while it is held."""
         h = self.handles
         gap = self.data.xpos[h.probe_body] - self._samples[-1, h.sensors.position]
         self._counted[3] = float(gap @ gap) < MAX_HELD_DISTANCE_M**2

@@ -1,4 +1,4 @@
-"""TODO door of glotouch_backends/mujoco/control."""
+"""Controllers of arm and gripper between two setpoints, slow requests, and the hard limits."""
 
 from glotouch_backends.mujoco.control.jaws import JawReports, JawServo
 from glotouch_backends.mujoco.control.requests import PAYLOAD_S, PendingPayload, PendingTare

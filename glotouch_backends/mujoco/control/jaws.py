@@ -1,4 +1,4 @@
-"""The gripper's own controller: a speed-limited aperture ramp with limited force, and its reports."""
+"""The gripper's controller: a speed-limited aperture ramp with limited force, and its delayed reports."""
 
 from __future__ import annotations
 
@@ -12,12 +12,14 @@ from glotouch_backends.mujoco.model import JAW_STIFFNESS_N_M, STEPS, Handles
 from glotouch_bt.robot import Array, Conditions, Gripper, GripperState, GripperTarget, ParamError
 from glotouch_bt.robot.scene import stream
 
-MOVING_M_S = 0.002  # aperture rate above which the jaws are reported as moving
-WINDUP_M = 0.001  # how far the ramp may lead the jaws beyond what the force limit needs
+MOVING_M_S = 0.002
+"""Report the jaws as moving above this aperture rate. Source: ours."""
+WINDUP_M = 0.001
+"""Largest lead of the ramp over the jaws, beyond what the force limit needs. Source: ours."""
 
 
 class JawServo:
-    """Ramps both jaws' servo commands towards the target and limits their force through the actuators' force range."""
+    """Ramp both jaws' servo commands to the target; limit their force through the actuators' force range."""
 
     def __init__(self, model: mujoco.MjModel, handles: Handles, gripper: Gripper, aperture_m: float) -> None:
         self._gripper = gripper
@@ -33,7 +35,7 @@ class JawServo:
         self._lead = 2.0 * (force_N / JAW_STIFFNESS_N_M + WINDUP_M)
 
     def check(self, target: GripperTarget) -> None:
-        """Refuse a target the gripper cannot take.
+        """Refuse a target outside the gripper's range.
 
         Raises:
             ParamError: Not finite or outside the gripper's range.
@@ -48,13 +50,13 @@ class JawServo:
                 raise ParamError(f"gripper.{name}", value, f"within {low:g} .. {high:g}")
 
     def set(self, target: GripperTarget) -> None:
-        """Take a new (checked) target."""
+        """Set a new (checked) target."""
         if target.force_N != self._target.force_N:
             self._apply_force(target.force_N)
         self._target = target
 
     def plan(self, aperture_m: float, period_s: float, ctrl: Array) -> None:
-        """Fill ctrl (steps, 2), travel of each jaw, for the coming period; `aperture_m` is the present one."""
+        """Fill ctrl (steps, 2), the travel of each jaw, for the next period; `aperture_m` is the present one."""
         start = min(max(self._ramp, aperture_m - self._lead), aperture_m + self._lead)
         step = self._target.speed_m_s * period_s
         end = start + min(max(self._target.aperture_m - start, -step), step)
@@ -66,7 +68,7 @@ class JawServo:
 
 
 class JawReports:
-    """What the gripper says about its jaws: late, biased, noisy and quantised."""
+    """Delayed reports of the jaws with bias, noise and quantisation."""
 
     def __init__(self, conditions: Conditions, seed: int, period_s: float, first: GripperState) -> None:
         self._c = conditions
@@ -86,6 +88,6 @@ class JawReports:
         return GripperState(state.stamp_s, aperture, state.force_N, state.moving)
 
     def report(self, stamp_s: float, aperture_m: float, rate_m_s: float, force_N: float) -> GripperState:
-        """Take the true state of now, give the report that arrives now."""
+        """Add the present true state; return the report that arrives now."""
         self._line.append(self._spoil(GripperState(stamp_s, aperture_m, force_N, abs(rate_m_s) > MOVING_M_S)))
         return self._line[0]

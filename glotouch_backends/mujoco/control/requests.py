@@ -1,4 +1,4 @@
-"""Slow requests under way: tare and payload, advanced by the robot once a period."""
+"""Pending tare and payload requests, advanced by the robot once a period."""
 
 from __future__ import annotations
 
@@ -6,22 +6,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from glotouch_bt.robot import Array, SetPayload, Tare
+from glotouch_bt.robot import Array, PendingTicket, SetPayload, Tare
 
-PAYLOAD_S = 0.05  # what switching the payload takes
-
-
-@dataclass
-class PendingTicket:
-    """A `Ticket` the robot completes."""
-
-    done: bool = False
-    error: str | None = None
+PAYLOAD_S = 0.05
+"""Duration of a payload request. Source: ours."""
 
 
 @dataclass
 class PendingTare:
-    """Collects samples until its duration has passed."""
+    """Average of samples until the duration has passed."""
 
     request: Tare
     periods: int
@@ -30,7 +23,7 @@ class PendingTare:
     samples: int = 0
 
     def add(self, block: Array) -> bool:
-        """Take a block (n, 6) of untared samples; True when there are enough."""
+        """Add a block (n, 6) of untared samples; return True when there are enough."""
         self.total += block.sum(axis=0)
         self.samples += len(block)
         self.periods -= 1
@@ -38,13 +31,13 @@ class PendingTare:
 
     @property
     def mean(self) -> Array:
-        """(6,) of all samples so far."""
+        """Mean (6,) of all samples so far."""
         return self.total / self.samples
 
 
 @dataclass
 class PendingPayload:
-    """Waits until the controller has switched."""
+    """Payload that the controller is switching to."""
 
     request: SetPayload
     periods: int

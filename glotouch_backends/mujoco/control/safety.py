@@ -1,4 +1,4 @@
-"""The hard limits below the skill layer: contact wrench, and a simulation that is still sane."""
+"""Hard limits below the skills: contact wrench, and numerical stability of the simulation."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ import numpy.typing as npt
 
 from glotouch_bt.robot import Array, BackendError, Limits, SafetyStop
 
-CHUNK = 5  # consecutive samples that must all be beyond the limit; also how often it is looked at
+CHUNK = 5
+"""Samples in a check; the limit trips when all of them are beyond it. Source: ours."""
 
 
 class HardLimitGuard:
-    """Looks at every chunk of raw wrench samples; once tripped it stays tripped."""
+    """Check every chunk of raw wrench samples; once tripped it stays tripped."""
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
@@ -22,9 +23,9 @@ class HardLimitGuard:
         self.tripped: SafetyStop | None = None
 
     def check(self, contact: Array, stamp_s: float) -> bool:
-        """Check a chunk (n, 6) of contact wrenches ending at `stamp_s`; True if a limit tripped now."""
+        """Check a chunk (n, 6) of contact wrenches that ends at `stamp_s`; return True if a limit trips now."""
         scaled = (contact * self._scale).ravel()
-        if scaled @ scaled < 1.0:  # not one sample can be beyond a limit
+        if scaled @ scaled < 1.0:  # no sample can be beyond a limit
             return False
         squared = contact * contact
         force2, torque2 = float(squared[:, :3].sum(axis=1).min()), float(squared[:, 3:].sum(axis=1).min())
@@ -38,23 +39,23 @@ class HardLimitGuard:
         return True
 
     def stop(self) -> SafetyStop:
-        """A fresh copy of the stop that tripped, to raise in every cycle from then on."""
+        """Return a new copy of the stop, to raise in every later cycle."""
         t = self.tripped
         assert t is not None
         return SafetyStop(t.quantity, t.value, t.limit, t.stamp_s)
 
 
 def silence_mujoco() -> None:
-    """Keep MuJoCo from printing its warnings and writing MUJOCO_LOG.TXT; `check_sane` turns them into errors."""
+    """Stop MuJoCo from printing warnings and writing MUJOCO_LOG.TXT; `check_sane` raises them as errors."""
     mujoco.set_mju_user_warning(lambda _: None)
 
 
 def check_sane(warnings: npt.NDArray[np.int32], samples: Array, time_s: float) -> None:
-    """Refuse a simulation that has blown up or run out of room.
+    """Refuse a simulation that has diverged or exceeded its buffers.
 
     Args:
-        warnings: `data.warning.number`, how often each of MuJoCo's warnings was raised.
-        samples: Any shape; what was sensed. A square that overflows counts as not finite.
+        warnings: `data.warning.number`, the count of each of MuJoCo's warnings.
+        samples: Sensor readings of any shape. A square that overflows counts as not finite.
         time_s: For the message.
 
     Raises:

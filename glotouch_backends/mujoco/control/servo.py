@@ -1,4 +1,4 @@
-"""From joint setpoints to servo commands: cubic Hermite between setpoints, feed-forward, and braking to a hold."""
+"""Servo commands from joint setpoints: cubic Hermite interpolation, feed-forward, and braking to rest."""
 
 from __future__ import annotations
 
@@ -8,15 +8,18 @@ import numpy as np
 from glotouch_backends.mujoco.model import DAMPING_PER_STIFFNESS_S, JOINT_DAMPING, STEPS, STIFFNESS_NM_RAD, Handles
 from glotouch_bt.robot import Array, JointSetpoint, ParamError, RobotDescription
 
-BRAKE_REACH_M = 0.8  # the hand's distance from the axes, to turn a Cartesian deceleration into a joint one
-MAX_ACCELERATION_RAD_S2 = 1e3  # a feed-forward acceleration beyond this is a mistake
-VELOCITY_SLACK = 1.02  # of the implied velocity between setpoints, for rounding
+BRAKE_REACH_M = 0.8
+"""Distance of the hand from the axes that converts a Cartesian deceleration into a joint deceleration. Source: ours."""
+MAX_ACCELERATION_RAD_S2 = 1e3
+"""Refuse a larger feed-forward acceleration. Source: ours."""
+VELOCITY_SLACK = 1.02
+"""Implied over allowed velocity between two setpoints, for rounding. Source: ours."""
 
 
 def hermite(period_s: float, steps: int) -> tuple[Array, Array]:
-    """Position and velocity bases (steps, 4) on (q0, dq0, q1, dq1), at the START of each of the period's steps.
+    """Return position and velocity bases (steps, 4) on (q0, dq0, q1, dq1), at the START of each step of a period.
 
-    Standard cubic Hermite basis; a step's command acts from its start, so the period's end is the next one's start.
+    Standard cubic Hermite basis. A step's command acts from its start, so the period's end is the next one's start.
     """
     s, t = np.arange(steps) / steps, period_s
     position = np.stack(
@@ -29,7 +32,7 @@ def hermite(period_s: float, steps: int) -> tuple[Array, Array]:
 
 
 class Servo:
-    """Keeps the last setpoint and turns the next one into one servo command a step.
+    """Interpolate from the last setpoint to the next one, with one servo command a step.
 
     MuJoCo's position servo gives kp (ctrl - q) - kv dq; with
     ctrl = q + ((kv + damping) dq + M ddq) / kp the joints follow q without lag (M includes the armature).
@@ -49,7 +52,7 @@ class Servo:
         n = description.dof
         lower, upper = np.array([j.lower_rad for j in joints]), np.array([j.upper_rad for j in joints])
         fastest = np.array([j.velocity_rad_s for j in joints])
-        # Rows: q, dq, ddq, implied velocity. |value - middle| <= half; false for NaN.
+        # Rows: q, dq, ddq, implied velocity. The test |value - middle| <= half is False for NaN.
         self._middle = np.stack([0.5 * (lower + upper), np.zeros(n), np.zeros(n), np.zeros(n)])
         self._half = np.stack(
             [0.5 * (upper - lower) + 1e-9, fastest, np.full(n, MAX_ACCELERATION_RAD_S2), VELOCITY_SLACK * fastest]
@@ -61,7 +64,8 @@ class Servo:
         self._period = period_s
         self._brake_step = stop_acceleration_m_s2 / BRAKE_REACH_M * period_s
         along = (np.arange(STEPS) / STEPS)[:, None]
-        # One product gives all commands: position basis on the knots, velocity basis on the led knots, ramped torques.
+        # One product gives all commands: position basis on the knots, velocity basis on the scaled knots, ramped
+        # torques.
         self._basis = np.hstack([*hermite(period_s, STEPS), 1.0 - along, along, np.ones((STEPS, 1))])
         self._terms = np.zeros((11, n))
         self._knots: Array = self._terms[:4]  # q0, dq0, q1, dq1
@@ -71,7 +75,7 @@ class Servo:
 
     @property
     def q(self) -> Array:
-        """(dof,) the setpoint reached at the end of the last period, rad."""
+        """Setpoint (dof,) at the end of the last period, rad."""
         return np.asarray(self._knots[2])
 
     @property
@@ -80,17 +84,17 @@ class Servo:
         return bool(self._knots[3].any())
 
     def reset(self, q: Array) -> None:
-        """Stand at `q` (dof,) from now on, at once."""
+        """Set the setpoint to `q` (dof,) at rest, without a ramp."""
         self._knots[0] = self._knots[2] = q
         self._knots[1] = self._knots[3] = 0.0
         self._ddq[:] = 0.0
 
     def load(self, torque_Nm: Array) -> None:
-        """Constant feed-forward torque (dof,) that carries a payload's weight."""
+        """Set the constant feed-forward torque (dof,) that carries a payload's weight."""
         self._terms[10] = torque_Nm * self._per_kp
 
     def check(self, setpoint: JointSetpoint) -> tuple[Array, Array, Array]:
-        """The setpoint as arrays, if it is sane.
+        """Return the setpoint as arrays (q, dq, ddq) if it is valid.
 
         Raises:
             ParamError: Wrong shape, not finite, or beyond a joint's position or velocity limit.
@@ -112,7 +116,7 @@ class Servo:
         return asked[0], asked[1], asked[2]
 
     def _brake(self) -> tuple[Array, Array, Array]:
-        """The next setpoint of a straight, even deceleration to rest (in joint space)."""
+        """Return the next setpoint of a uniform deceleration to rest, straight in joint space."""
         q, dq = self._knots[2], self._knots[3]
         fastest = float(np.abs(dq).max())
         if fastest == 0.0:
@@ -121,7 +125,7 @@ class Servo:
         return q + 0.5 * self._period * (dq + slower), slower, (slower - dq) / self._period
 
     def plan(self, target: tuple[Array, Array, Array] | None, ctrl: Array) -> None:
-        """Fill ctrl (steps, dof) for the coming period: towards the target, or braking to rest if None."""
+        """Fill ctrl (steps, dof) for the next period: towards the target, or braking to rest if it is None."""
         k, terms = self._knots, self._terms
         if target is None and not np.count_nonzero(k[3]):
             if not np.count_nonzero(self._ddq):
@@ -139,7 +143,7 @@ class Servo:
         self._ddq[:] = ddq
 
     def _inertia(self, ddq: Array) -> Array:
-        """M ddq / kp, with the present inertia matrix (the armature is in M)."""
+        """Return M ddq / kp with the present inertia matrix (the armature is in M)."""
         self._vector[self._dof] = ddq
         mujoco.mj_mulM(self._model, self._data, self._product, self._vector)
         return np.asarray(self._product[self._dof] * self._per_kp)

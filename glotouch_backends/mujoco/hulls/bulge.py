@@ -1,4 +1,4 @@
-"""How far a set of convex hulls departs from the solid it stands for."""
+"""Distance between the union of convex hulls and the solid that they represent."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from glotouch_bt.robot import Array
 from glotouch_bt.robot.scene import Mesh
 
 SKIN_M = 0.001
-"""Points deeper inside the solid than this belong to a crack between two hulls, not to the outer skin."""
+"""Points deeper than this inside the solid lie in a gap between two hulls, not on the outer surface. Source: ours."""
 
 
 def depth_inside_m(points: Array, hulls: Sequence[Array]) -> Array:
-    """Depth (n,) of each point inside the nearest hull; outside negative, a lower bound of the gap."""
+    """Return the depth (n,) of each point inside the nearest hull; negative outside: a lower bound of the gap."""
     depth = np.full(len(points), -np.inf)
     for hull in hulls:
         planes = ConvexHull(hull).equations
@@ -25,7 +25,7 @@ def depth_inside_m(points: Array, hulls: Sequence[Array]) -> Array:
 
 
 def surface_distance_m(points: Array, mesh: Mesh, samples: int = 200_000) -> Array:
-    """Distance (n,) of points from the mesh's surface: exact to the triangles near the nearest of dense samples."""
+    """Return the distance (n,) of points from the mesh: exact to the triangles next to the nearest of dense samples."""
     solid = mesh.as_trimesh()
     near, triangle = trimesh.sample.sample_surface(solid, samples, seed=0)
     _, index = cKDTree(near).query(points, k=6)
@@ -37,16 +37,16 @@ def surface_distance_m(points: Array, mesh: Mesh, samples: int = 200_000) -> Arr
 
 
 def bulge_m(mesh: Mesh, hulls: Sequence[Array], samples: int = 20_000) -> Array:
-    """How far the hulls' union stands out of the solid, at points spread evenly over the union's surface.
+    """Return how far the union of hulls protrudes from the solid, at points spread evenly over the union's surface.
 
     Args:
         mesh: The solid.
         hulls: (k_i, 3) vertices of each convex part, in the mesh frame.
-        samples: Points before those hidden inside another hull are dropped.
+        samples: Number of points, before those hidden inside another hull are dropped.
 
     Returns:
-        (n,) distances from the true surface in m, n <= samples; 0 where the union lies within the solid (how far it
-        falls short is measured by `depth_inside_m` of points of the true surface).
+        (n,) distances from the true surface in m, n <= samples; 0 where the union lies within the solid (to measure how
+        far it falls short, use `depth_inside_m` of points on the true surface).
     """
     shells = [trimesh.convex.convex_hull(h) for h in hulls]
     area = np.array([s.area for s in shells])
@@ -62,6 +62,6 @@ def bulge_m(mesh: Mesh, hulls: Sequence[Array], samples: int = 20_000) -> Array:
     found = points[~hidden]
     distance = surface_distance_m(found, mesh)
     inside = mesh.as_trimesh().contains(found)
-    # neighbours that abut instead of overlapping leave their common face visible deep inside the solid: not skin
+    # drop common faces of adjacent hulls: they lie deep inside the solid
     skin = ~inside | (distance < SKIN_M)
     return np.asarray(np.where(inside, 0.0, distance)[skin], dtype=np.float64)

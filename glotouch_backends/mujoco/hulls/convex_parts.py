@@ -1,4 +1,4 @@
-"""Convex parts as the physics engine wants them: true hull vertices only, not too many, nothing flat."""
+"""Convex parts as MuJoCo needs them: true hull vertices only, limited in number, none flat."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from scipy.spatial import ConvexHull, QhullError
 from glotouch_bt.robot import Array
 
 MIN_VOLUME_M3 = 1e-12
-"""Parts below 0.001 mm3 are crumbs of the cutting; MuJoCo refuses to compile a mesh without volume."""
+"""Drop parts below 0.001 mm3: they are residues of the cut, and MuJoCo refuses meshes without volume. Source: ours."""
 
 
 def trimmed_hull(points: Array, max_vertices: int, tolerance_m: float) -> Array | None:
-    """At most `max_vertices` of the hull's own vertices, chosen so that the rest sticks out least.
+    """Return at most `max_vertices` of the hull's vertices, chosen so that the dropped ones protrude least.
 
-    Greedy: starting from four vertices far apart, the vertices furthest outside the hull so far are added until the
-    count is reached or nothing sticks out by more than the tolerance. (CoACD's own decimation
-    leaves gaps of millimetres.)
+    Greedy: start from four vertices far apart, and add those furthest outside the present hull until the count is
+        reached
+    or none protrudes by more than the tolerance. (CoACD's own decimation leaves gaps of millimetres.)
 
     Args:
         points: (n, 3), m.
         max_vertices: At least 4.
-        tolerance_m: How far a dropped vertex may stick out of the trimmed hull.
+        tolerance_m: Largest protrusion of a dropped vertex.
 
     Returns:
         (k, 3) with 4 <= k <= max_vertices; None if the points span no volume.
@@ -38,7 +38,7 @@ def trimmed_hull(points: Array, max_vertices: int, tolerance_m: float) -> Array 
         planes = _hull(vertices[chosen]).equations
         above = vertices @ planes[:, :3].T + planes[:, 3]
         above[chosen] = -np.inf
-        # the furthest point over every face at once, the worst first, and none much less bad than the worst
+        # take the furthest point over every face at once, but none that protrudes much less than the worst
         candidates = np.unique(np.argmax(above, axis=0))
         outside = above[candidates].max(axis=1)
         order = np.argsort(-outside, kind="stable")
@@ -51,7 +51,7 @@ def trimmed_hull(points: Array, max_vertices: int, tolerance_m: float) -> Array 
 
 
 def _hull(points: Array) -> ConvexHull:
-    """Convex hull; joggled by a rounding error where coplanar points defeat the exact one."""
+    """Return the convex hull; joggle the points if coplanar ones defeat the exact algorithm."""
     try:
         return ConvexHull(points)
     except QhullError:
@@ -59,7 +59,7 @@ def _hull(points: Array) -> ConvexHull:
 
 
 def _first_simplex(vertices: Array) -> list[int]:
-    """Indices of four vertices far apart that span a volume."""
+    """Return the indices of four vertices far apart that span a volume."""
     first = int(np.argmax(np.linalg.norm(vertices - vertices.mean(axis=0), axis=1)))
     from_first = vertices - vertices[first]
     second = int(np.argmax(np.linalg.norm(from_first, axis=1)))

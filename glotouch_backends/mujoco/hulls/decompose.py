@@ -1,18 +1,18 @@
-"""True non-convex collision shapes: an object as a set of convex hulls, computed once and kept.
+"""Non-convex collision shapes: an object as a set of convex hulls, computed once and cached.
 
-A plain convex hull is a wrong object (a mug's handle measured 20.6 mm for 7.7); MuJoCo's `type="sdf"` costs forty times
-more and misses edges. CoACD (Wei et al., SIGGRAPH 2022) cuts the mesh into nearly convex parts; it takes 10-60 s an
-object, so the result is looked up by what the mesh IS (`Mesh.digest`) and by the parameters:
+A plain convex hull is the wrong shape (a mug's handle measures 20.6 mm instead of 7.7), and MuJoCo's `type="sdf"` costs
+forty times more and misses edges. CoACD (Wei et al., SIGGRAPH 2022) cuts the mesh into nearly convex parts. It takes
+10-60 s an object, so the result is looked up by the mesh's content (`Mesh.digest`) and the parameters:
 
-    1. the package's own glotouch_missions/hulls/<digest>.npz   (read only; the shipped objects)
-    2. the user's cache, $XDG_CACHE_HOME/glotouch-bt/hulls or ~/.cache/glotouch-bt/hulls
-    3. computed in a process of its own, then written to 2
+    1. in the package, glotouch_missions/hulls/<digest>.npz (read only; the shipped objects)
+    2. in the user's cache, $XDG_CACHE_HOME/glotouch-bt/hulls or ~/.cache/glotouch-bt/hulls
+    3. else computed in a separate process and written to 2
 
-A file that is damaged, or made with other parameters, is as good as absent. Results are read back from the bytes that
-are stored, so that a first run and every later one see the same floats. The measurements behind the parameters are in
-docs/decisions/0004-convex-decomposition.md.
+A damaged file, or one made with other parameters, counts as absent. New results are read back from the stored bytes, so
+that the first run and later ones use the same floats. docs/decisions/0004-convex-decomposition.md has the measurements
+behind the parameters.
 
-Redo: `python -m glotouch_backends.mujoco.hulls.decompose FOLDER [--out DIR]`.
+To recompute: `python -m glotouch_backends.mujoco.hulls.decompose FOLDER [--out DIR]`.
 """
 
 from __future__ import annotations
@@ -43,21 +43,23 @@ Progress = Callable[[str], None]
 _log = logging.getLogger(__name__)
 
 MAX_VERTICES = 256
-"""Of one hull. With 64 an apple's one large part falls 0.6 mm (p95) short of its surface, with 256 0.1 mm; MuJoCo walks
-the hull's graph, so that the step does not get slower."""
+"""Largest number of vertices of a hull. Source: measured; an apple's largest part misses its surface by 0.6 mm (p95)
+with 64, by 0.1 mm with 256. The step does not get slower, because MuJoCo walks the hull's graph."""
 TOLERANCE_M = 0.0001
+"""Vertices that protrude less than this from the trimmed hull are dropped. Source: ours."""
 MAX_GAP_M = 0.002
-"""No vertex of the mesh may lie further outside every hull than this, or the decomposition is refused."""
+"""Refuse a decomposition if a vertex of the mesh lies further outside every hull. Source: ours."""
 _POLL_S = 10.0
+"""Interval between two progress messages."""
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """One way to run CoACD.
+    """One parameter set of CoACD.
 
     Attributes:
         parameters: Keyword arguments of `coacd.run_coacd`.
-        limit_s: Wall time after which it is given up.
+        limit_s: Wall time after which it is killed.
     """
 
     parameters: dict[str, float | int | str | bool]
@@ -93,16 +95,16 @@ COARSE = Attempt(
 KEY = json.dumps(
     {"version": 1, "max_vertices": MAX_VERTICES, "tolerance_m": TOLERANCE_M, **FINE.parameters}, sort_keys=True
 )
-"""What was asked for. A coarser result that had to do is kept under the same key, with a note."""
+"""Key of a cached result: the requested parameters. A coarser fallback is cached under the same key, with a note."""
 
 
 @dataclass(frozen=True)
 class Hulls:
-    """An object's collision shape, in the mesh frame (lowest vertex at z = 0), m.
+    """Collision shape of an object, in the mesh frame (lowest vertex at z = 0), m.
 
     Attributes:
-        vertices: (k_i, 3) of each convex part, every one a corner of its hull, 4 <= k_i <= 256; read-only.
-        feet: (m, 3) centres of spheres of radius `feet.FOOT_RADIUS_M` round the base, m <= 8; see `feet`.
+        vertices: (k_i, 3) corners of each convex part, 4 <= k_i <= 256; read-only.
+        feet: (m, 3) centres of the foot spheres, m <= 8; see `feet`.
     """
 
     vertices: tuple[Array, ...]
@@ -110,16 +112,15 @@ class Hulls:
 
 
 def load_hulls(mesh: Mesh, progress: Progress | None = None) -> Hulls:
-    """The collision shape of one mesh, from the package, the user's cache, or computed now (up to a minute or so).
+    """Return the collision shape of a mesh from the package, the user's cache, or a computation of about a minute.
 
     Args:
-        mesh: A checked solid.
-        progress: Told, in one line each, when something takes long or had to be made coarser. By default that is
-            logged as a warning, which Python shows on stderr unless told otherwise: a minute's silence looks like a
-            hang, in a worker process too.
+        mesh: A valid solid.
+        progress: Called with one line when something takes long or is coarser than requested. Default: a log warning,
+            which Python prints to stderr, because a silent minute looks like a hang.
 
     Raises:
-        BadInput: The hulls cannot be computed: the solid has no volume.
+        BadInput: The solid has no volume.
     """
     say = progress or _log.warning
     name = f"{mesh.digest}.npz"
@@ -136,19 +137,19 @@ def _from_folder(mesh: Mesh, path: Path, say: Progress) -> Parts:
     if found is not None:
         return found
     with locked(path, lambda: say(f"{mesh.name}: waiting for another process to decompose it")):
-        found = read_parts(path, KEY)  # another process may have made it meanwhile
+        found = read_parts(path, KEY)  # another process may have written it meanwhile
         if found is not None:
             return found
         return write_parts(path, KEY, decompose(mesh, say), say)
 
 
 def decompose(mesh: Mesh, progress: Progress | None = None) -> Parts:
-    """Cut a mesh into convex parts, without any cache.
+    """Cut a mesh into convex parts, without the cache.
 
-    Tries `FINE`, then `COARSE`, then settles for the plain convex hull; the result's note says so.
+    Try `FINE`, then `COARSE`, then fall back to the convex hull; the note says which one was used.
 
     Raises:
-        BadInput: Not even the convex hull exists.
+        BadInput: The mesh has no convex hull.
     """
     say = progress or _log.warning
     say(f"{mesh.name}: cutting into convex parts (once per mesh, 10-60 s)")
@@ -160,17 +161,17 @@ def decompose(mesh: Mesh, progress: Progress | None = None) -> Parts:
             hulls = _trim(_run_coacd(mesh, attempt, say))
             _check(mesh, hulls)
         except _CutFailed as e:
-            say(f"{mesh.name}: cutting failed ({e}); trying a coarser way")
+            say(f"{mesh.name}: cutting failed ({e}); trying coarser parameters")
             continue
         return Parts(hulls, note)
     hull = trimmed_hull(mesh.vertices_m, MAX_VERTICES, TOLERANCE_M)
     if hull is None:
-        raise BadInput(f"{mesh.name}: no collision shape can be made; the mesh must enclose a volume")
-    return Parts((hull,), "collision shape is the plain convex hull: cutting failed; repair the mesh for a true one")
+        raise BadInput(f"{mesh.name}: no collision shape can be computed; the mesh must enclose a volume")
+    return Parts((hull,), "collision shape is the plain convex hull: cutting failed; repair the mesh for an exact one")
 
 
 class _CutFailed(Exception):
-    """One attempt gave nothing usable."""
+    """One attempt gave no usable parts."""
 
 
 def _trim(parts: Sequence[Array]) -> tuple[Array, ...]:
@@ -179,30 +180,30 @@ def _trim(parts: Sequence[Array]) -> tuple[Array, ...]:
 
 
 def _check(mesh: Mesh, hulls: Sequence[Array]) -> None:
-    """Every vertex of the mesh is covered, and nothing reaches out of its bounding box."""
+    """Check that the hulls cover every vertex of the mesh and stay within its bounding box."""
     if not hulls:
         raise _CutFailed("no part has a volume")
     gap_m = -float(depth_inside_m(mesh.vertices_m, hulls).min())
     if gap_m > MAX_GAP_M:
-        raise _CutFailed(f"the parts leave {gap_m * 1e3:.1f} mm of the surface bare")
+        raise _CutFailed(f"{gap_m * 1e3:.1f} mm of the surface are not covered")
     points = np.concatenate(hulls)
     beyond_m = max(
         float((mesh.vertices_m.min(axis=0) - points.min(axis=0)).max()),
         float((points.max(axis=0) - mesh.vertices_m.max(axis=0)).max()),
     )
     if beyond_m > MAX_GAP_M:
-        raise _CutFailed(f"the parts reach {beyond_m * 1e3:.1f} mm out of the mesh")
+        raise _CutFailed(f"the parts protrude {beyond_m * 1e3:.1f} mm from the mesh")
 
 
 def _run_coacd(mesh: Mesh, attempt: Attempt, say: Progress) -> list[Array]:
-    """Raw parts from `coacd_worker` in a process that is killed at the limit, on an error, and on Ctrl-C."""
+    """Run `coacd_worker`, and kill it at the time limit, on an error and on Ctrl-C; return the raw parts."""
     worker = Path(__file__).with_name("coacd_worker.py")
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "mesh.npz", Path(folder) / "parts.npz"
         vertices, faces = simplified(mesh)
         np.savez(source, vertices=vertices, faces=faces, shells=shell_labels(vertices, faces))
         process = subprocess.Popen(
-            # -P: without it the worker's own folder is on sys.path, and its files shadow installed modules
+            # -P: keep the worker's folder off sys.path, where its files would shadow installed modules
             [sys.executable, "-P", str(worker), str(source), str(target), json.dumps(attempt.parameters)],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -217,7 +218,7 @@ def _run_coacd(mesh: Mesh, attempt: Attempt, say: Progress) -> list[Array]:
                 except subprocess.TimeoutExpired:
                     waited_s += min(_POLL_S, attempt.limit_s - waited_s)
                     if waited_s >= attempt.limit_s:
-                        raise _CutFailed(f"not done after {attempt.limit_s:.0f} s") from None
+                        raise _CutFailed(f"not finished after {attempt.limit_s:.0f} s") from None
                     say(f"{mesh.name}: still cutting, {waited_s:.0f} s")
         finally:
             process.kill()
@@ -229,7 +230,7 @@ def _run_coacd(mesh: Mesh, attempt: Attempt, say: Progress) -> list[Array]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Decompose a folder of STLs; prints one line a mesh. Returns the exit code: 0, or 2 for bad input."""
+    """Decompose a folder of STL files and print one line a mesh. Return the exit code: 0, or 2 for bad input."""
     parser = argparse.ArgumentParser(
         prog="python -m glotouch_backends.mujoco.hulls.decompose", description=main.__doc__
     )

@@ -1,8 +1,8 @@
-"""The ring of small spheres an object stands on: at most eight, on the outline of its base.
+"""Foot spheres: at most eight small spheres on the outline of an object's base.
 
 A flat round base touches a plane in three or four contacts that change from step to step, and the object creeps by
-0.2-0.3 mm/s under half the load that should move it; a few spheres just below the base keep the same contacts for ever
-(creep below 5 um/s). Meant to touch the floor only: they stick out sideways by their radius.
+0.2-0.3 mm/s under half the load that should move it. Spheres just below the base have permanent contacts (creep below
+5 um/s). They touch the floor only, as they protrude sideways by their radius.
 """
 
 from __future__ import annotations
@@ -14,18 +14,21 @@ from glotouch_bt.robot import Array
 from glotouch_bt.robot.scene import Mesh
 
 FOOT_RADIUS_M = 0.0015
+"""Radius of a foot. Source: ours."""
 FOOT_PROTRUSION_M = 0.0001
-"""How far the spheres reach below the base. Vertices within the same height above the lowest one belong to the base."""
+"""Protrusion of the feet below the base; vertices within this height above the lowest one form the base. Source:
+ours."""
 MAX_FEET = 8
+"""Largest number of feet. Source: ours."""
 
 
 def foot_centres(mesh: Mesh) -> Array:
-    """Centres (m, 3) of the foot spheres in the mesh frame, counter-clockwise seen from above.
+    """Return the centres (m, 3) of the foot spheres in the mesh frame, counter-clockwise seen from above.
 
-    3 <= m <= 8, or none where the object stands on a point or an edge: it rolls, and its hulls carry it.
+    3 <= m <= 8, or none for an object that stands on a point or an edge: it rolls on its hulls.
 
-    They stand on the corners of the support polygon; where it has more than eight, the corner whose removal costs the
-    least area is dropped until eight are left (Visvalingam and Whyatt 1993), so that the object topples where it would.
+    The feet are corners of the support polygon. While there are more than eight, the corner whose removal costs the
+    least area is dropped (Visvalingam and Whyatt 1993), which keeps the toppling limit.
     """
     base = mesh.vertices_m[mesh.vertices_m[:, 2] <= mesh.vertices_m[:, 2].min() + FOOT_PROTRUSION_M, :2]
     ring = _support_polygon(base)
@@ -38,7 +41,7 @@ def foot_centres(mesh: Mesh) -> Array:
 
 
 def _support_polygon(points: Array) -> Array:
-    """Corners (m, 2) of the convex outline; (0, 2) where it has no area."""
+    """Return the corners (m, 2) of the convex outline; (0, 2) if it has no area."""
     try:
         return np.asarray(points[ConvexHull(points).vertices])
     except (QhullError, ValueError):

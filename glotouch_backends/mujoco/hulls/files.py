@@ -1,4 +1,4 @@
-"""Where convex parts are kept, and in what form: one small npz a mesh, named by the mesh's digest."""
+"""The cache of convex parts: one small npz file a mesh, named by the mesh's digest."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Parts:
 
     Attributes:
         hulls: (k_i, 3) vertices of each, m.
-        note: What is wrong with them, for people; empty if nothing.
+        note: Warning for the user; empty if there is none.
     """
 
     hulls: tuple[Array, ...]
@@ -32,18 +32,18 @@ class Parts:
 
 
 def package_file(name: str) -> Traversable:
-    """A file of the shipped decompositions (it need not exist)."""
+    """Return a file of the shipped decompositions; it need not exist."""
     return resources.files("glotouch_missions").joinpath("hulls", name)
 
 
 def user_folder() -> Path:
-    """The user's cache of decompositions (XDG base directory specification: a relative path is ignored)."""
+    """Return the user's cache folder (XDG base directory specification: a relative path is ignored)."""
     base = Path(os.environ.get("XDG_CACHE_HOME", ""))
     return (base if base.is_absolute() else Path.home() / ".cache") / "glotouch-bt" / "hulls"
 
 
 def encode(key: str, parts: Parts) -> bytes:
-    """The file's bytes: float32 vertices behind one another, their counts, the key and the note. Deterministic."""
+    """Return the file's bytes: concatenated float32 vertices, their counts, the key and the note. Deterministic."""
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,
@@ -56,7 +56,7 @@ def encode(key: str, parts: Parts) -> bytes:
 
 
 def decode(content: bytes, key: str) -> Parts | None:
-    """The parts of a file, or None if it is damaged or was made with another key."""
+    """Return the parts in a file's bytes, or None if they are damaged or were made with another key."""
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as data:
             if str(data["key"]) != key:
@@ -72,7 +72,7 @@ def decode(content: bytes, key: str) -> Parts | None:
 
 
 def read_parts(path: Traversable, key: str) -> Parts | None:
-    """The parts kept in a file, or None if there is no such file, it is damaged, or its key differs."""
+    """Return the parts in a file, or None if it does not exist, is damaged, or has another key."""
     try:
         content = path.read_bytes()
     except OSError:
@@ -81,9 +81,9 @@ def read_parts(path: Traversable, key: str) -> Parts | None:
 
 
 def write_parts(path: Path, key: str, parts: Parts, say: Callable[[str], None]) -> Parts:
-    """Keep parts in a file, whole or not at all, and return them as a later reader will see them.
+    """Write parts atomically, and return them as a later reader will see them.
 
-    A folder that cannot be written costs time in the next run, not this one: it is only reported.
+    If the folder cannot be written, report it: the next run must compute the parts again.
     """
     content = encode(key, parts)
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
@@ -94,7 +94,7 @@ def write_parts(path: Path, key: str, parts: Parts, say: Callable[[str], None]) 
     except OSError as e:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
-        say(f"convex parts cannot be kept in {path.parent} ({e.strerror}); they will be made anew next time")
+        say(f"convex parts cannot be kept in {path.parent} ({e.strerror}); they will be computed again next time")
     kept = decode(content, key)
     assert kept is not None
     return kept
@@ -102,7 +102,7 @@ def write_parts(path: Path, key: str, parts: Parts, say: Callable[[str], None]) 
 
 @contextmanager
 def locked(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
-    """Let one process at a time make a file; others wait, after `on_wait`. Without file locks nobody waits."""
+    """Let one process at a time write a file; others wait, after calling `on_wait`. Without file locks nobody waits."""
     try:
         import fcntl
 

@@ -1,4 +1,4 @@
-"""The closed surfaces a mesh is made of: the convex cutter gets them singly, for it never ends on two that cross."""
+"""The closed surfaces of a mesh. CoACD gets them one by one, because it does not terminate on two that intersect."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from glotouch_bt.robot import Array
 
 
 def shell_labels(vertices_m: Array, faces: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """(f,) number of each face's shell, from 0; -1 for the walls of inner hollows, which nothing can touch."""
+    """Return the shell number (f,) of each face, from 0; -1 for the walls of inner cavities."""
     solid = trimesh.Trimesh(vertices_m, faces, process=False)
     raw = trimesh.graph.connected_component_labels(solid.face_adjacency, node_count=len(faces))
     corners = solid.triangles

@@ -1,4 +1,4 @@
-"""TODO door of glotouch_backends/mujoco/model."""
+"""Builders of the compiled MuJoCo model: one file a part of the world. No state and no time step."""
 
 from glotouch_backends.mujoco.model.arm import DAMPING_PER_STIFFNESS_S, JOINT_DAMPING, STIFFNESS_NM_RAD
 from glotouch_backends.mujoco.model.compile import STEP_S, STEPS, Handles, SensorMap, compile_world

@@ -1,36 +1,24 @@
-"""The arm as a MuJoCo chain, built from its description so that every model of it agrees."""
+"""The arm as a MuJoCo chain, built from its description."""
 
 from __future__ import annotations
 
 import mujoco
-import numpy as np
 
 from glotouch_backends.mujoco.model.contact import HAND, HAND_FRICTION, set_category, set_friction
-from glotouch_bt.robot import Array, Link, ParamError, RobotDescription, matrix_to_quat
+from glotouch_bt.robot import Link, ParamError, RobotDescription, matrix_to_quat, rpy_to_matrix
 
-JOINT_DAMPING = 2.0  # Nm s/rad
-# Position servo, proximal to distal: the stiffness that tracked 60 mm/s to 0.12 mm and gave 0.13-0.19 mm/N at the hand.
+JOINT_DAMPING = 2.0
+"""Joint damping, Nm s/rad. Source: ours."""
 STIFFNESS_NM_RAD = (10000.0, 10000.0, 6000.0, 6000.0, 3000.0, 3000.0, 3000.0)
+"""Position servo, proximal to distal. Source: tuned; it tracks 60 mm/s to 0.12 mm and yields 0.13-0.19 mm/N at the
+hand."""
 DAMPING_PER_STIFFNESS_S = 0.04
+"""Servo damping over stiffness, s. Source: ours."""
 ARM_COLOUR = (0.80, 0.82, 0.85, 1.0)
 
 
-def rpy_quat(rpy_rad: tuple[float, float, float]) -> Array:
-    """Quaternion (4,) w x y z of fixed-axis roll, pitch, yaw: Rz(yaw) Ry(pitch) Rx(roll)."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy_rad), np.sin(rpy_rad)
-    return matrix_to_quat(
-        np.array(
-            [
-                [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-                [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-                [-sp, cp * sr, cp * cr],
-            ]
-        )
-    )
-
-
 def _dress(body: mujoco.MjsBody, link: Link) -> None:
-    """Inertia and collision capsules of one link; its weight is carried by the controller (gravcomp)."""
+    """Set inertia and collision capsules of one link; the controller carries its weight (gravcomp)."""
     body.explicitinertial = True
     body.mass = link.mass_kg
     body.ipos = link.com_m
@@ -46,7 +34,7 @@ def _dress(body: mujoco.MjsBody, link: Link) -> None:
 
 
 def add_arm(spec: mujoco.MjSpec, description: RobotDescription) -> mujoco.MjsBody:
-    """Add the arm and its servos (actuators named as the joints). Returns the body of the flange frame E, still empty.
+    """Add the arm and its servos (actuators named as the joints); return the body of the flange frame E, still empty.
 
     Raises:
         ParamError: The servo gains are for a seven-axis arm.
@@ -58,8 +46,10 @@ def add_arm(spec: mujoco.MjSpec, description: RobotDescription) -> mujoco.MjsBod
     for geom in body.geoms:  # the base stands on the table
         geom.contype = geom.conaffinity = 0
     for joint, kp in zip(description.joints, STIFFNESS_NM_RAD, strict=True):
-        body = body.add_body(name=joint.link.name, pos=joint.origin_m, quat=rpy_quat(joint.origin_rpy_rad))
-        if joint is description.joints[0]:  # the moving root decides for its whole tree
+        body = body.add_body(
+            name=joint.link.name, pos=joint.origin_m, quat=matrix_to_quat(rpy_to_matrix(joint.origin_rpy_rad))
+        )
+        if joint is description.joints[0]:  # the sleep policy of a tree is that of its root
             body.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER
         body.add_joint(
             name=joint.name,

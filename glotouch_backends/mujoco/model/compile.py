@@ -1,4 +1,4 @@
-"""The whole simulated world as one compiled model, and where everything is in MuJoCo's arrays."""
+"""The compiled model of the whole world, and the indices of its parts in MuJoCo's arrays."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ from glotouch_backends.mujoco.truth import Truth
 from glotouch_bt.robot import BackendError, RobotDescription, World
 
 STEP_S = 0.001
-STEPS = 10  # a control period
+"""Solver step."""
+STEPS = 10
+"""Solver steps in a control period."""
 
 Ids = npt.NDArray[np.int64]
 
@@ -40,12 +42,13 @@ class SensorMap:
 
 @dataclass(frozen=True)
 class Handles:
-    """Indices looked up once, after compilation.
+    """Indices into MuJoCo's arrays, found once after compilation.
 
     Attributes:
         arm_qpos, arm_dof, arm_ctrl: Slices of the arm in qpos, qvel and ctrl.
-        jaw_ctrl: Slice of the two jaws in ctrl; jaw_qpos in qpos; jaw_act their actuator rows.
-        hand_bodies: Slice of the bodies hand, finger_left, finger_right; held_bodies: the same and the probe.
+        jaw_qpos, jaw_ctrl: Slices of the two jaws in qpos and ctrl.
+        hand_bodies: Slice of the bodies hand, finger_left, finger_right.
+        held_bodies: The same and the probe.
         probe_body, tip_site, pads_site, sensor_site: Ids.
         object_bodies: (n,) body of each object.
         container_body, holder_body: Ids.
@@ -72,7 +75,7 @@ class Handles:
 
 
 def _add_sensors(spec: mujoco.MjSpec, description: RobotDescription) -> None:
-    """All that is sampled every millisecond, in the order of `SensorMap`."""
+    """Add the sensors that are sampled every millisecond, in the order of `SensorMap`."""
     kind, obj = mujoco.mjtSensor, mujoco.mjtObj
 
     def add(sensor: mujoco.mjtSensor, what: mujoco.mjtObj, name: str) -> None:
@@ -131,7 +134,7 @@ def _handles(model: mujoco.MjModel, description: RobotDescription, objects: int)
 
 
 def _dress(spec: mujoco.MjSpec, floor_z_m: float) -> None:
-    """What only a camera sees: light, sky and the pedestal the arm stands on."""
+    """Add what only a camera sees: light, sky and the arm's pedestal."""
     spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1080
     spec.visual.headlight.ambient = (0.35, 0.35, 0.35)
     spec.worldbody.add_light(pos=(0.3, -0.8, 1.6), dir=(0.2, 0.6, -1.0))
@@ -156,7 +159,7 @@ def _dress(spec: mujoco.MjSpec, floor_z_m: float) -> None:
 
 
 def build_spec(description: RobotDescription, world: World, truth: Truth) -> mujoco.MjSpec:
-    """Assemble the world of one trial; MuJoCo's world frame is B."""
+    """Assemble the model of one trial; MuJoCo's world frame is B."""
     spec = mujoco.MjSpec()
     spec.modelname = world.name
     spec.compiler.degree = False
@@ -173,7 +176,7 @@ def build_spec(description: RobotDescription, world: World, truth: Truth) -> muj
 
 
 def compile_world(description: RobotDescription, world: World, truth: Truth) -> tuple[mujoco.MjModel, Handles]:
-    """Build and compile.
+    """Build and compile the model; return it with its indices.
 
     Raises:
         BackendError: MuJoCo refuses the model; cause chained.

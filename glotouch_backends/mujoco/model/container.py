@@ -1,4 +1,4 @@
-"""The container as five boxes at its true pose, and the table it stands on."""
+"""The container as five boxes at its true pose, and the table below it."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ FLOOR_COLOUR, WALL_COLOUR, TABLE_COLOUR = (0.55, 0.47, 0.38, 1.0), (0.62, 0.54, 
 
 
 def add_container(spec: mujoco.MjSpec, container: Container, pose_B_K: Pose) -> None:
-    """Add body `container` with geoms `floor` and `wall_*`, and the plane `table` under it.
+    """Add the body `container` with geoms `floor` and `wall_*`, and the plane `table` below it.
 
-    Floor friction is 0: of two surfaces the rougher decides, so each object carries its own friction on the floor.
+    The floor has no friction: MuJoCo uses the larger of two frictions, so each object sets its own friction on the
+        floor.
     """
     lx, ly, height = (0.5 * s for s in container.interior_m)
     t = 0.5 * container.wall_m

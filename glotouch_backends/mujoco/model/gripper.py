@@ -1,6 +1,6 @@
-"""The parallel gripper: a housing and two coupled sliding fingers, each with a gel pad in front of it.
+"""The parallel gripper: a housing and two coupled sliding fingers, each with a gel pad.
 
-The pads stand PAD_PROUD_M out of the fingers, so that a flat object meets the gel and not the finger's back.
+The pads protrude by PAD_PROUD_M from the fingers, so that a flat object touches the gel and not the finger.
 """
 
 from __future__ import annotations
@@ -12,15 +12,20 @@ from glotouch_backends.mujoco.model.contact import GEL_TORSION_M, HAND, HAND_FRI
 from glotouch_bt.robot import Box, Gripper
 
 PAD_PROUD_M = 0.002
+"""Height of the pads above the fingers. Source: ours."""
 JAW_STIFFNESS_N_M = 8000.0
+"""Stiffness of a jaw's servo. Source: ours."""
 JAW_DAMPING_NS_M = 150.0
-JAW_ARMATURE_KG = 0.16  # motor and gear, seen at the jaw
+"""Damping of a jaw's servo. Source: ours."""
+JAW_ARMATURE_KG = 0.16
+"""Inertia of motor and gear as seen at the jaw. Source: ours."""
 COUPLING = (0.004, 1.0)
+"""Time constant s and damping ratio of the coupling between the jaws. Source: ours."""
 HAND_COLOUR, FINGER_COLOUR, PAD_COLOUR = (0.25, 0.27, 0.30, 1.0), (0.45, 0.47, 0.5, 1.0), (0.95, 0.55, 0.2, 1.0)
 
 
 def box_inertia(mass_kg: float, half_m: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Principal moments of a uniform box about its centre, kg m2."""
+    """Return the principal moments of a uniform box about its centre, kg m2."""
     x, y, z = (h * h for h in half_m)
     return mass_kg / 3 * (y + z), mass_kg / 3 * (x + z), mass_kg / 3 * (x + y)
 
@@ -35,7 +40,7 @@ def _box(body: mujoco.MjsBody, box: Box, colour: tuple[float, ...], name: str = 
 
 
 def finger_boxes(gripper: Gripper, side: float) -> tuple[Box, Box]:
-    """Finger and pad of the left (+1) or right (-1) finger, in P with the jaws closed."""
+    """Return finger and pad of the left (+1) or right (-1) side, in P with the jaws closed."""
     (x, y, z), (hx, hy, hz) = gripper.finger.centre_m, gripper.finger.half_m
     back = Box(
         centre_m=(x, side * (y + 0.5 * PAD_PROUD_M), z),

@@ -1,4 +1,4 @@
-"""Free objects: collision hulls and foot spheres, inertia of the true solid, the true mesh for the eye only."""
+"""Free objects: collision hulls, foot spheres, inertia of the true solid, and the true mesh for rendering."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ COLOURS = (
 def add_object(spec: mujoco.MjSpec, index: int, truth: ObjectTruth, pose_B_K: Pose, *, fixed: bool = False) -> None:
     """Add the body `object{index}`, standing on the container's floor; its frame is the mesh frame.
 
-    It is free, or, if `fixed`, a part of the container.
+    If `fixed`, it has no joint and belongs to the environment.
     """
     category = ENVIRONMENT if fixed else OBJECT
     mesh = truth.mesh
@@ -48,7 +48,7 @@ def add_object(spec: mujoco.MjSpec, index: int, truth: ObjectTruth, pose_B_K: Po
     for centre in shape_of.feet:
         geom = body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, pos=centre, size=(FOOT_RADIUS_M, 0.0, 0.0), mass=0.0)
         set_category(geom, category)
-        geom.contype, geom.conaffinity = 0, ENVIRONMENT  # they stick out sideways: floor and walls only
+        geom.contype, geom.conaffinity = 0, ENVIRONMENT  # feet protrude sideways: they touch floor and walls only
         set_friction(geom, truth.friction)
     skin = spec.add_mesh(
         name=f"object{index}_skin",

@@ -1,7 +1,7 @@
-"""The passive probe and the stand it waits in.
+"""The passive probe and its stand.
 
-The stand is a block with a slot; two rails on its top carry the handle, and the shaft hangs through the slot. The rails
-lie inside the handle's outline, so that closed fingers pass them, and the slot lets the ball pass with room to spare.
+The stand is a block with a slot. Two rails on its top carry the handle, and the shaft hangs through the slot. The rails
+lie inside the handle's outline, so that closed fingers pass them; the slot is wider than the ball.
 """
 
 from __future__ import annotations
@@ -26,21 +26,24 @@ from glotouch_bt.robot import Holder, ParamError, Pose, Probe
 from glotouch_bt.robot.scene import Mesh
 
 RAIL_HEIGHT_M = 0.003
-MIN_BALL_CLEARANCE_M = 0.001  # least room between ball and rail, on each side
-LEDGE_M = 0.0015  # how far a rail reaches under the handle
+"""Height of the rails. Source: ours."""
+MIN_BALL_CLEARANCE_M = 0.001
+"""Smallest gap between ball and rail on each side. Source: ours."""
+LEDGE_M = 0.0015
+"""Overlap of a rail with the handle. Source: ours."""
 HANDLE_COLOUR, STEEL_COLOUR, STAND_COLOUR = (0.15, 0.35, 0.65, 1.0), (0.75, 0.77, 0.80, 1.0), (0.3, 0.32, 0.3, 1.0)
 
 
 def handle_mesh(probe: Probe) -> Mesh:
-    """The handle as a solid, in the probe's body frame: what the pads feel while they hold it."""
+    """Return the handle as a solid in the probe's body frame; the pads sense it while they hold the probe."""
     box = trimesh.creation.box(probe.handle_m)
     return Mesh("handle", np.array(box.vertices), np.array(box.faces, dtype=np.int64), f"handle {probe.handle_m}")
 
 
 def add_probe(spec: mujoco.MjSpec, probe: Probe, holder: Holder, pose_handle_shaft: Pose, pad_friction: float) -> None:
-    """Add the free body `probe` (frame: handle's centre, z to the tip), standing in its stand, and the stand.
+    """Add the stand and, standing in it, the free body `probe` (frame: handle's centre, z to the tip).
 
-    Site `tip` is the ball's centre; geoms `handle`, `shaft` and `ball`.
+    Its geoms are `handle`, `shaft` and `ball`; the site `tip` is the ball's centre.
     """
     pose = holder.pose_B_grasp
     body = spec.worldbody.add_body(name="probe", pos=pose.position_m, quat=pose.quat)
@@ -65,7 +68,7 @@ def add_probe(spec: mujoco.MjSpec, probe: Probe, holder: Holder, pose_handle_sha
     body.explicitinertial = True
     body.mass = probe.mass_kg
     body.ipos = pose_handle_shaft.apply((0.0, 0.0, probe.com_below_grasp_m))
-    # A uniform rod of the whole length about its centre, as thick as the handle (its true make-up is not described).
+    # Inertia of a uniform rod of the whole length, as thick as the handle; the true mass distribution is not described.
     whole = probe.handle_m[2] + probe.length_m
     across = probe.mass_kg * (whole**2 + probe.handle_m[0] ** 2) / 12
     body.inertia = (across, across, probe.mass_kg * (probe.handle_m[0] ** 2 + probe.handle_m[1] ** 2) / 12)
@@ -83,9 +86,9 @@ def _add_stand(spec: mujoco.MjSpec, probe: Probe, holder: Holder) -> None:
     bx, by, bz = holder.half_m
     gap = hx - LEDGE_M  # half width of the slot
     if gap < probe.tip_radius_m + MIN_BALL_CLEARANCE_M:
-        least = 2e3 * (probe.tip_radius_m + MIN_BALL_CLEARANCE_M + LEDGE_M)
+        min_mm = 2e3 * (probe.tip_radius_m + MIN_BALL_CLEARANCE_M + LEDGE_M)
         raise ParamError(
-            "probe.handle_m[0]", probe.handle_m[0], f">= {least:.0f} mm, or the ball does not pass the stand"
+            "probe.handle_m[0]", probe.handle_m[0], f">= {min_mm:.0f} mm, or the ball does not fit through the stand"
         )
     if bx <= hx or by <= hy:
         raise ParamError("holder.half_m", holder.half_m, "larger than the probe's handle")
@@ -96,7 +99,7 @@ def _add_stand(spec: mujoco.MjSpec, probe: Probe, holder: Holder) -> None:
     across = 0.5 * (bx - gap)
     boxes = [((s * (gap + across), 0.0, block), (across, by, bz)) for s in (-1.0, 1.0)]
     boxes += [((0.0, s * (by - 0.002), block), (gap, 0.002, bz)) for s in (-1.0, 1.0)]
-    # Rails end inside the handle's outline: fingers close beside them.
+    # The rails end inside the handle's outline: the fingers close beside them.
     rail_x, rail_y = 0.5 * LEDGE_M, min(hy - 0.001, slot_y)
     boxes += [
         ((s * (gap + rail_x), 0.0, hz + 0.5 * RAIL_HEIGHT_M), (rail_x, rail_y, 0.5 * RAIL_HEIGHT_M))

@@ -1,6 +1,6 @@
-"""TODO door of glotouch_backends/mujoco/sensing."""
+"""Models of the wrist force sensor and the tactile pads: true state in, disturbed readings out."""
 
 from glotouch_backends.mujoco.sensing.tactile import Tactile, body_pose
-from glotouch_backends.mujoco.sensing.wrench import GRAVITY_M_S2, WristSensor, hand_mass, up_in
+from glotouch_backends.mujoco.sensing.wrench import GRAVITY_M_S2, WristSensor, up_in
 
-__all__ = ["GRAVITY_M_S2", "Tactile", "WristSensor", "body_pose", "hand_mass", "up_in"]
+__all__ = ["GRAVITY_M_S2", "Tactile", "WristSensor", "body_pose", "up_in"]

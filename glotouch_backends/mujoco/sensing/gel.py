@@ -1,34 +1,34 @@
-"""What a gel pad feels: a depth map and the shift of the pad, from the object's true surface and the pad's force.
+"""Model of a gel pad: depth map and shift of the pad, from the object's true surface and the pad's force.
 
 The physics engine presses a hard box against convex hulls: it knows the force, not the shape. Each frame is therefore
-made afterwards from two things it can be trusted with, the pose of the pad and the force on it:
+computed afterwards from the pose of the pad and the force on it:
 
-1. Rays along z_pad against the exact mesh give `h` (n,), the depth to which each taxel of the UNDEFORMED gel, placed at
+1. Rays along z_pad against the exact mesh give `h` (n,), the depth to which each taxel of the UNDEFORMED gel, at
    the pad's simulated pose, overlaps the solid (negative: a gap).
-2. The gel is a Winkler foundation, a bed of independent springs that stiffen towards the backing
+2. The gel is a Winkler foundation: independent springs that stiffen towards the backing
    (K. L. Johnson, Contact Mechanics, 1985, section 4.3; the stiffening law keeps x below the gel's thickness):
 
        p(x) = k x / (1 - (x / X)^2),   x = max(0, h + s),   k = 0.2 N/mm3,   X = 1.6 mm
 
-3. One number a frame is free, the shift `s` of the pad along z_pad, found such that the gel carries the pad's force:
+3. The shift `s` of the pad along z_pad is unknown. It is found such that the gel carries the pad's force:
 
        sum_i p(x_i) dA = F
 
-   f(s) = sum p dA is zero for s <= -max(h), grows monotonically and without bound as s -> X - max(h), and is convex, so
-   that the root exists for every F > 0 and Newton's method started above it descends to it without overshoot. The
-   deepest taxel alone carries at most F, which gives that start in closed form.
-4. The map is x, clipped to the largest indentation the gel can show.
+   f(s) = sum p dA is zero for s <= -max(h), grows monotonically and without bound as s -> X - max(h), and is convex.
+   The root therefore exists for every F > 0, and Newton's method that starts above it descends without overshoot.
+   The deepest taxel alone carries at most F, which gives that start in closed form.
+4. The map is x, clipped to the largest indentation that the gel can show.
 
-Shift and aperture. Let q_L, q_R be the simulated distances of the two pad surfaces from the hand's mid-plane. The box's
-contact is soft too, but by the solver's constants and not by the gel's: it sinks into the hull by some amount contained
-in h. A real pad with the same force stands where its gel carries it, which is s further along z_pad: towards the
-object if s > 0 (the gel is softer than the contact, or the hull bulges out of the true surface), away if s < 0. z_pad
-points to the mid-plane for both pads, so the aperture a gripper would report, UNDEFORMED gel to undeformed gel, is
+Shift and aperture. Let q_L, q_R be the simulated distances of the two pad surfaces from the hand's mid-plane. The
+simulated contact is soft too, by the solver's constants: the box sinks into the hull by an amount contained in h. A
+real pad with the same force stands s further along z_pad: towards the object if s > 0 (the gel is softer than the
+contact, or the hull bulges out of the true surface), away if s < 0. z_pad points to the mid-plane for both pads, so the
+aperture that a gripper would report, UNDEFORMED gel to undeformed gel, is
 
     aperture = (q_L - s_L) + (q_R - s_R) = q_L + q_R - s_L - s_R
 
-Method and measurements: "C" of the project's feasibility study (0.001-0.018 mm RMS and 0.03 mm of aperture from a gel
-simulated inside the physics loop, which is an order of magnitude slower and unstable at 1 ms).
+Accuracy: 0.001-0.018 mm RMS, and 0.03 mm of aperture, compared with a gel simulated inside the physics loop, which is
+ten times slower and unstable at 1 ms (the project's feasibility study).
 
 Frames: P pads' mid-point (z along the approach, y along the closing direction, left pad at +y_P). A pad frame has its
 origin at the centre of the gel's undeformed surface, z_pad out of the gel INTO the object, y_pad along +z_P.
@@ -49,14 +49,16 @@ from glotouch_bt.robot import Array, ParamError, Pose
 Side = Literal["left", "right"]
 
 STIFFNESS_N_MM3 = 0.2
-"""Winkler modulus of the gel. Source: an assumption of the feasibility study, not a vendor figure; over 1.6 mm of
-gel it amounts to a confined modulus of 0.32 MPa."""
+"""Winkler modulus of the gel. Source: assumption of the feasibility study, not a vendor figure; over 1.6 mm of gel it
+is a confined modulus of 0.32 MPa."""
 
 BOTTOM_M = 0.0016
-"""Indentation at which the stiffening spring becomes rigid: just above the 1.5 mm the gel can show."""
+"""Indentation at which the stiffening spring becomes rigid. Source: ours, just above the 1.5 mm that the gel can
+show."""
 
 RAY_TRAVEL_M = 0.010
-"""Rays start this far behind the undeformed surface: deeper than any contact sinks, less than a finger's thickness."""
+"""Distance of the ray origins behind the undeformed surface. Source: ours, deeper than any contact, less than a
+finger's thickness."""
 
 _ROTATION_P_PAD: dict[Side, Array] = {
     # columns are x_pad, y_pad, z_pad written in P
@@ -66,7 +68,7 @@ _ROTATION_P_PAD: dict[Side, Array] = {
 
 
 def pad_pose_P(side: Side, distance_m: float) -> Pose:
-    """Pad frame in P.
+    """Return the pad frame in P.
 
     Left: at +y_P, z_pad = -y_P, x_pad = +x_P. Right: at -y_P, z_pad = +y_P, x_pad = -x_P. y_pad = +z_P for both.
 
@@ -80,7 +82,7 @@ def pad_pose_P(side: Side, distance_m: float) -> Pose:
 
 @dataclass(frozen=True)
 class PairPress:
-    """Both pads at one instant.
+    """Depth maps and shifts of both pads.
 
     Attributes:
         left_m, right_m: (rows, cols) indentation, layout as in `robot.TactileFrame`.
@@ -94,15 +96,15 @@ class PairPress:
 
 
 class GelSensor:
-    """The gel of one finger (both fingers carry the same).
+    """Gel of one finger; both fingers have the same.
 
     Args:
         window_m: (width along x_P, length along z_P) of the gel.
         shape: (rows, cols) of the map; rows along +z_P, columns along +x_P.
         depth_m: Largest indentation shown; below 1.6 mm.
         stiffness_N_mm3: Winkler modulus.
-        reach_m: If the nearest surface in front of the window is further off than this, the force is held to be carried
-            outside the window and the map is empty. (The worst hull bulges 3 mm, 95 % bulge less than 1 mm.)
+        reach_m: If no surface in front of the window is nearer than this, the force acts outside the window and the map
+            is empty. Source: hulls bulge by at most 3 mm, 95 % by less than 1 mm.
 
     Attributes:
         taxels_P: (rows, cols, 3) taxel centres on the mid-plane y_P = 0, in P.
@@ -148,7 +150,7 @@ class GelSensor:
         }
 
     def overlap(self, side: Side, surfaces: Sequence[tuple[SurfaceRays, Pose]]) -> Array:
-        """Depth of each taxel of the undeformed gel inside the nearest solid.
+        """Return the depth of each taxel of the undeformed gel inside the nearest solid.
 
         Args:
             side: Which pad; it decides the order of the columns.
@@ -173,7 +175,7 @@ class GelSensor:
         return overlap.reshape(self.shape)
 
     def press(self, side: Side, surfaces: Sequence[tuple[SurfaceRays, Pose]], force_N: float) -> tuple[Array, float]:
-        """Depth map and shift of one pad that presses with a given force.
+        """Return depth map and shift of one pad that presses with a given force.
 
         Args:
             side: Which pad.
@@ -198,7 +200,7 @@ class GelSensor:
         distance_m: tuple[float, float],
         force_N: tuple[float, float],
     ) -> PairPress:
-        """Both pads against the same objects.
+        """Press both pads against the same objects.
 
         Args:
             surfaces: Each object's rays and `pose_O_P`, the hand frame P in that object's mesh frame.
@@ -211,18 +213,18 @@ class GelSensor:
         return PairPress(left, right, left_shift, right_shift)
 
     def shift(self, overlap: Array, force_N: float) -> float:
-        """Shift s with sum p(max(0, overlap + s)) dA = force_N; see the module's text.
+        """Return the shift s with sum p(max(0, overlap + s)) dA = force_N; see the module's text.
 
         Args:
             overlap: Any shape, m; at least one finite value.
             force_N: Positive.
 
         Returns:
-            The shift in m; the force is met to 1e-9 of itself.
+            The shift in m; the force is correct to a relative 1e-9.
         """
         load = force_N / (self._stiffness_N_m3 * self._area_m2)  # m: sum of x / (1 - (x/X)^2) over the taxels
         top = float(overlap.max())
-        # the deepest taxel alone: x / (1 - (x/X)^2) = load, a quadratic in x whose positive root is this
+        # deepest taxel alone: x / (1 - (x/X)^2) = load, a quadratic in x with one positive root
         ratio = 2.0 * load / BOTTOM_M
         deepest = BOTTOM_M * ratio / (1.0 + math.sqrt(1.0 + ratio * ratio))
         below_top = overlap[overlap > top - deepest] - top  # no other taxel can touch

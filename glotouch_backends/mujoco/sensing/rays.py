@@ -1,8 +1,8 @@
-"""Distances along rays to an object's true surface: one embree scene a mesh, cast in the object's own frame.
+"""Distances along rays to an object's true surface: one embree scene a mesh, in the object's own frame.
 
-The scene never moves: rays are brought into the mesh frame O instead, so that nothing is rebuilt when the object moves.
-Embree works in float32; the mesh is centred on its bounding box and scaled to unit size first, which keeps the error of
-a distance of 0.1 m below 1e-7 m (measured against spheres and boxes in tests/backends/mujoco/test_rays.py).
+Rays are transformed into the mesh frame O, so that a moving object needs no new scene. Embree works in float32. The
+mesh is centred and scaled to unit size first, which keeps the error of a distance of 0.1 m below 1e-7 m (tested against
+spheres and boxes).
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from glotouch_bt.robot.scene import Mesh
 
 
 class SurfaceRays:
-    """Ray queries against one mesh. Build once per mesh; a query of 700 rays takes about 0.1 ms.
+    """Ray queries against one mesh; 700 rays take about 0.1 ms.
 
     Attributes:
         centre_O_m: (3,) centre of the bounding box, in the mesh frame.
-        radius_m: Radius of the ball round that centre which holds every vertex.
+        radius_m: Radius of the ball around that centre that contains every vertex.
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -29,15 +29,15 @@ class SurfaceRays:
         self.radius_m = float(np.linalg.norm(mesh.vertices_m - self.centre_O_m, axis=1).max())
         self._per_m = 1.0 / self.radius_m
         vertices = ((mesh.vertices_m - self.centre_O_m) * self._per_m).astype(np.float32)
-        # robust: watertight at shared edges, so that no ray slips through between two triangles
+        # robust: no ray passes between two triangles at their shared edge
         self._scene = rtcore_scene.EmbreeScene(robust=True)
         TriangleMesh(self._scene, np.ascontiguousarray(vertices[mesh.faces]))
 
     def heights(self, origins_O: Array, direction_O: Array) -> Array:
-        """Distance from each origin to the first surface it ENTERS.
+        """Return the distance from each origin to the first surface that the ray ENTERS.
 
-        A ray that starts inside the solid and first leaves it has no entry and counts as a miss: a taxel that is buried
-        to its root says nothing about the surface in front of it.
+        A ray that starts inside the solid counts as a miss: a taxel that is buried to its root does not see the
+            surface.
 
         Args:
             origins_O: (n, 3) ray origins in the mesh frame, m.

@@ -1,6 +1,6 @@
-"""The gel pads in the loop: which objects press on them, how hard, and the frames that arrive.
+"""Model of the tactile sensors: contacts on the pads, depth maps from the gel model, and their delayed frames.
 
-Only forces on the pads' own geoms count: a finger's back that carries the object leaves the gel untouched.
+Only forces on the pads' own geoms count: an object on a finger's back leaves the gel untouched.
 """
 
 from __future__ import annotations
@@ -17,17 +17,19 @@ from glotouch_backends.mujoco.sensing.rays import SurfaceRays
 from glotouch_bt.robot import Conditions, Gripper, Pose, TactileFrame
 from glotouch_bt.robot.scene import Mesh, stream
 
-MAX_SAME_TRAVEL_M = 1e-5  # the gel is not solved again while pads and forces stay this near the last solution
+MAX_SAME_TRAVEL_M = 1e-5
+"""Do not solve the gel again while the jaws have moved less than this. Source: ours."""
 MAX_SAME_FORCE_N = 0.5
+"""Do not solve the gel again while the jaws' forces have changed less than this. Source: ours."""
 
 
 def body_pose(data: mujoco.MjData, body: int) -> Pose:
-    """True pose of a body in B."""
+    """Return the true pose of a body in B."""
     return Pose(data.xpos[body], data.xquat[body])
 
 
 class PadContacts:
-    """Contacts on the two pads, read from the solver at the present step."""
+    """Contacts on the two pads at the present solver step."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, handles: Handles) -> None:
         self._data, self._geoms = data, handles.pad_geoms
@@ -35,9 +37,9 @@ class PadContacts:
         self._body_of = model.geom_bodyid
 
     def touch(self) -> tuple[tuple[float, float], set[int]]:
-        """Normal force on (left, right) pad, N, and the bodies that press on them.
+        """Return the normal force on the (left, right) pad, N, and the bodies that touch them.
 
-        An elliptic contact's first three constraint rows are its force on the second geom, in the contact's frame.
+        The first three constraint rows of an elliptic contact are its force on the second geom, in the contact's frame.
         """
         contact = self._data.contact
         pairs, address = contact.geom, contact.efc_address
@@ -52,7 +54,7 @@ class PadContacts:
         rows = self._data.efc_force[address[mine][:, None] + np.arange(3)]
         force_B = np.einsum("ni,nij->nj", rows, contact.frame[mine].reshape(-1, 3, 3))
         along = force_B @ self._axes[1::3]  # on y_P
-        along[~pad_second] *= -1.0  # what the pad feels
+        along[~pad_second] *= -1.0  # force on the pad
         on_left = np.where(pad_second, pairs[:, 1], pairs[:, 0]) == left
         other = np.where(pad_second, pairs[:, 0], pairs[:, 1])[rows[:, 0] > 0.0]
         forces = (max(float(along[on_left].sum()), 0.0), max(-float(along[~on_left].sum()), 0.0))
@@ -60,11 +62,11 @@ class PadContacts:
 
 
 class Tactile:
-    """Samples the pads at the tactile rate; delivers frames late, noisy, with dead taxels.
+    """Sample the pads at the tactile rate; deliver frames late, with noise and dead taxels.
 
     Attributes:
-        shift_m: Sum of both pads' gel shifts at the last sample: how much further the jaws of a soft gel would have
-            closed than the simulated ones; part of the reported aperture.
+        shift_m: Sum of both pads' gel shifts at the last sample: the additional closing of jaws with a soft gel; part
+            of the reported aperture.
     """
 
     def __init__(
@@ -97,12 +99,12 @@ class Tactile:
         self.shift_m = 0.0
 
     def sample(self, now_s: float, wanted: bool, jaws: Sequence[float], jaw_forces: Sequence[float]) -> None:
-        """Called once a period, after its last step: take a frame if one is due.
+        """Take a frame if one is due. Call once a period, after its last step.
 
         Args:
             now_s: Robot clock.
-            wanted: A frame is asked for; if not, the gel is solved again only when jaws or their forces have changed.
-            jaws, jaw_forces: (left, right) travel m and servo force N now.
+            wanted: True if frames are requested; else the gel is solved again only when jaws or forces have changed.
+            jaws, jaw_forces: (left, right) present travel m and servo force N.
         """
         tick = int(now_s * self._c.tactile_rate_Hz + 1e-6)
         if tick == self._tick:
@@ -127,7 +129,7 @@ class Tactile:
         )
 
     def arrived(self, now_s: float, wanted: bool) -> TactileFrame | None:
-        """The newest frame that has arrived since the last call, if asked for."""
+        """Return the newest frame that has arrived since the last call, if requested."""
         newest = None
         while self._frames and self._frames[0][0] <= now_s + 1e-9:
             newest = self._frames.popleft()[1]

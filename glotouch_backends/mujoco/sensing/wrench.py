@@ -1,51 +1,41 @@
-"""The wrist force sensor: noise, drift, latency, tare, and the controller's imperfect idea of what it carries."""
+"""Model of the wrist force sensor: noise, drift, latency, tare, and the controller's imperfect load model."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from glotouch_backends.mujoco.model import STEP_S, STEPS
-from glotouch_bt.robot import Array, Conditions, RobotDescription
+from glotouch_bt.robot import Array, Conditions, RobotDescription, cross_matrix
 from glotouch_bt.robot.scene import stream
 
 GRAVITY_M_S2 = 9.81
-NOISE_BLOCKS = 128  # noise is drawn for this many periods at a time
+NOISE_BLOCKS = 128
+"""Number of periods for which noise is drawn at once."""
 
 
 def weight_matrix(mass_kg: float, com_S_m: Array) -> Array:
-    """(6, 3) that maps `up` (B's z axis written in S) to the wrench of a weight hanging on the sensor, in S at S.
+    """Return the matrix (6, 3) that maps `up` (B's z axis in S) to the wrench of a weight on the sensor, in S about S.
 
     Force -m g up; torque com x force.
     """
-    x, y, z = com_S_m
-    lever = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(-mass_kg * GRAVITY_M_S2 * np.vstack([np.eye(3), lever]))
+    return np.asarray(-mass_kg * GRAVITY_M_S2 * np.vstack([np.eye(3), cross_matrix(com_S_m)]))
 
 
 def up_in(quat_B_S: Array) -> Array:
-    """(3,) B's z axis written in S: the third row of the rotation matrix."""
+    """Return B's z axis (3,) in S: the third row of the rotation matrix."""
     w, x, y, z = quat_B_S.tolist()
     return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
 
 
-def hand_mass(description: RobotDescription) -> tuple[float, Array]:
-    """Mass kg and centre of mass (3,) in S of all that is bolted beyond the sensor."""
-    g = description.gripper
-    (x, _, z), fingers = g.finger.centre_m, 2 * g.finger_mass_kg
-    centre = g.pose_E_P.apply((x, 0.0, z))
-    mass = g.mass_kg + fingers
-    return mass, (g.mass_kg * np.asarray(g.com_E_m) + fingers * centre) / mass
-
-
 class WristSensor:
-    """Turns the true wrench of each step into what the controller reports.
+    """Turn the true wrench of each step into the controller's report.
 
     reported(t) = true(t - latency) + white noise + random walk - weight model - tare. Before the first tare the report
-    contains the hand's weight; from then on only its change with orientation, as the controller believes it.
+    contains the hand's weight; after it, only the error of the controller's weight model remains when the hand turns.
 
     Args:
-        description, conditions, seed: The robot, and what its sensor suffers from.
-        steps: Samples in a block of `measure`; the noise of a sample is the same for any.
+        description, conditions, seed: The robot, the sensor's disturbances, and their seed.
+        steps: Samples in a block of `measure`; the noise of a sample does not depend on it.
     """
 
     def __init__(self, description: RobotDescription, conditions: Conditions, seed: int, steps: int = STEPS) -> None:
@@ -54,7 +44,7 @@ class WristSensor:
         draw = stream(seed, "payload")
         self._mass_factor = 1.0 + conditions.payload_mass_error * float(draw.standard_normal())
         self._com_error = conditions.payload_com_error_m * draw.standard_normal(3)
-        mass, com = hand_mass(description)
+        mass, com = description.gripper.mass_and_com_E()
         self._hand = weight_matrix(mass * self._mass_factor, com + self._com_error)
         self._P_in_S = description.gripper.pose_E_P
         self._payload = np.zeros((6, 3))
@@ -72,7 +62,7 @@ class WristSensor:
         self._renew()
 
     def _renew(self) -> None:
-        """Fold payload, tare and hand into two affine maps of `up`: what is subtracted, and what is expected."""
+        """Combine payload, tare and hand into two affine maps of `up`: the subtracted and the expected wrench."""
         if self._up_at_tare is None:
             self._offset = (self._payload, np.zeros(6))
             self._expected = (self._payload + self._hand, np.zeros(6))
@@ -81,32 +71,30 @@ class WristSensor:
             self._expected = (self._offset[0], self._offset[1] + self._bias)
 
     def set_payload(self, mass_kg: float, com_P_m: Array) -> None:
-        """What the controller believes the hand carries, wrong by the condition's errors."""
+        """Set the payload that the controller subtracts, with the errors of the conditions."""
         self._payload = weight_matrix(mass_kg * self._mass_factor, self._P_in_S.apply(com_P_m) + self._com_error)
         self._renew()
 
     def tare(self, mean: Array, up: Array) -> None:
-        """Subtract `mean` (6,), an average of `measure`, taken at this orientation (see `up_in`), from now on."""
+        """Subtract `mean` (6,), an average of `measure`, from now on; `up` is `up_in` at the tare."""
         change = np.zeros(6) if self._up_at_tare is None else self._hand @ (up - self._up_at_tare)
-        self._bias = mean + change  # `measure` had the change since the last tare taken out; the new one starts here
+        self._bias = mean + change  # `measure` has removed the change since the last tare
         self._up_at_tare = up
         self._renew()
 
     def expected(self, up: Array) -> Array:
-        """(6,) what the sensor should read without contact, with `up_in` its orientation: basis of the hard limit."""
+        """Return the reading (6,) without contact at the orientation `up`; the hard limit is measured from it."""
         matrix, constant = self._expected
         return np.asarray(matrix @ up + constant)
 
     def fill(self, wrench: Array) -> None:
-        """Start the delay line as if the sensor had read `wrench` (6,) for ever."""
+        """Fill the delay line with `wrench` (6,)."""
         self._line[:] = wrench
 
     def measure(self, true: Array, up: Array) -> Array:
-        """(n, 6) block for a true block (n, 6), before the tare's bias is taken off: what a tare averages.
+        """Return the measured block (n, 6) for a true one, before the tare's bias is subtracted: the input of a tare.
 
-        `up` (3,) is `up_in` of the sensor's orientation.
-
-        The array is used again by the next call.
+        `up` (3,) is `up_in` of the sensor's orientation. The next call overwrites the array.
         """
         late = self._late
         if late:
@@ -124,7 +112,7 @@ class WristSensor:
 
     @property
     def bias(self) -> Array:
-        """(6,) what the last tare subtracts."""
+        """Bias (6,) of the last tare."""
         return self._bias
 
     def _draw(self) -> None:

@@ -1,4 +1,4 @@
-"""TODO door of glotouch_backends/mujoco/simulation."""
+"""Access to the simulated world besides the robot: ground truth, faults, snapshots and replay of the solver steps."""
 
 from glotouch_backends.mujoco.simulation.control_trace import ControlTrace
 from glotouch_backends.mujoco.simulation.disturber import MujocoDisturber

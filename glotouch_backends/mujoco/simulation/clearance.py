@@ -1,4 +1,4 @@
-"""Whether a part of the world could be moved without touching the robot, asked of a copy that nobody else sees."""
+"""Check on a private copy of the world whether bodies could move without touching the robot."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from glotouch_bt.robot import Pose
 from glotouch_bt.robot.simulation import PathBlocked
 
 PENETRATION_M = 0.0005
-"""What stands or leans on something is so deep in it at most; what is moved may end no deeper in anything."""
+"""Largest penetration of resting bodies; a moved body may not end deeper in another one. Source: ours."""
 
 
 class Posed(Protocol):
-    """What is looked at."""
+    """The parts of a simulated robot that the check reads."""
 
     model: mujoco.MjModel
     data: mujoco.MjData
@@ -25,7 +25,7 @@ class Posed(Protocol):
 
 
 class MotionClearance:
-    """See the module's text.
+    """Collision check of planned moves.
 
     Args:
         robot: The simulated robot; only read.
@@ -39,7 +39,7 @@ class MotionClearance:
         self._container = robot.handles.container_body
 
     def held(self) -> frozenset[int]:
-        """Bodies that are not to be moved or met: the robot's, its probe, and objects that nothing but they carry."""
+        """Return the bodies that must not be touched: the robot, its probe, and objects that only they carry."""
         touching = self._pairs(self._scratch())
         own, objects = set(self._arm) | {self._robot.handles.probe_body}, set(self._robot.handles.object_bodies)
         while new := {b for b in objects - own if touching.get(b) and touching[b] <= own}:
@@ -49,22 +49,22 @@ class MotionClearance:
     def require(
         self, moved: Set[int], way: Sequence[Mapping[int, Pose]] = (), *, rests: bool = True, container: bool = False
     ) -> None:
-        """Make sure that bodies can go along a way without meeting the robot.
+        """Check that bodies can move along a path without touching the robot.
 
         Args:
-            moved: The bodies that go together; those of the robot's are never among them.
-            way: Where they are (B), step by step; what a step does not name stays.
-            rests: They are put at the end of the way: there they must be clear of all else, too.
-            container: The container is one of them.
+            moved: The bodies that move together; none of the robot's.
+            way: Their poses in B, step by step; a step leaves unnamed bodies in place.
+            rests: True if they stay at the end of the path, where they must not penetrate any other body.
+            container: True if the container is one of them.
 
         Raises:
-            PathBlocked: The robot touches one of them now, is in the way, or the place is taken.
+            PathBlocked: The robot touches one of them now or on the path, or the end is occupied.
         """
         own = self.held()
         scratch = self._scratch()
         self._look(scratch, moved, own)
         for poses in way:
-            if container:  # MuJoCo computes where bodies without joints stand once, when its data are made
+            if container:  # MuJoCo computes the poses of bodies without joints only when its data are created
                 scratch = self._with_container(poses[self._container])
             for body, pose in poses.items():
                 if body != self._container:
@@ -75,16 +75,16 @@ class MotionClearance:
         ends = zip(scratch.contact, self._bodies(scratch), strict=True) if way and rests else ()
         for contact, (one, other) in ends:
             if (one in moved) != (other in moved) and contact.dist < -PENETRATION_M:
-                raise PathBlocked(f"{self._name(one)} and {self._name(other)} would be in one place")
+                raise PathBlocked(f"{self._name(one)} and {self._name(other)} would overlap")
 
     def _look(self, scratch: mujoco.MjData, moved: Set[int], own: Set[int]) -> None:
         mujoco.mj_collision(self._robot.model, scratch)
         for one, other in self._bodies(scratch):
             if (one in moved and other in own) or (one in own and other in moved):
-                raise PathBlocked(f"{self._name(one)} meets {self._name(other)}")
+                raise PathBlocked(f"{self._name(one)} touches {self._name(other)}")
 
     def _scratch(self) -> mujoco.MjData:
-        """A copy of the world as it is now, positions only."""
+        """Return a copy of the present world, positions only."""
         scratch = mujoco.MjData(self._robot.model)
         scratch.qpos[:] = self._robot.data.qpos
         mujoco.mj_kinematics(self._robot.model, scratch)
@@ -92,7 +92,7 @@ class MotionClearance:
         return scratch
 
     def _with_container(self, pose: Pose) -> mujoco.MjData:
-        """The same with the container elsewhere; the model is as it was afterwards."""
+        """Return a copy with the container at another pose; the model is restored."""
         model, body = self._robot.model, self._container
         before = model.body_pos[body].copy(), model.body_quat[body].copy()
         model.body_pos[body], model.body_quat[body] = pose.position_m, pose.quat
@@ -102,7 +102,7 @@ class MotionClearance:
             model.body_pos[body], model.body_quat[body] = before
 
     def _bodies(self, scratch: mujoco.MjData) -> list[tuple[int, int]]:
-        """The two bodies of each contact."""
+        """Return the two bodies of each contact."""
         pairs = self._robot.model.geom_bodyid[np.asarray(scratch.contact.geom).reshape(-1, 2)]
         return [(int(a), int(b)) for a, b in pairs]
 

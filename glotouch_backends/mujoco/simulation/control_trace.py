@@ -1,8 +1,7 @@
-"""What a run told the solver, so that the same steps can be done again with nothing round them.
+"""Recording of a run's control inputs, to repeat its solver steps with nothing else around them.
 
-The whole state at the start, every control vector, and the jaws' force limits (the one part of the model that a run
-changes) decide all that follows: a replay that does not end in the same state bit for bit means that something else
-moved the world.
+The initial state, every control vector, and the jaws' force limits (the only part of the model that a run changes)
+determine the run. If the replay does not end in the same state to the bit, something else moved the world.
 """
 
 from __future__ import annotations
@@ -20,14 +19,14 @@ STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 
 def state_of(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
-    """(n,) everything the next step depends on but the caches: positions, velocities, warm start, controls, time."""
+    """Return the state (n,) that determines the next step, without caches: positions, velocities, warm start, time."""
     state = np.zeros(mujoco.mj_stateSize(model, STATE))
     mujoco.mj_getState(model, data, state, STATE)
     return state
 
 
 class ControlTrace:
-    """Remembers from its making on; costs some 80 bytes a step and two copies a chunk.
+    """Recording of controls from its creation on; costs about 80 bytes a step and two copies a chunk.
 
     Args:
         model, data: The world, before its first step; both are copied.
@@ -39,7 +38,7 @@ class ControlTrace:
         self._limits: list[Array] = []
 
     def add(self, controls: Array, force_limits: Array) -> None:
-        """Keep a chunk: controls (steps, nu) and `actuator_forcerange` (nu, 2) that its steps are going to use."""
+        """Record a chunk before its steps: controls (steps, nu) and `actuator_forcerange` (nu, 2)."""
         self._controls.append(controls.copy())
         if not self._limits or not np.array_equal(self._limits[-1], force_limits):
             self._limits.append(force_limits.copy())
@@ -47,15 +46,15 @@ class ControlTrace:
             self._limits.append(self._limits[-1])
 
     def replay(self, data: mujoco.MjData) -> BareSteps:
-        """Do the same steps in a copy of the world: nothing but the controls' copy and `mj_step`.
+        """Repeat the steps in a copy of the world: only the copies of the controls and `mj_step`.
 
         Args:
-            data: Where the run has come to; not changed.
+            data: End state of the run; not changed.
         """
         model, fresh, step = copy.copy(self._model), copy.copy(self._start), mujoco.mj_step
         limits_now, ctrl_now = model.actuator_forcerange, fresh.ctrl
         limits_now[:] = self._limits[0] if self._limits else limits_now
-        # everything but the steps is made beforehand: the rows, and whether the limits change before them
+        # prepare the rows, and whether the limits change before them, outside the measured loop
         work = [
             (list(rows), limits if i == 0 or limits is not self._limits[i - 1] else None)
             for i, (rows, limits) in enumerate(zip(self._controls, self._limits, strict=True))

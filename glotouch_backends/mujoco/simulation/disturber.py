@@ -1,6 +1,6 @@
-"""Hands inside the simulated world, for faults: they change MuJoCo's state between two cycles.
+"""Changes of the simulated world for faults: they edit MuJoCo's state between two cycles.
 
-They move nothing through the robot: `MotionClearance` is asked first, and what has none is left as it is
+`MotionClearance` is checked first; a move that is blocked raises `PathBlocked` and changes nothing.
     (`PathBlocked`).
 """
 
@@ -19,18 +19,21 @@ from glotouch_backends.mujoco.truth import Truth, rotation_vector
 from glotouch_bt.robot import Array, BadInput, Pose, World
 
 PARKING_B_M = (-0.7, 0.8)
-"""On the table, out of the arm's way; removed objects stand there in a row."""
+"""First place of removed objects on the table, out of the arm's reach, in B."""
 PARKING_STEP_M = 0.25
+"""Distance between two removed objects."""
 LIFT_M = 0.002
-"""What is put down is put down from so high."""
-PATH_STEP_M, TURN_STEP_RAD = 0.002, np.deg2rad(5.0)
-"""How finely a way is looked at: the probe's shaft is three times as thick as the first."""
+"""Height above the floor from which an object is dropped when it is placed."""
+PATH_STEP_M = 0.002
+"""Distance between two checked poses of a path; the probe's shaft is three times as thick. Source: ours."""
+TURN_STEP_RAD = np.deg2rad(5.0)
+"""Angle between two checked poses of a turn. Source: ours."""
 MIN_FRICTION = 0.3
-"""A knocked object slides no farther than with this coefficient."""
+"""Friction coefficient that gives the longest slide of a knocked object. Source: ours."""
 
 
 class Disturbed(Protocol):
-    """What a simulated robot lets its disturber change."""
+    """The parts of a simulated robot that its disturber may change."""
 
     world: World
     truth: Truth
@@ -40,7 +43,7 @@ class Disturbed(Protocol):
 
 
 class MujocoDisturber:
-    """See `robot.disturber.Disturber`."""
+    """See `robot.simulation.Disturber`."""
 
     def __init__(self, robot: Disturbed) -> None:
         self._robot = robot
@@ -48,7 +51,7 @@ class MujocoDisturber:
         self._from: dict[int, Pose] = {}
 
     def places_B_m(self) -> Array:
-        """(n, 3) the objects' centres of mass."""
+        """See `Disturber`."""
         return np.array(self._robot.data.xipos[list(self._robot.handles.object_bodies)])
 
     def shove(self, index: int, velocity_B_m_s: Array) -> None:
@@ -72,7 +75,7 @@ class MujocoDisturber:
         floor_m, centre_O = self._lowest(index, pose), pose.inverse().apply(before)
 
         def turned(angle_rad: float) -> Pose:
-            """About its centre of mass, as high as it must be."""
+            """Return the pose turned about the centre of mass and lifted off the floor."""
             quat = (Pose(np.zeros(3), rotation_vector(angle_rad * axis).quat) @ Pose(np.zeros(3), pose.quat)).quat
             at = Pose(before - Pose(np.zeros(3), quat).apply(centre_O), quat)
             rise = floor_m + LIFT_M - self._lowest(index, at)
@@ -111,7 +114,7 @@ class MujocoDisturber:
         places = {i: self._pose(i) for i in inside}
 
         def moved(share: float) -> tuple[Pose, dict[int, Pose]]:
-            """The container, and each body's pose, after so much of the way."""
+            """Return the poses of the container and of each body after a share of the path."""
             turn = old @ Pose.planar((0.0, 0.0, 0.0), share * yaw_rad)
             new = Pose(old.position_m + share * np.array([*shift_B_m, 0.0]), turn.quat)
             change = new @ old.inverse()
@@ -131,7 +134,7 @@ class MujocoDisturber:
             self._place(index, change @ places[index])
 
     def _refresh_static_bodies(self) -> None:
-        """MuJoCo computes where bodies without joints stand once, when its data are made or reset."""
+        """Update the poses of bodies without joints: MuJoCo computes them only when its data are created or reset."""
         model, data = self._robot.model, self._robot.data
         fresh = mujoco.MjData(model)
         bodies = np.flatnonzero(model.body_weldid == 0)
@@ -143,7 +146,7 @@ class MujocoDisturber:
                 getattr(data, f"{kind}_{name}")[of] = getattr(fresh, f"{kind}_{name}")[of]
 
     def _pose(self, index: int) -> Pose:
-        """Where an object's body is, as a copy.
+        """Return a copy of an object's pose.
 
         Raises:
             BadInput: The objects are bolted down.
@@ -155,7 +158,7 @@ class MujocoDisturber:
     def _joint(self, index: int) -> int:
         joint = int(self._robot.model.body_jntadr[self._robot.handles.object_bodies[index]])
         if joint < 0:
-            raise BadInput("the objects are bolted to the floor (backend option `fixed`): they cannot be moved")
+            raise BadInput("the objects are bolted to the floor (backend option `fixed`) and cannot be moved")
         return joint
 
     def _dof(self, index: int) -> slice:
@@ -163,7 +166,7 @@ class MujocoDisturber:
         return slice(start, start + 6)
 
     def _place(self, index: int, pose_B_O: Pose) -> None:
-        """Put a body somewhere, at rest; everything that follows from positions is brought up to date."""
+        """Put a body at a pose, at rest, and update everything that follows from positions."""
         r = self._robot
         start = int(r.model.jnt_qposadr[self._joint(index)])
         r.data.qpos[start : start + 7] = [*pose_B_O.position_m, *pose_B_O.quat]
@@ -172,5 +175,5 @@ class MujocoDisturber:
         mujoco.mj_comPos(r.model, r.data)
 
     def _lowest(self, index: int, pose_B_O: Pose) -> float:
-        """Height in B of the lowest vertex of an object at a pose."""
+        """Return the height in B of an object's lowest vertex at a pose."""
         return float(pose_B_O.apply(self._robot.truth.objects[index].mesh.vertices_m)[:, 2].min())

@@ -1,4 +1,4 @@
-"""The truth of the simulated world, for scoring only."""
+"""Ground truth of the simulated world, for scoring only."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ from glotouch_backends.mujoco.truth import Truth
 from glotouch_bt.robot import Array, Pose, World
 from glotouch_bt.robot.simulation import BareSteps, TrueObject
 
-MAX_STOWED_OFFSET_M = 0.005  # the handle's centre this near its place in the stand
-MIN_STOWED_COSINE = 0.996  # cosine of 5 degrees
+MAX_STOWED_OFFSET_M = 0.005
+"""The probe is stowed if its handle is within this distance of its place in the stand. Source: ours."""
+MIN_STOWED_COSINE = 0.996
+"""... and tilted by less than 5 degrees (cosine). Source: ours."""
 
 
 class Simulated(Protocol):
-    """What a simulated robot lets its referee look at."""
+    """The parts of a simulated robot that its referee reads."""
 
     world: World
     truth: Truth
@@ -32,13 +34,13 @@ class Simulated(Protocol):
 
 
 class MujocoReferee:
-    """See `robot.referee.Referee`."""
+    """See `robot.simulation.Referee`."""
 
     def __init__(self, robot: Simulated) -> None:
         self._robot = robot
 
     def objects(self) -> list[TrueObject]:
-        """All objects, now, in the world's order."""
+        """See `Referee`; in the world's order."""
         r = self._robot
         touching = self._touching()
         left, right = r.handles.pad_geoms
@@ -52,21 +54,21 @@ class MujocoReferee:
         return result
 
     def pose_B_K(self) -> Pose:
-        """The true container frame."""
+        """See `Referee`."""
         return self._robot.truth.pose_B_K
 
     def tip_B_m(self) -> Array:
-        """(3,) true centre of the ball."""
+        """See `Referee`."""
         return np.array(self._robot.data.site_xpos[self._robot.handles.tip_site])
 
     def push_tip(self, force_B_N: Array) -> None:
-        """A force (3,) in B on the probe at the ball's centre, from now on."""
+        """See `Referee`."""
         r, body = self._robot, self._robot.handles.probe_body
         lever = self.tip_B_m() - r.data.xipos[body]
         r.data.xfrc_applied[body] = np.concatenate([force_B_N, np.cross(lever, force_B_N)])
 
     def probe_in_holder(self) -> bool:
-        """True if the handle is at its place, upright, and nobody touches it."""
+        """Return True if the handle is at its place, upright, and the hand does not touch the probe."""
         r = self._robot
         stowed = r.world.holder.pose_B_grasp
         now = body_pose(r.data, r.handles.probe_body)
@@ -76,16 +78,16 @@ class MujocoReferee:
         return near and upright and not any(self._on(r.handles.probe_body, b) for b in range(hand.start, hand.stop))
 
     def peak_force_N(self) -> float:
-        """Largest true contact force on the hand and on the probe it holds, so far."""
+        """See `Referee`."""
         return self._robot.peak_force_N
 
     def replay_bare_steps(self) -> BareSteps | None:
-        """The run's steps once more; None unless the backend's option `trace` was on."""
+        """See `Referee`."""
         trace = self._robot.trace
         return None if trace is None else trace.replay(self._robot.data)
 
     def _touching(self) -> dict[int, set[int]]:
-        """Bodies in contact with each geom."""
+        """Return the bodies in contact with each geom."""
         r = self._robot
         result: dict[int, set[int]] = {}
         for first, second in r.data.contact.geom:
@@ -94,7 +96,7 @@ class MujocoReferee:
         return result
 
     def _on(self, body: int, other: int) -> bool:
-        """True if two bodies are in contact."""
+        """Return True if two bodies are in contact."""
         r = self._robot
         bodies = r.model.geom_bodyid[np.asarray(r.data.contact.geom).reshape(-1, 2)]
         return bool(((bodies == (body, other)).all(axis=1) | (bodies == (other, body)).all(axis=1)).any())

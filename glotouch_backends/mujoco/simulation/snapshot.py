@@ -1,12 +1,12 @@
-"""The whole state of a simulated robot and its world, taken between two cycles and put back to the bit.
+"""Save and restore the whole state of a simulated robot and its world between two cycles, to the bit.
 
-MuJoCo's own state vector is not enough: with sleeping islands a step depends on what the last one left in `mjData`
-(who sleeps, positions of what sleeps), and the servo and the payload's feed-forward read the last step's inertia and
-poses. So every array of `mjData` of a fixed size is kept; contacts and constraint rows are made anew by the next step.
-Of the model, what a run changed is kept.
+MuJoCo's state vector is not enough. With sleeping islands a step depends on data of the last one (which bodies sleep,
+their positions), and the servo and the payload's feed-forward read the last step's inertia and poses. So every array of
+`mjData` with a fixed size is saved; the next step recomputes contacts and constraint rows. Of the model, only the
+arrays that the run changed are saved.
 
-Of the robot's parts everything is kept but what `FIXED` names, so that a new attribute is kept too; one of a kind that
-no checkpoint can hold is found by the tests.
+Every attribute of the robot's parts is saved unless `FIXED` names it, so that a new attribute is saved too. A test
+finds attributes of a type that a checkpoint cannot store.
 """
 
 from __future__ import annotations
@@ -39,19 +39,19 @@ FIXED: Mapping[str, frozenset[str]] = {
     "Tactile": frozenset(("_data", "_pads", "_site", "_gel", "_meshes", "_rays", "_c")),
     "JawReports": frozenset(("_c",)),
 }
-"""What an opened robot has from its world, conditions, seed and options alone, by class."""
+"""Attributes, by class, that follow from world, conditions, seed and options alone."""
 
 AWAKE = ("nbody_awake", "nparent_awake", "ntree_awake", "nv_awake")
 BULKY = ("bvh_", "mesh_", "tex_", "hfield_", "skin_", "flex", "names", "paths", "text_")
-"""Arrays of the model that no run changes, and that are too large to be compared each time."""
+"""Prefixes of arrays of the model that no run changes and that are too large to compare each time."""
 DRAWN_ONLY = ("bvh_active", "bvh_aabb_dyn")
 
 
 class SnapshotStore:
-    """Takes and puts back the state of one robot.
+    """Save and restore the state of one robot.
 
     Args:
-        model, data: The robot's own, as compiled; what the run changes of the model from now on is part of its state.
+        model, data: Those of the robot, as compiled; later changes of the model are part of the state.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -59,7 +59,7 @@ class SnapshotStore:
         self._pristine = copy.copy(model)
 
     def take(self, robot: object) -> Snapshot:
-        """The state of a robot that has not failed; independent of what the robot does next."""
+        """Return the state of a robot that has not failed, independent of its later changes."""
         data = self._data
         stop: SafetyStop | None = vars(robot)["_guard"].tripped
         return {
@@ -76,7 +76,7 @@ class SnapshotStore:
         }
 
     def put_back(self, robot: object, snapshot: Snapshot) -> None:
-        """Bring the robot to the state of a snapshot; contacts are known again after the next cycle.
+        """Restore a snapshot; contacts are known again after the next cycle.
 
         Raises:
             BadInput: See `Robot.restore`. Nothing was changed.
@@ -103,17 +103,17 @@ class SnapshotStore:
         ours = ("mujoco", FORMAT, mujoco.__version__)
         if given != ours:
             raise BadInput(
-                f"the kept world is of backend {given[0]}, format {given[1]}, MuJoCo {given[2]}; "
-                f"here it is {ours[0]}, format {ours[1]}, MuJoCo {ours[2]}"
+                f"the saved world is of backend {given[0]}, format {given[1]}, MuJoCo {given[2]}; "
+                f"this robot has {ours[0]}, format {ours[1]}, MuJoCo {ours[2]}"
             )
         kept: Any = snapshot
         shapes = {n: a.shape for n, a in kept["data"].items()}
         if kept["sizes"] != self._sizes or shapes != {n: getattr(self._data, n).shape for n in self._kept_arrays}:
-            raise BadInput("the kept world has other objects or parts than the one this robot was opened with")
+            raise BadInput("the saved world has other objects or parts than the one this robot was opened with")
         for name, part in _parts(robot).items():
             odd = sorted(kept["parts"][name].keys() ^ _names(part))
             if odd:
-                raise BadInput(f"the kept state of {type(part).__name__} is of another version ({', '.join(odd)})")
+                raise BadInput(f"the saved state of {type(part).__name__} is of another version ({', '.join(odd)})")
 
     @property
     def _sizes(self) -> tuple[int, ...]:
@@ -122,7 +122,7 @@ class SnapshotStore:
 
     @cached_property
     def _kept_arrays(self) -> tuple[str, ...]:
-        """Names of the arrays of mjData whose size the model fixes; the others live from step to step."""
+        """Names of the arrays of mjData with a fixed size; the others live from step to step."""
         fresh = mujoco.MjData(self._model)
         return tuple(n for n in _arrays(fresh) if n not in DRAWN_ONLY and _is_view(fresh, n))
 
@@ -131,7 +131,7 @@ class SnapshotStore:
         return tuple(n for n in _arrays(self._model) if not n.startswith(BULKY) and getattr(self._model, n).size)
 
     def _changed(self) -> list[str]:
-        """Arrays of the model that are not as they were compiled."""
+        """Return the names of the model's arrays that differ from the compiled ones."""
         now, then = self._model, self._pristine
         return [n for n in self._comparable if not np.array_equal(getattr(now, n), getattr(then, n))]
 
@@ -145,7 +145,7 @@ def _arrays(thing: object) -> list[str]:
 
 
 def _is_view(data: mujoco.MjData, name: str) -> bool:
-    """False for an empty array, and for one made anew at each look (what says which islands there are just now)."""
+    """Return False for an empty array and for one that is created at each access (the list of awake islands)."""
     return bool(np.shares_memory(getattr(data, name), getattr(data, name)))
 
 
@@ -162,6 +162,6 @@ def _set_attributes(part: object, kept: Mapping[str, Any]) -> None:
         now = vars(part)[name]
         fits = isinstance(now, np.ndarray) and isinstance(value, np.ndarray) and now.shape == value.shape
         if fits and now.flags.writeable and now.dtype == value.dtype:
-            now[...] = value  # others may hold views of it
+            now[...] = value  # in place: there may be views of it
         else:
             setattr(part, name, copy.deepcopy(value))

@@ -32,9 +32,9 @@ def open_robot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Open
         stop = threading.Event()
         thread = threading.Thread(target=serve, args=(socket, log, stop.is_set), daemon=True)
         thread.start()
-        read = read_options({"devices": "simulated", **options})
+        options_, settings = read_options({"devices": "simulated", **options})
         backend = FlexivXenseBackend()
-        link = DriverLink(address, lambda: None, paced=not read.lockstep)
+        link = DriverLink(address, lambda: None, paced=not options_.lockstep)
 
         def end() -> None:
             if robot is not None:
@@ -48,7 +48,9 @@ def open_robot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Open
 
         robot: FlexivXenseRobot | None = None
         ends.append(end)
-        opened = link.ask(backend._request(read, None, link.number(), True), Opened, on_progress=lambda _: None)
+        opened = link.ask(
+            backend._request(options_, settings, None, link.number(), True), Opened, on_progress=lambda _: None
+        )
         link.beat()
         first = link.wait(0, Block)
         robot = FlexivXenseRobot(backend._description, backend._limits, PERIOD_S, link, None, opened.info, first)

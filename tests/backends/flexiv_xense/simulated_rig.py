@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from glotouch_backends.flexiv_xense.simulated import ROBOT_SN, SimulatedVendor, open_vendor
-from glotouch_backends.mujoco.sensing.wrench import hand_mass
+from glotouch_backends.options import WorldOptions
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import Array, Conditions
 from tests.conformance.conformance_world import OPTIONS, WORLD
@@ -18,7 +18,7 @@ LIMITS = (0.375, 2.0, 3.0, 10.0)
 
 
 def vendor(conditions: Conditions | None = None, seed: int = 0) -> SimulatedVendor:
-    return open_vendor(pickle.dumps((WORLD, conditions or Conditions(), seed, OPTIONS)))
+    return open_vendor(pickle.dumps((WORLD, conditions or Conditions(), seed, WorldOptions(**OPTIONS))))
 
 
 class Bench:
@@ -46,7 +46,7 @@ class Bench:
 
     def tool(self) -> Bench:
         tools, params = self.rdk.Tool(self.robot), self.rdk.ToolParams()
-        params.mass, com = hand_mass(RIZON4_XENSE)
+        params.mass, com = RIZON4_XENSE.gripper.mass_and_com_E()
         params.CoM, params.tcp_location = com.tolist(), P_IN_E
         tools.Add("hand", params)
         tools.Switch("hand")
@@ -62,11 +62,6 @@ class Bench:
         self.enable().tool().zero()
         self.robot.SwitchMode(self.rdk.Mode.NRT_CARTESIAN_MOTION_FORCE)
         self.robot.SetNullSpacePosture(list(RIZON4_XENSE.home_q))
-        return self
-
-    def joints(self) -> Bench:
-        self.enable().tool().zero()
-        self.robot.SwitchMode(self.rdk.Mode.NRT_JOINT_POSITION)
         return self
 
     @property

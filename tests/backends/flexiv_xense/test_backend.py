@@ -43,7 +43,7 @@ def test_it_is_registered() -> None:
         ({"robot": "Rizon4-1", "layout": {}}, "only simulated devices"),
         ({"robot": "Rizon4-1", "left_pad": "OG1"}, "both or none"),
         ({"robot": "Rizon4-1", "driver": "tcp://x:1"}, "needs keys"),
-        ({"robot": "Rizon4-1", "keys": "/no/such/folder"}, "is no folder"),
+        ({"robot": "Rizon4-1", "keys": "/no/such/folder"}, "is not a folder"),
         ({"devices": "simulated", "driver": "tcp://x:1"}, "driver of our own"),
         ({"devices": "simulated", "feed_forward": "maybe"}, "true or false"),
     ],
@@ -56,7 +56,7 @@ def test_wrong_options_say_what_is_right(options: dict[str, object], text: str) 
 def test_the_simulated_devices_are_the_default_addresses_of_their_kind() -> None:
     from glotouch_backends.flexiv_xense.simulated import GRIPPER_ADDRESS, PAD_SNS, ROBOT_SN
 
-    o = read_options({"devices": "simulated"})
+    _, o = read_options({"devices": "simulated"})
     assert (o.robot, o.gripper, (o.left_pad, o.right_pad)) == (ROBOT_SN, GRIPPER_ADDRESS, PAD_SNS)
 
 

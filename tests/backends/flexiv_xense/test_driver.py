@@ -132,7 +132,7 @@ def test_a_tare_goes_through_the_primitive_while_samples_keep_coming(open_robot:
     robot = open_robot(vendor)
     vendor.calls.clear()
     ticket = robot.start(Tare(0.2))
-    with pytest.raises(ParamError, match="under way"):
+    with pytest.raises(ParamError, match="pending"):
         robot.cycle(Command(setpoint(HOME)))
     begin, cycles = robot.observe().now_s, 0
     while not ticket.done and cycles < 200:

@@ -9,7 +9,6 @@ import pytest
 
 from glotouch_backends.flexiv_xense.simulated import ROBOT_SN
 from glotouch_backends.flexiv_xense.simulated.arm import LINK_LOST_S
-from glotouch_backends.mujoco.sensing.wrench import hand_mass
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import Conditions, Pose
 from glotouch_bt.robot.geometry import quat_to_matrix
@@ -43,7 +42,7 @@ def test_the_order_of_a_session() -> None:
     assert robot.operational_status() is bench.rdk.OperationalStatus.RELEASING_BRAKE
     bench.wait(robot.operational)
     with pytest.raises(RuntimeError, match="mode IDLE"):
-        robot.SendJointPosition([0.0] * 7, [0.0] * 7, [1.0] * 7, [1.0] * 7)
+        robot.SendCartesianMotionForce(bench.pose.tolist())
     with pytest.raises(ValueError, match="unlicensed"):
         robot.SwitchMode(mode.NRT_PLAN_EXECUTION)
     robot.SwitchMode(mode.NRT_JOINT_POSITION)
@@ -73,7 +72,7 @@ def test_the_flange_alone_feels_the_hands_weight() -> None:
     bench = Bench().enable().zero()
     at = np.array(bench.robot.states().flange_pose)
     bench.robot.Stop()
-    mass, com = hand_mass(RIZON4_XENSE)
+    mass, com = RIZON4_XENSE.gripper.mass_and_com_E()
     bench.sleep(0.001)
     zeroed = np.array(bench.robot.states().ext_wrench_in_world_raw)
     assert np.abs(zeroed).max() < 0.05, "zeroed with the weight on"
@@ -214,22 +213,6 @@ def test_the_contact_wrench_is_bounded() -> None:
     assert pressed[0] > 100.0
     assert 4.0 < pressed[1] < 8.5
     assert peaks[1] < 50.0, "the first impact"
-
-
-def test_joint_setpoints_need_limits() -> None:
-    bench = Bench().joints()
-    q, zero, one = list(bench.robot.states().q), [0.0] * 7, [1.0] * 7
-    with pytest.raises(ValueError, match="7 items"):
-        bench.robot.SendJointPosition(q[:-1], zero, one, one)
-    with pytest.raises(ValueError, match="positive"):
-        bench.robot.SendJointPosition(q, zero, zero, one)
-    with pytest.raises(TypeError):
-        bench.robot.SendJointPosition(q, zero, 1.0, one)
-    goal = [q[0] + 0.1, *q[1:]]
-    bench.robot.SendJointPosition(goal, zero, one, one)
-    bench.wait(lambda: not bench.robot.busy())
-    bench.sleep(0.2)
-    np.testing.assert_allclose(bench.robot.states().q, goal, atol=1e-4)
 
 
 @pytest.mark.parametrize(

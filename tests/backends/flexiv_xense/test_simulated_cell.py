@@ -16,6 +16,7 @@ import pytest
 
 from glotouch_backends.flexiv_xense.simulated import PAD_SNS, ROBOT_SN, RemoteVendor, open_remote_vendor
 from glotouch_backends.flexiv_xense.simulated.arm import LINK_LOST_S, STOP_RAD_S2
+from glotouch_backends.options import WorldOptions
 from glotouch_bt.robot import Conditions
 from tests.conformance.conformance_world import OPTIONS, WORLD
 
@@ -32,7 +33,7 @@ def wait(seconds: float) -> None:
 @pytest.fixture
 def cell(tmp_path: Path) -> Iterator[Path]:
     """A running cell's folder: `socket` and `log`."""
-    (tmp_path / "world").write_bytes(pickle.dumps((WORLD, Conditions(), 0, OPTIONS)))
+    (tmp_path / "world").write_bytes(pickle.dumps((WORLD, Conditions(), 0, WorldOptions(**OPTIONS))))
     module = "glotouch_backends.flexiv_xense.simulated.cell"
     command = [sys.executable, "-m", module, tmp_path / "world", tmp_path / "socket", tmp_path / "log"]
     process = subprocess.Popen(command, cwd=ROOT)

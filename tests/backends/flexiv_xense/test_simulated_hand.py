@@ -63,16 +63,6 @@ def test_a_lost_gripper_repeats_itself(bench: SimulatedVendor) -> None:
     assert bench.clock.now_s() - began > 7.0
 
 
-def test_waiting_for_a_position_that_an_object_forbids(bench: SimulatedVendor) -> None:
-    """0.01 mm of tolerance: False after the timeout, whether it is an object or only the resolution."""
-    gripper: Any = bench.xensegripper.XenseGripper.create(GRIPPER_ADDRESS)
-    sleep(bench, 0.05)
-    assert gripper.set_position_sync(30.0, 100.0, 10.0, tolerance=0.5)
-    began = bench.clock.now_s()
-    assert not gripper.set_position_sync(-5.0, 100.0, 10.0, timeout=1.0)
-    assert bench.clock.now_s() - began == pytest.approx(1.0, abs=0.06)
-
-
 def test_aperture_noise_is_that_of_the_conditions() -> None:
     v = vendor(Conditions(aperture_noise_sd_m=5e-5, aperture_bias_m=(3e-4, 3e-4), gripper_latency_s=0.01))
     gripper: Any = v.xensegripper.XenseGripper.create(GRIPPER_ADDRESS)

@@ -1,4 +1,4 @@
-"""TODO door of glotouch_backends/flexiv_xense/driver/devices."""
+"""Adapters of the vendors' interfaces: the only files of the driver that call an SDK."""
 
 from .connect import Connected, connect_devices
 

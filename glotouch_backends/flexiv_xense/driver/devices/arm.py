@@ -1,8 +1,8 @@
-"""The arm as the driver uses it: one interface over the vendor's incompatible ones, and what they have in common.
+"""The arm as the driver uses it: one interface over the vendor's incompatible versions.
 
 Order of a session (vendor's documentation): connect, clear a fault, enable, wait until operational, switch the tool in
-IDLE, zero the wrist sensor, enter Cartesian motion-force, stream. A tare goes back through the primitive mode, a
-payload through IDLE; the sensor is zeroed BEFORE Cartesian motion-force is entered (it raises event 301004 otherwise).
+IDLE, zero the wrist sensor, enter Cartesian motion-force, stream. A tare returns to primitive mode, a payload to IDLE.
+The sensor must be zeroed BEFORE Cartesian motion-force is entered; otherwise the arm raises event 301004.
 """
 
 from __future__ import annotations
@@ -17,22 +17,30 @@ from ..faults import DeviceFault, vendor_call
 from ..messages import ArmEvent, ArmLimits, Numbers, Setpoint, ToolData
 
 TOOL_NAME = "glotouch"
+"""Name of our tool in the arm's memory."""
 CLEAR_FAULT_S = 30
+"""Longest wait for clearing a fault. Source: vendor default."""
 ENABLE_S = 30.0
+"""Longest wait for the arm to become operational. Source: ours."""
 TARE_WAIT_S = 5.0
+"""Longest wait for a tare beyond its duration. Source: ours."""
 MODE_POLL_S = 0.01
+"""Interval between two checks while waiting."""
 MAX_EVENTS = 12
-MAX_ANGULAR_RAD_S, MAX_ANGULAR_RAD_S2 = 4.0, 40.0
-"""Of the arm's own smoothing; far beyond the plan's 7.5 rad/s2, for it must not bind: setpoints come 10 ms apart, so a
-small error asks for much, and where it binds the hand falls behind. At 10 rad/s2 the simulated one did, by 0.1 rad."""
+"""Number of log entries attached to an error."""
+MAX_ANGULAR_RAD_S = 4.0
+"""Angular speed limit of the arm's own smoothing; high enough never to act."""
+MAX_ANGULAR_RAD_S2 = 40.0
+"""Angular acceleration limit of the arm's own smoothing, far above the plan's 7.5 rad/s2: setpoints come 10 ms apart,
+so a small error needs much acceleration. Source: measured; with 10 rad/s2 the simulated hand lagged by 0.1 rad."""
 SMOOTHING_HEADROOM = 1.5
-"""The arm's own smoothing may use this much more than the plan's limits; at 1 it could never catch up with it."""
+"""Limits of the arm's own smoothing over those of the plan; with 1 it could never catch up. Source: ours."""
 DEVICE_WRENCH_SHARE = 1.2
-"""The device's own contact limit over the driver's. The driver stops at its limit; the device bounds the peak."""
+"""The device's contact limit over the driver's: the driver stops the arm, the device bounds the peak. Source: ours."""
 
 
 class ArmState:
-    """One reading of the arm: the device's stamp s, q, dq (7,), TCP pose (7,) in B, wrench (6,) on the TCP in P."""
+    """A reading: the device's stamp, q, dq (7,), TCP pose (7,) in B, wrench (6,) on the TCP in P."""
 
     __slots__ = ("dq", "pose", "q", "stamp", "wrench")
 
@@ -43,14 +51,15 @@ class ArmState:
 
 
 class DriverArm(ABC):
-    """A Flexiv arm; subclasses know one version of the vendor's interface.
+    """A Flexiv arm; each subclass adapts one version of the vendor's interface.
 
     Args:
         rdk: The vendor's module.
         robot: Its `Robot`, connected.
         clock: Time.
         tool: The bare hand.
-        limits: For the device's own limits.
+        limits: Basis of the device's own limits.
+        posture: (7,) reference of the null space.
         raw: Use the unfiltered wrench.
         feed_forward: Send velocities.
     """
@@ -81,11 +90,11 @@ class DriverArm(ABC):
 
     @abstractmethod
     def state(self) -> ArmState:
-        """The newest reading. Does not block."""
+        """Return the newest reading without blocking."""
 
     @abstractmethod
     def _send(self, pose: Sequence[float], twist: Sequence[float]) -> None:
-        """A Cartesian setpoint. Does not block."""
+        """Send a Cartesian setpoint without blocking."""
 
     @abstractmethod
     def _zero_sensor(self, duration_s: float) -> None:
@@ -93,19 +102,19 @@ class DriverArm(ABC):
 
     @abstractmethod
     def _primitive_ended(self) -> bool:
-        """True once it has."""
+        """Return True once the primitive has ended."""
 
     @abstractmethod
     def _configure_motion(self, stiffness: list[float], posture: list[float], wrench: list[float]) -> None:
-        """Right after Cartesian motion-force has been entered: no force axis, impedance, null space, contact limit."""
+        """Configure Cartesian motion-force after entering it: no force axis, impedance, null space, contact limit."""
 
     # -- reading -----------------------------------------------------------------------------------------------------
 
     def check(self) -> None:
-        """Raise what keeps the arm from moving. Cheap: looks at flags the link keeps up to date.
+        """Check that the arm can move. Cheap: reads flags that the link keeps up to date.
 
         Raises:
-            DeviceFault: link, fault or state; with the event log.
+            DeviceFault: link, fault or state, with the event log.
         """
         robot = self.robot
         with vendor_call("reading the arm's status", "link"):
@@ -126,7 +135,7 @@ class DriverArm(ABC):
             raise DeviceFault("state", f"the arm {why} ({self._status()})", self.events())
 
     def events(self) -> tuple[ArmEvent, ...]:
-        """The last entries of the arm's event log; never raises."""
+        """Return the last entries of the arm's event log; never raises."""
         try:
             log = list(self.robot.event_log())[-MAX_EVENTS:]
             return tuple(
@@ -135,7 +144,7 @@ class DriverArm(ABC):
                 )
                 for e in log
             )
-        except Exception:  # a log that cannot be read must not hide the fault it belongs to
+        except Exception:  # an unreadable log must not hide the fault
             return ()
 
     def _status(self) -> str:
@@ -145,10 +154,10 @@ class DriverArm(ABC):
     # -- coming up ---------------------------------------------------------------------------------------------------
 
     def enable(self, progress: Callable[[str], None]) -> None:
-        """Clear a fault, release the brakes, wait until the arm may be commanded; every wait is bounded.
+        """Clear a fault, release the brakes, and wait until the arm is operational; every wait is bounded.
 
         Raises:
-            DeviceFault: It did not come up, and why.
+            DeviceFault: The arm did not come up.
         """
         robot = self.robot
         with vendor_call("enabling the arm", "connect"):
@@ -184,14 +193,14 @@ class DriverArm(ABC):
     # -- slow changes: each blocks, and runs beside the loop -----------------------------------------------------------
 
     def idle(self) -> None:
-        """Standstill, then IDLE."""
+        """Stop the arm and enter IDLE."""
         with vendor_call("stopping the arm"):
             self.robot.Stop()
 
     def load(self, mass_kg: float, com_E_m: Sequence[float]) -> None:
-        """Tell the arm what it carries (mass and centre of mass in E of the hand with its payload); in IDLE.
+        """Set mass and centre of mass in E of the hand with its payload; needs IDLE.
 
-        A mass of 0 stands for the bare hand.
+        A mass of 0 means the bare hand.
         """
         if mass_kg <= 0.0:
             mass_kg, com_E_m = self._tool.mass_kg, self._tool.com_E_m
@@ -209,10 +218,10 @@ class DriverArm(ABC):
             self._tools.Switch(TOOL_NAME)
 
     def zero(self, duration_s: float) -> None:
-        """Zero the wrist sensor by the vendor's primitive; leaves the arm in primitive mode.
+        """Zero the wrist sensor by the vendor's primitive; the arm stays in primitive mode.
 
         Raises:
-            DeviceFault: It did not end in time.
+            DeviceFault: The primitive did not end in time.
         """
         with vendor_call("zeroing the wrist sensor"):
             self.robot.SwitchMode(self.rdk.Mode.NRT_PRIMITIVE_EXECUTION)
@@ -220,7 +229,7 @@ class DriverArm(ABC):
             self._wait(self._primitive_ended, duration_s + TARE_WAIT_S, "the wrist sensor's zeroing")
 
     def enter_motion(self) -> None:
-        """Enter Cartesian motion-force, pure motion, with the device's own contact limit."""
+        """Enter Cartesian motion-force with motion control only and the device's contact limit."""
         limits = self._limits
         wrench = [DEVICE_WRENCH_SHARE * limits.force_N] * 3 + [DEVICE_WRENCH_SHARE * limits.torque_Nm] * 3
         with vendor_call("entering Cartesian motion-force"):
@@ -230,18 +239,18 @@ class DriverArm(ABC):
     # -- fast: nothing below blocks ------------------------------------------------------------------------------------
 
     def send(self, setpoint: Setpoint) -> None:
-        """Stream a (checked) setpoint."""
+        """Send a (checked) setpoint."""
         with vendor_call("sending a setpoint"):
             self._send(setpoint.pose, setpoint.twist if self._feed_forward else self._still)
 
     def hold_at(self, pose: Sequence[float]) -> None:
-        """Come to rest at a pose of P in B."""
+        """Bring the arm to rest at a pose of P in B."""
         with vendor_call("holding the arm"):
             self._send(pose, self._still)
 
     @property
     def _speed_limits(self) -> tuple[float, float, float, float]:
-        """Of the arm's own smoothing: linear and angular velocity, linear and angular acceleration."""
+        """Limits of the arm's own smoothing: linear and angular velocity, linear and angular acceleration."""
         limits = self._limits
         return (
             SMOOTHING_HEADROOM * limits.speed_m_s,
@@ -251,7 +260,7 @@ class DriverArm(ABC):
         )
 
     def describe(self) -> dict[str, str]:
-        """For people."""
+        """Return facts about the arm for display."""
         i = self.info
         return {
             "arm": str(i.model_name),
@@ -263,7 +272,7 @@ class DriverArm(ABC):
         }
 
     def joint_limits(self) -> tuple[Numbers, Numbers]:
-        """The device's own joint ranges (7,), rad; infinite where it gives none."""
+        """Return the device's joint ranges (7,), rad; infinite if it gives none."""
         low, high = list(self.info.q_min), list(self.info.q_max)
         if len(low) != 7 or len(high) != 7:
             return (-math.inf,) * 7, (math.inf,) * 7

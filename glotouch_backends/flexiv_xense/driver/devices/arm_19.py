@@ -1,4 +1,4 @@
-"""flexivrdk 1.9: flat arguments, one arm."""
+"""Adapter of flexivrdk 1.9: flat arguments, one arm."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""flexivrdk 2.0: everything by joint group; ours is ARMS, a single arm."""
+"""Adapter of flexivrdk 2.0: all calls name a joint group; ours is ARMS, a single arm."""
 
 from __future__ import annotations
 

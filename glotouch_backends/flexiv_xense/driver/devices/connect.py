@@ -1,4 +1,4 @@
-"""Bringing the devices up, in the order the vendor wants, with every wait bounded; and down again on every path."""
+"""Connect the devices in the order the vendors require, with bounded waits; release them on every path."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ APIS = {"1.9": Arm19, "2.0": Arm20}
 
 @dataclass
 class Connected:
-    """The devices of one session; `referee` only where they are simulated."""
+    """The devices of one session."""
 
     clock: Clock
     arm: DriverArm
@@ -31,8 +31,8 @@ class Connected:
     vendor: Vendor
 
     def release(self) -> None:
-        """Stop the arm (it ends in IDLE, holding itself), let go of gripper and sensors. Never raises."""
-        with suppress(DeviceFault):  # else it stands by its own fault, or is out of reach
+        """Stop the arm (it ends in IDLE and holds itself); release gripper and sensors. Never raises."""
+        with suppress(DeviceFault):  # otherwise the arm has stopped by its own fault, or is unreachable
             self.arm.idle()
         if self.gripper is not None:
             self.gripper.release()
@@ -41,10 +41,10 @@ class Connected:
 
 
 def api_of(rdk: Any, wanted: str) -> type[DriverArm]:
-    """The adapter for an installed flexivrdk.
+    """Return the adapter of the installed flexivrdk.
 
     Raises:
-        DeviceFault: A version we have none for; says why where we know.
+        DeviceFault: The version has no adapter.
     """
     version = wanted or ".".join(str(getattr(rdk, "__version__", "")).split(".")[:2])
     if not wanted and not version:
@@ -56,18 +56,19 @@ def api_of(rdk: Any, wanted: str) -> type[DriverArm]:
 
 
 def connect_devices(request: Open, progress: Callable[[str], None]) -> Connected:
-    """Everything up and, unless the request only looks, ready for the first setpoint.
+    """Connect all devices and, unless the request only observes, make them ready for the first setpoint.
 
     Raises:
-        DeviceFault: What did not come up; what had come up has been released again.
+        DeviceFault: A device did not come up; the others have been released.
     """
-    d = request.devices
-    vendor = load_vendor(d.kind, d.world, gripper=bool(d.gripper), pads=bool(d.pads))
+    kind, s = request.devices.kind, request.devices.settings
+    gripper = "" if s.gripper == "none" else s.gripper
+    vendor = load_vendor(kind, request.devices.world, gripper=bool(gripper), pads=bool(s.left_pad))
     clock, rdk = vendor.clock, vendor.flexivrdk
-    adapter = api_of(rdk, d.api)
-    progress(f"connecting to the arm {d.robot}")
-    with vendor_call(f"connecting to the arm {d.robot!r}", "connect"):
-        robot = rdk.Robot(d.robot, list(d.network), False)
+    adapter = api_of(rdk, s.api)
+    progress(f"connecting to the arm {s.robot}")
+    with vendor_call(f"connecting to the arm {s.robot!r}", "connect"):
+        robot = rdk.Robot(s.robot, list(s.network), False)
     arm = adapter(
         rdk,
         robot,
@@ -75,21 +76,20 @@ def connect_devices(request: Open, progress: Callable[[str], None]) -> Connected
         request.tool,
         request.arm,
         request.posture,
-        raw=d.wrench == "raw",
-        feed_forward=d.feed_forward,
+        raw=s.wrench == "raw",
+        feed_forward=s.feed_forward,
     )
     connected = Connected(clock, arm, None, None, vendor)
     try:
-        if d.gripper:
-            progress(f"connecting to the gripper {d.gripper}")
-            connected.gripper = DriverGripper(
-                open_gripper(vendor.xensegripper, d.gripper), clock, request.hand, d.link_loss
-            )
+        if gripper:
+            progress(f"connecting to the gripper {gripper}")
+            device = open_gripper(vendor.xensegripper, gripper)
+            connected.gripper = DriverGripper(device, clock, request.hand, s.link_loss)
             connected.gripper.wait_for_status()
-        if d.pads:
+        if s.left_pad:
             progress("opening the tactile sensors")
-            left, right = (open_sensor(vendor.xensesdk, serial) for serial in d.pads)
-            connected.pads = TactileSensors(vendor.xensesdk, (left, right), clock, request.hand, d.mirror)
+            left, right = (open_sensor(vendor.xensesdk, serial) for serial in (s.left_pad, s.right_pad))
+            connected.pads = TactileSensors(vendor.xensesdk, (left, right), clock, request.hand, s.mirror)
         if request.move:
             arm.enable(progress)
             arm.ready(progress)

@@ -1,4 +1,4 @@
-"""The Xense gripper: our own range clamps, and a watch on readings that repeat for ever when the link is gone."""
+"""The Xense gripper: range checks of our own, and detection of readings that repeat because the link is lost."""
 
 from __future__ import annotations
 
@@ -11,19 +11,23 @@ from ..frames import MM
 from ..messages import HandLimits, JawState, JawTarget
 
 MOVING_M_S = 0.002
+"""Report the jaws as moving above this speed. Source: ours."""
 MAX_RESPONSE_S = 1.0
-"""A gripper that was told to move must show some change within this."""
+"""After a command the status must change within this time. Source: ours."""
 MIN_MOVE_M = 1e-3
-"""A target nearer than this need not show."""
+"""A nearer target need not change the status. Source: ours."""
 GRIPPED_FORCE_SHARE = 0.5
-"""A force beyond this share of the limit explains why the jaws do not close further."""
+"""Above this share of the force limit, an object explains why the jaws do not close further. Source: ours."""
 FIRST_STATUS_S = 5.0
+"""Longest wait for the first status. Source: ours."""
 POLL_S = 0.01
+"""Interval between two reads while waiting."""
 SERIAL = "serial:"
+"""Prefix of the address of a gripper on a serial port."""
 
 
 def open_gripper(sdk: Any, address: str) -> Any:
-    """The vendor's gripper at a MAC or IP address, or at "serial:PORT".
+    """Connect to the gripper at a MAC or IP address, or at "serial:PORT".
 
     Raises:
         DeviceFault: It cannot be reached (the vendor raises a bare Exception after some seconds).
@@ -35,14 +39,13 @@ def open_gripper(sdk: Any, address: str) -> Any:
 
 
 class DriverGripper:
-    """Targets in, states out. Aperture 0 is closed, as everywhere in this project (the vendor's 85 mm is open).
+    """The gripper. Aperture 0 is closed, as everywhere in this project (the vendor's 85 mm is open).
 
     Args:
         device: From `open_gripper`.
         clock: Time.
-        limits: Range of the hand.
-        link_loss: What this model does when its link is lost: "holds" or "opens". Nobody can ask it then, so a person
-            is told.
+        limits: Ranges of the hand.
+        link_loss: Behaviour of this model when its link is lost, "holds" or "opens"; it is named in the errors.
     """
 
     def __init__(self, device: Any, clock: Clock, limits: HandLimits, link_loss: str = "holds") -> None:
@@ -56,10 +59,10 @@ class DriverGripper:
         self.state = JawState(clock.now_s(), math.nan, 0.0, False)
 
     def wait_for_status(self) -> None:
-        """The vendor has none right after connecting.
+        """Wait for the first status: the vendor has none right after connecting.
 
         Raises:
-            DeviceFault: None came.
+            DeviceFault: No status came.
         """
         until = self._clock.now_s() + FIRST_STATUS_S
         while True:
@@ -74,7 +77,7 @@ class DriverGripper:
             self._clock.sleep_until(now + POLL_S)
 
     def check(self, target: JawTarget) -> None:
-        """Refuse what the hand cannot do.
+        """Refuse a target outside the hand's ranges.
 
         Raises:
             CommandRefused: Not finite or out of range.
@@ -89,7 +92,7 @@ class DriverGripper:
                 raise CommandRefused(f"gripper.{name}", value, f"within {low:g} .. {high:g}")
 
     def send(self, target: JawTarget) -> None:
-        """A (checked) target; the vendor's own range checks cannot be relied on, so it is clamped once more."""
+        """Send a (checked) target, clamped once more because the vendor's own range checks are unreliable."""
         limits = self._limits
         aperture = min(max(target.aperture_m, 0.0), limits.stroke_m)
         speed, force = min(target.speed_m_s, limits.speed_m_s), min(target.force_N, limits.force_N)
@@ -100,10 +103,10 @@ class DriverGripper:
         self._target = JawTarget(aperture, speed, force)
 
     def poll(self) -> JawState:
-        """The newest status.
+        """Return the newest status.
 
         Raises:
-            DeviceFault: stale: it should have moved by now and shows no sign of it.
+            DeviceFault: stale: the jaws should have moved by now, but the status does not change.
         """
         with vendor_call("reading the gripper", "link"):
             status = self._device.get_gripper_status()
@@ -123,7 +126,7 @@ class DriverGripper:
         raise DeviceFault(
             "stale",
             f"the gripper was told to go to {target.aperture_m / MM:.1f} mm and still reports "
-            f"{self.state.aperture_m / MM:.1f} mm; it is blocked, or its link is lost: then this model "
+            f"{self.state.aperture_m / MM:.1f} mm; it is blocked, or its link is lost, and then this model "
             f"{self._link_loss_effect}",
             age_s=now - self._changed_s,
             limit_s=MAX_RESPONSE_S,
@@ -142,8 +145,8 @@ class DriverGripper:
         self.state = JawState(now, position * MM, abs(force), abs(velocity * MM) > MOVING_M_S)
 
     def release(self) -> None:
-        """Let go of the device (not of what it grips); never raises."""
+        """Disconnect from the device, which keeps its grip; never raises."""
         try:
             self._device.release()
-        except Exception:  # it is being left behind; what matters has been stopped before
+        except Exception:  # the session ends; the arm has been stopped before
             return

@@ -1,7 +1,7 @@
-"""The two tactile sensors: same-frame reads, millimetres to metres, frames that are missing or late.
+"""The two tactile sensors: pairs of depth maps taken together, in metres; missing and late frames.
 
-A read takes as long as the sensor's own processing does, so it is done beside the loop, and only while frames are
-wanted.
+A read takes as long as the sensor's own processing. Reads therefore run concurrently with the loop, and only while
+frames are requested.
 """
 
 from __future__ import annotations
@@ -19,19 +19,20 @@ from ..messages import HandLimits, Maps
 
 LEFT, RIGHT = 0, 1
 MAX_SAME_CLOCK_S = 1.0
-"""Which clock a sensor stamps with is not documented. Stamps this near our clock, or this machine's calendar time, are
-on it; others are shifted by the smallest lateness seen."""
+"""A stamp this near our clock, or this machine's calendar time, is on that clock; others are shifted by the smallest
+delay seen. The vendor does not document the clock."""
 MAX_PAIR_S = 0.04
-"""Two maps belong together if their stamps differ by less: one frame of the slower rate in use."""
+"""Largest difference between the stamps of a pair. Source: one frame at the slower of the rates in use."""
 MAX_MISSING_S = 1.0
-"""No frame for this long while they are wanted is a fault."""
+"""No frame for this long while frames are requested is a fault. Source: ours."""
 MAX_UNREQUESTED_S = 0.2
-"""The reader ends when nobody has wanted a frame for this long."""
+"""The reader ends after this time without a request. Source: ours."""
 POLL_S = 0.005
+"""Pause between two reads."""
 
 
 def open_sensor(sdk: Any, serial: str) -> Any:
-    """One sensor by serial number, with its reference taken now: nothing may touch the pads.
+    """Open a sensor by serial number and take its reference: nothing may touch the pads.
 
     Raises:
         DeviceFault: It cannot be opened.
@@ -43,14 +44,14 @@ def open_sensor(sdk: Any, serial: str) -> Any:
 
 
 class TactileSensors:
-    """Pairs of depth maps, on demand.
+    """Both tactile sensors: pairs of depth maps on request.
 
     Args:
-        sdk: The vendor's module, for its output types.
+        sdk: The vendor's module.
         sensors: Left and right, from `open_sensor`.
         clock: Time.
         limits: Shape of the maps.
-        mirror: Which pad's columns run along -x_P.
+        mirror: Pad whose columns run along -x_P.
     """
 
     def __init__(self, sdk: Any, sensors: tuple[Any, Any], clock: Clock, limits: HandLimits, mirror: str) -> None:
@@ -70,7 +71,7 @@ class TactileSensors:
         self._closed = False
 
     def request(self) -> None:
-        """Frames are wanted now; called once a period."""
+        """Request frames; call once a period while they are needed."""
         now = self._clock.now_s()
         if now - self._requested_s > MAX_UNREQUESTED_S:
             self._newest, self._newest_s = None, now
@@ -80,7 +81,7 @@ class TactileSensors:
             self._clock.spawn(self._read_while_requested)
 
     def take(self) -> Maps | None:
-        """A new pair, once.
+        """Return a new pair once, or None.
 
         Raises:
             DeviceFault: A sensor failed, or no pair has come for too long.
@@ -108,7 +109,7 @@ class TactileSensors:
             self._reading = False
 
     def _read(self, side: int) -> None:
-        """One read; depth and stamp come from the same frame only when asked for in one call."""
+        """Read one sensor; only one call for both gives depth and stamp of the same frame."""
         with vendor_call(f"reading the {('left', 'right')[side]} tactile sensor", "link"):
             depth, stamp = self._sensors[side].selectSensorInfo(*self._types)
             if depth is None or stamp is None:
@@ -141,12 +142,12 @@ class TactileSensors:
         self._newest_s = self._clock.now_s()
 
     def release(self) -> None:
-        """Mandatory by the vendor's documentation; never raises."""
+        """Release the sensors, as the vendor's documentation requires; never raises."""
         self._closed = True
         for sensor in self._sensors:
             try:
                 sensor.release()
-            except Exception:  # it is being left behind
+            except Exception:  # the session ends
                 continue
 
 

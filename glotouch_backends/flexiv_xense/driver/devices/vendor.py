@@ -1,4 +1,4 @@
-"""The vendors' modules, real or simulated: the only place that decides which."""
+"""The vendors' modules, real or simulated; no other file distinguishes them."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ SIMULATED = "glotouch_backends.flexiv_xense.simulated"
 
 
 class Vendor(Protocol):
-    """Modules with the vendors' names, and the clock their devices live by."""
+    """The vendors' modules, and the clock of their devices."""
 
     @property
     def flexivrdk(self) -> Any:
-        """The arm's interface."""
+        """Interface of the arm."""
         ...
 
     @property
     def xensesdk(self) -> Any:
-        """The pads'."""
+        """Interface of the pads."""
         ...
 
     @property
     def xensegripper(self) -> Any:
-        """The gripper's."""
+        """Interface of the gripper."""
         ...
 
     @property
     def clock(self) -> Clock:
-        """Time."""
+        """Clock of the devices."""
         ...
 
 
@@ -52,22 +52,21 @@ def _module(name: str, needed: bool) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError as e:
-        why = f"the vendor's package {name!r} cannot be imported by {sys.executable} ({e}); --set python=INTERPRETER"
-        raise DeviceFault("connect", f"{why} names one that has it") from e
+        why = f"the vendor's package {name!r} cannot be imported by {sys.executable} ({e})"
+        raise DeviceFault("connect", f"{why}; choose an interpreter that has it by --set python=INTERPRETER") from e
 
 
 def load_vendor(kind: str, world: str = "", *, gripper: bool = True, pads: bool = True) -> Vendor:
-    """The vendors' modules.
+    """Load the vendors' modules.
 
     Args:
-        kind: "real": the installed packages. "simulated": a world in this process, on a clock that steps it; `world` is
-            a file our own client wrote. "cell": a world in a process of its own, on the wall's clock; `world` is its
-            address.
+        kind: "real": the installed packages. "simulated": a world in this process that its clock advances; `world` is a
+            file written by our client. "cell": a world in a process of its own on wall time; `world` is its address.
         world: See `kind`.
-        gripper, pads: False if there is none, so that its package need not be there.
+        gripper, pads: False if there is none; then its package need not be installed.
 
     Raises:
-        DeviceFault: Something is not installed here, or the world cannot be built.
+        DeviceFault: A package is not installed, or the world cannot be built.
     """
     if kind == "real":
         return _Installed(

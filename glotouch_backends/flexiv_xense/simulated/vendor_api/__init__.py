@@ -1,4 +1,4 @@
-"""TODO door of glotouch_backends/flexiv_xense/simulated/vendor_api."""
+"""Stand-ins for the vendors' modules, with the vendors' names, signatures and errors; only what the driver uses."""
 
 from glotouch_backends.flexiv_xense.simulated.vendor_api.flexiv_types import (
     EPOCH_S,

@@ -1,6 +1,6 @@
-"""How the vendor's bindings refuse arguments: the wrong type or length is a TypeError, a wrong value a ValueError.
+"""Argument checks of the vendor's bindings: a wrong type or length is a TypeError, a wrong value a ValueError.
 
-NaN is accepted in silence, as by the real ones.
+NaN is accepted silently, as by the real ones.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from glotouch_bt.robot import Array
 
 
 def numbers(name: str, value: object, length: int | None = None) -> Array:
-    """A sequence of numbers.
+    """Return a sequence of numbers as an array.
 
     Args:
         name: Argument's name, for the message.
-        value: What was given.
+        value: The given value.
         length: Fixed length, or None.
 
     Raises:
@@ -34,10 +34,10 @@ def numbers(name: str, value: object, length: int | None = None) -> Array:
 
 
 def within(name: str, value: Array, low: float | Array, high: float | Array) -> Array:
-    """`value` again, if none of it is outside the range (NaN is not).
+    """Return `value` if no element is outside the range; NaN passes.
 
     Raises:
-        ValueError: It is.
+        ValueError: An element is.
     """
     if bool((value < low).any() or (value > high).any()):
         raise ValueError(f"[{name}] contains values outside the valid range")
@@ -45,10 +45,10 @@ def within(name: str, value: Array, low: float | Array, high: float | Array) -> 
 
 
 def positive(name: str, value: Array) -> Array:
-    """`value` again, if none of it is zero or negative (NaN is not).
+    """Return `value` if no element is zero or negative; NaN passes.
 
     Raises:
-        ValueError: It is.
+        ValueError: An element is.
     """
     if bool((value <= 0.0).any()):
         raise ValueError(f"[{name}] must be positive")

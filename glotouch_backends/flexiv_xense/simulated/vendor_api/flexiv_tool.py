@@ -1,4 +1,4 @@
-"""The tools of the simulated arm, as the vendor's `Tool` class keeps them."""
+"""Stand-in for the vendor's `Tool` class: the tools of the simulated arm."""
 
 from __future__ import annotations
 
@@ -8,35 +8,25 @@ from glotouch_backends.flexiv_xense.simulated.vendor_api.flexivrdk_robot import 
 
 
 class Tool:
-    """What is bolted to the flange. Changes need IDLE and block."""
+    """The tools. Changes need IDLE and block."""
 
     def __init__(self, robot: Robot) -> None:
         if not isinstance(robot, Robot):
             raise TypeError(f"incompatible constructor arguments: {robot!r}")
         self._box = robot._box
 
-    def list(self) -> list[str]:
-        """All tools."""
-        self._box.wait(REQUEST_S)
-        return [*self._box.tools]
-
     def exist(self, name: str) -> bool:
-        """Whether there is a tool of this name."""
+        """Return True if there is a tool of this name."""
         self._box.wait(REQUEST_S)
         return name in self._box.tools
 
-    def name(self) -> str:
-        """The current one."""
-        self._box.wait(REQUEST_S)
-        return self._box.tool
-
     def params(self, name: str | None = None) -> ToolParams:
-        """A tool's parameters, of the current one by default."""
+        """Return a tool's parameters; by default those of the current one."""
         self._box.wait(REQUEST_S)
         return self._box.tools[self._known(self._box.tool if name is None else name)]._copy()
 
     def Add(self, name: str, params: ToolParams) -> None:
-        """A new tool."""
+        """Add a tool."""
         self._check(params)
         if name in self._box.tools:
             raise ValueError(f"[flexiv::rdk] tool {name} exists already")
@@ -45,7 +35,7 @@ class Tool:
         self._box.tools[name] = params._copy()
 
     def Update(self, name: str, params: ToolParams) -> None:
-        """Other parameters, at once."""
+        """Change a tool's parameters at once."""
         self._check(params)
         self._known(name)
         self._box.need_mode(Mode.IDLE)
@@ -55,22 +45,11 @@ class Tool:
             self._box.use_tool(name)
 
     def Switch(self, name: str) -> None:
-        """Use another tool from now on."""
+        """Make a tool the current one."""
         self._known(name)
         self._box.need_mode(Mode.IDLE)
         self._box.wait(SWITCH_S)
         self._box.use_tool(name)
-
-    def Remove(self, name: str) -> None:
-        """Forget a tool."""
-        self._known(name)
-        self._box.need_mode(Mode.IDLE)
-        if name == "Flange":
-            raise RuntimeError("[flexiv::rdk] the flange cannot be removed")
-        self._box.wait(REQUEST_S)
-        del self._box.tools[name]
-        if name == self._box.tool:
-            self._box.use_tool("Flange")
 
     def _known(self, name: str) -> str:
         if name not in self._box.tools:

@@ -1,6 +1,6 @@
-"""The values of the flat `flexivrdk` 1.9 API: enumerations and data structures, with the vendor's names.
+"""Enumerations and data structures of the flat `flexivrdk` 1.9 API, with the vendor's names.
 
-Vendor classes hand out copies: a list taken from one can be changed without changing the other.
+As in the vendor's library, a list taken from an object is a copy.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from glotouch_backends.flexiv_xense.simulated.vendor_api.checks import numbers
 from glotouch_backends.mujoco.model import STEP_S, SensorMap
 from glotouch_bt.robot import Array, Pose
 
-EPOCH_S = 1_700_000_000  # the simulated control box was switched on at this time
+EPOCH_S = 1_700_000_000
+"""Time of the simulated control box at its start."""
 
 
 class _Numbered(Enum):
@@ -39,7 +40,7 @@ class Mode(_Numbered):
 
 
 class OperationalStatus(_Numbered):
-    """Why the robot is (not) ready."""
+    """Readiness of the robot."""
 
     UNKNOWN = 0
     READY = 1
@@ -55,15 +56,8 @@ class OperationalStatus(_Numbered):
     IN_AUTO_MODE = 11
 
 
-class CoordType(_Numbered):
-    """Root frames of the force control frame."""
-
-    WORLD = 0
-    TCP = 1
-
-
 class RobotEvent_Level(_Numbered):
-    """How bad an event is."""
+    """Severity of an event."""
 
     UNKNOWN = 0
     INFO = 1
@@ -108,7 +102,7 @@ class RobotInfo:
 
 
 def _numbers(name: str, length: int) -> property:
-    """A field of so many numbers: handed out as a copy, refused (TypeError) if it is anything else."""
+    """Return a property of `length` numbers: it returns a copy, and refuses anything else (TypeError)."""
 
     def _get(self: ToolParams) -> list[float]:
         return [*self._values[name]]
@@ -120,7 +114,7 @@ def _numbers(name: str, length: int) -> property:
 
 
 class ToolParams:
-    """What is bolted to the flange: kg, m and kg m2; `tcp_location` is x y z qw qx qy qz in the flange frame."""
+    """Tool on the flange: kg, m and kg m2; `tcp_location` is x y z qw qx qy qz in the flange frame."""
 
     __slots__ = ("_mass", "_values")
     CoM = _numbers("CoM", 3)
@@ -138,24 +132,24 @@ class ToolParams:
 
     @mass.setter
     def mass(self, value: float) -> None:
-        """TypeError if it is no number."""
+        """Set the mass; TypeError if it is not a number."""
         self._mass = float(numbers("mass", [value])[0])
 
     def _copy(self) -> ToolParams:
-        """The same values again (not the vendor's: its functions copy by themselves)."""
+        """Return a copy (not in the vendor's API, whose functions copy by themselves)."""
         other = ToolParams()
         other._mass, other._values = self._mass, {k: [*v] for k, v in self._values.items()}
         return other
 
 
 def seven(pose: Pose) -> list[float]:
-    """A pose as the vendor writes it: x y z qw qx qy qz."""
+    """Return a pose in the vendor's order: x y z qw qx qy qz."""
     return [*pose.position_m.tolist(), *pose.quat.tolist()]
 
 
 @dataclass(frozen=True)
 class ArmReading:
-    """A sample, and what it takes to read it: MuJoCo's columns, the tool then in use, P in the flange frame."""
+    """A sample with the data to interpret it: MuJoCo's columns, the tool in use, P in the flange frame."""
 
     sample: Sample
     sensors: SensorMap
@@ -163,23 +157,23 @@ class ArmReading:
     pose_E_P: Pose
 
     def flange(self) -> Pose:
-        """The flange in B."""
+        """Return the pose of the flange in B."""
         row = self.sample.row
         return Pose(row[self.sensors.position], row[self.sensors.quat]) @ self.pose_E_P.inverse()
 
     def tool(self) -> list[float]:
-        """The tool centre point in B."""
+        """Return the pose of the tool centre point in B."""
         if _same(self.load.pose_E_T, self.pose_E_P):
             row = self.sample.row
             return [*row[self.sensors.position].tolist(), *row[self.sensors.quat].tolist()]
         return seven(self.flange() @ self.load.pose_E_T)
 
     def in_tool(self, wrench_S: Array) -> list[float]:
-        """A wrench at the tool centre point, in the tool's axes."""
+        """Return a wrench at the tool centre point, in the tool's axes."""
         return _list(self.load.in_T @ wrench_S)
 
     def in_world(self, wrench_S: Array) -> list[float]:
-        """A wrench at the tool centre point, in B's axes."""
+        """Return a wrench at the tool centre point, in B's axes."""
         at_T, turn = self.load.at_T @ wrench_S, self.flange().rotation
         return [*_list(turn @ at_T[:3]), *_list(turn @ at_T[3:])]
 
@@ -189,7 +183,7 @@ def _same(a: Pose, b: Pose) -> bool:
 
 
 class RobotStates:
-    """One millisecond of the arm; every value is made when it is asked for. Only what the simulation has is offered."""
+    """State of the arm at one millisecond; only values that the simulation has."""
 
     __slots__ = ("_reading",)
 
@@ -217,20 +211,10 @@ class RobotStates:
         return [] if r is None else _list(r.sample.row[r.sensors.q])
 
     @property
-    def theta(self) -> list[float]:
-        """Joint positions, motor side; the simulated joints are stiff."""
-        return self.q
-
-    @property
     def dq(self) -> list[float]:
         """Joint velocities, link side, rad/s."""
         r = self._reading
         return [] if r is None else _list(r.sample.row[r.sensors.dq])
-
-    @property
-    def dtheta(self) -> list[float]:
-        """Joint velocities, motor side."""
-        return self.dq
 
     @property
     def flange_pose(self) -> list[float]:
@@ -244,7 +228,7 @@ class RobotStates:
 
     @property
     def ext_wrench_in_tcp(self) -> list[float]:
-        """What the tool feels at its centre point, in its axes, N and Nm; filtered."""
+        """Wrench on the tool at its centre point, in its axes, N and Nm; filtered."""
         r = self._reading
         return [0.0] * 6 if r is None else r.in_tool(r.sample.filtered_S)
 
@@ -256,7 +240,7 @@ class RobotStates:
 
     @property
     def ext_wrench_in_world(self) -> list[float]:
-        """What the tool feels at its centre point, in the world's axes; filtered."""
+        """Wrench on the tool at its centre point, in the world's axes; filtered."""
         r = self._reading
         return [0.0] * 6 if r is None else r.in_world(r.sample.filtered_S)
 
@@ -265,11 +249,6 @@ class RobotStates:
         """The same, not filtered."""
         r = self._reading
         return [0.0] * 6 if r is None else r.in_world(r.sample.wrench_S)
-
-    @property
-    def ft_sensor_raw(self) -> list[float]:
-        """What the wrist sensor says, at the flange in its axes: neither zeroed nor without the tool's weight."""
-        return [0.0] * 6 if self._reading is None else _list(self._reading.sample.raw_S)
 
 
 def _list(a: Array) -> list[float]:

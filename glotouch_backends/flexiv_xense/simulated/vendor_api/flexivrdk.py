@@ -1,8 +1,7 @@
-"""A stand-in for the vendor's module `flexivrdk` 1.9: the names a driver uses. See `flexivrdk_robot`."""
+"""Stand-in for the vendor's module `flexivrdk` 1.9: the names that the driver uses. See `flexivrdk_robot`."""
 
 from glotouch_backends.flexiv_xense.simulated.vendor_api.flexiv_tool import Tool
 from glotouch_backends.flexiv_xense.simulated.vendor_api.flexiv_types import (
-    CoordType,
     Mode,
     OperationalStatus,
     RobotEvent,
@@ -14,7 +13,6 @@ from glotouch_backends.flexiv_xense.simulated.vendor_api.flexiv_types import (
 from glotouch_backends.flexiv_xense.simulated.vendor_api.flexivrdk_robot import Robot
 
 __all__ = [
-    "CoordType",
     "Mode",
     "OperationalStatus",
     "Robot",

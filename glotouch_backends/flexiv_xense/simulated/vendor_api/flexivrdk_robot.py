@@ -1,7 +1,7 @@
-"""The vendor's `Robot` class of `flexivrdk` 1.9 over the simulated arm: its names, arguments, exceptions, blocking.
+"""Stand-in for the vendor's `Robot` class of `flexivrdk` 1.9: its names, arguments, exceptions and blocking.
 
-Only what a driver uses is here. What raises std::invalid_argument in the vendor's library is a ValueError, logic_error
-and runtime_error are a RuntimeError, the wrong length or type of an argument a TypeError; NaN is taken in silence.
+Only what the driver and the tests use. std::invalid_argument in the vendor's library is a ValueError here, logic_error
+and runtime_error are a RuntimeError, a wrong length or type of an argument is a TypeError; NaN is accepted silently.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ from glotouch_backends.flexiv_xense.simulated.control_box import (
 from glotouch_backends.flexiv_xense.simulated.vendor_api.checks import numbers, positive, within
 from glotouch_backends.flexiv_xense.simulated.vendor_api.flexiv_types import (
     ArmReading,
-    CoordType,
     Mode,
     OperationalStatus,
     RobotEvent,
@@ -38,7 +37,8 @@ from glotouch_bt.robot import Pose
 
 SERIAL = re.compile(r"[A-Z][A-Za-z]*( ?[0-9]*[A-Za-z]*)?-[0-9]{6}")
 CARTESIAN = Mode.NRT_CARTESIAN_MOTION_FORCE
-FAR_RAD = 0.02  # beyond its range a joint's setpoint is a fault
+FAULT_RAD = 0.02
+"""A joint setpoint this far beyond its range is a fault. ASSUMED."""
 Numbers = Sequence[float]
 
 
@@ -61,68 +61,56 @@ class Robot:
                 break
             raise RuntimeError(f"[flexiv::rdk] robot {robot_sn} not found")
         box.clock.sleep_until(box.clock.now_s() + CONNECT_S)
-        self._box, self._lite = box, lite
+        self._box = box
         box.events.clear()
         box.zeroed = False
         box.arm.find_link()
         self._kept: RobotStates | None = None
 
-    # --- status: none of it blocks ----------------------------------------------------------------------------------
+    # --- status: does not block ---------------------------------------------------------------------------------------
 
     def connected(self) -> bool:
-        """Whether the link is up."""
+        """Return True if the link is up."""
         return self._box.linked
 
     def fault(self) -> bool:
-        """Whether the robot has a fault."""
+        """Return True if the robot has a fault."""
         return self._box.faulty
 
     def operational(self) -> bool:
-        """Whether it may be commanded."""
+        """Return True if it accepts commands."""
         return self._box.status() is OperationalStatus.READY
 
     def operational_status(self) -> OperationalStatus:
-        """Ready, or why not."""
+        """Return READY, or the reason why not."""
         return self._box.status()
 
     def mode(self) -> Mode:
-        """Present control mode."""
+        """Return the present control mode."""
         return self._box.mode
 
-    def busy(self) -> bool:
-        """Whether it executes something."""
-        return not self._box.arm.trajectory.at_rest or self._box.primitive_started_s is not None
-
     def stopped(self) -> bool:
-        """Whether it stands."""
+        """Return True if it stands still."""
         return self._box.arm.stopped
 
     def reduced(self) -> bool:
-        """Whether a safety input has reduced it."""
+        """Return True if a safety input is active."""
         return self._box.reduced
 
     def recovery(self) -> bool:
-        """Whether a joint is beyond its limit."""
+        """Return True if a joint is beyond its limit."""
         return self._box.recovery
 
     def estop_released(self) -> bool:
-        """Whether the emergency stop is released."""
+        """Return True if the emergency stop is released."""
         return self._box.estop_released
 
-    def enabling_button_pressed(self) -> bool:
-        """Nobody presses it here."""
-        return False
-
-    def lite(self) -> bool:
-        """Whether this is a lite instance."""
-        return self._lite
-
     def event_log(self) -> list[RobotEvent]:
-        """Events since this client connected, oldest first."""
+        """Return the events since this client connected, oldest first."""
         return [replace(e) for e in self._box.events]
 
     def info(self) -> RobotInfo:
-        """General information."""
+        """Return general information."""
         d = self._box.arm.description
         return RobotInfo(
             serial_num=self._box.serial,
@@ -142,7 +130,7 @@ class Robot:
         )
 
     def states(self) -> RobotStates:
-        """The newest state; the last one for ever once the link is gone."""
+        """Return the newest state; once the link is lost, always the last one."""
         box = self._box
         if self._kept is None or (box.linked and not box.frozen):
             self._kept = RobotStates._of(
@@ -150,10 +138,10 @@ class Robot:
             )
         return self._kept
 
-    # --- coming up and stopping: these block ------------------------------------------------------------------------
+    # --- enabling and stopping: these block ---------------------------------------------------------------------------
 
     def Enable(self) -> None:
-        """Start releasing the brakes; returns before they are released."""
+        """Start releasing the brakes; return before they are released."""
         box = self._box
         box.wait(REQUEST_S)
         if not box.estop_released:
@@ -173,7 +161,7 @@ class Robot:
         return not box.faulty
 
     def Stop(self) -> None:
-        """Brake to standstill, end in IDLE."""
+        """Brake to standstill and enter IDLE."""
         box = self._box
         box.need_link()
         box.stand_still()
@@ -182,7 +170,7 @@ class Robot:
         box.mode = Mode.IDLE
 
     def SwitchMode(self, mode: Mode) -> None:
-        """Stop, then enter a mode."""
+        """Stop and enter a mode."""
         if not isinstance(mode, Mode):
             raise TypeError(f"incompatible function arguments: mode = {mode!r}")
         self._box.switch(mode)
@@ -192,7 +180,7 @@ class Robot:
     def ExecutePrimitive(
         self, primitive_name: str, input_params: Mapping[str, object], block_until_started: bool = True
     ) -> None:
-        """Start a primitive; of the vendor's only ZeroFTSensor is simulated."""
+        """Start a primitive; only ZeroFTSensor is simulated."""
         if not isinstance(primitive_name, str) or not isinstance(input_params, Mapping):
             raise TypeError(f"incompatible function arguments: {primitive_name!r}, {input_params!r}")
         box = self._box
@@ -207,7 +195,7 @@ class Robot:
         box.start_primitive(seconds)
 
     def primitive_states(self) -> dict[str, int | float]:
-        """States of the running primitive."""
+        """Return the states of the running primitive."""
         box = self._box
         box.wait(REQUEST_S)
         started = box.primitive_started_s
@@ -215,20 +203,6 @@ class Robot:
         return {"terminated": int(box.primitive_done()), "timePeriod": period}
 
     # --- streaming: neither blocks ----------------------------------------------------------------------------------
-
-    def SendJointPosition(self, positions: Numbers, velocities: Numbers, max_vel: Numbers, max_acc: Numbers) -> None:
-        """A joint setpoint."""
-        box = self._box
-        dof = box.arm.description.dof
-        q, dq = numbers("positions", positions), numbers("velocities", velocities)
-        vel, acc = numbers("max_vel", max_vel), numbers("max_acc", max_acc)
-        if any(len(v) != dof for v in (q, dq, vel, acc)):
-            raise ValueError(f"[flexiv::rdk] every argument must have {dof} items")
-        positive("max_vel", vel), positive("max_acc", acc)
-        box.need_mode(Mode.NRT_JOINT_IMPEDANCE, Mode.NRT_JOINT_POSITION)
-        box.need_ready()
-        if not self._faults_on(q, dq):
-            box.arm.go_to(q, dq, vel, acc)
 
     def SendCartesianMotionForce(
         self,
@@ -240,7 +214,7 @@ class Robot:
         max_linear_acc: float = 2.0,
         max_angular_acc: float = 5.0,
     ) -> None:
-        """A Cartesian setpoint; with no force axis on, the wrench has no effect."""
+        """Send a Cartesian setpoint; without a force axis the wrench has no effect."""
         box = self._box
         place, twist = numbers("pose", pose, 7), numbers("velocity", velocity, 6)
         numbers("wrench", wrench, 6)
@@ -262,12 +236,12 @@ class Robot:
         self._faults_on(box.arm.trajectory.goal_q, twist)
 
     def _faults_on(self, q: np.typing.NDArray[np.float64], dq: np.typing.NDArray[np.float64]) -> bool:
-        """A setpoint that is not a number or far out of range faults the robot; True if so."""
+        """Fault the robot if a setpoint is not finite or far out of range; return True if so."""
         box = self._box
         joints = box.arm.description.joints
         if not bool(np.isfinite(q).all() and np.isfinite(dq).all()):
             box.fail(200001, "the commanded joint position is not a number", critical=True)
-        elif any(not j.lower_rad - FAR_RAD <= v <= j.upper_rad + FAR_RAD for j, v in zip(joints, q, strict=True)):
+        elif any(not j.lower_rad - FAULT_RAD <= v <= j.upper_rad + FAULT_RAD for j, v in zip(joints, q, strict=True)):
             box.fail(200003, "the commanded joint position is beyond a joint's range")
         else:
             return False
@@ -276,7 +250,7 @@ class Robot:
     # --- settings: these block --------------------------------------------------------------------------------------
 
     def SetForceControlAxis(self, enabled_axes: Sequence[bool], max_linear_vel: Numbers = (1.0, 1.0, 1.0)) -> None:
-        """Only pure motion control is simulated: all axes off."""
+        """Accept only pure motion control: all axes off."""
         axes = list(enabled_axes)
         if len(axes) != 6 or not all(isinstance(a, bool | np.bool_) for a in axes):
             raise TypeError(f"incompatible function arguments: enabled_axes = {enabled_axes!r}")
@@ -286,32 +260,22 @@ class Robot:
         if any(axes):
             raise RuntimeError("[flexiv::rdk] force control is not simulated")
 
-    def SetForceControlFrame(
-        self, root_coord: CoordType, T_in_root: Numbers = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-    ) -> None:
-        """Has no effect: no axis is force-controlled."""
-        if not isinstance(root_coord, CoordType):
-            raise TypeError(f"incompatible function arguments: root_coord = {root_coord!r}")
-        numbers("T_in_root", T_in_root, 7)
-        self._box.need_mode(CARTESIAN)
-        self._box.wait(REQUEST_S)
-
     def SetCartesianImpedance(self, K_x: Numbers, Z_x: Numbers = (0.7,) * 6) -> None:
-        """Checked and taken, without effect: the simulated arm is always as stiff as the MuJoCo backend's."""
+        """Check the values; they have no effect, as the simulated arm is always as stiff as the MuJoCo backend's."""
         within("K_x", numbers("K_x", K_x, 6), 0.0, NOMINAL_STIFFNESS)
         within("Z_x", numbers("Z_x", Z_x, 6), 0.3, 0.8)
         self._box.need_mode(CARTESIAN)
         self._box.wait(REQUEST_S)
 
     def SetMaxContactWrench(self, max_wrench: Numbers) -> None:
-        """Bound the contact wrench; infinite is off."""
+        """Bound the contact wrench; an infinite value removes the bound."""
         most = within("max_wrench", numbers("max_wrench", max_wrench, 6), 0.0, np.inf)
         self._box.need_mode(CARTESIAN)
         self._box.wait(REQUEST_S)
         self._box.arm.limit_wrench(None if bool(np.isinf(most).all()) else most)
 
     def SetNullSpacePosture(self, ref_positions: Numbers) -> None:
-        """Pull the redundant freedom to a posture, until the mode is entered again."""
+        """Pull the redundant joint to a posture until the mode is entered again."""
         box = self._box
         joints = box.arm.description.joints
         q = numbers("ref_positions", ref_positions)
@@ -321,10 +285,3 @@ class Robot:
         box.need_mode(CARTESIAN)
         box.wait(REQUEST_S)
         box.arm.reference_q = q
-
-    def SetJointImpedance(self, K_q: Numbers, Z_q: Numbers = ()) -> None:
-        """Checked and taken, without effect."""
-        within("K_q", numbers("K_q", K_q), 0.0, np.array(self.info().K_q_nom))
-        within("Z_q", numbers("Z_q", Z_q), 0.3, 0.8)
-        self._box.need_mode(Mode.NRT_JOINT_IMPEDANCE)
-        self._box.wait(REQUEST_S)

@@ -1,8 +1,8 @@
-"""A stand-in for the vendor's `xensegripper` over the simulated hand: mm, mm/s and N; 85 mm is open.
+"""Stand-in for the vendor's `xensegripper`: mm, mm/s and N; 85 mm is open.
 
-As with the real ones: nobody checks a range but the serial class its position; a target is taken in silence whether
-anybody hears it or not; the status is a cached dict without a stamp, None at first and repeated for ever when the link
-is gone; an unreachable TCP gripper raises a bare Exception.
+Like the real grippers: only the serial class checks a range, that of its position; a target is accepted silently even
+without a link; the status is a cached dict without a stamp, None at first and repeated for ever once the link is lost;
+an unreachable TCP gripper raises a bare Exception.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class GripperLink:
 
 
 class XenseGripper:
-    """What both grippers can do."""
+    """Common part of both grippers."""
 
     class ControlMode(Enum):
         """Modes of the TCP gripper."""
@@ -46,7 +46,7 @@ class XenseGripper:
 
     @classmethod
     def create(cls, mac_addr: str | None = None, **kwargs: Any) -> XenseGripper:
-        """TCP with an address, serial with a `port`."""
+        """Create a TCP gripper with an address, a serial one with a `port`."""
         gripper = cls._tcp(mac_addr) if mac_addr is not None else cls._serial(**kwargs)
         assert isinstance(gripper, XenseGripper)
         return gripper
@@ -58,7 +58,7 @@ class XenseGripper:
         self._status: dict[str, float] | None = None
 
     def get_gripper_status(self) -> dict[str, float] | None:
-        """The cached status."""
+        """Return the cached status."""
         link = self._link
         if link.linked and link.clock.now_s() - self._since_s >= FIRST_S:
             aperture_m, speed_m_s, force_N = link.hand.status
@@ -75,11 +75,11 @@ class XenseGripper:
             self._link.hand.go_to(float(position) * MM, float(vmax) * MM, float(fmax))
 
     def release(self) -> None:
-        """Stop talking; the last target stays."""
+        """Disconnect; the last target stays."""
 
 
 class XenseTCPGripper(XenseGripper):
-    """Over the network."""
+    """Gripper on the network."""
 
     def __init__(self, mac_addr: str) -> None:
         link = self._links.get(mac_addr)
@@ -91,32 +91,12 @@ class XenseTCPGripper(XenseGripper):
         self._connect(link)
 
     def set_position(self, position: float, vmax: float = 80.0, fmax: float = 27.0) -> None:
-        """A target; returns at once and checks nothing."""
+        """Set a target without a check; return at once."""
         self._go(position, vmax, fmax)
-
-    def set_position_sync(
-        self,
-        position: float,
-        vmax: float,
-        fmax: float,
-        tolerance: float = 0.01,
-        timeout: float = 5,
-        poll_interval: float = 0.05,
-    ) -> bool:
-        """A target; blocks until it is reached to `tolerance` mm: False when an object stops the jaws before."""
-        clock = self._link.clock
-        self._go(position, vmax, fmax)
-        until = clock.now_s() + timeout
-        while clock.now_s() < until:
-            clock.sleep_until(clock.now_s() + poll_interval)
-            status = self.get_gripper_status()
-            if status is not None and abs(status["position"] - position) <= tolerance:
-                return True
-        return False
 
 
 class XenseSerialGripper(XenseTCPGripper):
-    """Over a serial line."""
+    """Gripper on a serial line."""
 
     def __init__(self, port: str, device_id: int = 1) -> None:
         link = self._links.get(port)
@@ -125,7 +105,7 @@ class XenseSerialGripper(XenseTCPGripper):
         self._connect(link)
 
     def set_position(self, position: float, vmax: float = 80.0, fmax: float = 27.0) -> None:
-        """A target; only the position is checked."""
+        """Set a target; only the position is checked."""
         if not 0.0 <= position <= 85.0:
             raise ValueError(f"position {position} is outside 0 .. 85")
         self._go(position, vmax, fmax)

@@ -1,8 +1,8 @@
-"""A stand-in for the vendor's `xensesdk` over the simulated pads: Depth (700, 400) in mm, positive indented.
+"""Stand-in for the vendor's `xensesdk`: Depth (700, 400) in mm, positive indented.
 
-A sensor looks at its gel from behind, its rows running towards the fingertip. So the columns of the LEFT pad run along
-+x_P and those of the RIGHT pad along -x_P (ASSUMED: both sensors are mounted alike). Only Depth and TimeStamp are made;
-every other output is None, as what is not available is with the real one.
+A sensor sees its gel from behind, with rows towards the fingertip. So the columns of the LEFT pad run along +x_P and
+those of the RIGHT pad along -x_P (ASSUMED: both sensors are mounted alike). Only Depth and TimeStamp are simulated;
+every other output is None, as an unavailable one is with the real sensor.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ Floats = npt.NDArray[np.floating[Any]]
 SHAPE = (700, 400)
 MM = 1e-3
 CREATE_S, CALIBRATE_S = 0.5, 0.2
-PRESSED_MM = 0.2  # beyond noise and offsets, which the real one keeps as well
+PRESSED_MM = 0.2
+"""Smallest depth that calibration subtracts: noise and offsets stay, as with the real sensor. ASSUMED."""
 
 
 class PadLink:
@@ -33,7 +34,7 @@ class PadLink:
         hand: The hand.
         clock: What blocking calls wait on.
         right: The pad at -y_P.
-        camera: Its camera's number.
+        camera: Number of its camera.
     """
 
     def __init__(self, hand: SimulatedHand, clock: Clock, *, right: bool, camera: int) -> None:
@@ -42,10 +43,10 @@ class PadLink:
 
 
 class Sensor:
-    """One visuotactile sensor; made by `create`."""
+    """A visuotactile sensor; created by `create`."""
 
     class OutputType(Enum):
-        """What a sensor can be asked for."""
+        """Outputs of a sensor."""
 
         Rectify = 1
         Difference = 2
@@ -112,15 +113,11 @@ class Sensor:
 
     @classmethod
     def scanSerialNumber(cls) -> dict[str, int]:
-        """Serial numbers and camera numbers of what is plugged in."""
+        """Return the camera numbers of the connected sensors by serial number."""
         return {serial: link.camera for serial, link in cls._links.items()}
 
-    def getCameraID(self) -> int | None:
-        """Its camera's number."""
-        return None if self._link is None else self._link.camera
-
     def calibrateSensor(self) -> None:
-        """Take the present depth as zero: nothing may touch the pad."""
+        """Set the present depth as zero: nothing may touch the pad."""
         if self._link is not None:
             link = self._link
             self._read(link)
@@ -131,7 +128,7 @@ class Sensor:
                 self._zero = depth if float(depth.max()) > PRESSED_MM else np.zeros(SHAPE)
 
     def selectSensorInfo(self, *output_types: Any) -> Any:
-        """One output for one type, a tuple for several, all of the same frame; None for what is not available."""
+        """Return the output for one type, or a tuple for several, of the same frame; None for what is not available."""
         link = self._link
         found = None if link is None else self._read(link)
         values: list[Any] = []
@@ -144,7 +141,7 @@ class Sensor:
         return values[0] if len(values) == 1 else tuple(values)
 
     def _read(self, link: PadLink) -> tuple[float, Floats] | None:
-        """Stamp and depth (700, 400) mm of the newest frame."""
+        """Return stamp and depth (700, 400) mm of the newest frame."""
         if link.missing:
             return None
         if not link.frozen:
@@ -158,5 +155,5 @@ class Sensor:
         return self._depth
 
     def release(self) -> None:
-        """Close it."""
+        """Close the sensor."""
         self._link = None

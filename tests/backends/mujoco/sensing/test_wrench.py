@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from glotouch_backends.mujoco.robot import MujocoRobot
-from glotouch_backends.mujoco.sensing.wrench import WristSensor, hand_mass, up_in, weight_matrix
+from glotouch_backends.mujoco.sensing.wrench import WristSensor, up_in, weight_matrix
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import Array, Conditions, SetPayload, Tare
 
@@ -64,7 +64,7 @@ def test_tare_then_tilt_leaves_only_the_payload_error() -> None:
     """The controller follows its own idea of the hand's weight: 2 % of 8.65 N tilted by 30 degrees is what is left."""
     ideal = WristSensor(RIZON4_XENSE, Conditions(), 0)
     wrong = WristSensor(RIZON4_XENSE, Conditions(payload_mass_error=0.02, payload_com_error_m=0.002), 0)
-    mass, com = hand_mass(RIZON4_XENSE)
+    mass, com = RIZON4_XENSE.gripper.mass_and_com_E()
     down = Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
     tilted = down * Rotation.from_euler("y", 30, degrees=True)
     quat = np.roll(tilted.as_quat(), 1)
@@ -82,7 +82,9 @@ def test_tare_then_tilt_leaves_only_the_payload_error() -> None:
 def test_hand_s_weight_hangs_on_the_sensor(open_robot: Open) -> None:
     robot = open_robot()
     wrench = robot.observe().wrench_S[-1]
-    expected = weight(*hand_mass(RIZON4_XENSE), Rotation.from_quat(np.roll(robot.observe().quat_B_P[-1], -1)))
+    expected = weight(
+        *RIZON4_XENSE.gripper.mass_and_com_E(), Rotation.from_quat(np.roll(robot.observe().quat_B_P[-1], -1))
+    )
     np.testing.assert_allclose(wrench, expected, atol=2e-3)
     assert wrench[2] == pytest.approx(HAND_KG * 9.81, abs=2e-2)  # z_S points down
 
