@@ -14,7 +14,7 @@ from typing import Any
 from glotouch_bt.bench.statistics import bootstrap_mean, wilson
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene import load_folder
-from glotouch_bt.run import RunRequest, launch
+from glotouch_bt.runs import RunRequest, launch
 
 COLUMNS = (
     "target", "seed", "exit_code", "status", "retrieved", "correct", "cause", "candidates", "contacts", "probe_path_m",

@@ -24,7 +24,7 @@ from glotouch_bt.mission.execution import run_mission
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import Record, Recorder
 from glotouch_bt.robot import BadInput, Command, Observation, Request, Robot, Ticket, load_backend
-from glotouch_bt.run import RunFolder
+from glotouch_bt.runs import RunFolder
 
 COLUMNS = (
     "seed", "status", "sim_s", "wall_s", "bare_s", "steps", "same_end_state", "realtime_factor", "bare_factor",

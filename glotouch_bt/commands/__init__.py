@@ -1,28 +1,40 @@
-"""The commands behind `glotouch`, one file each, and what they print."""
+"""The commands of `glotouch`: one file for each; they parse words, call the library and print, no logic.
 
+Heavy imports stand inside the commands, so that `glotouch --help` is quick.
+"""
+
+from collections.abc import Callable, Mapping
+
+from glotouch_bt.commands.backends import backends
 from glotouch_bt.commands.bench import bench
-from glotouch_bt.commands.check import bench_check, check
-from glotouch_bt.commands.doctor import doctor, link
-from glotouch_bt.commands.faults import bench_faults, faults
-from glotouch_bt.commands.options import read_settings
-from glotouch_bt.commands.pause import bench_pause
+from glotouch_bt.commands.check import check
+from glotouch_bt.commands.doctor import doctor
+from glotouch_bt.commands.errors import set_debug
+from glotouch_bt.commands.faults import faults
+from glotouch_bt.commands.missions import missions
+from glotouch_bt.commands.nodes import nodes
 from glotouch_bt.commands.replay import replay
-from glotouch_bt.commands.resume import bench_resume, resume
-from glotouch_bt.commands.test import bench_fuzz, mission_tests
+from glotouch_bt.commands.report import report
+from glotouch_bt.commands.resume import resume
+from glotouch_bt.commands.run import run
+from glotouch_bt.commands.schema import schema
+from glotouch_bt.commands.skills import skills
+from glotouch_bt.commands.test import run_tests
+from glotouch_bt.commands.tree import tree
 
-__all__ = [
-    "bench",
-    "bench_check",
-    "bench_faults",
-    "bench_fuzz",
-    "bench_pause",
-    "bench_resume",
-    "check",
-    "doctor",
-    "faults",
-    "link",
-    "mission_tests",
-    "read_settings",
-    "replay",
-    "resume",
-]
+__all__ = ["COMMANDS", "bench", "set_debug"]
+
+COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
+    "Run missions": {"run": run, "resume": resume, "replay": replay, "report": report},
+    "Write missions": {
+        "check": check,
+        "test": run_tests,
+        "tree": tree,
+        "missions": missions,
+        "nodes": nodes,
+        "skills": skills,
+        "schema": schema,
+    },
+    "Robots and faults": {"backends": backends, "doctor": doctor, "faults": faults},
+}
+"""Commands by use, in the order of `glotouch --help`."""

@@ -1,27 +1,49 @@
-"""Options that several commands take, and what becomes of them."""
+"""Options that several commands take, and the checks of their values."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-Trials = Annotated[int, typer.Option(min=1, help="seeds per target")]
-Seed = Annotated[int, typer.Option(min=0, help="first seed")]
-Workers = Annotated[int, typer.Option(min=1, help="processes")]
+if TYPE_CHECKING:
+    from glotouch_bt.mission import Mission
+
+MissionName = Annotated[
+    str, typer.Argument(metavar="MISSION", help="path of a mission file, or the name of a shipped mission")
+]
+RunFolderArgument = Annotated[Path, typer.Argument(metavar="RUN", help="a run's folder")]
+Settings = Annotated[
+    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="a mission parameter or backend option")
+]
+MissionSettings = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="a mission parameter")]
+BackendSettings = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="a backend option")]
+Objects = Annotated[
+    Path | None, typer.Option("--objects", metavar="DIR", help="folder of watertight STL files in metres")
+]
+Backend = Annotated[str, typer.Option(help="a registered backend (see: glotouch backends)")]
 Conditions = Annotated[str, typer.Option(help="disturbances: ideal, nominal, harsh, or a file")]
-Objects = Annotated[Path | None, typer.Option(metavar="DIR", help="folder of watertight STL files in metres")]
-Out = Annotated[Path | None, typer.Option(metavar="DIR", help="where trials and summary go (default: runs/bench-...)")]
-Json = Annotated[bool, typer.Option("--json", help="print summary.json on stdout, nothing else")]
+Json = Annotated[bool, typer.Option("--json", help="print JSON on stdout, nothing else")]
+
+Trials = Annotated[int, typer.Option(min=1, help="number of seeds")]
+FirstSeed = Annotated[int, typer.Option(min=0, help="first seed")]
+Workers = Annotated[int, typer.Option(min=1, help="worker processes")]
+BenchFolder = Annotated[
+    Path | None, typer.Option("--out", metavar="DIR", help="folder of trials and summary (default: runs/...-bench-...)")
+]
+SummaryJson = Annotated[bool, typer.Option("--json", help="print summary.json on stdout, nothing else")]
+KeepTrials = Annotated[bool, typer.Option("--resume", help="keep the trials that --out already holds")]
+FewObjects = Annotated[int, typer.Option(min=1, help="put only the first N objects into the box, which is faster")]
 
 
 def check_names(conditions: str, backend: str) -> None:
-    """Before anything is written: both must exist.
+    """Check that both exist, before anything is written.
 
     Raises:
-        BadInput: One does not; the message lists those that do.
+        BadInput: One does not exist; the message lists those that do.
     """
     from glotouch_bt.mission.read import load_conditions
     from glotouch_bt.robot import load_backend
@@ -30,13 +52,30 @@ def check_names(conditions: str, backend: str) -> None:
     load_backend(backend)
 
 
+def check_parameters(mission: Mission, needed: Iterable[str]) -> None:
+    """Check that a mission declares the parameters that an experiment sets.
+
+    Raises:
+        BadInput: One is missing.
+    """
+    from glotouch_bt.robot import BadInput
+
+    missing = [name for name in needed if name not in mission.parameters]
+    if missing:
+        raise BadInput(
+            f"--mission {mission.name}: this experiment sets the parameter{'s' * (len(missing) > 1)} "
+            f"{', '.join(missing)}, which the mission does not declare "
+            f"(its parameters: {', '.join(mission.parameters) or 'none'}); use a mission such as retrieve"
+        )
+
+
 def bench_folder(out: Path | None, name: str) -> Path:
-    """Where the experiment's files go; nothing is left there yet.
+    """Return the experiment's folder, after a check that it can be written; leave nothing there.
 
     Raises:
         BadInput: No file can be written there.
     """
-    from glotouch_bt.run import RunFolder
+    from glotouch_bt.runs import RunFolder
 
     folder = out or Path("runs") / f"{time.strftime('%Y%m%d-%H%M%S')}-bench-{name}"
     RunFolder(folder).abandon()
@@ -44,7 +83,7 @@ def bench_folder(out: Path | None, name: str) -> Path:
 
 
 def read_settings(given: list[str] | None) -> dict[str, str]:
-    """NAME=VALUE words as a mapping.
+    """Return NAME=VALUE words as a mapping.
 
     Raises:
         BadInput: A word without "=", or a name given twice.

@@ -79,6 +79,11 @@ class FaultPlan:
     seed: int | None = None
     description: str = ""
 
+    @classmethod
+    def from_yaml(cls, given: str | Path) -> FaultPlan:
+        """Read and check a plan by path or shipped name; errors as in `read_plan`."""
+        return read_plan(given)
+
 
 def read_plan(given: str | Path, tree: NodeSpec | None = None, root: str = "") -> FaultPlan:
     """Read and check a plan.

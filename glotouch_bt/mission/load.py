@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from py_trees.behaviour import Behaviour
 
 from glotouch_bt.mission.check import check_flow
 from glotouch_bt.mission.read import (
@@ -45,7 +46,7 @@ from glotouch_bt.mission.spec import (
     plain,
 )
 from glotouch_bt.robot import BadInput, World
-from glotouch_bt.skill import Skill
+from glotouch_bt.skill import Context, Skill
 
 MISSION_KEYS = ("mission", "description", "world", "parameters", "tree", "timeout_s", "leaves", "subtrees")
 MAX_DURATION_S = 3600.0
@@ -61,7 +62,7 @@ class Mission:
         world: The nominal world it runs in.
         parameters: Values in use, in their declared units.
         stl_parameters: Names of those parameters that name an object.
-        tree: The checked tree.
+        spec: The checked tree, as plain node specifications.
         timeout_s: Longest duration on the robot's clock.
         file: Where it came from.
         document: The mission as plain data with the values in use and its subtrees, for the run's folder.
@@ -73,11 +74,21 @@ class Mission:
     world: World
     parameters: Mapping[str, Value]
     stl_parameters: tuple[str, ...]
-    tree: NodeSpec
+    spec: NodeSpec
     timeout_s: float
     file: Path
     document: Mapping[str, Any]
     warnings: tuple[Finding, ...] = ()
+
+    @property
+    def tree(self) -> Behaviour:
+        """A new py_trees tree of the mission, to look at (`py_trees.display`). It has no robot and cannot be ticked."""
+        from glotouch_bt.mission.tree import build_tree
+
+        nothing: Any = None
+        built = build_tree(self.spec, Context(self.world, nothing, nothing, nothing, nothing), self.name)
+        built.forget()
+        return built.root
 
     def resolved_yaml(self) -> str:
         """The document as YAML text."""

@@ -48,7 +48,7 @@ class OutcomeCoverage:
     def add(self, mission: Mission, run: ScriptedRun) -> None:
         """Add the calls of a run."""
         leaves = self.missions.setdefault(shown(mission.file), {})
-        for path, expected in expected_endings(mission.tree, mission.name):
+        for path, expected in expected_endings(mission.spec, mission.name):
             leaves.setdefault(path, Leaf(expected))
         for call in run.calls:
             ending = call.ending

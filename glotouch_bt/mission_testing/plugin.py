@@ -50,7 +50,7 @@ class Scripted:
 
     Args:
         session: State shared by all tests.
-        here: The test's folder; relative paths are tried there too.
+        here: The test's folder; relative paths start there.
     """
 
     def __init__(self, session: Session, here: Path) -> None:
@@ -64,7 +64,7 @@ class Scripted:
         objects: Path | None = None,
         skills: Mapping[str, Any] | None = None,
     ) -> Mission:
-        """Load a checked mission: a shipped name, or a path relative to the working folder, the test or pytest's root.
+        """Return a checked mission: a shipped name, or a path relative to the test's folder or a folder above it.
 
         Raises:
             MissionFaults: All findings.

@@ -30,7 +30,7 @@ class ScriptMaker:
 
     def __post_init__(self) -> None:
         numbers, texts, seconds = {0.0, 1.0, 2.0}, {"a", "b"}, [1.0]
-        for node in self.mission.tree.walk():
+        for node in self.mission.spec.walk():
             kind = kind_of(node)
             _, compared = kind.comparison(node) or ("", None)
             for value in (compared.equals, compared.at_least, compared.at_most) if compared else ():
@@ -42,14 +42,14 @@ class ScriptMaker:
             if limit_s is not None:
                 seconds.append(limit_s)
         self._numbers, self._texts, self._seconds = sorted(numbers), sorted(texts), 2.5 * max(seconds)
-        endings = expected_endings(self.mission.tree, self.mission.name)
+        endings = expected_endings(self.mission.spec, self.mission.name)
         self._breakable = {path for path, expected in endings if "PREEMPTED" in expected}
 
     def rows(self, rng: np.random.Generator) -> dict[str, tuple[LeafOutcome, ...]]:
         """Return a random row of outcomes for each leaf, by its name; half of the leaves repeat one outcome."""
         wild = rng.uniform(0.05, 0.6)
         made = {}
-        for path, node in leaves_of(self.mission.tree, self.mission.name).items():
+        for path, node in leaves_of(self.mission.spec, self.mission.name).items():
             length = 1 if rng.random() < 0.5 else int(rng.integers(2, 6))
             made[node.name] = tuple(self._outcome(path, node, wild, rng) for _ in range(length))
         return made

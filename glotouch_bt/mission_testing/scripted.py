@@ -181,19 +181,19 @@ def run_scripted(
     Raises:
         ScriptError: The script does not fit the mission.
     """
-    paths = casting.paths_of(mission.tree, mission.name)
-    parts = casting.cast(mission.tree, mission.name, script or {})
+    paths = casting.paths_of(mission.spec, mission.name)
+    parts = casting.cast(mission.spec, mission.name, script or {})
     stage = Stage({paths[path].name: part for path, part in parts.items() if part is not None})
     end_s = mission.timeout_s if timeout_s is None else timeout_s
     if robot is None:
-        robot = _robot(mission.tree, end_s, stage, all(p is not None for p in parts.values()))
+        robot = _robot(mission.spec, end_s, stage, all(p is not None for p in parts.values()))
     stage.begin_s = robot.observe().now_s
     if make_arm is None:
         moving = any(p is None for p in parts.values())
         make_arm = default_arm if moving else lambda robot, world: cast("Arm", StillArm())
     supervision = PATIENT if isinstance(robot, SkippingRobot) else None
     heard = _Heard(dict.fromkeys(paths, "INVALID"), max_ticks)
-    scripted = replace(mission, tree=_played(mission.tree, stage.parts))
+    scripted = replace(mission, spec=_played(mission.spec, stage.parts))
     injector = injector_in(robot)
     record: Record = heard if injector is None else ListeningRecord(heard, injector)
     token = STAGE.set(stage)

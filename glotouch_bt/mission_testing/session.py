@@ -17,7 +17,7 @@ class Session:
     """Loads each mission once and collects coverage.
 
     Args:
-        root: pytest's root; relative paths are tried there too.
+        root: pytest's root.
 
     Attributes:
         coverage: Endings exercised so far.
@@ -54,12 +54,15 @@ class Session:
         return mission
 
     def find(self, given: str | Path, *folders: Path) -> Path:
-        """Find a mission's file: as given, in one of the folders, under the root, or shipped.
+        """Return a mission's file: relative to the folders and their parents below pytest's root, or shipped.
+
+        The root itself and the working directory come last. The path is relative to the working directory if possible.
 
         Raises:
-            BadInput: Not found.
+            BadInput: There is no such file.
         """
-        for folder in (Path(), *folders, self._root):
+        above = [p for folder in folders for p in (folder, *folder.parents) if p.is_relative_to(self._root)]
+        for folder in (*folders, *above, self._root, Path()):
             if Path(given).suffix in (".yaml", ".yml") and (folder / given).is_file():
                 found = (folder / given).resolve()
                 return found.relative_to(Path.cwd()) if found.is_relative_to(Path.cwd()) else found

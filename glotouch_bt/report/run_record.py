@@ -11,7 +11,7 @@ import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import zstandard
@@ -21,6 +21,9 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 
 from glotouch_bt.mission.record import EVENT_PREFIX, RESULT_ATTACHMENT, RUN_ATTACHMENT, STAMP_S, join, to_step, unpack
 from glotouch_bt.robot import Array, BadInput, GlotouchError, Pose
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 RECORD_NAME, RESULT_NAME, TRUTH_NAME = "run.mcap", "result.json", "truth.json"
 _PACKED = {"/packed/samples": "samples", "/packed/cycles": "cycles", "/packed/tactile": "tactile"}
@@ -102,6 +105,29 @@ class RunRecord:
             value = value.get(key) if isinstance(value, dict) else None
         return value
 
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the full-rate samples as a pandas table, indexed by `stamp_s` (s of robot time).
+
+        A column of vectors becomes one column for each component: q_0 .. q_6, force_S_N_0 .. force_S_N_2.
+
+        Raises:
+            BadInput: pandas is not installed.
+        """
+        try:
+            import pandas as pd
+        except ImportError as e:
+            raise BadInput(
+                "to_dataframe needs pandas, which is not installed: pip install pandas "
+                "(RunRecord.samples holds the same columns as NumPy arrays)"
+            ) from e
+        columns: dict[str, Array] = {}
+        for name, values in self.samples.items():
+            if values.ndim == 1:
+                columns[name] = values
+            else:
+                columns |= {f"{name}_{i}": values[:, i] for i in range(values.shape[1])}
+        return pd.DataFrame(columns).set_index("stamp_s")
+
     @property
     def pose_B_K(self) -> Pose | None:
         """The nominal container frame, if the description has it."""
@@ -122,12 +148,13 @@ class RunRecord:
         return None
 
 
-def read_run(path: Path) -> RunRecord:
+def read_run(path: str | Path) -> RunRecord:
     """Read a run's folder, or a record file.
 
     Raises:
         BadInput: There is no record, or it is not an MCAP file at all.
     """
+    path = Path(path)
     file = path / RECORD_NAME if path.is_dir() else path
     if not file.is_file():
         raise BadInput(f"{path}: no run here ({RECORD_NAME} is missing)")

@@ -17,7 +17,7 @@ from glotouch_bt.bench import wilson
 from glotouch_bt.mission.execution import Control
 from glotouch_bt.report import read_run
 from glotouch_bt.robot import Limits
-from glotouch_bt.run import RunRequest, launch
+from glotouch_bt.runs import RunRequest, launch
 
 COLUMNS = (
     "seed", "target", "status", "retrieved", "twin_status", "twin_retrieved", "same", "pauses", "on_the_way",

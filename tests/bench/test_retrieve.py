@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from glotouch_bt.bench import retrieve
-from glotouch_bt.run.launch import RunRequest
+from glotouch_bt.runs.launch import RunRequest
 
 LOST = {"node": "sequence/grasp/lift", "code": "lost", "message": "", "evidence": {}, "advice": ""}
 

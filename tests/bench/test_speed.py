@@ -52,7 +52,7 @@ def house(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     monkeypatch.setitem(sys.modules, "fake_cli", module)
     spec.loader.exec_module(module)
-    module.furnish(monkeypatch.setattr)
+    module.install_fakes(monkeypatch.setattr)
     return module
 
 

@@ -187,27 +187,27 @@ def _fits(value: Any, schema: dict[str, Any], root: dict[str, Any]) -> bool:
     return all(_fits(v, known.get(k, others), root) for k, v in value.items())
 
 
-HOUSE = Path(__file__).parents[1] / "support" / "fake_cli.py"
+FAKE_CLI = Path(__file__).parents[1] / "support" / "fake_cli.py"
 RUN = "mission: nap\nworld: container_five\nparameters:\n"
 RUN += "  s: {type: float, default: 0.3, unit: s}\n  end: {type: str, default: ok}\n"
 RUN += "tree:\n  - wait: {name: first}\n  - wait: {name: nap, seconds: $s, end: $end}\n"
 
 
 @pytest.fixture
-def house(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location("fake_cli", HOUSE)
+def fakes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location("fake_cli", FAKE_CLI)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     monkeypatch.setitem(sys.modules, "fake_cli", module)
     spec.loader.exec_module(module)
-    module.furnish(monkeypatch.setattr)
+    module.install_fakes(monkeypatch.setattr)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "nap.yaml").write_text(RUN)
     return module
 
 
-def test_a_run_leaves_its_folder(command: CliRunner, house: ModuleType, tmp_path: Path) -> None:
+def test_a_run_leaves_its_folder(command: CliRunner, fakes: ModuleType, tmp_path: Path) -> None:
     done = command.invoke(cli.app, ["run", "nap.yaml", "--seed", "3"])
     assert done.exit_code == 0, done.stderr
     (folder,) = (tmp_path / "runs").iterdir()
@@ -220,10 +220,10 @@ def test_a_run_leaves_its_folder(command: CliRunner, house: ModuleType, tmp_path
     assert result["sim_time_s"] == pytest.approx(0.4)
 
 
-def test_the_same_command_twice_gives_the_same_result(command: CliRunner, house: ModuleType, tmp_path: Path) -> None:
+def test_the_same_command_twice_gives_the_same_result(command: CliRunner, fakes: ModuleType, tmp_path: Path) -> None:
     results, records = [], []
     for _ in range(2):
-        assert command.invoke(cli.app, ["run", "nap.yaml", "--out", "same"]).exit_code == 0
+        assert command.invoke(cli.app, ["run", "nap.yaml", "--out", "same", "--overwrite"]).exit_code == 0
         result = json.loads((tmp_path / "same" / "result.json").read_text())
         results.append({k: v for k, v in result.items() if not k.startswith("wall_")})
         records.append((tmp_path / "same" / "run.mcap").read_bytes())
@@ -241,7 +241,7 @@ def test_the_same_command_twice_gives_the_same_result(command: CliRunner, house:
     ],
 )
 def test_exit_codes_of_runs(
-    end: str, code: int, status: str, message: str, command: CliRunner, house: ModuleType, tmp_path: Path
+    end: str, code: int, status: str, message: str, command: CliRunner, fakes: ModuleType, tmp_path: Path
 ) -> None:
     done = command.invoke(cli.app, ["run", "nap.yaml", "--set", f"end={end}", "--out", "o", "--json"])
     assert done.exit_code == code, done.output
@@ -253,7 +253,7 @@ def test_exit_codes_of_runs(
     assert json.loads((tmp_path / "o" / "result.json").read_text())["status"] == status
 
 
-def test_what_no_parameter_takes_goes_to_the_backend(command: CliRunner, house: ModuleType, tmp_path: Path) -> None:
+def test_what_no_parameter_takes_goes_to_the_backend(command: CliRunner, fakes: ModuleType, tmp_path: Path) -> None:
     done = command.invoke(cli.app, ["run", "nap.yaml", "--set", "sleep=2"])
     assert done.exit_code == 2
     assert "unknown option sleep (parameters of mission 'nap': s, end)" in done.stderr
@@ -262,9 +262,30 @@ def test_what_no_parameter_takes_goes_to_the_backend(command: CliRunner, house: 
     assert not (tmp_path / "runs").exists()
 
 
-def test_ctrl_c_closes_the_record_and_exits_130(house: ModuleType, tmp_path: Path) -> None:
+def test_an_earlier_run_is_replaced_only_with_overwrite(command: CliRunner, fakes: ModuleType, tmp_path: Path) -> None:
+    assert command.invoke(cli.app, ["run", "nap.yaml", "--out", "o"]).exit_code == 0
+    kept = {p.name: p.read_bytes() for p in (tmp_path / "o").iterdir()}
+    done = command.invoke(cli.app, ["run", "nap.yaml", "--out", "o"])
+    assert done.exit_code == 2
+    assert "o: holds an earlier run; give another folder, or --overwrite to replace it" in done.stderr
+    assert {p.name: p.read_bytes() for p in (tmp_path / "o").iterdir()} == kept
+    assert command.invoke(cli.app, ["run", "nap.yaml", "--seed", "1", "--out", "o", "--overwrite"]).exit_code == 0
+    assert json.loads((tmp_path / "o" / "result.json").read_text())["seed"] == 1
+
+
+def test_a_folder_with_other_files_is_refused(command: CliRunner, fakes: ModuleType, tmp_path: Path) -> None:
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "cat.png").write_bytes(b"cat")
+    for words in ([], ["--overwrite"]):
+        done = command.invoke(cli.app, ["run", "nap.yaml", "--out", "photos", *words])
+        assert done.exit_code == 2
+        assert "photos: is not empty and holds no run" in done.stderr
+    assert [p.name for p in (tmp_path / "photos").iterdir()] == ["cat.png"]
+
+
+def test_ctrl_c_closes_the_record_and_exits_130(fakes: ModuleType, tmp_path: Path) -> None:
     """A real process, a real signal."""
-    words = [sys.executable, str(HOUSE), "run", "nap.yaml", "--set", "s=100000", "--out", "o"]
+    words = [sys.executable, str(FAKE_CLI), "run", "nap.yaml", "--set", "s=100000", "--out", "o"]
     with subprocess.Popen(words, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=tmp_path) as process:
         for _ in range(600):
             if (tmp_path / "o" / "run.mcap").exists() and (tmp_path / "o" / "run.mcap").stat().st_size > 20_000:

@@ -18,7 +18,6 @@ from glotouch_bt.bench.contact.bench import METRICS, MORE, PAPER
 from glotouch_bt.bench.contact.square import TOOLS
 from glotouch_bt.bench.search import bench as search
 from glotouch_bt.bench.search.summary import ERRORS, summarise
-from glotouch_bt.commands import bench as bench_command
 
 
 class NoPool:
@@ -41,7 +40,7 @@ class NoPool:
 def command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[CliRunner]:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setattr(bench_command, "ProcessPoolExecutor", NoPool)
+    monkeypatch.setattr("concurrent.futures.ProcessPoolExecutor", NoPool)
     yield CliRunner()
     cli._debug = False
 
@@ -102,7 +101,7 @@ def test_search(as_json: bool, command: CliRunner, monkeypatch: pytest.MonkeyPat
         show(rows[0], 1, 4)
         return summarise(rows, campaign.policies, 2) | {"conditions": campaign.conditions, "objects": 2}
 
-    monkeypatch.setattr(search, "run_campaign", run)
+    monkeypatch.setattr("glotouch_bt.bench.search.run_campaign", run)
     words = ["--policies", "nearest_frontier, expected_find", "--trials", "3", "--planar", "5", "--seed", "4"]
     done = command.invoke(cli.app, ["bench", "search", *words, "--out", "o", "--workers", "1"] + ["--json"] * as_json)
     assert done.exit_code == 0, done.output
@@ -131,7 +130,7 @@ def test_contact(as_json: bool, command: CliRunner, monkeypatch: pytest.MonkeyPa
         said = {"paper": PAPER, "conditions": campaign.conditions, "seeds": list(campaign.seeds)}
         return contact.summarise(rows) | said | {"contacts_per_side": campaign.per_side}
 
-    monkeypatch.setattr(contact, "run_campaign", run)
+    monkeypatch.setattr("glotouch_bt.bench.contact.run_campaign", run)
     done = command.invoke(cli.app, ["bench", "contact", "--trials", "1", "--per-side", "2"] + ["--json"] * as_json)
     assert done.exit_code == 0, done.output
     (campaign,) = started

@@ -101,9 +101,9 @@ def test_a_disk_that_refuses_the_record_hides_no_reason(tmp_path: Path, monkeypa
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
-        ("{fault: wrench_bias, with: {force_N: [1, 0, 0]}}", "fault wrench_bias: began 1 times"),
-        ("{fault: wrench_bias, when: {time_s: 9999}}", "ALTERED NOTHING: its moment never came"),
-        ("{fault: touch_dead, when: {time_s: 0.1}}", "ALTERED NOTHING: it began, and found nothing to alter"),
+        ("{fault: wrench_bias, with: {force_N: [1, 0, 0]}}", "fault wrench_bias: began once"),
+        ("{fault: wrench_bias, when: {time_s: 9999}}", "NO EFFECT: its trigger never fired"),
+        ("{fault: touch_dead, when: {time_s: 0.1}}", "NO EFFECT: it began but had nothing to change"),
     ],
 )
 def test_the_terminal_says_whether_a_fault_did_anything(tmp_path: Path, fault: str, words: str) -> None:

@@ -69,8 +69,8 @@ def test_a_node_nobody_has() -> None:
     mission = load_mission("calibrate")
     text = "faults: f\nplan:\n  - {fault: wrench_off, when: {node: tool_pickupp}}"
     with pytest.raises(MissionFaults, match="did you mean 'tool_pickup'"):
-        check_plan(parse_yaml(text, "p.yaml"), mission.tree, mission.name)
-    check_plan(parse_yaml(text.replace("pickupp", "pick*"), "p.yaml"), mission.tree, mission.name)
+        check_plan(parse_yaml(text, "p.yaml"), mission.spec, mission.name)
+    check_plan(parse_yaml(text.replace("pickupp", "pick*"), "p.yaml"), mission.spec, mission.name)
 
 
 @pytest.mark.parametrize(
@@ -102,7 +102,7 @@ def test_defaults_and_units() -> None:
 @pytest.mark.parametrize("name", sorted(shipped("faults")))
 def test_shipped_plans_fit_the_flagship(name: str) -> None:
     mission = load_mission("retrieve")
-    assert read_plan(name, mission.tree, mission.name).faults
+    assert read_plan(name, mission.spec, mission.name).faults
 
 
 def test_the_catalogue_is_whole() -> None:

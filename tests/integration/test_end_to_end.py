@@ -15,7 +15,7 @@ import trimesh
 
 from glotouch_bt.report import read_run
 from glotouch_bt.robot import Limits
-from glotouch_bt.run.launch import RunRequest, RunResult, launch
+from glotouch_bt.runs.launch import RunRequest, RunResult, launch
 
 SCHEMA = {
     "mission": str, "backend": str, "seed": int, "conditions": str, "status": str, "reasons": list,

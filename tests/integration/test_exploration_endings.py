@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from glotouch_bt.run.launch import RunRequest, RunResult, launch
+from glotouch_bt.runs.launch import RunRequest, RunResult, launch
 
 BLOCK_M = (0.05, 0.04, 0.06)
 OUTSIDE = [0.0, 0.30, 0.0]

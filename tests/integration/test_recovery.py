@@ -95,7 +95,7 @@ def run(tmp_path: Path) -> Run:
         body = "\n".join("  " + line for line in tree.replace("SUBTREES", str(SUBTREES)).strip("\n").splitlines())
         file.write_text(f"mission: trial\nworld: container_five\ntree:\n{body}\n")
         mission = load_mission(file, skills={**SkillShelf(), **(stubs or {})}, objects=folder)
-        plan = check_plan(parse_yaml(f"faults: trial\nplan:\n{faults}", "plan.yaml"), mission.tree, mission.name)
+        plan = check_plan(parse_yaml(f"faults: trial\nplan:\n{faults}", "plan.yaml"), mission.spec, mission.name)
         backend = MujocoBackend()
         inner = backend.open(mission.world, load_conditions("nominal"), seed, {"layout": places})
         notes = Notes()

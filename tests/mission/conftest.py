@@ -236,7 +236,7 @@ def built(load: Callable[..., Mission], robot: ClockRobot) -> Callable[[str], tu
     def make(text: str) -> tuple[BuiltTree, Context]:
         mission = load(text)
         context = Context(mission.world, NoArm(), robot, _Journal(), robot.observe())  # type: ignore[arg-type]
-        return build_tree(mission.tree, context, mission.name), context
+        return build_tree(mission.spec, context, mission.name), context
 
     return make
 

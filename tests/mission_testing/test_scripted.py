@@ -163,7 +163,7 @@ def test_a_fault_in_a_skill_aborts_and_is_named(mission: Make) -> None:
 
 def test_a_required_input_that_nobody_wrote_raises_as_it_does_in_a_skill(mission: Make) -> None:
     made = mission()
-    made.tree.children[1].children[0].reads = {}  # a hole in the wiring that check would have found
+    made.spec.children[1].children[0].reads = {}  # a hole in the wiring that check would have found
     assert run_scripted(made).status == "aborted"
 
 

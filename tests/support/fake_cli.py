@@ -1,8 +1,9 @@
-"""A backend and a skill without physics, for whole runs: `python fake_house.py run ...` is `glotouch` with them."""
+"""A backend and a skill without physics, for whole runs: `python fake_cli.py run ...` is `glotouch` with them."""
 
 from __future__ import annotations
 
 import copy
+import importlib
 import sys
 from collections.abc import Mapping
 from typing import Any
@@ -25,7 +26,7 @@ from glotouch_bt.skill import Out, Skill, SkillFailed, SkillParams, SkillRun, pa
 
 
 class WaitParams(SkillParams):
-    seconds: float = param("how long", unit="s", default=0.1, gt=0, le=1e6)
+    seconds: float = param("duration", unit="s", default=0.1, gt=0, le=1e6)
     end: str = param("ok, fail, stop or bug", default="ok")
 
 
@@ -122,19 +123,18 @@ class NullBackend(Backend):
         return NullRobot(seed)
 
 
-def furnish(patch: Any) -> None:
-    """Make the house use these (patch: `monkeypatch.setattr` or the like)."""
+def install_fakes(patch: Any) -> None:
+    """Use this backend and skill only (patch: `monkeypatch.setattr` or `setattr`)."""
     import glotouch_bt.mission.load
     import glotouch_bt.motion
-    import glotouch_bt.run.launch
 
     patch(glotouch_bt.mission.load, "SkillShelf", lambda: {"wait": Wait})
-    patch(glotouch_bt.run.launch, "load_backend", lambda name: NullBackend())
+    patch(importlib.import_module("glotouch_bt.runs.launch"), "load_backend", lambda name: NullBackend())
     patch(glotouch_bt.motion, "Arm", NullArm)
 
 
 if __name__ == "__main__":
-    furnish(setattr)
+    install_fakes(setattr)
     from glotouch_bt.cli import main
 
     sys.exit(main())

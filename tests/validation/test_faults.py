@@ -17,7 +17,7 @@ from glotouch_bt.faults.catalogue import CATALOGUE
 from glotouch_bt.mission.checkpoint.store import Row
 from glotouch_bt.robot import BadInput, UnknownName
 from glotouch_bt.robot.fake import FakeRobot
-from glotouch_bt.run.launch import RunRequest
+from glotouch_bt.runs.launch import RunRequest
 from glotouch_bt.validation.faults import exhaustive as faults_exhaustive
 from glotouch_bt.validation.faults import start as faults_start
 from glotouch_bt.validation.faults import trial as faults_trial

@@ -70,6 +70,6 @@ def test_the_table_and_the_json(tmp_path: Path) -> None:
     words = ["bench", "pause", "--mission", "pick_at", "--backend", "fake", "--conditions", "ideal", "--trials", "1"]
     done = CliRunner().invoke(app, [*words, "--pause", "0.1", "--out", str(tmp_path / "a")])
     assert done.exit_code == 0, done.output
-    assert "as the twin: 1 of 1" in done.output
+    assert "same end: 1 of 1" in done.output
     done = CliRunner().invoke(app, [*words, "--pause", "0.1", "--out", str(tmp_path / "b"), "--json"])
     assert done.exit_code == 0, done.output

@@ -23,7 +23,7 @@ from glotouch_bt.bench.retrieve import cause
 from glotouch_bt.bench.statistics import bootstrap_mean, wilson
 from glotouch_bt.report import RunRecord, read_run
 from glotouch_bt.robot import Array, BadInput, Pose
-from glotouch_bt.run import RunRequest, launch
+from glotouch_bt.runs import RunRequest, launch
 
 METRICS = ("centre_error_mm", "contact_std_mm", "contact_rms_mm", "max_contact_mm", "side_error_mm")
 PAPER = {

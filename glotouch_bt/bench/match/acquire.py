@@ -15,7 +15,7 @@ from glotouch_bt.bench.match.dataset import Layout, Planar, Touched, write_layou
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.report import RunRecord, read_run
 from glotouch_bt.robot import Array, BadInput, Pose
-from glotouch_bt.run import RunRequest, launch
+from glotouch_bt.runs import RunRequest, launch
 
 NEAREST_M = 0.025
 """A candidate whose contour centre is farther than this from every object's centre belongs to no object."""

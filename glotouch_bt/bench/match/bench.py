@@ -23,7 +23,7 @@ from glotouch_bt.bench.match.trials import PAIR_COLUMNS, TRIAL_COLUMNS, decide, 
 from glotouch_bt.mission import load_mission
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene import load_folder, stream
-from glotouch_bt.run import RunRequest
+from glotouch_bt.runs import RunRequest
 
 IN_THE_BOX = 5
 """Objects in a layout. From a larger folder, each seed draws this many."""

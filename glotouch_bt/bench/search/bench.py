@@ -25,7 +25,7 @@ from glotouch_bt.bench.search.trial import (
 )
 from glotouch_bt.perception.search import POLICIES
 from glotouch_bt.robot import BadInput
-from glotouch_bt.run import RunRequest
+from glotouch_bt.runs import RunRequest
 
 CHUNK = 25
 """Number of planar layouts in one task."""

@@ -23,7 +23,7 @@ from glotouch_bt.perception.search import search_policy
 from glotouch_bt.report import RunRecord, read_run
 from glotouch_bt.robot import Array, BadInput, Pose, World
 from glotouch_bt.robot.scene import Mesh, load_folder
-from glotouch_bt.run import RunRequest, launch
+from glotouch_bt.runs import RunRequest, launch
 
 SWEEP_NODE, TRACE_NODE, REFINE_NODE, PICKUP_NODE = "guarded_sweep", "orbit_probe", "refine_outline", "tool_pickup"
 TOP_NODE = "touch_top"

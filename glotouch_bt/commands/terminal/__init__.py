@@ -1,22 +1,33 @@
-"""What commands share on the terminal: errors and exit codes, findings, the operator's keys, the end of a run."""
+"""What the commands print: progress, findings, tables, the end of a run. Import it when something is printed.
 
-from typing import TYPE_CHECKING
+Nothing here computes; the module of a table takes the summary that an experiment wrote.
+"""
 
-from glotouch_bt.commands.terminal.errors import guarded, set_debug
-from glotouch_bt.lazy import lazy_door
-
-if TYPE_CHECKING:
-    from glotouch_bt.commands.terminal.findings import print_findings, texts_of
-    from glotouch_bt.commands.terminal.operator import Operator, operated
-    from glotouch_bt.commands.terminal.run_end import tell_end
-
-__getattr__ = lazy_door(
-    __name__,
-    print_findings="findings",
-    texts_of="findings",
-    Operator="operator",
-    operated="operator",
-    tell_end="run_end",
+from glotouch_bt.commands.terminal.bench_tables import (
+    print_contact,
+    print_match,
+    print_retrieve,
+    print_search,
+    print_speed,
 )
+from glotouch_bt.commands.terminal.console import RunProgress, print_skill, print_skills, print_table
+from glotouch_bt.commands.terminal.fault_tables import print_exhaustive, print_faults
+from glotouch_bt.commands.terminal.findings import print_findings, texts_of
+from glotouch_bt.commands.terminal.run_end import print_end
 
-__all__ = ["Operator", "guarded", "operated", "print_findings", "set_debug", "tell_end", "texts_of"]
+__all__ = [
+    "RunProgress",
+    "print_contact",
+    "print_end",
+    "print_exhaustive",
+    "print_faults",
+    "print_findings",
+    "print_match",
+    "print_retrieve",
+    "print_search",
+    "print_skill",
+    "print_skills",
+    "print_speed",
+    "print_table",
+    "texts_of",
+]

@@ -1,4 +1,4 @@
-"""What the experiments' commands print. Imported only when something is printed."""
+"""Tables of the experiments."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from glotouch_bt.commands.terminal.console import print_table
 
 
 def print_retrieve(summary: dict[str, Any], folder: Path) -> None:
-    """The table of a retrieval campaign: rates with Wilson 95 % intervals, causes of failure."""
+    """Print a retrieval campaign: rates with Wilson 95 % intervals, causes of failure."""
 
     def rate(r: dict[str, Any]) -> str:
         return f"{r['rate'] * r['n']:.0f}/{r['n']}  {100 * r['rate']:.0f} % [{100 * r['lo']:.0f}, {100 * r['hi']:.0f}]"
@@ -26,13 +26,13 @@ def print_retrieve(summary: dict[str, Any], folder: Path) -> None:
     if summary["causes"]:
         print_table("causes of failure", ("cause", "trials"), [(c, str(n)) for c, n in summary["causes"].items()])
     Console().print(
-        f"robot time {summary['sim_s']['mean']:.0f} s, wall {summary['wall_s']['mean']:.0f} s a mission; "
+        f"robot time {summary['sim_s']['mean']:.0f} s, wall time {summary['wall_s']['mean']:.0f} s for each mission; "
         f"largest peak force {summary['largest_peak_force_N']:.1f} N\n{folder / 'summary.json'}"
     )
 
 
 def print_speed(summary: dict[str, Any], folder: Path) -> None:
-    """The tables of a speed study: factors with their range, cycle times, where a mission's wall time goes."""
+    """Print a speed study: factors with their range, cycle times, breakdown of the wall time."""
 
     def span(key: str, of: dict[str, Any] = summary) -> str:
         r = of[key]
@@ -48,8 +48,12 @@ def print_speed(summary: dict[str, Any], folder: Path) -> None:
         ("simulated time / wall time", span("realtime_factor"), verdict("realtime_factor")),
         ("wall time / bare steps", span("over_physics"), verdict("over_physics")),
         ("simulated time / bare steps", span("bare_factor"), ""),
-        ("simulated time / processor time", span("realtime_factor", summary["by_cpu"]), "differ from the"),
-        ("processor time / that of the bare steps", span("over_physics", summary["by_cpu"]), "above on a shared core"),
+        ("simulated time / processor time", span("realtime_factor", summary["by_cpu"]), "differs from the"),
+        (
+            "processor time / that of the bare steps",
+            span("over_physics", summary["by_cpu"]),
+            "values above on a shared core",
+        ),
     ]
     title = f"speed of {summary['mission']}, {summary['conditions']}, seeds {seeds[0]}-{seeds[-1]}"
     print_table(title, ("", "median [min, max]", "target"), rows)
@@ -74,9 +78,9 @@ def print_speed(summary: dict[str, Any], folder: Path) -> None:
     parts = [(names[k], f"{s:.2f}", f"{100 * s / wall:.0f} %") for k, s in summary["breakdown_s"].items()]
     parts += [(f"  tree: {k}", f"{s:.2f}", f"{100 * s / wall:.0f} %") for k, s in summary["leaves_s"].items()]
     print_table(f"a mission's {wall:.1f} s, mean", ("", "s", "share"), parts)
-    same = "every replay ended in the same state" if summary["same_end_state"] else "a REPLAY ENDED ELSEWHERE"
+    same = "every replay ended in the same state" if summary["same_end_state"] else "a REPLAY ENDED IN ANOTHER STATE"
     Console().print(
-        f"not in the wall time: opening {summary['open_s']:.1f} s, report {summary['report_s']:.1f} s\n"
+        f"not counted as wall time: opening {summary['open_s']:.1f} s, report {summary['report_s']:.1f} s\n"
         f"{same}; {summary['succeeded']} of {len(seeds)} missions succeeded\n{folder / 'summary.json'}",
         highlight=False,
         soft_wrap=True,
@@ -84,7 +88,7 @@ def print_speed(summary: dict[str, Any], folder: Path) -> None:
 
 
 def print_search(summary: dict[str, Any], folder: Path) -> None:
-    """The tables of a search campaign: discovered at each budget beside the paper's, and the candidates' errors."""
+    """Print a search campaign: objects found at each budget, the paper's figures, errors of the candidates."""
 
     def mean(m: dict[str, Any]) -> str:
         return f"{m['mean']:.2f} [{m['lo']:.2f}, {m['hi']:.2f}]"
@@ -105,7 +109,7 @@ def print_search(summary: dict[str, Any], folder: Path) -> None:
         for name, f in summary["paper"].items()
     ]  # fmt: skip
     print_table(
-        f"found of {summary['objects']} after 1, 3, 5 m of travel on n layouts, {summary['conditions']}",
+        f"objects found of {summary['objects']} after 1, 3, 5 m of travel on n layouts, {summary['conditions']}",
         ("policy", "n", "at 1 m", "at 3 m", "at 5 m", "all at 3 m", "all at 5 m"),
         rows,
     )
@@ -120,7 +124,7 @@ def print_search(summary: dict[str, Any], folder: Path) -> None:
 
 
 def print_contact(summary: dict[str, Any], folder: Path) -> None:
-    """The table of a contact campaign: errors of probe and bare gripper beside the paper's, and what was not traced."""
+    """Print a contact campaign: errors of probe and bare gripper, the paper's figures, squares not traced."""
     from glotouch_bt.bench.contact import METRICS, TOOLS
 
     def mean(of: dict[str, Any], metric: str) -> str:
@@ -145,14 +149,14 @@ def print_contact(summary: dict[str, Any], folder: Path) -> None:
     )
     seeds = summary["seeds"]
     title = f"calibration square, {summary['conditions']}, seeds {seeds[0]}-{seeds[-1]}, "
-    print_table(title + f"{summary['contacts_per_side']} contacts a side", head, rows)
+    print_table(title + f"{summary['contacts_per_side']} contacts per side", head, rows)
     if summary["not_traced"]:
         print_table("not traced", ("trial and cause",), [(c,) for c in summary["not_traced"]])
     Console().print(f"{folder / 'summary.json'}", markup=False, highlight=False, soft_wrap=True)
 
 
 def print_match(summary: dict[str, Any], folder: Path) -> None:
-    """The tables of a matching campaign: Top-1 beside the paper's, what is accepted, losses, calibration, closures."""
+    """Print a matching campaign: Top-1 and the paper's figures, acceptance, losses, calibration, closures."""
 
     def rate(r: dict[str, Any]) -> str:
         return f"{100 * r['rate']:.1f} [{100 * r['lo']:.0f}, {100 * r['hi']:.0f}]" if r["n"] else "-"
@@ -199,13 +203,13 @@ def print_match(summary: dict[str, Any], folder: Path) -> None:
     ]  # fmt: skip
     print_table(
         "fitted pose of the right candidate, cost",
-        ("", "mm median", "95 %", "deg median", "95 %", "ms a pair", "of processor"),
+        ("", "mm median", "95 %", "deg median", "95 %", "ms per pair", "of processor"),
         cost,
     )
     names = summary["loss_matrix"]["objects"]
     matrix = summary["loss_matrix"][summary["head"]]
     losses = [(n, *(value(v, 2) for v in line)) for n, line in zip(names, matrix, strict=True)]
-    print_table(f"mean loss of {summary['head']}: target STL down, object touched across", ("", *names), losses)
+    print_table(f"mean loss of {summary['head']}: rows target STL, columns touched object", ("", *names), losses)
     if summary["closures_to_confidence"]:
         counts = [
             (order, f"{c['closures']['mean']:.1f} [{c['closures']['lo']:.1f}, {c['closures']['hi']:.1f}]",
@@ -214,13 +218,13 @@ def print_match(summary: dict[str, Any], folder: Path) -> None:
             for order, c in summary["closures_to_confidence"].items()
         ]  # fmt: skip
         print_table(
-            "closures in the whole box until accepted with P > .95",
-            ("order", "closures", "median", "share", "right %", "sure and wrong %", "target absent, taken %"),
+            "closures in the whole box until a match with P > 0.95",
+            ("order", "closures", "median", "share", "right %", "confident and wrong %", "absent target taken %"),
             counts,
         )
     cost_of_stl = (
         f"a new STL takes {value(timing.get('new_stl_s'), 2)} s ({value(timing.get('new_stl_cpu_s'), 2)} s cpu), "
-        f"one kept on disk {value(timing.get('load_stl_ms'), 0)} ms"
+        f"a cached one {value(timing.get('load_stl_ms'), 0)} ms"
     )
     felt = f"{summary['touched']} of {summary['objects']} objects touched, {summary['nameless']} false candidates"
     Console().print(f"{cost_of_stl}\n{felt}\n{folder / 'summary.json'}", markup=False, highlight=False, soft_wrap=True)

@@ -1,4 +1,4 @@
-"""What the command line prints: errors, progress, the end of a run, tables. Imported only when something is printed."""
+"""Errors, progress and result of a run, tables, skills."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from rich.text import Text
 if TYPE_CHECKING:
     from glotouch_bt.mission import Mission
     from glotouch_bt.mission.record import RunSummary
-    from glotouch_bt.run import RunResult
+    from glotouch_bt.runs import RunResult
 
 REFRESH_S = 0.1
 
 
 def print_error(message: str) -> None:
-    """One message on stderr, as it is (no markup, no wrapping)."""
+    """Print one message on stderr without markup or wrapping."""
     sys.stderr.write(f"glotouch: {message}\n")
 
 
 class RunProgress:
-    """A live line on a terminal, plain lines elsewhere; on stderr. Use as a context manager."""
+    """Progress on stderr: a live line on a terminal, plain lines elsewhere. Use as a context manager."""
 
     def __init__(self, quiet: bool) -> None:
         self._console = Console(stderr=True)
@@ -45,7 +45,7 @@ class RunProgress:
             self._live.stop()
 
     def start(self, mission: Mission, folder: Path) -> None:
-        """The backend is open; the mission begins."""
+        """Print the mission and its folder; call when the backend is open."""
         if self._quiet:
             return
         self._console.print(f"[bold]{escape(mission.name)}[/] in {escape(mission.world.name)} -> {escape(str(folder))}")
@@ -54,7 +54,7 @@ class RunProgress:
             self._live.start()
 
     def update(self, robot_s: float, summary: RunSummary) -> None:
-        """Show where the run is."""
+        """Show the running node and the counts."""
         if self._quiet:
             return
         node = summary.node.rsplit("/", 1)[-1]
@@ -62,7 +62,7 @@ class RunProgress:
             f"t = {robot_s:6.1f} s  {node:<14} contacts {summary.contacts:3d}  candidates {len(summary.candidates):2d}"
         )
         if summary.last_event[1] in ("pause", "paused"):
-            line += "  PAUSED (p goes on)" if summary.last_event[1] == "paused" else "  pausing"
+            line += "  PAUSED (p continues)" if summary.last_event[1] == "paused" else "  pausing"
         else:
             line += f"  last: {summary.last_event[1]}" if summary.last_event[1] else ""
         now = time.perf_counter()
@@ -76,7 +76,7 @@ class RunProgress:
 
 
 def print_result(done: RunResult) -> None:
-    """The end of a run: what was retrieved, or why not, and where the report is."""
+    """Print the end of a run: the retrieved object or the reasons, the faults, the path of the report."""
     console = Console()
     r = done.result
     head = {"success": "[bold green]done[/]", "failure": "[bold red]failed[/]"}.get(
@@ -111,20 +111,20 @@ def print_result(done: RunResult) -> None:
 
 
 def _fault_in_words(fault: Mapping[str, Any]) -> str:
-    """What became of a fault of the plan; one that altered nothing has tested nothing."""
+    """Return the result of one fault of the plan; a fault without effect makes the run useless as a test."""
     if not fault["effective"]:
-        why = "it began, and found nothing to alter" if fault["applied"] else "its moment never came"
-        return f"fault {fault['name']}: ALTERED NOTHING: {why}; this run says nothing about it"
+        why = "it began but had nothing to change" if fault["applied"] else "its trigger never fired"
+        return f"fault {fault['name']}: NO EFFECT: {why}; this run does not test it"
     seen = fault["seen"]
-    told = (
-        "nobody saw it" if seen is None else f"seen by {seen['by']} ({seen['code']}) after {fault['latency_s']:.2f} s"
-    )
-    applied = fault["applied"]
-    return f"fault {fault['name']}: began {applied} time{'' if applied == 1 else 's'}, {told}"
+    times = "once" if fault["applied"] == 1 else f"{fault['applied']} times"
+    detected = "not detected"
+    if seen is not None:
+        detected = f"detected by {seen['by']} ({seen['code']}) after {fault['latency_s']:.2f} s"
+    return f"fault {fault['name']}: began {times}, {detected}"
 
 
 def print_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """A table on stdout; cells are plain text."""
+    """Print a table on stdout; cells are plain text."""
     console = Console()
     table = Table(title=title, title_justify="left", header_style="bold", show_edge=False)
     for i, name in enumerate(head):
@@ -135,7 +135,7 @@ def print_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) 
 
 
 def print_skills(described: Sequence[dict[str, Any]]) -> None:
-    """One line a skill."""
+    """Print one line for each skill."""
     rows = [
         (
             d["name"],
@@ -145,11 +145,11 @@ def print_skills(described: Sequence[dict[str, Any]]) -> None:
         )
         for d in described
     ]
-    print_table("skills", ("name", "reads", "writes", "what it does"), rows)
+    print_table("skills", ("name", "reads", "writes", "description"), rows)
 
 
 def print_skill(d: dict[str, Any]) -> None:
-    """One skill in full."""
+    """Print the full description of one skill."""
     sys.stdout.write(f"{d['name']}\n\n{d['description']}\n\n")
     rows = [
         (
@@ -162,9 +162,9 @@ def print_skill(d: dict[str, Any]) -> None:
         )
         for p in d["parameters"]
     ]
-    print_table("parameters", ("name", "type", "unit", "default", "range", "what it is"), rows)
+    print_table("parameters", ("name", "type", "unit", "default", "range", "description"), rows)
     ports = [("in", p["name"], p["type"], p["key"], p["description"]) for p in d["inputs"]]
     ports += [("out", p["name"], p["type"], p["key"], p["description"]) for p in d["outputs"]]
     sys.stdout.write("\n")
     sys.stdout.flush()
-    print_table("ports", ("", "name", "type", "key", "what it is"), ports)
+    print_table("ports", ("", "name", "type", "key", "description"), ports)

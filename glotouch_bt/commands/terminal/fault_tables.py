@@ -1,4 +1,4 @@
-"""What `glotouch bench faults` prints."""
+"""Tables of `glotouch bench faults`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from glotouch_bt.commands.terminal.console import print_table
-from glotouch_bt.validation.faults import VERDICTS
 
 
 def _rate(rate: Mapping[str, Any]) -> str:
@@ -18,7 +17,9 @@ def _rate(rate: Mapping[str, Any]) -> str:
 
 
 def print_faults(summary: Mapping[str, Any], out: Path) -> None:
-    """The matrix by class, then the rates."""
+    """Print the matrix by fault, then the rates."""
+    from glotouch_bt.validation.faults import VERDICTS
+
     rows = []
     for name, found in summary["by_class"].items():
         counts = [str(found[v] or "") for v in VERDICTS]
@@ -31,7 +32,7 @@ def print_faults(summary: Mapping[str, Any], out: Path) -> None:
         ("wrong object lifted", _rate(summary["wrong_object"])),
         ("cause named", _rate(summary["named"])),
         ("recoverable recovered", _rate(summary["recovered"])),
-        ("altered nothing", "; ".join(summary["altered_nothing"]) or "none"),
+        ("no effect", "; ".join(summary["altered_nothing"]) or "none"),
     )
     for name, text in lines:
         sys.stdout.write(f"{name:22s} {text}\n")
@@ -39,10 +40,10 @@ def print_faults(summary: Mapping[str, Any], out: Path) -> None:
 
 
 def print_exhaustive(summary: Mapping[str, Any], out: Path) -> None:
-    """How many calls were failed, and which did not end as they must."""
+    """Print the number of failed calls, and the runs that did not end safely."""
     sys.stdout.write(f"{summary['mission']} on {summary['backend']} ({summary['unfaulted']} if nothing fails): ")
-    sys.stdout.write(f"{summary['tried']} runs, each with one of {summary['calls']} calls failed: ")
-    sys.stdout.write(f"{len(summary['bad'])} did not end held, with the reason named\n")
+    sys.stdout.write(f"{summary['tried']} runs, in each of which one of {summary['calls']} calls failed: ")
+    sys.stdout.write(f"{len(summary['bad'])} did not end with the arm held and the reason named\n")
     for bad in summary["bad"][:20]:
         sys.stdout.write(f"  {bad['fault']} at call {bad['call']}: {bad['what']}\n")
     sys.stdout.write(f"{out / 'summary.json'}\n")

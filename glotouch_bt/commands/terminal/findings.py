@@ -1,25 +1,28 @@
-"""How findings look: each with its line of the mission, why it matters, and the shortest run that shows it."""
+"""Findings of the checker: place, line of the mission, reason, and the shortest run that reaches the mistake."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.text import Text
 
-from glotouch_bt.mission.spec import Finding
+if TYPE_CHECKING:
+    from glotouch_bt.mission.spec import Finding
 
 MAX_STEPS = 8
+"""Number of steps to print of the part of a run in which every step succeeded."""
 _COLOUR = {"error": "bold red", "warning": "bold yellow"}
 
 
 def print_findings(findings: Iterable[Finding], lines: dict[str, list[str]]) -> None:
-    """Findings on stderr, for a person.
+    """Print findings on stderr.
 
     Args:
         findings: In the order to print.
-        lines: Text of each file, by the name findings give it; what is missing is not quoted.
+        lines: Lines of each file, by the name in the findings; a missing file is not quoted.
     """
     console = Console(stderr=True, soft_wrap=True, highlight=False)
     for finding in findings:
@@ -42,7 +45,7 @@ def print_findings(findings: Iterable[Finding], lines: dict[str, list[str]]) -> 
 
 
 def path_in_words(path: tuple[str, ...]) -> str:
-    """The steps of a run, what went well and came long before left out; empty if it has one step only."""
+    """Return the steps of a run, without most of the early steps that succeeded; empty for a single step."""
     if len(path) < 2:
         return ""
     steps: list[str] = []
@@ -58,7 +61,7 @@ def path_in_words(path: tuple[str, ...]) -> str:
 
 
 def texts_of(files: Iterable[str], root: Path) -> dict[str, list[str]]:
-    """Lines of mission files by the name messages give them (`glotouch_missions/...` for shipped ones)."""
+    """Return the lines of mission files by their name in messages (`glotouch_missions/...` for shipped files)."""
     found: dict[str, list[str]] = {}
     for name in files:
         path = root / name.removeprefix("glotouch_missions/") if name.startswith("glotouch_missions/") else Path(name)

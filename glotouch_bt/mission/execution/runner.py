@@ -124,7 +124,7 @@ def run_mission(
         world=mission.world, arm=arm, requests=robot, journal=summary, observation=observation, command=HOLD
     )
     context.requests = requests = RecordedRequests(robot, summary, lambda: context.observation.now_s)
-    tree = build_tree(mission.tree, context, mission.name)
+    tree = build_tree(mission.spec, context, mission.name)
     outcome = Outcome("aborted", summary, start_s=observation.now_s)
     loop = _Loop(tree, context, robot, summary, rounding, on_progress, control or Control(), outcome)
     loop.begin(device, requests, supervisor.counts, CheckpointHooks(checkpoints, resume_point))

@@ -19,7 +19,7 @@ def as_btcpp(mission: Mission) -> str:
     root = ET.Element("root", BTCPP_format="4", main_tree_to_execute=mission.name)
     tree = ET.SubElement(root, "BehaviorTree", ID=mission.name)
     models: dict[str, ET.Element] = {}
-    _add(tree, mission.tree, models)
+    _add(tree, mission.spec, models)
     model = ET.SubElement(root, "TreeNodesModel")
     model.extend(models[name] for name in sorted(models))
     ET.indent(root)

@@ -1,16 +1,18 @@
-"""Describe skills and node kinds for people and programs: parameters with units and ranges, typed ports."""
+"""Describe skills, node kinds and missions as JSON data: parameters with units and ranges, typed ports."""
 
 from __future__ import annotations
 
 import inspect
 from dataclasses import asdict
+from pathlib import Path
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 
 from glotouch_bt.mission.nodes import NODES, ConditionSettings
-from glotouch_bt.mission.read import unit_of
+from glotouch_bt.mission.read import read_yaml, shown, unit_of
+from glotouch_bt.mission.spec import plain
 from glotouch_bt.skill import Skill
 
 _LIMITS = (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
@@ -46,6 +48,24 @@ def describe_nodes() -> list[dict[str, Any]]:
         }
         for kind in NODES.values()
     ]
+
+
+def describe_mission(file: Path) -> dict[str, Any]:
+    """Return a mission file's head as JSON data: name, description, world, parameters; the tree is not checked.
+
+    Raises:
+        BadInput: The file cannot be read.
+    """
+    source: Any = plain(read_yaml(file, shown(file)))
+    declared = source.get("parameters") or {}
+    keys = {"type": "", "unit": "", "default": None, "range": None, "description": ""}
+    return {
+        "name": file.stem,
+        "description": source.get("description", ""),
+        "world": source.get("world", ""),
+        "file": str(file),
+        "parameters": [{"name": n} | {k: p.get(k, empty) for k, empty in keys.items()} for n, p in declared.items()],
+    }
 
 
 def _fields(model: type[BaseModel]) -> list[dict[str, Any]]:

@@ -28,7 +28,7 @@ def as_text(mission: Mission) -> str:
         for i, child in enumerate(node.children):
             add(child, indent + ("   " if last else "│  "), i == len(node.children) - 1)
 
-    add(mission.tree, "", True)
+    add(mission.spec, "", True)
     return "\n".join(lines) + "\n"
 
 
@@ -66,7 +66,7 @@ def _layout(node: NodeSpec, left: float, depth: int) -> tuple[_Box, float]:
 
 def as_svg(mission: Mission) -> str:
     """Return the tree as one self-contained SVG picture, children from left to right in tick order."""
-    root, right = _layout(mission.tree, MARGIN, 0)
+    root, right = _layout(mission.spec, MARGIN, 0)
     shapes: list[str] = []
     depth = 0.0
 

@@ -17,7 +17,6 @@ from typing import Any, Self
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
-from glotouch_bt import __version__
 from glotouch_bt.mission.record import mcap_plots as plots
 from glotouch_bt.mission.record.mcap_json import dumps, to_json
 from glotouch_bt.mission.record.mcap_packing import Column, pack
@@ -37,6 +36,7 @@ from glotouch_bt.mission.record.rounding import (
     TORQUE_NM,
 )
 from glotouch_bt.robot import BadInput, Command, GlotouchError, Observation
+from glotouch_bt.version import __version__
 
 RUN_ATTACHMENT = "run.json"
 RESULT_ATTACHMENT = "result.json"

@@ -18,7 +18,7 @@ from typing import Any
 from glotouch_bt.faults import FaultPlan
 from glotouch_bt.robot import BadInput, Limits, ObjectSet
 from glotouch_bt.robot.scene import load_folder
-from glotouch_bt.run import RunRequest
+from glotouch_bt.runs import RunRequest
 from glotouch_bt.validation.faults.cases import Case
 from glotouch_bt.validation.faults.plots import plot_matrix
 from glotouch_bt.validation.faults.summary import summarise

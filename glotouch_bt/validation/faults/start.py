@@ -11,7 +11,7 @@ from pathlib import Path
 
 from glotouch_bt.faults import FaultPlan
 from glotouch_bt.mission.checkpoint import FILE, CheckpointFile, Row
-from glotouch_bt.run import ResumableRun, copy_run, find, installed_versions
+from glotouch_bt.runs import ResumableRun, copy_run, find, installed_versions
 from glotouch_bt.validation.faults.rejoin import watched
 
 

@@ -16,7 +16,7 @@ from glotouch_bt.faults import CATALOGUE, FaultPlan
 from glotouch_bt.mission.checkpoint import FILE as CHECKPOINTS
 from glotouch_bt.report import read_run
 from glotouch_bt.robot import BadInput
-from glotouch_bt.run import EARLIER, RunRequest, launch
+from glotouch_bt.runs import EARLIER, RunRequest, launch
 from glotouch_bt.validation.faults.cases import chosen_cases
 from glotouch_bt.validation.faults.rejoin import Rejoined
 from glotouch_bt.validation.faults.start import start_from

@@ -163,7 +163,7 @@ def _faulted_mission() -> Mission:
 def _plan(path: Path, rng: np.random.Generator) -> tuple[Class, str]:
     mission = _faulted_mission()
     try:
-        plan = read_plan(path, mission.tree, mission.name)
+        plan = read_plan(path, mission.spec, mission.name)
     except BadInput as e:
         return _refused(e)
     if any(f.kind.channel in PASSIVE for f in plan.faults):

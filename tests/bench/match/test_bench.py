@@ -16,7 +16,6 @@ from glotouch_bt.bench.match import bench, closures, trials
 from glotouch_bt.bench.match.bench import MatchCampaign, objects_of, run_campaign
 from glotouch_bt.bench.match.dataset import write_layout
 from glotouch_bt.bench.match.methods import chosen
-from glotouch_bt.commands import bench as bench_command
 from glotouch_bt.robot import BadInput
 from tests.bench.match.conftest import SIZES_M, a_layout, by_size
 
@@ -146,7 +145,7 @@ BAD = [
 def command(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setattr(bench_command, "ProcessPoolExecutor", Threads)
+    monkeypatch.setattr("concurrent.futures.ProcessPoolExecutor", Threads)
     yield CliRunner()
     cli._debug = False
 

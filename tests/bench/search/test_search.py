@@ -17,7 +17,7 @@ from glotouch_bt.bench.search.summary import correlation, quantiles, summarise
 from glotouch_bt.bench.search.trial import Way, _result_of, recorded_folders
 from glotouch_bt.report.run_record import Event, RunRecord, Tick
 from glotouch_bt.robot import BadInput
-from glotouch_bt.run.launch import RunRequest
+from glotouch_bt.runs.launch import RunRequest
 
 
 def thing(name="thing", size=(0.08, 0.04), centre=(0.01, 0.0), yaw=0.0, top=0.07):

@@ -121,7 +121,7 @@ GOOD = [
 
 @pytest.mark.parametrize("tree", [g[1] for g in GOOD], ids=[g[0] for g in GOOD])
 def test_nothing_is_found_in_good_trees(tree: str, load: Callable[..., Any]) -> None:
-    names = [n.name for n in load(tree).tree.walk()]
+    names = [n.name for n in load(tree).spec.walk()]
     assert len(names) == len(set(names))
 
 
@@ -133,8 +133,8 @@ def test_set_overrides_are_typed_and_ranged(load: Callable[..., Any]) -> None:
     text += "tree:\n  find: {how_many: $n, speed_m_s: $v}\n"
     mission = load(text, n="4", v="0.05 m/s", t="apple", b="true")
     assert dict(mission.parameters) == {"n": 4, "v": 50.0, "t": "apple", "b": True}
-    assert mission.tree.params is not None
-    assert mission.tree.params.model_dump() == {"how_many": 4, "speed_m_s": 0.05, "mode": "fast"}
+    assert mission.spec.params is not None
+    assert mission.spec.params.model_dump() == {"how_many": 4, "speed_m_s": 0.05, "mode": "fast"}
     assert mission.document["parameters"]["n"]["default"] == 4
     for name, value, word in (("n", "9", "[1, 5]"), ("n", "2.0", "whole"), ("t", "nobody", "unknown object"), ("b", "maybe", "true or false"), ("v", "inf", "finite"), ("v", "4 N", "not 'N'")):  # fmt: skip
         with pytest.raises(BadInput, match=f"--set {name}: ") as e:
@@ -169,7 +169,7 @@ def test_a_subtree_keeps_its_keys_to_itself(tmp_path: Path, registry: dict[str, 
         + "tree:\n  - subtree: {file: sub.yaml, parameters: {n: 4}, ports: {found: ours}}\n  - number: {in: {number: ours}}\n"
     )
     mission = load_mission(path, skills=registry)
-    find = next(n for n in mission.tree.walk() if n.skill == "find")
+    find = next(n for n in mission.spec.walk() if n.skill == "find")
     assert find.writes["found"].key == "ours"
     assert find.writes["items"].key.startswith("sub@1/")
     path.write_text(
@@ -235,7 +235,7 @@ def test_the_resolved_mission_carries_its_subtrees(tmp_path: Path, registry: dic
 
     def nodes(of: Any) -> list[Any]:
         return [
-            (n.kind, n.name, [w.key for w in (*n.reads.values(), *n.writes.values())], n.params) for n in of.tree.walk()
+            (n.kind, n.name, [w.key for w in (*n.reads.values(), *n.writes.values())], n.params) for n in of.spec.walk()
         ]
 
     assert nodes(loaded) == nodes(mission)

@@ -43,7 +43,7 @@ def found_in(load: Load, text: str) -> list[Finding]:
 )
 def test_a_speed_stays_the_same_speed_in_a_subtree(outer: str, inner: str, given: str, load: Load) -> None:
     mission = load(SUBTREE.format(outer=outer, inner=inner, given=given))
-    (leaf,) = [n for n in mission.tree.walk() if n.skill]
+    (leaf,) = [n for n in mission.spec.walk() if n.skill]
     assert leaf.params.speed_m_s == pytest.approx(0.03)
 
 
@@ -84,7 +84,7 @@ def test_a_faulty_parameter_is_the_only_finding_about_its_subtree(load: Load) ->
 @pytest.mark.parametrize("node", ["condition: C", "repeat: {until: C, do: {find: {out: {found: width_m}}}}"])
 def test_a_condition_compares_in_si(written: str, node: str, load: Load) -> None:
     text = HEAD + "parameters: {w: {type: float, unit: mm, default: 40}}\ntree:\n  - find: {out: {found: width_m}}\n"
-    tree = load(text + "  - " + node.replace("C", f"{{port: width_m, at_least: {written}}}") + "\n").tree
+    tree = load(text + "  - " + node.replace("C", f"{{port: width_m, at_least: {written}}}") + "\n").spec
     compared = [s for n in tree.walk() for s in (n.settings, getattr(n.settings, "until", None))]
     (settings,) = [s for s in compared if isinstance(s, ConditionSettings)]
     assert settings.at_least == pytest.approx(0.04)
@@ -179,7 +179,7 @@ def test_a_plan_in_the_wrong_unit(old: str, new: str, code: str, words: str, tmp
 def test_a_quantity_for_a_port(tmp_path: Path) -> None:
     path = tmp_path / "m.yaml"
     path.write_text(lifted(PLAN, "40 mm"))
-    lift = next(n for n in load_mission(path).tree.walk() if n.skill == "lift")
+    lift = next(n for n in load_mission(path).spec.walk() if n.skill == "lift")
     assert lift.constants == {"grip_m": pytest.approx(0.04)}
     path.write_text(lifted(PLAN, "40 N"))
     with pytest.raises(MissionFaults, match="grip_m is in m, not 'N'"):

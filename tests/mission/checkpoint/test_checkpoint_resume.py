@@ -47,7 +47,7 @@ def glotouch(*words: object) -> Any:
         house = importlib.util.module_from_spec(spec)
         patch.setitem(sys.modules, "fake_cli", house)
         spec.loader.exec_module(house)
-        house.furnish(patch.setattr)
+        house.install_fakes(patch.setattr)
         done = CliRunner().invoke(cli.app, [str(w) for w in words])
     return SimpleNamespace(returncode=done.exit_code, stdout=done.stdout, stderr=done.stderr)
 
@@ -133,7 +133,7 @@ def test_a_run_killed_after_its_last_skill_and_before_its_result_is_gone_on_with
     """Its last checkpoint is there, its result is not: the tree is brought to its end again."""
     folder = tmp_path / "run"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("glotouch_bt.run.folder.RunFolder.write_json", _killed)
+        patch.setattr("glotouch_bt.runs.folder.RunFolder.write_json", _killed)
         assert glotouch("run", mission, "--seed", 4, "--out", folder).returncode == 3
     assert not (folder / "result.json").exists()
     done = glotouch("resume", folder)
@@ -144,7 +144,7 @@ def test_a_run_killed_after_its_last_skill_and_before_its_result_is_gone_on_with
 def test_a_record_that_is_lost_is_said_to_be_on_the_terminal(mission: Path, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("glotouch_bt.run.folder.RunFolder.write_json", _killed)
+        patch.setattr("glotouch_bt.runs.folder.RunFolder.write_json", _killed)
         glotouch("run", mission, "--seed", 4, "--out", folder)
     (folder / "run.mcap").unlink()
     (folder / "run.mcap").mkdir()

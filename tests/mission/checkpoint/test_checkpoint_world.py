@@ -11,8 +11,8 @@ import pytest
 
 from glotouch_bt.mission.record.run_summary import RunSummary
 from glotouch_bt.report import read_run
-from glotouch_bt.run.launch import RunRequest, launch
-from glotouch_bt.run.resume import resume
+from glotouch_bt.runs.launch import RunRequest, launch
+from glotouch_bt.runs.resume import resume
 
 MISSION = """mission: fetch
 world: container_five

@@ -17,10 +17,10 @@ def test_every_node_is_there_in_order(name: str) -> None:
     root = ET.fromstring(as_btcpp(mission))
     assert root.attrib == {"BTCPP_format": "4", "main_tree_to_execute": mission.name}
     tree, model = root
-    wanted = [n.name for n in mission.tree.walk() if n.kind != "subtree"]
+    wanted = [n.name for n in mission.spec.walk() if n.kind != "subtree"]
     assert [e.get("name") for e in tree.iter() if e is not tree] == wanted
     described = {e.get("ID") for e in model}
-    assert {n.skill for n in mission.tree.walk() if n.kind == "skill"} <= described
+    assert {n.skill for n in mission.spec.walk() if n.kind == "skill"} <= described
     for action in model:
         ports = {p.get("name") for p in action}
         for used in tree.iter(str(action.get("ID"))):

@@ -1,0 +1,49 @@
+"""`glotouch bench fuzz`: random and corrupt documents for the checker."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from glotouch_bt.commands.bench.shared import print_summary, worker_pool
+from glotouch_bt.commands.errors import guarded
+from glotouch_bt.commands.options import BenchFolder, FirstSeed, SummaryJson, Workers, bench_folder
+
+
+@guarded
+def fuzz(
+    trials: Annotated[int, typer.Option(min=1, help="number of documents")] = 20_000,
+    seed: FirstSeed = 0,
+    workers: Workers = 2,
+    out: BenchFolder = None,
+    json_: SummaryJson = False,
+) -> int:
+    """Random and corrupt missions and fault plans: the checker must not crash, hang, run code or accept a mistake."""
+    from glotouch_bt.validation.fuzz import BAD, FuzzCampaign, run_campaign
+
+    campaign = FuzzCampaign(trials, seed, bench_folder(out, "fuzz"))
+
+    def show(done: int, total: int, counts: Mapping[str, int]) -> None:
+        bad = sum(counts.get(name, 0) for name in BAD)
+        sys.stderr.write(f"[{done}/{total}] {bad} bad\n")
+
+    with worker_pool(workers) as pool:
+        summary = run_campaign(campaign, pool, show)
+    print_summary(summary, campaign.out, _print_fuzz, json_)
+    return 1 if summary["failures"] else 0
+
+
+def _print_fuzz(summary: Mapping[str, Any], out: Path) -> None:
+    from glotouch_bt.commands.terminal import print_table
+
+    kinds = list(summary["counts"])
+    classes = sorted({c for found in summary["counts"].values() for c in found})
+    rows = [(c, *(str(summary["counts"][k].get(c, 0)) for k in kinds)) for c in classes]
+    print_table(f"{summary['trials']} documents, seed {summary['seed']}", ("outcome", *kinds), rows)
+    bad = summary["bad"]
+    sys.stdout.write(f"bad: {len(summary['failures'])} ({100 * bad['lo']:.3f} .. {100 * bad['hi']:.3f} %)\n")
+    sys.stdout.write(f"{out / 'summary.json'}\n")

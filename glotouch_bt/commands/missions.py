@@ -1,0 +1,46 @@
+"""`glotouch missions`: the shipped missions."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from glotouch_bt.commands.errors import guarded
+from glotouch_bt.commands.options import Json
+from glotouch_bt.commands.output import print_json
+
+
+@guarded
+def missions(
+    name: Annotated[str | None, typer.Argument(metavar="NAME", help="one mission")] = None, json_: Json = False
+) -> None:
+    """List the shipped missions, or describe one.
+
+    The list also names the shipped worlds, conditions and fault plans.
+    """
+    from glotouch_bt.commands.terminal import print_table
+    from glotouch_bt.mission.export import describe_mission
+    from glotouch_bt.mission.read import shipped
+    from glotouch_bt.robot import UnknownName
+
+    known = shipped("")
+    if name is not None and name not in known:
+        raise UnknownName("mission", name, known)
+    described = [describe_mission(known[n]) for n in ([name] if name else known)]
+    if json_:
+        print_json(described[0] if name else described)
+        return
+    if name is None:
+        rows = [(d["name"], d["description"], ", ".join(p["name"] for p in d["parameters"])) for d in described]
+        print_table("missions", ("name", "description", "parameters (--set NAME=VALUE)"), rows)
+        for kind, title in (("worlds", "worlds"), ("conditions", "conditions"), ("faults", "fault plans")):
+            sys.stdout.write(f"{title}: {', '.join(shipped(kind))}\n")
+        return
+    (d,) = described
+    sys.stdout.write(f"{d['name']}: {d['description']}\n{d['file']}\nworld {d['world']}\n")
+    head = ("name", "type", "unit", "default", "range", "description")
+    values = [["" if p[key] is None else str(p[key]) for key in head] for p in d["parameters"]]
+    if values:
+        print_table("parameters", head, values)

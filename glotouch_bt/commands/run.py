@@ -1,0 +1,49 @@
+"""`glotouch run`: one mission on one robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from glotouch_bt.commands.errors import guarded
+from glotouch_bt.commands.options import Backend, Conditions, Json, MissionName, Objects, Settings, read_settings
+
+
+@guarded
+def run(
+    mission: MissionName,
+    backend: Backend = "mujoco",
+    seed: Annotated[int, typer.Option(help="source of every random draw")] = 0,
+    set_: Settings = None,
+    objects: Objects = None,
+    conditions: Conditions = "nominal",
+    faults: Annotated[str | None, typer.Option(metavar="FILE", help="a fault plan (see: glotouch faults)")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="the run's folder (default: runs/...)")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the run that --out holds")] = False,
+    json_: Json = False,
+) -> int:
+    """Run a mission; write its record, result and report.
+
+    `p` or SIGUSR1 pauses and continues it, SIGTERM ends it safely.
+    """
+    from glotouch_bt.commands.operator import Operator, operated
+    from glotouch_bt.commands.terminal import RunProgress, print_end
+    from glotouch_bt.runs import RunRequest, launch
+
+    request = RunRequest(
+        mission,
+        backend,
+        seed,
+        read_settings(set_),
+        objects,
+        conditions,
+        out,
+        faults,
+        may_kill=True,
+        overwrite=overwrite,
+    )
+    with RunProgress(quiet=json_) as progress, operated(Operator()) as control:
+        done = launch(request, on_start=progress.start, on_progress=progress.update, control=control)
+    return print_end(done, json_)

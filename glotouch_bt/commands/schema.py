@@ -1,0 +1,15 @@
+"""`glotouch schema`: the JSON Schema of mission files."""
+
+from __future__ import annotations
+
+from glotouch_bt.commands.errors import guarded
+from glotouch_bt.commands.output import print_json
+
+
+@guarded
+def schema() -> None:
+    """Print the JSON Schema of mission files, for editors."""
+    from glotouch_bt.mission.export import mission_schema
+    from glotouch_bt.mission.read import SkillShelf
+
+    print_json(mission_schema(SkillShelf()))

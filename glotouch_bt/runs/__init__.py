@@ -1,0 +1,20 @@
+"""One run of a mission, from the request to the folder with its result; resume and replay of recorded runs."""
+
+from glotouch_bt.runs.folder import RunFolder
+from glotouch_bt.runs.launch import RunRequest, RunResult, launch
+from glotouch_bt.runs.result import installed_versions
+from glotouch_bt.runs.resume import resume
+from glotouch_bt.runs.resume_point import EARLIER, ResumableRun, copy_run, find
+
+__all__ = [
+    "EARLIER",
+    "ResumableRun",
+    "RunFolder",
+    "RunRequest",
+    "RunResult",
+    "copy_run",
+    "find",
+    "installed_versions",
+    "launch",
+    "resume",
+]

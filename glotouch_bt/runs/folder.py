@@ -1,0 +1,124 @@
+"""A run's folder: made writable before anything moves, its files written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from datetime import datetime
+from pathlib import Path
+
+from glotouch_bt.robot import BadInput, GlotouchError
+
+FILES = ("mission.yaml", "run.mcap", "result.json", "truth.json", "report.html", "checkpoint.sqlite")
+LEFT_BY_SQLITE = ("checkpoint.sqlite-wal", "checkpoint.sqlite-shm")
+
+
+@contextmanager
+def claimed(folder: Path) -> Iterator[None]:
+    """Lock a folder for this process until the block or the process ends.
+
+    Raises:
+        BadInput: Another run is under way in the folder, or the system has no such locks.
+    """
+    try:
+        import fcntl
+    except ImportError as e:
+        raise BadInput("runs need Linux or macOS; on Windows, use WSL 2 or Docker") from e
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as e:
+            raise BadInput(f"{folder}: a run is under way in this folder") from e
+        yield
+    finally:
+        os.close(handle)
+
+
+class RunFolder:
+    """Where one run is kept.
+
+    Args:
+        path: The folder; it may exist, and then this run's files replace those of an earlier run.
+
+    Raises:
+        BadInput: It cannot be made or written to.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._made: Path | None = _first_missing(path)
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            trial = path / ".writable"
+            trial.write_bytes(b"")
+            trial.unlink()
+        except OSError as e:
+            self.abandon()
+            raise BadInput(f"{path}: a run's folder cannot be written here ({e.strerror})") from e
+
+    @classmethod
+    def named(cls, mission: str, seed: int, runs: Path = Path("runs")) -> RunFolder:
+        """A new folder `runs/<time>-<mission>-s<seed>`."""
+        stem = f"{datetime.now():%Y%m%d-%H%M%S}-{mission}-s{seed}"
+        path, n = runs / stem, 2
+        while path.exists():
+            path, n = runs / f"{stem}-{n}", n + 1
+        return cls(path)
+
+    def check_free(self, overwrite: bool) -> None:
+        """Check that a new run may use the folder: it is empty, or holds an earlier run that may be replaced.
+
+        Raises:
+            BadInput: It holds other files, or a run that must be kept.
+        """
+        present = {p.name for p in self.path.iterdir()}
+        if present and present.isdisjoint(FILES):
+            raise BadInput(f"{self.path}: is not empty and holds no run; give a new or an empty folder")
+        if present and not overwrite:
+            raise BadInput(f"{self.path}: holds an earlier run; give another folder, or --overwrite to replace it")
+
+    def clear(self) -> None:
+        """Remove what an earlier run left under this run's names; call when this run is sure to begin."""
+        for name in (*FILES, *LEFT_BY_SQLITE):
+            (self.path / name).unlink(missing_ok=True)
+        shutil.rmtree(self.path / "earlier", ignore_errors=True)
+
+    def abandon(self) -> None:
+        """The run did not begin: remove what was made for it."""
+        if self._made is not None:
+            shutil.rmtree(self._made, ignore_errors=True)
+
+    def write_text(self, name: str, text: str) -> None:
+        """Write a file whole or not at all.
+
+        Raises:
+            GlotouchError: The disk refused.
+        """
+        target, part = self.path / name, self.path / f".{name}.part"
+        try:
+            with part.open("w", encoding="utf-8", newline="\n") as f:
+                f.write(text)
+                f.flush()
+                os.fsync(f.fileno())
+            part.replace(target)
+        except OSError as e:
+            part.unlink(missing_ok=True)
+            raise GlotouchError(f"{target}: cannot be written ({e.strerror})") from e
+
+    def write_json(self, name: str, data: Mapping[str, object]) -> None:
+        """Write JSON whole or not at all; errors as in `write_text`."""
+        self.write_text(name, json.dumps(data, indent=2, allow_nan=False) + "\n")
+
+
+def _first_missing(path: Path) -> Path | None:
+    """The topmost folder that `mkdir(parents=True)` would make, or None."""
+    missing: Path | None = None
+    for folder in (path, *path.parents):
+        if os.path.exists(folder):  # unlike Path.exists, false for names that no folder can have
+            break
+        missing = folder
+    return missing

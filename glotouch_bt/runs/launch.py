@@ -1,0 +1,243 @@
+"""One mission on one backend, from the command line's words to a run's folder with its result.
+
+Only here, and in the report, is the truth of a simulated world looked at, after the run, for scoring.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from glotouch_bt.faults import FaultInjector, FaultPlan, ListeningRecord, injector_in, read_plan, wrong_models
+from glotouch_bt.lazy import load_all
+from glotouch_bt.mission import Mission, load_mission, split_settings
+from glotouch_bt.mission.checkpoint import FILE as CHECKPOINTS
+from glotouch_bt.mission.checkpoint import CheckpointFile, CheckpointWriter, ResumePoint
+from glotouch_bt.mission.execution import Control, Outcome, Stuck, deferred_interrupt, run_mission
+from glotouch_bt.mission.read import load_conditions
+from glotouch_bt.mission.record import Record, Recorder, RunSummary
+from glotouch_bt.robot import Backend, BadInput, Conditions, GlotouchError, Robot, load_backend
+from glotouch_bt.robot.simulation import Referee, TrueObject
+from glotouch_bt.runs.folder import RunFolder, claimed
+from glotouch_bt.runs.request import RunRequest, RunResult
+from glotouch_bt.runs.result import description, installed_versions, mission_yaml, score, truth
+from glotouch_bt.runs.resume_point import ResumableRun, describe_run
+
+LARGEST_SEED = 2**32 - 1
+
+__all__ = ["LARGEST_SEED", "RunRequest", "RunResult", "launch"]
+
+
+def launch(
+    request: RunRequest,
+    *,
+    on_start: Callable[[Mission, Path], None] | None = None,
+    on_progress: Callable[[float, RunSummary], None] | None = None,
+    control: Control | None = None,
+    resumable: ResumableRun | None = None,
+) -> RunResult:
+    """Check everything, open the backend, run the mission, score it, write the run's folder.
+
+    Args:
+        request: What to run.
+        on_start: Called with the mission and its folder once the backend is open.
+        on_progress: As in `run_mission`.
+        control: Who may pause and stop it.
+        resumable: A broken-off run to go on with, in its own folder (`study.resume`).
+
+    Raises:
+        BadInput: Something given is wrong; nothing moved and nothing is left on disk.
+        BackendError: The backend did not open; nothing is left on disk.
+    """
+    began = time.perf_counter()
+    if not 0 <= request.seed <= LARGEST_SEED:
+        raise BadInput(f"--seed {request.seed}: must be in 0 .. {LARGEST_SEED}")
+    if resumable is not None:
+        mission = resumable.mission
+    else:
+        mission = load_mission(request.mission, request.settings, objects=request.objects)
+    conditions = load_conditions(request.conditions)
+    plan = _fault_plan(request, mission)
+    load_all()
+    backend = load_backend(request.backend)
+    options = split_settings(mission, request.settings)
+    folder = RunFolder(request.out) if request.out else RunFolder.named(mission.name, request.seed)
+    with claimed(folder.path):
+        try:
+            if resumable is None:
+                folder.check_free(request.overwrite)
+            if (
+                plan is not None
+                and resumable is None
+                and (models := wrong_models(plan, mission, folder.path / "models"))
+            ):
+                mission = load_mission(request.mission, {**request.settings, **models}, objects=request.objects)
+            try:
+                robot = backend.open(mission.world, conditions, request.seed, options)
+            except BadInput as e:
+                if not options:
+                    raise
+                known = ", ".join(mission.parameters) or "none"
+                raise BadInput(f"{e} (parameters of mission {mission.name!r}: {known})") from e
+            referee = backend.referee(robot)
+            world = None if resumable is None else resumable.file.world(resumable.row.number)
+            objects_at_start = referee.objects() if referee else []
+            if world is not None:
+                robot.restore(world)
+            if plan is not None:
+                robot = _faulted(robot, plan, request, backend)
+        except BaseException:
+            folder.abandon()
+            raise
+        with robot:
+            if resumable is None:
+                folder.clear()
+            if on_start is not None:
+                on_start(mission, folder.path)
+            resume_point = None if resumable is None else resumable.resume_point(same_world=world is not None)
+            run = _Run(
+                request, mission, conditions, robot, referee, folder, objects_at_start, began, resumable, resume_point
+            )
+            return _run(run, on_progress, control)
+
+
+def _fault_plan(request: RunRequest, mission: Mission) -> FaultPlan | None:
+    if request.faults is None or isinstance(request.faults, FaultPlan):
+        return request.faults
+    return read_plan(request.faults, mission.spec, mission.name)
+
+
+def _faulted(robot: Robot, plan: FaultPlan, request: RunRequest, backend: Backend) -> Robot:
+    """The device with its faults; closed again if they cannot be had."""
+    try:
+        disturber = backend.disturber(robot)
+        return FaultInjector(robot, plan, request.seed, disturber=disturber, may_kill=request.may_kill)
+    except BaseException:
+        robot.close()
+        raise
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A run that is about to begin, or to go on."""
+
+    request: RunRequest
+    mission: Mission
+    conditions: Conditions
+    robot: Robot
+    referee: Referee | None
+    folder: RunFolder
+    objects_at_start: list[TrueObject]
+    began: float
+    resumable: ResumableRun | None
+    resume_point: ResumePoint | None
+
+
+def _record(run: _Run) -> tuple[Recorder, CheckpointFile, CheckpointWriter]:
+    """The record and the checkpoints: new ones, or those of the run that goes on."""
+    told_first = description(run.request, run.mission, run.conditions, run.robot)
+    resumable, folder = run.resumable, run.folder
+    if resumable is None:
+        recorder = Recorder(folder.path / "run.mcap", told_first)
+        asked = run.request.as_json()
+        told = describe_run(asked, run.mission, run.conditions, installed_versions())
+        file = CheckpointFile.create(folder.path / CHECKPOINTS, told)
+        return recorder, file, CheckpointWriter(file, recorder)
+    part = folder.path / ".run.mcap.part"
+    recorder = Recorder(part, told_first)
+    try:
+        resumable.begin(part, recorder, run.resume_point is not None and run.resume_point.same_world)
+    except BaseException:
+        recorder.close()
+        part.unlink(missing_ok=True)
+        raise
+    return recorder, resumable.file, CheckpointWriter(resumable.file, recorder, resumable.row.number + 1)
+
+
+def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, control: Control | None) -> RunResult:
+    request, mission, robot, referee, folder = run.request, run.mission, run.robot, run.referee, run.folder
+    if run.resumable is None:
+        folder.write_text("mission.yaml", mission_yaml(request, mission))
+    ready = time.perf_counter()
+    recorder, store, checkpoints = _record(run)
+    injector = injector_in(robot)
+    record: Record = recorder if injector is None else ListeningRecord(recorder, injector)
+
+    def lost(stuck: Stuck, outcome: Outcome) -> None:
+        """The main thread is lost in a skill: write what is known, and end. It writes nothing itself any more."""
+        try:
+            record.event("stuck", outcome.end_s, {"node": stuck.node, "stack": stuck.stack})
+            told = score(request, mission, outcome, None) | {"wall_time_s": round(time.perf_counter() - ready, 3)}
+            _write_end(recorder, folder, told)
+            sys.stderr.write(f"glotouch: {outcome.reasons[-1]}\n{stuck.stack}")
+            sys.stderr.flush()
+        finally:
+            os._exit(3)
+
+    with closing(store), closing(recorder):
+        try:
+            outcome = run_mission(
+                mission,
+                robot,
+                record,
+                on_progress=on_progress,
+                control=control,
+                on_lost=lost,
+                checkpoints=checkpoints,
+                resume_point=run.resume_point,
+            )
+        except BaseException:  # it raises only before the first tick
+            recorder.close()
+            if run.resumable is None:
+                folder.clear()
+                folder.abandon()
+            raise
+        with deferred_interrupt(raising=False):  # it takes a moment, and is what the run was for
+            ended = time.perf_counter()
+            result = score(request, mission, outcome, referee)
+            result |= {"wall_time_s": round(ended - ready, 3), "wall_open_s": round(ready - run.began, 3)}
+            if run.resumable is not None:
+                result["resumed"] = [*run.resumable.before, run.resumable.told()]
+            if injector is not None:
+                root = outcome.chain[-1].as_dict() if outcome.chain else {"code": "", "message": ""}
+                injector.conclude(outcome.status, str(root["code"]), str(root["message"]), outcome.end_s)
+                result |= {"faults": injector.report(), "held_at_end": injector.held}
+            unwritten = _write_end(recorder, folder, result)
+            if referee is not None:
+                ends = {"start": truth(run.objects_at_start), "end": truth(referee.objects())}
+                truths = {**ends, "tip_B_m": referee.tip_B_m().tolist()}
+                unwritten += _unless_refused(lambda: folder.write_json("truth.json", truths))
+            if not unwritten:  # a run killed before this can be gone on with
+                unwritten = _unless_refused(lambda: store.note("ended", outcome.status))
+    report, warning = _report(folder.path) if request.report else (None, "")
+    return RunResult(folder.path, result, outcome, report, warning, tuple(unwritten))
+
+
+def _write_end(recorder: Recorder, folder: RunFolder, result: Mapping[str, Any]) -> list[str]:
+    """Each file by itself, so that a record the disk refused takes no result with it; what was refused."""
+    refused = _unless_refused(lambda: recorder.close(result))
+    return refused + _unless_refused(lambda: folder.write_json("result.json", result))
+
+
+def _unless_refused(write: Callable[[], None]) -> list[str]:
+    try:
+        write()
+    except GlotouchError as e:
+        return [str(e)]
+    return []
+
+
+def _report(folder: Path) -> tuple[Path | None, str]:
+    """A run whose report fails is still a run."""
+    from glotouch_bt.report import write_report
+
+    try:
+        return write_report(folder), ""
+    except (Exception, KeyboardInterrupt) as e:
+        return None, f"the report could not be made ({type(e).__name__}: {e}); `glotouch report {folder}` tries again"

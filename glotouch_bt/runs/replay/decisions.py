@@ -1,0 +1,114 @@
+"""The decisions of a run made again from the TouchSets it recorded: whatever changed before them, each stands alone.
+
+For the question "what would today's matcher have said of what was felt then?"; also for records of older versions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from glotouch_bt.mission import load_mission
+from glotouch_bt.perception import target_model
+from glotouch_bt.perception.recognition import MATCHERS, PadSpec, Ranking
+from glotouch_bt.perception.touch import TouchSet
+from glotouch_bt.report import RunRecord, read_run
+from glotouch_bt.robot import BadInput, GlotouchError
+from glotouch_bt.robot.scene import load_folder
+from glotouch_bt.runs.replay.run import replayed_robot
+
+
+@dataclass(frozen=True)
+class Decision:
+    """One decision, then and now.
+
+    Attributes:
+        stamp_s: Robot clock.
+        target: Name of the object looked for.
+        matcher: Which matcher decided.
+        then: As recorded: {matches: [{index, probability, ...}], accepted, reasons, ...}.
+        now: The ranking of the same TouchSets by the present code.
+    """
+
+    stamp_s: float
+    target: str
+    matcher: str
+    then: dict[str, Any]
+    now: Ranking
+
+    @property
+    def same(self) -> bool:
+        """The same candidate first, and accepted or not alike."""
+        first = self.then["matches"][0]["index"] if self.then.get("matches") else None
+        return first == self.now.best.index and bool(self.then.get("accepted")) == self.now.accepted
+
+    def __str__(self) -> str:
+        matches = self.then.get("matches") or [{"index": "none", "probability": None}]
+        was, is_ = matches[0], self.now.best
+        then = _words(was["index"], was.get("probability"), bool(self.then.get("accepted")), self.then.get("reasons"))
+        now = _words(is_.index, is_.probability, self.now.accepted, self.now.reasons)
+        head = f"t={self.stamp_s:.2f} s {self.target}"
+        return f"{head}: the same: {now}" if self.same else f"{head}: then {then}; now {now}"
+
+
+def replay_decisions(folder: Path, *, objects: Path | None = None) -> list[Decision]:
+    """Match again what each decision of a run had before it.
+
+    Args:
+        folder: The run's folder.
+        objects: Where its STL files are now, if not where they were.
+
+    Raises:
+        BadInput: There is no run, its mission cannot be loaded any more, or its record is not as this version reads it.
+    """
+    record = read_run(folder)
+    mission = load_mission(record.path.parent / "mission.yaml", objects=objects)
+    gripper = replayed_robot(record).description.gripper
+    pads = PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
+    made: list[Decision] = []
+    felt: dict[int, TouchSet] = {}
+    for event in record.events:
+        if event.kind == "touchset":
+            touchset = _touchset(event.data.get("touchset"), record)
+            felt[touchset.candidate.index] = touchset  # felt again: the newest holds all layers
+        elif event.kind == "ranking":
+            target, matcher = str(event.data["target"]), str(event.data.get("matcher", "likelihood"))
+            then = event.data["ranking"]
+            known = [m["index"] for m in then.get("matches", [])]
+            given = tuple(felt[i] for i in felt if i in known)
+            if not given or matcher not in MATCHERS:
+                continue
+            model = target_model(load_folder(mission.world.objects.folder, (target,))[0], pads)
+            made.append(Decision(event.stamp_s, target, matcher, then, MATCHERS[matcher](model, given)))
+    return made
+
+
+def _touchset(data: object, record: RunRecord) -> TouchSet:
+    try:
+        return msgspec.convert(_finite(data), TouchSet, dec_hook=_array, strict=False)
+    except (msgspec.ValidationError, GlotouchError, ValueError) as e:
+        raise BadInput(f"{record.path}: a TouchSet in it is not as this version reads it ({e})") from e
+
+
+def _finite(data: Any) -> Any:
+    """JSON has no NaN: the record wrote null for it."""
+    if isinstance(data, dict):
+        return {k: _finite(v) for k, v in data.items()}
+    if isinstance(data, list):
+        return [_finite(v) for v in data]
+    return float("nan") if data is None else data
+
+
+def _array(_: object, value: Any) -> np.ndarray[Any, Any]:
+    array = np.asarray(value, dtype=np.float64)
+    return array if array.size else array.reshape(0, 0)
+
+
+def _words(index: object, probability: float | None, accepted: bool, reasons: Any) -> str:
+    p = "" if probability is None else f", P {probability:.3f}"
+    verdict = "accepted" if accepted else f"not accepted ({'; '.join(reasons or ())})"
+    return f"candidate {index}{p}, {verdict}"

@@ -1,0 +1,107 @@
+"""The request for a run, and its result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from glotouch_bt.faults import FaultPlan
+from glotouch_bt.mission.execution import Outcome
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """A request for a run.
+
+    Attributes:
+        mission: Path or shipped name.
+        backend: Name of a registered backend.
+        seed: Source of every random draw, 0 .. 2**32 - 1.
+        settings: `--set` values: mission parameters, and what no parameter takes goes to the backend.
+        objects: Folder of STL files instead of the world's.
+        conditions: Path or shipped name.
+        out: The run's folder (default: runs/<time>-<mission>-s<seed>).
+        faults: A fault plan: a path, the name of a shipped one, or one that has been read.
+        may_kill: A fault may kill this process: it does nothing but this run.
+        report: Make report.html.
+        overwrite: Replace an earlier run in `out`; otherwise `out` must be new or empty.
+    """
+
+    mission: str
+    backend: str = "mujoco"
+    seed: int = 0
+    settings: Mapping[str, str] = field(default_factory=dict)
+    objects: Path | None = None
+    conditions: str = "nominal"
+    out: Path | None = None
+    faults: str | Path | FaultPlan | None = None
+    may_kill: bool = False
+    report: bool = True
+    overwrite: bool = True
+
+    def as_json(self) -> dict[str, Any]:
+        """What is needed to open the same robot and mission again."""
+        plan = self.faults.name if isinstance(self.faults, FaultPlan) else self.faults
+        return {
+            "mission": _absolute(self.mission),
+            "backend": self.backend,
+            "seed": self.seed,
+            "settings": dict(self.settings),
+            "objects": None if self.objects is None else str(self.objects.resolve()),
+            "conditions": _absolute(self.conditions),
+            "faults": None if plan is None else str(plan),
+        }
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """The result of a run.
+
+    Attributes:
+        folder: The run's folder.
+        result: The content of result.json.
+        outcome: How it ended.
+        report: Path of report.html, or None if none could be made.
+        warning: What went wrong after the run (a report that could not be made), or empty.
+        unwritten: What of the record and the result could not be written, and why.
+    """
+
+    folder: Path
+    result: Mapping[str, Any]
+    outcome: Outcome
+    report: Path | None
+    warning: str = ""
+    unwritten: tuple[str, ...] = ()
+
+    @property
+    def status(self) -> Literal["success", "failure", "aborted"]:
+        """End of the mission: success, failure, or aborted by a stop or a fault."""
+        return self.outcome.status
+
+    @property
+    def reasons(self) -> list[str]:
+        """Reasons for a failure or an abort, root cause last; empty after a success."""
+        return self.outcome.reasons
+
+    @property
+    def outputs(self) -> dict[str, Any]:
+        """Last value of each key that a skill wrote, as JSON data from the record (large arrays as a summary)."""
+        from glotouch_bt.report import read_run
+
+        return {write.key: write.value for write in read_run(self.folder).ports}
+
+    @property
+    def exit_code(self) -> int:
+        """0 done, 1 the mission failed, 3 a safety stop or failure (of the disk, too), 130 interrupted."""
+        if isinstance(self.outcome.error, KeyboardInterrupt):
+            return 130
+        if self.unwritten:
+            return 3
+        return {"success": 0, "failure": 1, "aborted": 3}[self.outcome.status]
+
+
+def _absolute(given: str) -> str:
+    """A file by its whole path, so that it is found from anywhere; a shipped name as it is."""
+    return str(Path(given).resolve()) if Path(given).suffix in (".yaml", ".yml") and Path(given).is_file() else given

@@ -1,0 +1,120 @@
+"""A run in words and numbers: its description before it begins, its result when it has ended.
+
+The truth of a simulated world is looked at here, after the run, for scoring.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from glotouch_bt.version import __version__
+from glotouch_bt.mission import Mission
+from glotouch_bt.mission.execution import Outcome
+from glotouch_bt.mission.read import shown
+from glotouch_bt.mission.record import to_json
+from glotouch_bt.robot import Conditions, Robot
+from glotouch_bt.robot.simulation import Referee, TrueObject
+from glotouch_bt.runs.request import RunRequest
+
+RECORDED_PACKAGES = ("mujoco", "numpy", "pin", "py_trees", "ruckig", "scipy", "trimesh")
+
+
+def mission_yaml(request: RunRequest, mission: Mission) -> str:
+    """The resolved mission, headed by how it was run."""
+    head = f"# backend {request.backend}, seed {request.seed}, conditions {request.conditions}\n"
+    return head + mission.resolved_yaml()
+
+
+def description(request: RunRequest, mission: Mission, conditions: Conditions, robot: Robot) -> dict[str, object]:
+    """What is known before the run; goes into the record. With `robot` a replay needs no backend."""
+    world = mission.world
+    objects = dataclasses.replace(world.objects, folder=Path(shown(world.objects.folder)))
+    return {
+        "mission": mission.name,
+        "backend": request.backend,
+        "seed": request.seed,
+        "conditions": conditions,
+        "parameters": dict(mission.parameters),
+        "pose_B_K": world.container.pose_B_K,
+        "container": world.container,
+        "probe": world.probe,
+        "holder": world.holder,
+        "objects": objects,
+        "robot": {"description": robot.description, "limits": robot.limits, "period_s": robot.period_s},
+        "versions": installed_versions(),
+    }
+
+
+def score(request: RunRequest, mission: Mission, outcome: Outcome, referee: Referee | None) -> dict[str, Any]:
+    """result.json but for wall times: how it ended, and what a referee says of it."""
+    found = outcome.found
+    target = _target(mission)
+    retrieved: str | None = None
+    correct: bool | None = None
+    peak = found.peak_force_N
+    if referee is not None:
+        held = [o.name for o in referee.objects() if o.in_gripper]
+        retrieved = held[0] if held else None
+        correct = retrieved == target if target is not None else None
+        peak = referee.peak_force_N()
+    return {
+        "mission": mission.name,
+        "backend": request.backend,
+        "seed": request.seed,
+        "conditions": Path(request.conditions).stem,
+        "status": outcome.status,
+        "reasons": outcome.reasons,
+        "reason_chain": [to_json(f.as_dict()) for f in outcome.chain],
+        "target": target,
+        "retrieved": retrieved,
+        "correct": correct,
+        "ranking": found.ranking,
+        "candidates": found.candidates,
+        "contacts": found.contacts,
+        "sim_time_s": round(outcome.end_s - outcome.start_s, 6),
+        "paused_s": round(outcome.paused_s, 6),
+        "guards": dict(outcome.guards),
+        "ending": outcome.ending,
+        "ticks": outcome.ticks,
+        "probe_path_m": round(found.probe_path_m, 6),
+        "peak_force_N": round(float(peak), 6),
+        "sensed_peak_force_N": round(found.peak_force_N, 6),
+        "parameters": {k: _portable(k, v, mission) for k, v in mission.parameters.items()},
+        "versions": installed_versions(),
+    }
+
+
+def _target(mission: Mission) -> str | None:
+    """The object the mission is after: its first stl parameter, by stem."""
+    for name in mission.stl_parameters:
+        if name in mission.parameters:
+            return _stem(str(mission.parameters[name]))
+    return None
+
+
+def _stem(given: str) -> str:
+    return Path(given).stem if given.lower().endswith(".stl") else given
+
+
+def _portable(name: str, value: object, mission: Mission) -> object:
+    """A parameter as result.json has it: no path of this machine."""
+    return _stem(str(value)) if name in mission.stl_parameters else value
+
+
+def truth(objects: list[TrueObject]) -> list[Any]:
+    """True objects as JSON data."""
+    return [to_json(o) for o in objects]
+
+
+def installed_versions() -> dict[str, str]:
+    """Of this package and of those whose version may change a result."""
+    found = {"glotouch-bt": __version__}
+    for package in RECORDED_PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found
