@@ -1,4 +1,4 @@
-"""What touch tells: contacts and outlines (touch), where to probe next (search), which object it is (recognition)."""
+"""Perception: touch (contacts and outlines), search (where to probe) and recognition (which object it is)."""
 
 from typing import TYPE_CHECKING
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.perception.search import Move, Plan, SearchMap, admit, joins, of_another, part_of, trace
+from glotouch_bt.perception.search import Move, SearchMap, SearchPlan, admit, joins, of_another, part_of, trace
 from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
@@ -117,6 +117,6 @@ class OrbitProbe(Skill):
         self.found, self.complete = len(admitted.candidates), admitted.belief.complete
 
 
-def _back_to(first: Contact, clearance_m: float) -> Plan[None]:
+def _back_to(first: Contact, clearance_m: float) -> SearchPlan[None]:
     """Over the object, and down again beside its first contact."""
     yield Move("hop", first.tip_K_m[:2] - clearance_m * first.approach_K[:2])

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from glotouch_bt.motion import Motion
-from glotouch_bt.perception.search import BallMove, Met, Top, TopPlan, TopRule, rounds, top_plan
+from glotouch_bt.perception.search import BallMove, BallOutcome, Top, TopPlan, TopRule, rounds, top_plan
 from glotouch_bt.perception.touch import Candidate, GuardParams
 from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
@@ -108,7 +108,7 @@ class TouchTop(Skill):
             except StopIteration as end:
                 return end.value  # type: ignore[no-any-return]
 
-    def _make(self, prober: Prober, move: BallMove) -> Motion[Met]:
+    def _make(self, prober: Prober, move: BallMove) -> Motion[BallOutcome]:
         p = self.params
         goal, tip = move.goal_K_m, prober.tip_K_m
         try:
@@ -124,10 +124,10 @@ class TouchTop(Skill):
                 probed = yield from prober.move(goal, speed, any_direction=move.kind != "down")
                 if probed.contact is not None:
                     self.event("contact", contact=probed.contact)
-                    return Met(prober.tip_K_m, probed.contact.tip_K_m)
+                    return BallOutcome(prober.tip_K_m, probed.contact.tip_K_m)
         except MotionRefused as refusal:
             if move.kind not in ("pass", "feel"):
                 raise
             self.event("note", text=f"a pass above candidate {self.candidate.index} was left out: {refusal}")
-            return Met(prober.tip_K_m, refused=True)
-        return Met(prober.tip_K_m)
+            return BallOutcome(prober.tip_K_m, refused=True)
+        return BallOutcome(prober.tip_K_m)

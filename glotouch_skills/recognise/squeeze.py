@@ -118,11 +118,11 @@ class Squeeze(Skill):
         if not (yield from hand.move_to(height_m)):
             return None  # caught under something that sticks out
         try:
-            layer, yielding = yield from hand.close()
+            layer, object_motion = yield from hand.close()
         except MotionRefused as refusal:
             self.event("note", text=f"a closure {height_m * 1e3:.0f} mm above the floor was given up: {refusal}")
             return None
-        if (moved := disturbance(hand.candidate, layer, yielding)) is not None:
+        if (moved := disturbance(hand.candidate, layer, object_motion)) is not None:
             self.event("object_moved", **moved)
         return layer
 

@@ -268,11 +268,11 @@ class TouchNext(Skill):
                 yield from hand.rise()
                 raise MotionRefused("squeeze", "the open hand is caught under something")
             try:
-                layer, yielding = yield from hand.close()
+                layer, object_motion = yield from hand.close()
             except MotionRefused:
                 yield from hand.rise()
                 raise
-        if (moved := disturbance(hand.candidate, layer, yielding)) is not None:
+        if (moved := disturbance(hand.candidate, layer, object_motion)) is not None:
             self.event("object_moved", **moved)
         return hand, layer
 

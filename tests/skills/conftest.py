@@ -15,7 +15,7 @@ from py_trees.common import Status
 
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.motion import Arm
-from glotouch_bt.perception.touch import Candidate, Carried, Contact, Contour, fit_contour
+from glotouch_bt.perception.touch import Candidate, Contact, Contour, Payload, fit_contour
 from glotouch_bt.robot import (
     HOLD,
     Array,
@@ -127,7 +127,7 @@ class BenchRobot(FakeRobot):
         velocity = (position[-1] - position[0]) / span_s
         change = velocity - (velocity if self.velocity_B is None else self.velocity_B)
         self.velocity_B = velocity
-        hand = Carried.hand(self.description.gripper, self.world.probe)
+        hand = Payload.hand(self.description.gripper, self.world.probe)
         return np.asarray(hand.wrench_S(pose.rotation.T @ change / self.period_s))
 
 

@@ -17,7 +17,7 @@ from glotouch_bt.bench.detection.signals import Hand, MoveKind
 from glotouch_bt.bench.detection.simulated import WORLD, FreeMotion, SimulatedProbe, free_motion, push_once
 from glotouch_bt.bench.statistics import wilson
 from glotouch_bt.mission.read import load_conditions, load_world
-from glotouch_bt.perception.touch import Carried, GuardParams
+from glotouch_bt.perception.touch import GuardParams, Payload
 from glotouch_bt.robot import RobotDescription
 from glotouch_bt.skill.probing import LISTENING_ACCELERATION_M_S2, LISTENING_JERK_M_S3
 
@@ -118,7 +118,7 @@ def _synthetic(
     """Measure false alarms with and without inertia compensation, and the share of pushes detected against force."""
     conditions, probe, gripper = load_conditions(name), load_world(WORLD).probe, description.gripper
     tip_P = np.array([0.0, 0.0, probe.grasp_to_tip_m])
-    hand = Hand(Carried.hand(gripper, probe), tip_P, gripper.pose_E_P)
+    hand = Hand(Payload.hand(gripper, probe), tip_P, gripper.pose_E_P)
     pace, guard = Pace(LISTENING_ACCELERATION_M_S2, LISTENING_JERK_M_S3), GuardParams()
     result: dict[str, Any] = {}
     for key, compensate, hours in (("false_alarms", True, study.hours), ("uncompensated", False, 0.1 * study.hours)):

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from glotouch_bt.motion import rest_to_rest
-from glotouch_bt.perception.touch import Carried, ContactGuard, GuardParams, MeasuredInertia, Onset, fit_baseline
+from glotouch_bt.perception.touch import ContactGuard, GuardParams, MeasuredInertia, Onset, Payload, fit_baseline
 from glotouch_bt.robot import Array, Conditions, GripperState, Observation, Pose
 
 RATE_HZ, PERIOD_S = 1000.0, 0.01
@@ -36,7 +36,7 @@ class Hand:
         pose_E_P: P in E.
     """
 
-    carried: Carried
+    carried: Payload
     tip_P_m: Array
     pose_E_P: Pose
 
@@ -64,10 +64,10 @@ class FreeMove:
     direction_B: Array
 
 
-def wrong(carried: Carried, conditions: Conditions, rng: np.random.Generator) -> Carried:
+def wrong(carried: Payload, conditions: Conditions, rng: np.random.Generator) -> Payload:
     """Draw the true payload for a configured one."""
     mass = carried.mass_kg * (1.0 + conditions.payload_mass_error * rng.standard_normal())
-    return Carried(mass, carried.com_S_m + conditions.payload_com_error_m * rng.standard_normal(3))
+    return Payload(mass, carried.com_S_m + conditions.payload_com_error_m * rng.standard_normal(3))
 
 
 class Wrist:

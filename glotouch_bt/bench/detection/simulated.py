@@ -14,7 +14,7 @@ from py_trees.common import Status
 from glotouch_bt.bench.detection.signals import wrong
 from glotouch_bt.mission.read import SkillShelf, load_conditions, load_world
 from glotouch_bt.motion import Arm, Motion
-from glotouch_bt.perception.touch import Carried, GuardParams
+from glotouch_bt.perception.touch import GuardParams, Payload
 from glotouch_bt.robot import HOLD, Array, BadInput, MotionRefused, Observation, Robot, load_backend
 from glotouch_bt.robot.simulation import Referee
 from glotouch_bt.skill import Context
@@ -77,7 +77,7 @@ class SimulatedProbe:
         self.context = Context(self.world, self.arm, self.robot, self, self.robot.observe())
         self.rng = np.random.default_rng([seed, 11])
         self.tool: HeldTool = self._pick_up()
-        carried = wrong(Carried.hand(self.arm.description.gripper, self.world.probe), known, self.rng)
+        carried = wrong(Payload.hand(self.arm.description.gripper, self.world.probe), known, self.rng)
         self.prober = Prober(self.context, self.tool, GuardParams(), carried=carried)
 
     def event(self, kind: str, stamp_s: float, data: Mapping[str, object]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol, TypeVar
 
-from glotouch_bt.perception.search import Felt, Move, Plan
+from glotouch_bt.perception.search import Move, MoveOutcome, SearchPlan
 
 T = TypeVar("T")
 
@@ -12,12 +12,12 @@ T = TypeVar("T")
 class Executes(Protocol):
     """Anything that executes moves."""
 
-    def execute(self, move: Move) -> Felt:
+    def execute(self, move: Move) -> MoveOutcome:
         """Execute one move and return what was felt."""
         ...
 
 
-def drive(plan: Plan[T], world: Executes) -> T:
+def drive(plan: SearchPlan[T], world: Executes) -> T:
     """Execute every move of a plan; return the plan's result."""
     try:
         move = next(plan)

@@ -10,8 +10,8 @@ from glotouch_bt.bench.planar.drive import drive
 from glotouch_bt.bench.planar.world import PlanarWorld
 from glotouch_bt.mission.read import SkillShelf
 from glotouch_bt.perception.search import (
-    Felt,
     Move,
+    MoveOutcome,
     SearchMap,
     SearchPolicy,
     admit,
@@ -74,7 +74,7 @@ class _Budget:
     def __init__(self, world: PlanarWorld, budget_m: float) -> None:
         self._world, self._budget_m, self._moves = world, budget_m, 0
 
-    def execute(self, move: Move) -> Felt:
+    def execute(self, move: Move) -> MoveOutcome:
         """Execute a move if the budget allows."""
         self._moves += 1
         if self._world.travel_m >= self._budget_m or self._moves > MAX_MOVES:

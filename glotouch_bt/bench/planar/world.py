@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from glotouch_bt.bench.planar.section import SENSING_HEIGHT_M, FeltSection
-from glotouch_bt.perception.search import Felt, Move, MoveKind
-from glotouch_bt.perception.touch import Contact, contact_point, pushed
+from glotouch_bt.perception.search import Move, MoveKind, MoveOutcome
+from glotouch_bt.perception.touch import Contact, contact_point, estimate_push
 from glotouch_bt.robot import Array
 
 MARCH_M = 0.0005
@@ -115,7 +115,7 @@ class PlanarWorld:
         """Add a log entry at the current travel."""
         self.log.append(Logged(self.travel_m, what, index))
 
-    def execute(self, move: Move) -> Felt:
+    def execute(self, move: Move) -> MoveOutcome:
         """Execute one move; the planar path length adds to the travel."""
         goal = np.asarray(move.goal_K_m, dtype=np.float64)[:2]
         if move.kind == "hop":
@@ -128,20 +128,20 @@ class PlanarWorld:
             return felt
         return self._guarded(move.kind, goal)
 
-    def _refuse(self, why: str) -> Felt:
+    def _refuse(self, why: str) -> MoveOutcome:
         self.note(f"refused: {why}")
-        return Felt(self.tip_K_m, np.zeros((0, 2)), refused=why)
+        return MoveOutcome(self.tip_K_m, np.zeros((0, 2)), refused=why)
 
-    def _go(self, goal: Array, contact: Contact | None) -> Felt:
+    def _go(self, goal: Array, contact: Contact | None) -> MoveOutcome:
         """Lowered, in a straight line."""
         length = float(np.linalg.norm(goal - self.tip_K_m))
         n = max(int(np.ceil(length / PATH_M)), 1)
         path = self.tip_K_m + np.linspace(0.0, 1.0, n + 1)[:, None] * (goal - self.tip_K_m)
         self.travel_m += length
         self.tip_K_m = goal
-        return Felt(goal, path, contact)
+        return MoveOutcome(goal, path, contact)
 
-    def _hop(self, goal: Array) -> Felt:
+    def _hop(self, goal: Array) -> MoveOutcome:
         if bool((np.abs(goal) > self.half_m).any()):
             return self._refuse("a wall is in the way")
         self.travel_m += float(np.linalg.norm(goal - self.tip_K_m))
@@ -154,11 +154,11 @@ class PlanarWorld:
             down = np.array([0.0, 0.0, -1.0])
             tip = np.array([*goal, height])
             contact = Contact(0.0, tip, down, -down, goal.copy(), self._model.touch_force_N)
-            return Felt(goal, np.zeros((0, 2)), contact)
+            return MoveOutcome(goal, np.zeros((0, 2)), contact)
         self.lowered = True
-        return Felt(goal, goal[None, :].copy())
+        return MoveOutcome(goal, goal[None, :].copy())
 
-    def _guarded(self, kind: MoveKind, goal: Array) -> Felt:
+    def _guarded(self, kind: MoveKind, goal: Array) -> MoveOutcome:
         way = goal - self.tip_K_m
         length = float(np.linalg.norm(way))
         if length < 1e-9:
@@ -265,7 +265,7 @@ class PlanarWorld:
         felt = onset + m.localisation_sd_m * self._rng.normal(size=2)
         direction = _turned(reaction, m.direction_sd_rad * float(self._rng.normal()))
         point = contact_point(felt, self.tip_radius_m, u, direction)
-        way = pushed(way, direction)
+        way = estimate_push(way, direction)
         tip = np.array([*felt, SENSING_HEIGHT_M])
         return Contact(
             0.0, tip, np.array([*u, 0.0]), np.array([*direction, 0.0]), point, m.touch_force_N, pushed_K_m=way

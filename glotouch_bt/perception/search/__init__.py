@@ -1,8 +1,8 @@
-"""Where to probe next. Pure: a map in, moves out."""
+"""Pure planners of tactile exploration: search for objects, outline tracing and height measurement."""
 
 from glotouch_bt.perception.search.candidates import Admitted, admit, elsewhere_m, joins, of_another, part_of, refined
 from glotouch_bt.perception.search.map import Exclusion, SearchMap
-from glotouch_bt.perception.search.moves import Felt, Move, MoveKind, Plan, T
+from glotouch_bt.perception.search.moves import Move, MoveKind, MoveOutcome, SearchPlan, T
 from glotouch_bt.perception.search.policies import (
     PAPER_PASSES,
     POLICIES,
@@ -15,8 +15,8 @@ from glotouch_bt.perception.search.policies import (
 )
 from glotouch_bt.perception.search.routes import Routes, segment_is_free
 from glotouch_bt.perception.search.seeking import Sought, seek
-from glotouch_bt.perception.search.top import BallMove, Met, Top, TopPlan, TopRule, rounds, top_plan
-from glotouch_bt.perception.search.tracing import Trace, TraceParams, trace, trace_more
+from glotouch_bt.perception.search.top import BallMove, BallOutcome, Top, TopPlan, TopRule, rounds, top_plan
+from glotouch_bt.perception.search.tracing import OutlineTrace, TraceParams, trace, trace_more
 
 __all__ = [
     "PAPER_PASSES",
@@ -26,12 +26,12 @@ __all__ = [
     "Exclusion",
     "ExpectationParams",
     "ExpectedFind",
-    "Felt",
-    "Met",
+    "MoveOutcome",
+    "BallOutcome",
     "Move",
     "MoveKind",
     "NearestFrontier",
-    "Plan",
+    "SearchPlan",
     "Routes",
     "SearchMap",
     "SearchPolicy",
@@ -41,7 +41,7 @@ __all__ = [
     "Top",
     "TopPlan",
     "TopRule",
-    "Trace",
+    "OutlineTrace",
     "TraceParams",
     "admit",
     "elsewhere_m",

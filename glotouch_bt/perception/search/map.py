@@ -1,5 +1,4 @@
-"""What the search knows: where the tip has been, what is traced, what is given up. A frozen value in K's plane,
-metres."""
+"""Map of a search: free path, traced objects and dropped positions. Frozen, in the plane of K, metres."""
 
 from __future__ import annotations
 
@@ -14,22 +13,24 @@ from glotouch_bt.perception.touch import Contact, Contour, signed_distance
 from glotouch_bt.robot import Array, ParamError, frozen_array
 
 PATH_STEP_M = 0.002
+"""Spacing of the path samples."""
 GRID_STEP_M = 0.005
-LIMB_M = 0.010
-"""Most that contacts outside the fitted outline may widen its envelope: gaps between objects are 30 mm."""
+"""Spacing of grids over the permitted region."""
+MAX_PROTRUSION_M = 0.010
+"""Maximum widening of an envelope by contacts outside the outline; gaps between objects are 30 mm."""
 KNOWN_M = 0.005
-"""A contact this near to the envelope of a traced object is one with that object: the next stands farther off."""
+"""Maximum distance from the envelope of a traced object at which a contact belongs to it."""
 FACING = -0.4
-"""Cosine between the force on the ball and the direction from an object's middle below which it is not the object's."""
+"""Minimum cosine between the force on the ball and the direction from an object's centre to the contact for the contact
+to belong to the object."""
 Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class Exclusion:
-    """A traced object and how far the tip's centre keeps from its outline (tip radius and clearance).
+    """A region that the tip's centre avoids: a contour dilated by a margin (tip radius and clearance).
 
-    Compared by identity: two exclusions are the same if they are one. `traced=False`: a place to keep out of, no
-    object.
+    Compared by identity. `traced=False` marks an obstacle that is no traced object.
     """
 
     contour: Contour
@@ -37,22 +38,22 @@ class Exclusion:
     traced: bool = True
 
     def clearance(self, points_K_m: Array) -> Array:
-        """(n,) distance of points (n, 2) from the envelope; negative inside."""
+        """Return the distances (n,) of points (n, 2) from the envelope, negative inside."""
         return signed_distance(self.contour, points_K_m) - self.margin_m
 
 
 @dataclass(frozen=True, eq=False)
 class SearchMap:
-    """The state of a search.
+    """State of a search.
 
     Attributes:
-        half_extent_m: (2,) the tip's centre may be at |x| <= half[0], |y| <= half[1] in K.
-        expected: How many objects there are.
-        found: How many are traced.
-        path_K_m: (n, 2) where the tip's centre has been at sensing height, every 2 mm, oldest first.
-        exclusions: Traced objects.
-        dropped: (m, 2) places given up: frontiers that cannot be reached, contacts that gave no object.
-        hints: Contacts with something that was not what was being traced: where to look first.
+        half_extent_m: (2,) limits of the tip's centre: |x| <= half[0], |y| <= half[1] in K.
+        expected: Number of objects to find.
+        found: Number of traced objects.
+        path_K_m: (n, 2) positions of the tip's centre at sensing height, every 2 mm, oldest first.
+        exclusions: Traced objects and obstacles.
+        dropped: (m, 2) positions given up: unreachable frontiers, contacts without an object.
+        hints: Contacts with other objects during a trace; the search visits them first.
     """
 
     half_extent_m: Array
@@ -65,7 +66,7 @@ class SearchMap:
 
     @classmethod
     def blank(cls, half_extent_m: npt.ArrayLike, expected: int) -> SearchMap:
-        """Nothing explored yet.
+        """Return a map without any exploration.
 
         Raises:
             ParamError: A half extent that is not positive, or no object expected.
@@ -80,7 +81,7 @@ class SearchMap:
         return cls(half, expected, 0, none, (), none)
 
     def with_path(self, points_K_m: npt.ArrayLike) -> SearchMap:
-        """With an executed, connected stretch of path (n, 2 or 3), resampled to one point every 2 mm of its length."""
+        """Add an executed, connected path (n, 2 or 3), resampled to 2 mm."""
         p = np.asarray(points_K_m, dtype=np.float64)
         if p.ndim != 2 or p.shape[1] < 2 or not np.isfinite(p).all():
             raise ParamError("points_K_m", p.shape, "(n, 2) finite positions")
@@ -96,24 +97,23 @@ class SearchMap:
         return replace(self, path_K_m=_frozen(np.concatenate([self.path_K_m, new])))
 
     def with_exclusion(self, contour: Contour, margin_m: float, *, new: bool = True) -> SearchMap:
-        """With one more object traced; the tip's centre keeps `margin_m` from its outline.
+        """Add a traced object; the tip's centre keeps `margin_m` from its outline.
 
-        `new=False`: more of an object that was counted before.
-
-        Contacts that stick out of the outline (limbs of a figure) widen the margin, by 10 mm at most.
+        `new=False` updates an object that is already counted. Contacts outside the outline widen the margin, by 10 mm
+        at most.
         """
         if not (np.isfinite(margin_m) and margin_m >= 0):
             raise ParamError("margin_m", margin_m, "finite and not negative")
-        out = float(np.clip(np.max(contour.residuals_m, initial=0.0), 0.0, LIMB_M))
+        out = float(np.clip(np.max(contour.residuals_m, initial=0.0), 0.0, MAX_PROTRUSION_M))
         return replace(self, found=self.found + new, exclusions=(*self.exclusions, Exclusion(contour, margin_m + out)))
 
     def with_dropped(self, point_K_m: npt.ArrayLike) -> SearchMap:
-        """With a place (2,) that the search shall not try again."""
+        """Add a position (2,) that the search must not try again."""
         point = np.asarray(point_K_m, dtype=np.float64).ravel()[None, :2]
         return replace(self, dropped=_frozen(np.concatenate([self.dropped, point])))
 
     def with_obstacle(self, point_K_m: npt.ArrayLike, radius_m: float) -> SearchMap:
-        """With a disc about a place (2,) that the tip's centre shall not enter; it counts as no object."""
+        """Add a disc that the tip's centre must not enter; it does not count as an object."""
         if not (np.isfinite(radius_m) and radius_m > 0):
             raise ParamError("radius_m", radius_m, "finite and positive")
         point = np.asarray(point_K_m, dtype=np.float64).ravel()[:2]
@@ -121,11 +121,11 @@ class SearchMap:
         return replace(self, exclusions=(*self.exclusions, Exclusion(disc, 0.0, traced=False)))
 
     def with_hints(self, contacts: tuple[Contact, ...]) -> SearchMap:
-        """With these hints, and no others."""
+        """Replace the hints."""
         return replace(self, hints=contacts)
 
     def clearance(self, points_K_m: Array) -> Array:
-        """(n,) distance of points (n, 2) from the nearest envelope; negative inside one, infinite if there is none."""
+        """Return the distances (n,) of points (n, 2) from the nearest envelope, negative inside, inf without one."""
         points = np.asarray(points_K_m, dtype=np.float64).reshape(-1, 2)
         nearest = np.full(len(points), np.inf)
         for e in self.exclusions:
@@ -133,12 +133,11 @@ class SearchMap:
         return nearest
 
     def inside_exclusion(self, points_K_m: Array) -> Mask:
-        """(n,) True for points (n, 2) inside any traced object's envelope."""
+        """Return (n,) True for points (n, 2) inside any envelope."""
         return np.asarray(self.clearance(points_K_m) < 0.0)
 
     def knows(self, contact: Contact) -> bool:
-        """True if a contact belongs to a traced object: in its envelope or hardly outside, on a surface that does not
-        face the object's middle."""
+        """Return True if a contact belongs to a traced object: near its envelope, on an outward-facing surface."""
         tip = contact.tip_K_m[:2]
         for e in self.exclusions:
             out = tip - e.contour.centre_K_m
@@ -148,18 +147,18 @@ class SearchMap:
         return False
 
     def inside_extent(self, points_K_m: Array) -> Mask:
-        """(n,) True for points (n, 2) where the tip's centre may be."""
+        """Return (n,) True for points (n, 2) that the tip's centre may visit."""
         return np.asarray(np.all(np.abs(points_K_m) <= self.half_extent_m + 1e-9, axis=1))
 
     def path_distance(self, points_K_m: Array) -> Array:
-        """(n,) distance of points (n, 2) from the nearest path sample; infinite without a path."""
+        """Return the distances (n,) of points (n, 2) from the nearest path sample; inf without a path."""
         points = np.asarray(points_K_m, dtype=np.float64).reshape(-1, 2)
         if len(self.path_K_m) == 0:
             return np.full(len(points), np.inf)
         return np.asarray(self._tree.query(points)[0], dtype=np.float64)
 
     def covered_fraction(self, coverage_radius_m: float) -> float:
-        """Part of the permitted region that is near the path or inside an envelope, on a 5 mm grid."""
+        """Return the fraction of the permitted region that is near the path or inside an envelope, on a 5 mm grid."""
         axes = [np.linspace(-h, h, max(int(2 * h / GRID_STEP_M) + 1, 2)) for h in self.half_extent_m]
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
         covered = (self.path_distance(grid) <= coverage_radius_m) | self.inside_exclusion(grid)
@@ -167,7 +166,7 @@ class SearchMap:
 
     @property
     def complete(self) -> bool:
-        """All expected objects are traced."""
+        """True if all expected objects are traced."""
         return self.found >= self.expected
 
     @cached_property

@@ -1,8 +1,7 @@
-"""What an exploration plan asks for and what it is told: moves of the ball in the plane, and what was felt on the way.
+"""Interface of an exploration plan: a generator that yields a `Move` and receives its `MoveOutcome`.
 
-A plan is a generator of `Move`s that is sent a `Felt` for each. It knows no robot: a skill drives it with the arm, the
-planar simulator of `glotouch_bt.study` with geometry alone, so the code that is compared over thousands of layouts is
-the code that explores.
+A plan knows no robot. A skill drives it with the arm and `glotouch_bt.bench.planar` with geometry alone, so the
+benchmarked code is the code that explores.
 """
 
 from __future__ import annotations
@@ -17,14 +16,14 @@ from glotouch_bt.robot import Array
 T = TypeVar("T")
 
 MoveKind = Literal["sweep", "step", "probe", "retreat", "hop"]
-"""How the ball goes; speeds and guards are the driver's.
+"""Kind of motion; the driver chooses speeds and guards.
 
-sweep    straight through unexplored space at sensing height; what opposes the motion stops it.
-step     straight beside an object at sensing height; any touch stops it, a graze too.
-probe    straight towards an object at sensing height; what opposes the motion stops it.
-retreat  straight away from a contact just made; unguarded and short.
-hop      up, across above the objects, and down again to sensing height; what it lands on stops it (`approach_K`
-         is then straight down, and the ball is left standing above what it met).
+sweep    straight through unexplored space at sensing height; an opposing force stops it.
+step     straight beside an object at sensing height; any contact stops it.
+probe    straight towards an object at sensing height; an opposing force stops it.
+retreat  straight away from the last contact; unguarded and short.
+hop      up, across above the objects, and down to sensing height; a contact from above stops it (`approach_K` points
+         down then, and the ball stays above the object).
 """
 
 
@@ -34,7 +33,7 @@ class Move:
 
     Attributes:
         kind: See `MoveKind`.
-        goal_K_m: (2,) where the ball's centre shall go.
+        goal_K_m: (2,) goal of the ball's centre.
     """
 
     kind: MoveKind
@@ -42,14 +41,14 @@ class Move:
 
 
 @dataclass(frozen=True)
-class Felt:
-    """What came of a move.
+class MoveOutcome:
+    """Outcome of a move.
 
     Attributes:
-        tip_K_m: (2,) where the ball's centre is now.
-        path_K_m: (n, 2) where it has been AT SENSING HEIGHT during the move, in order; may be empty.
-        contact: What stopped it, or None.
-        refused: Why the move was not made (out of reach, in the way of a wall), or "". The ball is where it was.
+        tip_K_m: (2,) position of the ball's centre after the move.
+        path_K_m: (n, 2) its positions AT SENSING HEIGHT during the move, in order; may be empty.
+        contact: Contact that stopped the move, or None.
+        refused: Reason why the move was not executed (reach, clearance), or "".
     """
 
     tip_K_m: Array
@@ -58,5 +57,5 @@ class Felt:
     refused: str = ""
 
 
-Plan = Generator[Move, Felt, T]
-"""A plan that ends in a T."""
+SearchPlan = Generator[Move, MoveOutcome, T]
+"""An exploration plan that returns a T."""

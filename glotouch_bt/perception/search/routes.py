@@ -1,5 +1,4 @@
-"""Ways for the tip round the envelopes of traced objects: straight if free, else over a 5 mm grid, then pulled
-tight."""
+"""Collision-free routes of the tip around envelopes: straight, or by Dijkstra on a 5 mm grid with shortcutting."""
 
 from __future__ import annotations
 
@@ -13,12 +12,13 @@ from glotouch_bt.perception.search.map import GRID_STEP_M, Exclusion, Mask, Sear
 from glotouch_bt.robot import Array
 
 CHECK_STEP_M = 0.001
+"""Spacing of the points at which a segment is checked."""
 NODE_CLEARANCE_M = 0.0005
-"""Grid nodes keep this much more, so that the chord between two of them does not dip into a round envelope."""
+"""Extra clearance of grid nodes, so that the chord between two nodes stays outside a round envelope."""
 
 
 def segment_is_free(belief: SearchMap, start_K_m: Array, end_K_m: Array) -> bool:
-    """True if the straight way (2,) to (2,) enters no envelope (checked every millimetre)."""
+    """Return True if the segment between two points (2,) enters no envelope (checked every millimetre)."""
     if not belief.exclusions:
         return True
     n = int(np.ceil(np.linalg.norm(np.subtract(end_K_m, start_K_m)) / CHECK_STEP_M)) + 1
@@ -29,8 +29,8 @@ def segment_is_free(belief: SearchMap, start_K_m: Array, end_K_m: Array) -> bool
 Half = tuple[float, float]
 
 
-class _Lattice:
-    """The 5 mm nodes of a permitted region and all edges between neighbours."""
+class _RouteLattice:
+    """Nodes of the 5 mm grid over a permitted region, and all edges between neighbours."""
 
     def __init__(self, half_m: Half) -> None:
         axes = [np.linspace(-h, h, grid_count(h)) for h in half_m]
@@ -49,7 +49,7 @@ class _Lattice:
 
 
 class _Grid:
-    """The lattice without what the exclusions forbid."""
+    """The grid without the nodes inside exclusions."""
 
     def __init__(self, half_m: Half, exclusions: tuple[Exclusion, ...]) -> None:
         lattice = _lattice(half_m)
@@ -64,7 +64,7 @@ class _Grid:
         )
 
     def nearest_free(self, point: Array) -> int:
-        """Index of the free node nearest to a point (2,); -1 if there is none."""
+        """Return the index of the free node nearest to a point (2,); -1 without one."""
         if not self.free.any():
             return -1
         distance = np.where(self.free, np.sum((self.nodes - point) ** 2, axis=1), np.inf)
@@ -72,13 +72,13 @@ class _Grid:
 
 
 def grid_count(half_m: float) -> int:
-    """Nodes along one side of the grid."""
+    """Return the number of nodes along one side of the grid."""
     return max(round(2 * half_m / GRID_STEP_M) + 1, 2)
 
 
 @lru_cache(maxsize=2)
-def _lattice(half_m: Half) -> _Lattice:
-    return _Lattice(half_m)
+def _lattice(half_m: Half) -> _RouteLattice:
+    return _RouteLattice(half_m)
 
 
 @lru_cache(maxsize=32)
@@ -92,12 +92,11 @@ def _grid(half_m: Half, exclusions: tuple[Exclusion, ...]) -> _Grid:
 
 
 class Routes:
-    """All ways from one place.
+    """Routes from one start.
 
     Args:
         belief: The map.
-        start_K_m: (2,) where the tip is. If it is inside an envelope the first leg leads out of it, to the nearest
-        free place.
+        start_K_m: (2,) position of the tip. Inside an envelope, the first leg leads to the nearest free node.
     """
 
     def __init__(self, belief: SearchMap, start_K_m: Array) -> None:
@@ -106,7 +105,7 @@ class Routes:
         self._tables: tuple[_Grid, Array, np.typing.NDArray[np.int32]] | None = None
 
     def lengths(self, goals_K_m: Array) -> Array:
-        """(n,) length of the way to each goal (n, 2), to a grid step; infinite if there is none."""
+        """Return the route lengths (n,) to goals (n, 2), to a grid step; inf if unreachable."""
         goals = np.asarray(goals_K_m, dtype=np.float64).reshape(-1, 2)
         straight = np.asarray(np.linalg.norm(goals - self.start_K_m, axis=1))
         if not self._belief.exclusions or len(goals) == 0:
@@ -116,11 +115,11 @@ class Routes:
         shape = np.array([grid_count(float(h)) for h in half])
         cell = np.clip(np.rint((goals + half) / (2 * half) * (shape - 1)), 0, shape - 1).astype(np.int64)
         by_grid = distance[cell[:, 0] * shape[1] + cell[:, 1]]
-        # grid ways are up to 8 % longer than straight ones
+        # Grid routes are up to 8 % longer than straight ones.
         return np.asarray(np.where(np.isfinite(by_grid), np.maximum(by_grid / 1.04, straight), np.inf))
 
     def to(self, goal_K_m: Array) -> Array | None:
-        """Waypoints (k, 2) from the start (left out) to the goal (last), entering no envelope; None if none."""
+        """Return waypoints (k, 2) from the start (excluded) to the goal, outside all envelopes; None if unreachable."""
         goal = np.asarray(goal_K_m, dtype=np.float64)
         if segment_is_free(self._belief, self.start_K_m, goal):
             return goal[None, :]
@@ -145,7 +144,7 @@ class Routes:
                 n = len(grid.nodes)
                 self._tables = grid, np.full(n, np.inf), np.full(n, -1, dtype=np.int32)
             else:
-                # the stubs know no single start index
+                # The type stubs do not allow a single start index.
                 solve: Any = scipy.sparse.csgraph.dijkstra
                 distance, before = solve(grid.graph, directed=False, indices=node, return_predecessors=True)
                 distance = distance + np.linalg.norm(grid.nodes[node] - self.start_K_m)
@@ -153,7 +152,7 @@ class Routes:
         return self._tables
 
     def _pull_tight(self, points: Array) -> Array | None:
-        """From each waypoint go straight to the farthest later one in sight. The first leg may leave an envelope."""
+        """Shortcut each waypoint to the farthest visible later one. The first leg may leave an envelope."""
         out: list[Array] = []
         here = self.start_K_m
         if bool(self._belief.inside_exclusion(here[None, :])[0]):

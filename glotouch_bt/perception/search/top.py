@@ -1,9 +1,8 @@
-"""Finding how high an object is with a ball: touch down in the middle, then pass above it and touch what is higher.
+"""Height measurement with a ball: touch the centre from above, then pass over the object and touch higher parts.
 
-A plan is a generator of `BallMove`s that is sent a `Met` for each; it knows no robot. A pass at the height of what is
-known plus a clearance c that meets nothing bounds everything under it: nothing at a lateral distance d is more than
-c + r - sqrt(r^2 - d^2) higher than what is known, for a ball of radius r. What a pass meets is touched from above, and
-the pass goes on above that.
+A plan is a generator that yields a `BallMove` and receives its `BallOutcome`. A contact-free pass at a clearance c
+above the known height bounds the object: at lateral distance d nothing is more than c + r - sqrt(r^2 - d^2) higher, for
+a ball of radius r. A part met by a pass is touched from above, and the pass continues above it.
 """
 
 from __future__ import annotations
@@ -19,14 +18,14 @@ import scipy
 from glotouch_bt.robot import Array, ParamError
 
 BallMoveKind = Literal["over", "lift", "back", "down", "pass", "feel"]
-"""How the ball goes; speeds and guards are the driver's.
+"""Kind of motion; the driver chooses speeds and guards.
 
-over   up above everything, across, and no farther; the goal's height is not used.
+over   up above everything and across; the goal's height is not used.
 lift   straight up; unguarded.
-back   straight back and up from a contact just made in a pass; unguarded.
-down   straight down; what opposes it stops it.
-pass   level, just above what is known; any touch stops it.
-feel   the same over a short way on which a touch is likely: slowly, since what is hit high up is easily pushed.
+back   straight back and up from a contact of a pass; unguarded.
+down   straight down; an opposing force stops it.
+pass   horizontal, just above the known height; any contact stops it.
+feel   a short, slow pass where a contact is likely: an object hit high up moves easily.
 """
 
 
@@ -39,13 +38,13 @@ class BallMove:
 
 
 @dataclass(frozen=True)
-class Met:
-    """What came of a move.
+class BallOutcome:
+    """Outcome of a move.
 
     Attributes:
-        tip_K_m: (3,) where the ball's centre is now.
-        touch_K_m: (3,) ball's centre when it met something, or None.
-        refused: The move was not made (out of reach, in the way of a wall); the ball is where it was.
+        tip_K_m: (3,) ball centre after the move.
+        touch_K_m: (3,) ball centre at the contact, or None.
+        refused: The move was not executed (reach, clearance).
     """
 
     tip_K_m: Array
@@ -55,12 +54,12 @@ class Met:
 
 @dataclass(frozen=True)
 class Top:
-    """The highest place found.
+    """Highest point found.
 
     Attributes:
-        ball_K_m: (3,) ball's centre as it touched it from above, or None: nothing was met anywhere.
-        touches: How many touches from above met something.
-        passed: Share of the tracks that was passed over.
+        ball_K_m: (3,) ball centre at the contact from above; None without any contact.
+        touches: Number of contacts from above.
+        passed: Fraction of the passes that was completed.
     """
 
     ball_K_m: Array | None
@@ -68,23 +67,23 @@ class Top:
     passed: float
 
 
-TopPlan = Generator[BallMove, Met, Top]
+TopPlan = Generator[BallMove, BallOutcome, Top]
 
 
 @dataclass(frozen=True)
 class TopRule:
-    """How the top is looked for.
+    """Parameters of the height measurement.
 
     Attributes:
-        clearance_m: Passes go so far above what is known.
-        inset_m: The way round keeps so far inside the outline; the ball reaches out again by about its radius.
-        reach_m: No place inside is farther from the passes. A peak between them hides as deep as the ball is round.
-        onward_m: From where a pass met something, so much farther on it is touched from above.
-        back_m: Way back from there before the ball is lifted.
-        lift_m: First lift there; three times as much for as long as the way on is still blocked.
-        near_m: Round the highest place the ball looks so far in four directions.
-        climbs: Most rounds of that, each about the highest place by then.
-        max_touches: The plan ends after so many touches from above.
+        clearance_m: Height of a pass above the known height.
+        inset_m: Distance of the first pass inside the outline; the ball reaches about its radius farther.
+        reach_m: Maximum distance of an inner point from the passes.
+        onward_m: Distance past a contact of a pass at which the part is touched from above.
+        back_m: Retreat from a contact before the lift.
+        lift_m: First lift after a contact; tripled while the pass is still blocked.
+        near_m: Length of the four passes around the highest point.
+        climbs: Maximum number of such rounds, each about the current highest point.
+        max_touches: Maximum number of contacts from above.
     """
 
     clearance_m: float = 0.0008
@@ -104,8 +103,8 @@ class TopRule:
 
 
 def rounds(points_K_m: Array, centre_K_m: Array, rule: TopRule) -> Array:
-    """Waypoints (k, 2) of the passes: once round, `inset_m` inside of the hull of `points_K_m` (n, 2), and through
-    whatever that leaves out of reach within. Begins where the way round is nearest to `centre_K_m` (2,).
+    """Return the waypoints (k, 2) of the passes: once around `inset_m` inside the hull of `points_K_m` (n, 2), with
+    detours to inner points out of reach. The first waypoint is the nearest to `centre_K_m` (2,).
     """
     points = np.asarray(points_K_m, dtype=np.float64)[:, :2]
     centre = np.asarray(centre_K_m, dtype=np.float64)[:2]
@@ -120,13 +119,15 @@ def rounds(points_K_m: Array, centre_K_m: Array, rule: TopRule) -> Array:
     return _with_all(way, centre, _inside(ring), rule)
 
 
-STRAIGHT_M, GRID_M = 0.003, 0.004
-"""The way round leaves out corners flatter than the first; places inside are this far apart."""
+STRAIGHT_M = 0.003
+"""Maximum distance of an omitted corner from the path."""
+GRID_M = 0.004
+"""Spacing of the inner points."""
 
 
 def _with_all(way: list[Array], centre: Array, places: Array, rule: TopRule) -> Array:
-    """The way with detours to every place (n, 2) that it leaves out of reach, farthest first, each where it lengthens
-    the way least. The ball comes from the centre."""
+    """Return the path with detours to all points (n, 2) out of reach, farthest first, by cheapest insertion. The ball
+    starts at the centre."""
     for _ in range(len(places)):
         away = _distance(places, np.array([centre, *way]))
         if away.max() <= rule.reach_m:
@@ -140,14 +141,14 @@ def _with_all(way: list[Array], centre: Array, places: Array, rule: TopRule) -> 
 
 
 def _nearest(place: Array, a: Array, b: Array) -> Array:
-    """The point of the segment a-b next to a place; all (2,)."""
+    """Return the point of the segment a-b nearest to a point; all (2,)."""
     step = b - a
     share = float(np.clip((place - a) @ step / max(float(step @ step), 1e-18), 0.0, 1.0))
     return np.asarray(a + share * step)
 
 
 def _hull(points: Array) -> Array:
-    """Corners of the convex hull, anticlockwise; the two ends of points in a row."""
+    """Return the corners of the convex hull, counter-clockwise; the two ends of collinear points."""
     try:
         return np.asarray(points[scipy.spatial.ConvexHull(points).vertices])
     except (scipy.spatial.QhullError, ValueError):
@@ -156,7 +157,7 @@ def _hull(points: Array) -> Array:
 
 
 def _plain(ring: Array, tolerance_m: float) -> Array:
-    """A convex ring (n, 2) without the corners that lie within a tolerance of the line past them, flattest first."""
+    """Simplify a convex ring (n, 2): remove corners within a tolerance of the chord past them, flattest first."""
     while len(ring) > 3:
         a, b = np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0)
         chord = b - a
@@ -169,7 +170,7 @@ def _plain(ring: Array, tolerance_m: float) -> Array:
 
 
 def _inside(ring: Array) -> Array:
-    """Places (n, 2) of a grid within a convex ring, anticlockwise."""
+    """Return the grid points (n, 2) inside a convex, counter-clockwise ring."""
     low, high = ring.min(axis=0), ring.max(axis=0)
     x, y = (np.arange(low[i], high[i] + 1e-9, GRID_M) for i in range(2))
     grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
@@ -179,7 +180,7 @@ def _inside(ring: Array) -> Array:
 
 
 def _distance(points: Array, way: Array) -> Array:
-    """(n,) distance of points (n, 2) from a polyline (k, 2)."""
+    """Return the distances (n,) of points (n, 2) from a polyline (k, 2)."""
     a, step = way[:-1], np.diff(way, axis=0)
     square = np.maximum((step * step).sum(axis=1), 1e-18)
     share = np.clip(((points[:, None] - a) * step).sum(axis=2) / square, 0.0, 1.0)
@@ -189,17 +190,17 @@ def _distance(points: Array, way: Array) -> Array:
 def top_plan(
     centre_K_m: Array, way_K_m: Array, rim_K_m: Array, lowest_K_m: float, ceiling_K_m: float, rule: TopRule
 ) -> TopPlan:
-    """Touch the middle (or, where that is hollow, the rim) from above, then pass over the whole object.
+    """Touch the centre (or, if hollow, the rim) from above, then pass over the whole object.
 
     Args:
-        centre_K_m: (2,) where the ball first goes down.
+        centre_K_m: (2,) first position to touch.
         way_K_m: (k, 2) waypoints of the passes.
-        rim_K_m: (m, 2) where to go down if the centre is hollow, in order.
-        lowest_K_m: The ball need not go lower: something is known to stand higher than that.
-        ceiling_K_m: Ball's height above everything.
-        rule: How to look.
+        rim_K_m: (m, 2) positions to touch if the centre is hollow, in order.
+        lowest_K_m: Minimum height of the ball: the object is known to be higher.
+        ceiling_K_m: Height of the ball above everything.
+        rule: Parameters.
     """
-    search = _Search(rule, lowest_K_m, ceiling_K_m)
+    search = _HeightSearch(rule, lowest_K_m, ceiling_K_m)
     for place in (centre_K_m, *rim_K_m):
         yield from search.over(place)
         yield from search.down()
@@ -218,18 +219,20 @@ def top_plan(
 
 
 LIFT_GROWTH = 3.0
-"""Every hit pushes the object, so few are better than a low last lift."""
-NEAR_M, FARTHEST_ONWARD_M = 0.012, 0.012
-"""Stopped again within NEAR_M of the last touch, a pass is on a slope: it looks twice as far on, at most so far."""
+"""Factor between successive lifts. Large, because every contact pushes the object."""
+SLOPE_M = 0.012
+"""Maximum distance between two contacts of a pass that indicates a slope; the next step is then longer."""
+MAX_ONWARD_M = 0.012
+"""Maximum step past a contact on a slope."""
 
 
-class _Search:
-    """Where the ball is and what is known; every method is a generator of moves."""
+class _HeightSearch:
+    """State of the height measurement; every method is a generator of moves."""
 
     def __init__(self, rule: TopRule, lowest_m: float, ceiling_m: float) -> None:
         self.rule, self.lowest_m, self.ceiling_m = rule, lowest_m, ceiling_m
         self.tip: Array = np.zeros(3)
-        self.came_m = 0.0  # how far across by the last move
+        self.came_m = 0.0  # horizontal length of the last move
         self.best: Array | None = None
         self.touches = 0
 
@@ -239,59 +242,59 @@ class _Search:
 
     @property
     def level_m(self) -> float:
-        """Ball's height in a pass."""
+        """Height of the ball in a pass."""
         assert self.best is not None
         return float(self.best[2]) + self.rule.clearance_m
 
-    def _go(self, kind: BallMoveKind, goal: Array) -> Generator[BallMove, Met, Met]:
+    def _go(self, kind: BallMoveKind, goal: Array) -> Generator[BallMove, BallOutcome, BallOutcome]:
         before = self.tip
-        met = yield BallMove(kind, np.asarray(goal, dtype=np.float64))
-        self.tip = np.asarray(met.tip_K_m, dtype=np.float64)
+        outcome = yield BallMove(kind, np.asarray(goal, dtype=np.float64))
+        self.tip = np.asarray(outcome.tip_K_m, dtype=np.float64)
         self.came_m = float(np.linalg.norm((self.tip - before)[:2]))
-        if met.touch_K_m is not None and (self.best is None or met.touch_K_m[2] > self.best[2]):
-            self.best = np.asarray(met.touch_K_m, dtype=np.float64)
-        return met
+        if outcome.touch_K_m is not None and (self.best is None or outcome.touch_K_m[2] > self.best[2]):
+            self.best = np.asarray(outcome.touch_K_m, dtype=np.float64)
+        return outcome
 
-    def over(self, place: Array) -> Generator[BallMove, Met, None]:
+    def over(self, place: Array) -> Generator[BallMove, BallOutcome, None]:
         yield from self._go("over", np.array([*place, self.ceiling_m]))
 
-    def lift(self, height_m: float) -> Generator[BallMove, Met, None]:
+    def lift(self, height_m: float) -> Generator[BallMove, BallOutcome, None]:
         if height_m > self.tip[2] + 1e-4:
             yield from self._go("lift", np.array([*self.xy, min(height_m, self.ceiling_m)]))
 
-    def down(self, to_m: float | None = None) -> Generator[BallMove, Met, bool]:
-        """Touch what is below, as far as anything there is of interest; True if something was met."""
+    def down(self, to_m: float | None = None) -> Generator[BallMove, BallOutcome, bool]:
+        """Touch down, not below `lowest_m`; return True on a contact."""
         to = self.lowest_m if to_m is None else to_m
         if self.tip[2] <= to + 1e-4:
             return False
-        met = yield from self._go("down", np.array([*self.xy, to]))
-        self.touches += met.touch_K_m is not None
-        return met.touch_K_m is not None
+        outcome = yield from self._go("down", np.array([*self.xy, to]))
+        self.touches += outcome.touch_K_m is not None
+        return outcome.touch_K_m is not None
 
-    def pass_to(self, goal: Array) -> Generator[BallMove, Met, bool]:
-        """Above everything met on the way to `goal` (2,); False if a move was refused or it took too many touches."""
+    def pass_to(self, goal: Array) -> Generator[BallMove, BallOutcome, bool]:
+        """Pass to `goal` (2,) above all contacts; return False after a refused move or too many contacts."""
         rule = self.rule
         onward, last = rule.onward_m, None
         while self.touches < rule.max_touches:
-            if self.tip[2] > self.level_m + 1e-4:  # come down to the pass, unless something is met
+            if self.tip[2] > self.level_m + 1e-4:  # descend to the pass, or to a contact
                 yield from self.down(self.level_m)
             yield from self.lift(self.level_m)
-            met = yield from self._go("pass", np.array([*goal, self.tip[2]]))
-            if met.refused:
+            outcome = yield from self._go("pass", np.array([*goal, self.tip[2]]))
+            if outcome.refused:
                 return False
-            if met.touch_K_m is None:
+            if outcome.touch_K_m is None:
                 return True
-            touch = met.touch_K_m[:2]
+            touch = outcome.touch_K_m[:2]
             onward = rule.onward_m
-            if last is not None and np.linalg.norm(touch - last) < NEAR_M:
-                onward = min(2 * float(np.linalg.norm(touch - last)) + rule.onward_m, FARTHEST_ONWARD_M)
+            if last is not None and np.linalg.norm(touch - last) < SLOPE_M:
+                onward = min(2 * float(np.linalg.norm(touch - last)) + rule.onward_m, MAX_ONWARD_M)
             if not (yield from self._above(touch, goal, float(onward))):
                 return False
             last = self.xy.copy()
         return False
 
-    def _above(self, touch: Array, goal: Array, onward_m: float) -> Generator[BallMove, Met, bool]:
-        """Having met something at `touch` (2,) on the way to `goal`: touch it from above, a little farther on."""
+    def _above(self, touch: Array, goal: Array, onward_m: float) -> Generator[BallMove, BallOutcome, bool]:
+        """After a contact at `touch` (2,) on the way to `goal`, touch the part from above a little farther on."""
         rule = self.rule
         heading = (goal - touch) / max(float(np.linalg.norm(goal - touch)), 1e-9)
         if np.linalg.norm(goal - touch) < 1e-3:
@@ -301,24 +304,24 @@ class _Search:
         lift = rule.lift_m
         while True:
             up = float(self.tip[2]) + lift
-            off = self.xy - min(rule.back_m, self.came_m) * heading  # no farther than it is known to be free
+            off = self.xy - min(rule.back_m, self.came_m) * heading  # only along the travelled, free path
             if up >= self.ceiling_m - 1e-4:
                 yield from self._go("back", np.array([*off, self.tip[2]]))
                 yield from self.over(aim)
                 break
             yield from self._go("back", np.array([*off, up]))
-            met = yield from self._go("feel", np.array([*aim, self.tip[2]]))
-            if met.refused:
+            outcome = yield from self._go("feel", np.array([*aim, self.tip[2]]))
+            if outcome.refused:
                 return False
-            if met.touch_K_m is None:
+            if outcome.touch_K_m is None:
                 break
             lift *= LIFT_GROWTH
         known = float(self.best[2]) if self.best is not None else level
         yield from self.down(max(known, level))
         return True
 
-    def climb(self, along: Array) -> Generator[BallMove, Met, None]:
-        """Look round the highest place, along and across `along` (2,), and again round what is found to be higher."""
+    def climb(self, along: Array) -> Generator[BallMove, BallOutcome, None]:
+        """Pass around the highest point, along and across `along` (2,); repeat at every higher point found."""
         rule = self.rule
         across = np.array([-along[1], along[0]])
         for _ in range(rule.climbs):

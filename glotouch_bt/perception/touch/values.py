@@ -1,4 +1,4 @@
-"""What touching yields: contacts, contours, candidates, squeezes. Plain frozen values, in the container frame K.
+"""Values of touch: contacts, contours, candidates, layers. Frozen, in the container frame K.
 
 K: origin at the centre of the container's floor, z up. Planar quantities are (x, y) in K; yaw is about +z, from x_K.
 """
@@ -17,22 +17,21 @@ ContourKind = Literal["round", "box"]
 ContourFamily = Literal["circle", "rectangle", "free"]
 
 ZERO_SD_M = 0.3e-3
-"""Standard deviation of a gripper's zero that nobody measured. Source: CONDITIONS, nominal 0.23 mm, harsh 0.58 mm."""
+"""Standard deviation of an uncalibrated jaw zero. Source: CONDITIONS, nominal 0.23 mm, harsh 0.58 mm."""
 
 
 @dataclass(frozen=True)
 class Contact:
-    """One place where the probe's tip met something.
+    """One contact of the probe's tip.
 
     Attributes:
         stamp_s: Robot clock at the onset.
         tip_K_m: (3,) centre of the ball at the onset.
-        approach_K: (3,) unit direction the tip moved in.
-        reaction_K: (3,) unit direction of the force the tip felt.
+        approach_K: (3,) unit direction of the tip's motion.
+        reaction_K: (3,) unit direction of the force on the tip.
         point_K_m: (2,) contact point: the support-plane intercept (paper III-B).
         force_N: Norm of the filtered contact force when the guard tripped.
-        pushed_K_m: (2,) estimated displacement of what was touched, between the onset and the ball's standstill: along
-            the force on it, less what bent of probe and grasp (`touch.pushing`); at most so far, for a wall stands.
+        pushed_K_m: (2,) estimated displacement of the object from the onset to rest, an upper bound (`estimate_push`).
     """
 
     stamp_s: float
@@ -49,15 +48,15 @@ class Contour:
     """A planar outline fitted to contacts.
 
     Attributes:
-        kind: How it is squeezed: "round" (from three directions) or "box" (in three parallel tracks).
+        kind: Squeeze plan: "round" (from three directions) or "box" (in three parallel tracks).
         centre_K_m: (2,); of a free outline, the area centroid of its convex hull.
-        size_m: (long, short); a circle has its diameter twice, a free outline the sides of its least rectangle.
+        size_m: (long, short); for a circle the diameter twice, for a free outline the minimum-area rectangle.
         yaw_rad: Direction of the long side in K, in [-pi/2, pi/2); 0 for a circle.
         rms_m: Root mean square of the residuals.
         residuals_m: (k,) signed distance of each contact from the outline, outside positive.
-        family: What was fitted; if not given, what `kind` says.
+        family: Fitted shape family; derived from `kind` by default.
         covariance: Of the family's parameters, SI: circle (x, y, radius), rectangle (x, y, yaw, half long side, half
-            short side), free (x, y) of the centre; (0, 0) if it is not known.
+            short side), free (x, y) of the centre; shape (0, 0) if unknown.
         boundary_K_m: (n, 2) corners of a free outline, counter-clockwise, not closed; (0, 2) for the other families.
     """
 
@@ -77,20 +76,15 @@ class Contour:
 
     @property
     def radius_m(self) -> float:
-        """Radius of the circle about the centre round the whole outline."""
+        """Radius of the enclosing circle about the centre."""
         if self.family == "free":
             return float(np.max(np.linalg.norm(self.boundary_K_m - self.centre_K_m, axis=1)))
         if self.family == "circle":
             return 0.5 * self.size_m[0]
         return 0.5 * float(np.hypot(*self.size_m))
 
-    @property
-    def enclosing_radius_m(self) -> float:
-        """Radius about the centre that also holds the contacts sticking out of the outline (limbs of a figure)."""
-        return self.radius_m + max(0.0, float(np.max(self.residuals_m, initial=0.0)))
-
     def outline_K_m(self, n: int = 48) -> Array:
-        """(m, 2) closed polyline of the outline, for maps; of a circle with `n` sides."""
+        """Return the outline as a closed polyline (m, 2); a circle has `n` sides."""
         if self.family == "free":
             return np.concatenate([self.boundary_K_m, self.boundary_K_m[:1]])
         if self.family == "circle":
@@ -111,8 +105,8 @@ class Candidate:
         index: Order of discovery, from 0.
         contour: Its outline at the sensing height.
         height_m: Top above the container floor.
-        quality: 0..1, how well its centre is known: 1/2 at a standard deviation of 5 mm (`search.candidates.quality`).
-        contacts: What it was fitted to.
+        quality: 0..1, certainty of the centre: 1/2 at a standard deviation of 5 mm (`search.candidates.quality`).
+        contacts: Contacts with the object.
     """
 
     index: int
@@ -122,16 +116,13 @@ class Candidate:
     contacts: tuple[Contact, ...]
 
     def span_m(self, yaw_rad: float) -> tuple[float, float]:
-        """(least, greatest) coordinate along the direction `yaw_rad` in K of the contact points and the outline.
-
-        Both, because few contacts leave wide gaps, and an outline leaves out what sticks out of it.
-        """
+        """Return (minimum, maximum) coordinate of contact points and outline along the direction `yaw_rad` in K."""
         along = self.extent_K_m @ np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
         return float(along.min()), float(along.max())
 
     @property
     def extent_K_m(self) -> Array:
-        """(n, 2) the contact points and the outline's corners (of a circle: many), in K."""
+        """(n, 2) contact points and outline vertices, in K. Protruding parts are only in the contacts."""
         points = np.array([c.point_K_m for c in self.contacts]).reshape(-1, 2)
         return np.concatenate([points, self.contour.outline_K_m(180)])
 
@@ -142,17 +133,16 @@ class Layer:
 
     Attributes:
         height_m: Pads' mid-point above the container floor.
-        aperture_m: Opening on the plateau.
+        aperture_m: Aperture on the plateau.
         position_K_m: (2,) pads' mid-point during the plateau.
-        yaw_rad: Direction of the pads' width axis x_P in K (the jaws close at right angles to it).
+        yaw_rad: Direction of the pads' width axis x_P in K; the jaws close perpendicular to it.
         left_m, right_m: (rows, cols) temporal median of the depth maps; layout as in `robot.TactileFrame`.
         force_N: Jaw force on the plateau.
         stable: The aperture reached a plateau and the arm stood still; only stable layers carry evidence.
-        why_not: What was missing, if it is not stable.
-        slide_m, turn_rad, compliance_m: What the closure did to the object, as far as the robot knows (`ObjectMotion`):
-            displacement along the closing direction (+y_P), turn about +z_K, closing after both pads touched; NaN if
-            nobody watched.
-        zero_sd_m: Standard deviation of the error that `aperture_m` shares with every other layer.
+        why_not: Failed condition of an unstable layer.
+        slide_m, turn_rad, compliance_m: Estimated motion of the object (`ObjectMotion`): displacement along +y_P, turn
+            about +z_K, closing after both pads touched; NaN if not estimated.
+        zero_sd_m: Standard deviation of the aperture error common to all layers.
     """
 
     height_m: float
@@ -190,8 +180,8 @@ class TouchSet:
     """All squeezes of one candidate.
 
     Attributes:
-        candidate: What was squeezed.
-        sequences: Three of them (three yaws if round, three parallel tracks if box-like).
+        candidate: The squeezed object.
+        sequences: Usually three: three yaws if round, three parallel tracks if box-like.
     """
 
     candidate: Candidate

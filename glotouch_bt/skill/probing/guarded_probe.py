@@ -11,7 +11,6 @@ import numpy as np
 from glotouch_bt.motion import Motion, MoveResult
 from glotouch_bt.perception.touch import (
     Baseline,
-    Carried,
     Contact,
     ContactGuard,
     GuardParams,
@@ -19,8 +18,9 @@ from glotouch_bt.perception.touch import (
     HardTrip,
     MeasuredInertia,
     Onset,
+    Payload,
+    estimate_push,
     fit_baseline,
-    pushed,
     settled,
 )
 from glotouch_bt.robot import Array, MotionRefused, Observation, Pose
@@ -74,14 +74,14 @@ class Prober:
         tool: HeldTool,
         guard: GuardParams,
         *,
-        carried: Carried | None = None,
+        carried: Payload | None = None,
     ) -> None:
         self._context, self._tool = context, tool
         self._guard = replace(guard, latency_s=tool.latency_s)
         self._world = context.world
         self._pose_K_B = context.world.container.pose_B_K.inverse()
         probe = context.world.probe if context.arm.scene.holding_tool else None
-        self._carried = carried or Carried.hand(context.arm.description.gripper, probe)
+        self._carried = carried or Payload.hand(context.arm.description.gripper, probe)
         self._rested: tuple[float, Baseline] | None = None
         self.resting_up_N: list[float] = []
 
@@ -186,9 +186,8 @@ class Prober:
         norm = float(np.linalg.norm(force_K))
         reaction = force_K / norm if norm > 1e-6 else -approach_K
         point = self._tool.contact_point_K_m(self._world, pose, approach_K, reaction)
-        return Contact(
-            onset.stamp_s, tip_K, approach_K, reaction, point, norm, pushed(end_K_m[:2] - tip_K[:2], reaction[:2])
-        )
+        push = estimate_push(end_K_m[:2] - tip_K[:2], reaction[:2])
+        return Contact(onset.stamp_s, tip_K, approach_K, reaction, point, norm, push)
 
 
 class _Listener:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from glotouch_bt.motion import Motion, hand_pose_B
-from glotouch_bt.perception.touch import Candidate, Layer, Yielding, make_layer, watch_yielding
+from glotouch_bt.perception.touch import Candidate, Layer, ObjectMotion, make_layer, estimate_object_motion
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose
 from glotouch_bt.skill import Context, SkillParams, param
@@ -116,7 +116,7 @@ class Squeezing:
         """Up or down beside the object, jaws open; False if the fingers met something."""
         return (yield from glide(self._context, self._pose(height_m), self._p.descent_speed_m_s))
 
-    def close(self) -> Motion[tuple[Layer, Yielding]]:
+    def close(self) -> Motion[tuple[Layer, ObjectMotion]]:
         """One closure where the hand is; the jaws are open again afterwards, and a pause comes then.
 
         Raises:
@@ -125,7 +125,7 @@ class Squeezing:
         with self._context.arm.pause_signal.finishing():
             return (yield from self._close())
 
-    def _close(self) -> Motion[tuple[Layer, Yielding]]:
+    def _close(self) -> Motion[tuple[Layer, ObjectMotion]]:
         p, arm = self._p, self._context.arm
         gripper = arm.description.gripper
         closing: list[Observation] = []
@@ -138,7 +138,7 @@ class Squeezing:
         x_P = np.array([np.cos(self.yaw_K_rad), np.sin(self.yaw_K_rad)])
         middle = float(x_P @ (contour.centre_K_m - self.at.position_K_m))
         half_diagonal = 0.5 * float(np.hypot(*contour.size_m)) if contour.family != "circle" else contour.radius_m
-        yielding = watch_yielding([*closing, *blocks], gripper.pad_window_m[0], middle, half_diagonal)
+        object_motion = estimate_object_motion([*closing, *blocks], gripper.pad_window_m[0], middle, half_diagonal)
         measured = self._context.world.container.pose_B_K.inverse().apply(blocks[-1].pose_B_P.position_m)
         layer = make_layer(
             blocks,
@@ -147,11 +147,11 @@ class Squeezing:
             yaw_rad=self.yaw_K_rad,
             force_N=p.force_N,
             pad_shape=gripper.pad_shape,
-            yielding=yielding,
+            object_motion=object_motion,
         )
         yield from release(arm, self.at.opening_m)
         true_m = layer.aperture_m - self._zero.error_m
-        return replace(layer, aperture_m=true_m, zero_sd_m=self._zero.sd_m), yielding
+        return replace(layer, aperture_m=true_m, zero_sd_m=self._zero.sd_m), object_motion
 
     def rise(self) -> Motion[None]:
         """Straight up to travelling height."""
@@ -164,10 +164,10 @@ class Squeezing:
         return hand_pose_B(self._context.arm, self._context.world.container, position, self.yaw_K_rad)
 
 
-def disturbance(candidate: Candidate, layer: Layer, yielding: Yielding) -> dict[str, object] | None:
+def disturbance(candidate: Candidate, layer: Layer, object_motion: ObjectMotion) -> dict[str, object] | None:
     """Data of an `object_moved` event, or None: no closure drags, turns or topples an object silently."""
-    lost = yielding.felt and not layer.stable
-    if not (yielding.moved or lost):
+    lost = object_motion.detected and not layer.stable
+    if not (object_motion.moved or lost):
         return None
     return {
         "candidate": candidate.index,

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from glotouch_bt.motion import Motion
-from glotouch_bt.perception.search import Felt, Move, Plan, T
+from glotouch_bt.perception.search import Move, MoveOutcome, SearchPlan, T
 from glotouch_bt.perception.touch import Contact, GuardParams
 from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.skill import Context, Failure
@@ -79,7 +79,7 @@ class Explorer:
     def _height_m(self) -> float:
         return self._tool.floor_z_K_m + self._speeds.height_m
 
-    def run(self, plan: Plan[T]) -> Motion[T]:
+    def run(self, plan: SearchPlan[T]) -> Motion[T]:
         """All of a plan; what the plan returns.
 
         Raises:
@@ -93,7 +93,7 @@ class Explorer:
             result: T = end.value
             return result
 
-    def _make(self, move: Move) -> Motion[Felt]:
+    def _make(self, move: Move) -> Motion[MoveOutcome]:
         self._require_tool()
         yield from self._require_weight()
         try:
@@ -105,12 +105,12 @@ class Explorer:
                 contact, path = yield from self._go(move)
         except MotionRefused as refusal:
             self._journal("note", text=f"{move.kind} refused: {refusal}")
-            return Felt(self.tip_K_m, np.zeros((0, 2)), refused=str(refusal))
+            return MoveOutcome(self.tip_K_m, np.zeros((0, 2)), refused=str(refusal))
         if len(path):
             self._journal("sweep", path_K_m=path)
         if contact is not None:
             self._journal("contact", contact=contact)
-        return Felt(self.tip_K_m, path[:, :2], contact)
+        return MoveOutcome(self.tip_K_m, path[:, :2], contact)
 
     def _require_tool(self) -> None:
         """The jaws must be as far apart as when they took the tool; without it nothing would ever be touched."""

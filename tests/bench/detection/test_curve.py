@@ -7,12 +7,12 @@ from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.bench.detection.curve import Pace, false_alarms, force_of, found_share, per_hour
 from glotouch_bt.bench.detection.signals import FreeMove, Hand, Wrist
 from glotouch_bt.mission.read.worlds import load_conditions
-from glotouch_bt.perception.touch import Carried, GuardParams
+from glotouch_bt.perception.touch import GuardParams, Payload
 from glotouch_bt.robot import Conditions, Probe
 
 PROBE = Probe()
 HAND = Hand(
-    Carried.hand(RIZON4_XENSE.gripper, PROBE),
+    Payload.hand(RIZON4_XENSE.gripper, PROBE),
     np.array([0.0, 0.0, PROBE.grasp_to_tip_m]),
     RIZON4_XENSE.gripper.pose_E_P,
 )

@@ -10,7 +10,7 @@ import trimesh
 
 from glotouch_bt.bench.planar import ContactModel, PlanarWorld
 from glotouch_bt.bench.planar.drive import drive
-from glotouch_bt.perception.search import Felt, Move, Trace, TraceParams, trace, trace_more
+from glotouch_bt.perception.search import Move, MoveOutcome, OutlineTrace, TraceParams, trace, trace_more
 from glotouch_bt.perception.search.tracing.trace_state import TraceState
 from glotouch_bt.perception.touch import Contact
 from glotouch_bt.robot.scene.meshes import Mesh
@@ -32,7 +32,7 @@ def touched_from(world: PlanarWorld, angle: float) -> Contact:
     return felt.contact
 
 
-def traced(world: PlanarWorld, first: Contact, params: TraceParams | None = None) -> Trace:
+def traced(world: PlanarWorld, first: Contact, params: TraceParams | None = None) -> OutlineTrace:
     return drive(trace(first, world.tip_K_m, TIP, params, half_extent_m=INNER), world)
 
 
@@ -123,7 +123,7 @@ def test_a_contact_that_faces_the_middle_is_with_something_else(world_of: WorldO
     class Intruded:
         met: Contact | None = None
 
-        def execute(self, move: Move) -> Felt:
+        def execute(self, move: Move) -> MoveOutcome:
             felt = world.execute(move)
             if self.met is not None or move.kind != "step" or felt.contact is not None:
                 return felt
@@ -176,11 +176,11 @@ def three_limbs() -> Mesh:
     return as_mesh(trimesh.util.concatenate(bars), "limbs")
 
 
-def refine(world: PlanarWorld, before: Trace, moves: list[tuple[Move, Felt]]) -> Trace:
+def refine(world: PlanarWorld, before: OutlineTrace, moves: list[tuple[Move, MoveOutcome]]) -> OutlineTrace:
     """As `refine_outline` goes on; what it does is written down."""
 
     class Watched:
-        def execute(self, move: Move) -> Felt:
+        def execute(self, move: Move) -> MoveOutcome:
             felt = world.execute(move)
             moves.append((move, felt))
             return felt
@@ -199,7 +199,7 @@ def test_refining_finds_every_limb(world_of: WorldOf) -> None:
         world = world_of([three_limbs()], [(*CENTRE, 0.3)], ContactModel(), seed=k)
         coarse = TraceParams(centre_sd_m=6e-3, radial_sd_m=0.0225, min_contacts=4, max_contacts=5)
         before = traced(world, touched_from(world, angle), coarse)
-        moves: list[tuple[Move, Felt]] = []
+        moves: list[tuple[Move, MoveOutcome]] = []
         result = refine(world, before, moves)
         assert result.contour is not None
         centre, yaw = world.poses[0, :2], world.poses[0, 2]

@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from glotouch_bt.perception.search import SearchMap, Trace, admit, elsewhere_m, joins, part_of
+from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit, elsewhere_m, joins, part_of
 from glotouch_bt.perception.search.candidates import _outline, quality
 from glotouch_bt.perception.touch import Candidate, Contact
 
@@ -50,7 +50,7 @@ def test_more_of_a_candidate_replaces_it_and_counts_nothing(candidate):
     belief = SearchMap.blank((0.2, 0.15), expected=2).with_exclusion(candidate.contour, 0.01)
     last = contact(0.04, 0.0, 1, 0)
     contacts = (*candidate.contacts, last)
-    traced = Trace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)), continued=True)
+    traced = OutlineTrace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)), continued=True)
     admitted = admit(belief, (candidate,), last, traced, 0.018, 0.01, part_of=candidate)
     assert (admitted.index, len(admitted.candidates), admitted.belief.found) == (0, 1, 1)
     np.testing.assert_allclose(admitted.candidates[0].contour.centre_K_m, [-0.005, 0.0], atol=1e-3)
@@ -62,7 +62,7 @@ def test_what_stands_too_near_for_another_object_is_the_same(candidate):
     two = {}
     for gap in (0.016, 0.026):
         contacts = tuple(contact(0.01 + gap + dx, y, nx, ny) for dx, y, nx, ny in LIMB)
-        traced = Trace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)))
+        traced = OutlineTrace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)))
         belief = SearchMap.blank((0.2, 0.15), expected=2).with_exclusion(candidate.contour, 0.01)
         near = dataclasses.replace(candidate, contour=_outline(candidate.contacts[:3], R).contour)
         two[gap] = len(admit(belief, (near,), contacts[0], traced, 0.018, 0.01).candidates)
@@ -73,7 +73,7 @@ def test_what_stands_too_near_for_another_object_is_the_same(candidate):
 def test_a_trace_turns_out_to_be_of_a_candidate_where_it_will_be_made_one_with_it(candidate, gap):
     contacts = tuple(contact(0.01 + gap + dx, y, nx, ny) for dx, y, nx, ny in LIMB)
     near = dataclasses.replace(candidate, contour=_outline(candidate.contacts[:3], R).contour)
-    traced = Trace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)))
+    traced = OutlineTrace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)))
     belief = SearchMap.blank((0.2, 0.15), expected=2).with_exclusion(candidate.contour, 0.01)
     one = len(admit(belief, (near,), contacts[0], traced, 0.018, 0.01).candidates) == 1
     assert joins((near,), contacts, R) == one == (gap == 0.016)

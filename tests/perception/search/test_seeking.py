@@ -7,14 +7,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from glotouch_bt.perception.search import Felt, Move, SearchMap, Sought, Stretch, seek
+from glotouch_bt.perception.search import Move, MoveOutcome, SearchMap, Sought, Stretch, seek
 from glotouch_bt.perception.search.seeking import MAX_HOPS, RETREAT_M
 from glotouch_bt.perception.touch import Contact, Contour
 from glotouch_bt.robot import Array
 
 HALF = np.array([0.138, 0.188])
 DISC = Contour("round", np.array([0.05, 0.0]), (0.06, 0.06), 0.0, 0.0, np.zeros(0))
-Answer = Callable[[Move, Array], Felt]
+Answer = Callable[[Move, Array], MoveOutcome]
 
 
 def blank() -> SearchMap:
@@ -26,9 +26,9 @@ def touch(tip: Array, along: Array) -> Contact:
     return Contact(0.0, np.array([*tip, 0.018]), way, -way, tip + 0.006 * way[:2], 1.0)
 
 
-def free(move: Move, tip: Array) -> Felt:
+def free(move: Move, tip: Array) -> MoveOutcome:
     """Nothing is met."""
-    return Felt(move.goal_K_m, np.array([move.goal_K_m if move.kind == "hop" else tip, move.goal_K_m]))
+    return MoveOutcome(move.goal_K_m, np.array([move.goal_K_m if move.kind == "hop" else tip, move.goal_K_m]))
 
 
 class Towards:
@@ -66,9 +66,9 @@ def test_the_way_becomes_evidence_until_the_policy_has_none_left() -> None:
 def test_a_contact_ends_it_and_the_ball_has_retreated() -> None:
     start, stop = np.array([0.0, 0.0]), np.array([0.06, 0.0])
 
-    def answer(move: Move, tip: Array) -> Felt:
+    def answer(move: Move, tip: Array) -> MoveOutcome:
         if move.kind == "sweep":
-            return Felt(stop, np.array([tip, stop]), touch(stop, move.goal_K_m - tip))
+            return MoveOutcome(stop, np.array([tip, stop]), touch(stop, move.goal_K_m - tip))
         return free(move, tip)
 
     sought, moves = run(seek(blank(), Towards((0.1, 0.0)), start, lowered=True), start, answer)
@@ -82,9 +82,9 @@ def test_a_traced_object_touched_again_is_no_find() -> None:
     start, stop = np.array([-0.05, 0.0]), np.array([0.015, 0.0])
     known = blank().with_exclusion(DISC, 0.01)
 
-    def answer(move: Move, tip: Array) -> Felt:
+    def answer(move: Move, tip: Array) -> MoveOutcome:
         if move.kind == "sweep" and move.goal_K_m[0] > 0.0:
-            return Felt(stop, np.array([tip, stop]), touch(stop, move.goal_K_m - tip))
+            return MoveOutcome(stop, np.array([tip, stop]), touch(stop, move.goal_K_m - tip))
         return free(move, tip)
 
     sought, moves = run(seek(known, Towards((0.12, 0.0), (-0.1, 0.1)), start, lowered=True), start, answer)
@@ -100,9 +100,9 @@ def test_no_sweep_out_of_a_corner_is_tried_again() -> None:
     start = np.array([0.02, 0.0])
     known = blank().with_path(np.array([[-0.1, 0.0], [-0.06, 0.0]])).with_exclusion(DISC, 0.01)
 
-    def answer(move: Move, tip: Array) -> Felt:
+    def answer(move: Move, tip: Array) -> MoveOutcome:
         if move.kind == "sweep" and np.linalg.norm(tip) < 0.03:
-            return Felt(tip, np.array([tip]), touch(tip, move.goal_K_m - tip))
+            return MoveOutcome(tip, np.array([tip]), touch(tip, move.goal_K_m - tip))
         return free(move, tip)
 
     sought, moves = run(seek(known, Towards(*[(0.12, 0.0)] * 4), start, lowered=True), start, answer)
@@ -113,8 +113,8 @@ def test_no_sweep_out_of_a_corner_is_tried_again() -> None:
 def test_what_is_refused_is_given_up() -> None:
     start = np.array([0.0, 0.0])
 
-    def answer(move: Move, tip: Array) -> Felt:
-        return Felt(tip, np.zeros((0, 2)), refused="a wall")
+    def answer(move: Move, tip: Array) -> MoveOutcome:
+        return MoveOutcome(tip, np.zeros((0, 2)), refused="a wall")
 
     sought, moves = run(seek(blank(), Towards((0.1, 0.1)), start, lowered=True), start, answer)
     assert (sought.contact, len(sought.belief.path_K_m)) == (None, 0)
@@ -133,16 +133,16 @@ def test_raised_it_comes_down_first() -> None:
 def test_landing_on_something_it_is_touched_from_its_side() -> None:
     start, middle, radius = np.array([-0.1, 0.1]), np.array([0.02, 0.02]), 0.03
 
-    def answer(move: Move, tip: Array) -> Felt:
+    def answer(move: Move, tip: Array) -> MoveOutcome:
         over = np.linalg.norm(move.goal_K_m - middle) < radius + 0.006
         if move.kind == "hop" and over:
             down = Contact(0.0, np.array([*move.goal_K_m, 0.07]), np.array([0.0, 0, -1]), np.array([0.0, 0, 1]),
                            move.goal_K_m, 1.0)  # fmt: skip
-            return Felt(move.goal_K_m, np.zeros((0, 2)), down)
+            return MoveOutcome(move.goal_K_m, np.zeros((0, 2)), down)
         if move.kind == "probe":
             way = (move.goal_K_m - tip) / np.linalg.norm(move.goal_K_m - tip)
             stop = middle - (radius + 0.006) * way
-            return Felt(stop, np.array([tip, stop]), touch(stop, way))
+            return MoveOutcome(stop, np.array([tip, stop]), touch(stop, way))
         return free(move, tip)
 
     policy = Towards((float(middle[0]), float(middle[1])), raised=True)
@@ -158,9 +158,9 @@ def test_a_hint_is_followed_before_the_policy_is_asked() -> None:
     start, place = np.array([-0.1, 0.0]), np.array([0.06, 0.0])
     hint = touch(place, np.array([1.0, 0.0]))
 
-    def answer(move: Move, tip: Array) -> Felt:
+    def answer(move: Move, tip: Array) -> MoveOutcome:
         if move.goal_K_m[0] > place[0]:
-            return Felt(place, np.array([tip, place]), touch(place, move.goal_K_m - tip))
+            return MoveOutcome(place, np.array([tip, place]), touch(place, move.goal_K_m - tip))
         return free(move, tip)
 
     sought, _ = run(seek(blank().with_hints((hint,)), Towards((-0.1, 0.15)), start, lowered=True), start, answer)

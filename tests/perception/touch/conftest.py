@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from glotouch_bt.perception.touch.outline.contours import widest_gap
 from glotouch_bt.robot import GripperState, Observation
 
 OBJECTS = Path(__file__).parents[3] / "glotouch_missions" / "objects"
@@ -16,7 +17,7 @@ TIP, SHAFT = 0.006, 0.004
 
 
 def mesh_discs(path, height, rng):
-    """What a vertical probe with its ball centre at `height` meets: surface points (n, 2), each with a radius (n,)."""
+    """Return surface points (n, 2) that a vertical probe at `height` can touch, each with a contact radius (n,)."""
     mesh = trimesh.load_mesh(path)
     mesh.apply_translation([0, 0, -mesh.bounds[0, 2]])
     points, _ = trimesh.sample.sample_surface(mesh, 40000, seed=int(rng.integers(1 << 30)))
@@ -28,7 +29,7 @@ def mesh_discs(path, height, rng):
 
 
 def polygon_discs(vertices, step=2e-4):
-    """The same for the closed polygon (n, 2) of an upright prism."""
+    """Return the same for an upright prism over a polygon (n, 2)."""
     closed = np.vstack([vertices, vertices[:1]])
     length = np.r_[0, np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))]
     at = np.arange(0, length[-1], step)
@@ -37,7 +38,7 @@ def polygon_discs(vertices, step=2e-4):
 
 
 def touch(discs, start, goal):
-    """Ball centre (2,) where a straight move from start to goal first touches, or None."""
+    """Return the ball centre (2,) at the first contact of a straight move, or None."""
     points, radius = discs
     u = (goal - start) / np.linalg.norm(goal - start)
     d = points - start
@@ -49,8 +50,43 @@ def touch(discs, start, goal):
     return start + t * u if t < np.linalg.norm(goal - start) else None
 
 
+def next_direction(tips, contour):
+    """Return the bearing of the next probe: an untouched face of a box, else the middle of the widest gap."""
+    offset = tips - contour.centre_K_m
+    faces = untouched_faces(tips, contour)
+    return faces[0] if faces else widest_gap(np.arctan2(offset[:, 1], offset[:, 0]))[0]
+
+
+def needs_more(tips, contour):
+    """Return True while the outline needs another contact: 6 to 12, 8 for a box, all sides, a good fit."""
+    if len(tips) >= 12 or len(tips) < 6:
+        return len(tips) < 6
+    offset = tips - contour.centre_K_m
+    _, gap = widest_gap(np.arctan2(offset[:, 1], offset[:, 0]))
+    if gap > np.deg2rad(100.0) or (contour.rms_m > 0.0015 and len(tips) < 10):
+        return True
+    return contour.kind == "box" and (len(tips) < 8 or len(untouched_faces(tips, contour)) > 0)
+
+
+def untouched_faces(tips, contour):
+    """Return the bearings of a box's faces without a contact."""
+    if contour.kind != "box":
+        return []
+    c, s = np.cos(contour.yaw_rad), np.sin(contour.yaw_rad)
+    local = (tips - contour.centre_K_m) @ np.array([[c, -s], [s, c]])
+    over = np.abs(local) - 0.5 * np.asarray(contour.size_m)
+    axis = np.argmax(over, axis=1)
+    turn = np.array([[0.0, np.pi], [0.5 * np.pi, -0.5 * np.pi]])
+    return [
+        float(np.pi - np.mod(np.pi - (contour.yaw_rad + turn[i, j]), 2 * np.pi))
+        for i in (0, 1)
+        for j, sign in enumerate((1.0, -1.0))
+        if not np.any((axis == i) & (np.sign(local[:, i]) == sign))
+    ]
+
+
 def trace(discs, rng, noise, tools, contacts=None):
-    """Orbit-and-probe as a skill does it: first a sweep that meets the object, then the largest gap until enough."""
+    """Sweep until a contact, then probe into the widest gap until the outline is known."""
     centre_true = discs[0].mean(axis=0)
     tips = None
     while tips is None:
@@ -66,10 +102,10 @@ def trace(discs, rng, noise, tools, contacts=None):
         if len(t) >= 3:
             contour = tools.fit_contour(t, TIP, contact_sd_m=max(noise, 4.5e-4))
             centre = contour.centre_K_m
-            if (contacts is None and not tools.needs_more(t, contour)) or len(t) == contacts:
+            if (contacts is None and not needs_more(t, contour)) or len(t) == contacts:
                 return t, contour
         bearings = np.arctan2(*(t - centre).T[::-1])
-        goal = tools.largest_gap_direction(bearings) if contour is None else tools.next_direction(t, contour)
+        goal = widest_gap(bearings)[0] if contour is None else next_direction(t, contour)
         start = centre + 0.15 * np.array([np.cos(goal), np.sin(goal)])
         tip = touch(discs, start, centre)
         if tip is None:
@@ -78,7 +114,7 @@ def trace(discs, rng, noise, tools, contacts=None):
 
 
 def blocks(force_P, *, rng, lever, sd_force=0.05, sd_torque=0.003, speed=(0.0, 0.0, 0.0), latency=3, start_s=0.0):
-    """Blocks of a down-pointing hand whose tip feels force (n, 3) in S (= P's axes), the sensor late by samples."""
+    """Return observations of a down-pointing hand with tip force (n, 3) in S; the sensor lags by `latency` samples."""
     n = len(force_P) // 10 * 10
     late = np.vstack([np.repeat(force_P[:1], latency, axis=0), force_P])[:n] if latency else force_P[:n]
     wrench = np.hstack([late, np.cross(lever, late)])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from py_trees.common import Status
 from scipy.spatial import ConvexHull
 
-from glotouch_bt.perception.search.top import BallMove, Met, Top, TopRule, rounds, top_plan
+from glotouch_bt.perception.search.top import BallMove, BallOutcome, Top, TopRule, rounds, top_plan
 from glotouch_bt.robot import MotionRefused, ParamError
 from glotouch_skills.explore.touch_top import TouchTop
 
@@ -56,7 +56,7 @@ def play(plan, height: Height) -> tuple[Top, list[BallMove]]:
                 assert low.max() <= 1e-4, "back into the object"
         tip = goal if touch is None else touch
         try:
-            move = plan.send(Met(tip, touch))
+            move = plan.send(BallOutcome(tip, touch))
         except StopIteration as stop:
             return stop.value, moves
 

@@ -1,4 +1,4 @@
-"""TODO door of glotouch_bt/perception/search/policies."""
+"""Search policies: interchangeable rules for the next sweep."""
 
 from glotouch_bt.perception.search.policies.expectation import ExpectationParams, ExpectedFind
 from glotouch_bt.perception.search.policies.frontier import PAPER_PASSES, NearestFrontier

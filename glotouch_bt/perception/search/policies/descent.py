@@ -1,4 +1,4 @@
-"""The paper's baseline without a search: raised from one random place to the next, down at each (section IV-B)."""
+"""Baseline policy of the paper: hop between random positions and descend at each (section IV-B)."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from glotouch_bt.perception.search.policies.policy import Stretch
 from glotouch_bt.robot import Array, ParamError
 
 HOP_M = 0.005
-"""Path samples farther apart than this have a hop between them; no descent is nearer than this to the last one."""
+"""Minimum distance between descents, and between path samples separated by a hop."""
 DRAWS = 200
+"""Number of positions drawn per descent."""
 
 
 class RandomDescent:
-    """A place drawn uniformly from the permitted region outside traced envelopes, reached raised.
+    """Draw positions uniformly from the permitted region outside envelopes, and hop to them.
 
-    No contact map and no frontier: only traced objects are kept out of. Stateless: the draw depends on the seed, on how
-    much the map holds and on where the tip is, to the micrometre: no two robots draw alike.
+    Stateless: the draw depends on the seed, on the size of the map and on the tip's position to the micrometre.
 
     Args:
-        seed: Of the draws.
-        max_descents: After so many hops the search counts as exhausted. The draws alone would never end; the default
-            is some 30 m of travel in a 0.3 m x 0.4 m container, six times the largest budget of the paper.
+        seed: Seed of the draws.
+        max_descents: Number of hops after which the search is exhausted. The default is about 30 m of travel in a
+            0.3 m x 0.4 m container, six times the largest budget of the paper.
 
     Raises:
         ParamError: `max_descents` below 1.
@@ -46,7 +46,7 @@ class RandomDescent:
         places = rng.uniform(-1.0, 1.0, (DRAWS, 2)) * belief.half_extent_m
         free = ~belief.inside_exclusion(places)
         last = path[-1:] if len(path) else tip[None]
-        for known in (last, tip[None], belief.dropped[-1:]):  # else a descent there would leave the map as it was
+        for known in (last, tip[None], belief.dropped[-1:]):  # a descent there would not change the map
             if len(known):
                 free &= np.linalg.norm(places - known, axis=1) > HOP_M
         if not free.any():

@@ -1,11 +1,10 @@
-"""Where to sweep next: the way on which most of the objects still hidden are expected soonest.
+"""Search policy that maximises the discounted probability of finding hidden objects.
 
-The belief is a weight for every place and size an unseen object may have: discs on a grid, of a few radii. A disc that
-a swept path would have touched, or that overlaps a traced object, is ruled out; one nearer to a wall or to an object
-than objects usually stand is unlikely, not impossible. A way finds what lies within its swath. The way chosen maximises
-the weight found, each find discounted by the travel up to it (a usual surrogate of expected search time; Stone, Theory
-of Optimal Search, 1975), over sequences of straight legs between the nodes of a lattice, by beam search; only its first
-leg is gone before the question is asked anew.
+The belief is a weight for every position and size of a hidden object: discs on a grid, of a few radii. Discs that a
+swept path would have touched, or that overlap a traced object, are excluded; discs near walls or objects are unlikely.
+A path finds the discs within its swath. Beam search over straight legs between lattice nodes maximises the weight
+found, discounted by the travel up to it (a surrogate of expected search time; Stone, Theory of Optimal Search, 1975).
+Only the first leg is executed before replanning.
 """
 
 from __future__ import annotations
@@ -25,26 +24,26 @@ from glotouch_bt.robot import Array
 
 Indices = npt.NDArray[np.int64]
 SAMPLE_M = 0.008
-"""Legs are checked against envelopes this often."""
+"""Spacing of the points at which legs are checked against envelopes."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExpectationParams:
-    """Lengths in metres.
+    """Parameters of `ExpectedFind`.
 
     Attributes:
-        radii_m: Half mean widths of the objects expected, about equally likely: 4-11 cm long things.
-        grid_m: Spacing of the places.
-        node_m: Spacing of the lattice of ways.
-        leg_m: Longest single leg of the lattice.
-        tip_radius_m: Of the ball.
-        touch: A disc counts as ruled out when the path came within this part of its radius plus the ball's.
-        gap_m: Objects usually stand this far from walls and from each other ...
-        gap_weight: ... and nearer only with this weight.
-        wall_m: The tip's centre keeps so far from the walls.
-        discount_m: A find after this much more travel is worth 1/e.
-        depth, width: Legs looked ahead, and ways kept.
-        left: When less than this part of the weight is left, the frontier search sweeps up what was missed.
+        radii_m: Half mean widths of the expected objects, equally likely: objects 4-11 cm long.
+        grid_m: Spacing of the positions.
+        node_m: Spacing of the lattice nodes.
+        leg_m: Maximum length of a lattice leg.
+        tip_radius_m: Radius of the ball.
+        touch: Fraction of disc radius plus ball radius within which a path excludes a disc.
+        gap_m: Usual distance of objects from walls and from each other.
+        gap_weight: Weight of a disc at less than the usual distance.
+        wall_m: Minimum distance of the tip's centre from the walls.
+        discount_m: Travel after which a find is worth 1/e.
+        depth, width: Number of legs ahead, and beam width.
+        left: Remaining weight below which the frontier search takes over.
     """
 
     radii_m: tuple[float, ...] = (0.020, 0.028, 0.038)
@@ -63,14 +62,14 @@ class ExpectationParams:
 
 
 @dataclass(frozen=True)
-class _Lattice:
-    """Places, nodes, legs, and what each leg's swath holds.
+class _SearchLattice:
+    """Discs, nodes, legs and the swath of each leg.
 
     Attributes:
-        centre, radius, prior: (h, 2), (h,), (h,) of every place-and-size.
-        nodes: (n, 2).
-        ends: (l, 2) from and to node of every leg, each way.
-        length: (l,).
+        centre, radius, prior: (h, 2), (h,), (h,) of every disc.
+        nodes: (n, 2) positions, m.
+        ends: (l, 2) start and end node of every leg, in both directions.
+        length: (l,) lengths of the legs, m.
         swath: (l, h) float32, 1 where the leg touches the disc.
         first: (n + 1,) legs of node i are first[i]..first[i + 1].
         samples, owner: points along all legs (s, 2) and the leg of each (s,).
@@ -89,7 +88,7 @@ class _Lattice:
 
 
 def touched(centre: Array, reach: Array, a: Array, b: Array) -> Mask:
-    """(l, h): segments a-b (l, 2) come within reach (h,) of centre (h, 2)."""
+    """Return (l, h) True where a segment a-b (l, 2) comes within reach (h,) of a centre (h, 2)."""
     ab = b - a
     square = np.maximum((ab * ab).sum(axis=1), 1e-12)
     t = ((centre[None] - a[:, None]) * ab[:, None]).sum(axis=2) / square[:, None]
@@ -98,17 +97,17 @@ def touched(centre: Array, reach: Array, a: Array, b: Array) -> Mask:
 
 
 @lru_cache(maxsize=4)
-def _lattice(half: tuple[float, float], p: ExpectationParams) -> _Lattice:
+def _lattice(half: tuple[float, float], p: ExpectationParams) -> _SearchLattice:
     inner = np.array(half) + p.wall_m
     axes = [np.linspace(-h, h, max(round(2 * h / p.grid_m) + 1, 2)) for h in inner]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     centre = np.concatenate([grid] * len(p.radii_m))
     radius = np.repeat(np.array(p.radii_m), len(grid))
-    room = (inner - np.abs(centre)).min(axis=1) - radius
-    prior = np.where(room >= p.gap_m, 1.0, p.gap_weight) * (room >= 0)
+    gap = (inner - np.abs(centre)).min(axis=1) - radius
+    prior = np.where(gap >= p.gap_m, 1.0, p.gap_weight) * (gap >= 0)
     keep = prior > 0
     centre, radius, prior = centre[keep], radius[keep], prior[keep]
-    for r in p.radii_m:  # every size as likely
+    for r in p.radii_m:  # every size equally likely
         prior[radius == r] /= max(prior[radius == r].sum(), 1e-9) * len(p.radii_m)
     node_axes = [np.linspace(-h, h, max(round(2 * h / p.node_m) + 1, 2)) for h in half]
     nodes = np.stack(np.meshgrid(*node_axes, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -125,7 +124,7 @@ def _lattice(half: tuple[float, float], p: ExpectationParams) -> _Lattice:
     t = np.concatenate([np.linspace(0, 1, c) for c in count])[:, None]
     samples = (1 - t) * nodes[start][owner] + t * nodes[end][owner]
     ends = np.column_stack([start, end])
-    return _Lattice(centre, radius, prior, nodes, ends, length, swath, np.asarray(first), samples, owner)
+    return _SearchLattice(centre, radius, prior, nodes, ends, length, swath, np.asarray(first), samples, owner)
 
 
 @lru_cache(maxsize=8)
@@ -138,7 +137,7 @@ def _free_legs(half: tuple[float, float], p: ExpectationParams, exclusions: tupl
 
 
 class ExpectedFind:
-    """See the module. Stateless; takes some 20 ms a question, the first one half a second.
+    """Policy of this module. Stateless; about 20 ms per call, 0.5 s for the first one.
 
     Args:
         params: See `ExpectationParams`.
@@ -149,7 +148,7 @@ class ExpectedFind:
         self._rest = NearestFrontier(passes=((1.0, 0.0), (0.6, 0.0)))
 
     def weights(self, belief: SearchMap) -> tuple[Array, Array, Array]:
-        """Centres (h, 2), radii (h,) and weights (h,) of what may still be hidden; they sum to 1 before any search."""
+        """Return centres (h, 2), radii (h,) and weights (h,) of hidden objects; the weights sum to 1 initially."""
         p = self.params
         lattice = _lattice(_half(belief), p)
         weight = lattice.prior.copy()
@@ -177,14 +176,14 @@ class ExpectedFind:
         return self._rest.next_stretch(belief, tip)
 
     def _first_node(self, belief: SearchMap, tip: Array, weight: npt.NDArray[np.float32]) -> Array | None:
-        """End of the best way's first leg, or None if no way finds anything."""
+        """Return the end of the best path's first leg, or None if no path finds anything."""
         p, half = self.params, _half(belief)
         lattice = _lattice(half, p)
         free = _free_legs(half, p, belief.exclusions)
         reach = p.touch * (lattice.radius + p.tip_radius_m)
         lengths = Routes(belief, tip).lengths(lattice.nodes)
         straight = np.linalg.norm(lattice.nodes - tip, axis=1)
-        # a first leg beyond the lattice's longest is for coming out of places where all near is known
+        # The first leg may be longer than a lattice leg, to leave fully explored surroundings.
         near = np.argsort(np.where(np.isfinite(lengths), lengths, 9.0), kind="stable")[: 4 * p.width + 16]
         near = near[
             np.isfinite(lengths[near]) & (straight[near] > 1e-3) & ~belief.inside_exclusion(lattice.nodes[near])

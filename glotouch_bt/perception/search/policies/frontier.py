@@ -1,4 +1,4 @@
-"""Where to sweep next: the nearest unexplored frontier (paper III-C)."""
+"""Search policy of the paper: sweep to the nearest unexplored frontier (III-C)."""
 
 from __future__ import annotations
 
@@ -10,36 +10,37 @@ from glotouch_bt.perception.search.routes import Routes
 from glotouch_bt.robot import Array, ParamError
 
 DROP_RADIUS_M = 0.012
-"""A frontier this near a dropped place is dropped with it."""
+"""Distance from a dropped position within which a frontier is dropped too."""
 MIN_TRAVEL_M = 0.003
-"""A frontier nearer than this is no journey; the tip is there."""
+"""Minimum distance of a frontier from the tip."""
 
 PAPER_PASSES = ((1.0, 0.0),)
+"""The paper's single pass."""
 PASSES = ((1.6, 0.03), (1.0, 0.03), (1.0, 0.0), (0.6, 0.0))
-"""Tuned on random layouts of five objects of 4-11 cm; the last pass is for what was missed."""
+"""Passes from coarse to fine. Source: tuned on random layouts of five objects of 4-11 cm."""
 TURN_M = 0.02
+"""Cost of a full turn back, as travel. Source: tuned with PASSES."""
 
 
 class NearestFrontier:
-    """The nearest unexplored place, by the length of the way to it; coarse first, then finer.
+    """Sweep to the nearest unexplored frontier by route length, from coarse to fine.
 
-    Frontier samples are uniform in the permitted region, drawn once from the seed. One is unexplored if it is farther
-    than the coverage radius from all path samples, outside every envelope, and not dropped. Two things are added to
-    the paper:
+    Frontier samples are uniform in the permitted region, drawn once from the seed. A sample is unexplored if it is
+    farther than the coverage radius from the path, outside all envelopes, and not dropped. Two extensions of the paper:
 
-    - Passes: a first pass with a wider radius and away from the border finds the large objects on a short way; only
-      what it leaves is searched at the coverage radius. `passes=PAPER_PASSES` is the paper's single pass.
-    - A turn costs something, so of two frontiers about as near the one ahead is taken.
+    - Passes: a first pass with a larger radius and away from the border finds large objects on a short path. The rest
+      is searched at the coverage radius. `passes=PAPER_PASSES` is the paper's single pass.
+    - Turning has a cost, so of two equally near frontiers the one ahead is chosen.
 
     Stateless: the answer depends on map and tip alone.
 
     Args:
-        coverage_radius_m: The paper's r_cov. A tip of radius r passing a disc of radius R touches it within R + r: 26
-            mm for the smallest object (40 mm) and a 6 mm tip; the default leaves 2 mm for path and registration errors.
-        samples: How many frontier samples.
-        seed: Of the samples.
-        turn_m: Length that turning back costs; 0 is the paper.
-        passes: (radius factor, border in metres that needs no visit) of each pass, in order.
+        coverage_radius_m: The paper's r_cov. A tip of radius r touches a disc of radius R within R + r: 26 mm for the
+            smallest object (40 mm) and a 6 mm tip; the default leaves 2 mm for path and registration errors.
+        samples: Number of frontier samples.
+        seed: Seed of the samples.
+        turn_m: Cost of turning back, as travel; 0 in the paper.
+        passes: (radius factor, width of the border to skip, m) of each pass, in order.
 
     Raises:
         ParamError: A radius, a number of samples or a pass that is not positive.
@@ -64,7 +65,7 @@ class NearestFrontier:
         self._unit = np.random.default_rng(seed).uniform(-1.0, 1.0, (samples, 2))
 
     def frontiers(self, belief: SearchMap, step: int = -1) -> Array:
-        """(n, 2) samples unexplored in the given pass (the last by default)."""
+        """Return the unexplored samples (n, 2) of the given pass (the last by default)."""
         factor, border = self._passes[step]
         samples = self._unit * belief.half_extent_m
         inner = np.all(np.abs(samples) <= np.maximum(belief.half_extent_m - border, 0.0), axis=1)
@@ -76,7 +77,7 @@ class NearestFrontier:
         return None if way is None else Stretch(way)
 
     def next_path(self, belief: SearchMap, tip_K_m: Array) -> Array | None:
-        """Waypoints (k, 2) in K to the nearest unexplored place; None if none can be reached."""
+        """Return waypoints (k, 2) in K to the nearest unexplored sample; None if none is reachable."""
         tip = np.asarray(tip_K_m, dtype=np.float64)[:2]
         routes = Routes(belief, tip)
         for step in range(len(self._passes)):
@@ -88,7 +89,7 @@ class NearestFrontier:
 
 
 def turning(belief: SearchMap, tip_K_m: Array, goals_K_m: Array) -> Array:
-    """(n,) 0 for a goal straight ahead of the path's end .. 1 for one straight back; 0 if the tip is not at its end."""
+    """Return (n,) 0 for a goal ahead of the path's end .. 1 for one behind; 0 if the tip is not at the path's end."""
     path = belief.path_K_m
     if len(path) < 4 or len(goals_K_m) == 0 or np.linalg.norm(path[-1] - tip_K_m) > 0.005:
         return np.zeros(len(goals_K_m))
@@ -99,7 +100,7 @@ def turning(belief: SearchMap, tip_K_m: Array, goals_K_m: Array) -> Array:
 
 
 def unexplored(belief: SearchMap, points_K_m: Array, radius_m: float) -> Array:
-    """Those of the points (n, 2) that are farther than `radius_m` from the path, outside envelopes, and not dropped."""
+    """Return the points of (n, 2) farther than `radius_m` from the path, outside envelopes and not dropped."""
     left = points_K_m[belief.path_distance(points_K_m) > radius_m]
     left = left[~belief.inside_exclusion(left)]
     if len(belief.dropped) and len(left):
@@ -109,7 +110,7 @@ def unexplored(belief: SearchMap, points_K_m: Array, radius_m: float) -> Array:
 
 
 def first_reachable(routes: Routes, goals_K_m: Array, cost: Array, tries: int = 40) -> Array | None:
-    """Waypoints to the cheapest goal that can be reached; None if there is none."""
+    """Return waypoints to the cheapest reachable goal; None without one."""
     for i in np.argsort(cost, kind="stable")[:tries]:
         if not np.isfinite(cost[i]):
             return None

@@ -1,4 +1,4 @@
-"""The small interface behind which search policies are exchanged."""
+"""Interface of search policies."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from glotouch_bt.robot import Array
 
 @dataclass(frozen=True)
 class Stretch:
-    """The next way of the ball.
+    """Next path of the ball.
 
     Attributes:
-        waypoints_K_m: (k, 2) where the ball's centre goes, in order; entering no traced object's envelope.
-        raised: True: over the objects to the last waypoint, and down there. False: swept at sensing height.
+        waypoints_K_m: (k, 2) positions of the ball's centre, in order, outside all envelopes.
+        raised: True: hop above the objects to the last waypoint. False: sweep at sensing height.
     """
 
     waypoints_K_m: Array
@@ -23,8 +23,8 @@ class Stretch:
 
 
 class SearchPolicy(Protocol):
-    """Chooses the next stretch of a search. Stateless: the answer depends on what it was made with, map and tip."""
+    """Rule for the next path of a search. Stateless: the answer depends on its parameters, map and tip."""
 
     def next_stretch(self, belief: SearchMap, tip_K_m: Array) -> Stretch | None:
-        """The way to go on from tip_K_m (2,); None: nothing is left to explore, or nothing can be reached from here."""
+        """Return the next path from tip_K_m (2,); None if nothing unexplored is reachable."""
         ...

@@ -1,4 +1,4 @@
-"""The search policies by name, as missions call them."""
+"""Search policies by their name in missions."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ POLICIES: MappingProxyType[str, Callable[[int], SearchPolicy]] = MappingProxyTyp
         "random_descent": RandomDescent,
     }
 )
-"""expected_find: ours (the default). nearest_frontier, random_descent: the paper's, as baselines. Each is made with a
-seed."""
+"""Factories from a seed. expected_find: own policy, the default. nearest_frontier, random_descent: baselines of the
+paper."""
 
 
 @lru_cache(maxsize=8)
 def search_policy(name: str, seed: int = 0) -> SearchPolicy:
-    """The policy of that name; stateless, so one does for all.
+    """Return the policy of a name, cached because policies are stateless.
 
     Args:
         name: See `POLICIES`.
-        seed: Of what it draws, if it draws anything.
+        seed: Seed of its random draws, if any.
 
     Raises:
-        UnknownName: There is none of that name.
+        UnknownName: Unknown policy.
     """
     if name not in POLICIES:
         raise UnknownName("search policy", name, tuple(POLICIES))

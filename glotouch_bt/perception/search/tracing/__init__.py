@@ -1,7 +1,7 @@
-"""TODO door of glotouch_bt/perception/search/tracing."""
+"""Tracing of one object's outline."""
 
 from glotouch_bt.perception.search.tracing.trace import trace, trace_more
 from glotouch_bt.perception.search.tracing.trace_params import TraceParams
-from glotouch_bt.perception.search.tracing.trace_state import Trace
+from glotouch_bt.perception.search.tracing.trace_state import OutlineTrace
 
-__all__ = ["Trace", "TraceParams", "trace", "trace_more"]
+__all__ = ["OutlineTrace", "TraceParams", "trace", "trace_more"]

@@ -1,4 +1,4 @@
-"""Round an object: where the next probe says most for the way it costs, and when enough is known (paper III-D)."""
+"""Tracing of an outline: choose the most informative probe per travel until the outline is known (paper III-D)."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glotouch_bt.perception.search.moves import Move, Plan
+from glotouch_bt.perception.search.moves import Move, SearchPlan
 from glotouch_bt.perception.search.tracing.trace_params import TraceParams
-from glotouch_bt.perception.search.tracing.trace_state import BEARINGS, Trace, TraceState, all_bearings, unit
+from glotouch_bt.perception.search.tracing.trace_state import BEARINGS, OutlineTrace, TraceState, all_bearings, unit
 from glotouch_bt.perception.touch import Contact
 from glotouch_bt.perception.touch.outline import OutlineBelief, wrapped
 from glotouch_bt.robot import Array
 
 MIN_MORE = 3
-"""Contacts made of an object that was thought to be known."""
+"""Minimum number of new contacts with an object traced before."""
 BESIDE_RAD = np.deg2rad(10.0)
-"""The ball is not sent nearer than this to the bearing of something else beside the object."""
+"""Minimum angle between a route around the object and the bearing of an outlier beside it."""
 OUTWARDS_M = (0.0, 0.012, 0.024)
-"""Where the ball lands on what nothing predicted, it is brought down so much farther out, and finds a limb's end."""
+"""Extra distances at which a hop is repeated after landing on an unpredicted part."""
 OWN_M = 0.030
-"""What is met beside a lone contact, this near to it, is the same thing: objects stand so far apart."""
+"""Maximum distance from a lone contact of another contact with the same object; objects stand farther apart."""
 LOST = 2
-"""After so many misses in a row round a lone contact, what is ahead of it is not what was touched."""
+"""Number of consecutive misses around a lone contact after which both its sides are probed."""
 INSIDE_M = 0.004
-"""A probe that came this near to the object's supposed middle has passed through: nothing is there."""
+"""Distance from the predicted centre at which a probe ends: nothing is there."""
 
 
 def trace(
@@ -40,19 +40,19 @@ def trace(
     known: tuple[Contact, ...] = (),
     elsewhere: Callable[[Contact], bool] | None = None,
     joined: Callable[[tuple[Contact, ...]], bool] | None = None,
-) -> Plan[Trace]:
-    """Trace the outline of what was touched. The ball ends beside it, at sensing height.
+) -> SearchPlan[OutlineTrace]:
+    """Trace the outline of a touched object. The ball ends beside it, at sensing height.
 
     Args:
-        first: The contact that found it; the ball may have been retreated from it.
-        tip_K_m: (2,) where the ball is.
-        tip_radius_m: Its radius; of another section, that of a disc about as large.
+        first: Contact that found the object; the ball may have retreated from it.
+        tip_K_m: (2,) position of the ball.
+        tip_radius_m: Radius of the ball, or of a disc similar to another section.
         params: See `TraceParams`.
-        round_tip: The section is a disc: outlines are fitted to its centres. Else to the contacts' points.
-        half_extent_m: (2,) the ball's centre keeps within |x|, |y| of it in K; None: no walls near.
-        known: Contacts with the same object made before, where it stands now.
-        elsewhere: Whether a contact is with another object that is known already; None: none is.
-        joined: Whether these contacts show that it is an object known already; None: they never do.
+        round_tip: The section is a disc: fit outlines to its centres, else to the contact points.
+        half_extent_m: (2,) limits of |x| and |y| of the ball's centre in K; None: no walls near.
+        known: Earlier contacts with the same object, at its current position.
+        elsewhere: Returns True if a contact belongs to another, known object.
+        joined: Returns True if the contacts belong to a known object, which ends the trace.
     """
     p = params or TraceParams()
     s = TraceState.begin([*_still(known), first], tip_K_m, tip_radius_m, round_tip, half_extent_m)
@@ -69,11 +69,11 @@ def trace_more(
     *,
     round_tip: bool = True,
     half_extent_m: Array | None = None,
-) -> Plan[Trace]:
-    """Go on tracing what was traced before, from above: come down where the outline is least certain.
+) -> SearchPlan[OutlineTrace]:
+    """Continue the trace of an object from above: hop to where the outline is least certain.
 
     Args:
-        known: Its contacts, where it stands now.
+        known: Its contacts, at its current position.
         tip_K_m, tip_radius_m, params, round_tip, half_extent_m: As for `trace`; the ball may be raised.
     """
     p = params or TraceParams()
@@ -86,22 +86,22 @@ def trace_more(
     for i in _apart(np.where(within, sd, -1.0), p.misses):
         if not (yield from _come_down(outline, s, p, float(bearings[i]))):
             continue
-        felt = yield Move("probe", outline.centre_K_m + INSIDE_M * unit(s.tip - outline.centre_K_m))
-        s.felt(felt)
-        if felt.contact is not None and s.belongs(outline, felt.contact, p):
-            s.add(felt.contact, outline, p)
+        outcome = yield Move("probe", outline.centre_K_m + INSIDE_M * unit(s.tip - outline.centre_K_m))
+        s.record(outcome)
+        if outcome.contact is not None and s.belongs(outline, outcome.contact, p):
+            s.add(outcome.contact, outline, p)
             yield from _retreat(s, p)
             return (yield from _until_known(s, p))
     return replace(s.trace(outline, "it was not met again"), missing=True)
 
 
 def _still(contacts: tuple[Contact, ...]) -> list[Contact]:
-    """They are where the object stands now: the pushes they made are in their places."""
+    """Return the contacts without their pushes, which their positions already contain."""
     return [replace(c, pushed_K_m=np.zeros(2)) for c in contacts]
 
 
 def _apart(worth: Array, n: int) -> list[int]:
-    """Indices of up to n bearings of the most worth, none next to another; those below zero left out."""
+    """Return the indices of up to n bearings of the highest worth, spaced apart; skip negative worths."""
     chosen: list[int] = []
     for i in np.argsort(-worth, kind="stable"):
         gaps = [min(abs(int(i) - j), BEARINGS - abs(int(i) - j)) for j in chosen]
@@ -117,10 +117,10 @@ def _until_known(
     p: TraceParams,
     elsewhere: Callable[[Contact], bool] | None = None,
     joined: Callable[[tuple[Contact, ...]], bool] | None = None,
-) -> Plan[Trace]:
-    """Probe on until enough is known, from beside the object.
+) -> SearchPlan[OutlineTrace]:
+    """Probe from beside the object until the outline is known.
 
-    Once a contact was odd, each one asks whether the object moved without being felt to: three are needed to tell.
+    After a surprising contact, test at each contact whether the object has moved unobserved (needs three contacts).
     """
     outline, missed, ended, about = s.outline(), 0, "", False
     while not ended:
@@ -157,7 +157,7 @@ def _until_known(
             missed += 1
             s.outliers.append(found)
             s.blocked.append(bearing)
-            s.felt((yield Move("retreat", s.tip + p.clearance_m * unit(found.reaction_K[:2]))))
+            s.record((yield Move("retreat", s.tip + p.clearance_m * unit(found.reaction_K[:2]))))
         if missed > p.misses:
             ended = f"{missed} probes in a row told nothing"
         outline = s.outline()
@@ -166,14 +166,14 @@ def _until_known(
     return s.trace(outline, ended)
 
 
-def _retreat(s: TraceState, p: TraceParams) -> Plan[None]:
-    """Away from the last contact until the clearance is reached, along what the force, rather than the approach, says
-    is outwards (they differ for a graze)."""
+def _retreat(s: TraceState, p: TraceParams) -> SearchPlan[None]:
+    """Retreat from the last contact to the clearance, mainly along the reaction (it differs from the approach in a
+    graze)."""
     last = s.raw[-1]
     out = unit(2.0 * last.reaction_K[:2] - last.approach_K[:2])
     way = p.clearance_m - float((s.tip - last.tip_K_m[:2]) @ out)
     if way > 5e-4:
-        s.felt((yield Move("retreat", s.tip + way * out)))
+        s.record((yield Move("retreat", s.tip + way * out)))
 
 
 def _enough(outline: OutlineBelief, s: TraceState, p: TraceParams) -> str:
@@ -194,7 +194,7 @@ def _enough(outline: OutlineBelief, s: TraceState, p: TraceParams) -> str:
 
 
 class _Aim(NamedTuple):
-    """A bearing to be probed, rad; which way round (+1 counter-clockwise); whether it is reached over the top."""
+    """Next probe: bearing, rad; direction around the object (+1 counter-clockwise); True to reach it by a hop."""
 
     bearing: float
     side: float
@@ -202,7 +202,7 @@ class _Aim(NamedTuple):
 
 
 def _choose(outline: OutlineBelief, s: TraceState, p: TraceParams) -> _Aim | None:
-    """The bearing with the most uncertainty for the way to it; None if none can be reached."""
+    """Return the probe with the highest uncertainty per travel; None if none is reachable."""
     bearings = all_bearings()
     distance, sd = s.ring(outline, bearings, p)
     here = s.bearing(outline)
@@ -230,7 +230,7 @@ def _choose(outline: OutlineBelief, s: TraceState, p: TraceParams) -> _Aim | Non
 
 
 def _barred(outline: OutlineBelief, s: TraceState, p: TraceParams, here: float, side: float) -> float:
-    """How far, rad, the way round is free of what is not the object: outliers beside it stand in the way."""
+    """Return the angle, rad, by which the ball can go around the object before it meets an outlier."""
     off = np.array([c.tip_K_m[:2] for c in s.outliers]).reshape(-1, 2) - outline.centre_K_m
     at = np.arctan2(off[:, 1], off[:, 0])
     beside = np.hypot(off[:, 0], off[:, 1]) < s.passing(outline, at, p) + s.radius
@@ -238,10 +238,10 @@ def _barred(outline: OutlineBelief, s: TraceState, p: TraceParams, here: float, 
     return float(np.min(turns - BESIDE_RAD, initial=2 * np.pi))
 
 
-def _probe_at(outline: OutlineBelief, s: TraceState, p: TraceParams, aim: _Aim) -> Plan[Contact | None]:
-    """To the bearing aimed at, and inwards. A touch on the way round is as good as the one that was meant.
+def _probe_at(outline: OutlineBelief, s: TraceState, p: TraceParams, aim: _Aim) -> SearchPlan[Contact | None]:
+    """Move to the bearing and probe inwards; return the first contact, also one on the way.
 
-    Where the way round is too uncertain to be planned, the ball goes on along the surface it touched last.
+    If the outline is too uncertain on the way, follow the surface from the last contact instead.
     """
     if aim.over:
         if not (yield from _come_down(outline, s, p, aim.bearing)):
@@ -251,75 +251,75 @@ def _probe_at(outline: OutlineBelief, s: TraceState, p: TraceParams, aim: _Aim) 
         if beside and _doubt(outline, s, p, aim.bearing, aim.side) > p.doubt_m:
             return (yield from _along(s, p, aim.side))
         for waypoint in _way_round(outline, s, p, aim.bearing, aim.side):
-            felt = yield Move("step", waypoint)
-            s.felt(felt)
-            if felt.refused:
+            outcome = yield Move("step", waypoint)
+            s.record(outcome)
+            if outcome.refused:
                 return None
-            if felt.contact is not None:
-                return felt.contact
+            if outcome.contact is not None:
+                return outcome.contact
     distance, sd = (float(v[0]) for v in s.ring(outline, np.array([aim.bearing]), p))
     inner = max(distance - p.reach_sds * sd - 0.003, INSIDE_M)
     u = np.array([np.cos(aim.bearing), np.sin(aim.bearing)])
-    felt = yield Move("probe", outline.centre_K_m + inner * u)
-    s.felt(felt)
-    return felt.contact
+    outcome = yield Move("probe", outline.centre_K_m + inner * u)
+    s.record(outcome)
+    return outcome.contact
 
 
-def _come_down(outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: float) -> Plan[bool]:
-    """Over the top to beside `bearing`, or farther out where the ball lands on the object. Whether it is down."""
+def _come_down(outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: float) -> SearchPlan[bool]:
+    """Hop beside the object at `bearing`, farther out after landing on it; return True at sensing height."""
     at = np.array([bearing])
     distance, sd = s.ring(outline, at, p)
     for farther in OUTWARDS_M:
         place = _beside(outline, at, distance + farther, sd, p)[0]
         if np.any(np.abs(place) > s.half):
             return False
-        felt = yield Move("hop", place)
-        s.felt(felt)
-        if felt.refused:
+        outcome = yield Move("hop", place)
+        s.record(outcome)
+        if outcome.refused:
             return False
-        s.raised = felt.contact is not None
+        s.raised = outcome.contact is not None
         if not s.raised:
             return True
     return False
 
 
 def _beside(outline: OutlineBelief, bearings: Array, distance: Array, sd: Array, p: TraceParams) -> Array:
-    """(n, 2) places to come down at, clear of what is predicted at these distances from the outline's middle."""
+    """Return positions (n, 2) for the descent, outside the outline predicted at these distances."""
     ring = distance + p.clearance_m + np.minimum(2.0 * sd, p.widest_margin_m)
     return np.asarray(outline.centre_K_m + ring[:, None] * np.column_stack([np.cos(bearings), np.sin(bearings)]))
 
 
 def _doubt(outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: float, side: float) -> float:
-    """Largest standard deviation of the outline on the way round to `bearing`."""
+    """Return the maximum standard deviation of the outline on the way to `bearing`."""
     _, sd = s.ring(outline, _angles(outline, s, bearing, side), p)
     return float(np.max(sd))
 
 
-def _along(s: TraceState, p: TraceParams, side: float) -> Plan[Contact | None]:
-    """A step along the tangent of the last contact, and inwards from there."""
+def _along(s: TraceState, p: TraceParams, side: float) -> SearchPlan[Contact | None]:
+    """Step along the tangent of the last contact and probe inwards."""
     last = s.raw[-1]
     normal = unit(2.0 * last.reaction_K[:2] - last.approach_K[:2])
     goal = np.clip(s.tip + p.along_m * side * np.array([-normal[1], normal[0]]), -s.half, s.half)
     for move in (Move("step", goal), Move("probe", goal - (p.clearance_m + p.along_reach_m) * normal)):
-        felt = yield move
-        s.felt(felt)
-        if felt.refused or felt.contact is not None:
-            return felt.contact
+        outcome = yield move
+        s.record(outcome)
+        if outcome.refused or outcome.contact is not None:
+            return outcome.contact
     return None
 
 
-def _feel_about(s: TraceState, p: TraceParams) -> Plan[Contact | None]:
-    """Along the surface to either side of the last contact, the side away from the way round so far first.
+def _feel_about(s: TraceState, p: TraceParams) -> SearchPlan[Contact | None]:
+    """Probe to both sides of the last contact along the surface, first against the current direction.
 
-    What was touched at its end, a limb say, is not ahead of the contact, where every outline would have it.
+    A part touched at its end, e.g. a limb, is not ahead of the contact, where every outline predicts it.
     """
     last = s.raw[-1]
     beside = last.tip_K_m[:2] + p.clearance_m * unit(2.0 * last.reaction_K[:2] - last.approach_K[:2])
     for side in (-(s.side or 1.0), s.side or 1.0):
-        felt = yield Move("step", np.clip(beside, -s.half, s.half))
-        s.felt(felt)
-        if felt.refused or felt.contact is not None:
-            return felt.contact
+        outcome = yield Move("step", np.clip(beside, -s.half, s.half))
+        s.record(outcome)
+        if outcome.refused or outcome.contact is not None:
+            return outcome.contact
         found = yield from _along(s, p, side)
         if found is not None:
             return found
@@ -327,7 +327,7 @@ def _feel_about(s: TraceState, p: TraceParams) -> Plan[Contact | None]:
 
 
 def _angles(outline: OutlineBelief, s: TraceState, bearing: float, side: float) -> Array:
-    """(k,) bearings on the way round from where the ball is, this left out, to `bearing`."""
+    """Return the bearings (k,) on the way around from the ball (excluded) to `bearing`."""
     here = s.bearing(outline)
     turn = float(wrapped(np.array(side * (bearing - here))) % (2 * np.pi))
     n = max(int(np.ceil(turn / np.deg2rad(5.0))), 1)
@@ -335,7 +335,7 @@ def _angles(outline: OutlineBelief, s: TraceState, bearing: float, side: float) 
 
 
 def _way_round(outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: float, side: float) -> Array:
-    """(k, 2) waypoints outside the predicted outline, from where the ball is to `bearing`, pulled tight."""
+    """Return waypoints (k, 2) outside the predicted outline from the ball to `bearing`, with shortcuts."""
     angles = _angles(outline, s, bearing, side)
     ring = s.passing(outline, angles, p)
     points = outline.centre_K_m + ring[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
@@ -344,7 +344,7 @@ def _way_round(outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: f
 
 
 def _tight(s: TraceState, points: Array, outline: OutlineBelief, p: TraceParams) -> Array:
-    """Leave out what can be cut without coming nearer to the predicted outline than the clearance."""
+    """Remove waypoints whose shortcut keeps the clearance from the predicted outline."""
     kept: list[Array] = []
     here, i = s.tip, 0
     while i < len(points):

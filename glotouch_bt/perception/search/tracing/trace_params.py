@@ -1,4 +1,4 @@
-"""When an outline is known well enough, and how the ball goes round meanwhile."""
+"""Parameters of tracing."""
 
 from __future__ import annotations
 
@@ -8,46 +8,43 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class TraceParams:
-    """How an outline is traced. Lengths in metres.
+    """Parameters of tracing. Lengths in metres.
 
     Attributes:
-        clearance_m: Ball to predicted outline while going round.
-        margin_sds: So many standard deviations of the prediction are added to the clearance.
-        widest_margin_m: No more than this is added.
-        centre_sd_m: Enough is known when the centre's standard deviation is below this ...
-        radial_sd_m: ... and the outline's nowhere above this.
-        min_contacts, max_contacts: Bounds whatever the covariance says.
-        unfelt_m: Standard deviation of how far what was known before may have moved unfelt, each way; contacts made
-            since say how far it did not.
-        smallest_m: What is shorter is a part of an object: not enough is known.
-        largest_m: What is longer are two objects.
-        step_m: Longest way round before the ball probes again.
-        doubt_m: With a deviation above this on the way round, the ball goes along the surface instead ...
-        along_m, along_reach_m: ... so far, and then looks for it so far deeper than it was.
-        back: How much a bearing counts that lies behind, against the way round so far.
-        way_m: Travel that every probe costs beside the way to it (in and out).
-        hop_m: What is farther round than `step_m` is reached over the top, which counts as so much travel. Infinite: it
-            is not reached at once.
-        keen: Power of the deviation when a bearing's worth is weighed against the way: 2 takes the variance.
-        reach_sds: A probe goes so many standard deviations past the prediction.
-        facing: Cosine between the force on the ball and the direction from the object's middle below which the contact
-            is with something else.
-        between_m: A contact so near to an earlier one is the object's own: objects stand 30 mm apart, and are pushed a
-            few.
-        same_m: A contact so near to an earlier one says nothing new.
-        own_m: A contact within this (and twice the deviation) of the prediction is the object's own; farther out the
-            evidence for one object or two decides.
-        other: Odds, before it is looked at, that a contact on the way round belongs to another object.
-        unmodelled_m: What no contact is near is not known better than this, whatever the families say that have been
-            thought of ...
-        near_m, far_m: ... fully so from the second of these distances on, not at all within the first ...
-        odd_near_m, odd_far_m: ... and these, as far as it is believed to be neither a circle nor a rectangle.
-        misses: So many probes may meet nothing, or be refused, one after another.
-        surprise_sds, surprise_m: A contact farther off the prediction than so many standard deviations and this is odd:
-            has the object moved without being felt to? ...
-        settling: ... So many contacts, the odd one included, are made before enough is known of what was known before.
-        moves: An object is begun anew so many times.
-        farthest_m: Farther than this no object moves unfelt.
+        clearance_m: Clearance of the ball from the predicted outline.
+        margin_sds: Extra clearance, in standard deviations of the prediction.
+        widest_margin_m: Maximum extra clearance.
+        centre_sd_m: Maximum standard deviation of the centre of a known outline.
+        radial_sd_m: Maximum standard deviation of a known outline at any bearing.
+        min_contacts, max_contacts: Minimum and maximum number of contacts.
+        unfelt_m: Prior standard deviation, per axis, of an unobserved motion since earlier contacts.
+        smallest_m: Minimum size of an outline; a smaller one is only a part of the object.
+        largest_m: Maximum size of an outline; a larger one is two objects.
+        step_m: Maximum travel around the object between probes.
+        doubt_m: Standard deviation on the way around above which the ball follows the surface instead.
+        along_m: Step along the surface.
+        along_reach_m: Depth of the probe after such a step, past the last contact.
+        back: Factor on the worth of bearings against the current direction.
+        way_m: Travel of a probe in and out, added to the travel to its bearing.
+        hop_m: Cost of a hop, as travel; infinite: no hops.
+        keen: Exponent of the standard deviation in a bearing's worth; 2 gives the variance.
+        reach_sds: Depth of a probe past the prediction, in standard deviations.
+        facing: Minimum cosine between the force on the ball and the direction from the object's centre for the contact
+            to belong to the object.
+        between_m: Distance from an earlier contact within which a contact always belongs to the object. Source: objects
+            stand 30 mm apart and are pushed by a few millimetres.
+        same_m: Distance from an earlier contact within which a contact is not new.
+        own_m: Distance from the prediction (plus two standard deviations) within which a contact belongs to the object;
+            beyond, the evidence for one or two objects decides.
+        other: Prior odds that a contact on the way belongs to another object.
+        unmodelled_m: Standard deviation of model error far from any contact.
+        near_m, far_m: Distances from the nearest contact at which the model error starts and is complete.
+        odd_near_m, odd_far_m: The same distances for the free family.
+        misses: Maximum number of consecutive probes without a new contact.
+        surprise_sds, surprise_m: A contact is surprising if it is farther from the prediction than the sum of these.
+        settling: Minimum number of contacts from a surprising one on, before an earlier outline counts as known.
+        moves: Maximum number of restarts after an unobserved motion.
+        farthest_m: Maximum unobserved motion.
     """
 
     clearance_m: float = 0.003

@@ -1,4 +1,4 @@
-"""What is known while an outline is traced: what was felt, what it says, and how far that can be trusted."""
+"""State of a trace: contacts, predicted outline and its uncertainty."""
 
 from __future__ import annotations
 
@@ -7,37 +7,37 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from glotouch_bt.perception.search.moves import Felt
+from glotouch_bt.perception.search.moves import MoveOutcome
 from glotouch_bt.perception.search.tracing.trace_params import TraceParams
-from glotouch_bt.perception.touch import Contact, Contour, split_moved
-from glotouch_bt.perception.touch.outline import OutlineBelief, believe_outline, wrapped
+from glotouch_bt.perception.touch import Contact, Contour, split_at_motion
+from glotouch_bt.perception.touch.outline import OutlineBelief, infer_outline, wrapped
 from glotouch_bt.robot import Array
 
 BEARINGS = 72
-"""Directions a next probe is chosen from."""
+"""Number of bearings considered for the next probe."""
 TOUCH_SD_M = 0.0005
-"""How well a contact says along its normal where an outline of known shape is."""
-FEWEST_OF_ONE = 2
-"""Contacts with one of two objects that were taken for one."""
-LIMB_M = 0.006
-"""What was touched is kept clear of so far to each side of the contact."""
+"""Standard deviation of a contact along the normal of a known outline."""
+MIN_PART_CONTACTS = 2
+"""Minimum number of contacts with each of two objects traced as one."""
+PROTRUSION_M = 0.006
+"""Half width of the region around a contact that a route avoids."""
 NEAR_CONTACT_M = 0.004
-"""A place this near to a contact is no evidence of free space."""
+"""Distance from a contact within which a path position is no evidence of free space."""
 
 
 def all_bearings() -> Array:
-    """(BEARINGS,) from -pi on, rad."""
+    """Return BEARINGS evenly spaced bearings from -pi, rad."""
     return np.linspace(-np.pi, np.pi, BEARINGS, endpoint=False)
 
 
 def unit(v: Array) -> Array:
-    """A vector (2,) scaled to length 1; one of no length stays."""
+    """Return a vector (2,) scaled to length 1; zero stays zero."""
     scaled: Array = v / max(float(np.linalg.norm(v)), 1e-9)
     return scaled
 
 
 def _polar(outline: OutlineBelief, bearings: Array, distance: Array) -> Array:
-    """(n, 2) K, so far from the outline's middle."""
+    """Return points (n, 2) in K at distances (n,) from the outline's centre."""
     return np.asarray(outline.centre_K_m + distance[:, None] * np.column_stack([np.cos(bearings), np.sin(bearings)]))
 
 
@@ -51,19 +51,19 @@ def _moved_along(contacts: Sequence[Contact]) -> tuple[Contact, ...]:
 
 
 @dataclass(frozen=True)
-class Trace:
-    """What going round an object gave.
+class OutlineTrace:
+    """Result of tracing an object.
 
     Attributes:
-        contacts: In the order they were made, moved along with the object to where it stands now.
-        outline: What they say, or None if they say nothing.
-        displaced_K_m: (2,) how far the object was pushed in all.
-        path_K_m: (n, 2) where the ball has been at sensing height.
-        outliers: Contacts that belong to something else.
-        ended: Why no more probes were made.
-        missing: It was not met where it had been traced.
-        moves: So many times it moved without being felt to, and was traced anew.
-        continued: It is the object whose contacts were given at the beginning.
+        contacts: Contacts in order of time, moved to the object's current position.
+        outline: Inferred outline, or None.
+        displaced_K_m: (2,) total displacement of the object.
+        path_K_m: (n, 2) positions of the ball at sensing height.
+        outliers: Contacts with other objects.
+        ended: Reason for the end.
+        missing: The object was not found where it had been traced.
+        moves: Number of restarts after an unobserved motion.
+        continued: The object is the one whose contacts were given at the start.
     """
 
     contacts: tuple[Contact, ...]
@@ -78,32 +78,32 @@ class Trace:
 
     @property
     def contour(self) -> Contour | None:
-        """The fitted outline."""
+        """The fitted contour."""
         return None if self.outline is None else self.outline.contour
 
 
 @dataclass
 class TraceState:
-    """Everything felt so far.
+    """Mutable state of a trace.
 
     Attributes:
-        tip: (2,) where the tool's reference point is.
-        radius: Of the tool, m.
-        round: Its section is a disc: outlines are fitted to its centres, exactly. Else to contact points.
-        raw: The contacts as they were felt.
-        half: (2,) it keeps within |x|, |y| of this.
-        paths: Where it has been.
-        outliers: Contacts with something else.
-        blocked: Bearings that were tried in vain, rad.
-        side: The way round so far: +1 counter-clockwise, 0 not chosen yet.
-        moves: So many times the object moved unfelt.
-        moved_K_m: (2,) how far in all.
-        fresh: Index of the first of `paths` since the last of them.
-        odd: Index of the first contact that was odd; -1: none was.
-        raised: It stands on the object, not beside it.
-        told: (2, 2) 1/m^2 what contacts made now say of such a move.
-        given: How many of `raw` were there at the beginning.
-        known: How many of `raw` were made before, with who knows what in between.
+        tip: (2,) position of the tool's reference point.
+        radius: Radius of the tool, m.
+        round: The section is a disc: fit outlines to its centres, else to contact points.
+        raw: Contacts as measured.
+        half: (2,) limits of |x| and |y| of the reference point.
+        paths: Paths at sensing height.
+        outliers: Contacts with other objects.
+        blocked: Bearings probed without a new contact, rad.
+        side: Direction around the object: +1 counter-clockwise, 0 not chosen yet.
+        moves: Number of unobserved motions of the object.
+        moved_K_m: (2,) their total displacement.
+        fresh: Index of the first of `paths` after the last unobserved motion.
+        odd: Index of the first surprising contact; -1 without one.
+        raised: The tool stands above the object, not beside it.
+        shift_information: (2, 2) 1/m^2 information of the new contacts about an unobserved motion.
+        given: Number of contacts in `raw` at the start.
+        known: Number of contacts in `raw` from an earlier trace.
     """
 
     tip: Array
@@ -122,24 +122,24 @@ class TraceState:
     given: int = 0
     known: int = 0
     raised: bool = False
-    told: Array = field(default_factory=lambda: np.zeros((2, 2)))
+    shift_information: Array = field(default_factory=lambda: np.zeros((2, 2)))
 
     @classmethod
     def begin(
         cls, contacts: list[Contact], tip_K_m: Array, radius_m: float, round_tip: bool, half_extent_m: Array | None
     ) -> TraceState:
-        """With the contacts there are; no half extent: no walls near."""
+        """Start from given contacts; without a half extent there are no walls."""
         half = np.full(2, np.inf) if half_extent_m is None else np.asarray(half_extent_m, dtype=np.float64)
         return cls(np.asarray(tip_K_m, dtype=np.float64)[:2], radius_m, round_tip, contacts, half)
 
     def present(self) -> tuple[Contact, ...]:
-        """The contacts moved to where the object stands now: each by all pushes from its own on."""
+        """Return the contacts at the object's current position: each moved by its own and all later pushes."""
         return _moved_along(self.raw)
 
     def outline(self, more: tuple[Contact, ...] = (), *, alone: bool = False) -> OutlineBelief:
-        """What the contacts say, with some more, or those alone."""
+        """Infer the outline from all contacts and `more`, or from `more` alone."""
         now = more if alone else (*self.present(), *more)
-        return believe_outline(
+        return infer_outline(
             np.array([self.place(c) for c in now]),
             self.radius if self.round else 0.0,
             approach_K=np.array([c.approach_K[:2] for c in now]),
@@ -148,11 +148,11 @@ class TraceState:
         )
 
     def place(self, contact: Contact) -> Array:
-        """(2,) what the outline is fitted to."""
+        """Return the point (2,) of a contact that outlines are fitted to."""
         return contact.tip_K_m[:2] if self.round else contact.point_K_m
 
     def ring(self, outline: OutlineBelief, bearings: Array, p: TraceParams) -> tuple[Array, Array]:
-        """Distance from the outline's middle at which the reference point would touch, (n,) m, and its deviation."""
+        """Predict the distance (n,) m from the outline's centre at which the tool touches, and its deviation."""
         distance, at, sd = self._shape(outline, bearings, p)
         if self.known:
             sd = np.sqrt(sd**2 + self._shift_variance(outline, bearings, at, p))
@@ -161,23 +161,22 @@ class TraceState:
     def passing(
         self, outline: OutlineBelief, bearings: Array, p: TraceParams, clearance: float = 1.0, margin: float = 1.0
     ) -> Array:
-        """(n,) distance from the outline's middle at which the ball goes past: clear of what is predicted, and of what
-        was touched there, which may stick out of every family of outlines.
+        """Return the distances (n,) from the outline's centre at which the ball passes prediction and contacts.
 
         Args:
-            outline, bearings, p: Of what, (n,) rad, with which clearances.
-            clearance, margin: Parts of the clearance and of the margin that are kept.
+            outline, bearings, p: The outline, bearings (n,) rad, and clearances.
+            clearance, margin: Fractions of the clearance and of the margin to keep.
         """
         distance, sd = self.ring(outline, bearings, p)
         out = distance + margin * np.minimum(p.margin_sds * sd, p.widest_margin_m)
         off = np.array([self.place(c) for c in self.present()]) - outline.centre_K_m
         far = np.hypot(off[:, 0], off[:, 1]) + (0.0 if self.round else self.radius)
         aside = np.abs(wrapped(bearings[:, None] - np.arctan2(off[:, 1], off[:, 0])[None, :])) * far
-        limbs = np.where(aside < LIMB_M, far, 0.0).max(axis=1)
+        limbs = np.where(aside < PROTRUSION_M, far, 0.0).max(axis=1)
         return np.asarray(np.maximum(out, limbs) + clearance * p.clearance_m)
 
     def _shape(self, outline: OutlineBelief, bearings: Array, p: TraceParams) -> tuple[Array, Array, Array]:
-        """As `ring` for an object that never moved unfelt, and where that is: (n,), (n, 2) K, (n,)."""
+        """Predict distance (n,), point (n, 2) in K and deviation (n,) for an object without unobserved motion."""
         distance, sd = outline.predict(bearings)
         at = _polar(outline, bearings, distance)
         known = np.array([self.place(c) for c in self.present()])
@@ -188,7 +187,7 @@ class TraceState:
         return distance, at, np.hypot(sd, share * p.unmodelled_m)
 
     def _shift_variance(self, outline: OutlineBelief, bearings: Array, at_K_m: Array, p: TraceParams) -> Array:
-        """(n,) m^2 that an unfelt move adds to the outline's deviation along its normal."""
+        """Return the variance (n,) m^2 of the outline along its normal due to an unobserved motion."""
         step = np.deg2rad(2.0)
         ahead = _polar(outline, bearings + step, outline.predict(bearings + step)[0])
         along = ahead - at_K_m
@@ -196,47 +195,48 @@ class TraceState:
         return np.asarray(np.einsum("ni,ij,nj->n", normal, self.shift_covariance(p), normal))
 
     def shift_covariance(self, p: TraceParams) -> Array:
-        """(2, 2) m^2 of how far the object may have moved unfelt before the contacts made now; zeros if all are."""
+        """Return the posterior covariance (2, 2) m^2 of an unobserved motion since earlier contacts; zeros if none."""
         if not self.known:
             return np.zeros((2, 2))
-        return np.asarray(np.linalg.inv(np.eye(2) / p.unfelt_m**2 + self.told))
+        return np.asarray(np.linalg.inv(np.eye(2) / p.unfelt_m**2 + self.shift_information))
 
     def add(self, contact: Contact, outline: OutlineBelief, p: TraceParams) -> None:
-        """A contact with the object, of which `outline` was known."""
+        """Add a contact with the object, given the outline before it."""
         if self.known:
             off = self.place(contact) - outline.centre_K_m
             _, _, sd = self._shape(outline, np.array([np.arctan2(off[1], off[0])]), p)
             normal = unit(2.0 * contact.reaction_K[:2] - contact.approach_K[:2])
-            self.told = self.told + np.outer(normal, normal) / (TOUCH_SD_M**2 + float(sd[0]) ** 2)
+            self.shift_information = self.shift_information + np.outer(normal, normal) / (
+                TOUCH_SD_M**2 + float(sd[0]) ** 2
+            )
         if self.odd < 0 and self.surprising(outline, contact, p):
             self.odd = len(self.raw)
         self.raw.append(contact)
 
     def is_new(self, contact: Contact, p: TraceParams) -> bool:
-        """Whether a contact is not where there was one before."""
+        """Return True if no earlier contact is at the same position."""
         return not self.near(contact, p.same_m)
 
     def bearing(self, outline: OutlineBelief) -> float:
-        """Where the ball is, seen from the outline's middle, rad."""
+        """Return the bearing of the ball from the outline's centre, rad."""
         off = self.tip - outline.centre_K_m
         return float(np.arctan2(off[1], off[0]))
 
     def lone(self, apart_m: float) -> bool:
-        """Whether all contacts are nearer to one another than this: they may be with the end of a limb."""
+        """Return True if all contacts are within `apart_m` of each other, e.g. at the end of a protruding part."""
         places = np.array([self.place(c) for c in self.present()])
         return bool(np.linalg.norm(places[:, None] - places[None], axis=2).max() < apart_m)
 
     def near(self, contact: Contact, apart_m: float) -> bool:
-        """Whether a contact is nearer than this to one made before."""
+        """Return True if a contact is within `apart_m` of an earlier one."""
         known = np.array([self.place(c) for c in self.present()])
         return bool(np.linalg.norm(known - self.place(contact), axis=1).min() < apart_m)
 
     def belongs(self, outline: OutlineBelief, contact: Contact, p: TraceParams) -> bool:
-        """Whether a new contact was made with this object.
+        """Return True if a new contact belongs to this object.
 
-        It is if it is so near to another one that no second object has room. Else not if the surface it met faces the
-        object's middle. Else if it is near to the prediction, or one object explains it together with the others
-        better than two.
+        It does if it is near an earlier contact. It does not if its surface faces the object's centre. Otherwise it
+        does if it is near the prediction, or if one object explains all contacts better than two.
         """
         points = np.array([c.point_K_m for c in self.present()])
         if float(np.linalg.norm(points - contact.point_K_m, axis=1).min()) < p.between_m:
@@ -253,28 +253,28 @@ class TraceState:
         return bool(one > two + np.log(p.other))
 
     def surprising(self, outline: OutlineBelief, contact: Contact, p: TraceParams) -> bool:
-        """Whether a contact lies where the outline was thought not to be."""
+        """Return True if a contact is far from the predicted outline."""
         off = self.place(contact) - outline.centre_K_m
         distance, sd = outline.predict(np.array([np.arctan2(off[1], off[0])]))
         gap = abs(float(np.hypot(off[0], off[1])) - float(distance[0]))
         return gap > p.surprise_m + p.surprise_sds * float(sd[0])
 
     def begin_anew(self, p: TraceParams) -> bool:
-        """If no one pose explains the contacts, keep the latest that one does; whether it was so.
+        """If the object has moved unobserved, keep only the contacts after the motion; return True in this case.
 
-        What the ball passed before is no evidence about the object where it stands now.
+        Earlier paths are no evidence of free space at the object's current position.
         """
         if self.odd < 0 or self.moves >= p.moves:
             return False
         radius = self.radius if self.round else 0.0
-        felt = [replace(c, tip_K_m=np.array([*self.place(c), c.tip_K_m[2]])) for c in self.raw]
-        stray, _ = split_moved(felt, radius, likely=self.known)
+        measured = [replace(c, tip_K_m=np.array([*self.place(c), c.tip_K_m[2]])) for c in self.raw]
+        stray, _ = split_at_motion(measured, radius, likely=self.known)
         if not stray:
             return False
         stood = self.outline(_moved_along(stray), alone=True).centre_K_m
         stands = self.outline(_moved_along(self.raw[len(stray) :]), alone=True).centre_K_m
         if float(np.linalg.norm(stands - stood)) > p.farthest_m:
-            self.odd = -1  # it would have been felt: the outline is odder than thought
+            self.odd = -1  # too far to be unobserved: the shape is unusual instead
             return False
         del self.raw[: len(stray)]
         self.given = max(self.given - len(stray), 0)
@@ -286,19 +286,20 @@ class TraceState:
         return True
 
     def keep_one(self, outline: OutlineBelief, p: TraceParams) -> bool:
-        """If what was traced is larger than any object, keep the contacts with one of two; whether it was so.
+        """If the outline is larger than any object, keep the contacts of one object; return True in this case.
 
-        The two are told by the best cut across the long side; the others are outliers. The larger part is kept.
+        The cut across the long axis with the highest evidence separates two objects. The larger part is kept, the other
+        contacts become outliers.
         """
         size = outline.contour.size_m
-        if len(self.raw) < 2 * FEWEST_OF_ONE or max(size) <= p.largest_m:
+        if len(self.raw) < 2 * MIN_PART_CONTACTS or max(size) <= p.largest_m:
             return False
         now = self.present()
         places = np.array([self.place(c) for c in now])
         axis = np.linalg.svd(places - places.mean(axis=0))[2][0]
         order = np.argsort(places @ axis, kind="stable")
         best, kept = -np.inf, order
-        for k in range(FEWEST_OF_ONE, len(order) - FEWEST_OF_ONE + 1):
+        for k in range(MIN_PART_CONTACTS, len(order) - MIN_PART_CONTACTS + 1):
             parts = [self.outline(tuple(now[i] for i in part), alone=True) for part in (order[:k], order[k:])]
             if sum(b.log_evidence for b in parts) > best:
                 best = sum(b.log_evidence for b in parts)
@@ -316,8 +317,7 @@ class TraceState:
         return True
 
     def free(self) -> Array:
-        """(n, 2) places the ball has been, but for those so near to a contact that a push or the ball's own scatter
-        could have put the object there."""
+        """Return the free positions (n, 2) of the ball, except those near a contact, where the object may be."""
         if not self.paths[self.fresh :]:
             return np.zeros((0, 2))
         path = np.concatenate(self.paths[self.fresh :])
@@ -325,9 +325,9 @@ class TraceState:
         far = np.linalg.norm(path[:, None] - touched[None], axis=2).min(axis=1) > NEAR_CONTACT_M
         return np.asarray(path[far])
 
-    def trace(self, outline: OutlineBelief, ended: str) -> Trace:
-        """All of it."""
-        return Trace(
+    def trace(self, outline: OutlineBelief, ended: str) -> OutlineTrace:
+        """Return the result of the trace."""
+        return OutlineTrace(
             self.present(),
             outline,
             self.moved_K_m + np.sum([c.pushed_K_m for c in self.raw], axis=0),
@@ -338,8 +338,8 @@ class TraceState:
             continued=self.given > 0 or self.moves > 0,
         )
 
-    def felt(self, felt: Felt) -> None:
-        """Take note of a move."""
-        self.tip = np.asarray(felt.tip_K_m)
-        if len(felt.path_K_m):
-            self.paths.append(np.asarray(felt.path_K_m))
+    def record(self, outcome: MoveOutcome) -> None:
+        """Record the outcome of a move."""
+        self.tip = np.asarray(outcome.tip_K_m)
+        if len(outcome.path_K_m):
+            self.paths.append(np.asarray(outcome.path_K_m))

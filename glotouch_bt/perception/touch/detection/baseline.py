@@ -1,4 +1,4 @@
-"""What the wrist feels while nothing is touched: the robust baseline of a stationary interval (paper III-A)."""
+"""Robust baseline of the wrist's wrench over a stationary, contact-free interval (paper III-A)."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ MAD_TO_SD = 1.4826
 
 @dataclass(frozen=True)
 class Baseline:
-    """The wrench that means "nothing touched".
+    """Contact-free wrench.
 
     Attributes:
         median: (6,) force N then torque Nm in S.
-        sd: (6,) robust standard deviation of ONE sample about it, same units.
-        n: How many samples it was taken from.
+        sd: (6,) robust standard deviation of ONE sample, same units.
+        n: Number of samples.
     """
 
     median: Array
@@ -41,7 +41,7 @@ class Baseline:
 
 
 def fit_baseline(wrench_S: Array) -> Baseline:
-    """Median and MAD-based spread of a stationary interval, wrench_S (n, 6) in N and Nm.
+    """Compute median and MAD-based deviation of a stationary interval, wrench_S (n, 6) in N and Nm.
 
     Raises:
         ParamError: Not (n, 6), fewer than 3 samples, or a value that is not finite.

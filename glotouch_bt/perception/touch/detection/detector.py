@@ -1,7 +1,7 @@
-"""The contact guard: the soft rule that ends a guarded move (paper III-A); `hard_stop` is the rule beside it.
+"""Contact guard: the soft rule that ends a guarded move (paper III-A). `hard_stop` is independent of it.
 
-Signal: LPF(wrench - baseline - inertia of what is carried), fused to a force at the tip. The rule needs the force that
-opposes the motion AND the total force (or the moment) above their thresholds for N samples running.
+Signal: LPF(wrench - baseline - payload inertia), fused to a force at the tip. Rule: the opposing force AND the total
+force (or the moment) exceed their thresholds for N consecutive samples.
 """
 
 from __future__ import annotations
@@ -22,10 +22,9 @@ from glotouch_bt.perception.touch.detection.onset import onset_index
 from glotouch_bt.robot import Array, Observation, ParamError, Pose, frozen_array, quat_to_matrix
 
 HISTORY_BLOCKS = 10
-"""Blocks kept for dating an onset: 100 ms at 100 Hz, of which the last third may belong to the contact."""
+"""Number of blocks kept to date an onset: 100 ms at 100 Hz; the last third may belong to the contact."""
 DRIFT_S = 2.0
-"""While a paused motion stands, what changes over this time or slower is the sensor's drift (harsh CONDITIONS: 0.02 N
-in it), what changes faster is a push."""
+"""Time constant of the baseline while a paused motion stands: slower changes are drift (harsh CONDITIONS: 0.02 N)."""
 
 
 @dataclass(frozen=True)
@@ -33,11 +32,11 @@ class Onset:
     """The beginning of a contact.
 
     Attributes:
-        stamp_s: Robot clock when the contact began (sensor latency removed).
-        position_B_P: (3,) pads' mid-point in B then.
-        quat_B_P: (4,) its orientation then.
+        stamp_s: Robot clock at the beginning of the contact (sensor latency removed).
+        position_B_P: (3,) pads' mid-point in B at that time.
+        quat_B_P: (4,) its orientation at that time.
         force_B: (3,) filtered force on the tip when the guard tripped, in B.
-        peak_N: Largest unfiltered tip force seen up to the end of that block.
+        peak_N: Maximum unfiltered tip force up to the end of that block.
         detected_s: Robot clock of the sample at which the guard tripped.
     """
 
@@ -50,21 +49,21 @@ class Onset:
 
 
 class ContactGuard:
-    """Listens for a contact at the tip during one guarded move; call it with every observation, in order.
+    """Detect a contact at the tip during one guarded move; call it with every observation, in order.
 
     The hand keeps its orientation during a guarded move; the newest one of each block is used.
 
     Args:
-        baseline: The wrench that means "nothing touched", taken at rest just before the move.
-        approach_B: (3,) direction of the motion in B, or None: a force in any direction counts (arcs).
-        tip_P_m: (3,) the tip in P.
+        baseline: Contact-free wrench, measured at rest just before the move.
+        approach_B: (3,) direction of motion in B; None: a force in any direction counts (arcs).
+        tip_P_m: (3,) tip in P.
         pose_E_P: P in E (S = E).
         params: Thresholds.
-        inertial: Gives the (n, 6) wrench in S that the hand's own acceleration causes in a block's n samples, as
-            `inertia.MeasuredInertia` does; None: the hand is not accelerated, or too little to matter.
+        inertial: Returns the inertial wrench (n, 6) in S of a block's n samples, e.g. `MeasuredInertia`; None: no
+            compensation.
 
     Raises:
-        ParamError: An approach of no length or a wrong shape.
+        ParamError: A zero approach or a wrong shape.
     """
 
     def __init__(
@@ -98,7 +97,7 @@ class ContactGuard:
         self._onset: Onset | None = None
 
     def __call__(self, observation: Observation) -> Onset | None:
-        """The onset once the soft rule has tripped (the same one ever after), else None."""
+        """Return the onset once the soft rule has tripped (always the same one), else None."""
         if self._onset is not None:
             return self._onset
         residual = observation.wrench_S - self._zero
@@ -124,7 +123,7 @@ class ContactGuard:
         return self._onset
 
     def standing(self, observation: Observation) -> Onset | None:
-        """As a call, while the hand stands still in a pause: the zero follows the sensor's drift meanwhile."""
+        """Evaluate an observation during a pause; the baseline follows the sensor's drift."""
         onset = self(observation)
         if onset is None:
             share = len(observation.stamp_s) / (DRIFT_S * self.params.rate_Hz)
@@ -132,7 +131,7 @@ class ContactGuard:
         return onset
 
     def _soft_rule(self, force_S: Array, moment_S: Array) -> npt.NDArray[np.int64] | None:
-        """(n,) 1 where a sample fulfils the soft rule; None if surely none does, told as early as it is clear."""
+        """Return (n,) 1 where a sample satisfies the soft rule; None if no sample does (early exit)."""
         p, opposing = self.params, None
         if self._approach_B is not None:
             approach_S = self._approach_B @ self._R_B_S
@@ -145,7 +144,7 @@ class ContactGuard:
         square = (force_S * force_S).sum(axis=1)
         if opposing is None and not np.count_nonzero(square > p.total_N**2):
             return None
-        # sigma along each sample's own direction times its norm: compares without dividing by a norm that may be zero
+        # Multiplying both sides of the threshold by the norm avoids a division by a norm that may be zero.
         variance = ((force_S @ self._fusion.covariance) * force_S).sum(axis=1)
         strong = (square > p.total_N**2) & (square * square > self._sigmas**2 * variance)
         if opposing is None:

@@ -1,6 +1,6 @@
-"""A causal low-pass that is fed block by block: second-order Butterworth, second-order section form.
+"""Causal, streaming second-order Butterworth low-pass.
 
-At 30 Hz cut-off and 1 kHz sampling the group delay at DC is sqrt(2) / (2 pi f_c) = 7.5 ms and white noise is scaled by
+At 30 Hz cut-off and 1 kHz sampling the group delay at DC is sqrt(2) / (2 pi f_c) = 7.5 ms, and white noise is scaled by
 sqrt(1.11 f_c / 500) = 0.26 (noise bandwidth of the order-2 Butterworth: pi / (2 sqrt 2) f_c).
 """
 
@@ -11,15 +11,15 @@ import scipy
 
 from glotouch_bt.robot import Array, ParamError
 
-LONGEST_OPERATOR = 64
-"""Blocks up to this long are filtered by one matrix product."""
+MAX_OPERATOR_SAMPLES = 64
+"""Maximum block length, in samples, that is filtered by one matrix product."""
 
 
 class LowPass:
-    """Streaming second-order Butterworth low-pass of several channels; starts at rest at zero.
+    """Streaming low-pass of several channels with zero initial state.
 
     Args:
-        channels: Number of columns it filters.
+        channels: Number of columns.
         cutoff_Hz: -3 dB frequency.
         rate_Hz: Sampling rate; the cut-off must lie below half of it.
 
@@ -36,9 +36,9 @@ class LowPass:
         self._operators: dict[int, Array] = {}
 
     def __call__(self, block: Array) -> Array:
-        """Filter the next block (n, channels); the state carries over to the next call."""
+        """Filter the next block (n, channels); keep the state for the following call."""
         n = len(block)
-        if n > LONGEST_OPERATOR:
+        if n > MAX_OPERATOR_SAMPLES:
             out, state = scipy.signal.sosfilt(self._sos, block, axis=0, zi=self._state[None])
             self._state = np.asarray(state[0])
             return np.asarray(out)
@@ -50,23 +50,17 @@ class LowPass:
         return np.asarray(both[2:])
 
     def _operator(self, n: int) -> Array:
-        """(2 + n, 2 + n): [state; n inputs] to [next state; n outputs]. One product is ten times faster than `sosfilt`.
+        """Return the matrix (2 + n, 2 + n) from [state; n inputs] to [next state; n outputs].
 
-        A linear filter over a block is a matrix; its columns are the responses to each unit state and unit input.
+        Its columns are the responses to unit states and unit inputs. It is ten times faster than `sosfilt`.
         """
         columns = np.eye(2 + n)
         out, state = scipy.signal.sosfilt(self._sos, columns[2:], axis=0, zi=columns[None, :2])
         return np.concatenate([state[0], out])
 
     @property
-    def group_delay_s(self) -> float:
-        """Delay of a slow signal: the bilinear transform keeps the analogue sqrt(2) / w_c, w_c pre-warped."""
-        warped = 2 * self.rate_Hz * np.tan(np.pi * self.cutoff_Hz / self.rate_Hz)
-        return float(np.sqrt(2.0) / warped)
-
-    @property
     def noise_gain(self) -> float:
-        """Standard deviation of filtered white noise over that of the white noise (energy of the impulse response)."""
+        """Ratio of the standard deviations of filtered and unfiltered white noise (energy of the impulse response)."""
         impulse = np.zeros(int(20 * self.rate_Hz / self.cutoff_Hz) + 1)
         impulse[0] = 1.0
         return float(np.sqrt(np.sum(np.square(scipy.signal.sosfilt(self._sos, impulse)))))

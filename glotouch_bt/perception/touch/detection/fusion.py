@@ -1,9 +1,8 @@
-"""Force at the probe's tip from the wrist's force AND torque (weighted least squares).
+"""Tip force from the wrist's force AND torque, by weighted least squares.
 
-A point force f at the tip p gives F = f and T = p x f at the sensor. With the noise of both known, the best unbiased f
-is f = (W_F + [p]' W_T [p])^-1 (W_F F + [p]' W_T T), [p] the cross-product matrix: at 0.34 m lever the torque carries
-the two lateral directions (noise 0.009 N a sample against 0.05 N by force alone) and the force carries the one along
-the lever.
+A point force f at the tip p gives F = f and T = p x f at the sensor. The best linear unbiased estimate is
+f = (W_F + [p]' W_T [p])^-1 (W_F F + [p]' W_T T), with [p] the cross-product matrix. At a 0.34 m lever the torque
+determines the two lateral directions (noise 0.009 N per sample, 0.05 N from force alone), the force the third.
 """
 
 from __future__ import annotations
@@ -14,12 +13,14 @@ import numpy as np
 
 from glotouch_bt.robot import Array, Pose, frozen_array
 
-SD_FLOOR_N, SD_FLOOR_NM = 0.005, 0.0003
-"""Least noise credited to a sensor: an ideal one must not make the weights infinite, nor the onset threshold zero."""
+SD_FLOOR_N = 0.005
+"""Minimum force noise: an ideal sensor must not give infinite weights or a zero onset threshold."""
+SD_FLOOR_NM = 0.0003
+"""Minimum torque noise, for the same reason."""
 
 
 def cross_matrix(p: Array) -> Array:
-    """(3, 3) matrix [p] with [p] f = p x f."""
+    """Return the matrix [p] (3, 3) with [p] f = p x f."""
     x, y, z = p
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
@@ -38,7 +39,7 @@ class TipFusion:
 
     @classmethod
     def for_tip(cls, tip_P_m: Array, pose_E_P: Pose, sd: Array) -> TipFusion:
-        """For a tip at tip_P_m (3,) in P and a sensor (S = E) of noise sd (6,) N and Nm a sample."""
+        """Build the estimator for a tip (3,) in P and a sensor (S = E) with noise sd (6,) N and Nm per sample."""
         lever = pose_E_P.apply(frozen_array("tip_P_m", tip_P_m, (3,)))
         w_force = 1.0 / np.maximum(sd[:3], SD_FLOOR_N) ** 2
         w_torque = 1.0 / np.maximum(sd[3:], SD_FLOOR_NM) ** 2
@@ -48,9 +49,9 @@ class TipFusion:
         return cls(frozen_array("gain", gain, (3, 6)), frozen_array("covariance", covariance, (3, 3)))
 
     def __call__(self, residual_S: Array) -> Array:
-        """Tip forces (n, 3) in S, N, of residual wrenches (n, 6)."""
+        """Return tip forces (n, 3) in S, N, for residual wrenches (n, 6)."""
         return np.asarray(residual_S @ self.gain.T)
 
     def sd_along(self, direction_S: Array) -> float:
-        """Standard deviation, N, of one unfiltered sample along a unit direction (3,)."""
+        """Return the standard deviation, N, of one unfiltered sample along a unit direction (3,)."""
         return float(np.sqrt(direction_S @ self.covariance @ direction_S))

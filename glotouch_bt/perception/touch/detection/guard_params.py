@@ -1,4 +1,4 @@
-"""Thresholds of the contact guard and of the hard stop, with their sources."""
+"""Thresholds of the contact guard and of the hard stop."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ class GuardParams:
     """Thresholds of the contact guard and of the hard stop.
 
     Attributes:
-        directional_N: Tip force against the motion that counts as touch. Source: three times what free motion at
-            0.5 m/s2 leaves with its inertia taken out (0.05 N in simulation); see `bench detection`.
-        total_N: Norm of the tip force that must go with it. Source: as above.
-        moment_Nm: Moment at the sensor that may stand in for the total force: `total_N` on a 0.34 m lever.
-        consecutive: Samples in a row. Source: 3 at 1 kHz, one tenth of the filter's rise time: outliers only.
-        sigmas: No threshold is ever below this many standard deviations of the filtered estimate in its direction, so
-            that a noisy sensor does not trip by itself. Source: `bench detection`, harsh, downward moves with the
-            latency 5 ms wrong: 12 false alarms an hour at 5.5, a few at 6.5; none elsewhere in two hours each.
+        directional_N: Minimum tip force opposing the motion. Source: three times the residual of free motion at
+            0.5 m/s2 after inertia compensation (0.05 N in simulation); see `bench detection`.
+        total_N: Minimum norm of the tip force. Source: as above.
+        moment_Nm: Moment at the sensor that may replace the total force: `total_N` on a 0.34 m lever.
+        consecutive: Number of consecutive samples. Source: 3 at 1 kHz, a tenth of the filter's rise time.
+        sigmas: Minimum of every threshold, in standard deviations of the filtered estimate in its direction. Source:
+            `bench detection`, harsh, downward moves with a latency error of 5 ms: 12 false alarms an hour at 5.5, a few
+            at 6.5; none elsewhere in two hours each.
         cutoff_Hz, rate_Hz: Low-pass and sampling rate. Source: 15-60 Hz change the result by < 0.2 mm.
-        latency_s: Age of a wrench sample when it arrives. Source: the wrist sensor's declared latency.
+        latency_s: Age of a wrench sample on arrival. Source: the wrist sensor's declared latency.
         hard_force_N, hard_torque_Nm: Absolute limits of the tared wrench. Source: `robot.Limits`.
-        hard_residual_N, hard_residual_Nm: Limits of the wrench minus its baseline: below what makes the grasped probe
-            slip (12.8 N measured at 60 N grip), on the same lever for the torque.
+        hard_residual_N, hard_residual_Nm: Limits of the wrench minus its baseline. Source: slip of the grasped probe
+            (12.8 N measured at 60 N grip); the torque on the same lever.
     """
 
     directional_N: float = 0.15

@@ -1,7 +1,4 @@
-"""The hard rule beside the contact guard: limits of the raw wrench that no touch may pass (paper III-A).
-
-Independent of the soft rule in all but the baseline: no filter, no direction, no inertia model, one sample is enough.
-"""
+"""Hard stop: limits of the raw wrench, independent of the contact guard but for the baseline (paper III-A)."""
 
 from __future__ import annotations
 
@@ -16,7 +13,7 @@ from glotouch_bt.robot import Observation
 
 @dataclass(frozen=True)
 class HardTrip:
-    """A hard limit passed: which quantity (unit in its name), its value, its limit, and when."""
+    """Violation of a hard limit: quantity (with unit), value, limit and time."""
 
     quantity: str
     value: float
@@ -25,7 +22,7 @@ class HardTrip:
 
 
 class HardStop:
-    """The envelope beside the soft rule: absolute and residual wrench norms, unfiltered, one sample is enough.
+    """Limit the absolute and residual wrench norms; one unfiltered sample suffices.
 
     Args:
         baseline: Subtracted for the residual limits.
@@ -45,16 +42,16 @@ class HardStop:
         self._residual_scale = np.array([residual_force] * 3 + [residual_torque] * 3)
 
     def __call__(self, observation: Observation) -> HardTrip | None:
-        """The earliest sample of the block beyond a limit, or None."""
+        """Return the earliest violation in a block, or None."""
         w = observation.wrench_S
         r = w - self._median
         whole, rest = (w * self._scale).ravel(), (r * self._residual_scale).ravel()
-        if whole @ whole < 1.0 and rest @ rest < 1.0:  # not one sample can be beyond a limit, nor a NaN among them
+        if whole @ whole < 1.0 and rest @ rest < 1.0:  # early exit: no violation and no NaN is possible
             return None
         norms = [np.linalg.norm(v, axis=1) for v in (w[:, :3], w[:, 3:], r[:, :3], r[:, 3:])]
         trips = []
         for (quantity, limit), norm in zip(self._limits, norms, strict=True):
-            # NOT below the limit: a NaN from the sensor trips as well
+            # The negated comparison also trips on NaN.
             bad = np.nonzero(~(norm <= limit))[0]
             if len(bad):
                 trips.append(

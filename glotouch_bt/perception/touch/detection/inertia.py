@@ -1,8 +1,7 @@
-"""The wrench of what hangs below the wrist while it is accelerated: known, so it can be taken out.
+"""Inertial wrench of the payload below the wrist sensor.
 
-A sensor at S feels, of a body of mass m whose centre of mass is at c, the d'Alembert force F = -m a and the torque
-T = c x F when the body is moved without turning (the hand keeps its orientation in every guarded move). m and c come
-from the robot's and the probe's data, a from the measured motion.
+For a translation with acceleration a, a sensor at S measures F = -m a and T = c x F for mass m and centre of mass c.
+The hand keeps its orientation in guarded moves. m and c come from robot and probe data, a from the measured motion.
 """
 
 from __future__ import annotations
@@ -17,22 +16,23 @@ import numpy.typing as npt
 from glotouch_bt.robot import Array, Gripper, Observation, ParamError, Pose, Probe, frozen_array, quat_to_matrix
 
 NEAREST = 9
-"""An acceleration is taken from so many samples: at 1 kHz, 4 ms to either side, as far as a usual wrist sensor is late.
-White noise of 1 um in the positions becomes 0.11 m/s2, before the guard's filter."""
+"""Number of samples per acceleration: 4 ms to either side at 1 kHz, a usual wrist latency. Position noise of 1 um gives
+0.11 m/s2 before the guard's filter."""
 NEIGHBOURS = np.arange(NEAREST)
+"""Sample offsets of the window."""
 EVEN_S = 1e-7
-"""Steps between samples that differ by less are even."""
+"""Maximum difference between sampling steps that count as equal."""
 BEFORE_S = 0.001
-"""The hand is taken to have stood before the first sample, at this spacing."""
+"""Spacing of the padding before the first sample; the hand is assumed at rest there."""
 
 
 @dataclass(frozen=True)
-class Carried:
-    """What hangs below the wrist sensor, as one body.
+class Payload:
+    """Payload of the wrist sensor as one body.
 
     Attributes:
-        mass_kg: Its mass.
-        com_S_m: (3,) its centre of mass in S.
+        mass_kg: Mass.
+        com_S_m: (3,) centre of mass in S.
     """
 
     mass_kg: float
@@ -44,15 +44,15 @@ class Carried:
         object.__setattr__(self, "com_S_m", frozen_array("carried.com_S_m", self.com_S_m, (3,)))
 
     @classmethod
-    def of(cls, parts: Sequence[tuple[float, npt.ArrayLike]]) -> Carried:
-        """Several bodies, each (mass kg, centre of mass (3,) in S), as one."""
+    def of(cls, parts: Sequence[tuple[float, npt.ArrayLike]]) -> Payload:
+        """Combine bodies, each (mass kg, centre of mass (3,) in S)."""
         masses = np.array([mass for mass, _ in parts])
         centres = np.array([np.asarray(com, dtype=np.float64) for _, com in parts])
         return cls(float(masses.sum()), masses @ centres / masses.sum())
 
     @classmethod
-    def hand(cls, gripper: Gripper, probe: Probe | None = None) -> Carried:
-        """Gripper body and two fingers, and the probe when its handle is between the pads."""
+    def hand(cls, gripper: Gripper, probe: Probe | None = None) -> Payload:
+        """Return the payload of gripper body and fingers, and of the probe if held."""
         middle = gripper.pose_E_P.apply((gripper.finger.centre_m[0], 0.0, gripper.finger.centre_m[2]))
         parts = [(gripper.mass_kg, np.asarray(gripper.com_E_m)), (2 * gripper.finger_mass_kg, middle)]
         if probe is not None:
@@ -60,32 +60,31 @@ class Carried:
         return cls.of(parts)
 
     def wrench_S(self, acceleration_S_m_s2: Array) -> Array:
-        """(..., 6) force N and torque Nm the sensor feels, in S at S, for accelerations (..., 3) without turning."""
+        """Return the inertial wrench (..., 6) N and Nm in S at S for accelerations (..., 3) of a translation."""
         force = -self.mass_kg * np.asarray(acceleration_S_m_s2, dtype=np.float64)
         return np.concatenate([force, np.cross(self.com_S_m, force)], axis=-1)
 
 
 class MeasuredInertia:
-    """The inertial wrench in the newest samples, block by block, from how the hand was measured to move.
+    """Inertial wrench from the measured motion of the hand, block by block.
 
-    Its acceleration at a time is that of the parabola that fits the `NEAREST` positions best (on an even grid the
-    filter of Savitzky and Golay, 1964), read `lag_s` before each sample: for a sensor that reports late, no samples of
-    the future are needed. What the plan says would be free of noise, but an arm does not follow it to the millisecond
-    when commands come late. Samples may be missing: stamps count. The hand does not turn.
+    The acceleration is that of the least-squares parabola through the `NEAREST` positions (Savitzky and Golay, 1964, on
+    a uniform grid), `lag_s` before each sample, so no future samples are needed. The planned acceleration would have no
+    noise, but an arm follows it only to some milliseconds. Missing samples are allowed. The hand does not rotate.
 
     Args:
-        carried: What is moved.
+        carried: The payload.
         pose_E_P: P in E (S = E).
-        lag_s: The sensor reports the wrench so much later than the arm reports the motion.
+        lag_s: Delay of the wrench behind the reported motion.
     """
 
-    def __init__(self, carried: Carried, pose_E_P: Pose, lag_s: float) -> None:
+    def __init__(self, carried: Payload, pose_E_P: Pose, lag_s: float) -> None:
         self._carried, self._R_P_E, self._lag_s = carried, pose_E_P.rotation.T, lag_s
         self._stamp_s: Array | None = None
         self._position_m: Array = np.zeros((0, 3))
 
     def __call__(self, o: Observation) -> Array:
-        """(n, 6) expected wrench in S at S of a block's n samples; blocks in order."""
+        """Return the expected wrench (n, 6) in S at S of a block's n samples; call with blocks in order."""
         if self._stamp_s is None:
             before = NEAREST + math.ceil(self._lag_s / BEFORE_S)
             self._stamp_s = o.stamp_s[0] - BEFORE_S * np.arange(before, 0, -1)
@@ -106,9 +105,9 @@ class MeasuredInertia:
 
 
 def _bend(stamp_s: Array) -> Array:
-    """(n, k) weights that give, of values at stamps (n, k), the second derivative of the best parabola.
+    """Return weights (n, k) that map values at stamps (n, k) to the second derivative of the least-squares parabola.
 
-    The parabola's leading coefficient is the values' share of x^2 made orthogonal to 1 and x.
+    They are x^2 made orthogonal to 1 and x, normalised.
     """
     x = stamp_s - stamp_s.mean(axis=1, keepdims=True)
     square = x * x
@@ -118,3 +117,4 @@ def _bend(stamp_s: Array) -> Array:
 
 
 EVENLY = _bend(NEIGHBOURS[None].astype(np.float64))[0]
+"""Weights (NEAREST,) on a uniform grid of unit spacing."""

@@ -1,4 +1,4 @@
-"""Where the tool touched: support function of its section and the combined contact direction (paper III-B)."""
+"""Contact point of a tool: support function of its section and combined contact direction (paper III-B)."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from glotouch_bt.robot import Array, ParamError, frozen_array
 
 
 class Section(Protocol):
-    """The tool's section at the height of contact: a set of points about the tool's reference point."""
+    """Section of a tool at the height of contact, about its reference point."""
 
     def support_m(self, direction: Array) -> float:
-        """Support distance max d.p over the section's points p, for d (2,) written in the section's axes."""
+        """Return the support function: max d.p over the section's points p, for d (2,) in the section's axes."""
         ...
 
 
 @dataclass(frozen=True)
 class Disc:
-    """A ball, or a round shaft, about its centre.
+    """Disc about the reference point: a ball or a round shaft.
 
     Attributes:
-        radius_m: Its radius.
+        radius_m: Radius.
     """
 
     radius_m: float
@@ -33,13 +33,13 @@ class Disc:
             raise ParamError("disc.radius_m", self.radius_m, "finite and not negative")
 
     def support_m(self, direction: Array) -> float:
-        """See `Section`: the radius, whatever the direction."""
-        return disc_support(self.radius_m, direction)
+        """See `Section`."""
+        return float(self.radius_m * np.linalg.norm(direction))
 
 
 @dataclass(frozen=True)
 class Polygon:
-    """A convex section with corners, for instance the outline of two closed fingers.
+    """Convex polygon, for instance the outline of two closed fingers.
 
     Attributes:
         vertices_m: (n, 2), n >= 3, in the section's axes.
@@ -55,52 +55,40 @@ class Polygon:
 
     @classmethod
     def rectangle(cls, half_x_m: float, half_y_m: float) -> Polygon:
-        """A rectangle about the reference point."""
+        """Return a rectangle about the reference point."""
         return cls(np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * (half_x_m, half_y_m))
 
     def support_m(self, direction: Array) -> float:
         """See `Section`."""
-        return polygon_support(self.vertices_m, direction)
-
-
-def disc_support(radius_m: float, direction: Array) -> float:
-    """Support distance of a disc about the origin: its radius, whatever the direction (2,)."""
-    return float(radius_m * np.linalg.norm(direction))
-
-
-def polygon_support(vertices_m: Array, direction: Array) -> float:
-    """Support distance max_p d.p of a convex (or any) polygon with vertices (n, 2), in direction (2,), same frame."""
-    return float(np.max(np.asarray(vertices_m, dtype=np.float64) @ direction))
+        return float(np.max(self.vertices_m @ direction))
 
 
 APPROACH_WEIGHT = 0.1
-"""Weight of the approach against the reaction's 1 in the combined direction. The paper adds them equally, for probes
-that are aimed at the surface. Traced outlines are met at up to 70 degrees from their normal (40 rms), while friction
-keeps the reaction within 12 degrees of it (polished ball): inverse variances are as 0.1 to 1."""
-SIDEWAYS = 0.2
-"""A reaction that pushes along the motion by more than this share is no evidence about a surface ahead; a graze, whose
-reaction is at right angles, is."""
+"""Weight of the approach in the contact direction, relative to the reaction's 1. The paper uses 1 for probes along the
+normal. Here the approach deviates from the normal by 40 degrees rms, the reaction by at most 12 (polished ball); the
+inverse variances are as 0.1 to 1."""
+MAX_SIDEWAYS = 0.2
+"""Maximum component of the unit reaction along the motion; a larger one is no evidence of a surface ahead."""
 
 
 def contact_direction(approach: Array, reaction: Array | None, approach_weight: float = APPROACH_WEIGHT) -> Array:
-    """Object-facing unit direction (2,): d along w u - r, approach u, reaction r (eq. contact_direction: w = 1).
+    """Return the unit direction (2,) towards the object: d along w u - r for approach u and reaction r.
 
-    `reaction=None` is the radial trace probe: d = u. A reaction that pushes along the motion is left out too: a
-    verified directional consistency is what the paper asks for.
+    Without a reaction, or with one along the motion, d = u (eq. contact_direction of the paper, where w = 1).
 
     Raises:
-        ParamError: The approach has no planar length.
+        ParamError: The approach is zero in the plane.
     """
     u = np.asarray(approach, dtype=np.float64)
     norm = float(np.linalg.norm(u))
     if u.shape != (2,) or norm < 1e-9:
-        raise ParamError("approach", u.tolist(), "a planar direction (2,) of some length")
+        raise ParamError("approach", u.tolist(), "a non-zero planar direction (2,)")
     u = u / norm
     if reaction is None:
         return u
     r = np.asarray(reaction, dtype=np.float64)
     length = float(np.linalg.norm(r))
-    if length < 1e-9 or float(u @ r) > SIDEWAYS * length:
+    if length < 1e-9 or float(u @ r) > MAX_SIDEWAYS * length:
         return u
     d = approach_weight * u - r / length
     return np.asarray(d / np.linalg.norm(d))
@@ -109,14 +97,14 @@ def contact_direction(approach: Array, reaction: Array | None, approach_weight: 
 def section_point(
     place_m: Array, section: Section, axes: Array, approach: Array, reaction: Array | None = None
 ) -> Array:
-    """Contact point (2,) of a tool: x + h(d) d, the support-plane intercept (eq. contact_point).
+    """Return the contact point (2,) of a tool: x + h(d) d, the support-plane intercept (eq. contact_point).
 
     Args:
-        place_m: (2,) the tool's reference point at the onset, in some planar frame.
-        section: Its section about that point.
-        axes: (2, 2) the section's axes in the planar frame, as columns (may mirror: a hand that points down does).
-        approach: (2,) direction the tool moved in; a vertical approach (no planar part) gives the reference itself.
-        reaction: (2,) direction of the force it felt, or None.
+        place_m: (2,) reference point of the tool at the onset, in a planar frame.
+        section: Section about that point.
+        axes: (2, 2) section axes in the planar frame, as columns (mirrored for a hand that points down).
+        approach: (2,) direction of motion; a vertical approach (zero in the plane) gives the reference point.
+        reaction: (2,) direction of the force on the tool, or None.
     """
     place = np.asarray(place_m, dtype=np.float64)
     if np.linalg.norm(approach) < 1e-6:
@@ -126,5 +114,5 @@ def section_point(
 
 
 def contact_point(tip_m: Array, tip_radius_m: float, approach: Array, reaction: Array | None = None) -> Array:
-    """Contact point (2,) of a ball of `tip_radius_m` whose centre is at tip_m (2,); the rest as in `section_point`."""
+    """Return the contact point (2,) of a ball with centre tip_m (2,); see `section_point`."""
     return section_point(tip_m, Disc(tip_radius_m), np.eye(2), approach, reaction)

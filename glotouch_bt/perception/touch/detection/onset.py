@@ -1,8 +1,7 @@
-"""When did the contact begin? Dating an onset in the unfiltered signal.
+"""Dating of a contact's onset in the unfiltered signal.
 
-The filtered signal trips some 7 ms late, and the delay depends on the impact. Walking back in the UNFILTERED one to
-where it was still noise is exact to a sample for a stiff contact. Where the signal hardly leaves the noise (a soft
-contact, or along the lever where only the force speaks) the ramp with the least squared error is dated instead.
+The filtered signal trips about 7 ms late, depending on the impact. For a clear contact, walk back in the
+UNFILTERED signal to the noise level: exact to a sample. For a weak one (soft, or along the lever), fit a ramp.
 """
 
 from __future__ import annotations
@@ -12,50 +11,50 @@ import numpy as np
 from glotouch_bt.robot import Array
 
 SIGMAS = 4.0
-"""A sample this many standard deviations above the level before the contact belongs to the contact."""
+"""Minimum rise of a contact sample above the level before it, in standard deviations."""
 CLEAR_SIGMAS = 8.0
-"""The signal must rise this high for walking back to be trusted."""
+"""Minimum rise for which walking back is reliable, in standard deviations."""
 SLOW_SAMPLES = 8
-"""A rise that takes this many samples from the noise to the trip is a ramp, not an impact."""
+"""Minimum number of samples from noise to trip of a ramp; a faster rise is an impact."""
 RAMP_SHARE = 0.6
-"""What leaves the noise at 4 sigma and passes 8 as a ramp begins at half its height; more, and it is a step."""
+"""Maximum ratio of the first to the last value of a ramp: it is 1/2 from 4 to 8 sigma, larger for a filtered step."""
 
 
 def onset_index(signal_N: Array, trip: int, sd_N: float, quiet: int = 30) -> float:
-    """When the contact began, as a fractional sample index in 0..trip.
+    """Return the onset of the contact as a fractional sample index in 0..trip.
 
     Args:
-        signal_N: (n,) unfiltered contact force along the direction it acts in, oldest first.
+        signal_N: (n,) unfiltered contact force along its direction, oldest first.
         trip: Index at which the filtered signal tripped.
-        sd_N: Noise of one sample.
-        quiet: How many samples before the trip may belong to the contact; the level before it is taken from the rest.
+        sd_N: Standard deviation of one sample.
+        quiet: Number of samples before the trip that may belong to the contact; earlier ones give the level.
     """
     s = signal_N[: trip + 1]
     before = s[: max(len(s) - quiet, 0)]
     level, spread = 0.0, sd_N
     if len(before) >= 8:
-        # Inertia of the hand and vibration lift the level while the arm moves: measure it, but trust it only so far.
+        # Residual inertia and vibration shift the level; measure it, bounded by half of the signal.
         level = float(np.clip(np.median(before), -0.5 * abs(s[-1]), 0.5 * abs(s[-1])))
         spread = max(sd_N, 1.4826 * float(np.median(np.abs(before - np.median(before)))))
     lifted = s - level
     if float(np.max(lifted[-3:])) < CLEAR_SIGMAS * spread:
         return _ramp_start(lifted)
-    # The last samples may dip by ringing: walk back from the highest one near the trip.
+    # The last samples may dip by ringing: walk back from the maximum near the trip.
     top = max(len(s) - 3, 0) + int(np.argmax(lifted[-3:]))
     low = np.nonzero(lifted[:top] < SIGMAS * spread)[0]
     first = int(low[-1]) + 1 if len(low) else 0
     if top - first < SLOW_SAMPLES:
-        return max(first - 0.5, 0.0)  # it began between two samples
-    # A slow rise was under way before it left the noise: extend its line back to the level.
+        return max(first - 0.5, 0.0)  # between two samples
+    # A slow rise began within the noise: extrapolate its line back to the level.
     t = np.arange(first, top + 1)
     slope, offset = np.polyfit(t, lifted[first : top + 1], 1)
     if slope <= 0 or slope * first + offset > RAMP_SHARE * (slope * top + offset):
-        return max(first - 0.5, 0.0)  # no ramp but a step that the filter took its time over
+        return max(first - 0.5, 0.0)  # a step, detected late by the filter
     return float(np.clip(-offset / slope, max(first - quiet, 0), first))
 
 
 def _ramp_start(s: Array) -> float:
-    """Start of the least-squares ramp (zero, then a straight rise) of a noisy signal."""
+    """Return the start of the least-squares ramp (zero, then linear) of a noisy signal."""
     n = len(s)
     if n < 6:
         return float(max(n - 1, 0))

@@ -1,40 +1,32 @@
-"""TODO door of glotouch_bt/perception/touch/outline."""
+"""Planar outlines of objects estimated from contacts: posterior over shape families, envelopes, polygon geometry."""
 
-from glotouch_bt.perception.touch.outline.belief import believe_outline, present_tips
+from glotouch_bt.perception.touch.outline.belief import current_tips, infer_outline
 from glotouch_bt.perception.touch.outline.contours import (
-    consistent,
     contour_quality,
     fit_contour,
     fit_kind,
     signed_distance,
 )
 from glotouch_bt.perception.touch.outline.envelope import envelope
-from glotouch_bt.perception.touch.outline.mixture import OutlineBelief, informative_direction
-from glotouch_bt.perception.touch.outline.moved import believe_contacts, split_moved
+from glotouch_bt.perception.touch.outline.mixture import OutlineBelief
+from glotouch_bt.perception.touch.outline.moved import infer_outline_from_contacts, split_at_motion
 from glotouch_bt.perception.touch.outline.polygons import convex_hull, polygon_distance
 from glotouch_bt.perception.touch.outline.primitives import wrapped
-from glotouch_bt.perception.touch.outline.pushing import pushed
-from glotouch_bt.perception.touch.outline.tracing import largest_gap_direction, needs_more, next_direction, widest_gap
+from glotouch_bt.perception.touch.outline.pushing import estimate_push
 
 __all__ = [
     "OutlineBelief",
-    "believe_contacts",
-    "believe_outline",
-    "consistent",
+    "infer_outline_from_contacts",
+    "infer_outline",
     "contour_quality",
     "convex_hull",
     "envelope",
     "fit_contour",
     "fit_kind",
-    "informative_direction",
-    "largest_gap_direction",
-    "needs_more",
-    "next_direction",
     "polygon_distance",
-    "present_tips",
-    "pushed",
+    "current_tips",
+    "estimate_push",
     "signed_distance",
-    "split_moved",
-    "widest_gap",
+    "split_at_motion",
     "wrapped",
 ]

@@ -1,6 +1,6 @@
-"""What the contacts made so far say about an object's outline: explanations weighted by evidence.
+"""Posterior over an object's outline given its contacts.
 
-Circle, rectangle (every distinct optimum), and either with smooth deviations (figures with limbs, a truck).
+Hypotheses: circle, rectangle (every distinct optimum), and both with smooth deviations, weighted by evidence.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from glotouch_bt.perception.touch.outline.deviation import Hypothesis, explain
+from glotouch_bt.perception.touch.outline.deviation import Hypothesis, infer_posteriors
 from glotouch_bt.perception.touch.outline.mixture import TEMPER, OutlineBelief
 from glotouch_bt.perception.touch.outline.primitives import (
     APPROACH_SD_RAD,
@@ -23,29 +23,31 @@ from glotouch_bt.perception.touch.outline.primitives import (
 )
 from glotouch_bt.robot import Array, ParamError
 
-__all__ = ["OutlineBelief", "believe_outline", "present_tips"]
+__all__ = ["OutlineBelief", "infer_outline", "current_tips"]
 
 AMPLITUDES: tuple[float, ...] = (0.3, 1.0, 2.0)
-"""Deviations a circle is given (a rectangle: the first two); scales of the spread over random objects."""
-LOOSENESS = ((1.0, 0.3), (2.2, 0.03))
-"""A plain circle or rectangle leaves the contacts' scatter, or so many times as much; each with its prior."""
-WAVY_CHANCE = 1 / 15
-"""Prior of each amplitude."""
-MODES, MODE_LOSS = 3, 12.0
-"""So many optima of the rectangle are kept, if their loss is within so much of the best one's."""
-FREE_BINS = 18
-"""Of free places, the nearest to the middle in each of so many sectors forbids the others too."""
+"""Deviation scales of a circle, relative to the spread over random objects; a rectangle uses the first two."""
+SCATTER_SCALES = ((1.0, 0.3), (2.2, 0.03))
+"""(factor on the contacts' scatter, prior probability) of plain primitives."""
+DEVIATION_PRIOR = 1 / 15
+"""Prior probability of each deviation amplitude."""
+MAX_RECTANGLE_MODES = 3
+"""Number of rectangle optima to keep."""
+RECTANGLE_MODE_LOSS = 12.0
+"""Keep an optimum only if its loss is within this of the best (nats)."""
+FREE_SECTORS = 18
+"""Number of sectors; only the innermost free position of each is used."""
 SIDE_COSINE = 0.7
-"""A side was touched if a contact's normal is so near to its own."""
-OPEN_M = 0.030
-"""A side that was not may stand farther out by up to this."""
-DULL_WEIGHT = 1e-3
-"""Hypotheses of less weight are dropped."""
-LARGEST_FREE_M = 0.08
-"""Free places further from the middle say nothing."""
+"""Minimum cosine between a contact's normal and a side's normal for the side to count as touched."""
+MAX_OPEN_SIDE_M = 0.030
+"""Maximum distance by which an untouched side may stand farther out."""
+MIN_WEIGHT = 1e-3
+"""Drop hypotheses of less weight."""
+MAX_FREE_DISTANCE_M = 0.08
+"""Ignore free positions farther than this from the middle."""
 
 
-def believe_outline(
+def infer_outline(
     tip_K_m: Array,
     tip_radius_m: float,
     *,
@@ -56,17 +58,17 @@ def believe_outline(
     contact_sd_m: float = CONTACT_SD_M,
     outliers: int = 0,
 ) -> OutlineBelief:
-    """The belief after k >= 1 contacts with one object.
+    """Infer the outline of one object from k >= 1 contacts.
 
     Args:
         tip_K_m: (k, 2) or (k, 3) ball centres at the onsets, in order of time.
         tip_radius_m: Radius of the ball.
-        approach_K: (k, 2) or (k, 3) directions the ball moved in.
-        reaction_K: (k, 2) or (k, 3) directions of the force it felt; rows of zeros or NaN are not known.
-        pushed_K_m: (k, 2) how far each contact shoved the object; all contacts are moved to where it stands now.
-        free_K_m: (m, 2) places the ball's centre has been without touching the object as it stands now.
-        contact_sd_m: Scatter of a ball's centre at the onset.
-        outliers: So many of the first contacts were made before the object moved, by a common, unknown shift.
+        approach_K: (k, 2) or (k, 3) directions of motion.
+        reaction_K: (k, 2) or (k, 3) directions of the force on the ball; rows of zeros or NaN are unknown.
+        pushed_K_m: (k, 2) displacement of the object by each contact; contacts are moved to its current position.
+        free_K_m: (m, 2) contact-free positions of the ball's centre, for the object's current position.
+        contact_sd_m: Standard deviation of a ball centre at the onset.
+        outliers: Number of first contacts made before the object moved by a common, unknown shift.
 
     Raises:
         ParamError: No contact, none since the object moved, wrong shapes, or values that are not finite.
@@ -82,7 +84,7 @@ def believe_outline(
     approach = _directions("approach_K", approach_K, len(tips))
     reaction = _directions("reaction_K", reaction_K, len(tips))
     if pushed_K_m is not None:
-        tips = present_tips(tips, pushed_K_m)
+        tips = current_tips(tips, pushed_K_m)
     felt = np.any(reaction != 0.0, axis=1)
     seen = np.any(approach != 0.0, axis=1)
     normal = np.where(felt[:, None], reaction, -approach)
@@ -95,11 +97,11 @@ def believe_outline(
     return OutlineBelief(*_hypotheses(touches), touches)
 
 
-def present_tips(tip_K_m: Array, pushed_K_m: Array) -> Array:
-    """(k, 2) ball centres moved along with an object that was shoved by `pushed_K_m` (k, 2) after each contact.
+def current_tips(tip_K_m: Array, pushed_K_m: Array) -> Array:
+    """Return ball centres (k, 2) moved with an object that each contact displaced by `pushed_K_m` (k, 2).
 
     Raises:
-        ParamError: Not one push a contact, or one that is not finite.
+        ParamError: Not one displacement per contact, or one that is not finite.
     """
     pushed = np.asarray(pushed_K_m, dtype=np.float64)
     if pushed.shape != (len(tip_K_m), 2) or not np.isfinite(pushed).all():
@@ -108,32 +110,32 @@ def present_tips(tip_K_m: Array, pushed_K_m: Array) -> Array:
 
 
 def _hypotheses(touches: Touches) -> tuple[tuple[Hypothesis, ...], Array]:
-    """Explanations, weightiest first, and their weights."""
-    ring, boxes, losses = fit_both(touches.rooted)
-    distinct = _distinct(boxes[losses < losses[0] + MODE_LOSS])
-    loose, loose_chances = [scale for scale, _ in LOOSENESS], [chance for _, chance in LOOSENESS]
-    found = explain(circle, ring[None].repeat(len(loose), axis=0), [0.0] * len(loose), touches, loose)
-    middle = explain(circle, ring[None], AMPLITUDES[1:2], touches)[0].corrected
-    found += explain(circle, middle[None].repeat(len(AMPLITUDES), axis=0), AMPLITUDES, touches)
-    plain, more = np.array(distinct[:1] * len(loose) + distinct[1:]), len(distinct) - 1
-    found += explain(rounded, plain, [0.0] * len(plain), touches, loose + loose[:1] * more)
-    found += explain(rounded, np.array(distinct[:1] * 2), AMPLITUDES[:2], touches)
-    found = [h if h.shape is circle else _open_sided(h, touches.rooted) for h in found]
-    prior = [*loose_chances, *[WAVY_CHANCE] * len(AMPLITUDES), *loose_chances, *loose_chances[:1] * more]
-    prior += [WAVY_CHANCE] * 2
+    """Return the hypotheses, most probable first, and their weights."""
+    ring, boxes, losses = fit_both(touches.current)
+    distinct = _distinct(boxes[losses < losses[0] + RECTANGLE_MODE_LOSS])
+    scales, loose_priors = [scale for scale, _ in SCATTER_SCALES], [chance for _, chance in SCATTER_SCALES]
+    found = infer_posteriors(circle, ring[None].repeat(len(scales), axis=0), [0.0] * len(scales), touches, scales)
+    middle = infer_posteriors(circle, ring[None], AMPLITUDES[1:2], touches)[0].corrected
+    found += infer_posteriors(circle, middle[None].repeat(len(AMPLITUDES), axis=0), AMPLITUDES, touches)
+    plain, more = np.array(distinct[:1] * len(scales) + distinct[1:]), len(distinct) - 1
+    found += infer_posteriors(rounded, plain, [0.0] * len(plain), touches, scales + scales[:1] * more)
+    found += infer_posteriors(rounded, np.array(distinct[:1] * 2), AMPLITUDES[:2], touches)
+    found = [h if h.shape is circle else _open_sided(h, touches.current) for h in found]
+    prior = [*loose_priors, *[DEVIATION_PRIOR] * len(AMPLITUDES), *loose_priors, *loose_priors[:1] * more]
+    prior += [DEVIATION_PRIOR] * 2
     score = TEMPER * np.array([h.log_evidence for h in found]) + np.log(prior)
     weights = np.exp(score - score.max())
     weights /= weights.sum()
-    order = [int(i) for i in np.argsort(-weights, kind="stable") if weights[i] > DULL_WEIGHT]
+    order = [int(i) for i in np.argsort(-weights, kind="stable") if weights[i] > MIN_WEIGHT]
     kept = weights[order]
     return tuple(found[i] for i in order), kept / kept.sum()
 
 
 def _open_sided(h: Hypothesis, touches: Touches) -> Hypothesis:
-    """A rectangle whose untouched sides may stand farther out.
+    """Return a rectangle with larger variance on its untouched sides.
 
-    The fit puts such a side as far in as the contacts beside it permit: it is held from one side only, which no normal
-    distribution about the optimum says. The ball's way beyond it is a bound.
+    Contacts bound such a side from inside only, so the Gaussian at the optimum is too narrow. The nearest free position
+    beyond the side bounds it from outside.
     """
     x, y, yaw, *half = h.corrected[:5]
     covariance = h.covariance.copy()
@@ -148,15 +150,15 @@ def _open_sided(h: Hypothesis, touches: Touches) -> Hypothesis:
         off = touches.free_m - (x, y)
         beside = np.abs(off @ along) < half[1 - side % 2] + touches.radius_m
         beyond = off[beside] @ normal - reach - touches.radius_m
-        room = float(np.min(beyond[beyond > 0.0], initial=OPEN_M))
+        gap = float(np.min(beyond[beyond > 0.0], initial=MAX_OPEN_SIDE_M))
         step = np.zeros(len(covariance))
         step[:2], step[3 + side % 2] = 0.5 * normal, 0.5
-        covariance += (0.5 * room) ** 2 * np.outer(step, step)
+        covariance += (0.5 * gap) ** 2 * np.outer(step, step)
     return replace(h, covariance=covariance)
 
 
 def _distinct(boxes: Array) -> list[Array]:
-    """The first of boxes (s, 6) that are not each other's likes (a quarter turn with the sides swapped is the same)."""
+    """Return the first distinct boxes of (s, 6); a quarter turn with swapped sides is the same box."""
     kept: list[Array] = []
     for p in boxes:
         turns = round(float(p[2]) / (0.5 * math.pi))
@@ -165,28 +167,28 @@ def _distinct(boxes: Array) -> list[Array]:
         same = np.array([p[0], p[1], -like[2] if abs(like[2]) > 0.02 else like[2], b, a, p[5]])
         if all(min(np.abs(like - q).max(), np.abs(same - q).max()) > 0.002 for q in kept):
             kept.append(like)
-        if len(kept) == MODES:
+        if len(kept) == MAX_RECTANGLE_MODES:
             break
     return [np.array([q[0], q[1], q[2] / 0.03, q[3], q[4], q[5]]) for q in kept]
 
 
 def _nearest_free(free: Array, touches: Touches) -> Array:
-    """Of free places (m, 2), the nearest to the contacts' likely middle in each sector, none beside a contact."""
-    middle = touches.likely_middle_m
+    """Return the innermost free position of each sector about the likely middle, excluding those near a contact."""
+    middle = touches.prior_centre_m
     if len(touches.tips_m) > 2:
         middle = 0.5 * (touches.tips_m.min(axis=0) + touches.tips_m.max(axis=0))
     gap = np.min(np.linalg.norm(free[:, None] - touches.tips_m, axis=2), axis=1)
     off = free[gap > 0.5 * touches.radius_m] - middle
     distance = np.linalg.norm(off, axis=1)
-    off, distance = off[distance < LARGEST_FREE_M], distance[distance < LARGEST_FREE_M]
-    sector = np.floor((np.arctan2(off[:, 1], off[:, 0]) / (2 * math.pi) + 0.5) * FREE_BINS).astype(int)
+    off, distance = off[distance < MAX_FREE_DISTANCE_M], distance[distance < MAX_FREE_DISTANCE_M]
+    sector = np.floor((np.arctan2(off[:, 1], off[:, 0]) / (2 * math.pi) + 0.5) * FREE_SECTORS).astype(int)
     order = np.argsort(distance, kind="stable")
     _, first = np.unique(sector[order], return_index=True)
     return np.asarray(middle + off[order[first]])
 
 
 def _directions(name: str, given: Array | None, k: int) -> Array:
-    """(k, 2) unit vectors; zeros where nothing is known."""
+    """Return unit vectors (k, 2); zeros where unknown."""
     if given is None:
         return np.zeros((k, 2))
     d = np.nan_to_num(np.asarray(given, dtype=np.float64))

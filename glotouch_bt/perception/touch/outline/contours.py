@@ -1,23 +1,18 @@
-"""Outlines of one object from the ball centres of its contacts (paper III-E).
-
-`fit_contour` asks the belief of `belief` for its outline; `fit_kind` fits one given primitive. What they mean by an
-outline, and why ball centres instead of contact points, see `primitives`.
-"""
+"""Contours fitted to the ball centres of one object's contacts (paper III-E)."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from glotouch_bt.perception.touch.outline.belief import believe_outline
+from glotouch_bt.perception.touch.outline.belief import infer_outline
 from glotouch_bt.perception.touch.outline.polygons import polygon_distance
 from glotouch_bt.perception.touch.outline.primitives import CONTACT_SD_M, Touches, circle, fit, rectangle
-from glotouch_bt.perception.touch.outline.tracing import widest_gap
 from glotouch_bt.perception.touch.values import Contour
 from glotouch_bt.robot import Array, ParamError
 
 
 def signed_distance(contour: Contour, points_K_m: Array) -> Array:
-    """(n,) distance of points (n, 2) in K from the outline; negative inside. Exact for every family."""
+    """Return signed distances (n,) of points (n, 2) in K from the outline, negative inside; exact for all families."""
     p = np.asarray(points_K_m, dtype=np.float64).reshape(-1, 2)
     if contour.family == "free":
         return polygon_distance(contour.boundary_K_m, p)
@@ -33,30 +28,29 @@ def signed_distance(contour: Contour, points_K_m: Array) -> Array:
 def fit_contour(
     tip_K_m: Array, tip_radius_m: float, *, approach_K: Array | None = None, contact_sd_m: float = CONTACT_SD_M
 ) -> Contour:
-    """The outline that the contacts speak for.
+    """Return the contour of the most probable shape family.
 
     Args:
         tip_K_m: (k, 2) or (k, 3) ball centres at the contacts, k >= 3.
         tip_radius_m: Radius of the ball.
-        approach_K: (k, 2) or (k, 3) directions of approach: the object lies ahead. Settles on which side of three
-            contacts in a row the object is; not needed once the object has been touched all round.
-        contact_sd_m: Scatter of a contact.
+        approach_K: (k, 2) or (k, 3) directions of approach; they resolve the side of collinear contacts.
+        contact_sd_m: Standard deviation of a contact.
 
     Raises:
         ParamError: Fewer than 3 contacts, wrong shapes or values that are not finite.
     """
     if np.ndim(tip_K_m) == 2 and len(tip_K_m) < 3:
         raise ParamError("tip_K_m", np.shape(tip_K_m), "(k, 2) or (k, 3) with k >= 3 contacts")
-    return believe_outline(tip_K_m, tip_radius_m, approach_K=approach_K, contact_sd_m=contact_sd_m).contour
+    return infer_outline(tip_K_m, tip_radius_m, approach_K=approach_K, contact_sd_m=contact_sd_m).contour
 
 
 def fit_kind(tip_K_m: Array, tip_radius_m: float, kind: str) -> Contour:
-    """The circle ("round") or the rectangle ("box": a calibration square, say) that fits best by soft-L1.
+    """Fit a circle ("round") or a rectangle ("box", e.g. a calibration square) by soft-L1.
 
     Args:
         tip_K_m: (k, 2) or (k, 3) ball centres at the contacts, k >= 3.
         tip_radius_m: Radius of the ball.
-        kind: Which of the two.
+        kind: "round" or "box".
 
     Raises:
         ParamError: Fewer than 3 contacts, or an unknown kind.
@@ -78,19 +72,28 @@ def fit_kind(tip_K_m: Array, tip_radius_m: float, kind: str) -> Contour:
     return Contour("box", params[:2], (long, short), (yaw + 0.5 * np.pi) % np.pi - 0.5 * np.pi, rms, residuals)
 
 
-def contour_quality(tips_K_m: Array, contour: Contour) -> float:
-    """0..1: how well an outline is supported, coverage times fit.
+def widest_gap(bearings_rad: Array) -> tuple[float, float]:
+    """Return (middle, width), rad, of the widest interval between neighbouring bearings (k,); middle in (-pi, pi].
 
-    Coverage falls from 1 (no gap wider than 90 degrees between contacts, seen from the centre) to 0 (all on one side,
-    half a turn untouched); fit is 1 / (1 + (rms / 4 mm)^2).
+    Raises:
+        ParamError: No bearing given.
+    """
+    b = np.sort(np.mod(np.asarray(bearings_rad, dtype=np.float64).ravel(), 2 * np.pi))
+    if len(b) == 0:
+        raise ParamError("bearings_rad", 0, "at least one bearing")
+    gaps = np.diff(np.append(b, b[0] + 2 * np.pi))
+    i = int(np.argmax(np.round(gaps, 9)))
+    middle = b[i] + 0.5 * gaps[i]
+    return float(np.pi - np.mod(np.pi - middle, 2 * np.pi)), float(gaps[i])
+
+
+def contour_quality(tips_K_m: Array, contour: Contour) -> float:
+    """Return the support of an outline by its contacts, 0..1: coverage times fit.
+
+    Coverage falls from 1 (no gap of bearings wider than 90 degrees) to 0 (a gap of 180 degrees); fit is
+    1 / (1 + (rms / 4 mm)^2).
     """
     offset = np.asarray(tips_K_m, dtype=np.float64)[:, :2] - contour.centre_K_m
     _, gap = widest_gap(np.arctan2(offset[:, 1], offset[:, 0]))
     coverage = float(np.clip((np.pi - gap) / (0.5 * np.pi), 0.0, 1.0))
     return coverage / (1.0 + (contour.rms_m / 0.004) ** 2)
-
-
-def consistent(contour: Contour, tip_K_m: Array, tip_radius_m: float, tolerance_m: float = 0.008) -> bool:
-    """True if a ball centred at tip_K_m (2,) could be touching this outline: within `tolerance_m` of its offset."""
-    distance = float(signed_distance(contour, np.asarray(tip_K_m, dtype=np.float64)[None, :2])[0])
-    return abs(distance - tip_radius_m) <= tolerance_m

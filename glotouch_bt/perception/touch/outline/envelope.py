@@ -1,4 +1,4 @@
-"""The room an object takes, whatever outline was fitted to it: for keeping clear of it."""
+"""Envelope of an object for clearance, independent of the fitted outline."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from glotouch_bt.robot import Array, ParamError
 
 
 def envelope(candidate: Candidate) -> Contour:
-    """The smaller of the circle and the rectangle that hold every contact point and the fitted outline.
+    """Return the smaller of the circle and the rectangle that contain all contact points and the fitted outline.
 
-    Both, because few contacts leave wide gaps, and an outline leaves out what sticks out of it.
+    Few contacts leave gaps, and an outline omits protruding parts, so both are included.
 
     Returns:
-        A Contour whose `residuals_m` are the (never positive) distances of those points inside it, for the rectangle
-        the distance to its nearest side.
+        A Contour; its `residuals_m` are the signed distances of those points, never positive (rectangle: to its
+        nearest side).
     """
     points = candidate.extent_K_m
     circle = _circle(points, candidate.contour.centre_K_m)

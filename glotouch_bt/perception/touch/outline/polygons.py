@@ -1,4 +1,4 @@
-"""Plane geometry of closed polygons (n, 2), vertices in order, the last joined to the first."""
+"""Geometry of closed polygons (n, 2); the last vertex is joined to the first."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Indices = npt.NDArray[np.int64]
 
 
 def convex_hull(points_m: Array) -> Array:
-    """(m, 2) corners of the convex hull of points (n, 2), counter-clockwise.
+    """Return the corners (m, 2) of the convex hull of points (n, 2), counter-clockwise.
 
     Raises:
         ParamError: The points span no area.
@@ -24,18 +24,16 @@ def convex_hull(points_m: Array) -> Array:
 
 
 def star_hull(points_m: Array) -> Indices:
-    """(m,) indices of the convex hull's corners, counter-clockwise, of a closed polygon (n, 2) whose points follow one
-    another counter-clockwise round the origin, inside it.
+    """Return indices (m,) of the convex hull of a polygon (n, 2) ordered counter-clockwise around the origin inside it.
 
-    A corner that is not to the right of its neighbours' chord goes, and so may, then, the one before it (Graham, IPL 1,
-    1972): a few operations a point, since the order is known.
+    Graham scan (IPL 1, 1972) without its sort: linear time.
 
     Raises:
         ParamError: The points span no area.
     """
     x, y = points_m.T.tolist()
     n = len(x)
-    first = int(np.argmax(points_m[:, 0])) if n else 0  # a corner of the hull for certain
+    first = int(np.argmax(points_m[:, 0])) if n else 0  # always a corner of the hull
     kept: list[int] = []
     for i in [*range(first, n), *range(first + 1)]:
         xi, yi = x[i], y[i]
@@ -51,7 +49,7 @@ def star_hull(points_m: Array) -> Indices:
 
 
 def area_and_centroid(polygon_m: Array) -> tuple[float, Array]:
-    """Signed area (counter-clockwise positive) and area centroid (2,): Green's theorem."""
+    """Return signed area (counter-clockwise positive) and area centroid (2,), by Green's theorem."""
     middle = polygon_m.mean(axis=0)
     p = polygon_m - middle
     q = np.roll(p, -1, axis=0)
@@ -63,7 +61,7 @@ def area_and_centroid(polygon_m: Array) -> tuple[float, Array]:
 
 
 def minimum_rectangle(points_m: Array) -> tuple[Array, tuple[float, float], float]:
-    """Centre (2,), (long, short) and yaw of the long side, in [-pi/2, pi/2), of the least rectangle by area.
+    """Return centre (2,), (long, short) and yaw of the long side, in [-pi/2, pi/2), of the minimum-area rectangle.
 
     One of its sides lies along an edge of the convex hull (Freeman and Shapira, CACM 18, 1975).
 
@@ -85,10 +83,10 @@ def minimum_rectangle(points_m: Array) -> tuple[Array, tuple[float, float], floa
 
 
 def shrunk_convex(hull_m: Array, by_m: float) -> Array:
-    """A convex polygon without everything nearer than `by_m` to its outline: (m, 2) corners, counter-clockwise.
+    """Return the erosion of a convex polygon by `by_m`: corners (m, 2), counter-clockwise.
 
-    What is left is where the half planes of all edges, moved inwards, meet; found as the hull of their dual points
-    about the centroid. For a polygon too small to keep its centroid, the centroid alone (1, 2).
+    The intersection of the shifted half planes is the hull of their dual points about the centroid. If the centroid is
+    eroded too, return the centroid alone (1, 2).
     """
     middle = area_and_centroid(hull_m)[1]
     edge = np.roll(hull_m, -1, axis=0) - hull_m
@@ -107,7 +105,7 @@ def shrunk_convex(hull_m: Array, by_m: float) -> Array:
 
 
 def polygon_distance(polygon_m: Array, points_m: Array) -> Array:
-    """(k,) distance of points (k, 2) from a polygon's outline, negative inside (even-odd rule)."""
+    """Return signed distances (k,) of points (k, 2) from a polygon's outline, negative inside (even-odd rule)."""
     a, b = polygon_m, np.roll(polygon_m, -1, axis=0)
     edge, d = b - a, points_m[:, None, :] - a
     t = np.clip(np.einsum("knj,nj->kn", d, edge) / np.maximum(np.sum(edge * edge, axis=1), 1e-18), 0.0, 1.0)

@@ -1,8 +1,8 @@
-"""Circle and oriented rectangle fitted to ball centres: distances, normals, their derivatives, damped Gauss-Newton.
+"""Circle and oriented rectangle fitted to ball centres: distances, normals, derivatives, damped Gauss-Newton.
 
-A ball of radius r that touches a shape has its centre at signed distance r from it, whatever the direction of approach
-or of the force; so the OFFSET shape is fitted to ball centres, exactly also round a corner. The direction of the force
-adds what little it knows about the normal (friction turns it by 6-13 degrees), which matters with one to four contacts.
+The centre of a touching ball is at signed distance r from the shape, for any approach or force direction. So the OFFSET
+shape is fitted to ball centres, which is exact at corners too. The force direction adds weak evidence about the normal
+(friction turns it by 6-13 degrees), which matters with one to four contacts.
 """
 
 from __future__ import annotations
@@ -15,39 +15,49 @@ import numpy as np
 
 from glotouch_bt.robot import Array
 
-SMALLEST_M, LARGEST_M = 0.005, 0.150
-"""No outline is smaller or larger: what a 0-85 mm gripper and a hand-sized container hold, with a margin."""
-TYPICAL_M, SIZE_SD_M = 0.060, 0.028
-"""Prior of every size (diameter, side): objects are 40-110 mm long, and less across."""
-CORNER_M, CORNER_SD_M = 0.002, 0.004
-"""Prior of a corner's radius."""
-PLACE_SD_M = 0.025
-"""Prior of the centre about the place half a typical size behind the contacts."""
+MIN_SIZE_M = 0.005
+"""Minimum size of an outline: below what an 85 mm gripper handles, with a margin."""
+MAX_SIZE_M = 0.150
+"""Maximum size of an outline: above what an 85 mm gripper and the container hold, with a margin."""
+TYPICAL_M = 0.060
+"""Prior mean of every size (diameter, side). Source: objects are 40-110 mm long, and less across."""
+SIZE_SD_M = 0.028
+"""Prior standard deviation of every size."""
+CORNER_M = 0.002
+"""Prior mean of a corner radius."""
+CORNER_SD_M = 0.004
+"""Prior standard deviation of a corner radius."""
+CENTRE_SD_M = 0.025
+"""Prior standard deviation of the centre about the point half a typical size behind the contacts."""
 SCALE_M = 0.001
-"""Residual at which the loss turns from squared to linear: contact scatter plus how far real objects deviate."""
+"""Residual at which the soft-L1 loss becomes linear: contact scatter plus deviation of real objects from primitives."""
 CONTACT_SD_M = 0.00045
-"""Scatter of a contact unless it is given: of the onset, 0.2-0.4 mm, and of what is nearly a circle or a rectangle."""
-NORMAL_SD_RAD, APPROACH_SD_RAD = 0.20, 0.60
-"""Scatter of the true outward normal about the reaction, and, where no reaction is known, against the approach."""
-SIFT_STEP, SIFTED = 4, 5
-"""After so many steps only the best so many starts are followed."""
+"""Default standard deviation of a contact: onset scatter of 0.2-0.4 mm, and deviation from a primitive."""
+NORMAL_SD_RAD = 0.20
+"""Standard deviation of the outward normal about the reaction."""
+APPROACH_SD_RAD = 0.60
+"""Standard deviation of the outward normal about the reversed approach, where the reaction is unknown."""
+SIFT_STEP = 4
+"""Step of the descent after which only the best starts continue."""
+SIFTED = 5
+"""Number of starts that continue."""
 FREE_SD_M = 0.001
-"""How sharply a place where the ball has been forbids the outline."""
+"""Standard deviation of the penalty on an outline that covers a free position."""
 
 
 @dataclass(frozen=True)
 class Touches:
-    """What a fit is given, all in one frame of the plane.
+    """Data of a fit, in one planar frame.
 
     Attributes:
         tips_m: (k, 2) ball centres at the contacts.
-        normal_rad: (k,) measured bearing of the outward normal (the reaction's, else against the approach).
-        normal_sd_rad: (k,) its scatter; inf where nothing is known.
-        approach: (k, 2) unit directions of approach, zeros where not known.
-        free_m: (m, 2) places where the ball's centre was without touching; few, near the outline.
+        normal_rad: (k,) measured bearing of the outward normal (reaction, else reversed approach).
+        normal_sd_rad: (k,) its standard deviation; inf where unknown.
+        approach: (k, 2) unit directions of approach; zeros where unknown.
+        free_m: (m, 2) contact-free positions of the ball's centre; few, near the outline.
         radius_m: Radius of the ball.
-        contact_sd_m: Scatter of a ball's centre at the onset, and what a plain primitive may leave of an outline.
-        outliers: So many of the first contacts were made before the object moved, by a common, unknown shift.
+        contact_sd_m: Standard deviation of a ball centre, including the deviation from a plain primitive.
+        outliers: Number of first contacts made before the object moved by a common, unknown shift.
     """
 
     tips_m: Array
@@ -60,20 +70,20 @@ class Touches:
     outliers: int = 0
 
     @cached_property
-    def rooted(self) -> Touches:
-        """Those made since the object moved."""
+    def current(self) -> Touches:
+        """The contacts made since the object moved."""
         s = self.outliers
         tips, normal, sd = self.tips_m[s:], self.normal_rad[s:], self.normal_sd_rad[s:]
         return Touches(tips, normal, sd, self.approach[s:], self.free_m, self.radius_m, self.contact_sd_m)
 
     @cached_property
     def points_m(self) -> Array:
-        """(k + m, 2) the contacts, then the free places."""
+        """(k + m, 2) contacts, then free positions."""
         return np.concatenate([self.tips_m, self.free_m])
 
     @cached_property
-    def likely_middle_m(self) -> Array:
-        """(2,) the middle of what was touched: half a typical object behind each contact."""
+    def prior_centre_m(self) -> Array:
+        """(2,) prior mean of the centre: half a typical size behind the contacts."""
         known = np.isfinite(self.normal_sd_rad)[:, None]
         outward = np.stack([np.cos(self.normal_rad), np.sin(self.normal_rad)], axis=1)
         return np.asarray(
@@ -83,8 +93,8 @@ class Touches:
 
 @dataclass(frozen=True)
 class Geometry:
-    """Shapes (s) seen from points (k): signed distance (s, k), bearing of the nearest outward normal (s, k), and the
-    derivatives (s, k, p) of both by the shapes' parameters. The first two of `by_params` are the normal, negated."""
+    """Signed distances (s, k) of points from shapes, bearings (s, k) of the nearest outward normals, and the
+    derivatives (s, k, p) of both by the parameters. The first two of `by_params` are the negated normal."""
 
     distance_m: Array
     by_params: Array
@@ -93,11 +103,11 @@ class Geometry:
 
 
 Shape = Callable[[Array, Array], Geometry]
-"""Parameters (s, p) and points, (k, 2) common to all or (s, k, 2), to what is seen."""
+"""Function from parameters (s, p) and points, (k, 2) or (s, k, 2), to their geometry."""
 
 
 def circle(params: Array, points_m: Array) -> Geometry:
-    """Circles (s, 3) = x, y, radius seen from points."""
+    """Return the geometry of circles (s, 3) = x, y, radius."""
     dx, dy = points_m[..., 0] - params[:, :1], points_m[..., 1] - params[:, 1:2]
     norm = np.maximum(np.sqrt(dx * dx + dy * dy), 1e-9)
     by, turn = np.zeros((2, *norm.shape, 3))
@@ -108,18 +118,16 @@ def circle(params: Array, points_m: Array) -> Geometry:
 
 
 def rectangle(params: Array, points_m: Array) -> Geometry:
-    """Rectangles (s, 5) = x, y, yaw, half sides along and across the yaw, seen from points."""
+    """Return the geometry of rectangles (s, 5) = x, y, yaw, half sides along and across the yaw."""
     g = rounded(np.concatenate([params, np.zeros((len(params), 1))], axis=1), points_m)
     return Geometry(g.distance_m, g.by_params[..., :5], g.normal_rad, g.normal_by_params[..., :5])
 
 
 def rounded(params: Array, points_m: Array) -> Geometry:
-    """Rectangles with rounded corners (s, 6) = as `rectangle`, and the corners' radius; seen from points.
+    """Return the geometry of rectangles with rounded corners (s, 6) = as `rectangle`, then the corner radius.
 
-    What real things have for corners: on a chamfer or a nose a ball is not held against a sharp corner, which would
-    fix the end of a box that nothing has touched. The distance is the one from the rectangle smaller by the radius all
-    round, less the radius: along a face the radius cancels, on a corner's bisector it moves the outline by
-    sqrt(2) - 1 of itself.
+    A sharp corner would fix an untouched end of a real object with chamfers. The distance is that from the rectangle
+    shrunk by the corner radius, minus the radius.
     """
     c, s = np.cos(params[:, 2:3]), np.sin(params[:, 2:3])
     dx, dy = points_m[..., 0] - params[:, :1], points_m[..., 1] - params[:, 1:2]
@@ -136,7 +144,7 @@ def rounded(params: Array, points_m: Array) -> Geometry:
     by, turn = np.zeros((2, *norm.shape, 6))
     by[..., 0], by[..., 1], by[..., 2] = s * gy - c * gx, -(s * gx + c * gy), gx * y - gy * x
     by[..., 3], by[..., 4], by[..., 5] = -grad_x, -grad_y, grad_x + grad_y - 1.0
-    # The normal turns with the yaw; beside a corner also with the place: by d(atan2(v_y, v_x)) of v from the corner.
+    # The normal depends on the yaw; at a corner also on the position: d(atan2(v_y, v_x)) of v from the corner.
     beside = ((out_x > 0) & (out_y > 0)) / size
     tx, ty = -gy * beside, gx * beside
     turn_x, turn_y = -np.copysign(1.0, x) * tx, -np.copysign(1.0, y) * ty
@@ -147,10 +155,8 @@ def rounded(params: Array, points_m: Array) -> Geometry:
 
 
 def ray_m(params: Array, grown_m: float, origin_m: Array, unit: Array) -> Array:
-    """(s, n) distance along unit vectors (n, 2) from places inside, (2,) or (s, 2), to primitives (s, p) grown by
-    `grown_m` all round.
-
-    From a place outside, where a ray may miss it, to where the ray passes nearest.
+    """Return distances (s, n) along unit vectors (n, 2) from inner points, (2,) or (s, 2), to primitives (s, p)
+    dilated by `grown_m`. For a ray from outside that misses, return the distance to its nearest point.
     """
     off = origin_m - params[:, :2]
     if params.shape[1] == 3:
@@ -170,30 +176,30 @@ def ray_m(params: Array, grown_m: float, origin_m: Array, unit: Array) -> Array:
 
 
 def _far_root(ux: Array, uy: Array, x: Array, y: Array, radius: Array) -> Array:
-    """Where rays along (ux, uy) from (x, y), seen from a circle's centre, leave the circle."""
+    """Return where rays along (ux, uy) from (x, y), relative to a circle's centre, leave the circle."""
     along, across = ux * x + uy * y, ux * y - uy * x
     return np.asarray(np.sqrt(np.maximum(radius**2 - across * across, 0.0)) - along)
 
 
 def prior(shape: Shape, touches: Touches) -> tuple[Array, Array]:
-    """Mean (p,) and sd (p,) of a shape's parameters before any contact; a yaw has none (inf)."""
+    """Return prior mean (p,) and standard deviation (p,) of a shape's parameters; the yaw is free (inf)."""
     half, half_sd = 0.5 * TYPICAL_M, 0.5 * SIZE_SD_M
-    middle = touches.likely_middle_m
+    middle = touches.prior_centre_m
     if shape is circle:
-        return np.array([*middle, half]), np.array([PLACE_SD_M, PLACE_SD_M, half_sd])
-    mean, sd = [*middle, 0.0, half, half], [PLACE_SD_M, PLACE_SD_M, np.inf, half_sd, half_sd]
+        return np.array([*middle, half]), np.array([CENTRE_SD_M, CENTRE_SD_M, half_sd])
+    mean, sd = [*middle, 0.0, half, half], [CENTRE_SD_M, CENTRE_SD_M, np.inf, half_sd, half_sd]
     if shape is rounded:
         mean, sd = [*mean, CORNER_M], [*sd, CORNER_SD_M]
     return np.array(mean), np.array(sd)
 
 
 def wrapped(angle_rad: Array) -> Array:
-    """Angles in (-pi, pi]."""
+    """Wrap angles to (-pi, pi]."""
     return np.asarray(angle_rad + 2 * np.pi * np.floor((np.pi - angle_rad) / (2 * np.pi)))
 
 
 def fit(shape: Shape, touches: Touches, *, steps: int = 14, gain: float = 1e-2) -> tuple[Array, Array]:
-    """Local optima of the soft-L1 loss from many starts: parameters (s, p) and losses (s,), best first."""
+    """Minimise the soft-L1 loss from many starts; return optima (s, p) and losses (s,), best first."""
     params = _circle_starts(touches) if shape is circle else _rectangle_starts(touches)
     if shape is rounded:
         params = np.concatenate([params, np.full((len(params), 1), CORNER_M)], axis=1)
@@ -204,9 +210,9 @@ def fit(shape: Shape, touches: Touches, *, steps: int = 14, gain: float = 1e-2) 
 
 
 def fit_both(touches: Touches, *, steps: int = 14, gain: float = 1e-2) -> tuple[Array, Array, Array]:
-    """The best circle (3,), and what `fit` gives for rounded rectangles, in one descent.
+    """Return the best circle (3,) and the rounded rectangles of `fit`, from one joint descent.
 
-    A circle is a rounded rectangle that is all corner: yaw 0, half sides and corner's radius equal, and kept so.
+    A circle is a rounded rectangle constrained to yaw 0 with half sides equal to the corner radius.
     """
     rounds, boxes = _circle_starts(touches), _rectangle_starts(touches)
     n = len(rounds)
@@ -245,9 +251,10 @@ def _descend(
     steps: int,
     gain: float,
 ) -> tuple[Array, Array]:
-    """Parameters (s, p) and losses (s,) of local optima; after some steps of the first `kept` starts and the best.
+    """Return parameters (s, p) and losses (s,) of local optima of the first `kept` starts and the best others.
 
-    Levenberg-Marquardt by iterated reweighting, all starts at once; ends when two steps running gain less than `gain`.
+    Levenberg-Marquardt with iterated reweighting on all starts at once. It ends after two consecutive steps that gain
+    less than `gain`.
     """
     identity = np.eye(params.shape[1])
     longest = np.array([0.02, 0.02, 0.3] if params.shape[1] > 3 else [0.02, 0.02])
@@ -278,8 +285,8 @@ def _descend(
 def normal_equations(
     shape: Shape, params: Array, touches: Touches, mean: Array, weight: Array
 ) -> tuple[Array, Array, Array]:
-    """Loss (s,), gradient (s, p) and Gauss-Newton matrix (s, p, p) of parameters whose prior has this mean (p,) and
-    inverse variance, (p,) or one each (s, p)."""
+    """Return loss (s,), gradient (s, p) and Gauss-Newton matrix (s, p, p) for a prior of mean (p,) and inverse
+    variance, (p,) or (s, p)."""
     k = len(touches.tips_m)
     g = shape(params, touches.points_m)
     known = 1.0 / touches.normal_sd_rad
@@ -293,10 +300,9 @@ def normal_equations(
     rows[:, k : len(scale)] *= (gap[:, k:] < 0.0)[..., None]
     off = params - mean
     pull = off * weight
-    # Twice the data's part of the gradient's loss: it decides which of two optima is the better one, and which steps
-    # are taken; where they end is where the gradient vanishes.
+    # This loss ranks optima and accepts steps; its data term is twice the one of the gradient.
     loss = 2.0 * (root.sum(axis=1) - root.shape[1]) + 0.5 * (off * pull).sum(axis=1)
-    # A contact on a face that looks along its approach would have been made from inside.
+    # Penalise a contact on a face whose normal points along the approach: the ball would have come from inside.
     into = -(g.by_params[:, :k, :2] * touches.approach).sum(axis=2)
     loss += 10.0 * (into > 0.3).sum(axis=1)
     weighted = np.swapaxes(rows / root[..., None], 1, 2)
@@ -307,30 +313,30 @@ def normal_equations(
 
 
 def clipped(params: Array) -> Array:
-    """Parameters (s, p) with sizes and corners within the physical limits; in place."""
+    """Clip sizes and corner radii (s, p) to the physical limits, in place."""
     sizes = params[:, 2:3] if params.shape[1] == 3 else params[:, 3:5]
-    sizes[:] = np.minimum(np.maximum(sizes, 0.5 * SMALLEST_M), 0.5 * LARGEST_M)
+    sizes[:] = np.minimum(np.maximum(sizes, 0.5 * MIN_SIZE_M), 0.5 * MAX_SIZE_M)
     if params.shape[1] == 6:
         params[:, 5] = np.minimum(np.maximum(params[:, 5], 0.0), 0.8 * np.minimum(params[:, 3], params[:, 4]))
     return params
 
 
 def _circle_starts(touches: Touches) -> Array:
-    """Algebraic circle (Kasa), one about the contacts' mean, and typical ones behind them."""
+    """Return start circles: algebraic fit (Kasa), one about the contacts' mean, and typical ones behind them."""
     tips, r = touches.tips_m, touches.radius_m
     mean = tips.mean(axis=0)
     q = tips - mean
     spread = float(np.sqrt(np.mean(np.sum(q * q, axis=1)))) + 1e-6
     matrix = np.column_stack([2 * q, np.ones(len(q))])
     solution = np.linalg.lstsq(matrix, np.sum(q * q, axis=1), rcond=1e-4)[0]
-    offset = solution[:2] * min(1.0, 0.5 * LARGEST_M / (float(np.linalg.norm(solution[:2])) + 1e-9))
+    offset = solution[:2] * min(1.0, 0.5 * MAX_SIZE_M / (float(np.linalg.norm(solution[:2])) + 1e-9))
     radius = float(np.sqrt(max(solution[2] + solution[:2] @ solution[:2], 1e-8)))
     starts = [[*(mean + offset), radius - r], [*mean, spread - r]]
     return np.array(starts + [[*middle, 0.5 * TYPICAL_M] for middle in _middles(touches)])
 
 
 def _rectangle_starts(touches: Touches) -> Array:
-    """Boxes round the contacts at twelve yaws over a quarter turn, and typical ones behind the contacts."""
+    """Return start boxes: around the contacts at twelve yaws over a quarter turn, and typical ones behind them."""
     tips, r = touches.tips_m, touches.radius_m
     starts = []
     for yaw in np.arange(12) * (np.pi / 24) if len(tips) > 2 else ():
@@ -347,9 +353,9 @@ def _rectangle_starts(touches: Touches) -> Array:
 
 
 def _middles(touches: Touches) -> list[Array]:
-    """Where the middle may be; without normals and approaches, on either side of contacts in a row."""
+    """Return possible centres; without normals and approaches, one on each side of collinear contacts."""
     if bool(np.isfinite(touches.normal_sd_rad).any()):
-        return [touches.likely_middle_m]
+        return [touches.prior_centre_m]
     mean = touches.tips_m.mean(axis=0)
     across = np.linalg.svd(touches.tips_m - mean, full_matrices=True)[2][1]
     return [mean + 0.5 * TYPICAL_M * across, mean - 0.5 * TYPICAL_M * across]

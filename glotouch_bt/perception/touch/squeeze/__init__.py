@@ -1,6 +1,6 @@
-"""TODO door of glotouch_bt/perception/touch/squeeze."""
+"""Evidence from one closure of the jaws: plateau, depth-map patches and motion of the object."""
 
-from glotouch_bt.perception.touch.squeeze.object_motion import Yielding, watch_yielding
+from glotouch_bt.perception.touch.squeeze.object_motion import ObjectMotion, estimate_object_motion
 from glotouch_bt.perception.touch.squeeze.patches import (
     PatchStats,
     evidence_weight,
@@ -19,12 +19,12 @@ __all__ = [
     "PatchStats",
     "Plateau",
     "PlateauParams",
-    "Yielding",
+    "ObjectMotion",
     "evidence_weight",
     "find_plateau",
     "make_layer",
     "patch_statistics",
     "relative_nonplanarity",
     "temporal_median",
-    "watch_yielding",
+    "estimate_object_motion",
 ]

@@ -1,10 +1,9 @@
-"""How what is squeezed gave way while the jaws closed: slid, turned, slipped. From the robot's own senses only.
+"""Motion of the object during a closure (slide, turn, compliance), from aperture, jaw force, wrist and depth maps.
 
-One jaw that touches first pushes the object along y_P. Its surface is then where that pad is: half the aperture from
-the hand's middle, less what the gel gives. So the way from the first push on the wrist to the end is the object's slide
-along y_P. Jaws that go on closing after both touch move the object otherwise: if the pads touch it at different places
-along x_P, a lever b apart, closing by d turns it by d / b (a wedge that is squeezed out looks the same: an upper
-bound, right for flat sides).
+Slide: the jaw that touches first pushes the object along y_P, and the object's surface moves with its pad. So the slide
+is the pad's travel from the first wrist force to the end, corrected for the indentation of the gel. Turn: if the pads
+touch at positions a lever b apart along x_P, closing by d after both contacts turns the object by d / b. This is an
+upper bound, exact for flat sides; a wedge that slips out gives the same signal.
 """
 
 from __future__ import annotations
@@ -18,55 +17,69 @@ from glotouch_bt.perception.touch.squeeze.patches import THRESHOLD_M
 from glotouch_bt.robot import Array, Observation, TactileFrame
 
 PUSH_N = 0.3
-"""Sideways force on the wrist that is a push: six standard deviations of a period's mean in the harsh conditions."""
+"""Minimum lateral wrist force of a push: six standard deviations of a period's mean in the harsh conditions."""
 BOTH_N = 1.5
-"""Twice the jaw force less the push on the hand: more of it and the other jaw touches, too."""
+"""Minimum of twice the jaw force minus the lateral wrist force when both jaws touch."""
 BASELINE_PERIODS = 6
+"""Number of first periods that give the wrist's baseline."""
 MIN_LEVER_M = 0.003
-"""Closer than this the pads are opposite to each other: no lever."""
+"""Minimum lever between the two contacts; below it the pads are opposite each other."""
 FRICTION_RADIUS = 0.65
-"""c over half the diagonal of the outline: 0.54 for a 7 x 4 cm box of even pressure, 1 if it stands on its corners."""
-TURN_LIMIT_RAD = float(np.deg2rad(20.0))
-DEEP_TAXELS, MIN_TAXELS = 8, 6
-SLIDE_M, TURN_RAD, GAVE_M = 0.0025, float(np.deg2rad(3.0)), 0.003
-"""From here on a closure has moved its object: the spread of a sequence's own pose in `recognition` is of this size."""
+"""Effective friction radius over half the diagonal of the outline: 0.54 for a 7 x 4 cm box of uniform pressure, 1 for
+support at the corners."""
+MAX_TURN_RAD = float(np.deg2rad(20.0))
+"""Maximum estimated turn."""
+DEEP_TAXELS = 8
+"""Number of taxels that must reach a depth for it to count as the indentation."""
+MIN_CONTACT_TAXELS = 6
+"""Minimum number of taxels of a contact."""
+MOVED_SLIDE_M = 0.0025
+"""Slide above which the object counts as moved: the standard deviation of a sequence's pose in `recognition`."""
+MOVED_TURN_RAD = float(np.deg2rad(3.0))
+"""Turn above which the object counts as moved: the standard deviation of a sequence's pose in `recognition`."""
+MOVED_COMPLIANCE_M = 0.003
+"""Compliance above which the object counts as moved."""
 
 
 @dataclass(frozen=True)
-class Yielding:
-    """What one closure did to its object.
+class ObjectMotion:
+    """Motion of the object during one closure.
 
     Attributes:
-        slide_m: Displacement along +y_P of the side that was touched first, at the pad; 0 if both were touched at once.
-        turn_rad: Turn about +z_B, at most `TURN_LIMIT_RAD` either way; 0 if nothing had a lever.
-        compliance_m: How far the jaws closed after both touched, the gels' own give taken off.
-        felt: Something was pushed or pressed at all.
+        slide_m: Displacement along +y_P at the first contact; 0 if both sides were touched at once.
+        turn_rad: Turn about +z_B, at most `MAX_TURN_RAD` in magnitude; 0 without a lever.
+        compliance_m: Closing of the jaws after both contacts, without the indentation of the gels.
+        detected: A contact was detected.
     """
 
     slide_m: float
     turn_rad: float
     compliance_m: float
-    felt: bool
+    detected: bool
 
     @property
     def moved(self) -> bool:
-        """It is not where it was."""
-        return abs(self.slide_m) > SLIDE_M or abs(self.turn_rad) > TURN_RAD or self.compliance_m > GAVE_M
+        """True if the closure moved the object."""
+        return (
+            abs(self.slide_m) > MOVED_SLIDE_M
+            or abs(self.turn_rad) > MOVED_TURN_RAD
+            or self.compliance_m > MOVED_COMPLIANCE_M
+        )
 
 
-def watch_yielding(
+def estimate_object_motion(
     blocks: Sequence[Observation], pad_width_m: float, middle_x_m: float = 0.0, half_diagonal_m: float = 0.03
-) -> Yielding:
-    """Judge a whole closure.
+) -> ObjectMotion:
+    """Estimate the object's motion during a whole closure.
 
     Args:
-        blocks: From open jaws to the plateau; depth maps from the first touch on, if there are any.
-        pad_width_m: Of the gel window, along x_P.
-        middle_x_m: Where the object's middle was traced, along x_P from the pads.
-        half_diagonal_m: Of its outline.
+        blocks: Observations from open jaws to the plateau, with depth maps from the first contact on if available.
+        pad_width_m: Width of the gel window along x_P.
+        middle_x_m: Centre of the object's outline along x_P, from the pads.
+        half_diagonal_m: Half diagonal of the outline.
     """
     if len(blocks) <= BASELINE_PERIODS:
-        return Yielding(0.0, 0.0, 0.0, False)
+        return ObjectMotion(0.0, 0.0, 0.0, False)
     rotation = blocks[0].pose_B_P.rotation
     stamp = np.array([b.gripper.stamp_s for b in blocks])
     aperture = np.array([b.gripper.aperture_m for b in blocks])
@@ -79,7 +92,7 @@ def watch_yielding(
     dents = np.array([_dents(f) for f in frames]).reshape(-1, 2)
     last = dents[-1] if len(dents) else np.zeros(2)
 
-    slide = gave = 0.0
+    slide = compliance = 0.0
     pushed = np.flatnonzero(np.abs(side_N) > PUSH_N)
     if len(pushed):
         k = int(pushed[0])
@@ -89,16 +102,17 @@ def watch_yielding(
     both = np.flatnonzero(2 * jaw - np.abs(side_N) > BOTH_N)
     both = both[both >= BASELINE_PERIODS]
     if len(both):
-        gave = max(float(np.interp(stamp[both[0]], stamp, aperture) - aperture[-1] - last.sum()), 0.0)
+        compliance = max(float(np.interp(stamp[both[0]], stamp, aperture) - aperture[-1] - last.sum()), 0.0)
     turn = _turn(frames, dents, np.array([np.interp(f.stamp_s, stamp, aperture) for f in frames]), pad_width_m)
     turn -= slide * middle_x_m / ((FRICTION_RADIUS * half_diagonal_m) ** 2 + middle_x_m**2)
-    turn = min(max(turn, -TURN_LIMIT_RAD), TURN_LIMIT_RAD)
-    return Yielding(slide, float(turn * rotation[2, 2]), gave, bool(len(pushed) or len(both)))
+    turn = min(max(turn, -MAX_TURN_RAD), MAX_TURN_RAD)
+    return ObjectMotion(slide, float(turn * rotation[2, 2]), compliance, bool(len(pushed) or len(both)))
 
 
 def _turn(frames: Sequence[TactileFrame], dents: Array, aperture: Array, width_m: float) -> float:
-    """Turn about +z_P: what the touched surfaces came closer, over the lever between the two touches."""
-    left, right = (np.array([_middle_m(m, width_m) for m in maps]) for maps in _sides(frames))
+    """Return the turn about +z_P: approach of the touched surfaces over the lever between the contacts."""
+    left = np.array([_middle_m(f.left_m, width_m) for f in frames])
+    right = np.array([_middle_m(f.right_m, width_m) for f in frames])
     lever = right - left
     seen = np.flatnonzero(np.isfinite(lever))
     if len(seen) < 2:
@@ -109,12 +123,8 @@ def _turn(frames: Sequence[TactileFrame], dents: Array, aperture: Array, width_m
     return float(np.sum(-np.diff(between)[use] / arm[use]))
 
 
-def _sides(frames: Sequence[TactileFrame]) -> tuple[list[Array], list[Array]]:
-    return [f.left_m for f in frames], [f.right_m for f in frames]
-
-
 def _dents(frame: TactileFrame) -> tuple[float, float]:
-    """How deep the object is in each gel: the depth that eight taxels reach; 0 if it does not touch."""
+    """Return the indentation of each gel: the depth reached by DEEP_TAXELS taxels; 0 without contact."""
     depths = []
     for depth in (frame.left_m, frame.right_m):
         known = depth[np.isfinite(depth)]
@@ -124,9 +134,9 @@ def _dents(frame: TactileFrame) -> tuple[float, float]:
 
 
 def _middle_m(depth: Array, width_m: float) -> float:
-    """Place along x_P of a contact's middle, weighted by depth; NaN without contact."""
+    """Return the depth-weighted centre of a contact along x_P; NaN without contact."""
     touched = np.where(np.nan_to_num(depth) > THRESHOLD_M, np.nan_to_num(depth), 0.0)
-    if np.count_nonzero(touched) < MIN_TAXELS:
+    if np.count_nonzero(touched) < MIN_CONTACT_TAXELS:
         return float("nan")
     across = (np.arange(depth.shape[1]) + 0.5) / depth.shape[1] - 0.5
     weight = touched.sum(axis=0)

@@ -1,4 +1,4 @@
-"""What one depth map says: contact mask, support patches, relative nonplanarity, evidence weight (paper IV-A)."""
+"""Statistics of one depth map: contact mask, support patches, nonplanarity, evidence weight (paper IV-A)."""
 
 from __future__ import annotations
 
@@ -11,22 +11,26 @@ from glotouch_bt.perception.touch.values import Layer
 from glotouch_bt.robot import Array
 
 THRESHOLD_M = 8e-5
-"""Indentation that is contact: four standard deviations of a taxel in the nominal conditions (0.02 mm)."""
+"""Minimum indentation of a contact: four standard deviations of a taxel in the nominal conditions (0.02 mm)."""
 MIN_TAXELS = 12
-"""A smaller patch supports no plane: three parameters and dead taxels."""
-BILATERAL, UNILATERAL, INVALID = 1.0, 0.4, 0.0
-"""Evidence weight of a layer with both pads, one pad, no pad in contact. The paper orders them and gives no numbers."""
+"""Minimum number of taxels of a patch: enough for a plane (three parameters) despite dead taxels."""
+BILATERAL = 1.0
+"""Evidence weight of a layer with both pads in contact."""
+UNILATERAL = 0.4
+"""Evidence weight of a layer with one pad in contact. Own choice; the paper gives an order, no numbers."""
+INVALID = 0.0
+"""Evidence weight of an unstable layer or one without contact."""
 
 
 @dataclass(frozen=True)
 class PatchStats:
-    """One pad's contact.
+    """Contact statistics of one pad.
 
     Attributes:
         valid: At least one support patch is large enough.
         mask: (rows, cols) taxels of the valid patches, bool.
-        patches: How many valid patches.
-        area_fraction: Valid patches' area over the area of all living taxels.
+        patches: Number of valid patches.
+        area_fraction: Taxels of valid patches over all working taxels.
         valid_fraction: Taxels of valid patches over all taxels above the threshold; 0 without contact.
         rho: Relative nonplanarity RMS(D - plane) / q90(D) of the largest patch; NaN if not valid.
         depth_q90_m: 90th percentile of the indentation over the valid patches; 0 without contact.
@@ -42,11 +46,11 @@ class PatchStats:
 
 
 def patch_statistics(depth_m: Array, *, threshold_m: float = THRESHOLD_M, min_taxels: int = MIN_TAXELS) -> PatchStats:
-    """Statistics of one depth map (rows, cols), m, positive indented, NaN dead (eq. relative_nonplanarity)."""
+    """Compute statistics of a depth map (rows, cols), m, positive indented, NaN dead (eq. relative_nonplanarity)."""
     depth = np.asarray(depth_m, dtype=np.float64)
     alive = np.isfinite(depth)
     touched = alive & (np.nan_to_num(depth, nan=0.0) > threshold_m)
-    # A dead taxel must not cut a patch in two: bridge it for the labelling only.
+    # Bridge dead taxels for the labelling, so that they do not split a patch.
     bridged = touched | (~alive & scipy.ndimage.binary_dilation(touched))
     labels, count = scipy.ndimage.label(bridged)
     sizes = np.bincount(labels[touched], minlength=count + 1)
@@ -68,7 +72,7 @@ def patch_statistics(depth_m: Array, *, threshold_m: float = THRESHOLD_M, min_ta
 
 
 def relative_nonplanarity(depth_m: Array, mask: np.typing.NDArray[np.bool_]) -> float:
-    """RMS of the residual to the least-squares plane over the 90th percentile of the depth, on the mask's taxels."""
+    """Return the RMS residual to the least-squares plane over the 90th percentile of the depth, on a mask."""
     rows, cols = np.nonzero(mask)
     values = depth_m[mask]
     q90 = float(np.quantile(values, 0.9))
@@ -80,7 +84,7 @@ def relative_nonplanarity(depth_m: Array, mask: np.typing.NDArray[np.bool_]) -> 
 
 
 def evidence_weight(layer: Layer) -> float:
-    """Bilateral contact counts fully, unilateral less, and an unstable layer or one without contact not at all."""
+    """Return the evidence weight of a layer by the number of pads in contact; INVALID if unstable."""
     if not layer.stable:
         return INVALID
     sides = sum(patch_statistics(d).valid for d in (layer.left_m, layer.right_m))

@@ -1,4 +1,4 @@
-"""From a closing pair of jaws to one evidence layer (paper IV-A): aperture plateau, temporal median."""
+"""Aperture plateau of a closure and its evidence layer (paper IV-A)."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glotouch_bt.perception.touch.squeeze.object_motion import Yielding
+from glotouch_bt.perception.touch.squeeze.object_motion import ObjectMotion
 from glotouch_bt.perception.touch.values import Layer
 from glotouch_bt.robot import Array, Observation, ParamError, TactileFrame
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlateauParams:
-    """When a closure counts.
+    """Conditions of a stable plateau.
 
     Attributes:
-        duration_s: The plateau must have lasted this long. Source: six periods of a 60 Hz tactile sensor.
-        tolerance_m: Largest drift of the aperture over it: difference of the means of its two halves, above what its
-            own scatter explains. Source: a quarter of a millimetre is the aperture's noise (harsh) with a margin.
-        force_fraction: Part of the commanded jaw force that must be reached; an empty closure never reaches it.
-        arm_m: Largest movement of the pads' mid-point over the plateau. Source: half a pad pixel.
-        empty_m: A smaller aperture is jaws that met each other. Source: aperture bias of the harsh conditions.
+        duration_s: Minimum duration. Source: six periods of a 60 Hz tactile sensor.
+        tolerance_m: Maximum aperture drift: difference between the means of the halves, beyond what the scatter
+            explains. Source: aperture noise of the harsh conditions with a margin.
+        force_fraction: Minimum fraction of the commanded jaw force; an empty closure does not reach it.
+        arm_m: Maximum motion of the pads' mid-point. Source: half a pad pixel.
+        empty_m: Apertures below this mean empty jaws. Source: aperture bias of the harsh conditions.
     """
 
     duration_s: float = 0.1
@@ -42,14 +42,14 @@ class PlateauParams:
 
 @dataclass(frozen=True)
 class Plateau:
-    """The end of a closure.
+    """End of a closure.
 
     Attributes:
-        stable: All of the plateau's conditions hold.
-        aperture_m: Median aperture over it.
-        force_N: Median jaw force over it.
-        start_s: Robot clock at its beginning.
-        why_not: Which condition fails, for the journal; "" if stable.
+        stable: All conditions hold.
+        aperture_m: Median aperture.
+        force_N: Median jaw force.
+        start_s: Robot clock at the start of the plateau.
+        why_not: The failed condition; "" if stable.
     """
 
     stable: bool
@@ -60,7 +60,7 @@ class Plateau:
 
 
 def find_plateau(blocks: Sequence[Observation], force_N: float, params: PlateauParams | None = None) -> Plateau:
-    """Judge the last `duration_s` of a closure commanded with jaw force `force_N`.
+    """Evaluate the last `duration_s` of a closure commanded with jaw force `force_N`.
 
     Raises:
         ParamError: No blocks.
@@ -99,9 +99,7 @@ def find_plateau(blocks: Sequence[Observation], force_N: float, params: PlateauP
 
 
 def temporal_median(frames: Sequence[TactileFrame], shape: tuple[int, int]) -> tuple[Array, Array]:
-    """Taxel-wise median over time of left and right maps, (rows, cols), m; NaN where no frame delivered the taxel.
-
-    No frame at all gives maps of NaN.
+    """Return the taxel-wise median over time of left and right maps, (rows, cols), m; NaN for taxels without data.
 
     Raises:
         ParamError: A frame of another shape.
@@ -112,7 +110,7 @@ def temporal_median(frames: Sequence[TactileFrame], shape: tuple[int, int]) -> t
     if not frames:
         return np.full(shape, np.nan), np.full(shape, np.nan)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # an all-NaN taxel stays NaN; that is meant
+        warnings.simplefilter("ignore", RuntimeWarning)  # an all-NaN taxel stays NaN by design
         left, right = (
             np.nanmedian(np.stack(m), axis=0) for m in zip(*((f.left_m, f.right_m) for f in frames), strict=True)
         )
@@ -128,26 +126,26 @@ def make_layer(
     force_N: float,
     pad_shape: tuple[int, int],
     params: PlateauParams | None = None,
-    yielding: Yielding | None = None,
+    object_motion: ObjectMotion | None = None,
 ) -> Layer:
-    """One closure as a `Layer`: aperture and force on the plateau, median maps of the frames TAKEN during it.
+    """Build a `Layer` from one closure: aperture and force on the plateau, median maps of the frames TAKEN during it.
 
     Args:
-        blocks: Observations of the closure, oldest first, tactile frames asked for.
+        blocks: Observations of the closure, oldest first, with tactile frames.
         height_m: Pads' mid-point above the floor.
         position_K_m: (2,) pads' mid-point in K.
         yaw_rad: Direction of x_P in K.
         force_N: Commanded jaw force.
         pad_shape: (rows, cols) of the maps.
         params: Plateau conditions.
-        yielding: What the closure did to the object, if it was watched.
+        object_motion: Motion of the object during the closure, if estimated.
 
     Raises:
         ParamError: No blocks, or maps of another shape.
     """
     plateau = find_plateau(blocks, force_N, params)
     frames = [b.tactile for b in blocks if b.tactile is not None]
-    # Frames arrive late: keep those taken on the plateau, or the newest if none was.
+    # Frames arrive late: select by their stamp; use the newest if none was taken on the plateau.
     on_plateau = [f for f in frames if f.stamp_s >= plateau.start_s] or frames[-1:]
     left, right = temporal_median(on_plateau, pad_shape)
     return Layer(
@@ -160,7 +158,7 @@ def make_layer(
         force_N=plateau.force_N,
         stable=plateau.stable,
         why_not=plateau.why_not,
-        slide_m=math.nan if yielding is None else yielding.slide_m,
-        turn_rad=math.nan if yielding is None else yielding.turn_rad,
-        compliance_m=math.nan if yielding is None else yielding.compliance_m,
+        slide_m=math.nan if object_motion is None else object_motion.slide_m,
+        turn_rad=math.nan if object_motion is None else object_motion.turn_rad,
+        compliance_m=math.nan if object_motion is None else object_motion.compliance_m,
     )

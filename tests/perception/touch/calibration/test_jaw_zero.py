@@ -26,7 +26,7 @@ class Seen:
 @given(
     error=st.floats(-1e-3, 1e-3), left=st.floats(3e-4, 1.4e-3), right=st.floats(3e-4, 1.4e-3), seed=st.integers(0, 99)
 )
-def test_the_error_is_found_whatever_sinks(error: float, left: float, right: float, seed: int) -> None:
+def test_zero_is_measured_for_any_indentation(error: float, left: float, right: float, seed: int) -> None:
     """Harsh noise, and 3 % of the taxels dead: 20 reports leave 0.15 / sqrt(20) = 0.034 mm."""
     rng = np.random.default_rng(seed)
     width, blocks = 0.016, []
@@ -43,6 +43,6 @@ def test_the_error_is_found_whatever_sinks(error: float, left: float, right: flo
 
 
 @pytest.mark.parametrize(("left", "right"), [(None, None), (0.0, 5e-4), (5e-4, np.nan), (0.0, 0.0)])
-def test_what_a_pad_does_not_show_is_not_measured(left: float | None, right: float | None) -> None:
+def test_zero_is_not_measured_without_contact_on_both_pads(left: float | None, right: float | None) -> None:
     blocks: list[Any] = [Seen(0.0149, left, right) for _ in range(20)]
     assert measured_zero(blocks, 0.016, SHAPE) == JawZero()

@@ -34,7 +34,7 @@ def touches(error_P, late_s, yaws, *, speeds=(0.015,), noise=None) -> list[WallT
 
 
 @given(x=small, y=small, late=st.floats(-0.004, 0.006))
-def test_the_tip_is_found_whatever_the_walls_and_the_latency(x: float, y: float, late: float) -> None:
+def test_tip_is_independent_of_walls_and_latency(x: float, y: float, late: float) -> None:
     """Straight and a quarter turn either way; the latency cancels in the tip, and is found from two speeds."""
     made = touches(np.array([x, y]), late, (0.3, 0.3 + np.pi / 2, 0.3 - np.pi / 2), speeds=(0.01, 0.02))
     found = solve_tip(made, RADIUS, touch_sd_m=1e-6, late_sd_s=1.0)
@@ -45,7 +45,7 @@ def test_the_tip_is_found_whatever_the_walls_and_the_latency(x: float, y: float,
 
 
 @pytest.mark.parametrize("yaws", [(0.0, np.pi / 2, -np.pi / 2), (0.0, np.pi / 2)])
-def test_the_covariance_is_that_of_many_trials(yaws) -> None:
+def test_covariance_matches_many_trials(yaws) -> None:
     rng = np.random.default_rng(5)
     sd = 3e-5
     errors, claimed = [], 0.0
@@ -57,12 +57,12 @@ def test_the_covariance_is_that_of_many_trials(yaws) -> None:
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(claimed, rel=0.06)
 
 
-def test_without_a_turn_the_tip_is_not_known() -> None:
+def test_tip_is_unknown_from_one_yaw() -> None:
     found = solve_tip(touches(np.array([1e-3, 0]), 0.0, (0.0,)), RADIUS, touch_sd_m=3e-5, late_sd_s=1e-4)
     assert found.tip_sd_m == pytest.approx(0.005, rel=0.01)
 
 
-def test_bad_touches_are_refused() -> None:
+def test_invalid_touches_are_refused() -> None:
     made = touches(np.zeros(2), 0.0, (0.0, 1.5))
     with pytest.raises(ParamError):
         solve_tip([], RADIUS, touch_sd_m=1e-5, late_sd_s=1e-4)
@@ -84,20 +84,20 @@ def shaken(delay_s: float, noise_N: float, rng, n: int = 800) -> tuple[np.ndarra
 
 
 @pytest.mark.parametrize("delay_s", [0.001, 0.003, 0.008, 0.015])
-def test_a_known_delay_is_found(delay_s: float) -> None:
+def test_known_delay_is_estimated(delay_s: float) -> None:
     position, force = shaken(delay_s, 0.0, np.random.default_rng(0))
     found, _ = wrench_delay(position + 0.6, force, 1000.0)
     assert found == pytest.approx(delay_s, abs=2e-5)
 
 
-def test_its_standard_deviation_is_honest() -> None:
+def test_standard_deviation_of_the_delay_matches_its_scatter() -> None:
     rng = np.random.default_rng(1)
     found = np.array([wrench_delay(*shaken(0.005, 0.15, rng), 1000.0, steps=81) for _ in range(60)])
     assert abs(np.mean(found[:, 0]) - 0.005) < 4 * np.std(found[:, 0]) / np.sqrt(60)
     assert np.std(found[:, 0]) == pytest.approx(np.mean(found[:, 1]), rel=0.4)
 
 
-def test_a_shake_that_is_too_short_is_refused() -> None:
+def test_short_signal_is_refused() -> None:
     with pytest.raises(ParamError):
         wrench_delay(np.zeros(100), np.zeros(100), 1000.0)
     with pytest.raises(ParamError):

@@ -11,7 +11,7 @@ R_B_S = np.diag([1.0, -1.0, -1.0])
 
 
 @pytest.mark.parametrize(("force_N", "soft", "hard"), [(-2.0, True, False), (25.0, False, True), (-25.0, True, True)])
-def test_each_rule_by_itself(bench, force_N, soft, hard):
+def test_soft_and_hard_rule_are_independent(bench, force_N, soft, hard):
     """Moving along x: 2 N against it is a touch; 25 N WITH it is none, yet too much; 25 N against it is both."""
     rng = np.random.default_rng(0)
     baseline = fit_baseline(np.vstack([b.wrench_S for b in bench.blocks(np.zeros((120, 3)), rng=rng, lever=LEVER)]))

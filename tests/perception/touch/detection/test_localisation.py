@@ -3,12 +3,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from glotouch_bt.perception.touch import contact_direction, contact_point, disc_support, polygon_support
+from glotouch_bt.perception.touch import contact_direction, contact_point
 from glotouch_bt.perception.touch.detection.localisation import Disc, Polygon, section_point
 from glotouch_bt.robot import ParamError
 
 
-def test_frictional_force_halves_its_angle_with_the_papers_weight():
+def test_equal_weights_halve_the_friction_angle():
     """d bisects approach and opposing reaction: for friction angle a off the normal, d is a/2 off."""
     for a in np.deg2rad([0, 6, 13]):
         d = contact_direction(np.array([2.0, 0.0]), np.array([-np.cos(a), np.sin(a)]), approach_weight=1.0)
@@ -17,7 +17,7 @@ def test_frictional_force_halves_its_angle_with_the_papers_weight():
 
 
 @given(approach=st.floats(-1.2, 1.2), mu=st.floats(0.0, 0.2))
-def test_a_slanted_approach_with_friction_misplaces_the_surface_by_little(approach: float, mu: float) -> None:
+def test_slanted_approach_with_friction_shifts_the_contact_point_little(approach: float, mu: float) -> None:
     """A ball slides along a wall x = r: its force is off the normal by the friction angle, against the sliding."""
     u = np.array([np.cos(approach), np.sin(approach)])
     angle = min(np.arctan(mu), abs(approach))
@@ -26,14 +26,14 @@ def test_a_slanted_approach_with_friction_misplaces_the_surface_by_little(approa
     assert 0.006 - point[0] <= 0.00025
 
 
-def test_a_graze_tells_where_the_surface_is() -> None:
+def test_grazing_contact_locates_the_surface() -> None:
     """Moving along a wall at -y: the reaction is at right angles to the motion."""
     np.testing.assert_allclose(
         contact_point(np.zeros(2), 0.006, np.array([1.0, 0.0]), np.array([0.02, 1.0])), [0, -0.006], atol=7e-4
     )
 
 
-def test_a_reaction_along_the_motion_is_left_out() -> None:
+def test_reaction_along_the_motion_is_ignored() -> None:
     np.testing.assert_allclose(
         contact_point(np.zeros(2), 0.006, np.array([1.0, 0.0]), np.array([0.5, 1.0])), [0.006, 0], atol=1e-12
     )
@@ -51,9 +51,9 @@ def test_support_of_a_polygon_tends_to_the_disc():
     ring = 0.006 * np.c_[np.cos(a), np.sin(a)]
     for t in np.linspace(0, 6, 7):
         d = np.array([np.cos(t), np.sin(t)])
-        assert polygon_support(ring, d) == pytest.approx(disc_support(0.006, d), rel=1e-4)
+        assert Polygon(ring).support_m(d) == pytest.approx(Disc(0.006).support_m(d), rel=1e-4)
     square = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1.0]])
-    assert polygon_support(square, np.array([0.6, 0.8])) == pytest.approx(1.4)
+    assert Polygon(square).support_m(np.array([0.6, 0.8])) == pytest.approx(1.4)
 
 
 @given(turn=st.floats(-np.pi, np.pi), yaw=st.floats(-np.pi, np.pi), x=st.floats(0.005, 0.02), y=st.floats(0.005, 0.02))
@@ -67,7 +67,7 @@ def test_fingers_on_a_wall(turn: float, yaw: float, x: float, y: float) -> None:
     assert point @ normal == pytest.approx(reach)
 
 
-def test_sections_refuse_nonsense() -> None:
+def test_invalid_sections_are_refused() -> None:
     with pytest.raises(ParamError):
         Disc(-1.0)
     with pytest.raises(ParamError):
@@ -76,6 +76,6 @@ def test_sections_refuse_nonsense() -> None:
         Polygon(np.full((3, 2), np.nan))
 
 
-def test_no_approach_no_direction():
+def test_zero_approach_has_no_direction():
     with pytest.raises(ParamError):
         contact_direction(np.zeros(2), None)

@@ -14,7 +14,7 @@ def _candidate(points: np.ndarray) -> Candidate:
 
 
 @pytest.mark.parametrize("yaw_deg", [-80.0, -30.0, 0.0, 17.0, 60.0])
-def test_a_rectangle_is_its_own_envelope(yaw_deg: float) -> None:
+def test_envelope_of_a_rectangle_is_the_rectangle(yaw_deg: float) -> None:
     yaw = np.deg2rad(yaw_deg)
     local = np.array([[x, y] for x in np.linspace(-0.05, 0.05, 9) for y in (-0.02, 0.02)])
     c, s = np.cos(yaw), np.sin(yaw)
@@ -25,14 +25,14 @@ def test_a_rectangle_is_its_own_envelope(yaw_deg: float) -> None:
     assert np.cos(2 * (found.yaw_rad - yaw)) == pytest.approx(1.0)
 
 
-def test_a_circle_is_its_own_envelope() -> None:
+def test_envelope_of_a_circle_is_the_circle() -> None:
     a = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     found = envelope(_candidate(0.03 * np.stack([np.cos(a), np.sin(a)], axis=1)))
     assert found.kind == "round"
     assert found.size_m[0] == pytest.approx(0.06)
 
 
-def test_everything_lies_inside() -> None:
+def test_envelope_contains_all_points() -> None:
     rng = np.random.default_rng(3)
     for _ in range(30):
         points = rng.normal(0.0, 0.02, (9, 2)) * [1.0, rng.uniform(0.3, 1.0)]

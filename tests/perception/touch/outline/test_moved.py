@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from glotouch_bt.perception.touch import Contact, believe_contacts, split_moved
+from glotouch_bt.perception.touch import Contact, infer_outline_from_contacts, split_at_motion
 
 R = 0.006
 
@@ -18,7 +18,7 @@ def contacts_on(centres, bearings, rng, radius=0.033):
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.008, 0.015])
-def test_a_disc_that_moved_is_noticed(shift):
+def test_motion_of_a_disc_is_detected(shift):
     """Ten contacts, the disc shoved unseen after the fifth; of eight trials at most one goes wrong."""
     right = 0
     for seed in range(8):
@@ -27,14 +27,14 @@ def test_a_disc_that_moved_is_noticed(shift):
         centres = np.zeros((10, 2))
         centres[5:] = shift * np.array([np.cos(way), np.sin(way)])
         contacts = contacts_on(centres, 2.4 * np.arange(10), rng)
-        stray, kept = split_moved(contacts, R)
+        stray, kept = split_at_motion(contacts, R)
         assert stray + kept == contacts
         right += (len(stray) == 0) if shift == 0 else (4 <= len(stray) <= 6)
         if len(stray) == 5:
-            assert np.linalg.norm(believe_contacts(kept, R).centre_K_m - centres[-1]) < 1.5e-3
+            assert np.linalg.norm(infer_outline_from_contacts(kept, R).centre_K_m - centres[-1]) < 1.5e-3
     assert right >= 7
 
 
-def test_few_contacts_are_never_split():
+def test_few_contacts_are_not_split():
     contacts = contacts_on(np.zeros((3, 2)), np.arange(3), np.random.default_rng(0))
-    assert split_moved(contacts, R) == ((), contacts)
+    assert split_at_motion(contacts, R) == ((), contacts)

@@ -51,7 +51,7 @@ def test_shrinking_undoes_growing(seed, radius):
     np.testing.assert_allclose((left @ ring.T).max(0), (points @ ring.T).max(0), atol=1e-3 * radius + 1e-9)
 
 
-def test_what_is_too_small_shrinks_to_its_centroid():
+def test_small_polygon_shrinks_to_its_centroid():
     assert shrunk_convex(np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]), 0.6).shape == (1, 2)
 
 
@@ -67,13 +67,13 @@ def test_distance_of_an_l():
     np.testing.assert_array_equal(got < 0, (x > 0) & (y > 0) & (((x < 6) & (y < 2)) | ((x < 2) & (y < 5))))
 
 
-def test_no_area_no_hull():
+def test_points_without_area_have_no_hull():
     with pytest.raises(ParamError):
         convex_hull(np.zeros((5, 2)))
 
 
 @given(st.integers(0, 10_000))
-def test_the_hull_of_a_star_is_the_hull_of_its_points(seed):
+def test_star_hull_equals_the_convex_hull(seed):
     """Against Qhull, for random distances along evenly spaced rays."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(8, 80))

@@ -87,7 +87,7 @@ def soft_l1(p, shape, touches):
 
 
 @pytest.mark.parametrize("shape", [circle, rounded])
-def test_gradient_against_the_formula_and_finite_differences(shape):
+def test_gradient_matches_finite_differences_of_the_loss(shape):
     rng = np.random.default_rng(3)
     for _ in range(10):
         p = random_params(shape, rng)
@@ -102,7 +102,7 @@ def test_gradient_against_the_formula_and_finite_differences(shape):
 
 
 @pytest.mark.parametrize("shape", [circle, rounded])
-def test_both_fits_in_one_descent_end_as_well_as_either_alone(shape):
+def test_joint_descent_is_as_good_as_separate_fits(shape):
     rng = np.random.default_rng(4)
     for _ in range(6):
         p = random_params(shape, rng)

@@ -3,20 +3,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from glotouch_bt.perception.touch import pushed
-from glotouch_bt.perception.touch.outline.pushing import GIVE_M
+from glotouch_bt.perception.touch import estimate_push
+from glotouch_bt.perception.touch.outline.pushing import COMPLIANCE_M
 
 
 @given(st.floats(-0.005, 0.005), st.floats(-0.005, 0.005), st.floats(0, 6.3), st.floats(0.1, 9.0))
-def test_pushed_is_the_part_along_the_force_and_never_more_than_the_way(x, y, angle, size):
+def test_push_is_the_travel_along_the_force(x, y, angle, size):
     reaction = size * np.array([np.cos(angle), np.sin(angle)])
     way = np.array([x, y])
-    got = pushed(way, reaction)
+    got = estimate_push(way, reaction)
     along = -way @ reaction / size
-    assert np.linalg.norm(got) == pytest.approx(max(along - GIVE_M, 0.0), abs=1e-12)
+    assert np.linalg.norm(got) == pytest.approx(max(along - COMPLIANCE_M, 0.0), abs=1e-12)
     assert np.linalg.norm(got) <= np.linalg.norm(way) + 1e-12
     assert got @ reaction <= 1e-12
 
 
-def test_a_touch_from_above_pushes_nothing():
-    assert not pushed(np.array([1e-3, 0.0]), np.zeros(2)).any()
+def test_touch_from_above_pushes_nothing():
+    assert not estimate_push(np.array([1e-3, 0.0]), np.zeros(2)).any()

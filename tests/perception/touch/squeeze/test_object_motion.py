@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glotouch_bt.perception.touch import watch_yielding
+from glotouch_bt.perception.touch import ObjectMotion, estimate_object_motion
 from glotouch_bt.robot import GripperState, Observation, TactileFrame
 
 SHAPE, PAD_WIDTH, GEL = (35, 20), 0.0172, 4e-4
@@ -64,19 +64,17 @@ def pushed(off_m: float, width_m: float, seed: int) -> list[Observation]:
     width=st.floats(0.02, 0.05),
     seed=st.integers(0, 99),
 )
-def test_a_block_off_the_middle_slides_by_as_much_as_it_is_off(
-    off: float, side: float, width: float, seed: int
-) -> None:
+def test_off_centre_block_slides_to_the_centre(off: float, side: float, width: float, seed: int) -> None:
     """Jaws of a hand that stands still centre it: it goes from `off` to 0."""
-    felt = watch_yielding(pushed(side * off, width, seed), PAD_WIDTH)
-    assert felt.felt
-    assert felt.slide_m == pytest.approx(-side * off, abs=0.0006)
-    assert felt.turn_rad == 0.0
-    assert felt.compliance_m < 0.0006
-    assert felt.moved == (abs(felt.slide_m) > 0.0025)
+    motion = estimate_object_motion(pushed(side * off, width, seed), PAD_WIDTH)
+    assert motion.detected
+    assert motion.slide_m == pytest.approx(-side * off, abs=0.0006)
+    assert motion.turn_rad == 0.0
+    assert motion.compliance_m < 0.0006
+    assert motion.moved == (abs(motion.slide_m) > 0.0025)
 
 
-def test_a_hand_that_gives_way_does_not_slide_it() -> None:
+def test_compliant_hand_does_not_slide_the_object() -> None:
     """The hand comes to the block: what was pushed is what the hand did not follow."""
     blocks = []
     for i in range(150):
@@ -84,47 +82,48 @@ def test_a_hand_that_gives_way_does_not_slide_it() -> None:
         closed = max(0.060 - aperture, 0.0)
         blocks.append(block(0.01 * i, aperture, 0.75 * (closed > 0), 1.5 * (closed > 0), 0.5 * closed))
     blocks += [block(1.5 + 0.01 * k, aperture, 10.0, 0.0, 0.5 * closed) for k in range(10)]
-    assert watch_yielding(blocks, PAD_WIDTH).slide_m == pytest.approx(0.0, abs=3e-4)
+    assert estimate_object_motion(blocks, PAD_WIDTH).slide_m == pytest.approx(0.0, abs=3e-4)
 
 
 @pytest.mark.parametrize("lever", [-0.009, -0.005, 0.005, 0.009])
-def test_a_box_held_by_two_corners_turns_by_what_the_jaws_close_over_the_lever(lever: float) -> None:
+def test_box_held_at_two_corners_turns_by_closing_over_lever(lever: float) -> None:
     """Touched at +-lever / 2, closing by 1 mm after that: 1 mm / lever about z_P, so the other way about z_B."""
     blocks = [block(0.01 * i, 0.05 - 3e-4 * i, 0.0, 0.0) for i in range(30)]
     for k in range(30):
         t = 0.3 + 0.01 * k
         blocks.append(block(t, 0.041 - 1e-3 * min(k / 20, 1.0), 3.0, 0.0, 0.0, frame(t + 0.01, -lever / 2, lever / 2)))
-    felt = watch_yielding(blocks, PAD_WIDTH)
-    assert felt.turn_rad == pytest.approx(-1e-3 / lever, rel=0.15)
-    assert felt.moved
-    assert felt.slide_m == 0.0
+    motion = estimate_object_motion(blocks, PAD_WIDTH)
+    assert motion.turn_rad == pytest.approx(-1e-3 / lever, rel=0.15)
+    assert motion.moved
+    assert motion.slide_m == 0.0
 
 
-def test_closing_on_nothing_or_on_what_stands_still() -> None:
+def test_empty_closure_and_fixed_object_do_not_move() -> None:
     empty = [block(0.01 * i, 0.05 - 3e-4 * i, 0.0, 0.0) for i in range(100)]
-    felt = watch_yielding(empty, PAD_WIDTH)
-    assert (felt.felt, felt.moved, felt.slide_m, felt.turn_rad, felt.compliance_m) == (False, False, 0.0, 0.0, 0.0)
-    assert not watch_yielding(empty[:3], PAD_WIDTH).felt
+    motion = estimate_object_motion(empty, PAD_WIDTH)
+    assert motion == ObjectMotion(0.0, 0.0, 0.0, False)
+    assert not motion.moved
+    assert not estimate_object_motion(empty[:3], PAD_WIDTH).detected
     held = empty + [block(1.0 + 0.01 * k, 0.02, 10.0, 0.0, 0.0, frame(1.0, 0.0, 0.0)) for k in range(20)]
-    felt = watch_yielding(held, PAD_WIDTH)
-    assert felt.felt
-    assert not felt.moved
+    motion = estimate_object_motion(held, PAD_WIDTH)
+    assert motion.detected
+    assert not motion.moved
 
 
-def test_what_slips_out_under_both_jaws_is_seen_without_depth_maps() -> None:
+def test_slip_between_both_jaws_is_detected_without_depth_maps() -> None:
     """Both jaws press, then they close by another 8 mm: a wedge squeezed out, or something falling over."""
     blocks = [block(0.01 * i, 0.05 - 3e-4 * i, 0.0, 0.0) for i in range(30)]
     blocks += [block(0.3 + 0.01 * k, 0.041 - 4e-4 * min(k, 20), 3.0, 0.0) for k in range(40)]
-    felt = watch_yielding(blocks, PAD_WIDTH)
-    assert felt.compliance_m == pytest.approx(0.008, abs=5e-4)
-    assert felt.moved
+    motion = estimate_object_motion(blocks, PAD_WIDTH)
+    assert motion.compliance_m == pytest.approx(0.008, abs=5e-4)
+    assert motion.moved
 
 
 @pytest.mark.parametrize("middle", [-0.02, 0.015])
-def test_a_push_beside_the_middle_turns_it(middle: float) -> None:
+def test_off_centre_push_turns_the_object(middle: float) -> None:
     """5 mm pushed at x from the middle: s x / (c^2 + x^2) about z_P, x = -middle, c = 0.65 x 40 mm; z_B is -z_P."""
-    still = watch_yielding(pushed(0.005, 0.04, 0), PAD_WIDTH, 0.0, 0.04)
-    felt = watch_yielding(pushed(0.005, 0.04, 0), PAD_WIDTH, middle, 0.04)
+    still = estimate_object_motion(pushed(0.005, 0.04, 0), PAD_WIDTH, 0.0, 0.04)
+    motion = estimate_object_motion(pushed(0.005, 0.04, 0), PAD_WIDTH, middle, 0.04)
     assert still.turn_rad == 0.0
-    assert felt.slide_m == still.slide_m < 0
-    assert felt.turn_rad == pytest.approx(felt.slide_m * middle / (0.026**2 + middle**2), rel=1e-9)
+    assert motion.slide_m == still.slide_m < 0
+    assert motion.turn_rad == pytest.approx(motion.slide_m * middle / (0.026**2 + middle**2), rel=1e-9)

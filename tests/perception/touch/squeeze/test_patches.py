@@ -6,7 +6,7 @@ from glotouch_bt.perception.touch import patch_statistics, relative_nonplanarity
 ROWS, COLS = np.meshgrid(np.arange(35.0), np.arange(20.0), indexing="ij")
 
 
-def test_any_plane_has_no_nonplanarity():
+def test_plane_has_zero_nonplanarity():
     for slope in ((0, 0), (1e-6, 2e-6), (-3e-6, 1e-6)):
         depth = 4e-4 + slope[0] * ROWS + slope[1] * COLS
         stats = patch_statistics(depth)
@@ -16,7 +16,7 @@ def test_any_plane_has_no_nonplanarity():
         assert stats.patches == 1
 
 
-def test_sphere_has_its_closed_form():
+def test_nonplanarity_of_a_sphere():
     """Paraboloid cap d0 (1 - r^2/R^2) on its disc: depth is uniform on [0, d0], so the plane is its mean d0/2, the RMS
     d0/sqrt(12) and the 90th percentile 0.9 d0; rho = 0.3208."""
     y, x = np.meshgrid(np.linspace(-1, 1, 401), np.linspace(-1, 1, 401), indexing="ij")
@@ -26,7 +26,7 @@ def test_sphere_has_its_closed_form():
     assert patch_statistics(np.maximum(coarse, 0), threshold_m=1e-6).rho == pytest.approx(0.3208, rel=0.05)
 
 
-def test_cylinder_has_its_closed_form():
+def test_nonplanarity_of_a_cylinder():
     """d0 (1 - t^2), t uniform in [-1, 1]: variance 4/45 d0^2, 90th percentile 0.99 d0."""
     t = np.linspace(-1, 1, 2001)
     depth = np.tile(1e-3 * (1 - t**2), (35, 1))
@@ -34,7 +34,7 @@ def test_cylinder_has_its_closed_form():
     assert relative_nonplanarity(depth, depth >= 0) == pytest.approx(want, rel=0.01)
 
 
-def test_small_specks_and_dead_taxels():
+def test_specks_are_ignored_and_dead_taxels_bridged():
     depth = np.zeros((35, 20))
     depth[5:15, 3:13] = 3e-4
     depth[25, 15] = 5e-4  # a speck

@@ -37,7 +37,7 @@ def layer(blocks):
 
 
 @pytest.mark.parametrize("noise", [0.0, 5e-5, 1.5e-4])
-def test_a_plateau_is_seen_through_the_noise(noise):
+def test_plateau_is_found_despite_noise(noise):
     stable = [find_plateau(closure(noise=noise, seed=s), 10.0) for s in range(60)]
     assert sum(p.stable for p in stable) >= 59
     assert np.std([p.aperture_m for p in stable]) <= 0.6 * noise + 1e-12
@@ -54,7 +54,7 @@ def test_a_plateau_is_seen_through_the_noise(noise):
         ({"seconds": 0.05}, "only"),
     ],
 )
-def test_what_is_no_plateau(fault, why):
+def test_unstable_closures_name_the_failed_condition(fault, why):
     plateau = find_plateau(closure(**fault), 10.0)
     assert not plateau.stable
     assert why in plateau.why_not
@@ -73,7 +73,7 @@ def test_layer_holds_the_median_of_frames_taken_on_the_plateau():
     assert evidence_weight(got) == 1.0
 
 
-def test_no_frame_and_wrong_shape():
+def test_median_of_no_frame_is_nan_and_wrong_shape_is_refused():
     left, right = temporal_median([], SHAPE)
     assert np.isnan(left).all()
     assert np.isnan(right).all()

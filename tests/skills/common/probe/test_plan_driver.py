@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from glotouch_bt.perception.search import Felt, Move
+from glotouch_bt.perception.search import Move, MoveOutcome
 from glotouch_bt.skill import SkillFailed
 from glotouch_skills.common.probe.plan_driver import Explorer, ExploringSpeeds
 
@@ -37,7 +37,7 @@ def asking(*moves):
     return felt
 
 
-def go(b, explorer, *moves) -> list[Felt]:
+def go(b, explorer, *moves) -> list[MoveOutcome]:
     return b.go(explorer.run(asking(*moves)))
 
 
