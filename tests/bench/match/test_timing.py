@@ -9,8 +9,8 @@ import numpy as np
 from glotouch_bt.bench.match.dataset import Layout, Touched
 from glotouch_bt.bench.match.timing import time_matching
 from glotouch_bt.perception.recognition import PadSpec
-from glotouch_bt.perception.recognition.synthetic.acquisition import NOMINAL, acquire
 from glotouch_bt.robot.scene.meshes import load_folder
+from tests.support.acquisition import NOMINAL, acquire
 
 
 def a_ball(path: Path) -> None:

@@ -11,9 +11,9 @@ import trimesh
 
 from glotouch_bt.perception.model_cache import target_model
 from glotouch_bt.perception.recognition import MATCHERS, TargetModel
-from glotouch_bt.perception.recognition.synthetic.acquisition import NOMINAL, acquire
 from glotouch_bt.robot import BadInput, ParamError
 from glotouch_bt.robot.scene.meshes import load_mesh
+from tests.support.acquisition import NOMINAL, acquire
 
 
 def box(*size_m: float) -> trimesh.Trimesh:

@@ -7,8 +7,8 @@ import pytest
 
 from glotouch_bt.perception.recognition import Closure, TargetModel
 from glotouch_bt.perception.recognition.gain import believe, closure_options, expected_gain, identify
-from glotouch_bt.perception.recognition.synthetic.acquisition import NOMINAL, acquire
 from glotouch_bt.robot import ParamError
+from tests.support.acquisition import NOMINAL, acquire
 
 
 @pytest.fixture(scope="module")

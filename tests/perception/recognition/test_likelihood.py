@@ -15,9 +15,9 @@ from glotouch_bt.perception.recognition.gain import believe
 from glotouch_bt.perception.recognition.likelihood.pair import compare, read_touchset, watched_turns
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.perception.recognition.likelihood.posterior import against_others, probabilities, ratios
-from glotouch_bt.perception.recognition.synthetic.acquisition import HARSH, IDEAL, NOMINAL, acquire
 from glotouch_bt.perception.touch import TouchSequence, TouchSet
 from glotouch_bt.robot import ParamError
+from tests.support.acquisition import HARSH, IDEAL, NOMINAL, acquire
 
 likelihood = MATCHERS["likelihood"]
 

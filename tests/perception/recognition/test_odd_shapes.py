@@ -12,8 +12,8 @@ import pytest
 from glotouch_bt.perception.recognition import MATCHERS, TargetModel
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.perception.recognition.likelihood.scalars import height_ratio
-from glotouch_bt.perception.recognition.synthetic.acquisition import IDEAL, acquire
 from glotouch_bt.robot.scene.meshes import load_mesh
+from tests.support.acquisition import IDEAL, acquire
 
 SHAPES = Path(__file__).parents[2] / "support" / "shapes.py"
 POSE = (0.03, -0.02, 0.7)

@@ -9,10 +9,10 @@ import pytest
 import trimesh
 from py_trees.common import Status
 
-from glotouch_bt.perception.recognition.synthetic.acquisition import IDEAL, acquire
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene.meshes import load_mesh
 from glotouch_skills.recognise.match import Match, load_target
+from tests.support.acquisition import IDEAL, acquire
 
 POSE = (0.03, -0.02, 0.4)
 

@@ -14,9 +14,9 @@ from glotouch_bt.perception.recognition.paper import TERMS, PaperParams, paper_m
 from glotouch_bt.perception.recognition.paper.branches import bias_grid, fit_widths
 from glotouch_bt.perception.recognition.paper.observation import read_observation
 from glotouch_bt.perception.recognition.paper.widths import Hypotheses, predicted_widths, width_tables
-from glotouch_bt.perception.recognition.synthetic.acquisition import IDEAL, NOMINAL, acquire
 from glotouch_bt.perception.touch import TouchSequence, TouchSet
 from glotouch_bt.robot import ParamError
+from tests.support.acquisition import IDEAL, NOMINAL, acquire
 
 FULL = PaperParams()
 

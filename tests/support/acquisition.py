@@ -1,8 +1,8 @@
-"""Synthetic acquisition: what the probe and the pads would report of a mesh at a pose, without a simulator.
+"""Synthetic acquisition: contacts and squeezes of a mesh at a pose, without a simulator.
 
-For tests and tuning. It shares no table with `model`: every pad is ray-cast at full resolution at the true pose and the
-gel is solved for each frame (SIMULATION A4, recipe C). Jaws are coupled, so the object slides until it is centred
-between them. Not modelled: toppling, slip along x_P, gel shear, friction, touching outside the gel but by `one_sided`.
+It shares no table with the recognition model: every pad is ray-cast at full resolution at the true pose, and the gel is
+solved for each frame (SIMULATION A4, recipe C). Coupled jaws slide the object until it is centred. Not modelled:
+toppling, slip along x_P, gel shear, friction, contact outside the gel except `one_sided`.
 """
 
 from __future__ import annotations
