@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from glotouch_bt.motion import Motion, hand_pose_B
-from glotouch_bt.perception.touch import Candidate, Layer, ObjectMotion, make_layer, estimate_object_motion
+from glotouch_bt.perception.touch import Candidate, Layer, ObjectMotion, estimate_object_motion, make_layer
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose
 from glotouch_bt.skill import Context, SkillParams, param
