@@ -19,7 +19,6 @@ from glotouch_bt.perception.touch.detection.settling import settled
 
 __all__ = [
     "Baseline",
-    "Payload",
     "ContactGuard",
     "Disc",
     "GuardParams",
@@ -28,6 +27,7 @@ __all__ = [
     "LowPass",
     "MeasuredInertia",
     "Onset",
+    "Payload",
     "Polygon",
     "Section",
     "TipFusion",

@@ -16,15 +16,15 @@ from glotouch_bt.perception.touch.squeeze.plateau import (
 )
 
 __all__ = [
+    "ObjectMotion",
     "PatchStats",
     "Plateau",
     "PlateauParams",
-    "ObjectMotion",
+    "estimate_object_motion",
     "evidence_weight",
     "find_plateau",
     "make_layer",
     "patch_statistics",
     "relative_nonplanarity",
     "temporal_median",
-    "estimate_object_motion",
 ]
