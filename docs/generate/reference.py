@@ -17,10 +17,10 @@ from pydantic import BaseModel
 from glotouch_bt.faults import CATALOGUE
 from glotouch_bt.mission.export import describe_skill, mission_schema
 from glotouch_bt.mission.nodes import NODES
-from glotouch_bt.mission.read import Declaration, SkillShelf, WorldFile, shipped
+from glotouch_bt.mission.read import Declaration, SkillRegistry, WorldFile, shipped
 from glotouch_bt.mission.record import Recorder
 from glotouch_bt.mission.record.mcap_schemas import CHANNELS as CHANNELS_OF_RECORD
-from glotouch_bt.mission.spec import UNITS
+from glotouch_bt.mission.spec import UNITS, describe_findings
 from glotouch_bt.robot import HOLD, FakeRobot
 
 MISSION = """# Mission files
@@ -139,13 +139,17 @@ def pages() -> dict[str, str]:
 
 def _own_skills() -> list[dict[str, Any]]:
     """Descriptions of the skills that ship with the project."""
-    shelf = SkillShelf()
-    return [describe_skill(n, shelf[n]) for n in sorted(shelf) if shelf[n].__module__.startswith("glotouch_skills.")]
+    registry = SkillRegistry()
+    return [
+        describe_skill(n, registry[n])
+        for n in sorted(registry)
+        if registry[n].__module__.startswith("glotouch_skills.")
+    ]
 
 
 def missions() -> str:
     """Return the page on mission files."""
-    schema = mission_schema(SkillShelf())
+    schema = mission_schema(SkillRegistry())
     meaning = {
         "mission": "name: letters, digits, `_` and `-`",
         "description": "one sentence for people",
@@ -293,10 +297,11 @@ def faults() -> str:
 
 def findings() -> str:
     """Return the page on the findings of `glotouch check`."""
-    from glotouch_bt.mission.spec.explanations import WARNINGS, WHY
-
-    rows = [(code(c), "warning" if c in WARNINGS else "error", why) for c, why in sorted(WHY.items())]
-    return "# Findings of `glotouch check`\n\n" + table(("code", "severity", "why it matters"), rows)
+    names = ("severity", "meaning", "why", "advice")
+    rows = [(code(f["code"]), *(str(f[n]) for n in names)) for f in describe_findings()]
+    return "# Findings of `glotouch check`\n\n" + table(
+        ("code", "severity", "meaning", "why it matters", "advice"), rows
+    )
 
 
 def record() -> str:

@@ -10,6 +10,6 @@ from glotouch_bt.commands.output import print_json
 def schema() -> None:
     """Print the JSON Schema of mission files, for editors."""
     from glotouch_bt.mission.export import mission_schema
-    from glotouch_bt.mission.read import SkillShelf
+    from glotouch_bt.mission.read import SkillRegistry
 
-    print_json(mission_schema(SkillShelf()))
+    print_json(mission_schema(SkillRegistry()))

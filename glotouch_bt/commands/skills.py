@@ -21,9 +21,9 @@ def skills(
     """
     from glotouch_bt.commands.terminal import print_skill, print_skills
     from glotouch_bt.mission.export import describe_skill
-    from glotouch_bt.mission.read import SkillShelf
+    from glotouch_bt.mission.read import SkillRegistry
 
-    installed = SkillShelf()
+    installed = SkillRegistry()
     described = [describe_skill(n, installed[n]) for n in ([name] if name else installed)]
     if json_:
         print_json(described[0] if name else described)

@@ -17,7 +17,7 @@ from glotouch_bt.mission.read import (
     Parameter,
     Reading,
     Scope,
-    SkillShelf,
+    SkillRegistry,
     Value,
     check_used,
     entries_of,
@@ -116,7 +116,7 @@ def load_mission(
     """
     path = find_shipped("", str(given), "mission")
     findings = Findings()
-    mission = _read(path, dict(settings or {}), SkillShelf() if skills is None else skills, objects, findings)
+    mission = _read(path, dict(settings or {}), SkillRegistry() if skills is None else skills, objects, findings)
     if mission is None or len(findings):
         raise MissionFaults(findings.errors, findings.warnings)
     return mission

@@ -13,9 +13,18 @@ class SkillParams(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def param(description: str, *, unit: str = "", names: str = "", default: Any = ..., **rules: Any) -> Any:
-    """One parameter: a description, its unit, a default (none: required) and pydantic rules (ge, le, gt, ...).
+def param(
+    description: str, *, unit: str = "", names: str = "", formerly: str = "", default: Any = ..., **rules: Any
+) -> Any:
+    """Return one parameter as a pydantic field.
 
-    `names="stl"`: its text is the path of an STL file or the name of one in the world's folder, which must be there.
+    Args:
+        description: One line for people.
+        unit: Its unit; empty: none.
+        names: "stl" if its text is the path of an STL file, or the name of one in the world's folder.
+        formerly: Its old name; a file that uses it still loads, with a warning.
+        default: Its default; none: it is required.
+        rules: Rules of pydantic (ge, le, gt, ...).
     """
-    return Field(default, description=description, json_schema_extra={"unit": unit, "names": names}, **rules)
+    extra = {"unit": unit, "names": names} | ({"formerly": formerly} if formerly else {})
+    return Field(default, description=description, json_schema_extra=extra, **rules)

@@ -54,7 +54,9 @@ class TouchNextParams(ClosureParams):
 
     target: str = param("The object to find: an STL file, or the name of one in the world's object folder", names="stl")
     confidence: float = param("Probability that is enough", default=0.95, gt=0.5, lt=1.0)
-    min_gain_nats: float = param("Expected gain below which no closure is worth it", default=0.005, ge=0.0)
+    min_gain_nats: float = param(
+        "Expected gain below which no closure is worth it", default=0.005, ge=0.0, formerly="least_gain_nats"
+    )
 
 
 class TouchNext(Skill):

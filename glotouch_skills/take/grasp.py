@@ -23,7 +23,9 @@ class GraspParams(SkillParams):
     descent_speed_m_s: float = param("Speed down beside the object", unit="m/s", default=0.010, gt=0.0, le=0.04)
     headroom_m: float = param("Fingertips above the floor on the way", unit="m", default=0.14, ge=0.05, le=0.25)
     side_gap_m: float = param("Least gap between open jaw and object", unit="m", default=0.005, ge=0.001, le=0.03)
-    min_aperture_m: float = param("Closed farther than this: nothing held", unit="m", default=0.003, ge=0.0)
+    min_aperture_m: float = param(
+        "Closed farther than this: nothing held", unit="m", default=0.003, ge=0.0, formerly="least_aperture_m"
+    )
 
 
 class Grasp(Skill):

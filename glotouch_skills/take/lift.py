@@ -15,8 +15,12 @@ class LiftParams(SkillParams):
 
     height_m: float = param("How far to lift", unit="m", default=0.15, gt=0.0, le=0.3)
     speed_m_s: float = param("Lifting speed", unit="m/s", default=0.06, gt=0.0, le=0.2)
-    min_weight_N: float = param("Less weight than this in the hand: nothing lifted", unit="N", default=0.3, ge=0.0)
-    min_aperture_m: float = param("Closed farther than this: it was lost", unit="m", default=0.003, ge=0.0)
+    min_weight_N: float = param(
+        "Less weight than this in the hand: nothing lifted", unit="N", default=0.3, ge=0.0, formerly="least_weight_N"
+    )
+    min_aperture_m: float = param(
+        "Closed farther than this: it was lost", unit="m", default=0.003, ge=0.0, formerly="least_aperture_m"
+    )
 
 
 class Lift(Skill):

@@ -30,7 +30,9 @@ class PutBackParams(SkillParams):
     lower_speed_m_s: float = param("Speed of setting down", unit="m/s", default=0.008, gt=0.0, le=0.04)
     drop_m: float = param("It may stand so far above its place when it is let go", unit="m", default=0.015, ge=0.0,
                           le=0.05)  # fmt: skip
-    min_aperture_m: float = param("Closed farther than this: nothing held", unit="m", default=0.003, ge=0.0)
+    min_aperture_m: float = param(
+        "Closed farther than this: nothing held", unit="m", default=0.003, ge=0.0, formerly="least_aperture_m"
+    )
 
 
 class PutBack(Skill):

@@ -17,7 +17,7 @@ from glotouch_bt.faults.plan import check_plan
 from glotouch_bt.faults.run_listener import ListeningRecord
 from glotouch_bt.mission.execution.runner import Outcome, run_mission
 from glotouch_bt.mission.load import load_mission
-from glotouch_bt.mission.read.library import SkillShelf, shipped_root
+from glotouch_bt.mission.read.library import SkillRegistry, shipped_root
 from glotouch_bt.mission.read.worlds import load_conditions
 from glotouch_bt.mission.read.yaml_source import parse_yaml
 from glotouch_bt.mission.record.run_summary import NullRecord
@@ -94,7 +94,7 @@ def run(tmp_path: Path) -> Run:
         file = tmp_path / "mission.yaml"
         body = "\n".join("  " + line for line in tree.replace("SUBTREES", str(SUBTREES)).strip("\n").splitlines())
         file.write_text(f"mission: trial\nworld: container_five\ntree:\n{body}\n")
-        mission = load_mission(file, skills={**SkillShelf(), **(stubs or {})}, objects=folder)
+        mission = load_mission(file, skills={**SkillRegistry(), **(stubs or {})}, objects=folder)
         plan = check_plan(parse_yaml(f"faults: trial\nplan:\n{faults}", "plan.yaml"), mission.spec, mission.name)
         backend = MujocoBackend()
         inner = backend.open(mission.world, load_conditions("nominal"), seed, {"layout": places})
@@ -204,7 +204,7 @@ sequence:
 
 def with_target(skill: type[Skill]) -> type[Skill]:
     """The same skill with the parameters of `match`."""
-    return type("Given", (skill,), {"Params": SkillShelf()["match"].Params})
+    return type("Given", (skill,), {"Params": SkillRegistry()["match"].Params})
 
 
 def test_what_is_gone_cannot_be_held_and_the_first_reason_is_kept(run: Run) -> None:

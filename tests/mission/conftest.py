@@ -12,7 +12,6 @@ import pytest
 
 from glotouch_bt.mission.load import Mission, load_mission
 from glotouch_bt.mission.nodes import NODES, register
-from glotouch_bt.mission.spec.findings import Finding, MissionFaults
 from glotouch_bt.mission.tree.build import BuiltTree, build_tree
 from glotouch_bt.robot import HOLD, Array, GripperState, Limits, Observation
 from glotouch_bt.robot.fake import FAKE_ARM
@@ -244,18 +243,3 @@ def built(load: Callable[..., Mission], robot: ClockRobot) -> Callable[[str], tu
 class _Journal:
     def event(self, kind: str, stamp_s: float, data: object) -> None:
         pass
-
-
-@pytest.fixture
-def found_in(tmp_path: Path) -> Callable[..., list[Finding]]:
-    """What reading a mission's text finds, its warnings too; keywords: settings."""
-
-    def found(text: str, **settings: str) -> list[Finding]:
-        path = tmp_path / "m.yaml"
-        path.write_text(text)
-        try:
-            return list(load_mission(path, settings).warnings)
-        except MissionFaults as e:
-            return [*e.findings, *e.warnings]
-
-    return found

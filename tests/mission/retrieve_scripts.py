@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from glotouch_bt.mission.read.library import SkillShelf
+from glotouch_bt.mission.read.library import SkillRegistry
 from glotouch_bt.mission_testing import ScriptedRun, ok, stand_in
 from glotouch_bt.perception.touch import Candidate
 
@@ -15,7 +15,7 @@ SWEEP, JAWS, TAKE = "*/explore/*", "*/squeeze_all/*", "*/take_target/*"
 IN_ORDER, GO_ON = "*/bring the probe in order/*", "*/go on with what was found/stow*"
 FELT, LAST_CHECK = "*/bring the probe in order/tool_check*", "*/with the probe/tool_check*"
 SAFE_END = "*/end safely/stow*"
-SHELF = SkillShelf()
+SHELF = SkillRegistry()
 
 Run = Callable[..., ScriptedRun]
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 import glotouch_bt.mission_testing.scripted  # noqa: F401  loaded before pytester, which unloads what it loads
-from glotouch_bt.mission.read.library import SkillShelf
+from glotouch_bt.mission.read.library import SkillRegistry
 
-dict(SkillShelf())
+dict(SkillRegistry())
 pytest_plugins = ["pytester"]
 
 MISSION = """

@@ -12,12 +12,12 @@ from typing import Any
 
 import pytest
 
-from glotouch_bt.mission.read.library import SkillShelf
+from glotouch_bt.mission.read.library import SkillRegistry
 from glotouch_bt.robot import HOLD
 from glotouch_bt.skill import UNCHANGED, Failure, Reason, Skill, SkillParams, SkillRun, UndeclaredFailure
 from glotouch_skills.recheck import Recheck
 
-SHELF = SkillShelf()
+SHELF = SkillRegistry()
 NAMES = sorted(n for n in SHELF if SHELF[n].__module__.startswith("glotouch_skills."))
 # What the base class adds to every skill, and what motions raise deep below (MotionRefused), are not looked for.
 NOT_SEARCHED = {"motion_refused", "not_at_rest"}

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from glotouch_bt.mission.read.library import SkillShelf
+from glotouch_bt.mission.read.library import SkillRegistry
 from glotouch_bt.perception.touch import Candidate, Contour
 from glotouch_bt.skill import SkillFailed
 from glotouch_skills.recheck import Recheck, _reach_m
@@ -52,10 +52,10 @@ def test_a_contact_on_the_outline_is_the_candidate_and_any_other_is_not() -> Non
 
 def test_every_skill_that_remembers_something_says_so_to_checkpoints() -> None:
     """An attribute of its own that is no port lives from one run of the skill to the next; `remember` must know it."""
-    shelf = SkillShelf()
+    registry = SkillRegistry()
     forgetful = []
-    for name in shelf:
-        skill = shelf[name]
+    for name in registry:
+        skill = registry[name]
         tree = ast.parse(Path(inspect.getsourcefile(skill) or "").read_text())
         (found,) = (n for n in ast.walk(tree) if isinstance(n, ast.ClassDef) and n.name == skill.__name__)
         stored = {

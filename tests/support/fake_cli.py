@@ -128,7 +128,7 @@ def install_fakes(patch: Any) -> None:
     import glotouch_bt.mission.load
     import glotouch_bt.motion
 
-    patch(glotouch_bt.mission.load, "SkillShelf", lambda: {"wait": Wait})
+    patch(glotouch_bt.mission.load, "SkillRegistry", lambda: {"wait": Wait})
     patch(importlib.import_module("glotouch_bt.runs.launch"), "load_backend", lambda name: NullBackend())
     patch(glotouch_bt.motion, "Arm", NullArm)
 

@@ -12,7 +12,7 @@ from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
 from glotouch_bt.bench.detection.signals import wrong
-from glotouch_bt.mission.read import SkillShelf, load_conditions, load_world
+from glotouch_bt.mission.read import SkillRegistry, load_conditions, load_world
 from glotouch_bt.motion import Arm, Motion
 from glotouch_bt.perception.touch import GuardParams, Payload
 from glotouch_bt.robot import HOLD, Array, BadInput, MotionRefused, Observation, Robot, load_backend
@@ -84,7 +84,7 @@ class SimulatedProbe:
         """Discard the event."""
 
     def _pick_up(self) -> HeldTool:
-        pickup = SkillShelf()["tool_pickup"]
+        pickup = SkillRegistry()["tool_pickup"]
         skill = pickup("pickup", pickup.Params(), self.context)
         keys = {port: f"/detection/{id(self)}/{key}" for port, key in pickup.default_keys().items()}
         skill.setup_ports(keys)

@@ -8,7 +8,7 @@ from typing import Any
 
 from glotouch_bt.bench.planar.drive import drive
 from glotouch_bt.bench.planar.world import PlanarWorld
-from glotouch_bt.mission.read import SkillShelf
+from glotouch_bt.mission.read import SkillRegistry
 from glotouch_bt.perception.search import (
     Move,
     MoveOutcome,
@@ -85,7 +85,7 @@ class _Budget:
 @cache
 def _defaults(skill: str) -> Any:
     """Return the default parameters of an installed skill."""
-    return SkillShelf()[skill].Params()
+    return SkillRegistry()[skill].Params()
 
 
 def explore(

@@ -33,12 +33,20 @@ def print_findings(findings: Iterable[Finding], lines: dict[str, list[str]]) -> 
             head.append("; did you mean ").append(repr(finding.hint), style="bold green").append("?")
         head.append(f" [{finding.code}]", style="dim")
         text = lines.get(place.file, [])
+        if finding.kind.brief:
+            console.print(head)
+            continue
         if 0 < place.line <= len(text):
             quoted = text[place.line - 1].rstrip()
             shift = len(quoted) - len(quoted.lstrip())
             head.append(f"\n  {place.line:5d} | ", style="dim").append(quoted[shift:])
             head.append("\n        | ", style="dim").append(" " * (place.column - 1 - shift) + "^", style=colour)
-        for word, said in (("why", finding.why), ("path", path_in_words(finding.path)), ("valid", finding.valid)):
+        for word, said in (
+            ("why", finding.kind.why),
+            ("path", path_in_words(finding.path)),
+            ("valid", finding.valid),
+            ("fix", finding.kind.advice),
+        ):
             if said:
                 head.append(f"\n  {word:>5}   ", style="dim").append(said)
         console.print(head, "", sep="\n")

@@ -37,7 +37,9 @@ class ShortParams(FaultParams):
     """Parameters of `grip_short`."""
 
     short_m: float = param("The jaws stop so far before what they are told", unit="m", default=0.004, gt=0.0, le=0.08)
-    min_m: float = param("and never close farther than this", unit="m", default=0.0, ge=0.0, le=0.08)
+    min_m: float = param(
+        "and never close farther than this", unit="m", default=0.0, ge=0.0, le=0.08, formerly="least_m"
+    )
 
 
 class Short(Effect):

@@ -62,12 +62,14 @@ class _Judge:
         self._variables, self._sets = exact.variables, exact.variables.sets
         self._writers = _writers(exact.tree, exact.variables)
         self._paths, self._budget = 0, StepBudget()
+        self._unwritten: dict[str, list[Requirement]] = {}  # optional inputs, by the name of their key
 
     def all(self, leaves: Mapping[str, tuple[frozenset[str], Place]]) -> None:
         for node in self._exact.tree.walk():
             for requirement in self._exact.requirements[id(node)]:
                 self._demand(requirement)
             self._ordered_by(node)
+        self._never_written_inputs()
         self._unreachable(self._exact.tree)
         self._end(leaves)
 
@@ -86,6 +88,9 @@ class _Judge:
             if bad := found - requirement.good:
                 self._wrong_state(flow, requirement, bad, always=not found & requirement.good)
             return
+        optional = requirement.unset == "allowed" and requirement.node.skill_type is not None
+        if optional and not self._exact.has_unknown and not self._writers.get(requirement.key):
+            self._unwritten.setdefault(requirement.key.rpartition("/")[2], []).append(requirement)
         if self._never_written(requirement, found):
             self._unset(flow, requirement, asked)
         elif UNSET in found and UNSET not in requirement.good:
@@ -100,6 +105,14 @@ class _Judge:
             )
         for kind, values in alike.items():
             self._wrong_kind(flow, requirement, kind, values)
+
+    def _never_written_inputs(self) -> None:
+        """Report optional inputs that no node writes, once for each name of a key."""
+        for name, requirements in self._unwritten.items():
+            readers = " and ".join(dict.fromkeys(repr(r.node.skill) for r in requirements))
+            what = f"no node writes {name!r}, an optional input of {readers}"
+            node = requirements[0].node
+            self._findings.add(requirements[0].place, "input_never_written", what, node=node.name)
 
     def _never_written(self, requirement: Requirement, found: frozenset[int]) -> bool:
         if requirement.unset == "allowed":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from glotouch_bt.mission.read import RESUME_CHECK_GROUP, SkillShelf
+from glotouch_bt.mission.read import RESUME_CHECK_GROUP, SkillRegistry
 from glotouch_bt.mission.tree import BuiltTree
 from glotouch_bt.robot import GlotouchError
 from glotouch_bt.skill import Context, Reason, Skill
@@ -23,7 +23,7 @@ def world_check(tree: BuiltTree, context: Context, start: str = "") -> Skill | N
     check touches no candidate (they may have moved, which may be why), and the preconditions of that node's first skill
     say whether the probe may have been put back.
     """
-    installed = SkillShelf(RESUME_CHECK_GROUP)
+    installed = SkillRegistry(RESUME_CHECK_GROUP)
     name = min(installed, default="")
     if not name:
         text = f"no skill is installed under {RESUME_CHECK_GROUP}: the mission goes on without checking its world"

@@ -34,6 +34,7 @@ from glotouch_bt.mission.nodes.base import (
     wire_setting,
 )
 from glotouch_bt.mission.spec import Map, NodeSpec, Scalar, Settings
+from glotouch_bt.skill import param
 
 Pairs = Mapping[str, tuple[str, str]]
 """Source key and target key of each port that gathers."""
@@ -46,7 +47,9 @@ class ForEachSettings(Settings):
     item: str = Field(description="key each item is written to")
     collect: dict[str, str] = Field(default_factory=dict, description="child's key: key of the tuple it is gathered in")
     on_failure: Literal["continue", "stop"] = Field(default="stop", description="what a failing item does")
-    least_first: str | None = Field(default=None, description="field of the items: those with the least of it first")
+    order_by: str | None = param(
+        "field of the items: those with the least of it first", default=None, formerly="least_first"
+    )
 
 
 class ForEach(MissionDecorator):
@@ -55,7 +58,7 @@ class ForEach(MissionDecorator):
     SUCCESS: every item succeeded (`on_failure: stop`), or at least one did (`continue`), or there is no item.
     FAILURE: the items are not written; an item failed (`stop`); no item succeeded (`continue`).
     The gathered tuples hold one value per item that succeeded, in the items' order, and are written in each case. With
-    `least_first` the items are taken in rising order of that field. `collect` maps a key that the child writes to the
+    `order_by` the items are taken in rising order of that field. `collect` maps a key that the child writes to the
     key of its tuple.
     """
 
@@ -94,7 +97,7 @@ class ForEach(MissionDecorator):
         items = self._keys.get(self._items_key)
         self._items = tuple(items) if items is not None else ()
         self._order = list(range(len(self._items)))
-        if (field := self._settings.least_first) is not None:
+        if (field := self._settings.order_by) is not None:
             self._order.sort(key=lambda i: getattr(self._items[i], field))
         if items is None:
             self.fail("no_items", f"{self._items_key!r} has not been written")
@@ -326,8 +329,8 @@ class ForEachKind(NodeKind):
         return below if node.settings is None else below.per_item()
 
     def ordered_by(self, node: NodeSpec) -> tuple[str, str] | None:
-        """Return the items' key and `least_first`."""
-        field = node.settings.least_first if isinstance(node.settings, ForEachSettings) else None
+        """Return the items' key and `order_by`."""
+        field = node.settings.order_by if isinstance(node.settings, ForEachSettings) else None
         return (node.reads["items"].key, field) if field is not None and "items" in node.reads else None
 
     def loses_gathered(self, node: NodeSpec) -> bool:

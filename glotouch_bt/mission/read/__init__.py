@@ -1,7 +1,14 @@
 """TODO door of glotouch_bt/mission/read."""
 
 from glotouch_bt.mission.read.fields import unit_of, validate
-from glotouch_bt.mission.read.library import RESUME_CHECK_GROUP, SkillShelf, find_shipped, shipped, shipped_root, shown
+from glotouch_bt.mission.read.library import (
+    RESUME_CHECK_GROUP,
+    SkillRegistry,
+    find_shipped,
+    shipped,
+    shipped_root,
+    shown,
+)
 from glotouch_bt.mission.read.parameters import (
     Declaration,
     Parameter,
@@ -24,7 +31,7 @@ __all__ = [
     "Parameter",
     "Reading",
     "Scope",
-    "SkillShelf",
+    "SkillRegistry",
     "Value",
     "WorldFile",
     "check_used",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import operator
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType, UnionType
 from typing import Any, TypeVar, Union, get_args, get_origin
 
@@ -53,16 +54,16 @@ POISON = Poison()
 
 
 def unit_of(field: FieldInfo) -> str:
-    """The unit a parameter declares, or empty."""
-    return _said_of(field, "unit")
+    """Return the unit that a parameter declares, or empty."""
+    return _extra(field, "unit")
 
 
 def named_by(field: FieldInfo) -> str:
-    """What a text parameter names (`stl`), or empty."""
-    return _said_of(field, "names")
+    """Return the kind of thing that a text parameter names (`stl`), or empty."""
+    return _extra(field, "names")
 
 
-def _said_of(field: FieldInfo, word: str) -> str:
+def _extra(field: FieldInfo, word: str) -> str:
     extra = field.json_schema_extra
     return str(extra.get(word, "")) if isinstance(extra, dict) else ""
 
@@ -86,6 +87,7 @@ def validate(
         where: Place of missing keys (default: the mapping).
         beside: Names that belong to what is filled as well, and where they are written; empty: here.
     """
+    given = _with_new_names(model, given, what, findings)
     values: dict[str, Any] = {}
     poisoned: set[str] = set()
     known = True
@@ -119,6 +121,19 @@ def validate(
         if isinstance(node, Scalar) and node.span is not None and str(key.value) in model.model_fields:
             _check_span(node, str(key.value), model.model_fields[str(key.value)], findings)
     return made if known and not poisoned else None
+
+
+def _with_new_names(model: type[BaseModel], given: Map, what: str, findings: Findings) -> Map:
+    """Replace the old names of parameters (`param(formerly=...)`), with a warning; a new name beside it wins."""
+    renamed = {old: n for n, field in model.model_fields.items() if (old := _extra(field, "formerly"))}
+    entries: list[tuple[Scalar, Node]] = []
+    for key, node in given.entries:
+        new = renamed.get(str(key.value), "")
+        if new and new not in given:
+            findings.add(key.place, "renamed", f"{key.value!r} of {what} is now called {new!r}")
+            key = replace(key, value=new)
+        entries.append((key, node))
+    return replace(given, entries=tuple(entries))
 
 
 def _check_span(node: Scalar, name: str, field: FieldInfo, findings: Findings) -> None:

@@ -56,7 +56,7 @@ def shown(path: Path) -> str:
         return str(path)
 
 
-class SkillShelf(Mapping[str, type[Skill]]):
+class SkillRegistry(Mapping[str, type[Skill]]):
     """Installed skills by name; a skill's module is imported when first asked for.
 
     Args:

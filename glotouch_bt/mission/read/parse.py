@@ -68,14 +68,29 @@ def _named(name: str, place: Place, body: Node, scope: Scope) -> NodeSpec:
     if name not in scope.skills:
         also = {kind.btcpp: name for name, kind in NODES.items() if kind.btcpp}
         known = scope.findings.unknown(place, "unknown_skill", "skill or node", name, [*NODES, *scope.skills], also)
-        if known not in scope.skills:
-            return NodeSpec("unknown", name, place)
+        if known in NODES and _holds_children(body) == (NODES[known].children != "none"):
+            return NODES[known].read(_Reader(scope), place, body)
+        if known not in scope.skills or _holds_children(body):
+            return NodeSpec("unknown", name, place, _children_of_unknown(body, scope))
     try:
         skill = scope.skills[known]
     except BadInput as e:
         scope.findings.add(place, "unusable_skill", str(e))
         return NodeSpec("unknown", name, place)
     return _skill(known, skill, place, body, scope)
+
+
+def _holds_children(body: Node) -> bool:
+    """Return True if nodes stand below a name: a list, or a mapping with `do`."""
+    return isinstance(body, Seq) or (isinstance(body, Map) and "do" in body)
+
+
+def _children_of_unknown(body: Node, scope: Scope) -> tuple[NodeSpec, ...]:
+    """Read the nodes below an unknown name, so that it hides none of their mistakes."""
+    below = body.get("do") if isinstance(body, Map) else body
+    if isinstance(below, Seq):
+        return tuple(parse_tree(i, scope) for i in below.items)
+    return (parse_tree(below, scope),) if isinstance(below, Map) else ()
 
 
 def _settings_map(name: str, place: Place, body: Node, scope: Scope) -> Map:

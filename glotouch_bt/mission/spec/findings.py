@@ -1,4 +1,4 @@
-"""What a check found: every fault with its place, gathered and reported together."""
+"""The findings of a check: every fault and warning with its place, gathered and reported together."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from dataclasses import asdict, dataclass
 from types import MappingProxyType
 from typing import Literal
 
-from glotouch_bt.mission.spec.explanations import WARNINGS, WHY
+from glotouch_bt.mission.spec.finding_kinds import FINDING_KINDS, FindingKind
 from glotouch_bt.mission.spec.source import Place
 from glotouch_bt.robot import BadInput
 
 
 @dataclass(frozen=True, order=True)
 class Finding:
-    """One fault.
+    """One fault or warning.
 
     Attributes:
         place: Where it stands.
-        code: Short stable word, for programs (``unknown_skill``, ``port_unset`` ...).
+        code: Short stable word, for programs (``unknown_skill``, ``port_unset`` ...); a key of `FINDING_KINDS`.
         what: What is wrong, for a person.
         valid: What would be right, or empty.
         hint: The nearest valid name, or empty.
-        path: Outcomes of leaves on the shortest run that shows it, the node it is about last; empty: no run is needed.
+        path: Outcomes of leaves on the shortest run that shows it, then the node it is about; empty: no run is needed.
         node: Name of the node it is about, or empty.
     """
 
@@ -36,15 +36,19 @@ class Finding:
     path: tuple[str, ...] = ()
     node: str = ""
 
-    @property
-    def severity(self) -> Literal["error", "warning"]:
-        """A warning leaves the mission as it is: it may be meant so."""
-        return "warning" if self.code in WARNINGS else "error"
+    def __post_init__(self) -> None:
+        if self.code not in FINDING_KINDS:
+            raise ValueError(f"finding {self.code!r} is not declared in mission/spec/finding_kinds.py")
 
     @property
-    def why(self) -> str:
-        """Why it matters, or empty."""
-        return WHY.get(self.code, "")
+    def kind(self) -> FindingKind:
+        """Its declaration."""
+        return FINDING_KINDS[self.code]
+
+    @property
+    def severity(self) -> Literal["error", "warning"]:
+        """A mission with an error is not run; a warning may be intended."""
+        return self.kind.severity
 
     def __str__(self) -> str:
         hint = f"; did you mean {self.hint!r}?" if self.hint else ""
@@ -53,13 +57,14 @@ class Finding:
         return f"{self.place}: {self.what}{hint}{valid}{path}"
 
     def as_dict(self) -> dict[str, object]:
-        """For --json."""
+        """Return it as plain data, for --json."""
         return {
             **asdict(self.place),
             "severity": self.severity,
             "code": self.code,
             "what": self.what,
-            "why": self.why,
+            "why": self.kind.why,
+            "advice": self.kind.advice,
             "valid": self.valid,
             "hint": self.hint,
             "path": list(self.path),
@@ -71,7 +76,7 @@ NO_NAMES: Mapping[str, str] = MappingProxyType({})
 
 
 class Findings:
-    """A growing, duplicate-free list of faults."""
+    """A growing list of findings without duplicates."""
 
     def __init__(self) -> None:
         self._found: dict[Finding, None] = {}
@@ -87,56 +92,60 @@ class Findings:
         path: tuple[str, ...] = (),
         node: str = "",
     ) -> None:
-        """Note one fault."""
+        """Note one finding; the arguments are the fields of `Finding`.
+
+        Raises:
+            ValueError: The code is not declared.
+        """
         self._found[Finding(place, code, what, valid, hint, path, node)] = None
 
     @staticmethod
     def nearest(name: str, valid: Iterable[str]) -> str:
-        """The valid name that is most like another, or empty."""
+        """Return the valid name that is most like another name, or empty."""
         plain = {_plain(v): v for v in sorted(valid, reverse=True)}
         near = difflib.get_close_matches(_plain(name), sorted(plain), n=1)
         return plain[near[0]] if near else ""
 
     @staticmethod
     def near(name: str, valid: Iterable[str], most: int = 12) -> list[str]:
-        """The valid names, if they are many those that are most like another, in order of the alphabet."""
+        """Return the valid names in alphabetical order; of more than `most`, those that are most like `name`."""
         names = sorted(valid)
         return names if len(names) <= most else sorted(difflib.get_close_matches(name, names, n=most, cutoff=0.0))
 
     def unknown(
         self, place: Place, code: str, kind: str, name: str, valid: Iterable[str], also: Mapping[str, str] = NO_NAMES
     ) -> str:
-        """Note a name nobody knows; returns the nearest valid one or an empty string.
+        """Note an unknown name; return the nearest valid one or an empty string.
 
-        `also`: what others call some of the valid ones.
+        `also`: other words for some of the valid names.
         """
         names = sorted(valid)
         nearest = self.nearest(name, [*names, *also])
         hint = also.get(nearest, nearest)
-        self._found[Finding(place, code, f"unknown {kind} {name!r}", ", ".join(names) or "none", hint)] = None
+        self.add(place, code, f"unknown {kind} {name!r}", valid=", ".join(names) or "none", hint=hint)
         return hint
 
     def sorted(self) -> list[Finding]:
-        """All faults and warnings by file, line and column."""
+        """Return all findings by file, line and column."""
         return sorted(self._found)
 
     @property
     def errors(self) -> list[Finding]:
-        """The faults, by place."""
+        """The errors, by place."""
         return [f for f in self.sorted() if f.severity == "error"]
 
     @property
     def warnings(self) -> list[Finding]:
-        """What may be meant as it is, by place."""
+        """The warnings, by place."""
         return [f for f in self.sorted() if f.severity == "warning"]
 
     def __len__(self) -> int:
-        """How many faults."""
+        """Return the number of errors."""
         return sum(f.severity == "error" for f in self._found)
 
 
 def _plain(name: str) -> str:
-    """A name without what is easily mistaken: capitals and separators."""
+    """Return a name without capitals and separators, which are easily mistaken."""
     return re.sub("[-_ .]", "", name).lower() or name
 
 
@@ -144,8 +153,8 @@ class MissionFaults(BadInput):
     """Everything that is wrong with a mission, in one report.
 
     Attributes:
-        findings: All faults, sorted by place.
-        warnings: What may be meant as it is.
+        findings: All errors, by place.
+        warnings: All warnings, by place.
     """
 
     def __init__(self, findings: list[Finding], warnings: Sequence[Finding] = ()) -> None:

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
 from glotouch_bt.faults import CATALOGUE
-from glotouch_bt.mission.read import SkillShelf, read_yaml, shipped, shipped_root
+from glotouch_bt.mission.read import SkillRegistry, read_yaml, shipped, shipped_root
 from glotouch_bt.mission.spec import plain
 from glotouch_bt.skill import Skill
 
@@ -39,8 +39,8 @@ class Grown:
 @lru_cache(maxsize=1)
 def skills() -> Mapping[str, type[Skill]]:
     """Return every installed skill that can be imported."""
-    shelf = SkillShelf()
-    return {name: shelf[name] for name in shelf}
+    registry = SkillRegistry()
+    return {name: registry[name] for name in registry}
 
 
 @lru_cache(maxsize=1)

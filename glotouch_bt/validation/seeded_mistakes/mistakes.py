@@ -37,7 +37,7 @@ tree:
     - for_each:
         name: measure
         items: candidates
-        least_first: quality
+        order_by: quality
         item: candidate
         collect: {measured: candidates}
         do:
@@ -114,8 +114,8 @@ MISTAKES = (
     M("the plan is not sure", "    - match: {target: $target}\n", "    - succeed: {match: {target: $target}}\n", "port_maybe_unset", "- grasp", "'plan'"),
     M("grasped before matched", "    - match: {target: $target}\n    - grasp\n", "    - grasp\n    - match: {target: $target}\n", "port_unset", "- grasp", "later"),
     M("gathers what nobody writes", "{touchset: touchsets}", "{touch_set: touchsets}", "port_unset", "touch_set:", "touch_set"),
-    M("loops over what is no list", "        items: candidates\n        least_first: quality\n", "        items: tool\n", "port_type", "items: tool", "as tuple"),
-    M("sorts by a field that is not there", "    - for_each:\n        name: measure\n        items: candidates\n        least_first: quality\n", "    - for_each:  # by size\n        name: measure\n        items: candidates\n        least_first: qality\n", "unknown_field", "# by size", "'quality'"),
+    M("loops over what is no list", "        items: candidates\n        order_by: quality\n", "        items: tool\n", "port_type", "items: tool", "as tuple"),
+    M("sorts by a field that is not there", "    - for_each:\n        name: measure\n        items: candidates\n        order_by: quality\n", "    - for_each:  # by size\n        name: measure\n        items: candidates\n        order_by: qality\n", "unknown_field", "# by size", "'quality'"),
     M("a candidate where a plan is wanted", "    - grasp\n", "    - grasp: {in: {plan: ranking}}\n", "port_type", "plan: ranking", "GraspPlan"),
     M("a weight where a width is wanted", "    - lift\n", "    - lift\n    - lift: {in: {grip_m: weight}}\n", "port_unit", "grip_m: weight", "in N"),
     M("waits for a number", "until: complete", "until: found", "port_type", "until: found", "as bool"),

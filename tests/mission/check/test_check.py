@@ -49,7 +49,7 @@ MISTAKES: list[tuple[str, str, list[tuple[int, int, str, str]]]] = [
     ("not a key", HEAD + "tree:\n  find: {out: {found: /n}}\n", [(4, 23, "wrong_key", "'/n'")]),
     ("for_each over a number", HEAD + "tree:\n  - find\n  - for_each: {items: found, item: item, do: act}\n", [(5, 23, "port_type", "as tuple")]),
     ("collects what nobody writes", HEAD + "tree:\n  - find\n  - for_each: {items: items, item: item, collect: {mrk: marks}, do: act}\n", [(5, 52, "port_unset", "mrk")]),
-    ("for_each by an unknown field", HEAD + "tree:\n  - find\n  - for_each: {items: items, item: item, least_first: sise, do: act}\n", [(5, 5, "unknown_field", "of Item")]),
+    ("for_each by an unknown field", HEAD + "tree:\n  - find\n  - for_each: {items: items, item: item, order_by: sise, do: act}\n", [(5, 5, "unknown_field", "of Item")]),
     ("until of a number", HEAD + "tree:\n  repeat: {until: found, do: find}\n", [(4, 19, "port_type", "as bool")]),
     ("repeat without an end", HEAD + "tree:\n  repeat: {do: find}\n", [(4, 3, "wrong_value", "either times or until")]),
     ("two comparisons", HEAD + "tree:\n  - find\n  - condition: {port: found, at_least: 1, at_most: 2}\n", [(5, 5, "wrong_value", "exactly one")]),
@@ -145,18 +145,18 @@ def test_set_overrides_are_typed_and_ranged(load: Callable[..., Any]) -> None:
 def test_objects_folder_replaces_the_world_s(tmp_path: Path, registry: dict[str, Any]) -> None:
     path = tmp_path / "m.yaml"
     path.write_text(HEAD + "parameters:\n  t: {type: stl, default: wukong}\ntree: find\n")
-    shelf = tmp_path / "stl"
-    shelf.mkdir()
+    folder = tmp_path / "stl"
+    folder.mkdir()
     with pytest.raises(BadInput, match=r"--objects .*: is not a folder with \.stl"):
-        load_mission(path, skills=registry, objects=shelf)
-    (shelf / "cup.stl").write_bytes((shipped_root() / "objects" / "apple.stl").read_bytes())
-    (shelf / "flat.stl").write_bytes(b"solid\nendsolid\n")
+        load_mission(path, skills=registry, objects=folder)
+    (folder / "cup.stl").write_bytes((shipped_root() / "objects" / "apple.stl").read_bytes())
+    (folder / "flat.stl").write_bytes(b"solid\nendsolid\n")
     with pytest.raises(BadInput, match=r"unknown object .*wukong.*valid: cup"):
-        load_mission(path, skills=registry, objects=shelf)
+        load_mission(path, skills=registry, objects=folder)
     with pytest.raises(BadInput, match=r"--set t: .*flat.stl: "):
-        load_mission(path, {"t": "flat"}, skills=registry, objects=shelf)
-    mission = load_mission(path, {"t": "cup"}, skills=registry, objects=shelf)
-    assert mission.world.objects.folder == shelf
+        load_mission(path, {"t": "flat"}, skills=registry, objects=folder)
+    mission = load_mission(path, {"t": "cup"}, skills=registry, objects=folder)
+    assert mission.world.objects.folder == folder
 
 
 def test_a_subtree_keeps_its_keys_to_itself(tmp_path: Path, registry: dict[str, Any]) -> None:

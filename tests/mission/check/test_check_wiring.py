@@ -24,9 +24,9 @@ MISTAKES = [
     ("{touchset: touchsets}", "{touchset: touchsets, candidate: touchsets}", "written_twice", "'touchsets'"),
     ("{touchset: touchsets}", "{touchset: candidate}", "written_twice", "'candidate'"),
     ("{touchset: touchsets}", "{touchset: touch_sets}", "unused_key", "nobody writes 'touchsets'"),
-    ("least_first: quality", "least_first: contour", "unknown_field", "'contour'"),
-    ("least_first: quality", "least_first: extent_K_m", "unknown_field", "'extent_K_m'"),
-    ("least_first: quality", "least_first: span_m", "unknown_field", "'span_m'"),
+    ("order_by: quality", "order_by: contour", "unknown_field", "'contour'"),
+    ("order_by: quality", "order_by: extent_K_m", "unknown_field", "'extent_K_m'"),
+    ("order_by: quality", "order_by: span_m", "unknown_field", "'span_m'"),
     ("{hand: object}", "{hand: objct}", "unknown_state", "state of the hand: 'objct'"),
     ("{hand: object}", "{hand: [object, emtpy]}", "unknown_state", "state of the hand: 'emtpy'"),
 ]  # fmt: skip
@@ -42,7 +42,7 @@ def test_a_wrong_wire(old: str, new: str, code: str, words: str, found_in: Found
 
 @pytest.mark.parametrize("field", ["quality", "height_m", "index"])
 def test_what_can_be_put_in_order(field: str, found_in: Found) -> None:
-    assert found_in(MISSION.replace("least_first: quality", f"least_first: {field}")) == []
+    assert found_in(MISSION.replace("order_by: quality", f"order_by: {field}")) == []
 
 
 def test_a_key_that_a_subtree_keeps_to_itself(found_in: Found) -> None:

@@ -162,7 +162,7 @@ def test_for_each_takes_the_least_first_and_gathers_in_order() -> None:
             keys.set("mark", item.imag)
             return Status.FAILURE if item.real == 0.2 else Status.SUCCESS
 
-    settings = ForEachSettings(items="items", item="item", on_failure="continue", least_first="real")
+    settings = ForEachSettings(items="items", item="item", on_failure="continue", order_by="real")
     made = ForEach("each", Child("child"), keys, "items", "item", {"mark": "marks"}, settings)
     while made.status not in (Status.SUCCESS, Status.FAILURE):
         made.tick_once()
