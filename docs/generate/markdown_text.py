@@ -43,6 +43,7 @@ def codes(values: Iterable[object]) -> str:
 def prose(text: str) -> str:
     """Return a docstring as Markdown: sections become bold words, double backquotes single ones."""
     text = inspect.cleandoc(text).replace("``", "`")
+    text = re.sub(r"\n(SUCCESS|FAILURE)\b", r"\n\n\1", text)
     return re.sub(r"^(Args|Raises|Returns|Attributes|Yields):$", r"\n**\1**\n", text, flags=re.MULTILINE)
 
 
@@ -50,7 +51,8 @@ def type_name(kind: Any) -> str:
     """Return a type as a reader writes it."""
     text = kind.__name__ if inspect.isclass(kind) and not getattr(kind, "__args__", ()) else str(kind)
     text = re.sub(r"typing\.Literal\[(.*)\]", lambda m: m[1].replace("'", "").replace(", ", " or "), text)
-    return re.sub(r"\b(?:[a-z_]\w*\.)+(?=[A-Z])", "", text).replace("typing.", "")
+    text = re.sub(r"\b(?:[a-z_]\w*\.)+(?=[A-Z])", "", text).replace("typing.", "")
+    return text.replace(" | None", "").replace(" | ", " or ")
 
 
 def default_of(field: Any) -> str:

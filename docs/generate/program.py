@@ -67,7 +67,7 @@ def _anchor(name: str) -> str:
 
 
 def _argument(p: Any) -> str:
-    name = p.metavar or p.name.upper()
+    name = (p.metavar or p.name.upper()).rstrip(".")
     return f"{name}{'...' if p.nargs == -1 else ''}" if p.required else f"[{name}{'...' if p.nargs == -1 else ''}]"
 
 

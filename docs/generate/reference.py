@@ -15,12 +15,20 @@ from mcap.reader import make_reader
 from pydantic import BaseModel
 
 from glotouch_bt.faults import CATALOGUE
-from glotouch_bt.mission.export import describe_skill, mission_schema
-from glotouch_bt.mission.nodes import NODES
-from glotouch_bt.mission.read import Declaration, SkillRegistry, WorldFile, shipped
+from glotouch_bt.mission.export import describe_nodes, describe_skill, mission_schema
+from glotouch_bt.mission.read import Declaration, SkillShelf, WorldFile, shipped
 from glotouch_bt.mission.record import Recorder
 from glotouch_bt.mission.record.mcap_schemas import CHANNELS as CHANNELS_OF_RECORD
-from glotouch_bt.mission.spec import UNITS, describe_findings
+from glotouch_bt.mission.spec import UNITS
+
+try:
+    from glotouch_bt.mission.spec import describe_findings
+except ImportError:
+    from glotouch_bt.mission.spec.explanations import WARNINGS, WHY
+
+    def describe_findings():
+        return [{"code": c, "meaning": "", "why": w, "advice": "", "severity": "warning" if c in WARNINGS else "error"} for c, w in WHY.items()]
+
 from glotouch_bt.robot import HOLD, FakeRobot
 
 MISSION = """# Mission files
@@ -139,17 +147,13 @@ def pages() -> dict[str, str]:
 
 def _own_skills() -> list[dict[str, Any]]:
     """Descriptions of the skills that ship with the project."""
-    registry = SkillRegistry()
-    return [
-        describe_skill(n, registry[n])
-        for n in sorted(registry)
-        if registry[n].__module__.startswith("glotouch_skills.")
-    ]
+    shelf = SkillShelf()
+    return [describe_skill(n, shelf[n]) for n in sorted(shelf) if shelf[n].__module__.startswith("glotouch_skills.")]
 
 
 def missions() -> str:
     """Return the page on mission files."""
-    schema = mission_schema(SkillRegistry())
+    schema = mission_schema(SkillShelf())
     meaning = {
         "mission": "name: letters, digits, `_` and `-`",
         "description": "one sentence for people",
@@ -188,14 +192,23 @@ def missions() -> str:
 
 def nodes() -> str:
     """Return the page on node kinds."""
-    text = ["# Nodes\n", "A mission's tree is built from these nodes and from [skills](skills.md).\n"]
+    found = [n for n in describe_nodes() if n["description"]]
     children = {"none": "none", "one": "one, `do:`", "many": "a list"}
-    rows = [(f"[`{n}`](#{n})", k.description, children[k.children], k.btcpp) for n, k in NODES.items()]
+    rows = [(f"[`{n['name']}`](#{n['name']})", n["description"], children[n["children"]], n["btcpp"]) for n in found]
+    text = ["# Nodes\n", "A mission's tree is built from these nodes and from [skills](skills.md).\n"]
     text.append(table(("node", "result", "children", "BehaviorTree.CPP"), rows))
-    for name, kind in NODES.items():
-        text.append(f"## {name}\n\n{kind.description[0].upper()}{kind.description[1:]}.\n")
-        text.append(fields(kind.Settings) or "No settings.\n")
+    for n in found:
+        text.append(f"## {n['name']}\n\n{n['description'][0].upper()}{n['description'][1:]}.\n")
+        text.append(_parameters(n["settings"], "setting") or "No settings.\n")
     return "\n".join(text)
+
+
+def _parameters(found: list[dict[str, Any]], title: str) -> str:
+    """Return a table of parameters or settings."""
+    rows = [
+        (code(p["name"]), p["type"], p["unit"], _default(p), p["range"], p["description"]) for p in found
+    ]
+    return table((title, "type", "unit", "default", "valid", "meaning"), rows)
 
 
 def skills() -> str:
@@ -206,10 +219,7 @@ def skills() -> str:
     text = ["# Skills\n", intro, table(("skill", "what it does"), first)]
     for s in found:
         text.append(f"## {s['name']}\n\n{prose(s['description'])}\n")
-        rows = [
-            (code(p["name"]), p["type"], p["unit"], _default(p), p["range"], p["description"]) for p in s["parameters"]
-        ]
-        text.append(table(("parameter", "type", "unit", "default", "valid", "meaning"), rows))
+        text.append(_parameters(s["parameters"], "parameter"))
         ports = [
             (code(p["name"]), way, p["type"], "yes" if p.get("required") else "", p["description"])
             for way, many in (("in", s["inputs"]), ("out", s["outputs"]))
@@ -236,7 +246,8 @@ def _failures(found: Any) -> str:
 def _default(p: dict[str, Any]) -> str:
     if p["required"]:
         return "required"
-    return code(f"{p['default']:g}" if isinstance(p["default"], float) else p["default"])
+    value = p["default"]
+    return code(f"{value:g}" if isinstance(value, float) else "" if value in ({}, ()) else value)
 
 
 def worlds() -> str:
@@ -284,24 +295,27 @@ def faults() -> str:
     ]
     for channel in dict.fromkeys(k.channel for k in CATALOGUE.values()):
         kinds = [k for k in CATALOGUE.values() if k.channel == channel]
-        rows = [(f"[`{k.name}`](#{k.name})", k.summary, k.seen_by, "yes" if k.recoverable else "no") for k in kinds]
-        text.append(f"## {channel}\n\n" + table(("fault", "effect", "should be noticed by", "recoverable"), rows))
+        names = (f"[`{k.name}`](#{k.name})" if k.parameters() else code(k.name) for k in kinds)
+        summary = [
+            (name, k.summary, k.seen_by, "yes" if k.recoverable else "no") for name, k in zip(names, kinds, strict=True)
+        ]
+        text.append(f"## {channel}\n\n" + table(("fault", "effect", "should be noticed by", "recoverable"), summary))
         for k in kinds:
-            given = [
-                (code(p["name"]), p["unit"], code(p["default"]), p["valid"], p["description"]) for p in k.parameters()
-            ]
-            parameters = table(("parameter", "unit", "default", "valid", "meaning"), given) or "No parameters.\n"
-            text.append(f"### {k.name}\n\n{parameters}")
+            if given := k.parameters():
+                rows = [(code(p["name"]), p["unit"], code(p["default"]), p["valid"], p["description"]) for p in given]
+                text.append(f"### {k.name}\n\n" + table(("parameter", "unit", "default", "valid", "meaning"), rows))
     return "\n".join(text)
 
 
 def findings() -> str:
     """Return the page on the findings of `glotouch check`."""
-    names = ("severity", "meaning", "why", "advice")
-    rows = [(code(f["code"]), *(str(f[n]) for n in names)) for f in describe_findings()]
-    return "# Findings of `glotouch check`\n\n" + table(
-        ("code", "severity", "meaning", "why it matters", "advice"), rows
-    )
+    found = sorted(describe_findings(), key=lambda f: (f["severity"], f["code"]))
+    text = ["# Findings of `glotouch check`\n"]
+    for severity, meaning in (("error", "`run` refuses a mission with errors."), ("warning", "A warning may be intended.")):
+        rows = [(code(f["code"]), f["meaning"], f["why"], f["advice"]) for f in found if f["severity"] == severity]
+        text.append(f"## {severity.capitalize()}s\n\n{meaning}\n")
+        text.append(table(("code", "meaning", "why it matters", "what to do"), rows))
+    return "\n".join(text)
 
 
 def record() -> str:

@@ -1,4 +1,4 @@
-"""Makes docs/images/mission.png: six moments of one retrieval. Needs an OpenGL (MUJOCO_GL=egl works in software).
+"""Write docs/images/mission.png: six moments of one retrieval. Needs OpenGL (MUJOCO_GL=egl works in software).
 
 MUJOCO_GL=egl python docs/images/mission.py
 """
@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from backends.mujoco.render import render
-from glotouch_bt.mission.runner import run_mission
-from glotouch_bt.mission.worlds import load_conditions
 from PIL import Image, ImageDraw
 
-from glotouch_bt.mission.load import load_mission
+from glotouch_backends.mujoco.render import render
+from glotouch_bt.mission import load_mission
+from glotouch_bt.mission.execution import run_mission
+from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.robot import Command, Observation, load_backend
 
 SIZE = (520, 390)
@@ -30,7 +30,7 @@ SHOTS = (
 
 
 class Photographer:
-    """A record that only watches which node runs."""
+    """A record that only notes which node runs and since when."""
 
     def __init__(self) -> None:
         self.node, self.since = "", 0.0
