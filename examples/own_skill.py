@@ -1,6 +1,6 @@
 """Write a skill and a mission, check the mission and test it without physics: `python examples/own_skill.py`.
 
-A package makes its skills known to `glotouch run` through an entry point; see docs/compose.md.
+A package makes its skills known to `glotouch run` through an entry point; see docs/tutorial.md.
 """
 
 import tempfile

@@ -27,7 +27,11 @@ except ImportError:
     from glotouch_bt.mission.spec.explanations import WARNINGS, WHY
 
     def describe_findings():
-        return [{"code": c, "meaning": "", "why": w, "advice": "", "severity": "warning" if c in WARNINGS else "error"} for c, w in WHY.items()]
+        return [
+            {"code": c, "meaning": "", "why": w, "advice": "", "severity": "warning" if c in WARNINGS else "error"}
+            for c, w in WHY.items()
+        ]
+
 
 from glotouch_bt.robot import HOLD, FakeRobot
 
@@ -205,9 +209,7 @@ def nodes() -> str:
 
 def _parameters(found: list[dict[str, Any]], title: str) -> str:
     """Return a table of parameters or settings."""
-    rows = [
-        (code(p["name"]), p["type"], p["unit"], _default(p), p["range"], p["description"]) for p in found
-    ]
+    rows = [(code(p["name"]), p["type"], p["unit"], _default(p), p["range"], p["description"]) for p in found]
     return table((title, "type", "unit", "default", "valid", "meaning"), rows)
 
 
@@ -311,7 +313,10 @@ def findings() -> str:
     """Return the page on the findings of `glotouch check`."""
     found = sorted(describe_findings(), key=lambda f: (f["severity"], f["code"]))
     text = ["# Findings of `glotouch check`\n"]
-    for severity, meaning in (("error", "`run` refuses a mission with errors."), ("warning", "A warning may be intended.")):
+    for severity, meaning in (
+        ("error", "`run` refuses a mission with errors."),
+        ("warning", "A warning may be intended."),
+    ):
         rows = [(code(f["code"]), f["meaning"], f["why"], f["advice"]) for f in found if f["severity"] == severity]
         text.append(f"## {severity.capitalize()}s\n\n{meaning}\n")
         text.append(table(("code", "meaning", "why it matters", "what to do"), rows))
