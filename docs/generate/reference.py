@@ -20,20 +20,18 @@ from glotouch_bt.mission.read import Declaration, SkillShelf, WorldFile, shipped
 from glotouch_bt.mission.record import Recorder
 from glotouch_bt.mission.record.mcap_schemas import CHANNELS as CHANNELS_OF_RECORD
 from glotouch_bt.mission.spec import UNITS
+from glotouch_bt.robot import HOLD, FakeRobot
 
 try:
     from glotouch_bt.mission.spec import describe_findings
 except ImportError:
     from glotouch_bt.mission.spec.explanations import WARNINGS, WHY
 
-    def describe_findings():
-        return [
-            {"code": c, "meaning": "", "why": w, "advice": "", "severity": "warning" if c in WARNINGS else "error"}
-            for c, w in WHY.items()
-        ]
+    def describe_findings() -> list[dict[str, str]]:
+        """Return every kind of finding."""
+        every = [(c, w, "warning" if c in WARNINGS else "error") for c, w in WHY.items()]
+        return [{"code": c, "meaning": "", "why": w, "advice": "", "severity": s} for c, w, s in every]
 
-
-from glotouch_bt.robot import HOLD, FakeRobot
 
 MISSION = """# Mission files
 
