@@ -16,22 +16,11 @@ from pydantic import BaseModel
 
 from glotouch_bt.faults import CATALOGUE
 from glotouch_bt.mission.export import describe_nodes, describe_skill, mission_schema
-from glotouch_bt.mission.read import Declaration, SkillShelf, WorldFile, shipped
+from glotouch_bt.mission.read import Declaration, SkillRegistry, WorldFile, shipped
 from glotouch_bt.mission.record import Recorder
 from glotouch_bt.mission.record.mcap_schemas import CHANNELS as CHANNELS_OF_RECORD
-from glotouch_bt.mission.spec import UNITS
+from glotouch_bt.mission.spec import UNITS, describe_findings
 from glotouch_bt.robot import HOLD, FakeRobot
-
-try:
-    from glotouch_bt.mission.spec import describe_findings
-except ImportError:
-    from glotouch_bt.mission.spec.explanations import WARNINGS, WHY
-
-    def describe_findings() -> list[dict[str, str]]:
-        """Return every kind of finding."""
-        every = [(c, w, "warning" if c in WARNINGS else "error") for c, w in WHY.items()]
-        return [{"code": c, "meaning": "", "why": w, "advice": "", "severity": s} for c, w, s in every]
-
 
 MISSION = """# Mission files
 
@@ -149,13 +138,13 @@ def pages() -> dict[str, str]:
 
 def _own_skills() -> list[dict[str, Any]]:
     """Descriptions of the skills that ship with the project."""
-    shelf = SkillShelf()
+    shelf = SkillRegistry()
     return [describe_skill(n, shelf[n]) for n in sorted(shelf) if shelf[n].__module__.startswith("glotouch_skills.")]
 
 
 def missions() -> str:
     """Return the page on mission files."""
-    schema = mission_schema(SkillShelf())
+    schema = mission_schema(SkillRegistry())
     meaning = {
         "mission": "name: letters, digits, `_` and `-`",
         "description": "one sentence for people",
