@@ -1,4 +1,4 @@
-"""What the driver uses of the vendors' modules, read from its source: every attribute, call and keyword.
+"""Uses of the vendors' modules in the driver's source: every attribute, call and keyword.
 
 A name below stands for an object of a vendor's class wherever it appears in the driver's adapter files.
 """
@@ -45,9 +45,9 @@ class Use:
     Attributes:
         where: File and line.
         path: Dotted name in the vendor's module, e.g. ("Robot", "SwitchMode").
-        called: It is called,
-        positional: with so many arguments (None if one is starred)
-        keywords: and these.
+        called: True if it is called.
+        positional: Number of positional arguments of the call; None if one is starred.
+        keywords: Keyword arguments of the call.
     """
 
     where: str
@@ -58,7 +58,7 @@ class Use:
 
     @property
     def name(self) -> str:
-        """As written."""
+        """Dotted name."""
         return ".".join(self.path)
 
 
@@ -87,7 +87,7 @@ def _resolve(node: ast.expr, roots: dict[str, str]) -> tuple[str, ...] | None:
 
 
 def uses(*files: str) -> Iterator[Use]:
-    """All uses in these files of the driver."""
+    """Yield all uses in these files of the driver."""
     for name in files:
         tree = ast.parse((FOLDER / name).read_text())
         inner: set[int] = set()

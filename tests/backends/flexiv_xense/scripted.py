@@ -1,6 +1,6 @@
-"""A vendor without physics, for tests of the driver alone: the arm is where the last pose says, walls push back.
+"""A vendor without physics, for tests of the driver alone: the arm is where the last pose says.
 
-Only what the driver uses, with the vendor's names (flexivrdk 1.9). Faults, silence and losses are switched on by tests.
+Only what the driver uses, with the vendor's names (flexivrdk 1.9). Tests switch on faults, silence and losses.
 """
 
 from __future__ import annotations
@@ -196,7 +196,7 @@ class ScriptedTool:
 
 
 class ScriptedGripper:
-    """Moves 0.5 mm at every look, towards its target; `dead` repeats the last status for ever."""
+    """Moves 0.5 mm towards its target at every read; `dead` repeats the last status for ever."""
 
     def __init__(self, vendor: ScriptedVendor) -> None:
         self._vendor = vendor

@@ -22,7 +22,7 @@ def vendor(conditions: Conditions | None = None, seed: int = 0) -> SimulatedVend
 
 
 class Bench:
-    """The arm, up to the mode that is asked for."""
+    """The arm, brought up step by step."""
 
     def __init__(self, conditions: Conditions | None = None, seed: int = 0) -> None:
         self.vendor = vendor(conditions, seed)
@@ -70,7 +70,7 @@ class Bench:
         return np.array(self.robot.states().tcp_pose)
 
     def stream(self, velocity: tuple[float, float, float], seconds: float) -> Array:
-        """Setpoints at 100 Hz along a line at an even speed; positions (n, 3) measured at the end of each period."""
+        """Send setpoints at 100 Hz along a line at constant speed; return the positions (n, 3) after each period."""
         start, v, track = self.pose, np.array(velocity), []
         begin = self.clock.now_s()
         for k in range(1, round(seconds / 0.01) + 1):

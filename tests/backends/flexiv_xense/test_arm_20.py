@@ -23,7 +23,7 @@ class Command:
 
 
 class Robot20:
-    """Keeps every call with its arguments."""
+    """Records every call with its arguments."""
 
     def __init__(self, vendor: ScriptedVendor, old: Any) -> None:
         self._vendor, self._old, self.calls = vendor, old, list[tuple[str, tuple[Any, ...]]]()

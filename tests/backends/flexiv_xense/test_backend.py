@@ -1,4 +1,4 @@
-"""The backend as missions open it: options, a driver process with simulated devices, its end."""
+"""The backend as missions open it: options, the driver process with simulated devices, and its end."""
 
 from __future__ import annotations
 
@@ -48,19 +48,19 @@ def test_it_is_registered() -> None:
         ({"devices": "simulated", "feed_forward": "maybe"}, "true or false"),
     ],
 )
-def test_wrong_options_say_what_is_right(options: dict[str, object], text: str) -> None:
+def test_invalid_options_name_the_valid_ones(options: dict[str, object], text: str) -> None:
     with pytest.raises(BadInput, match=text):
         read_options(options)
 
 
-def test_the_simulated_devices_are_the_default_addresses_of_their_kind() -> None:
+def test_default_addresses_are_those_of_the_simulated_devices() -> None:
     from glotouch_backends.flexiv_xense.simulated import GRIPPER_ADDRESS, PAD_SNS, ROBOT_SN
 
     _, o = read_options({"devices": "simulated"})
     assert (o.robot, o.gripper, (o.left_pad, o.right_pad)) == (ROBOT_SN, GRIPPER_ADDRESS, PAD_SNS)
 
 
-def test_a_run_is_the_same_every_time_and_leaves_nothing(robot: FlexivXenseRobot) -> None:
+def test_a_run_is_reproducible_and_leaves_no_files(robot: FlexivXenseRobot) -> None:
     world = nearly_empty(load_mission("retrieve", {}).world)
     backend = FlexivXenseBackend()
     first = [robot.cycle(HOLD) for _ in range(20)]
@@ -97,8 +97,8 @@ def test_a_killed_driver_is_an_error_and_closing_still_works(robot: FlexivXenseR
     assert robot.process._process is None
 
 
-def test_a_killed_executive_leaves_nothing_behind() -> None:
-    """Its private folder is removed by the driver, which outlives it."""
+def test_a_killed_executive_leaves_no_files() -> None:
+    """The driver outlives it and removes its private folder."""
     code = (
         "import sys, time\n"
         "from glotouch_bt.mission.load import load_mission\n"

@@ -1,4 +1,4 @@
-"""Readings are dated by the device's clock, whatever the way to us took."""
+"""A device's stamps give the time of a reading, independent of its delay."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ def stamped(made_s: float, drift: float = 0.0) -> tuple[int, int]:
 
 
 @pytest.mark.parametrize("drift", [0.0, 5e-5, -5e-5])
-def test_jitter_of_the_way_is_taken_out(drift: float) -> None:
-    """True times are known here; after the first window the dates differ from them by the shortest way, 0.2 ms."""
+def test_transport_jitter_is_removed(drift: float) -> None:
+    """After the first window the times differ from the true ones by the smallest delay, 0.2 ms."""
     rng = np.random.default_rng(0)
     convert, off, now = StampConverter(), [], 0.0
     for k in range(20_000):
@@ -28,7 +28,7 @@ def test_jitter_of_the_way_is_taken_out(drift: float) -> None:
     assert np.diff(np.array(off) + 1e-3 * np.arange(20_000)).min() > 0
 
 
-def test_a_device_whose_clock_fell_back_is_followed() -> None:
+def test_a_jump_of_the_offset_is_followed() -> None:
     convert = StampConverter()
     for k in range(3000):
         convert(stamped(1e-3 * k), 1e-3 * k)
@@ -38,5 +38,5 @@ def test_a_device_whose_clock_fell_back_is_followed() -> None:
 
 
 @pytest.mark.parametrize("stamp", [None, 3.5, "x", (1, 2, 3), (1.0, 2)])
-def test_without_a_stamp_it_was_made_now(stamp: object) -> None:
+def test_without_a_stamp_the_arrival_time_counts(stamp: object) -> None:
     assert StampConverter()(stamp, 12.5) == 12.5

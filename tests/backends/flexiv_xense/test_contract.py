@@ -1,7 +1,7 @@
-"""What the simulated devices offer and what the driver uses, compared with the real vendors' packages.
+"""The simulated devices and the driver's calls, compared with the real vendors' packages.
 
-The real ones are installed into throw-away environments of Python 3.10; where there is none these tests are skipped by
-name. The comparison itself is tested without them at the end.
+The real packages are installed into temporary environments of Python 3.10; without one these tests are skipped. The
+comparison itself is tested without them at the end.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def real_20(tmp_path_factory: pytest.TempPathFactory) -> Api:
 
 
 def differences(name: str, ours: Api, real: Api) -> Iterator[str]:
-    """Everything of a class of ours that the real one does not have, or has otherwise."""
+    """Yield every part of a class of ours that the real one does not have or has differently."""
     if ours["kind"] != real["kind"]:
         yield f"{name}: is no {ours['kind']}"
         return
@@ -81,7 +81,7 @@ def _arguments(name: str, ours: list[Api], theirs: list[list[Api]]) -> Iterator[
 
 
 def faults_of(use: Use, module: Api) -> Iterator[str]:
-    """What is wrong with a use, given a module's classes."""
+    """Yield the errors of a use, given a module's classes."""
     classes = module["classes"]
     first, *rest = use.path
     if first.startswith("__"):
@@ -113,7 +113,7 @@ def faults_of(use: Use, module: Api) -> Iterator[str]:
 
 
 def _call(use: Use, overloads: list[list[Api]]) -> Iterator[str]:
-    """Whether one of the overloads takes the call."""
+    """Yield an error if no overload accepts the call."""
     if not overloads or use.positional is None:
         return
     for arguments in overloads:
@@ -173,7 +173,7 @@ def test_the_serial_gripper_takes_the_same_calls(real_19: Api) -> None:
 
 
 def test_the_driver_is_read_completely() -> None:
-    """If the driver's variables are renamed, the reader above must learn their new names."""
+    """The reader above knows the driver's variables by name; it must follow their renaming."""
     seen = {use.name for use in uses("arm.py", "arm_19.py", "arm_20.py", "connect.py", "pads.py", "gripper.py")}
     assert {
         "Robot.SendCartesianMotionForce",

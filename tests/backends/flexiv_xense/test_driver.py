@@ -39,7 +39,7 @@ def rest(robot: Robot, periods: int, command: Command = HOLD) -> None:
         robot.cycle(command)
 
 
-def test_a_session_comes_up_in_the_vendors_order(open_robot: Open) -> None:
+def test_a_session_opens_in_the_order_of_the_vendor(open_robot: Open) -> None:
     vendor = ScriptedVendor()
     vendor.flags.update(fault=True, operational=False)
     robot = open_robot(vendor)
@@ -71,7 +71,7 @@ def test_a_cycle_is_one_period_of_ten_samples(open_robot: Open) -> None:
     assert stamps[-1] == pytest.approx(before + 0.05)
 
 
-def test_a_setpoint_goes_out_as_pose_and_twist(open_robot: Open) -> None:
+def test_a_setpoint_is_sent_as_pose_and_twist(open_robot: Open) -> None:
     vendor = ScriptedVendor()
     robot = open_robot(vendor)
     robot.cycle(HOLD)
@@ -87,7 +87,7 @@ def test_a_setpoint_goes_out_as_pose_and_twist(open_robot: Open) -> None:
     assert np.allclose(twist[3:], [turn[2, 1], turn[0, 2], turn[1, 0]], atol=1e-6)
 
 
-def test_a_hold_brakes_along_the_way(open_robot: Open) -> None:
+def test_a_hold_brakes_along_the_path(open_robot: Open) -> None:
     vendor = ScriptedVendor()
     robot = open_robot(vendor)
     dq = np.zeros(7)
@@ -115,7 +115,7 @@ def test_a_hold_brakes_along_the_way(open_robot: Open) -> None:
     ],
     ids=["nan", "shape", "joint speed", "jump", "range", "other pose"],
 )
-def test_what_breaks_a_limit_is_refused_and_not_sent(open_robot: Open, bad: JointSetpoint) -> None:
+def test_an_invalid_setpoint_is_refused_and_not_sent(open_robot: Open, bad: JointSetpoint) -> None:
     vendor = ScriptedVendor()
     robot = open_robot(vendor)
     robot.cycle(Command(setpoint(HOME)))
@@ -127,7 +127,7 @@ def test_what_breaks_a_limit_is_refused_and_not_sent(open_robot: Open, bad: Join
     robot.cycle(Command(setpoint(HOME)))
 
 
-def test_a_tare_goes_through_the_primitive_while_samples_keep_coming(open_robot: Open) -> None:
+def test_a_tare_runs_as_a_primitive_while_samples_arrive(open_robot: Open) -> None:
     vendor = ScriptedVendor()
     robot = open_robot(vendor)
     vendor.calls.clear()
@@ -182,7 +182,7 @@ def test_the_hard_limit_stops_the_arm_below_the_client(open_robot: Open) -> None
     assert len(vendor.sent) == n
 
 
-def test_after_a_hard_stop_a_hold_is_where_the_arm_stopped(open_robot: Open) -> None:
+def test_after_a_safety_stop_a_hold_keeps_the_stopped_pose(open_robot: Open) -> None:
     vendor = ScriptedVendor()
     robot = open_robot(vendor)
     dq = np.zeros(7)
@@ -197,7 +197,7 @@ def test_after_a_hard_stop_a_hold_is_where_the_arm_stopped(open_robot: Open) -> 
     assert np.linalg.norm(np.subtract(vendor.pose[:3], stopped[:3])) < 0.02
 
 
-def test_without_feed_forward_every_setpoint_is_one_to_rest_at(open_robot: Open) -> None:
+def test_without_feed_forward_the_twist_is_zero(open_robot: Open) -> None:
     vendor = ScriptedVendor()
     robot = open_robot(vendor, feed_forward="false")
     dq = np.zeros(7)
@@ -206,7 +206,7 @@ def test_without_feed_forward_every_setpoint_is_one_to_rest_at(open_robot: Open)
     assert vendor.sent[-1][1] == [0.0] * 6
 
 
-def test_a_gripper_that_lets_go_when_its_link_is_lost_is_said_to(open_robot: Open) -> None:
+def test_the_error_names_the_effect_of_a_lost_gripper_link(open_robot: Open) -> None:
     vendor = ScriptedVendor()
     robot = open_robot(vendor, link_loss="opens")
     vendor.gripper.get_gripper_status = lambda: None  # type: ignore[assignment,method-assign,return-value]
@@ -259,7 +259,7 @@ def test_a_fault_comes_with_the_event_log(open_robot: Open) -> None:
         ({"operational": False, "estop_released": False}, "emergency stop"),
     ],
 )
-def test_states_that_keep_the_arm_from_moving_are_named(open_robot: Open, flags: dict[str, bool], text: str) -> None:
+def test_the_reason_why_the_arm_cannot_move_is_named(open_robot: Open, flags: dict[str, bool], text: str) -> None:
     vendor = ScriptedVendor()
     robot = open_robot(vendor)
     vendor.flags.update(flags)
@@ -267,7 +267,7 @@ def test_states_that_keep_the_arm_from_moving_are_named(open_robot: Open, flags:
         robot.cycle(HOLD)
 
 
-def test_an_arm_that_repeats_itself_is_stale(open_robot: Open) -> None:
+def test_an_arm_that_repeats_old_readings_is_stale(open_robot: Open) -> None:
     vendor = ScriptedVendor()
     robot = open_robot(vendor)
     vendor.frozen = True
@@ -283,7 +283,7 @@ def test_a_vendor_error_is_mapped(open_robot: Open) -> None:
         robot.cycle(Command(setpoint(HOME)))
 
 
-def test_an_arm_that_does_not_come_up_says_so(open_robot: Open) -> None:
+def test_an_arm_that_cannot_be_enabled_is_an_error(open_robot: Open) -> None:
     vendor = ScriptedVendor()
     vendor.flags.update(operational=False, estop_released=False)
     with pytest.raises(BackendError, match="emergency stop"):
@@ -303,7 +303,7 @@ def test_the_gripper_takes_millimetres(open_robot: Open) -> None:
         robot.cycle(Command(gripper=GripperTarget(0.2, 0.05, 12.0)))
 
 
-def test_a_gripper_that_repeats_itself_is_stale(open_robot: Open) -> None:
+def test_a_gripper_that_repeats_old_readings_is_stale(open_robot: Open) -> None:
     vendor = ScriptedVendor()
     robot = open_robot(vendor)
     vendor.gripper.dead = True
@@ -312,7 +312,7 @@ def test_a_gripper_that_repeats_itself_is_stale(open_robot: Open) -> None:
         rest(robot, 120)
 
 
-def test_frames_come_in_pairs_in_metres_one_mirrored(open_robot: Open) -> None:
+def test_frames_arrive_in_pairs_in_metres_with_one_mirrored(open_robot: Open) -> None:
     robot = open_robot(ScriptedVendor())
     frames = [robot.cycle(Command(tactile=True)).tactile for _ in range(30)]
     got = [f for f in frames if f is not None]
@@ -325,7 +325,7 @@ def test_frames_come_in_pairs_in_metres_one_mirrored(open_robot: Open) -> None:
     assert robot.cycle(HOLD).tactile is None
 
 
-def test_missing_frames_are_a_fault_only_while_they_are_wanted(open_robot: Open) -> None:
+def test_missing_frames_are_a_fault_only_while_requested(open_robot: Open) -> None:
     vendor = ScriptedVendor()
     robot = open_robot(vendor)
     vendor.sensors[1].silent = True

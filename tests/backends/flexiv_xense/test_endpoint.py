@@ -1,4 +1,4 @@
-"""The socket: keys for the network, and nothing without them."""
+"""The socket: a network port needs keys."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ def server(keys: Path) -> Iterator[str]:
         thread.join()
 
 
-def test_a_client_with_a_known_key_is_let_in(server: str, keys: Path) -> None:
+def test_a_client_with_a_known_key_is_accepted(server: str, keys: Path) -> None:
     link = DriverLink(server, lambda: None, paced=False, keys=keys)
     assert link.ask(HoldRequest(number=7), Accepted, limit_s=10.0).number == 7
     link.close()
 
 
 @pytest.mark.parametrize("who", ["nobody", "stranger"])
-def test_others_are_not_heard(server: str, keys: Path, who: str) -> None:
+def test_a_client_without_a_known_key_gets_no_answer(server: str, keys: Path, who: str) -> None:
     given: Path | None = None
     if who == "stranger":
         given = keys / "strangers"
@@ -72,7 +72,7 @@ def test_no_port_without_keys(address: str, text: str) -> None:
 
 
 @pytest.mark.parametrize("number", [int.from_bytes(bytes(15) + b"+"), int.from_bytes(b"\0" + b"+" * 15)])
-def test_any_name_a_client_draws_is_heard(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, number: int) -> None:
+def test_every_random_client_name_works(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, number: int) -> None:
     monkeypatch.setattr(uuid, "uuid4", lambda: uuid.UUID(int=number))
     address, stop = f"ipc://{tmp_path / 'driver'}", threading.Event()
     with DriverSocket(address) as socket:

@@ -1,4 +1,4 @@
-"""Signs, frames and units, with cases worked by hand."""
+"""Signs, frames and units in cases computed by hand."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_a_push_on_the_side_of_P_turns_about_S() -> None:
     assert np.allclose(wrench_map(OURS) @ [0, 10.0, 0, 0, 0, 0], [0, 10.0, 0, -2.0, 0, 0])
 
 
-def test_a_push_on_the_probes_tip_arrives_with_its_whole_lever() -> None:
+def test_a_push_on_the_tip_has_its_whole_lever() -> None:
     # A ball 0.13 m beyond P, 10 N along +x: about P the torque is 1.3 along +y; about S, 0.33 m away, 3.3.
     assert np.allclose(wrench_map(OURS) @ [10.0, 0, 0, 0, 1.3, 0], [10.0, 0, 0, 0, 3.3, 0])
 
@@ -71,7 +71,7 @@ def test_a_depth_map_in_millimetres_becomes_metres_by_cells() -> None:
     assert np.allclose(depth_map_m(image, (2, 2), True), [[0.0, 0.002], [0.004, 0.002]])
 
 
-def test_pixels_that_deliver_nothing_are_left_out() -> None:
+def test_dead_pixels_are_left_out() -> None:
     image = np.array([[1.0, np.nan, np.nan, np.nan]])
     got = depth_map_m(image, (1, 2), False)
     assert got[0, 0] == pytest.approx(0.001)

@@ -1,4 +1,4 @@
-"""The driver on the wall's clock: what it does when its client, or a device, goes silent. Nothing here is timed."""
+"""The driver on wall time: silence of its client or of a device. No test measures a time."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def events(tmp_path: Path) -> list[str]:
     return [json.loads(line)["event"] for line in (tmp_path / "log.jsonl").read_text().splitlines()]
 
 
-def test_blocks_follow_each_other_and_nothing_is_made_up(open_robot: Open) -> None:
+def test_blocks_are_consecutive(open_robot: Open) -> None:
     robot = open_robot(ScriptedVendor(stepped=False), pace="real")
     stamps = list(robot.observe().stamp_s)
     for _ in range(20):
@@ -55,7 +55,7 @@ def test_blocks_follow_each_other_and_nothing_is_made_up(open_robot: Open) -> No
     assert stamps[-1] - stamps[0] > 0.15
 
 
-def test_a_client_that_sends_no_setpoint_is_held_for(open_robot: Open) -> None:
+def test_without_setpoints_the_arm_is_held(open_robot: Open) -> None:
     vendor = ScriptedVendor(stepped=False)
     robot = open_robot(vendor, pace="real")
     robot.cycle(a_moving_setpoint())
@@ -65,7 +65,7 @@ def test_a_client_that_sends_no_setpoint_is_held_for(open_robot: Open) -> None:
     assert robot.late_periods > 10
 
 
-def test_a_client_that_is_gone_ends_the_session(open_robot: Open, tmp_path: Path) -> None:
+def test_losing_the_client_ends_the_session(open_robot: Open, tmp_path: Path) -> None:
     vendor = ScriptedVendor(stepped=False)
     robot = open_robot(vendor, pace="real")
     robot.cycle(a_moving_setpoint())
@@ -79,7 +79,7 @@ def test_a_client_that_is_gone_ends_the_session(open_robot: Open, tmp_path: Path
     assert all(s.released for s in vendor.sensors)
 
 
-def test_a_driver_that_is_silent_is_an_error(open_robot: Open) -> None:
+def test_a_silent_driver_is_an_error(open_robot: Open) -> None:
     vendor = ScriptedVendor(stepped=False)
     robot = open_robot(vendor, pace="real")
     vendor.stamp = lambda: time.sleep(2.0)  # type: ignore[assignment,method-assign]
@@ -87,7 +87,7 @@ def test_a_driver_that_is_silent_is_an_error(open_robot: Open) -> None:
         cycle_twice(robot)
 
 
-def test_a_tare_runs_beside_the_loop(open_robot: Open) -> None:
+def test_a_tare_runs_concurrently_with_the_loop(open_robot: Open) -> None:
     robot = open_robot(ScriptedVendor(stepped=False), pace="real")
     ticket = robot.start(Tare(0.1))
     for _ in range(500):
@@ -98,7 +98,7 @@ def test_a_tare_runs_beside_the_loop(open_robot: Open) -> None:
     assert ticket.error is None
 
 
-def test_a_second_client_is_told_so(open_robot: Open) -> None:
+def test_a_second_client_is_refused(open_robot: Open) -> None:
     from glotouch_backends.flexiv_xense.client.link import DriverLink
     from glotouch_backends.flexiv_xense.driver.messages import Block
 
@@ -112,7 +112,7 @@ def test_a_second_client_is_told_so(open_robot: Open) -> None:
     robot.cycle(HOLD)
 
 
-def test_rubbish_is_refused_and_does_not_end_the_driver(open_robot: Open) -> None:
+def test_an_undecodable_message_is_refused_and_the_driver_continues(open_robot: Open) -> None:
     robot = open_robot(ScriptedVendor(stepped=False), pace="real")
     robot.link._socket.send(b"\xc1 rubbish")
     with pytest.raises(BackendError, match="could not be read"):

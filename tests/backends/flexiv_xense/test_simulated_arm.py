@@ -1,4 +1,4 @@
-"""The simulated arm through the vendor's API: a session's order, units, signs, frames, limits, what it does alone."""
+"""The simulated arm through the vendor's API: order of a session, units, signs, frames, limits and faults."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_the_order_of_a_session() -> None:
         bench.rdk.Tool(robot).Switch("other")
 
 
-def test_cartesian_mode_wants_a_zeroed_sensor() -> None:
+def test_cartesian_mode_needs_a_zeroed_sensor() -> None:
     bench = Bench().enable().tool()
     with pytest.raises(RuntimeError):
         bench.robot.SwitchMode(bench.rdk.Mode.NRT_CARTESIAN_MOTION_FORCE)
@@ -68,7 +68,7 @@ def test_cartesian_mode_wants_a_zeroed_sensor() -> None:
 
 
 def test_the_flange_alone_feels_the_hands_weight() -> None:
-    """Without a tool the hand hangs on the flange as an external force: m g down, in the axes asked for."""
+    """Without a tool the hand's weight shows as an external force: m g down, in the requested axes."""
     bench = Bench().enable().zero()
     at = np.array(bench.robot.states().flange_pose)
     bench.robot.Stop()
@@ -127,7 +127,7 @@ def test_it_follows_streamed_setpoints(cartesian: Bench) -> None:
 
 
 def test_a_setpoints_velocity_is_kept() -> None:
-    """As the vendor documents: when no further setpoint comes the arm goes on; one with velocity 0 ends it."""
+    """As the vendor documents: without a further setpoint the arm continues; one with velocity 0 ends it."""
     bench = Bench().cartesian()
     bench.stream((0.0, 0.05, 0.0), 0.4)
     at = bench.pose
@@ -139,8 +139,8 @@ def test_a_setpoints_velocity_is_kept() -> None:
     assert np.linalg.norm(bench.pose[:3] - here[:3]) < 1e-3
 
 
-def test_limits_of_a_setpoint_are_kept(cartesian: Bench) -> None:
-    """A far setpoint is reached at the speed that came with it, from rest to rest."""
+def test_limits_of_a_setpoint_are_obeyed(cartesian: Bench) -> None:
+    """A far setpoint is reached at the speed limit that came with it."""
     start = cartesian.pose
     goal = (start + np.eye(7)[2] * 0.05).tolist()
     cartesian.robot.SendCartesianMotionForce(goal, [0.0] * 6, [0.0] * 6, 0.05, 1.0, 1.0, 5.0)
@@ -159,7 +159,7 @@ def test_limits_of_a_setpoint_are_kept(cartesian: Bench) -> None:
     ids=["not a number", "out of reach"],
 )
 def test_a_bad_pose_is_a_fault(change: dict[int, float], critical: bool) -> None:
-    """It is taken in silence, as by the real interface; the arm then stops by itself."""
+    """It is accepted silently, as by the real interface; then the arm stops by itself."""
     bench = Bench().cartesian()
     pose = bench.pose.tolist()
     for i, value in change.items():
@@ -229,12 +229,14 @@ def test_the_contact_wrench_is_bounded() -> None:
         ("SendCartesianMotionForce", ("abcdefg",), TypeError),
     ],
 )
-def test_settings_are_refused(cartesian: Bench, call: str, arguments: tuple[Any, ...], error: type[Exception]) -> None:
+def test_invalid_arguments_are_refused(
+    cartesian: Bench, call: str, arguments: tuple[Any, ...], error: type[Exception]
+) -> None:
     with pytest.raises(error):
         getattr(cartesian.robot, call)(*arguments)
 
 
-def test_noise_is_that_of_the_conditions() -> None:
+def test_noise_has_the_spread_of_the_conditions() -> None:
     """White noise of the sensor at 1 kHz in the raw wrench; the filtered one has less."""
     bench = Bench(Conditions(force_noise_sd_N=0.05, torque_noise_sd_Nm=0.003)).cartesian()
     bench.sleep(0.2)
@@ -248,8 +250,8 @@ def test_noise_is_that_of_the_conditions() -> None:
     assert np.std(filtered, axis=0)[:3].max() < 0.02
 
 
-def test_a_second_client_starts_anew() -> None:
-    """Zeroing belongs to a client's session, and so does the event log."""
+def test_a_second_client_starts_a_new_session() -> None:
+    """Zeroing and the event log belong to a client's session."""
     bench = Bench().cartesian()
     bench.vendor.box.fail(1, "made up")
     assert bench.robot.ClearFault()

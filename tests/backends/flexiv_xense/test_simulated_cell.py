@@ -1,4 +1,4 @@
-"""The cell: a world that outlives its clients. kill -9 of a client that moves the arm: how the arm comes to rest."""
+"""The cell: a world that outlives its clients; how the arm stops when the client that moves it is killed."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def until(found: Callable[[], Any], limit_s: float = 60.0) -> Any:
 
 
 def test_a_killed_clients_arm_stands_still(cell: Path) -> None:
-    """Within LINK_LOST_S and the time of braking; the way is bounded by both."""
+    """Time and distance are bounded by LINK_LOST_S and the braking time."""
     command = [sys.executable, "-m", "tests.backends.flexiv_xense.cell_client", cell / "socket", str(SPEED_M_S)]
     for round_number in range(3):
         with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as client:
@@ -68,7 +68,7 @@ def test_a_killed_clients_arm_stands_still(cell: Path) -> None:
                 client.kill()
         still = until(lambda n=round_number: [e for e in events(cell) if e["event"] == "standstill"][n:])[0]
         lost = [e for e in events(cell) if e["event"] == "client lost"][round_number]
-        # A client that is short of processor time sends late and makes the arm catch up.
+        # A client that lacks processor time sends late and makes the arm catch up.
         speed = max(lost["speed_m_s"], SPEED_M_S)
         braking_s = speed / REACH_M / STOP_RAD_S2
         assert speed < 3 * SPEED_M_S
@@ -77,7 +77,7 @@ def test_a_killed_clients_arm_stands_still(cell: Path) -> None:
         assert still["peak_force_N"] < 1e-6, "in free space"
 
 
-def test_calls_pass_with_their_values_and_errors(cell: Path) -> None:
+def test_calls_return_their_values_and_errors(cell: Path) -> None:
     vendor: RemoteVendor = open_remote_vendor(str(cell / "socket"))
     rdk = vendor.flexivrdk
     with pytest.raises(ValueError, match="serial"):

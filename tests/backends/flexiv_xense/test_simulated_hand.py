@@ -1,4 +1,4 @@
-"""The simulated gripper and pads through the vendors' APIs, with the quirks a driver has to live with."""
+"""The simulated gripper and pads through the vendors' APIs, with the quirks of the real ones."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_positions_are_millimetres_and_open_is_85(bench: SimulatedVendor) -> Non
     assert float(bench.world.data.qpos[bench.world.handles.jaw_qpos].sum()) == pytest.approx(0.070, abs=2e-4)
 
 
-def test_the_network_gripper_checks_nothing_and_the_board_clamps(bench: SimulatedVendor) -> None:
+def test_the_network_gripper_clamps_without_a_check(bench: SimulatedVendor) -> None:
     gripper: Any = bench.xensegripper.XenseGripper.create(GRIPPER_ADDRESS)
     for position in (500.0, float("nan")):
         gripper.set_position(position, 1000.0, 1000.0)
@@ -49,7 +49,7 @@ def test_the_network_gripper_checks_nothing_and_the_board_clamps(bench: Simulate
     serial.set_position(50.0, 10000.0, 10.0)
 
 
-def test_a_lost_gripper_repeats_itself(bench: SimulatedVendor) -> None:
+def test_a_lost_gripper_repeats_its_last_status(bench: SimulatedVendor) -> None:
     gripper: Any = bench.xensegripper.XenseGripper.create(GRIPPER_ADDRESS)
     sleep(bench, 0.05)
     last = gripper.get_gripper_status()
@@ -63,7 +63,7 @@ def test_a_lost_gripper_repeats_itself(bench: SimulatedVendor) -> None:
     assert bench.clock.now_s() - began > 7.0
 
 
-def test_aperture_noise_is_that_of_the_conditions() -> None:
+def test_aperture_noise_has_the_spread_of_the_conditions() -> None:
     v = vendor(Conditions(aperture_noise_sd_m=5e-5, aperture_bias_m=(3e-4, 3e-4), gripper_latency_s=0.01))
     gripper: Any = v.xensegripper.XenseGripper.create(GRIPPER_ADDRESS)
     sleep(v, 0.05)
@@ -101,7 +101,7 @@ def test_a_pads_outputs(bench: SimulatedVendor) -> None:
 
 
 def test_millimetres_and_mirroring(bench: SimulatedVendor, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A dent of 0.5 mm at row 3, column 2 of the left map and the right one: the right sensor sees it mirrored."""
+    """A dent of 0.5 mm at row 3, column 2 of both maps: the right sensor sees it mirrored."""
     dent = np.zeros(bench.world.description.gripper.pad_shape)
     dent[3, 2] = 5e-4
     left = bench.xensesdk.Sensor.create(PAD_SNS[0])
@@ -115,8 +115,8 @@ def test_millimetres_and_mirroring(bench: SimulatedVendor, monkeypatch: pytest.M
         assert (seen > 0.4).sum() == 400
 
 
-def test_frames_are_made_only_while_somebody_reads(bench: SimulatedVendor) -> None:
-    """At the tactile rate, then not at all; the last one stays available with its old stamp."""
+def test_frames_are_simulated_only_while_a_sensor_is_read(bench: SimulatedVendor) -> None:
+    """They come at the tactile rate, then stop; the last one stays available with its old stamp."""
     kinds = bench.xensesdk.Sensor.OutputType
     pad = bench.xensesdk.Sensor.create(PAD_SNS[0])
     stamps = set()

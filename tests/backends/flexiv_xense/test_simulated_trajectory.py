@@ -1,4 +1,4 @@
-"""The simulated arm's motion generator against dense sampling, and its kinematics against the planner's."""
+"""The simulated arm's motion generator against dense sampling; its kinematics against the planner's."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_extremes_of_a_cubic(delta: float, v0: float, v1: float, time_s: float) 
 
 
 def steps(t: Trajectory, n: int) -> np.ndarray:
-    """Positions (n + 1, dof) at the end of each step, the present one first."""
+    """Return the positions (n + 1, dof) at the end of each step, the present one first."""
     out = [t.q.copy()]
     for _ in range(n):
         t.advance()
@@ -40,7 +40,7 @@ def steps(t: Trajectory, n: int) -> np.ndarray:
     return np.array(out)
 
 
-def test_it_arrives_with_its_velocity_and_keeps_it() -> None:
+def test_a_motion_ends_with_its_velocity_and_keeps_it() -> None:
     t = Trajectory(np.zeros(2))
     t.go(np.array([0.01, -0.02]), np.array([0.1, 0.0]), 0.05)
     track = steps(t, 100)
@@ -49,7 +49,7 @@ def test_it_arrives_with_its_velocity_and_keeps_it() -> None:
     assert not t.at_rest
 
 
-def test_braking_is_even() -> None:
+def test_braking_is_uniform() -> None:
     """From (0.4, -0.2) rad/s with 2 rad/s2: 0.2 s, both joints in proportion."""
     t = Trajectory(np.zeros(2))
     t.go(np.array([0.004, -0.002]), np.array([0.4, -0.2]), 0.01)
@@ -66,7 +66,7 @@ def test_braking_is_even() -> None:
 
 @given(st.floats(-0.3, 0.3), st.floats(0.2, 2.0), st.floats(0.5, 10.0))
 @settings(max_examples=30, deadline=None)
-def test_the_shortest_time_keeps_the_limits(delta: float, max_vel: float, max_acc: float) -> None:
+def test_the_shortest_time_obeys_the_limits(delta: float, max_vel: float, max_acc: float) -> None:
     zero = np.zeros(1)
 
     def fits(time_s: float) -> bool:

@@ -1,4 +1,4 @@
-"""A small world, and a driver that moves the simulated arm with an inverse kinematics of its own (MuJoCo Jacobians)."""
+"""A small world, and a driver of the simulated arm with its own inverse kinematics (MuJoCo Jacobians)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session", autouse=True)
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Hulls computed here stay here."""
+    """Use a private cache of hulls."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         yield
@@ -108,7 +108,7 @@ class Driver:
         until: Callable[[Observation], bool] | None = None,
         settle_s: float = 0.05,
     ) -> Observation:
-        """To `position_m` of P in B, pointing down; stops early (at once) when `until` says so."""
+        """Move P to `position_m` in B, pointing down; stop at once when `until` returns True."""
         start, end = self.pose, Pose.pointing_down(position_m, yaw_rad)
         turn = (end.yaw_rad - start.yaw_rad + np.pi) % (2 * np.pi) - np.pi
         distance = max(float(np.linalg.norm(end.position_m - start.position_m)), 0.1 * abs(turn))
@@ -167,7 +167,7 @@ class Driver:
 
 @pytest.fixture
 def drive() -> Callable[[MujocoRobot], Driver]:
-    """Makes a driver of a robot."""
+    """Return the driver class."""
     return Driver
 
 

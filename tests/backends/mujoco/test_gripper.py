@@ -1,4 +1,4 @@
-"""The jaws: force and speed limits, reports, and the probe really taken and put back."""
+"""The jaws: force and speed limits, reports, and picking up and returning the probe."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def over_block(open_robot: Open, drive: Drive) -> Any:
 
 @pytest.mark.parametrize("force_N", [5.0, 10.0, 30.0])
 def test_force_limit(over_block: Any, force_N: float) -> None:
-    """A block between the pads: each pad pushes with the asked force, in balance, and no harder on the way."""
+    """Each pad presses on a block with the commanded force, in balance, and without overshoot."""
     robot, pads = over_block.robot, PadContacts(over_block.robot.model, over_block.robot.data, over_block.robot.handles)
     over_block.cycle(Command(gripper=GripperTarget(0.0, 0.04, force_N)))
     peak = 0.0
@@ -47,8 +47,8 @@ def test_force_limit(over_block: Any, force_N: float) -> None:
     assert np.abs(over_block.last.wrench_S[-1, :2]).max() < 0.2  # a squeeze is no force on the wrist
 
 
-def test_aperture_on_a_block_is_its_width_less_both_gels(over_block: Any) -> None:
-    """A flat face over the whole window sinks x with k x / (1 - (x/X)^2) A = F (Winkler); twice that is missing."""
+def test_aperture_on_a_block_is_its_width_minus_both_indentations(over_block: Any) -> None:
+    """A flat face over the whole window indents x with k x / (1 - (x/X)^2) A = F (Winkler), once on each side."""
     last = over_block.jaws(0.0, 10.0, 0.04, 1.5)
     area, k, rigid = 17.2 * 28.5, 0.2, 1.6
     x = np.linspace(0.0, 1.5, 200001)
@@ -56,7 +56,7 @@ def test_aperture_on_a_block_is_its_width_less_both_gels(over_block: Any) -> Non
     assert last.gripper.aperture_m * 1e3 == pytest.approx(36.0 - 2 * sink_mm, abs=0.02)
 
 
-def test_speed_and_place(open_robot: Open, drive: Drive) -> None:
+def test_jaws_keep_their_speed_and_reach_the_target(open_robot: Open, drive: Drive) -> None:
     driver = drive(open_robot())
     driver.cycle(Command(gripper=GripperTarget(0.080, 0.040, 30.0)))
     apertures = [driver.cycle(Command()).gripper.aperture_m for _ in range(130)]
@@ -86,7 +86,7 @@ def test_reports_are_late_biased_and_quantised() -> None:
     assert got[-1].moving
 
 
-def test_probe_is_taken_carried_and_put_back(open_robot: Open, drive: Drive) -> None:
+def test_probe_is_picked_carried_and_returned(open_robot: Open, drive: Drive) -> None:
     robot = open_robot(Conditions(tip_offset_sd_m=2e-4, tip_tilt_sd_deg=0.3), seed=4)
     referee = MujocoBackend().referee(robot)
     assert referee is not None
@@ -118,7 +118,7 @@ def test_probe_is_taken_carried_and_put_back(open_robot: Open, drive: Drive) -> 
     assert referee.peak_force_N() < 10.0
 
 
-def test_lift(over_block: Any) -> None:
+def test_a_lifted_block_does_not_creep(over_block: Any) -> None:
     robot = over_block.robot
     referee = MujocoBackend().referee(robot)
     assert referee is not None

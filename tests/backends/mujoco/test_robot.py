@@ -1,4 +1,4 @@
-"""The whole backend: same seed same bytes, hard limits, failures, free bodies, frames in time."""
+"""The whole backend: reproducibility, hard limits, failures, free bodies and tactile frames."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def bytes_of(o: Observation) -> bytes:
 
 
 def run(robot: MujocoRobot, driver: Any) -> bytes:
-    """A short trial that touches everything: jaws, a line into the block, a squeeze with frames."""
+    """Run a short trial: jaws, a line to the block, and a squeeze with frames."""
     driver.request(Tare(0.05))
     driver.jaws(0.070, time_s=0.2)
     driver.line((0.63, 0.08, -0.10), speed_m_s=0.2)
@@ -80,7 +80,7 @@ def test_same_seed_same_bytes(open_robot: Open, drive: Drive) -> None:
 
 
 def test_layout_does_not_depend_on_conditions(world: World) -> None:
-    """Streams by purpose: a trial's layout is the seed's, whatever else is disturbed."""
+    """The layout has its own random stream, so no other disturbance changes it."""
     poses = []
     for conditions in (Conditions(), replace(NOISY, registration_sd_m=0.0, registration_sd_deg=0.0)):
         robot = MujocoBackend().open(world, conditions, 7, {})
@@ -109,7 +109,7 @@ def test_frames_come_at_their_rate_and_late(open_robot: Open, drive: Drive) -> N
     assert driver.wait(0.1).tactile is None  # nobody asks any more
 
 
-def test_hard_limit_stops_below_the_skills(open_robot: Open, drive: Drive) -> None:
+def test_hard_limit_stops_the_arm(open_robot: Open, drive: Drive) -> None:
     driver = drive(open_robot())
     robot = driver.robot
     driver.request(Tare())
@@ -149,7 +149,7 @@ def test_free_fall_and_rest(open_robot: Open) -> None:
     assert np.abs(robot.data.qvel).max() < 1e-3
 
 
-def test_a_simulation_that_blows_up_is_an_error(
+def test_a_simulation_that_diverges_is_an_error(
     open_robot: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -178,7 +178,7 @@ def test_impossible_world(world: World) -> None:
         MujocoBackend().open(small, Conditions(), 0, {})
 
 
-def test_closed_and_registered(open_robot: Open) -> None:
+def test_the_backend_is_registered_and_a_closed_robot_refuses_cycles(open_robot: Open) -> None:
     assert isinstance(load_backend("mujoco"), MujocoBackend)
     with open_robot() as robot:
         robot.cycle(HOLD)
@@ -188,7 +188,7 @@ def test_closed_and_registered(open_robot: Open) -> None:
 
 
 def test_fixed_objects_do_not_move(world: World) -> None:
-    """20 N push a free block along, a bolted one not at all."""
+    """20 N move a free block, but not a fixed one."""
     with pytest.raises(ParamError, match="fixed"):
         MujocoBackend().open(world, Conditions(), 0, {"fixed": "perhaps"})
     moved = {}

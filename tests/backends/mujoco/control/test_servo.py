@@ -1,4 +1,4 @@
-"""Interpolation against SciPy; the moving arm against what it was told; commands that must be refused."""
+"""Interpolation against SciPy, tracking of setpoints, and refused commands."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Convex parts: notches stay open, nothing is lost, and the cache neither lies nor breaks."""
+"""Convex parts keep notches and cover the shape; the cache survives damage and never returns wrong data."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def union_volume_m3(parts: tuple[np.ndarray, ...], lower: np.ndarray, upper: np.
         (ring, [(0.0, 0.0, 0.012), (0.012, 0.0, 0.012), (0.0, -0.012, 0.001)]),
     ],
 )
-def test_hollows_stay_open(make, open_points_m, tmp_path: Path) -> None:
+def test_notches_and_holes_stay_open(make, open_points_m, tmp_path: Path) -> None:
     mesh = as_mesh(make(), tmp_path, "shape")
     hulls = load_hulls(mesh).vertices
     assert depth_inside_m(np.array(open_points_m), hulls).max() < 0  # outside every hull
@@ -81,7 +81,7 @@ def test_hollows_stay_open(make, open_points_m, tmp_path: Path) -> None:
     assert 2 <= len(hulls) <= 32
 
 
-def test_second_load_is_the_first_to_the_byte(tmp_path: Path, cache: Path) -> None:
+def test_second_load_equals_the_first_byte_for_byte(tmp_path: Path, cache: Path) -> None:
     mesh = as_mesh(l_shape(), tmp_path, "shape")
     said: list[str] = []
     first = load_hulls(mesh, said.append)
@@ -114,7 +114,7 @@ def test_a_convex_solid_is_one_hull_of_its_own_corners(tmp_path: Path) -> None:
 
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The cache does not care who cuts: a convex solid is its own single part."""
+    """Replace CoACD: a convex solid is its own single part."""
     monkeypatch.setattr(room, "_run_coacd", lambda mesh, *_: [mesh.vertices_m])
 
 
@@ -122,7 +122,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     "damage", ["truncated", "garbage", "empty", "other key", "wrong counts", "not finite", "folder"]
 )
-def test_a_damaged_file_heals(damage: str, tmp_path: Path, cache: Path) -> None:
+def test_a_damaged_file_is_replaced(damage: str, tmp_path: Path, cache: Path) -> None:
     mesh = box(tmp_path)
     load_hulls(mesh)
     file = cache / f"{mesh.digest}.npz"
@@ -155,7 +155,7 @@ def test_a_damaged_file_heals(damage: str, tmp_path: Path, cache: Path) -> None:
 
 @pytest.mark.parametrize("offset", range(0, 1000, 37))
 def test_a_flipped_byte_never_raises(offset: int, tmp_path: Path) -> None:
-    """Either the zip's checksum finds it or it hit a part that does not matter."""
+    """The zip's checksum finds it, or the byte has no effect."""
     hull = box(tmp_path).vertices_m
     content = bytearray(encode(KEY, Parts((hull,))))
     content[offset % len(content)] ^= 0xFF
@@ -171,7 +171,7 @@ def test_another_shape_has_another_file(tmp_path: Path, cache: Path) -> None:
     assert {p.stem for p in cache.glob("*.npz")} == {first.digest, second.digest}
 
 
-def test_failed_cutting_falls_back_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failed_cutting_falls_back_to_coarse_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = as_mesh(l_shape(), tmp_path, "shape")
     monkeypatch.setattr(room, "FINE", room.Attempt({"threshold": "not a number"}, 30.0))
     said: list[str] = []
@@ -182,7 +182,7 @@ def test_failed_cutting_falls_back_and_says_so(tmp_path: Path, monkeypatch: pyte
     assert "coarse" in room.read_parts(user_folder() / f"{mesh.digest}.npz", KEY).note
 
 
-def test_pathological_time_falls_back_to_the_hull(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_slow_cutting_falls_back_to_the_convex_hull(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = as_mesh(l_shape(), tmp_path, "shape")
     started: list[subprocess.Popen] = []
     popen = subprocess.Popen
@@ -203,7 +203,7 @@ def test_pathological_time_falls_back_to_the_hull(tmp_path: Path, monkeypatch: p
     assert all(p.poll() is not None for p in started)  # killed, not left running
 
 
-def test_parts_that_lose_the_shape_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_parts_that_do_not_cover_the_mesh_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = as_mesh(l_shape(), tmp_path, "shape")
     stump = mesh.vertices_m[mesh.vertices_m[:, 0] < 0.021]
     monkeypatch.setattr(room, "_run_coacd", lambda *_: [stump])
@@ -214,7 +214,7 @@ def test_parts_that_lose_the_shape_are_refused(tmp_path: Path, monkeypatch: pyte
     assert depth_inside_m(mesh.vertices_m, parts.hulls).min() > -1e-9
 
 
-def test_every_shipped_object_has_its_file() -> None:
+def test_every_shipped_object_has_a_decomposition() -> None:
     objects = Path(str(resources.files("glotouch_missions") / "objects"))
     total = 0
     for mesh in load_folder(objects):
@@ -233,7 +233,7 @@ def test_every_shipped_object_has_its_file() -> None:
 
 
 def test_bulge_of_a_known_overhang(tmp_path: Path) -> None:
-    """A box 1 mm too large on every side: faces stand out by 1 mm, corners by sqrt 3."""
+    """A box 1 mm too large on every side: faces protrude by 1 mm, corners by sqrt 3 mm."""
     mesh = box(tmp_path)
     middle = np.array([0.0, 0.0, 0.02])
     large = middle + (mesh.vertices_m - middle) * (0.042 / 0.04)
@@ -243,7 +243,7 @@ def test_bulge_of_a_known_overhang(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("limit", [12, 40, 200])
-def test_trimmed_hull_keeps_true_corners_and_loses_little(limit: int) -> None:
+def test_trimmed_hull_keeps_original_vertices_within_the_optimal_error(limit: int) -> None:
     """The best n points on a sphere miss it by 4 pi R / (3 sqrt 3 n) (a triangular lattice); the greedy choice of the
     furthest doubles the covering radius at worst (k-centre, Gonzalez 1985), which is four times the sagitta."""
     points = np.asarray(trimesh.creation.icosphere(subdivisions=4, radius=0.03).vertices)
@@ -255,7 +255,7 @@ def test_trimmed_hull_keeps_true_corners_and_loses_little(limit: int) -> None:
     assert missed < 4 * 4 * np.pi * 0.03 / (3 * np.sqrt(3) * limit)
 
 
-def test_trimmed_hull_drops_what_is_flat_or_within_tolerance() -> None:
+def test_trimmed_hull_drops_flat_parts_and_vertices_within_the_tolerance() -> None:
     rng = np.random.default_rng(0)
     flat = np.c_[rng.uniform(0, 0.05, (30, 2)), np.zeros(30)]
     assert trimmed_hull(flat, 64, 1e-4) is None
@@ -319,13 +319,13 @@ def test_overlapping_shells_are_cut_one_by_one(tmp_path: Path) -> None:
     assert found == [pytest.approx(size, abs=2e-5) for size in ([0.02, 0.06, 0.03], [0.07, 0.02, 0.04])]
 
 
-def test_progress_is_a_warning_unless_somebody_else_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_progress_is_logged_as_a_warning_by_default(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     load_hulls(as_mesh(l_shape(), tmp_path, "shape"))
     assert any(r.levelname == "WARNING" and "cutting into convex parts" in r.message for r in caplog.records)
 
 
-def test_a_killed_parent_takes_the_cutter_along(tmp_path: Path) -> None:
-    """A parent that is killed outright cannot kill its worker, which would go on for minutes."""
+def test_the_worker_ends_when_its_parent_is_killed(tmp_path: Path) -> None:
+    """A killed parent cannot kill its worker, which would run for minutes."""
     source = tmp_path / "in.npz"
     solid = trimesh.creation.torus(0.03, 0.01, major_sections=128, minor_sections=64)
     np.savez(source, vertices=solid.vertices, faces=solid.faces, shells=np.zeros(len(solid.faces), dtype=int))
@@ -351,7 +351,7 @@ def test_a_killed_parent_takes_the_cutter_along(tmp_path: Path) -> None:
             return
         time.sleep(0.1)
     os.kill(pid, signal.SIGKILL)
-    pytest.fail("the cutter outlived its parent")
+    pytest.fail("the worker outlived its parent")
 
 
 def _running(pid: int) -> bool:

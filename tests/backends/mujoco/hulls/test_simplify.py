@@ -1,4 +1,4 @@
-"""Thinning: fewer triangles, closed like before, and where the surface was."""
+"""Simplification: fewer triangles, still closed, with the same surface."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ def as_mesh(solid: trimesh.Trimesh) -> Mesh:
     return Mesh("solid", v, f, hashlib.sha256(v.tobytes()).hexdigest())
 
 
-def test_few_faces_stay_as_they_are() -> None:
+def test_a_small_mesh_is_unchanged() -> None:
     mesh = as_mesh(trimesh.creation.icosphere(4, 0.03))
     vertices, faces = simplified(mesh)
     assert vertices is mesh.vertices_m or np.array_equal(vertices, mesh.vertices_m)
     assert np.array_equal(faces, mesh.faces)
 
 
-def test_many_faces_become_few_and_the_shape_stays() -> None:
+def test_a_large_mesh_is_simplified_and_keeps_its_shape() -> None:
     mesh = as_mesh(trimesh.creation.torus(0.03, 0.012, major_sections=320, minor_sections=160))
     vertices, faces = simplified(mesh)
     solid = trimesh.Trimesh(vertices, faces, process=False)

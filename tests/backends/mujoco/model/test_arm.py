@@ -1,4 +1,4 @@
-"""The compiled arm against the description, by another road: SciPy rotations and finite differences."""
+"""The compiled arm against the description, computed independently: SciPy rotations and finite differences."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def robot(open_robot: Open) -> MujocoRobot:
 
 
 def chain(robot: MujocoRobot, q: Array) -> list[tuple[Array, Rotation]]:
-    """Origin and rotation of every link frame in B, then of P."""
+    """Return origin and rotation of every link frame in B, then of P."""
     at, turn, frames = np.zeros(3), Rotation.identity(), []
     for joint, angle in zip(robot.description.joints, q, strict=True):
         at = at + turn.apply(joint.origin_m)
@@ -82,7 +82,7 @@ def test_gravity_torque_is_the_slope_of_the_potential(robot: MujocoRobot) -> Non
         np.testing.assert_allclose(data.qfrc_gravcomp[h.arm_dof], data.qfrc_bias[h.arm_dof], atol=1e-9)
 
 
-def test_limits_are_the_description_s(robot: MujocoRobot) -> None:
+def test_limits_equal_those_of_the_description(robot: MujocoRobot) -> None:
     for joint in robot.description.joints:
         np.testing.assert_allclose(robot.model.joint(joint.name).range, (joint.lower_rad, joint.upper_rad))
         assert robot.model.joint(joint.name).armature[0] == joint.armature_kgm2

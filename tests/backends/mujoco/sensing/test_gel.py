@@ -101,8 +101,8 @@ def test_edge_leaves_a_wedge(force: float) -> None:
     assert depth == pytest.approx(np.maximum(0.0, shift - np.abs(fine.taxels_P[..., 0])), abs=2e-7)
 
 
-def test_short_edge_bottoms_and_is_clipped() -> None:
-    """25 N on 4 mm of edge drive it to the backing; the map stops at what the gel can show."""
+def test_short_edge_reaches_the_backing_and_is_clipped() -> None:
+    """25 N on 4 mm of edge press it to the backing; the map is clipped at its largest indentation."""
     bar, tip = edge_rays(0.004)
     depth, shift = GEL.press("left", [(bar, pad_pose_P("left", tip))], 25.0)
     assert depth.max() == GEL.depth_m
@@ -111,7 +111,7 @@ def test_short_edge_bottoms_and_is_clipped() -> None:
     assert depth[flank] == pytest.approx((shift - np.abs(X))[flank], abs=2e-7)
 
 
-def test_nothing_pressed_is_zero() -> None:
+def test_no_contact_gives_an_empty_map() -> None:
     box = rays_of(trimesh.creation.box((0.1, 0.04, 0.1)))
     touching = [(box, pad_pose_P("left", 0.02))]
     for surfaces, force in (
@@ -127,7 +127,7 @@ def test_nothing_pressed_is_zero() -> None:
         assert shift == 0.0
 
 
-def test_two_objects_at_once_are_both_felt() -> None:
+def test_two_objects_at_once_are_both_sensed() -> None:
     """Two boxes, each before one half of the window; the one at +x_P stands 0.3 mm further off."""
     box = rays_of(trimesh.creation.box((0.05, 0.04, 0.1)))
     pad_P = pad_pose_P("left", 0.02)

@@ -1,4 +1,4 @@
-"""Rays against solids whose surface is a formula."""
+"""Rays against solids with an analytic surface."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_sphere_within_its_tessellation() -> None:
     assert (found - true <= sagitta * slope + 1e-7).all()
 
 
-def test_no_ray_slips_through_an_edge_between_triangles() -> None:
+def test_no_ray_passes_between_two_triangles() -> None:
     box = trimesh.creation.box((0.04, 0.04, 0.04)).subdivide().subdivide().subdivide()
     on_edges = box.vertices[box.edges_unique].mean(axis=1)
     front = on_edges[(on_edges[:, 1] < -0.0199) & (np.abs(on_edges[:, [0, 2]]).max(axis=1) < 0.0199)]
@@ -60,12 +60,12 @@ def test_no_ray_slips_through_an_edge_between_triangles() -> None:
     assert np.abs(found - 0.05).max() < 1e-7
 
 
-def test_a_ray_that_starts_inside_sees_no_entry() -> None:
+def test_a_ray_that_starts_inside_is_a_miss() -> None:
     rays = SurfaceRays(solid(trimesh.creation.box((0.04, 0.04, 0.04))))
     assert np.isinf(rays.heights(np.zeros((3, 3)), np.array([0.0, 1.0, 0.0]))).all()
 
 
-def test_bad_input_is_named() -> None:
+def test_invalid_rays_are_refused() -> None:
     rays = SurfaceRays(solid(trimesh.creation.box((0.04, 0.04, 0.04))))
     with pytest.raises(ParamError, match="unit vector"):
         rays.heights(np.zeros((3, 3)), np.array([0.0, 2.0, 0.0]))

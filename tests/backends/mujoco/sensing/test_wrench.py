@@ -60,8 +60,8 @@ def test_noise_and_drift_have_the_stated_spread() -> None:
     assert 0.02 < np.std(ends) < 0.04  # 72 draws of sd 0.03 N after a minute
 
 
-def test_tare_then_tilt_leaves_only_the_payload_error() -> None:
-    """The controller follows its own idea of the hand's weight: 2 % of 8.65 N tilted by 30 degrees is what is left."""
+def test_after_a_tare_a_tilt_leaves_only_the_payload_error() -> None:
+    """The controller's weight model is wrong by 2 % of 8.65 N; a tilt of 30 degrees shows the error."""
     ideal = WristSensor(RIZON4_XENSE, Conditions(), 0)
     wrong = WristSensor(RIZON4_XENSE, Conditions(payload_mass_error=0.02, payload_com_error_m=0.002), 0)
     mass, com = RIZON4_XENSE.gripper.mass_and_com_E()
@@ -79,7 +79,7 @@ def test_tare_then_tilt_leaves_only_the_payload_error() -> None:
     assert 0.0 < left < 4 * 0.02 * mass * 9.81 * 2 * np.sin(np.deg2rad(15))
 
 
-def test_hand_s_weight_hangs_on_the_sensor(open_robot: Open) -> None:
+def test_the_sensor_carries_the_weight_of_the_hand(open_robot: Open) -> None:
     robot = open_robot()
     wrench = robot.observe().wrench_S[-1]
     expected = weight(
@@ -89,8 +89,8 @@ def test_hand_s_weight_hangs_on_the_sensor(open_robot: Open) -> None:
     assert wrench[2] == pytest.approx(HAND_KG * 9.81, abs=2e-2)  # z_S points down
 
 
-def test_probe_s_weight_and_payload(open_robot: Open, drive: Drive) -> None:
-    """Empty tare, then the probe in the hand: its weight shows, until the controller is told of it."""
+def test_the_weight_of_the_probe_shows_until_the_payload_is_set(open_robot: Open, drive: Drive) -> None:
+    """Tare without the probe, then pick it up."""
     driver = drive(open_robot())
     driver.request(Tare())
     assert np.abs(driver.last.wrench_S).max() < 1e-3
@@ -102,8 +102,8 @@ def test_probe_s_weight_and_payload(open_robot: Open, drive: Drive) -> None:
     assert driver.last.position_B_P[-1, 2] > before  # and the arm carries it: it no longer sags
 
 
-def test_lever_of_a_known_contact(open_robot: Open, drive: Drive) -> None:
-    """The ball against the wall: torque at S is the tip's lever times the force, which pushes away from the wall."""
+def test_torque_of_a_contact_at_the_tip(open_robot: Open, drive: Drive) -> None:
+    """The ball presses on the wall: the torque at S is the tip's lever times the force away from the wall."""
     driver = drive(open_robot())
     driver.pick()
     driver.line((0.60, 0.0, 0.02))
@@ -123,7 +123,7 @@ def test_lever_of_a_known_contact(open_robot: Open, drive: Drive) -> None:
     np.testing.assert_allclose(wrench[3:], np.cross(lever_S, wrench[:3]), atol=2e-3)
 
 
-def test_pressing_the_floor_pushes_up(open_robot: Open, drive: Drive) -> None:
+def test_pressing_the_floor_gives_an_upward_force(open_robot: Open, drive: Drive) -> None:
     driver = drive(open_robot())
     driver.request(Tare())
     driver.jaws(0.02, time_s=0.5)

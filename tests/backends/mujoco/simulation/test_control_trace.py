@@ -1,4 +1,4 @@
-"""The bare steps of a run, repeated, end where the run ended: nothing but its controls moved the world."""
+"""The repeated solver steps of a run end in its end state: only its controls moved the world."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def open_traced(world: World, limits: Limits | None = None) -> MujocoRobot:
     return robot
 
 
-def test_a_replay_ends_in_the_same_state_and_leaves_the_run_alone(world: World, drive: Drive) -> None:
-    """Jaws with two forces (the solver's limits change), a line that pushes the block, and a look at the truth."""
+def test_a_replay_ends_in_the_same_state_and_does_not_change_the_run(world: World, drive: Drive) -> None:
+    """Jaws with two forces (the solver's limits change), a line that pushes the block, and a query of the truth."""
     with open_traced(world) as robot:
         driver, referee = drive(robot), MujocoBackend().referee(robot)
         assert referee is not None
@@ -43,8 +43,8 @@ def test_a_replay_ends_in_the_same_state_and_leaves_the_run_alone(world: World, 
         assert (robot.data.qpos == before).all()
 
 
-def test_a_nudge_from_outside_is_seen(world: World) -> None:
-    """A nanometre that no control asked for."""
+def test_a_change_by_anything_but_the_controls_is_detected(world: World) -> None:
+    """One joint is displaced by a nanoradian."""
     with open_traced(world) as robot:
         robot.cycle(HOLD)
         robot.data.qpos[robot.handles.arm_qpos.start] += 1e-9
@@ -57,7 +57,7 @@ def test_a_nudge_from_outside_is_seen(world: World) -> None:
 
 
 def test_a_safety_stop_within_a_period_is_replayed(world: World, drive: Drive) -> None:
-    """The arm is frozen between two chunks of one period: the trace holds what was applied, not what was planned."""
+    """The arm stops between two chunks of a period: the trace has the applied controls, not the planned ones."""
     with open_traced(world, Limits(hard_force_N=8.0)) as robot:
         driver = drive(robot)
         driver.jaws(0.0, time_s=0.3)
@@ -70,7 +70,7 @@ def test_a_safety_stop_within_a_period_is_replayed(world: World, drive: Drive) -
         assert robot.trace.replay(robot.data).same_end_state
 
 
-def test_without_the_option_nothing_is_kept(world: World) -> None:
+def test_without_the_option_nothing_is_recorded(world: World) -> None:
     backend = MujocoBackend()
     with backend.open(world, Conditions(), 0, {"layout": LAYOUT}) as robot:
         referee = backend.referee(robot)

@@ -1,4 +1,4 @@
-"""A simulated robot put back into an earlier state, its own or another's, goes on as that one did, bit by bit."""
+"""A simulated robot restored to an earlier state, its own or another's, continues bit-identically."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def same_observation(a: Observation, b: Observation) -> bool:
 
 
 def go_on(robot: MujocoRobot, drive: Drive) -> list[Observation]:
-    """Squeezes, pushes on, tares, changes the payload, asks for depth maps."""
+    """Squeeze, move, tare, change the payload and request depth maps."""
     driver = drive(robot)
     driver.q = np.array(robot._servo.q)
     driver.pose = driver._forward(driver.q)
@@ -74,7 +74,7 @@ def go_on(robot: MujocoRobot, drive: Drive) -> list[Observation]:
 
 
 def busy(robot: MujocoRobot, drive: Drive) -> None:
-    """Leaves the robot in the midst of everything: moving, gripping, taring, with frames and reports under way."""
+    """Bring the robot into motion with a grip, a tare, a payload, frames and reports pending."""
     driver = drive(robot)
     driver.jaws(0.070, force_N=20.0, time_s=0.2)
     driver.line((0.63, 0.08, -0.165), speed_m_s=0.2)
@@ -84,8 +84,8 @@ def busy(robot: MujocoRobot, drive: Drive) -> None:
         robot.cycle(Command(gripper=GripperTarget(0.020, 0.1, 10.0), tactile=True))
 
 
-def test_another_robot_goes_on_as_this_one(world: World, drive: Drive) -> None:
-    """Through the bytes of a checkpoint, while everything is under way; objects sleep meanwhile, too."""
+def test_another_robot_continues_as_this_one(world: World, drive: Drive) -> None:
+    """Through the bytes of a checkpoint, with everything pending and objects asleep."""
     with open_robot(world) as one, open_robot(world) as other:
         busy(one, drive)
         kept = encode(one.snapshot())
@@ -100,7 +100,7 @@ def test_another_robot_goes_on_as_this_one(world: World, drive: Drive) -> None:
         assert walk(one) == walk(other)
 
 
-def test_a_robot_goes_back_as_often_as_asked_and_the_snapshot_stays_as_it_was(world: World, drive: Drive) -> None:
+def test_a_robot_is_restored_repeatedly_and_the_snapshot_stays(world: World, drive: Drive) -> None:
     with open_robot(world) as robot:
         busy(robot, drive)
         kept = robot.snapshot()
@@ -122,7 +122,7 @@ def test_taking_a_snapshot_changes_nothing(world: World, drive: Drive) -> None:
         assert all(same_observation(a, b) for a, b in zip(go_on(one, drive), go_on(other, drive), strict=True))
 
 
-def test_what_a_run_changed_of_the_model_comes_along_and_goes_away(world: World) -> None:
+def test_changes_of_the_model_are_saved_and_undone(world: World) -> None:
     with open_robot(world) as one, open_robot(world) as other:
         clean = one.snapshot()
         body = one.handles.object_bodies[0]
@@ -139,8 +139,8 @@ def test_what_a_run_changed_of_the_model_comes_along_and_goes_away(world: World)
         assert not other.data.xfrc_applied.any()
 
 
-def test_a_stop_comes_along(world: World, drive: Drive) -> None:
-    """A robot that was stopped by its guard is still stopped, and says so in the same words."""
+def test_a_safety_stop_is_restored(world: World, drive: Drive) -> None:
+    """The restored robot is still stopped and raises the same message."""
     limits = Limits(hard_force_N=15.0)
     with open_robot(world, limits) as one, open_robot(world, limits) as other:
         driver = drive(one)
@@ -152,7 +152,7 @@ def test_a_stop_comes_along(world: World, drive: Drive) -> None:
         assert str(again.value) == str(stopped.value)
 
 
-def test_a_snapshot_of_something_else_is_refused_and_nothing_is_changed(world: World, folder: Any) -> None:
+def test_a_foreign_snapshot_is_refused_without_a_change(world: World, folder: Any) -> None:
     with open_robot(world) as robot:
         good = dict(robot.snapshot())
         robot.cycle(HOLD)
@@ -173,7 +173,7 @@ def test_a_snapshot_of_something_else_is_refused_and_nothing_is_changed(world: W
         assert encode(robot.snapshot()) == before
 
 
-def test_a_robot_that_keeps_nothing_says_so() -> None:
+def test_a_robot_without_snapshots_refuses_to_restore() -> None:
     robot = FakeRobot()
     assert robot.snapshot() is None
     with pytest.raises(BackendError, match="FakeRobot"):
@@ -181,9 +181,9 @@ def test_a_robot_that_keeps_nothing_says_so() -> None:
 
 
 def walk(robot: MujocoRobot) -> dict[str, bytes]:
-    """Every array and number reachable from a robot's attributes, by path: found by itself, not by the snapshot's list.
+    """Return every array and number reachable from a robot's attributes by path, found independently of the snapshot.
 
-    MuJoCo's data is looked at through its own state vector and every array of fixed size.
+    MuJoCo's data is compared through its state vector and several arrays of fixed size.
     """
     found: dict[str, bytes] = {}
     ours = ("glotouch_backends.", "glotouch_bt.")
@@ -230,8 +230,8 @@ def walk(robot: MujocoRobot) -> dict[str, bytes]:
     return found
 
 
-def test_a_new_attribute_of_any_part_is_kept_too(world: World) -> None:
-    """Without anybody adding it to a list; one of a kind that cannot be kept is an error, not a silent loss."""
+def test_a_new_attribute_of_any_part_is_saved_too(world: World) -> None:
+    """No list names it; one of a type that cannot be saved is an error."""
     with open_robot(world) as one, open_robot(world) as other:
         for robot, number in ((one, 5), (other, 6)):
             for name in ("_servo", "_jaws", "_wrist", "_guard", "_tactile", "_reports"):
