@@ -172,8 +172,13 @@ class ReadingsGuard:
             if fatal:
                 return o
             o = _select(o, good)
+        self._check_gap(o, bad, findings)
+        return o
+
+    def _check_gap(self, o: Observation, dropped: int, findings: list[GuardFinding]) -> None:
+        """Report a late block and missing samples; `dropped` samples arrived out of order."""
         now_s = float(o.stamp_s[-1])
-        periods = (now_s - last) / self._period_s
+        periods = (now_s - self._last_s) / self._period_s
         if periods >= 1.0 + LATE_PERIODS:
             fatal = self._was_moving and periods > 1.0 + self._rules.late_periods
             if not fatal and self._was_moving and periods > 1.0 + self._rules.held_periods:
@@ -181,7 +186,7 @@ class ReadingsGuard:
             what = f"{periods:.1f} control periods passed in one cycle" + (" while the arm moved" * self._was_moving)
             findings.append(GuardFinding("overrun", what, periods, 1.0 + self._rules.late_periods, now_s, fatal))
         expected = round(self._samples * periods)
-        missing = expected - len(o.stamp_s) - bad
+        missing = expected - len(o.stamp_s) - dropped
         if missing > 1 and len(o.stamp_s) < MIN_SAMPLE_SHARE * expected:
             blind = missing / (self._samples * self._rules.late_periods) if self._was_moving else 0.0
             fatal = self._transients.exceeded(
@@ -190,7 +195,6 @@ class ReadingsGuard:
             what = f"{missing} of {expected} samples are missing"
             most = (1.0 - MIN_SAMPLE_SHARE) * expected
             findings.append(GuardFinding("samples_missing", what, float(missing), most, now_s, fatal))
-        return o
 
     def _check_each(self, o: Observation, findings: list[GuardFinding]) -> Observation:
         """Find the guard that trips; drop samples that are not finite."""
