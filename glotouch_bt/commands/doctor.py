@@ -25,7 +25,7 @@ def doctor(
 
     Reports versions, rates, noise, jaws, gel pads and the container's walls. Asks before it moves the robot.
     """
-    from glotouch_bt.commissioning import Finding, nearly_empty, visit
+    from glotouch_bt.commissioning import DoctorFinding, nearly_empty, run_doctor
     from glotouch_bt.mission import load_mission
     from glotouch_bt.mission.read import load_conditions
     from glotouch_bt.robot import BadInput, load_backend
@@ -37,19 +37,19 @@ def doctor(
         raise BadInput("--yes is for simulated robots only; on a real robot each step needs an answer")
     if not yes and not sys.stdin.isatty():
         raise BadInput("doctor asks before it moves, and there is no terminal here; on a simulated robot use --yes")
-    world, findings = load_mission(mission, {}).world, list[Finding]()
+    world, findings = load_mission(mission, {}).world, list[DoctorFinding]()
     if not real:
         world = nearly_empty(world)
 
     def ask(question: str) -> bool:
         return yes or typer.confirm(question, err=True)
 
-    def show(finding: Finding) -> None:
+    def show(finding: DoctorFinding) -> None:
         mark = {True: "ok", False: "LOOK", None: "--"}[finding.good]
         sys.stdout.write(f"{mark:4s} {finding.step:6s} {finding.what:12s} {finding.text}\n")
         sys.stdout.flush()
 
-    for finding in visit(chosen, world, load_conditions(conditions), options, ask, sure=not yes):
+    for finding in run_doctor(chosen, world, load_conditions(conditions), options, ask, sure=not yes):
         findings.append(finding)
         if not json_:
             show(finding)

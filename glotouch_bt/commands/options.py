@@ -78,7 +78,7 @@ def bench_folder(out: Path | None, name: str) -> Path:
     from glotouch_bt.runs import RunFolder
 
     folder = out or Path("runs") / f"{time.strftime('%Y%m%d-%H%M%S')}-bench-{name}"
-    RunFolder(folder).abandon()
+    RunFolder(folder).discard()
     return folder
 
 

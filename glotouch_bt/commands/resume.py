@@ -69,9 +69,9 @@ def resume(
 
 def _list(folder: Path, json_: bool) -> None:
     from glotouch_bt.commands.terminal import print_table
-    from glotouch_bt.mission.checkpoint import FILE, CheckpointFile
+    from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile
 
-    file = CheckpointFile(folder / FILE)
+    file = CheckpointFile(folder / CHECKPOINT_FILE)
     rows, run = file.rows(), file.run
     file.close()
     if json_:

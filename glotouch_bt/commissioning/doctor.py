@@ -1,4 +1,4 @@
-"""A first visit to a robot: looks first, then asks before everything that moves. Works with any backend.
+"""A first run_doctor to a robot: looks first, then asks before everything that moves. Works with any backend.
 
 Each step returns findings: what was measured, whether it is good, and what to do if it is not. Nothing is changed on
 the robot and nothing is written to files: a person decides what to do with the findings.
@@ -45,7 +45,7 @@ PRESSED_M = 1e-4
 
 
 @runtime_checkable
-class Looking(Protocol):
+class ObservableBackend(Protocol):
     """A backend that can connect without enabling or commanding anything."""
 
     def look(self, world: World, conditions: Conditions, options: Mapping[str, object]) -> Robot:
@@ -54,14 +54,14 @@ class Looking(Protocol):
 
 
 @runtime_checkable
-class Informed(Protocol):
+class DeviceInformation(Protocol):
     """A robot that knows what its devices say about themselves."""
 
     info: dict[str, str]
 
 
 @dataclass(frozen=True)
-class Finding:
+class DoctorFinding:
     """One thing found; `good` is None if nobody can say."""
 
     step: str
@@ -100,17 +100,17 @@ def nearly_empty(world: World) -> World:
     return replace(world, objects=replace(objects, names=names[:1]))
 
 
-def visit(
+def run_doctor(
     backend: Backend, world: World, conditions: Conditions, options: Mapping[str, object], ask: Ask, *, sure: bool
-) -> Iterator[Finding]:
-    """The whole visit; a generator, so that every finding is told when it is found.
+) -> Iterator[DoctorFinding]:
+    """The whole run_doctor; a generator, so that every finding is told when it is found.
 
     Args:
         backend, world, conditions, options: What to open.
         ask: Puts a yes/no question to the person there.
         sure: False when nobody is there to be asked what they see (a dry run).
     """
-    looking = backend.look(world, conditions, options) if isinstance(backend, Looking) else None
+    looking = backend.look(world, conditions, options) if isinstance(backend, ObservableBackend) else None
     if looking is not None:
         with looking:
             yield from facts(looking)
@@ -133,15 +133,15 @@ def visit(
             yield from walls(robot, world)
 
 
-def facts(robot: Robot) -> Iterator[Finding]:
+def facts(robot: Robot) -> Iterator[DoctorFinding]:
     """What the devices say about themselves."""
-    if isinstance(robot, Informed):
+    if isinstance(robot, DeviceInformation):
         for name, value in robot.info.items():
-            yield Finding("facts", name, None, value)
-    yield Finding("facts", "description", None, robot.description.name)
+            yield DoctorFinding("facts", name, None, value)
+    yield DoctorFinding("facts", "description", None, robot.description.name)
 
 
-def rates(robot: Robot) -> Iterator[Finding]:
+def rates(robot: Robot) -> Iterator[DoctorFinding]:
     """Samples a second, gaps between them, and whether the clock runs forward."""
     seen = rest(robot, LOOK_S)
     stamps = np.concatenate([o.stamp_s for o in seen])
@@ -149,11 +149,13 @@ def rates(robot: Robot) -> Iterator[Finding]:
     rate = float(1.0 / steps.mean())
     gap, typical = float(steps.max()), float(np.median(steps))
     forward = bool((steps > 0.0).all())
-    yield Finding("rates", "clock", forward, "runs forward" if forward else "jumped back", {"samples": len(stamps)})
+    yield DoctorFinding(
+        "rates", "clock", forward, "runs forward" if forward else "jumped back", {"samples": len(stamps)}
+    )
     text = f"{rate:.0f} samples a second; guards and onsets are made for 1000"
-    yield Finding("rates", "samples", rate > RATE_Hz, text, {"rate_Hz": rate})
+    yield DoctorFinding("rates", "samples", rate > RATE_Hz, text, {"rate_Hz": rate})
     text = f"longest gap {gap * 1e3:.1f} ms (usually {typical * 1e3:.1f} ms)"
-    yield Finding("rates", "gaps", gap < max(GAP_FACTOR * typical, robot.period_s), text, {"gap_s": gap})
+    yield DoctorFinding("rates", "gaps", gap < max(GAP_FACTOR * typical, robot.period_s), text, {"gap_s": gap})
 
 
 def _tared(robot: Robot) -> Motion[None]:
@@ -164,7 +166,7 @@ def _tared(robot: Robot) -> Motion[None]:
             break
 
 
-def wrist(robot: Robot, when: str) -> Iterator[Finding]:
+def wrist(robot: Robot, when: str) -> Iterator[DoctorFinding]:
     """Bias and noise of the wrench at rest."""
     wrench = np.concatenate([o.wrench_S for o in rest(robot, LOOK_S)])
     bias, sd = wrench.mean(axis=0), wrench.std(axis=0)
@@ -172,15 +174,15 @@ def wrist(robot: Robot, when: str) -> Iterator[Finding]:
     good = None if when != "tared" else size < BIAS_N
     advice = "; zero it again with nothing touching, or calibrate the arm's torque sensors" if good is False else ""
     values = {"bias": bias.round(4).tolist(), "sd": sd.round(5).tolist()}
-    yield Finding("wrist", "bias", good, f"{size:.2f} N {when}{advice}", values)
+    yield DoctorFinding("wrist", "bias", good, f"{size:.2f} N {when}{advice}", values)
     worst = float(sd[:3].max())
     text = f"{worst:.3f} N standard deviation on the worst axis (missions were measured at 0.05)"
-    yield Finding("wrist", "noise", worst < NOISE_N, text, {"sd_N": worst})
+    yield DoctorFinding("wrist", "noise", worst < NOISE_N, text, {"sd_N": worst})
     wander = float(np.linalg.norm(wrench[-500:, :3].mean(axis=0) - wrench[:500, :3].mean(axis=0)))
-    yield Finding("wrist", "drift", wander < NOISE_N, f"{wander:.3f} N over {LOOK_S:g} s", {"drift_N": wander})
+    yield DoctorFinding("wrist", "drift", wander < NOISE_N, f"{wander:.3f} N over {LOOK_S:g} s", {"drift_N": wander})
 
 
-def place(robot: Robot, world: World) -> Iterator[Finding]:
+def place(robot: Robot, world: World) -> Iterator[DoctorFinding]:
     """Does the arm stand where our kinematics say it stands?"""
     observation = robot.cycle(HOLD)
     arm = Arm(robot.description, robot.limits, world, robot.period_s)
@@ -190,10 +192,10 @@ def place(robot: Robot, world: World) -> Iterator[Finding]:
     text = f"the tool is {away * 1e3:.2f} mm and {turned:.2f} deg from where its joints put it by our numbers"
     good = away < AGREE_M and turned < AGREE_DEG
     advice = "" if good else "; use the arm's own calibrated kinematics, and measure the tool"
-    yield Finding("place", "kinematics", good, text + advice, {"away_m": away, "turned_deg": turned})
+    yield DoctorFinding("place", "kinematics", good, text + advice, {"away_m": away, "turned_deg": turned})
 
 
-def jaws(robot: Robot, ask: Ask | None) -> Iterator[Finding]:
+def jaws(robot: Robot, ask: Ask | None) -> Iterator[DoctorFinding]:
     """Direction and stroke, at low force."""
     hand = robot.description.gripper
     first = robot.cycle(HOLD).gripper.aperture_m
@@ -203,20 +205,20 @@ def jaws(robot: Robot, ask: Ask | None) -> Iterator[Finding]:
     moved = last - first
     good = moved * (goal - first) > 0.0 and abs(last - goal) < 1e-3
     values = {"from_m": first, "to_m": last}
-    yield Finding("jaws", "answer", good, f"told {goal * 1e3:.1f} mm, reports {last * 1e3:.1f} mm", values)
+    yield DoctorFinding("jaws", "answer", good, f"told {goal * 1e3:.1f} mm, reports {last * 1e3:.1f} mm", values)
     if ask is not None:
         seen = ask(f"Did the jaws {'OPEN' if further else 'CLOSE'}?")
         advice = "" if seen else ": the gripper's scale is reversed; do not run a mission"
-        yield Finding("jaws", "direction", seen, ("as reported" if seen else "not as reported") + advice)
+        yield DoctorFinding("jaws", "direction", seen, ("as reported" if seen else "not as reported") + advice)
         if not seen:
             return
     shut, wide = _jaws_to(robot, 0.0), _jaws_to(robot, hand.stroke_m)
     text = f"{shut * 1e3:.1f} .. {wide * 1e3:.1f} mm of {hand.stroke_m * 1e3:.0f}"
     good = shut < 2e-3 and wide > hand.stroke_m - 2e-3
-    yield Finding("jaws", "stroke", good, text, {"closed_m": shut, "open_m": wide})
+    yield DoctorFinding("jaws", "stroke", good, text, {"closed_m": shut, "open_m": wide})
     if ask is not None:
         seen = ask("Are the jaws now fully OPEN?")
-        yield Finding("jaws", "open", seen, "as reported" if seen else "reversed: do not run a mission")
+        yield DoctorFinding("jaws", "open", seen, "as reported" if seen else "reversed: do not run a mission")
 
 
 def _jaws_to(robot: Robot, aperture_m: float) -> float:
@@ -230,14 +232,14 @@ def _jaws_to(robot: Robot, aperture_m: float) -> float:
     return float(np.mean([o.gripper.aperture_m for o in rest(robot, 0.3)]))
 
 
-def pads(robot: Robot, ask: Ask | None) -> Iterator[Finding]:
+def pads(robot: Robot, ask: Ask | None) -> Iterator[DoctorFinding]:
     """Rate, noise and dead taxels untouched; then which pad, and which part of it, a press shows on."""
     frames = _frames(robot)
     if len(frames) < 2:
-        yield Finding("pads", "frames", False, f"{len(frames)} frames in {FRAMES_S:g} s")
+        yield DoctorFinding("pads", "frames", False, f"{len(frames)} frames in {FRAMES_S:g} s")
         return
     rate = (len(frames) - 1) / (frames[-1].stamp_s - frames[0].stamp_s)
-    yield Finding("pads", "frames", rate > 10.0, f"{rate:.0f} pairs a second", {"rate_Hz": rate})
+    yield DoctorFinding("pads", "frames", rate > 10.0, f"{rate:.0f} pairs a second", {"rate_Hz": rate})
     for side in ("left", "right"):
         maps = np.array([getattr(f, f"{side}_m") for f in frames])
         alive = ~np.isnan(maps).any(axis=0)
@@ -246,7 +248,7 @@ def pads(robot: Robot, ask: Ask | None) -> Iterator[Finding]:
         offset = float(np.median(np.abs(seen))) if seen.size else np.nan
         text = f"noise {noise * 1e3:.3f} mm, offset {offset * 1e3:.3f} mm, {dead * 100:.1f} % of the taxels dead"
         good = dead < 0.05 and offset < PRESSED_M
-        yield Finding("pads", side, good, text, {"noise_m": noise, "offset_m": offset, "dead": dead})
+        yield DoctorFinding("pads", side, good, text, {"noise_m": noise, "offset_m": offset, "dead": dead})
     if ask is None:
         return
     words = "Press the LEFT pad (the one at +y of P) with a finger, near its tip, on the side of +x of P. Pressing?"
@@ -262,7 +264,7 @@ def _frames(robot: Robot) -> list[TactileFrame]:
     return [o.tactile for o in seen if o.tactile is not None]
 
 
-def _pressed(before: TactileFrame, now: TactileFrame) -> Finding:
+def _pressed(before: TactileFrame, now: TactileFrame) -> DoctorFinding:
     """Where a press shows; it should be on the left map, in the lower rows, at high columns."""
     found = {}
     for side in ("left", "right"):
@@ -272,7 +274,7 @@ def _pressed(before: TactileFrame, now: TactileFrame) -> Finding:
     side = max(found, key=lambda s: found[s][0])
     depth, row, column = found[side]
     if depth < PRESSED_M:
-        return Finding("pads", "press", False, "no press was seen on either pad")
+        return DoctorFinding("pads", "press", False, "no press was seen on either pad")
     wrong = [] if side == "left" else ["the pads are swapped: exchange left_pad and right_pad"]
     if row < 0.5:
         wrong.append("rows run towards the flange: mount or number the sensor the other way round")
@@ -280,10 +282,10 @@ def _pressed(before: TactileFrame, now: TactileFrame) -> Finding:
         wrong.append("columns are mirrored: set mirror to the other pad")
     text = f"seen on the {side} map, {row * 100:.0f} % down and {column * 100:.0f} % along +x"
     values = {"side": side, "row": row, "column": column, "depth_m": depth}
-    return Finding("pads", "press", not wrong, "; ".join([text, *wrong]), values)
+    return DoctorFinding("pads", "press", not wrong, "; ".join([text, *wrong]), values)
 
 
-def walls(robot: Robot, world: World) -> Iterator[Finding]:
+def walls(robot: Robot, world: World) -> Iterator[DoctorFinding]:
     """Where the container is, by touch."""
     arm = Arm(robot.description, robot.limits, world, robot.period_s)
     arm.sync(robot.observe())
@@ -291,15 +293,15 @@ def walls(robot: Robot, world: World) -> Iterator[Finding]:
     try:
         found = drive(robot, touch_walls(arm, world, robot.observe))
     except MotionRefused as e:
-        yield Finding("walls", "touch", False, str(e))
+        yield DoctorFinding("walls", "touch", False, str(e))
         return
     if isinstance(found, str):
-        yield Finding("walls", "touch", False, found)
+        yield DoctorFinding("walls", "touch", False, found)
         return
     yield _registered(found)
 
 
-def _registered(found: Registration) -> Finding:
+def _registered(found: Registration) -> DoctorFinding:
     x, y, z = (1e3 * found.shift_K_m).tolist()
     yaw = float(np.degrees(found.yaw_rad))
     where, turn = found.pose_B_K.position_m.round(4).tolist(), float(np.degrees(found.pose_B_K.yaw_rad))
@@ -310,4 +312,4 @@ def _registered(found: Registration) -> Finding:
     )
     values = {"shift_K_m": found.shift_K_m.tolist(), "yaw_deg": yaw, "residual_m": found.residual_m}
     values |= {"peak_N": found.peak_N, "position_m": where, "pose_yaw_deg": turn}
-    return Finding("walls", "container", found.residual_m < 2e-3, text, values)
+    return DoctorFinding("walls", "container", found.residual_m < 2e-3, text, values)

@@ -21,7 +21,7 @@ SWAY_RAD, SWAY_S = 0.004, 4.0
 
 
 @runtime_checkable
-class Timed(Protocol):
+class LatencyReporting(Protocol):
     """A robot that knows how late its last cycle was.
 
     Attributes:
@@ -87,11 +87,11 @@ def run_study(study: LinkStudy, on_progress: Callable[[float], None] | None = No
             observation = robot.cycle(command)
             walls.append(time.perf_counter() - began)
             blocks.append(len(observation.stamp_s))
-            if isinstance(robot, Timed):
+            if isinstance(robot, LatencyReporting):
                 latencies.append(robot.latency_s)
             if on_progress is not None and k % 100 == 0:
                 on_progress(k * period_s)
-        late = robot.late_periods if isinstance(robot, Timed) else None
+        late = robot.late_periods if isinstance(robot, LatencyReporting) else None
     summary: dict[str, Any] = {
         "backend": study.backend,
         "options": dict(study.options),

@@ -31,7 +31,7 @@ SPREAD = 0.30
 
 
 @dataclass(frozen=True)
-class WallTouch:
+class WallContact:
     """One touch.
 
     Attributes:
@@ -68,7 +68,7 @@ class Registration:
     peak_N: float
 
 
-def solve(touches: list[WallTouch], floor_m: float, pose_B_K: Pose) -> Registration:
+def solve(touches: list[WallContact], floor_m: float, pose_B_K: Pose) -> Registration:
     """Least squares for a small shift t and turn d: n.t - d (n_x r_y - n_y r_x) = n.r - told for each touch at r."""
     rows, values = [], []
     for touch in touches:
@@ -107,7 +107,7 @@ def touch_walls(arm: Arm, world: World, observe: Callable[[], Observation]) -> M
     interior = world.container.interior_m
     half = 0.5 * np.array(interior[:2])
     long_axis = int(half[1] > half[0])
-    touches: list[WallTouch] = []
+    touches: list[WallContact] = []
     spread = SPREAD * float(half[long_axis])
     across, along_it = 1 - long_axis, long_axis
     for axis, side, along in (
@@ -152,7 +152,7 @@ def _lower(arm: Arm, world: World, observe: Callable[[], Observation], pose_B_P:
 
 def _touch_wall(
     arm: Arm, world: World, observe: Callable[[], Observation], axis: int, side: float, along: float
-) -> Motion[WallTouch | str]:
+) -> Motion[WallContact | str]:
     container = world.container
     reach = float(finger_outline_half_m(arm.description.gripper, 0.0)[axis])
     told = 0.5 * container.interior_m[axis]
@@ -172,7 +172,7 @@ def _touch_wall(
     name = f"wall {'+' if side > 0 else '-'}{'xy'[axis]}"
     if result.stop is None:
         return f"{name} was not met within {TOO_FAR_M * 1e3:.0f} mm beyond where it is told to be"
-    return WallTouch(name, normal[:2], place + reach * normal, told, guard.peak_N)
+    return WallContact(name, normal[:2], place + reach * normal, told, guard.peak_N)
 
 
 def _touch_floor(arm: Arm, world: World, observe: Callable[[], Observation]) -> Motion[float | str]:

@@ -1,7 +1,6 @@
-"""Fault plans, and the wrapper that makes them happen on any Robot: `FaultInjector(robot, plan, ...)`.
+"""Fault injection: checked fault plans, the catalogue of faults, and the robot wrapper that applies them.
 
-A plan is a checked YAML file (`plan`), a fault one of a catalogue (`catalogue`), its moment a trigger (`trigger`), what
-it does an effect (`effect`; `wrench`, `touch`, `gripper`, `arm`, `world`, `process`). `proof` says what happened.
+To add a fault, write its effect in `effects` and one row in `catalogue`.
 """
 
 from glotouch_bt.faults.catalogue import CATALOGUE, FaultKind
@@ -9,7 +8,7 @@ from glotouch_bt.faults.injector import FaultInjector
 from glotouch_bt.faults.models import wrong_models
 from glotouch_bt.faults.plan import FaultPlan, FaultSpec, check_plan, read_plan
 from glotouch_bt.faults.run_listener import ListeningRecord, injector_in
-from glotouch_bt.faults.trigger import Lasting, Repeat, When
+from glotouch_bt.faults.trigger import Duration, Repeat, When
 
 __all__ = [
     "CATALOGUE",
@@ -17,7 +16,7 @@ __all__ = [
     "FaultKind",
     "FaultPlan",
     "FaultSpec",
-    "Lasting",
+    "Duration",
     "ListeningRecord",
     "Repeat",
     "When",

@@ -1,4 +1,4 @@
-"""Every fault there is: its name, what it does, who should see it, and what counts as naming its cause."""
+"""The catalogue of faults: name, summary, effect, expected detector, and the words that name the cause."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from glotouch_bt.faults.effects import Effect, arm, gripper, model, process, world, wrench
-from glotouch_bt.faults.effects import tactile as touch
+from glotouch_bt.faults.effects import Effect, arm, gripper, model, process, tactile, world, wrench
 from glotouch_bt.mission.read import unit_of
 
 CHANNELS = ("wrench", "touch", "gripper", "arm", "world", "model", "process")
 
-NAMED_BY: Mapping[str, str] = {
+CAUSE_PATTERNS: Mapping[str, str] = {
     "wrench": r"wrench|wrist|force|torque|weigh|off_zero|hard_contact|\btare",
     "touch": r"tactile|depth map|\bpads?\b|taxel|\bgel|\bframes?\b",
     "gripper": r"jaw|gripper|aperture|\bgrip|clos(?:ed|ure)|tool_lost|slipped|\bheld\b|in the hand",
@@ -22,8 +21,8 @@ NAMED_BY: Mapping[str, str] = {
     "model": r"recognis|candidate|target|model|\bwide|fits?\b|object",
     "process": r"driver|cycle|overrun|control period|RuntimeError",
 }
-"""What counts as naming the cause, by channel: one of these words in a guard's finding, a skill's failure or the chain
-of reasons, after the fault began. Fixed before anything was measured."""
+"""Words that name the cause of a fault, by channel, in a guard's finding, a skill's failure or the chain of reasons
+after the fault began. Fixed before the first measurement."""
 
 
 @dataclass(frozen=True)
@@ -32,13 +31,12 @@ class FaultKind:
 
     Attributes:
         name: As written in a plan.
-        channel: What it is a fault of, one of `CHANNELS`.
-        summary: What it does.
-        effect: The class at work.
-        seen_by: Who should notice it, for people.
-        recoverable: A mission can still reach its goal: the fault passes or can be worked round. A device that gives
-            no numbers, old ones or ever the same, or goes beside its setpoints, is not trusted again before a person
-            has looked: it is not.
+        channel: Faulted part of the system, one of `CHANNELS`.
+        summary: One line for people.
+        effect: The class that applies it.
+        seen_by: Expected detector, for people.
+        recoverable: A mission can still reach its goal, because the fault passes or can be worked around. False for a
+            device that delivers no, old or constant data or leaves its setpoints: a person must check it first.
     """
 
     name: str
@@ -49,11 +47,11 @@ class FaultKind:
     recoverable: bool
 
     def named_in(self, text: str) -> bool:
-        """True if a text names what was faulted."""
-        return re.search(NAMED_BY[self.channel], text, re.IGNORECASE) is not None
+        """Return True if a text names the faulted part."""
+        return re.search(CAUSE_PATTERNS[self.channel], text, re.IGNORECASE) is not None
 
     def parameters(self) -> list[dict[str, Any]]:
-        """Each parameter: name, unit, default, what is valid, description."""
+        """Return name, unit, default, valid range and description of each parameter."""
         rows = []
         for name, field in self.effect.Params.model_fields.items():
             rules = [
@@ -77,7 +75,7 @@ class FaultKind:
         return rows
 
     def as_dict(self) -> dict[str, Any]:
-        """For --json."""
+        """Return the entry as JSON data."""
         return {
             "name": self.name,
             "channel": self.channel,
@@ -92,51 +90,51 @@ class FaultKind:
 def _kinds() -> Mapping[str, FaultKind]:
     watch, guard, tree = "supervision", "the guarded move or the hard limit", "the skill that meets it"
     rows: tuple[tuple[str, str, str, type[Effect], str, bool], ...] = (
-        ("wrench_off", "wrench", "every component reads zero", wrench.Off, watch, False),
-        ("wrench_stuck", "wrench", "the last sample is repeated", wrench.Stuck, watch, False),
-        ("wrench_garbage", "wrench", "samples are NaN, infinite or huge", wrench.Garbage, watch, False),
-        ("wrench_bias", "wrench", "a constant is added", wrench.Bias, guard + "; a new tare", True),
-        ("wrench_drift", "wrench", "a ramp is added", wrench.Drift, guard + "; a new tare", True),
-        ("wrench_scale", "wrench", "every component is multiplied", wrench.Scale, tree + ", by a weight", True),
-        ("wrench_noise", "wrench", "white noise is added", wrench.Noise, watch + "; " + tree, True),
-        ("wrench_delay", "wrench", "samples come late", wrench.Delay, "tool_calibrate, which measures it", True),
-        ("wrench_intermittent", "wrench", "whole blocks are lost", wrench.Intermittent, watch, True),
-        ("wrench_saturation", "wrench", "components are clipped", wrench.Saturation, watch, True),
-        ("wrench_sign_flip", "wrench", "all signs are wrong", wrench.SignFlip, tree + ", by a weight", True),
-        ("wrench_frame_flip", "wrench", "axes are turned about z", wrench.FrameFlip, "tool_calibrate", True),
+        ("wrench_off", "wrench", "every component reads zero", wrench.WrenchOff, watch, False),
+        ("wrench_stuck", "wrench", "the last sample is repeated", wrench.WrenchStuck, watch, False),
+        ("wrench_garbage", "wrench", "samples are NaN, infinite or huge", wrench.WrenchGarbage, watch, False),
+        ("wrench_bias", "wrench", "a constant is added", wrench.WrenchBias, guard + "; a new tare", True),
+        ("wrench_drift", "wrench", "a ramp is added", wrench.WrenchDrift, guard + "; a new tare", True),
+        ("wrench_scale", "wrench", "every component is multiplied", wrench.WrenchScale, tree + ", by a weight", True),
+        ("wrench_noise", "wrench", "white noise is added", wrench.WrenchNoise, watch + "; " + tree, True),
+        ("wrench_delay", "wrench", "samples come late", wrench.WrenchDelay, "tool_calibrate, which measures it", True),
+        ("wrench_intermittent", "wrench", "whole blocks are lost", wrench.WrenchIntermittent, watch, True),
+        ("wrench_saturation", "wrench", "components are clipped", wrench.WrenchSaturation, watch, True),
+        ("wrench_sign_flip", "wrench", "all signs are inverted", wrench.WrenchSignFlip, tree + ", by a weight", True),
+        ("wrench_frame_flip", "wrench", "axes are rotated about z", wrench.WrenchFrameFlip, "tool_calibrate", True),
         ("stale_tare", "wrench", "tares are acknowledged, not done", wrench.StaleTare, tree + ", by a weight", True),
-        ("touch_dead", "touch", "taxels deliver nothing", touch.Dead, "squeeze: fewer valid taxels", True),
-        ("touch_frozen", "touch", "one pair of maps comes again", touch.Frozen, watch + "; squeeze", True),
-        ("touch_dropped", "touch", "frames are lost", touch.Dropped, watch + "; squeeze", False),
-        ("touch_swapped", "touch", "left is given as right", touch.Swapped, "match", True),
-        ("gel_offset", "touch", "untouched gel reads a depth", touch.Offset, "squeeze; match", True),
-        ("grip_stall", "gripper", "the jaws stand still", gripper.Stall, tree, True),
-        ("grip_short", "gripper", "the jaws stop before what they are told", gripper.Short, tree, True),
+        ("touch_dead", "touch", "taxels deliver nothing", tactile.TouchDead, "squeeze: fewer valid taxels", True),
+        ("touch_frozen", "touch", "one pair of maps is repeated", tactile.TouchFrozen, watch + "; squeeze", True),
+        ("touch_dropped", "touch", "frames are lost", tactile.TouchDropped, watch + "; squeeze", False),
+        ("touch_swapped", "touch", "left is given as right", tactile.TouchSwapped, "match", True),
+        ("gel_offset", "touch", "untouched gel reads a depth", tactile.GelOffset, "squeeze; match", True),
+        ("grip_stall", "gripper", "the jaws do not move", gripper.GripStall, tree, True),
+        ("grip_short", "gripper", "the jaws stop short of their target", gripper.GripShort, tree, True),
         (
             "grip_slip",
             "gripper",
-            "the jaws press with a part of the told force",
-            gripper.Slip,
+            "the jaws press with a fraction of the commanded force",
+            gripper.GripSlip,
             "lift, by a weight",
             True,
         ),
-        ("grip_misreport", "gripper", "the reported aperture is wrong", gripper.Misreport, tree, True),
-        ("grip_drop", "gripper", "the jaws open for a moment: what they hold falls", gripper.Drop, tree, True),
-        ("following_error", "arm", "a joint goes beside its setpoint", arm.FollowingError, watch, False),
+        ("grip_misreport", "gripper", "the reported aperture is wrong", gripper.GripMisreport, tree, True),
+        ("grip_drop", "gripper", "the jaws open briefly and drop what they hold", gripper.GripDrop, tree, True),
+        ("following_error", "arm", "a joint deviates from its setpoint", arm.FollowingError, watch, False),
         ("joint_limit", "arm", "the device refuses setpoints near its own range", arm.JointLimit, watch, False),
         ("ik_failure", "arm", "the device finds no joint solution", arm.IkFailure, tree, False),
-        ("lost_cycle", "arm", "commands do not arrive", arm.LostCycle, watch, True),
+        ("lost_cycle", "arm", "commands are lost", arm.LostCycle, watch, True),
         ("slow_cycle", "arm", "cycles overrun, their samples are lost", arm.SlowCycle, watch, True),
         ("stale_data", "arm", "one old block is delivered again", arm.StaleData, watch, False),
         ("robot_fault", "arm", "the controller stops by itself", arm.RobotFault, "the runner", False),
-        ("object_shoved", "world", "an object is knocked and slides", world.Shove, tree, True),
-        ("object_toppled", "world", "an object is laid on its side", world.Topple, tree, True),
-        ("object_added", "world", "an object appears", world.Add, tree, True),
-        ("object_removed", "world", "an object is taken away", world.Remove, tree, False),
+        ("object_shoved", "world", "an object is knocked and slides", world.ObjectShoved, tree, True),
+        ("object_toppled", "world", "an object is laid on its side", world.ObjectToppled, tree, True),
+        ("object_added", "world", "an object appears", world.ObjectAdded, tree, True),
+        ("object_removed", "world", "an object is taken away", world.ObjectRemoved, tree, False),
         ("container_offset", "world", "the container is moved with its content", world.ContainerOffset, tree, True),
-        ("wrong_scale_stl", "model", "the target's STL has another size", model.WrongScale, "match", False),
-        ("exception", "process", "the driver raises an unknown error", process.Unexpected, "the runner", False),
-        ("hang", "process", "one cycle does not come back for a while", process.Hang, watch, True),
+        ("wrong_scale_stl", "model", "the target's STL has another size", model.WrongScaleStl, "match", False),
+        ("exception", "process", "the driver raises an unknown error", process.DriverException, "the runner", False),
+        ("hang", "process", "one cycle blocks for a while", process.Hang, watch, True),
         ("kill", "process", "the process is killed (SIGKILL)", process.Kill, "glotouch resume", False),
     )
     return {row[0]: FaultKind(*row) for row in rows}

@@ -1,10 +1,10 @@
-"""The wrong models a plan asks for, written and given to the mission before it is loaded for good."""
+"""Write the wrong models of a fault plan, to be passed to the mission as parameters."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from glotouch_bt.faults.effects import ScaleParams
+from glotouch_bt.faults.effects import WrongScaleStlParams
 from glotouch_bt.faults.plan import FaultPlan
 from glotouch_bt.mission import Mission
 from glotouch_bt.robot import BadInput
@@ -12,19 +12,19 @@ from glotouch_bt.robot.scene import load_mesh
 
 
 def wrong_models(plan: FaultPlan, mission: Mission, folder: Path) -> dict[str, str]:
-    """Write the wrong models of a plan and give them as mission parameters; empty if the plan has none.
+    """Write the wrong models of a plan; return them as mission parameters, empty if the plan has none.
 
     Args:
-        plan: A plan.
-        mission: Whose object parameters are replaced.
-        folder: Where the models go, each under its object's name.
+        plan: A fault plan.
+        mission: The mission whose stl parameters are replaced.
+        folder: Folder of the models, each named as its object.
 
     Raises:
-        BadInput: The mission takes no object, or its model cannot be scaled so.
+        BadInput: The mission has no stl parameter, or the scaled model is unusable.
     """
     given: dict[str, str] = {}
     for spec in plan.faults:
-        if not isinstance(spec.params, ScaleParams):
+        if not isinstance(spec.params, WrongScaleStlParams):
             continue
         if not mission.stl_parameters:
             raise BadInput(f"{spec.place}: {spec.name}: mission {mission.name!r} has no parameter of type stl")

@@ -1,7 +1,7 @@
-"""A fault plan: what shall go wrong and when, as a checked YAML file.
+"""Read and check a fault plan, a YAML file that says which faults happen when.
 
 faults: biased wrist
-seed: 7                     # of the faults' own draws; without it, the run's
+seed: 7                     # of the faults' random draws; default: the run's
 plan:
   - fault: wrench_bias
     with: {force_N: [0, 0, 3]}
@@ -20,7 +20,7 @@ from pydantic import BaseModel
 
 from glotouch_bt.faults.catalogue import CATALOGUE, FaultKind
 from glotouch_bt.faults.effects import FaultParams
-from glotouch_bt.faults.trigger import Lasting, Repeat, When, matches
+from glotouch_bt.faults.trigger import Duration, Repeat, When, matches
 from glotouch_bt.mission.read import find_shipped, read_yaml, shown, validate
 from glotouch_bt.mission.spec import Findings, Map, MissionFaults, Node, NodeSpec, Place, Scalar, Seq, split_quantity
 
@@ -36,29 +36,29 @@ class FaultSpec:
     """One fault of a plan.
 
     Attributes:
-        name: For reports; by default the kind's, numbered if it comes twice.
-        kind: What it is.
+        name: For reports; by default the kind's name, numbered if it occurs twice.
+        kind: Its entry of the catalogue.
         params: Its parameters.
-        when, lasting, repeat: Its moments.
-        place: Where it stands.
-        node_place: Where the name of its node stands, if it has one.
+        when, duration, repeat: When it starts, how long it lasts, how often it comes.
+        place: Its place in the file.
+        node_place: Place of its node's name, if it has one.
     """
 
     name: str
     kind: FaultKind
     params: FaultParams
     when: When
-    lasting: Lasting
+    duration: Duration
     repeat: Repeat
     place: Place
     node_place: Place | None = None
 
     def requested(self) -> dict[str, object]:
-        """What was asked for, as plain data."""
+        """Return the requested fault as JSON data."""
         return {
             "with": self.params.model_dump(mode="json"),
             "when": self.when.model_dump(mode="json", exclude_defaults=True),
-            "for": self.lasting.model_dump(mode="json", exclude_defaults=True),
+            "for": self.duration.model_dump(mode="json", exclude_defaults=True),
             "repeat": self.repeat.model_dump(mode="json", exclude_defaults=True),
         }
 
@@ -69,9 +69,9 @@ class FaultPlan:
 
     Attributes:
         name: Its name.
-        faults: In the order of the file; where two change the same samples, the later one has the last word.
-        seed: Of the faults' draws; None: the run's.
-        description: For people.
+        faults: In the order of the file. If two change the same samples, the later one is applied last.
+        seed: Seed of the faults' draws; None: the run's.
+        description: Text for people.
     """
 
     name: str
@@ -90,19 +90,19 @@ def read_plan(given: str | Path, tree: NodeSpec | None = None, root: str = "") -
 
     Args:
         given: A path, or the name of a shipped plan.
-        tree: The mission's tree; every `when: {node: ...}` must then fit one of its nodes.
-        root: The mission's name, first word of every path.
+        tree: The mission's tree; every `when: {node: ...}` must then match one of its nodes.
+        root: The mission's name, first part of every path.
 
     Raises:
-        MissionFaults: Everything that is wrong with it, each with its place. (A `BadInput`.)
-        BadInput: It cannot be read at all.
+        MissionFaults: The plan is wrong; lists every finding with its place. (A `BadInput`.)
+        BadInput: The file cannot be read.
     """
     path = find_shipped("faults", str(given), "fault plan")
     return check_plan(read_yaml(path, shown(path)), tree, root)
 
 
 def check_plan(source: Node, tree: NodeSpec | None = None, root: str = "") -> FaultPlan:
-    """Check a plan that has been read; errors as in `read_plan`."""
+    """Check a plan that has been read; raises as `read_plan`."""
     findings = Findings()
     plan = _plan(source, findings)
     if plan is not None and tree is not None:
@@ -170,14 +170,14 @@ def _fault(source: Node, taken: set[str], findings: Findings) -> FaultSpec | Non
         findings.unknown(node.place if node else source.place, "unknown_fault", "fault", word, CATALOGUE)
     params = None if kind is None else _model(kind.effect.Params, source, "with", f"fault {word!r}", findings)
     when = _model(When, source, "when", "'when'", findings)
-    lasting = _lasting(source, when, findings)
+    duration = _lasting(source, when, findings)
     repeat = _model(Repeat, source, "repeat", "'repeat'", findings)
     if when is not None:
         _check_when(source, when, findings)
-    if lasting is not None and repeat is not None and lasting.until == "ever" and repeat.times > 1:
-        what = "repeat: what lasts for ever does not begin again"
+    if duration is not None and repeat is not None and duration.until == "ever" and repeat.times > 1:
+        what = "repeat: a fault that lasts for ever cannot repeat"
         findings.add(source.key_place("repeat"), "wrong_value", what, valid="for: 2 s, {cycles: 20} or node")
-    if kind is None or params is None or when is None or lasting is None or repeat is None:
+    if kind is None or params is None or when is None or duration is None or repeat is None:
         return None
     base = _text(source, "name", findings) or word
     name, n = base, 2
@@ -186,11 +186,11 @@ def _fault(source: Node, taken: set[str], findings: Findings) -> FaultSpec | Non
     taken.add(name)
     moment = source.get("when")
     node = moment.get("node") if isinstance(moment, Map) else None
-    return FaultSpec(name, kind, params, when, lasting, repeat, source.place, node.place if node else None)
+    return FaultSpec(name, kind, params, when, duration, repeat, source.place, node.place if node else None)
 
 
 def _check_when(source: Map, when: When, findings: Findings) -> None:
-    """What can never hold, and what would not be looked at."""
+    """Report conditions that can never hold and keys without effect."""
     given = source.get("when")
     at = given if isinstance(given, Map) else source
     for sensed, unit in (("force", "N"), ("aperture", "m")):
@@ -200,7 +200,7 @@ def _check_when(source: Map, when: When, findings: Findings) -> None:
             findings.add(at.key_place(f"{sensed}_below_{unit}"), "wrong_value", what)
     for key in ("visit", "after_s"):
         if when.node is None and key in when.model_fields_set:
-            what = f"when: {key} is of a node, and 'when' names none"
+            what = f"when: {key} needs a node, and 'when' names none"
             findings.add(at.key_place(key), "wrong_value", what, valid="add node: NAME; time_s is the mission's time")
 
 
@@ -214,23 +214,23 @@ def _model(model: type[M], source: Map, key: str, what: str, findings: Findings)
     return validate(model, node, what, findings)
 
 
-def _lasting(source: Map, when: When | None, findings: Findings) -> Lasting | None:
-    """`for: 2 s`, `for: ever`, `for: node` or a mapping; by default until the node ends, or for ever."""
+def _lasting(source: Map, when: When | None, findings: Findings) -> Duration | None:
+    """Read `for`: a time, `ever`, `node` or a mapping; by default until the node ends, or for ever."""
     node = source.get("for")
     has_node = when is not None and when.node is not None
     if node is None:
-        return Lasting(until="node" if has_node else "ever")
+        return Duration(until="node" if has_node else "ever")
     words = "ever, node, a time such as 2 s, {duration_s: ...} or {cycles: ...}"
     if isinstance(node, Map):
-        made = validate(Lasting, node, "'for'", findings)
+        made = validate(Duration, node, "'for'", findings)
         if made is not None and len(node.entries) != 1:
-            findings.add(node.place, "wrong_value", "for: exactly one of its keys", valid=words)
+            findings.add(node.place, "wrong_value", "for: give exactly one key", valid=words)
             return None
     elif isinstance(node, Scalar) and node.value in ("ever", "node"):
-        made = Lasting(until="node" if node.value == "node" else "ever")
+        made = Duration(until="node" if node.value == "node" else "ever")
     elif isinstance(node, Scalar) and (_is_number(node.value) or split_quantity(str(node.value))):
         key = Scalar("duration_s", node.place)
-        made = validate(Lasting, Map(((key, node),), node.place), "'for'", findings)
+        made = validate(Duration, Map(((key, node),), node.place), "'for'", findings)
     else:
         findings.add(node.place, "wrong_type", "for: cannot be read", valid=words)
         return None
@@ -245,25 +245,11 @@ def _is_number(value: object) -> bool:
 
 
 def _check_nodes(plan: FaultPlan, tree: NodeSpec, root: str, findings: Findings) -> None:
-    paths = dict(_paths(tree, root))
+    paths = tree.paths(root)
     for fault in plan.faults:
         pattern = fault.when.node
         if pattern is None or any(matches(p, pattern) for p in paths):
             continue
         names = sorted({p.rsplit("/", 1)[-1] for p in paths})
-        findings.unknown(
-            fault.node_place or fault.place, "unknown_node", f"node of fault {fault.name!r}:", pattern, names
-        )
-
-
-def _paths(tree: NodeSpec, above: str) -> list[tuple[str, NodeSpec]]:
-    found, stack = [], [(tree, above)]
-    while stack:
-        node, before = stack.pop()
-        path = f"{before}/{node.name}"
-        found.append((path, node))
-        stack.extend((c, path) for c in node.children)
-    return found
-
-
-__all__ = ["FaultPlan", "FaultSpec", "check_plan", "read_plan"]
+        at = fault.node_place or fault.place
+        findings.unknown(at, "unknown_node", f"node of fault {fault.name!r}:", pattern, names)

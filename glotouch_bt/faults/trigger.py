@@ -1,4 +1,4 @@
-"""When a fault begins and ends: a moment, a node that runs, a call of the seam, a condition on what is sensed."""
+"""Triggers: when a fault starts and ends, by time, running node, number of calls, or sensed values."""
 
 from __future__ import annotations
 
@@ -14,52 +14,52 @@ from glotouch_bt.skill import param
 
 
 class When(BaseModel):
-    """All that is given must hold at once, at the beginning of a control period; nothing given: from the start."""
+    """Start condition. All given keys must hold at the start of a control period; without keys it holds at once."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     time_s: float | None = param("Robot time since the mission began", unit="s", default=None, ge=0.0)
-    node: str | None = param("A node runs: name or path, with * and ?", default=None, min_length=1)
-    visit: int = param("It runs for the n-th time, or a later one", default=1, ge=1)
-    after_s: float = param("It has run for so long", unit="s", default=0.0, ge=0.0)
-    cycle: int | None = param("Control periods done", default=None, ge=0)
-    call: int | None = param("Calls of the seam done: observe, cycle, start", default=None, ge=0)
-    force_above_N: float | None = param("The device's force, norm of the newest sample", unit="N", default=None, ge=0.0)
-    force_below_N: float | None = param("The same", unit="N", default=None, ge=0.0)
-    aperture_above_m: float | None = param("The device's aperture", unit="m", default=None, ge=0.0)
-    aperture_below_m: float | None = param("The same", unit="m", default=None, ge=0.0)
-    height_below_m: float | None = param("Height of the pads' mid-point in B", unit="m", default=None)
+    node: str | None = param("This node runs: name or path, with * and ?", default=None, min_length=1)
+    visit: int = param("It runs for at least the n-th time", default=1, ge=1)
+    after_s: float = param("It has run for this long", unit="s", default=0.0, ge=0.0)
+    cycle: int | None = param("Number of control periods done", default=None, ge=0)
+    call: int | None = param("Number of robot calls done: observe, cycle, start", default=None, ge=0)
+    force_above_N: float | None = param("Sensed force (newest sample) is above", unit="N", default=None, ge=0.0)
+    force_below_N: float | None = param("Sensed force is below", unit="N", default=None, ge=0.0)
+    aperture_above_m: float | None = param("Sensed aperture is above", unit="m", default=None, ge=0.0)
+    aperture_below_m: float | None = param("Sensed aperture is below", unit="m", default=None, ge=0.0)
+    height_below_m: float | None = param("Height of the pads' mid-point in B is below", unit="m", default=None)
 
 
-class Lasting(BaseModel):
-    """How long a fault lasts; one of these."""
+class Duration(BaseModel):
+    """Duration of a fault: exactly one of the keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     duration_s: float | None = param("Robot time", unit="s", default=None, gt=0.0)
     cycles: int | None = param("Control periods", default=None, ge=1)
-    until: Literal["node", "ever"] | None = Field(default=None, description="node: until that node ends; ever: no end")
+    until: Literal["node", "ever"] | None = Field(default=None, description="node: until it ends; ever: without end")
 
 
 class Repeat(BaseModel):
-    """How often a fault comes."""
+    """Repetition of a fault."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    times: int = param("How often at most", default=1, ge=1, le=100_000)
-    every_s: float = param("Least time between two beginnings", unit="s", default=0.0, ge=0.0)
+    times: int = param("Largest number of starts", default=1, ge=1, le=100_000)
+    every_s: float = param("Least time between two starts", unit="s", default=0.0, ge=0.0)
 
 
 @dataclass
-class Moment:
-    """What triggers look at; the injector keeps it up to date.
+class TriggerState:
+    """The state that triggers are evaluated on; updated by the injector.
 
     Attributes:
         start_s: Robot clock at the start.
         sensed: The newest block as the device delivered it.
-        cycles, calls: Control periods and calls of the seam so far.
-        running: Since when each running node runs, by path.
-        visits: How often each node has begun.
+        cycles, calls: Control periods and robot calls so far.
+        running: Robot clock at which each running node started, by path.
+        visits: Number of starts of each node, by path.
     """
 
     start_s: float
@@ -76,12 +76,12 @@ class Moment:
 
 
 def matches(path: str, pattern: str) -> bool:
-    """True if a node's path, or its name, fits a pattern."""
+    """Return True if a node's path or name matches a pattern."""
     return fnmatchcase(path, pattern) or fnmatchcase(path.rsplit("/", 1)[-1], pattern)
 
 
-def running_node(when: When, moment: Moment) -> str | None:
-    """Path of the running node a trigger waits for, if it has run as often and as long as asked."""
+def running_node(when: When, moment: TriggerState) -> str | None:
+    """Return the path of the running node that satisfies a trigger, or None."""
     if when.node is None:
         return None
     for path, since_s in moment.running.items():
@@ -94,8 +94,8 @@ def running_node(when: When, moment: Moment) -> str | None:
     return None
 
 
-def holds(when: When, moment: Moment) -> bool:
-    """True if the fault shall begin now (the node apart, see `running_node`)."""
+def condition_holds(when: When, moment: TriggerState) -> bool:
+    """Return True if every condition except the node holds; for the node see `running_node`."""
     if when.time_s is not None and moment.now_s - moment.start_s < when.time_s - 1e-9:
         return False
     if when.cycle is not None and moment.cycles < when.cycle:

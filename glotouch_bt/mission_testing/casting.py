@@ -25,16 +25,7 @@ class ScriptError(BadInput):
 
 def paths_of(root: NodeSpec, title: str) -> dict[str, NodeSpec]:
     """Return every node by its path, as the runner names it."""
-    found: dict[str, NodeSpec] = {}
-
-    def visit(node: NodeSpec, above: str) -> None:
-        path = f"{above}/{node.name}"
-        found[path] = node
-        for child in node.children:
-            visit(child, path)
-
-    visit(root, title)
-    return found
+    return root.paths(title)
 
 
 def leaves_of(root: NodeSpec, title: str) -> dict[str, NodeSpec]:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from glotouch_bt.report.page import esc, legend, number, section
-from glotouch_bt.report.run_record import Event, RunRecord
-from glotouch_bt.report.svg import Scale, label, picture, polyline, x_axis, y_axis
+from glotouch_bt.report.run_record import RecordedEvent, RunRecord
+from glotouch_bt.report.svg import AxisScale, label, picture, polyline, x_axis, y_axis
 from glotouch_bt.robot import Array
 
 BINS = 1000
@@ -17,13 +17,13 @@ CLOSE_UPS = 48
 CLOSE_UP_S = 0.12
 
 
-def contact_of(event: Event) -> dict[str, Any]:
+def contact_of(event: RecordedEvent) -> dict[str, Any]:
     """The contact an event carries; empty if it has none."""
     value = event.data.get("contact")
     return value if isinstance(value, dict) else {}
 
 
-def contact_stamp_s(event: Event) -> float:
+def contact_stamp_s(event: RecordedEvent) -> float:
     """Robot clock at the onset of an event's contact."""
     stamp = contact_of(event).get("stamp_s")
     return float(stamp) if isinstance(stamp, int | float) else event.stamp_s
@@ -60,11 +60,11 @@ def force_section(record: RunRecord) -> str:
     return section("Force", lead, body)
 
 
-def _trace(record: RunRecord, stamp: Array, force: Array, contacts: list[Event]) -> str:
+def _trace(record: RunRecord, stamp: Array, force: Array, contacts: list[RecordedEvent]) -> str:
     width, left, right = 1060.0, 46.0, 1050.0
     top, bottom = 34.0, 214.0
-    x = Scale(float(stamp[0]), float(stamp[-1]), left, right)
-    y = Scale(0.0, max(float(force.max()) * 1.12, 1.0), bottom, top)
+    x = AxisScale(float(stamp[0]), float(stamp[-1]), left, right)
+    y = AxisScale(0.0, max(float(force.max()) * 1.12, 1.0), bottom, top)
     t, low, _, high = envelope(stamp, force, BINS)
     px = x(t)
     out = [x_axis(x, top, bottom, ""), y_axis(y, left, right, "force, N")]
@@ -93,7 +93,7 @@ def _trace(record: RunRecord, stamp: Array, force: Array, contacts: list[Event])
     if len(cycles.get("stamp_s", ())) > 1:
         top2, bottom2 = bottom + 52, bottom + 122
         aperture = np.nan_to_num(cycles["gripper_aperture_m"]) * 1e3
-        y2 = Scale(0.0, max(float(aperture.max()) * 1.1, 1.0), bottom2, top2)
+        y2 = AxisScale(0.0, max(float(aperture.max()) * 1.1, 1.0), bottom2, top2)
         out.append(x_axis(x, top2, bottom2, "robot clock, s"))
         out.append(y_axis(y2, left, right, "jaw opening, mm", about=3))
         t2, low2, median2, high2 = envelope(cycles["stamp_s"], aperture, BINS)
@@ -103,7 +103,7 @@ def _trace(record: RunRecord, stamp: Array, force: Array, contacts: list[Event])
     return picture(width, height, "".join(out), "wrist force over time with contact stops")
 
 
-def _close_ups(stamp: Array, force_S_N: Array, contacts: list[Event]) -> str:
+def _close_ups(stamp: Array, force_S_N: Array, contacts: list[RecordedEvent]) -> str:
     """One small chart a contact: the force's change around the onset."""
     figures: list[str] = []
     for i, e in enumerate(contacts[:CLOSE_UPS]):
@@ -114,8 +114,8 @@ def _close_ups(stamp: Array, force_S_N: Array, contacts: list[Event]) -> str:
         force = np.nan_to_num(force_S_N[a:b])
         before = stamp[a:b] < at - 0.02
         change = np.linalg.norm(force - (force[before].mean(axis=0) if before.any() else force[0]), axis=1)
-        x = Scale(-CLOSE_UP_S, CLOSE_UP_S, 2, 148)
-        y = Scale(0.0, max(float(change.max()) * 1.1, 1.0), 52, 6)
+        x = AxisScale(-CLOSE_UP_S, CLOSE_UP_S, 2, 148)
+        y = AxisScale(0.0, max(float(change.max()) * 1.1, 1.0), 52, 6)
         step = max(1, len(change) // 120)
         body = (
             '<line x1="2" x2="148" y1="52" y2="52" class="axis"/>'

@@ -10,7 +10,7 @@ from glotouch_bt.perception.touch import Contour
 from glotouch_bt.report.force import contact_of
 from glotouch_bt.report.page import esc, legend, number, section, table
 from glotouch_bt.report.run_record import RunRecord
-from glotouch_bt.report.svg import Scale, label, picture, points, polyline
+from glotouch_bt.report.svg import AxisScale, label, picture, points, polyline
 from glotouch_bt.report.truth import TrueOutline, true_outlines
 from glotouch_bt.robot import Array
 
@@ -96,15 +96,15 @@ def _picture(
     width = 1060.0
     scale = (width - 60) / (2 * (half_x + margin))
     height = 2 * (half_y + margin) * scale + 40
-    x = Scale(-half_x - margin, half_x + margin, 44, width - 16)
-    y = Scale(-half_y - margin, half_y + margin, height - 34, 6)
+    x = AxisScale(-half_x - margin, half_x + margin, 44, width - 16)
+    y = AxisScale(-half_y - margin, half_y + margin, height - 34, 6)
     left, right, low, high = x.at(-half_x), x.at(half_x), y.at(-half_y), y.at(half_y)
     out = []
-    for v in Scale(-half_x * 1e3, half_x * 1e3, 0, 1).ticks(9):
+    for v in AxisScale(-half_x * 1e3, half_x * 1e3, 0, 1).ticks(9):
         px = x.at(v * 1e-3)
         out.append(f'<line x1="{px:.1f}" x2="{px:.1f}" y1="{high:.1f}" y2="{low:.1f}" class="grid"/>')
         out.append(label(px, low + 28, f"{v:.0f}".replace("-", "−"), "m"))
-    for v in Scale(-half_y * 1e3, half_y * 1e3, 0, 1).ticks(7):
+    for v in AxisScale(-half_y * 1e3, half_y * 1e3, 0, 1).ticks(7):
         py = y.at(v * 1e-3)
         out.append(f'<line x1="{left:.1f}" x2="{right:.1f}" y1="{py:.1f}" y2="{py:.1f}" class="grid"/>')
         out.append(label(left - 14, py + 4, f"{v:.0f}".replace("-", "−"), "e"))
@@ -169,7 +169,7 @@ def _picture(
     return picture(width, height, "".join(out + names), "map of the container") + (legend(keys) if keys else "")
 
 
-def _path(record: RunRecord, x: Scale, y: Scale, interior: tuple[float, float, float]) -> str:
+def _path(record: RunRecord, x: AxisScale, y: AxisScale, interior: tuple[float, float, float]) -> str:
     """The probe's path inside the container, broken where it leaves it."""
     tip = tip_path_K_m(record)
     if len(tip) == 0 or not np.isfinite(tip).any():
@@ -184,7 +184,7 @@ def _path(record: RunRecord, x: Scale, y: Scale, interior: tuple[float, float, f
     return "".join(f'<polyline points="{points(x(p[:, 0]), y(p[:, 1]))}" style="{style}"/>' for p in runs if len(p) > 1)
 
 
-def _jaws(record: RunRecord, x: Scale, y: Scale) -> list[str]:
+def _jaws(record: RunRecord, x: AxisScale, y: AxisScale) -> list[str]:
     """The two pads at every stable closure, as lines along x_P at half the aperture to either side."""
     out: list[str] = []
     for e in record.of_kind("touchset"):

@@ -7,7 +7,7 @@ from typing import Any
 
 from glotouch_bt.report.page import esc, legend, number, section, table
 from glotouch_bt.report.run_record import RunRecord
-from glotouch_bt.report.svg import Scale, label, picture, x_axis
+from glotouch_bt.report.svg import AxisScale, label, picture, x_axis
 
 COLOURS = 6
 
@@ -60,7 +60,7 @@ def _share_bars(shares: list[tuple[str, float]]) -> str:
     """One bar a hypothesis, from 0 to 1."""
     width, left, right, row, top = 1060.0, 110.0, 980.0, 30.0, 14.0
     bottom = top + row * len(shares)
-    x = Scale(0.0, 1.0, left, right)
+    x = AxisScale(0.0, 1.0, left, right)
     out = [x_axis(x, top - 6, bottom, "probability", about=8)]
     for i, (name, share) in enumerate(shares):
         y = top + row * i
@@ -118,7 +118,7 @@ def _bars(matches: list[dict[str, Any]], names: list[str]) -> str:
         return ""
     width, left, right, row, top = 1060.0, 110.0, 980.0, 30.0, 14.0
     bottom = top + row * len(matches)
-    x = Scale(0.0, max(max(_loss(m) for m in finite), 1e-9) * 1.02, left, right)
+    x = AxisScale(0.0, max(max(_loss(m) for m in finite), 1e-9) * 1.02, left, right)
     out = [x_axis(x, top - 6, bottom, "loss", about=8)]
     split = all(_adds_up(m) for m in finite)
     for i, m in enumerate(matches):

@@ -31,7 +31,7 @@ _SCHEMA, _CHANNEL, _MESSAGE = 0x03, 0x04, 0x05
 
 
 @dataclass(frozen=True)
-class Event:
+class RecordedEvent:
     """Something a skill found or decided: `data` as plain JSON (arrays are nested lists)."""
 
     stamp_s: float
@@ -81,12 +81,12 @@ class RunRecord:
     samples: dict[str, Array] = field(default_factory=dict)
     cycles: dict[str, Array] = field(default_factory=dict)
     tactile: dict[str, Array] = field(default_factory=dict)
-    events: list[Event] = field(default_factory=list)
+    events: list[RecordedEvent] = field(default_factory=list)
     ticks: list[Tick] = field(default_factory=list)
     ports: list[PortWrite] = field(default_factory=list)
     complete: bool = False
 
-    def of_kind(self, *kinds: str) -> list[Event]:
+    def of_kind(self, *kinds: str) -> list[RecordedEvent]:
         """The events of these kinds."""
         return [e for e in self.events if e.kind in kinds]
 
@@ -239,7 +239,7 @@ def _take(record: RunRecord, packed: dict[str, list[dict[str, Array]]], topic: s
     elif topic == "/tree/ports":
         record.ports.append(PortWrite(stamp_s, content["key"], content["value"]))
     elif isinstance(content.get("data"), dict):
-        record.events.append(Event(stamp_s, content["kind"], content["data"]))
+        record.events.append(RecordedEvent(stamp_s, content["kind"], content["data"]))
 
 
 def _json_file(path: Path) -> Any:

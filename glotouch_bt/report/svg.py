@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 
 @dataclass(frozen=True)
-class Scale:
+class AxisScale:
     """A linear map of values `low`..`high` to pixels `start`..`end`."""
 
     low: float
@@ -61,7 +61,7 @@ def tick_text(value: float) -> str:
     return f"{value:.10g}".replace("-", "−")
 
 
-def x_axis(scale: Scale, top: float, bottom: float, title: str, about: int = 9) -> str:
+def x_axis(scale: AxisScale, top: float, bottom: float, title: str, about: int = 9) -> str:
     """Grid lines, tick labels and the title under a chart."""
     out = []
     for t in scale.ticks(about):
@@ -73,7 +73,7 @@ def x_axis(scale: Scale, top: float, bottom: float, title: str, about: int = 9) 
     return "".join(out)
 
 
-def y_axis(scale: Scale, left: float, right: float, title: str, about: int = 5) -> str:
+def y_axis(scale: AxisScale, left: float, right: float, title: str, about: int = 5) -> str:
     """Grid lines, tick labels and the title above a chart."""
     out = []
     for t in scale.ticks(about):

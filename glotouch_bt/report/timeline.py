@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from glotouch_bt.report.page import esc, legend, section
 from glotouch_bt.report.run_record import RunRecord
-from glotouch_bt.report.svg import Scale, label, picture, x_axis
+from glotouch_bt.report.svg import AxisScale, label, picture, x_axis
 
 ROWS = 60
 _COLOUR = {"SUCCESS": "var(--good)", "FAILURE": "var(--bad)"}
@@ -51,7 +51,7 @@ def timeline_section(record: RunRecord) -> str:
     start_s, end_s = record.span_s
     width, left, right, row, top = 1060.0, 250.0, 1050.0, 22.0, 8.0
     bottom = top + row * len(nodes) + 4
-    x = Scale(start_s, max(end_s, start_s + 1e-3), left, right)
+    x = AxisScale(start_s, max(end_s, start_s + 1e-3), left, right)
     out = [x_axis(x, top, bottom, "robot clock, s")]
     lines = {n: i for i, n in enumerate(nodes)}
     for n, i in lines.items():

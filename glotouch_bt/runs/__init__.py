@@ -4,7 +4,7 @@ from glotouch_bt.runs.folder import RunFolder
 from glotouch_bt.runs.launch import RunRequest, RunResult, launch
 from glotouch_bt.runs.result import installed_versions
 from glotouch_bt.runs.resume import resume
-from glotouch_bt.runs.resume_point import EARLIER, ResumableRun, copy_run, find
+from glotouch_bt.runs.resume_point import EARLIER, ResumableRun, copy_run, find_resumable
 
 __all__ = [
     "EARLIER",
@@ -13,7 +13,7 @@ __all__ = [
     "RunRequest",
     "RunResult",
     "copy_run",
-    "find",
+    "find_resumable",
     "installed_versions",
     "launch",
     "resume",

@@ -1,4 +1,4 @@
-"""A run's folder: made writable before anything moves, its files written whole or not at all."""
+"""The folder of a run: checked for writing before anything moves, its files written atomically."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LEFT_BY_SQLITE = ("checkpoint.sqlite-wal", "checkpoint.sqlite-shm")
 
 
 @contextmanager
-def claimed(folder: Path) -> Iterator[None]:
+def locked(folder: Path) -> Iterator[None]:
     """Lock a folder for this process until the block or the process ends.
 
     Raises:
@@ -39,13 +39,13 @@ def claimed(folder: Path) -> Iterator[None]:
 
 
 class RunFolder:
-    """Where one run is kept.
+    """The folder of one run.
 
     Args:
-        path: The folder; it may exist, and then this run's files replace those of an earlier run.
+        path: The folder; in an existing one this run's files replace those of an earlier run.
 
     Raises:
-        BadInput: It cannot be made or written to.
+        BadInput: It cannot be created or written to.
     """
 
     def __init__(self, path: Path) -> None:
@@ -57,12 +57,12 @@ class RunFolder:
             trial.write_bytes(b"")
             trial.unlink()
         except OSError as e:
-            self.abandon()
+            self.discard()
             raise BadInput(f"{path}: a run's folder cannot be written here ({e.strerror})") from e
 
     @classmethod
-    def named(cls, mission: str, seed: int, runs: Path = Path("runs")) -> RunFolder:
-        """A new folder `runs/<time>-<mission>-s<seed>`."""
+    def timestamped(cls, mission: str, seed: int, runs: Path = Path("runs")) -> RunFolder:
+        """Create a folder `runs/<time>-<mission>-s<seed>`."""
         stem = f"{datetime.now():%Y%m%d-%H%M%S}-{mission}-s{seed}"
         path, n = runs / stem, 2
         while path.exists():
@@ -82,21 +82,21 @@ class RunFolder:
             raise BadInput(f"{self.path}: holds an earlier run; give another folder, or --overwrite to replace it")
 
     def clear(self) -> None:
-        """Remove what an earlier run left under this run's names; call when this run is sure to begin."""
+        """Remove the files of an earlier run; call when this run is certain to start."""
         for name in (*FILES, *LEFT_BY_SQLITE):
             (self.path / name).unlink(missing_ok=True)
         shutil.rmtree(self.path / "earlier", ignore_errors=True)
 
-    def abandon(self) -> None:
-        """The run did not begin: remove what was made for it."""
+    def discard(self) -> None:
+        """Remove the folders that were created for this run, because it does not start."""
         if self._made is not None:
             shutil.rmtree(self._made, ignore_errors=True)
 
     def write_text(self, name: str, text: str) -> None:
-        """Write a file whole or not at all.
+        """Write a file atomically.
 
         Raises:
-            GlotouchError: The disk refused.
+            GlotouchError: The file cannot be written.
         """
         target, part = self.path / name, self.path / f".{name}.part"
         try:
@@ -110,12 +110,12 @@ class RunFolder:
             raise GlotouchError(f"{target}: cannot be written ({e.strerror})") from e
 
     def write_json(self, name: str, data: Mapping[str, object]) -> None:
-        """Write JSON whole or not at all; errors as in `write_text`."""
+        """Write JSON atomically; raises as `write_text`."""
         self.write_text(name, json.dumps(data, indent=2, allow_nan=False) + "\n")
 
 
 def _first_missing(path: Path) -> Path | None:
-    """The topmost folder that `mkdir(parents=True)` would make, or None."""
+    """Return the topmost folder that `mkdir(parents=True)` would create, or None."""
     missing: Path | None = None
     for folder in (path, *path.parents):
         if os.path.exists(folder):  # unlike Path.exists, false for names that no folder can have

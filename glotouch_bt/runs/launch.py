@@ -1,6 +1,6 @@
-"""One mission on one backend, from the command line's words to a run's folder with its result.
+"""Launch a run: check the request, open the backend, run the mission, and write the run's folder.
 
-Only here, and in the report, is the truth of a simulated world looked at, after the run, for scoring.
+The truth of a simulated world is read only here and in the report, after the run, for scoring.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from typing import Any
 from glotouch_bt.faults import FaultInjector, FaultPlan, ListeningRecord, injector_in, read_plan, wrong_models
 from glotouch_bt.lazy import load_all
 from glotouch_bt.mission import Mission, load_mission, split_settings
-from glotouch_bt.mission.checkpoint import FILE as CHECKPOINTS
+from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE
 from glotouch_bt.mission.checkpoint import CheckpointFile, CheckpointWriter, ResumePoint
 from glotouch_bt.mission.execution import Control, Outcome, Stuck, deferred_interrupt, run_mission
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import Record, Recorder, RunSummary
 from glotouch_bt.robot import Backend, BadInput, Conditions, GlotouchError, Robot, load_backend
 from glotouch_bt.robot.simulation import Referee, TrueObject
-from glotouch_bt.runs.folder import RunFolder, claimed
+from glotouch_bt.runs.folder import RunFolder, locked
 from glotouch_bt.runs.request import RunRequest, RunResult
 from glotouch_bt.runs.result import description, installed_versions, mission_yaml, score, truth
-from glotouch_bt.runs.resume_point import ResumableRun, describe_run
+from glotouch_bt.runs.resume_point import ResumableRun, describe_checkpointed_run
 
-LARGEST_SEED = 2**32 - 1
+MAX_SEED = 2**32 - 1
 
-__all__ = ["LARGEST_SEED", "RunRequest", "RunResult", "launch"]
+__all__ = ["MAX_SEED", "RunRequest", "RunResult", "launch"]
 
 
 def launch(
@@ -42,22 +42,22 @@ def launch(
     control: Control | None = None,
     resumable: ResumableRun | None = None,
 ) -> RunResult:
-    """Check everything, open the backend, run the mission, score it, write the run's folder.
+    """Check the request, open the backend, run the mission, score it, and write the run's folder.
 
     Args:
-        request: What to run.
+        request: The requested run.
         on_start: Called with the mission and its folder once the backend is open.
         on_progress: As in `run_mission`.
-        control: Who may pause and stop it.
-        resumable: A broken-off run to go on with, in its own folder (`study.resume`).
+        control: Source of pause and stop requests.
+        resumable: An interrupted run to resume, in its own folder (`resume`).
 
     Raises:
-        BadInput: Something given is wrong; nothing moved and nothing is left on disk.
+        BadInput: The request is wrong; nothing moved and nothing is left on disk.
         BackendError: The backend did not open; nothing is left on disk.
     """
     began = time.perf_counter()
-    if not 0 <= request.seed <= LARGEST_SEED:
-        raise BadInput(f"--seed {request.seed}: must be in 0 .. {LARGEST_SEED}")
+    if not 0 <= request.seed <= MAX_SEED:
+        raise BadInput(f"--seed {request.seed}: must be in 0 .. {MAX_SEED}")
     if resumable is not None:
         mission = resumable.mission
     else:
@@ -67,8 +67,8 @@ def launch(
     load_all()
     backend = load_backend(request.backend)
     options = split_settings(mission, request.settings)
-    folder = RunFolder(request.out) if request.out else RunFolder.named(mission.name, request.seed)
-    with claimed(folder.path):
+    folder = RunFolder(request.out) if request.out else RunFolder.timestamped(mission.name, request.seed)
+    with locked(folder.path):
         try:
             if resumable is None:
                 folder.check_free(request.overwrite)
@@ -93,7 +93,7 @@ def launch(
             if plan is not None:
                 robot = _faulted(robot, plan, request, backend)
         except BaseException:
-            folder.abandon()
+            folder.discard()
             raise
         with robot:
             if resumable is None:
@@ -102,7 +102,16 @@ def launch(
                 on_start(mission, folder.path)
             resume_point = None if resumable is None else resumable.resume_point(same_world=world is not None)
             run = _Run(
-                request, mission, conditions, robot, referee, folder, objects_at_start, began, resumable, resume_point
+                request=request,
+                mission=mission,
+                conditions=conditions,
+                robot=robot,
+                referee=referee,
+                folder=folder,
+                objects_at_start=objects_at_start,
+                began=began,
+                resumable=resumable,
+                resume_point=resume_point,
             )
             return _run(run, on_progress, control)
 
@@ -114,7 +123,7 @@ def _fault_plan(request: RunRequest, mission: Mission) -> FaultPlan | None:
 
 
 def _faulted(robot: Robot, plan: FaultPlan, request: RunRequest, backend: Backend) -> Robot:
-    """The device with its faults; closed again if they cannot be had."""
+    """Wrap the device in a fault injector; close it if the plan is impossible."""
     try:
         disturber = backend.disturber(robot)
         return FaultInjector(robot, plan, request.seed, disturber=disturber, may_kill=request.may_kill)
@@ -125,7 +134,7 @@ def _faulted(robot: Robot, plan: FaultPlan, request: RunRequest, backend: Backen
 
 @dataclass(frozen=True)
 class _Run:
-    """A run that is about to begin, or to go on."""
+    """A run that is about to start or to resume."""
 
     request: RunRequest
     mission: Mission
@@ -140,17 +149,18 @@ class _Run:
 
 
 def _record(run: _Run) -> tuple[Recorder, CheckpointFile, CheckpointWriter]:
-    """The record and the checkpoints: new ones, or those of the run that goes on."""
-    told_first = description(run.request, run.mission, run.conditions, run.robot)
+    """Open the record and the checkpoints, new ones or those of a resumed run."""
+    setup = description(run.request, run.mission, run.conditions, run.robot)
     resumable, folder = run.resumable, run.folder
     if resumable is None:
-        recorder = Recorder(folder.path / "run.mcap", told_first)
-        asked = run.request.as_json()
-        told = describe_run(asked, run.mission, run.conditions, installed_versions())
-        file = CheckpointFile.create(folder.path / CHECKPOINTS, told)
+        recorder = Recorder(folder.path / "run.mcap", setup)
+        described = describe_checkpointed_run(
+            run.request.as_json(), run.mission, run.conditions, installed_versions()
+        )
+        file = CheckpointFile.create(folder.path / CHECKPOINT_FILE, described)
         return recorder, file, CheckpointWriter(file, recorder)
     part = folder.path / ".run.mcap.part"
-    recorder = Recorder(part, told_first)
+    recorder = Recorder(part, setup)
     try:
         resumable.begin(part, recorder, run.resume_point is not None and run.resume_point.same_world)
     except BaseException:
@@ -169,12 +179,12 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
     injector = injector_in(robot)
     record: Record = recorder if injector is None else ListeningRecord(recorder, injector)
 
-    def lost(stuck: Stuck, outcome: Outcome) -> None:
-        """The main thread is lost in a skill: write what is known, and end. It writes nothing itself any more."""
+    def exit_stuck(stuck: Stuck, outcome: Outcome) -> None:
+        """Write what is known and end the process, because the main thread hangs in a skill."""
         try:
             record.event("stuck", outcome.end_s, {"node": stuck.node, "stack": stuck.stack})
-            told = score(request, mission, outcome, None) | {"wall_time_s": round(time.perf_counter() - ready, 3)}
-            _write_end(recorder, folder, told)
+            result = score(request, mission, outcome, None) | {"wall_time_s": round(time.perf_counter() - ready, 3)}
+            _write_end(recorder, folder, result)
             sys.stderr.write(f"glotouch: {outcome.reasons[-1]}\n{stuck.stack}")
             sys.stderr.flush()
         finally:
@@ -188,7 +198,7 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
                 record,
                 on_progress=on_progress,
                 control=control,
-                on_lost=lost,
+                on_unresponsive=exit_stuck,
                 checkpoints=checkpoints,
                 resume_point=run.resume_point,
             )
@@ -196,14 +206,14 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
             recorder.close()
             if run.resumable is None:
                 folder.clear()
-                folder.abandon()
+                folder.discard()
             raise
-        with deferred_interrupt(raising=False):  # it takes a moment, and is what the run was for
+        with deferred_interrupt(raising=False):  # Ctrl-C must not lose the result
             ended = time.perf_counter()
             result = score(request, mission, outcome, referee)
             result |= {"wall_time_s": round(ended - ready, 3), "wall_open_s": round(ready - run.began, 3)}
             if run.resumable is not None:
-                result["resumed"] = [*run.resumable.before, run.resumable.told()]
+                result["resumed"] = [*run.resumable.before, run.resumable.as_dict()]
             if injector is not None:
                 root = outcome.chain[-1].as_dict() if outcome.chain else {"code": "", "message": ""}
                 injector.conclude(outcome.status, str(root["code"]), str(root["message"]), outcome.end_s)
@@ -212,20 +222,19 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
             if referee is not None:
                 ends = {"start": truth(run.objects_at_start), "end": truth(referee.objects())}
                 truths = {**ends, "tip_B_m": referee.tip_B_m().tolist()}
-                unwritten += _unless_refused(lambda: folder.write_json("truth.json", truths))
-            if not unwritten:  # a run killed before this can be gone on with
-                unwritten = _unless_refused(lambda: store.note("ended", outcome.status))
+                unwritten += _errors_of(lambda: folder.write_json("truth.json", truths))
+            if not unwritten:  # a run killed before this can be resumed
+                unwritten = _errors_of(lambda: store.note("ended", outcome.status))
     report, warning = _report(folder.path) if request.report else (None, "")
     return RunResult(folder.path, result, outcome, report, warning, tuple(unwritten))
 
 
 def _write_end(recorder: Recorder, folder: RunFolder, result: Mapping[str, Any]) -> list[str]:
-    """Each file by itself, so that a record the disk refused takes no result with it; what was refused."""
-    refused = _unless_refused(lambda: recorder.close(result))
-    return refused + _unless_refused(lambda: folder.write_json("result.json", result))
+    """Close the record and write result.json, each on its own; return the errors."""
+    return _errors_of(lambda: recorder.close(result)) + _errors_of(lambda: folder.write_json("result.json", result))
 
 
-def _unless_refused(write: Callable[[], None]) -> list[str]:
+def _errors_of(write: Callable[[], None]) -> list[str]:
     try:
         write()
     except GlotouchError as e:
@@ -234,7 +243,7 @@ def _unless_refused(write: Callable[[], None]) -> list[str]:
 
 
 def _report(folder: Path) -> tuple[Path | None, str]:
-    """A run whose report fails is still a run."""
+    """Return the report's path, or a warning if it could not be made."""
     from glotouch_bt.report import write_report
 
     try:

@@ -19,12 +19,12 @@ class RunRequest:
         mission: Path or shipped name.
         backend: Name of a registered backend.
         seed: Source of every random draw, 0 .. 2**32 - 1.
-        settings: `--set` values: mission parameters, and what no parameter takes goes to the backend.
+        settings: `--set` values: mission parameters; names that are no parameter go to the backend.
         objects: Folder of STL files instead of the world's.
         conditions: Path or shipped name.
         out: The run's folder (default: runs/<time>-<mission>-s<seed>).
-        faults: A fault plan: a path, the name of a shipped one, or one that has been read.
-        may_kill: A fault may kill this process: it does nothing but this run.
+        faults: A fault plan: a path, the name of a shipped plan, or a plan that has been read.
+        may_kill: A fault may kill this process, because it does nothing but this run.
         report: Make report.html.
         overwrite: Replace an earlier run in `out`; otherwise `out` must be new or empty.
     """
@@ -42,7 +42,7 @@ class RunRequest:
     overwrite: bool = True
 
     def as_json(self) -> dict[str, Any]:
-        """What is needed to open the same robot and mission again."""
+        """Return what is needed to open the same robot and mission again, as JSON data."""
         plan = self.faults.name if isinstance(self.faults, FaultPlan) else self.faults
         return {
             "mission": _absolute(self.mission),
@@ -62,10 +62,10 @@ class RunResult:
     Attributes:
         folder: The run's folder.
         result: The content of result.json.
-        outcome: How it ended.
-        report: Path of report.html, or None if none could be made.
-        warning: What went wrong after the run (a report that could not be made), or empty.
-        unwritten: What of the record and the result could not be written, and why.
+        outcome: Outcome of the mission.
+        report: Path of report.html, or None.
+        warning: Why the report could not be made, or empty.
+        unwritten: Files that could not be written, with the reason.
     """
 
     folder: Path
@@ -94,7 +94,7 @@ class RunResult:
 
     @property
     def exit_code(self) -> int:
-        """0 done, 1 the mission failed, 3 a safety stop or failure (of the disk, too), 130 interrupted."""
+        """0 success, 1 the mission failed, 3 aborted or a file could not be written, 130 interrupted."""
         if isinstance(self.outcome.error, KeyboardInterrupt):
             return 130
         if self.unwritten:
@@ -103,5 +103,5 @@ class RunResult:
 
 
 def _absolute(given: str) -> str:
-    """A file by its whole path, so that it is found from anywhere; a shipped name as it is."""
+    """Return a file's absolute path; return a shipped name unchanged."""
     return str(Path(given).resolve()) if Path(given).suffix in (".yaml", ".yml") and Path(given).is_file() else given

@@ -1,6 +1,6 @@
-"""A run in words and numbers: its description before it begins, its result when it has ended.
+"""The description of a run before it starts and its result when it has ended.
 
-The truth of a simulated world is looked at here, after the run, for scoring.
+The truth of a simulated world is read here after the run, for scoring only.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ RECORDED_PACKAGES = ("mujoco", "numpy", "pin", "py_trees", "ruckig", "scipy", "t
 
 
 def mission_yaml(request: RunRequest, mission: Mission) -> str:
-    """The resolved mission, headed by how it was run."""
+    """Return the resolved mission as YAML, with a comment that says how it was run."""
     head = f"# backend {request.backend}, seed {request.seed}, conditions {request.conditions}\n"
     return head + mission.resolved_yaml()
 
 
 def description(request: RunRequest, mission: Mission, conditions: Conditions, robot: Robot) -> dict[str, object]:
-    """What is known before the run; goes into the record. With `robot` a replay needs no backend."""
+    """Return the description stored in the record; with its `robot` a replay needs no backend."""
     world = mission.world
     objects = dataclasses.replace(world.objects, folder=Path(shown(world.objects.folder)))
     return {
@@ -49,8 +49,8 @@ def description(request: RunRequest, mission: Mission, conditions: Conditions, r
 
 
 def score(request: RunRequest, mission: Mission, outcome: Outcome, referee: Referee | None) -> dict[str, Any]:
-    """result.json but for wall times: how it ended, and what a referee says of it."""
-    found = outcome.found
+    """Return the content of result.json without wall times."""
+    found = outcome.summary
     target = _target(mission)
     retrieved: str | None = None
     correct: bool | None = None
@@ -77,7 +77,7 @@ def score(request: RunRequest, mission: Mission, outcome: Outcome, referee: Refe
         "sim_time_s": round(outcome.end_s - outcome.start_s, 6),
         "paused_s": round(outcome.paused_s, 6),
         "guards": dict(outcome.guards),
-        "ending": outcome.ending,
+        "ending": outcome.safe_stop,
         "ticks": outcome.ticks,
         "probe_path_m": round(found.probe_path_m, 6),
         "peak_force_N": round(float(peak), 6),
@@ -88,7 +88,7 @@ def score(request: RunRequest, mission: Mission, outcome: Outcome, referee: Refe
 
 
 def _target(mission: Mission) -> str | None:
-    """The object the mission is after: its first stl parameter, by stem."""
+    """Return the target of the mission, the stem of its first stl parameter, or None."""
     for name in mission.stl_parameters:
         if name in mission.parameters:
             return _stem(str(mission.parameters[name]))
@@ -100,17 +100,17 @@ def _stem(given: str) -> str:
 
 
 def _portable(name: str, value: object, mission: Mission) -> object:
-    """A parameter as result.json has it: no path of this machine."""
+    """Return a parameter without paths of this machine."""
     return _stem(str(value)) if name in mission.stl_parameters else value
 
 
 def truth(objects: list[TrueObject]) -> list[Any]:
-    """True objects as JSON data."""
+    """Return true objects as JSON data."""
     return [to_json(o) for o in objects]
 
 
 def installed_versions() -> dict[str, str]:
-    """Of this package and of those whose version may change a result."""
+    """Return the versions of this package and of those that may change a result."""
     found = {"glotouch-bt": __version__}
     for package in RECORDED_PACKAGES:
         try:

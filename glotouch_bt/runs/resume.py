@@ -1,4 +1,4 @@
-"""`glotouch resume`: a broken-off run goes on from its newest checkpoint, or starts again at a node."""
+"""Resume an interrupted run from its newest checkpoint, or start it again at a node."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 from glotouch_bt.mission import Mission
 from glotouch_bt.mission.execution import Control
 from glotouch_bt.mission.record import RunSummary
-from glotouch_bt.runs.folder import claimed
+from glotouch_bt.runs.folder import locked
 from glotouch_bt.runs.launch import RunRequest, RunResult, launch
 from glotouch_bt.runs.result import installed_versions
-from glotouch_bt.runs.resume_point import ResumableRun, copy_run, find
+from glotouch_bt.runs.resume_point import ResumableRun, copy_run, find_resumable
 
 
 def resume(
@@ -25,34 +25,34 @@ def resume(
     control: Control | None = None,
     report: bool = True,
 ) -> RunResult:
-    """Go on with a run in its own folder; what that replaces moves to `earlier/<number>` in it.
+    """Resume a run in its own folder; replaced files move to `earlier/<number>` in it.
 
-    The backend is opened as it was. A simulated world goes back to what it was at the checkpoint, faults of a fault
-    plan are left out; on a real robot the world is where it is, and is looked at before the mission goes on.
+    The backend is opened with the same options. A simulated world is restored to the checkpoint, and a fault plan is
+    not applied again. On a real robot the world is checked before the mission continues.
 
     Args:
         folder: The run's folder.
-        start: A node to start at, whatever came next: its name, its path, or the end of its path. In simulation the
-            world is the one in which the node last began.
-        out: Go on in a copy of the run in this folder instead.
-        on_found: Called with what was found, before anything is opened.
+        start: Node to start at: its name, its path, or the end of its path. In simulation the world is restored to
+            the last start of that node.
+        out: Resume a copy of the run in this folder instead.
+        on_found: Called with the resumable run before anything is opened.
         on_start, on_progress, control: As for `launch`.
         report: Make report.html at the end.
 
     Raises:
-        BadInput: Nothing to go on from; nothing was changed.
+        BadInput: The run cannot be resumed; nothing was changed.
         BackendError: The backend did not open.
     """
     if out is not None:
-        find(folder, start, installed_versions()).file.close()  # complain before anything is copied
-        with claimed(folder):  # a run under way is not copied in the middle
+        find_resumable(folder, start, installed_versions()).file.close()  # raise before anything is copied
+        with locked(folder):  # do not copy an active run
             copy_run(folder, out)
         folder = out
-    resumable = find(folder, start, installed_versions())
+    resumable = find_resumable(folder, start, installed_versions())
     try:
         asked = resumable.request
         if asked["faults"] is not None:
-            resumable.notes.append(f"goes on without the faults of {asked['faults']}")
+            resumable.notes.append(f"resumed without the faults of {asked['faults']}")
         if on_found is not None:
             on_found(resumable)
         request = RunRequest(

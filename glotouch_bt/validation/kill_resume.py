@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from glotouch_bt.bench import Rate, bootstrap_mean, wilson
-from glotouch_bt.mission.checkpoint import FILE, CheckpointFile
+from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile
 from glotouch_bt.report import RunRecord, read_run
 from glotouch_bt.robot import BackendError, BadInput, GlotouchError
 from glotouch_bt.robot.scene import stream
@@ -155,7 +155,7 @@ def _twin(study: KillStudy, seed: int) -> Twin:
         while process.poll() is None:
             cpu_s = _cpu_s(process.pid)
             if cpu_s is not None:
-                if not began_s and (folder / FILE).is_file():
+                if not began_s and (folder / CHECKPOINT_FILE).is_file():
                     began_s = cpu_s
                 if not (folder / "result.json").is_file():
                     ended_s = cpu_s
@@ -189,7 +189,7 @@ def _trial(study: KillStudy, seed: int, number: int, share: float, twin: Twin) -
     }
     if row["outcome"] == "killed" and (folder / "result.json").exists():
         row["outcome"] = "ended before"  # it was closing already
-    if not (folder / FILE).exists():
+    if not (folder / CHECKPOINT_FILE).exists():
         return row | {"outcome": "not begun"}
     row |= _after_kill(folder, twin)
     done = subprocess.run([*study.words, "resume", str(folder), "--json"], capture_output=True, env=_environment())
@@ -205,7 +205,7 @@ def _after_kill(folder: Path, twin: Twin) -> dict[str, Any]:
     record = _read(folder)
     row["readable_after_kill"] = record is not None
     try:
-        file, whole = CheckpointFile(folder / FILE), CheckpointFile(twin.folder / FILE)
+        file, whole = CheckpointFile(folder / CHECKPOINT_FILE), CheckpointFile(twin.folder / CHECKPOINT_FILE)
         rows, expected = file.rows(), whole.rows()
         file.close()
         whole.close()

@@ -1,4 +1,4 @@
-"""The first visit to a robot: what it finds is compared with what is true."""
+"""The first run_doctor to a robot: what it finds is compared with what is true."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glotouch_bt.commissioning.doctor import (
-    Finding,
+    DoctorFinding,
     _pressed,
     jaws,
     nearly_empty,
     pads,
     place,
     rates,
-    visit,
+    run_doctor,
     walls,
     wrist,
 )
-from glotouch_bt.commissioning.registration import WallTouch, solve
+from glotouch_bt.commissioning.registration import WallContact, solve
 from glotouch_bt.mission.load import load_mission
 from glotouch_bt.robot import Conditions, GripperState, Observation, Pose, TactileFrame, World, load_backend
 from glotouch_bt.robot.fake import FakeBackend, FakeRobot
@@ -47,7 +47,7 @@ def test_a_shifted_and_turned_box_is_found_from_four_touches(x: float, y: float,
         begin = np.zeros(2)
         begin[1 - axis] = along
         reach = (HALF[axis] + n @ true.position_m[:2] - n @ begin) / (n @ normal)
-        touches.append(WallTouch("wall", normal, np.array([*(begin + reach * normal), 0.0]), HALF[axis], 3.0))
+        touches.append(WallContact("wall", normal, np.array([*(begin + reach * normal), 0.0]), HALF[axis], 3.0))
     found = solve(touches, z, Pose(np.zeros(3)))
     assert found.yaw_rad == pytest.approx(yaw, abs=1e-4)  # linear in the turn
     assert found.shift_K_m == pytest.approx([x, y, z], abs=1.5e-4)
@@ -56,12 +56,12 @@ def test_a_shifted_and_turned_box_is_found_from_four_touches(x: float, y: float,
 
 def test_a_box_of_another_length_shows() -> None:
     touches = [
-        WallTouch("wall", np.array([0.0, s]), np.array([0.0, 0.21 * s, 0.0]), 0.20, 3.0) for s in (1.0, -1.0)
-    ] + [WallTouch("wall", np.array([1.0, 0.0]), np.array([0.15, a, 0.0]), 0.15, 3.0) for a in (-0.06, 0.06)]
+        WallContact("wall", np.array([0.0, s]), np.array([0.0, 0.21 * s, 0.0]), 0.20, 3.0) for s in (1.0, -1.0)
+    ] + [WallContact("wall", np.array([1.0, 0.0]), np.array([0.15, a, 0.0]), 0.15, 3.0) for a in (-0.06, 0.06)]
     assert solve(touches, 0.0, Pose(np.zeros(3))).residual_m == pytest.approx(0.01)
 
 
-def a_press(side: str, row: int, column: int) -> Finding:
+def a_press(side: str, row: int, column: int) -> DoctorFinding:
     flat = {"left_m": np.zeros((35, 20)), "right_m": np.zeros((35, 20))}
     map_m = np.zeros((35, 20))
     map_m[row, column] = 5e-4
@@ -77,7 +77,7 @@ def test_a_press_tells_how_the_pads_are_mounted() -> None:
     assert _pressed(flat, flat).good is False
 
 
-def bad(findings: Iterator[Finding]) -> list[str]:
+def bad(findings: Iterator[DoctorFinding]) -> list[str]:
     return [f"{f.step} {f.what}" for f in findings if f.good is False]
 
 
@@ -122,7 +122,7 @@ def test_nothing_is_moved_without_a_yes(world: World) -> None:
         asked.append(question)
         return False
 
-    list(visit(Kept(), world, Conditions(), {}, no, sure=True))
+    list(run_doctor(Kept(), world, Conditions(), {}, no, sure=True))
     assert len(asked) == 3
     assert all(c.motion is None and c.gripper is None for c in robots[0].commands)
 

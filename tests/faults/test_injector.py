@@ -52,12 +52,12 @@ def test_a_condition_on_what_the_device_senses(pair: Make) -> None:
 def test_a_node_and_its_visits(pair: Make) -> None:
     made = pair("  - {fault: wrench_off, when: {node: sweep, visit: 2, after_s: 0.02}, for: node}")
     assert altered(made, 3) == []
-    made.injector.node_began("m/seq/sweep", 0.03)
+    made.injector.on_node_started("m/seq/sweep", 0.03)
     assert altered(made, 3) == []
-    made.injector.node_ended("m/seq/sweep")
-    made.injector.node_began("m/seq/sweep", 0.06)
+    made.injector.on_node_ended("m/seq/sweep")
+    made.injector.on_node_started("m/seq/sweep", 0.06)
     assert altered(made, 5) == [2, 3, 4]
-    made.injector.node_ended("m/seq/sweep")
+    made.injector.on_node_ended("m/seq/sweep")
     assert altered(made, 3) == []
     assert made.proof.nodes == ["m/seq/sweep"]
 
@@ -92,10 +92,10 @@ def test_the_later_fault_has_the_last_word() -> None:
 
 def test_who_saw_it_and_how_soon(pair: Make) -> None:
     made = pair("  - {fault: wrench_off, when: {cycle: 10}}")
-    made.injector.saw(0.05, "early", "before", "the fault")
+    made.injector.add_sighting(0.05, "early", "before", "the fault")
     made.wrenches(20)
-    made.injector.saw(0.15, "squeeze", "off_zero", "the wrist reads nothing")
-    made.injector.node_began("m/tare", 0.16)
+    made.injector.add_sighting(0.15, "squeeze", "off_zero", "the wrist reads nothing")
+    made.injector.on_node_started("m/tare", 0.16)
     made.injector.conclude("failure", "off_zero", "...", 0.3)
     (report,) = made.injector.report()
     assert report["first_s"] == pytest.approx(0.11)  # the newest sample of the first altered block

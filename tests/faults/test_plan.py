@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glotouch_bt.faults import FaultInjector
-from glotouch_bt.faults.catalogue import CATALOGUE, NAMED_BY
+from glotouch_bt.faults.catalogue import CATALOGUE, CAUSE_PATTERNS
 from glotouch_bt.faults.plan import check_plan, read_plan
-from glotouch_bt.faults.trigger import Lasting, When
+from glotouch_bt.faults.trigger import Duration, When
 from glotouch_bt.mission.load import load_mission
 from glotouch_bt.mission.read.library import shipped
 from glotouch_bt.mission.read.yaml_source import parse_yaml
@@ -76,18 +76,18 @@ def test_a_node_nobody_has() -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("for: 2 s", Lasting(duration_s=2.0)),
-        ("for: 250 ms", Lasting(duration_s=0.25)),
-        ("for: 3", Lasting(duration_s=3.0)),
-        ("for: ever", Lasting(until="ever")),
-        ("for: {cycles: 4}", Lasting(cycles=4)),
-        ("when: {node: x}", Lasting(until="node")),
-        ("name: x", Lasting(until="ever")),
+        ("for: 2 s", Duration(duration_s=2.0)),
+        ("for: 250 ms", Duration(duration_s=0.25)),
+        ("for: 3", Duration(duration_s=3.0)),
+        ("for: ever", Duration(until="ever")),
+        ("for: {cycles: 4}", Duration(cycles=4)),
+        ("when: {node: x}", Duration(until="node")),
+        ("name: x", Duration(until="ever")),
     ],
 )
-def test_how_long(text: str, expected: Lasting) -> None:
+def test_how_long(text: str, expected: Duration) -> None:
     plan = check_plan(parse_yaml(f"faults: f\nplan:\n  - fault: wrench_off\n    {text}", "p.yaml"))
-    assert plan.faults[0].lasting == expected
+    assert plan.faults[0].duration == expected
 
 
 def test_defaults_and_units() -> None:
@@ -108,7 +108,7 @@ def test_shipped_plans_fit_the_flagship(name: str) -> None:
 def test_the_catalogue_is_whole() -> None:
     for name, kind in CATALOGUE.items():
         assert kind.name == name
-        assert kind.channel in NAMED_BY
+        assert kind.channel in CAUSE_PATTERNS
         kind.effect.Params()
         assert kind.as_dict()["parameters"] == kind.parameters()
 
@@ -152,9 +152,9 @@ def test_no_plan_gives_anything_but_a_plan_or_its_faults(document: object) -> No
     [
         ("when: {force_above_N: 10, force_below_N: 5}", (4, 31), "no force is above 10 N and below 5 N"),
         ("when: {aperture_above_m: 50 mm, aperture_below_m: 20 mm}", (4, 37), "above 0.05 m and below 0.02 m"),
-        ("when: {visit: 3}", (4, 12), "visit is of a node"),
-        ("when: {after_s: 2 s}", (4, 12), "after_s is of a node"),
-        ("repeat: {times: 3, every_s: 1}", (4, 5), "for ever does not begin again"),
+        ("when: {visit: 3}", (4, 12), "visit needs a node"),
+        ("when: {after_s: 2 s}", (4, 12), "after_s needs a node"),
+        ("repeat: {times: 3, every_s: 1}", (4, 5), "for ever cannot repeat"),
         ("for: forever", (4, 10), "a time such as 2 s"),
     ],
 )

@@ -281,7 +281,7 @@ def test_a_probe_dropped_later_leaves_what_was_found(run: Run) -> None:
     done = run(EXPLORE.replace("EXPECTED", "2"), faults, {"block": (0.02, -0.12, 0.0)}, {"block": WIDE})
     assert done.outcome.status == "success", done.outcome.reasons
     assert "tool_lost" in done.notes.codes()
-    assert done.outcome.found.candidates
+    assert done.outcome.summary.candidates
 
 
 def test_a_probe_that_slipped_in_the_jaws_is_put_back_and_taken_anew(run: Run) -> None:

@@ -64,7 +64,7 @@ def test_a_shoved_object_slides_as_friction_lets_it(folder: Path) -> None:
     moved = np.linalg.norm(cell.places() - before, axis=1)
     expected = 0.5**2 / (2 * 0.6 * 9.81)
     proof = cell.injector.proofs()[0]
-    assert proof.acts.moved_m == pytest.approx(moved.max(), rel=0.1)  # centre of mass here, mesh frame there
+    assert proof.actions.moved_m == pytest.approx(moved.max(), rel=0.1)  # centre of mass here, mesh frame there
     assert 0.5 * expected < moved.max() < 1.6 * expected
     assert moved.min() < 1e-4
 
@@ -96,7 +96,7 @@ def test_taken_away_and_put_back(folder: Path) -> None:
     cell.run(60)
     away = np.linalg.norm(cell.places()[:, :2] - cell.referee.pose_B_K().position_m[:2], axis=1)
     assert (away > inside).sum() == 1
-    assert cell.injector.proofs()[0].acts.moved_m > 0.5
+    assert cell.injector.proofs()[0].actions.moved_m > 0.5
 
 
 def test_the_container_takes_its_content_along(folder: Path) -> None:
@@ -146,11 +146,11 @@ def test_what_the_robot_touches_waits(folder: Path, fault: str) -> None:
     assert len(proof.begun_s) == 1
     put(cell, cell.device.handles.probe_body, stowed)
     cell.run(60)
-    assert proof.acts.times == 1
+    assert proof.actions.count == 1
     assert proof.first_s == pytest.approx(proof.begun_s[0] + 0.15, abs=0.05)
-    assert "without room: " in proof.acts.notes[-1]
-    assert "probe" in proof.acts.notes[-1]
-    assert proof.acts.moved_m > 0.002
+    assert "without room: " in proof.actions.notes[-1]
+    assert "probe" in proof.actions.notes[-1]
+    assert proof.actions.moved_m > 0.002
 
 
 def test_what_never_has_room_is_void_and_says_why(folder: Path) -> None:

@@ -22,9 +22,9 @@ plan:
 
 def test_each_fault_is_a_line_and_one_without_effect_is_marked() -> None:
     injector = FaultInjector(FakeRobot(), check_plan(parse_yaml(PLAN, "p.yaml")), 0)
-    injector.node_began("m/squeeze", 0.0)
+    injector.on_node_started("m/squeeze", 0.0)
     injector.cycle(HOLD)
-    injector.saw(0.02, "squeeze", "off_zero", "the wrist reads 3 N")
+    injector.add_sighting(0.02, "squeeze", "off_zero", "the wrist reads 3 N")
     page = faults_section(RunRecord(Path("run.mcap"), result={"faults": injector.report()}))
     assert "&lt;bias&gt;" in page
     assert "10 samples" in page

@@ -13,7 +13,7 @@ import typer
 from glotouch_bt.commands.replay import replay as replay_command
 from glotouch_bt.mission.execution.control import Control
 from glotouch_bt.report import read_run
-from glotouch_bt.report.run_record import Event
+from glotouch_bt.report.run_record import RecordedEvent
 from glotouch_bt.robot import HOLD, BadInput, Command
 from glotouch_bt.runs.launch import RunRequest, launch
 from glotouch_bt.runs.replay.compare import compare_events, compare_ticks
@@ -34,7 +34,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_same_code_finds_the_same(folder: Path) -> None:
     done = replay(folder)
     assert done.same
-    assert done.parted is None
+    assert done.divergence is None
     assert done.statuses == ("success", "success")
     assert done.compared["contact"] > 3
     assert max(v for v, _ in done.largest.values()) < 1e-12, "to the rounding of sums"
@@ -50,10 +50,10 @@ def test_other_code_is_seen(folder: Path, monkeypatch: pytest.MonkeyPatch) -> No
         monkeypatch.undo()
         ToolCalibrate.Params.model_rebuild(force=True)
     assert not done.same
-    assert done.parted is not None
+    assert done.divergence is not None
     record = read_run(folder)
     begun = next(t.stamp_s for t in record.ticks if t.node.endswith("tool_calibrate") and t.new == "RUNNING")
-    assert done.parted.stamp_s > begun, "up to there both did the same"
+    assert done.divergence.stamp_s > begun, "up to there both did the same"
     assert all(d.stamp_s >= begun for d in done.differences)
 
 
@@ -66,10 +66,10 @@ def test_it_senses_what_the_record_holds(folder: Path) -> None:
     np.testing.assert_array_equal(np.concatenate([o.stamp_s for o in seen]), record.samples["stamp_s"])
     np.testing.assert_array_equal(np.concatenate([o.q for o in seen]), record.samples["q"])
     assert [o.gripper.aperture_m for o in seen] == record.cycles["gripper_aperture_m"].tolist()
-    assert robot.parted is not None
+    assert robot.divergence is not None
     moved = np.flatnonzero(~np.isnan(record.cycles["command_q"][1:, 0]))[0] + 1
     jaws = np.flatnonzero(~np.isnan(record.cycles["command_aperture_m"][1:]))[0] + 1
-    assert robot.parted.cycle == min(moved, jaws), "holding is not what the robot was told from there on"
+    assert robot.divergence.cycle == min(moved, jaws), "holding is not what the robot was told from there on"
     with pytest.raises(RecordEnded, match="the record ends"):
         robot.cycle(Command())
 
@@ -82,7 +82,7 @@ def test_a_run_that_was_cut_off_is_replayed_to_its_end(folder: Path, tmp_path: P
     (cut / "result.json").unlink()
     done = replay(cut)
     assert done.ended
-    assert done.parted is None
+    assert done.divergence is None
     assert done.statuses == ("unknown", "unknown")
     assert "the record is cut off or damaged at t=" in as_lines(done, 3)[1]
     assert replay(folder).cut_s is None
@@ -112,8 +112,14 @@ def test_the_command_prints_json(folder: Path, capsys: pytest.CaptureFixture[str
 
 
 def test_differences_are_named_by_their_path() -> None:
-    then = [Event(1.0, "contact", {"point": [0.1, 0.2], "node": "a"}), Event(2.0, "contact", {"point": [0.0, 0.0]})]
-    now = [Event(1.0, "contact", {"point": [0.1, 0.3], "node": "a"}), Event(2.0, "contact", {"point": [0.0, 1e-9]})]
+    then = [
+        RecordedEvent(1.0, "contact", {"point": [0.1, 0.2], "node": "a"}),
+        RecordedEvent(2.0, "contact", {"point": [0.0, 0.0]}),
+    ]
+    now = [
+        RecordedEvent(1.0, "contact", {"point": [0.1, 0.3], "node": "a"}),
+        RecordedEvent(2.0, "contact", {"point": [0.0, 1e-9]}),
+    ]
     differences, compared, largest = compare_events(then, now, 1e-4)
     assert [(d.where, d.then, d.now) for d in differences] == [("1.point[1]", 0.2, 0.3)]
     assert compared == {"contact": 2}
@@ -141,5 +147,5 @@ def test_a_paused_run_is_replayed_with_its_pauses(tmp_path: Path) -> None:
     assert done.outcome.status == "success"
     assert done.outcome.paused_s > 1.0
     again = replay(done.folder)
-    assert again.parted is None
+    assert again.divergence is None
     assert again.same

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from glotouch_bt.faults.catalogue import CATALOGUE
-from glotouch_bt.mission.checkpoint.store import Row
+from glotouch_bt.mission.checkpoint.store import CheckpointRow
 from glotouch_bt.robot import BadInput, UnknownName
 from glotouch_bt.robot.fake import FakeRobot
 from glotouch_bt.runs.launch import RunRequest
@@ -206,7 +206,7 @@ def test_a_run_that_does_not_end_as_it_must_is_told(tmp_path: Path, monkeypatch:
 
 def test_a_trial_begins_at_the_last_checkpoint_before_the_first_run_of_its_skill() -> None:
     paths = [(), ("m/a",), ("m/b", "m/seq"), ("m/a",), ("m/b",)]
-    rows = [Row(i, 10.0 * i, "", "", begun, {}, None, True) for i, begun in enumerate(paths)]
+    rows = [CheckpointRow(i, 10.0 * i, "", "", begun, {}, None, True) for i, begun in enumerate(paths)]
     found = faults_start._first(rows, "b")
     assert found is not None
     path, before, index = found

@@ -1,6 +1,6 @@
-"""TODO door of glotouch_bt/faults/effects."""
+"""The effects of faults: one class per fault, one file per channel. An effect never knows a plan or a trigger."""
 
-from glotouch_bt.faults.effects.base import Acts, Effect, FaultParams, Scene, samples_altered
-from glotouch_bt.faults.effects.model import ScaleParams
+from glotouch_bt.faults.effects.base import Actions, Effect, EffectContext, FaultParams, samples_altered
+from glotouch_bt.faults.effects.model import WrongScaleStlParams
 
-__all__ = ["Acts", "Effect", "FaultParams", "ScaleParams", "Scene", "samples_altered"]
+__all__ = ["Actions", "Effect", "FaultParams", "WrongScaleStlParams", "EffectContext", "samples_altered"]

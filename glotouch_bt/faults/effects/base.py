@@ -1,4 +1,4 @@
-"""What a fault does while it lasts: it changes what goes to the device, what comes from it, or the world itself."""
+"""Base of all effects: an effect alters commands to the device, observations from it, or the simulated world."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from glotouch_bt.robot import Array, BadInput, Command, Observation, Request, Ro
 from glotouch_bt.robot.simulation import Disturber
 from glotouch_bt.skill import param
 
-__all__ = ["Effect", "FaultParams", "Scene", "param"]
+__all__ = ["Effect", "FaultParams", "EffectContext", "param"]
 
 Cycle = Callable[[Command], Observation]
 
 
 class FaultParams(BaseModel):
-    """Base of every fault's parameters; YAML keys are the field names. Unknown keys are errors."""
+    """Base of every fault's parameters. YAML keys are the field names; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 @dataclass
-class Scene:
-    """What an effect may look at.
+class EffectContext:
+    """Inputs of an effect.
 
     Attributes:
-        rng: The fault's own random draws.
+        rng: The fault's own random generator.
         period_s: Control period.
-        description: The robot as numbers.
-        disturber: Hands inside the simulated world; None on hardware.
+        description: Description of the robot.
+        disturber: Access to the simulated world; None on hardware.
         sensed: The newest block as the device delivered it.
-        may_kill: The process may be killed (it is the mission's own).
+        may_kill: The process runs only this mission and may be killed.
     """
 
     rng: np.random.Generator
@@ -46,46 +46,46 @@ class Scene:
 
 
 @dataclass
-class Acts:
-    """What an effect did that cannot be seen by comparing what went in with what came out.
+class Actions:
+    """What an effect did besides altering commands and observations.
 
     Attributes:
-        times: How often it acted.
-        moved_m: How far it moved something in the world.
-        notes: In words.
+        count: Number of acts.
+        moved_m: Distance by which it moved something in the world.
+        notes: Notes for people.
     """
 
-    times: int = 0
+    count: int = 0
     moved_m: float = 0.0
     notes: list[str] = field(default_factory=list)
 
 
 class Effect:
-    """One fault at work. Every method has a default that changes nothing.
+    """The effect of one fault. Every method has a default that changes nothing.
 
     Args:
-        params: What the plan asks for.
-        scene: What it may look at.
+        params: Parameters of the plan.
+        context: Inputs of the effect.
     """
 
     Params: ClassVar[type[FaultParams]] = FaultParams
     drives: ClassVar[bool] = False
-    """True for effects that decide whether and how the device is cycled at all."""
+    """True for effects that override `drive`."""
 
-    def __init__(self, params: Any, scene: Scene) -> None:
-        self.params, self.scene, self.acts = params, scene, Acts()
+    def __init__(self, params: Any, context: EffectContext) -> None:
+        self.params, self.context, self.actions = params, context, Actions()
 
     def prepare(self) -> None:
-        """Before the first cycle, whenever the fault will begin."""
+        """Prepare before the first cycle, whenever the fault starts."""
 
     def begin(self) -> None:
-        """The fault begins."""
+        """Start the fault."""
 
     def end(self) -> None:
-        """The fault ends; what cannot be mended stays."""
+        """End the fault; permanent changes stay."""
 
     def command(self, command: Command) -> Command:
-        """What the device is told instead."""
+        """Return the command that the device gets instead."""
         return command
 
     def drive(self, cycle: Cycle, command: Command) -> Observation:
@@ -93,14 +93,14 @@ class Effect:
         return cycle(command)
 
     def sense(self, observation: Observation) -> Observation:
-        """What is said to have been sensed instead."""
+        """Return the observation that is reported instead."""
         return observation
 
     def refuse(self) -> None:
-        """Raise, if every call of the seam fails while the fault lasts; a call that is no cycle asks this only."""
+        """Raise if robot calls other than `cycle` fail, too."""
 
     def tared(self) -> None:
-        """The device has just zeroed its wrist sensor."""
+        """React to a tare that the device has just completed."""
 
     def request(self, request: Request) -> Ticket | None:
         """Answer a slow request in the device's place; None lets it pass."""
@@ -108,7 +108,7 @@ class Effect:
 
 
 def rows_altered(before: Array, after: Array) -> int:
-    """How many rows of two blocks (n, ...) differ; what is not a number differs from everything."""
+    """Return the number of rows in which two blocks (n, ...) differ; NaN differs from everything."""
     if before is after:
         return 0
     if before.shape != after.shape:
@@ -118,7 +118,7 @@ def rows_altered(before: Array, after: Array) -> int:
 
 
 def samples_altered(before: Observation, after: Observation) -> int:
-    """How many samples of a block differ: rows of the blocks, the gripper's report, the pair of depth maps."""
+    """Return the number of differing samples: rows, the gripper state, the pair of depth maps."""
     if before is after:
         return 0
     rows = max(
@@ -143,12 +143,12 @@ def samples_altered(before: Observation, after: Observation) -> int:
     return rows + jaws + maps
 
 
-def require_disturber(scene: Scene) -> Disturber:
-    """The hands inside the world.
+def require_disturber(context: EffectContext) -> Disturber:
+    """Return the access to the simulated world.
 
     Raises:
-        BadInput: There are none: the backend is no simulation that offers them.
+        BadInput: The backend offers none.
     """
-    if scene.disturber is None:
+    if context.disturber is None:
         raise BadInput("this fault changes the world itself: it needs a simulation backend that offers a disturber")
-    return scene.disturber
+    return context.disturber

@@ -1,4 +1,4 @@
-"""Faults of the jaws: what they do of what they are told, and what they say about it."""
+"""Faults of the gripper: altered targets and altered reports."""
 
 from __future__ import annotations
 
@@ -8,98 +8,95 @@ from glotouch_bt.faults.effects.base import Effect, FaultParams, param
 from glotouch_bt.robot import Command, GripperTarget, Observation
 
 
-class Stall(Effect):
-    """The jaws stand: targets are taken and not carried out. Told again when the fault ends."""
+class GripStall(Effect):
+    """The jaws do not move: targets are accepted and not executed."""
 
     def begin(self) -> None:
         """See `Effect`."""
         self._hold: GripperTarget | None = self._standing()
-        self._missed: GripperTarget | None = None
 
     def command(self, command: Command) -> Command:
         """See `Effect`."""
         if command.gripper is not None:
-            self._missed = command.gripper
             hold, self._hold = self._hold or self._standing(), None
             return replace(command, gripper=hold)
-        if self._hold is not None and self.scene.sensed.gripper.moving:
+        if self._hold is not None and self.context.sensed.gripper.moving:
             hold, self._hold = self._hold, None
             return replace(command, gripper=hold)
         return command
 
     def _standing(self) -> GripperTarget:
-        hand, now = self.scene.description.gripper, self.scene.sensed.gripper
+        hand, now = self.context.description.gripper, self.context.sensed.gripper
         aperture = min(max(now.aperture_m, 0.0), hand.stroke_m)
         return GripperTarget(aperture, hand.speed_m_s, min(max(now.force_N, 1.0), hand.force_N))
 
 
-class ShortParams(FaultParams):
+class GripShortParams(FaultParams):
     """Parameters of `grip_short`."""
 
-    short_m: float = param("The jaws stop so far before what they are told", unit="m", default=0.004, gt=0.0, le=0.08)
-    min_m: float = param(
-        "and never close farther than this", unit="m", default=0.0, ge=0.0, le=0.08, formerly="least_m"
-    )
+    short_m: float = param("Distance of the jaws short of the target", unit="m", default=0.004, gt=0.0, le=0.08)
+    min_m: float = param("Smallest aperture they reach", unit="m", default=0.0, ge=0.0, le=0.08, formerly="least_m")
 
 
-class Short(Effect):
-    """The jaws do not close all the way."""
+class GripShort(Effect):
+    """The jaws do not close completely."""
 
-    Params = ShortParams
-    params: ShortParams
+    Params = GripShortParams
+    params: GripShortParams
 
     def command(self, command: Command) -> Command:
         """See `Effect`."""
         asked = command.gripper
-        if asked is None or asked.aperture_m >= self.scene.sensed.gripper.aperture_m:
+        if asked is None or asked.aperture_m >= self.context.sensed.gripper.aperture_m:
             return command
-        stroke = self.scene.description.gripper.stroke_m
+        stroke = self.context.description.gripper.stroke_m
         aperture = min(max(asked.aperture_m + self.params.short_m, self.params.min_m), stroke)
         return replace(command, gripper=replace(asked, aperture_m=aperture))
 
 
-class SlipParams(FaultParams):
+class GripSlipParams(FaultParams):
     """Parameters of `grip_slip`."""
 
-    factor: float = param("Share of the told force that the jaws really press with", default=0.1, gt=0.0, lt=1.0)
+    factor: float = param("Share of the commanded force that the jaws apply", default=0.1, gt=0.0, lt=1.0)
 
 
-class Slip(Effect):
-    """The jaws press with a part of the force they are told, and report the force they were told."""
+class GripSlip(Effect):
+    """The jaws apply a fraction of the commanded force and report the commanded force."""
 
-    Params = SlipParams
-    params: SlipParams
+    Params = GripSlipParams
+    params: GripSlipParams
 
     def begin(self) -> None:
         """See `Effect`."""
-        self._told = 0.0
+        self._commanded_N = 0.0
 
     def command(self, command: Command) -> Command:
         """See `Effect`."""
         if command.gripper is None:
             return command
-        self._told = command.gripper.force_N
-        return replace(command, gripper=replace(command.gripper, force_N=max(0.2, self._told * self.params.factor)))
+        self._commanded_N = command.gripper.force_N
+        force_N = max(0.2, self._commanded_N * self.params.factor)
+        return replace(command, gripper=replace(command.gripper, force_N=force_N))
 
     def sense(self, observation: Observation) -> Observation:
         """See `Effect`."""
         state = observation.gripper
-        if self._told == 0.0 or state.force_N < 0.1:
+        if self._commanded_N == 0.0 or state.force_N < 0.1:
             return observation
         return replace(observation, gripper=replace(state, force_N=state.force_N / self.params.factor))
 
 
-class MisreportParams(FaultParams):
+class GripMisreportParams(FaultParams):
     """Parameters of `grip_misreport`."""
 
     aperture_m: float = param("Added to the reported aperture", unit="m", default=0.004, ge=-0.08, le=0.08)
 
 
-class Misreport(Effect):
-    """The reported aperture is wrong by a constant."""
+class GripMisreport(Effect):
+    """The reported aperture has a constant error."""
 
-    Params = MisreportParams
-    params: MisreportParams
+    Params = GripMisreportParams
+    params: GripMisreportParams
 
     def sense(self, observation: Observation) -> Observation:
         """See `Effect`."""
@@ -107,25 +104,25 @@ class Misreport(Effect):
         return replace(observation, gripper=replace(state, aperture_m=state.aperture_m + self.params.aperture_m))
 
 
-class DropParams(FaultParams):
+class GripDropParams(FaultParams):
     """Parameters of `grip_drop`."""
 
-    opening_m: float = param("How far the jaws open", unit="m", default=0.02, gt=0.001, le=0.08)
-    duration_s: float = param("before they close again", unit="s", default=0.4, gt=0.0, le=10.0)
-    masked: bool = param("The reports go on as if nothing had happened", default=False)
+    opening_m: float = param("Distance by which the jaws open", unit="m", default=0.02, gt=0.001, le=0.08)
+    duration_s: float = param("Time until they close again", unit="s", default=0.4, gt=0.0, le=10.0)
+    masked: bool = param("Report the state before the fault", default=False)
 
 
-class Drop(Effect):
-    """The jaws open for a moment and close again: what they held, the probe or an object, falls."""
+class GripDrop(Effect):
+    """The jaws open briefly and close again, so that the probe or object they hold falls."""
 
-    Params = DropParams
-    params: DropParams
+    Params = GripDropParams
+    params: GripDropParams
 
     def begin(self) -> None:
         """See `Effect`."""
-        hand, state = self.scene.description.gripper, self.scene.sensed.gripper
+        hand, state = self.context.description.gripper, self.context.sensed.gripper
         self._before = state
-        self._left = max(1, round(self.params.duration_s / self.scene.period_s))
+        self._left = max(1, round(self.params.duration_s / self.context.period_s))
         force = min(max(state.force_N, 5.0), hand.force_N)
         self._open: GripperTarget | None = GripperTarget(
             min(state.aperture_m + self.params.opening_m, hand.stroke_m), hand.speed_m_s, force
@@ -137,7 +134,7 @@ class Drop(Effect):
         self._left -= 1
         if self._open is not None:
             target, self._open = self._open, None
-            self.acts.times += 1
+            self.actions.count += 1
             return replace(command, gripper=target)
         if self._left <= 0 and self._shut is not None:
             target, self._shut = self._shut, None

@@ -1,23 +1,23 @@
-"""Faults of the model the mission is given: an STL in the wrong scale. They are there from the start."""
+"""Faults of the model given to the mission: an STL in the wrong scale, present from the start."""
 
 from __future__ import annotations
 
 from glotouch_bt.faults.effects.base import Effect, FaultParams, param
 
 
-class ScaleParams(FaultParams):
+class WrongScaleStlParams(FaultParams):
     """Parameters of `wrong_scale_stl`."""
 
-    factor: float = param("The model is so many times as large as the object", default=1.15, ge=0.2, le=5.0)
+    factor: float = param("Size of the model relative to the object", default=1.15, ge=0.2, le=5.0)
 
 
-class WrongScale(Effect):
-    """The target's STL was made for another unit, or another size of the object; the real one stays as it is."""
+class WrongScaleStl(Effect):
+    """The target's STL has the wrong scale; the real object does not change."""
 
-    Params = ScaleParams
-    params: ScaleParams
+    Params = WrongScaleStlParams
+    params: WrongScaleStlParams
 
     def prepare(self) -> None:
-        """See `Effect`; the model was replaced when the mission was loaded (`models.wrong_models`)."""
-        self.acts.times += 1
-        self.acts.notes.append(f"the model is {self.params.factor:g} times as large as the object")
+        """See `Effect`. `models.wrong_models` replaced the model when the mission was loaded."""
+        self.actions.count += 1
+        self.actions.notes.append(f"the model is {self.params.factor:g} times as large as the object")

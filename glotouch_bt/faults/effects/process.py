@@ -10,8 +10,8 @@ from glotouch_bt.faults.effects.base import Cycle, Effect, FaultParams, param
 from glotouch_bt.robot import BadInput, Command, Observation
 
 
-class Unexpected(Effect):
-    """The driver raises what it never said it would."""
+class DriverException(Effect):
+    """The driver raises an undocumented error."""
 
     drives = True
 
@@ -22,20 +22,18 @@ class Unexpected(Effect):
 
     def refuse(self) -> None:
         """See `Effect`."""
-        self.acts.times += 1
+        self.actions.count += 1
         raise RuntimeError("the driver broke (injected exception)")
 
 
 class HangParams(FaultParams):
     """Parameters of `hang`."""
 
-    wall_s: float = param(
-        "How long one cycle does not come back, on the wall's clock", unit="s", default=2.0, gt=0.0, le=600.0
-    )
+    wall_s: float = param("Wall time for which one cycle blocks", unit="s", default=2.0, gt=0.0, le=600.0)
 
 
 class Hang(Effect):
-    """One cycle does not come back for a while."""
+    """One cycle blocks for a while."""
 
     Params = HangParams
     params: HangParams
@@ -49,13 +47,13 @@ class Hang(Effect):
         """See `Effect`."""
         if not self._slept:
             self._slept = True
-            self.acts.times += 1
-            threading.Event().wait(self.params.wall_s)  # this thread is gone for as long, as in a blocking call
+            self.actions.count += 1
+            threading.Event().wait(self.params.wall_s)  # block this thread, as a blocking call does
         return cycle(command)
 
 
 class Kill(Effect):
-    """The process is killed (SIGKILL), as when power fails; only where the process is the mission's own."""
+    """The process is killed (SIGKILL), as in a power failure; only if it runs nothing but this mission."""
 
     drives = True
 
@@ -65,11 +63,11 @@ class Kill(Effect):
         Raises:
             BadInput: This process does more than run the mission.
         """
-        if not self.scene.may_kill:
+        if not self.context.may_kill:
             raise BadInput("fault kill: the process does more than run this mission; use `glotouch run --faults`")
 
     def drive(self, cycle: Cycle, command: Command) -> Observation:
         """See `Effect`."""
-        self.acts.times += 1
+        self.actions.count += 1
         os.kill(os.getpid(), signal.SIGKILL)
         return cycle(command)

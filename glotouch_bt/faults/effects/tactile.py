@@ -11,7 +11,7 @@ from glotouch_bt.robot import Observation, TactileFrame
 
 
 class TouchEffect(Effect):
-    """Replaces a pair of depth maps by another, or by none."""
+    """Base of effects that replace or drop a pair of depth maps."""
 
     def sense(self, observation: Observation) -> Observation:
         """See `Effect`."""
@@ -21,26 +21,26 @@ class TouchEffect(Effect):
         return observation if frame is observation.tactile else replace(observation, tactile=frame)
 
     def alter(self, frame: TactileFrame) -> TactileFrame | None:
-        """What is reported instead of a pair of depth maps."""
+        """Return the pair of depth maps that is reported instead, or None."""
         raise NotImplementedError
 
 
-class DeadParams(FaultParams):
+class TouchDeadParams(FaultParams):
     """Parameters of `touch_dead`."""
 
     share: float = param("Share of the taxels that deliver nothing", default=0.3, gt=0.0, le=1.0)
 
 
-class Dead(TouchEffect):
-    """Taxels that deliver nothing (NaN), always the same ones."""
+class TouchDead(TouchEffect):
+    """A fixed set of taxels delivers NaN."""
 
-    Params = DeadParams
-    params: DeadParams
+    Params = TouchDeadParams
+    params: TouchDeadParams
 
     def begin(self) -> None:
         """See `Effect`."""
-        shape = self.scene.description.gripper.pad_shape
-        self._left, self._right = (self.scene.rng.random(shape) < self.params.share for _ in range(2))
+        shape = self.context.description.gripper.pad_shape
+        self._left, self._right = (self.context.rng.random(shape) < self.params.share for _ in range(2))
 
     def alter(self, frame: TactileFrame) -> TactileFrame:
         """See `TouchEffect`."""
@@ -50,8 +50,8 @@ class Dead(TouchEffect):
         )
 
 
-class Frozen(TouchEffect):
-    """The first pair of maps comes again and again, with new stamps."""
+class TouchFrozen(TouchEffect):
+    """The first pair of maps is repeated with new stamps."""
 
     def begin(self) -> None:
         """See `Effect`."""
@@ -65,43 +65,43 @@ class Frozen(TouchEffect):
         return replace(self._first, stamp_s=frame.stamp_s)
 
 
-class DroppedParams(FaultParams):
+class TouchDroppedParams(FaultParams):
     """Parameters of `touch_dropped`."""
 
     share: float = param("Share of the frames that are lost", default=1.0, gt=0.0, le=1.0)
 
 
-class Dropped(TouchEffect):
+class TouchDropped(TouchEffect):
     """Frames are lost."""
 
-    Params = DroppedParams
-    params: DroppedParams
+    Params = TouchDroppedParams
+    params: TouchDroppedParams
 
     def alter(self, frame: TactileFrame) -> TactileFrame | None:
         """See `TouchEffect`."""
-        return None if self.scene.rng.random() < self.params.share else frame
+        return None if self.context.rng.random() < self.params.share else frame
 
 
-class Swapped(TouchEffect):
-    """The left pad's map is given as the right pad's, and the other way round."""
+class TouchSwapped(TouchEffect):
+    """The maps of the left and the right pad are exchanged."""
 
     def alter(self, frame: TactileFrame) -> TactileFrame:
         """See `TouchEffect`."""
         return TactileFrame(frame.stamp_s, frame.right_m, frame.left_m)
 
 
-class OffsetParams(FaultParams):
+class GelOffsetParams(FaultParams):
     """Parameters of `gel_offset`."""
 
     left_m: float = param("Added to the left map", unit="m", default=0.0003, ge=-0.002, le=0.002)
     right_m: float = param("Added to the right map", unit="m", default=0.0003, ge=-0.002, le=0.002)
 
 
-class Offset(TouchEffect):
-    """Untouched gel reads a depth: it swelled, or its reference image is old."""
+class GelOffset(TouchEffect):
+    """Untouched gel reads a depth: it is swollen, or its reference image is old."""
 
-    Params = OffsetParams
-    params: OffsetParams
+    Params = GelOffsetParams
+    params: GelOffsetParams
 
     def alter(self, frame: TactileFrame) -> TactileFrame:
         """See `TouchEffect`."""

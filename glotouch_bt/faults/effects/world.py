@@ -1,7 +1,7 @@
-"""Faults of the world itself, in simulation only: objects pushed, toppled, taken away or added, the container moved.
+"""Faults of the simulated world: objects are pushed, toppled, removed or added, the container is moved.
 
-Nothing is moved through the robot, out of its jaws or away from under its touch: a jump of the world would press the
-hand as nothing in the world can. So such a fault may have to wait; its report says for how long and for what.
+Nothing is moved through the robot, out of its jaws or away from under its touch, because such a jump would cause forces
+that no real event causes. A fault may therefore have to wait; its report says how long and why.
 """
 
 from __future__ import annotations
@@ -12,83 +12,82 @@ from typing import Any, Literal
 
 import numpy as np
 
-from glotouch_bt.faults.effects.base import Effect, FaultParams, Scene, param, require_disturber
+from glotouch_bt.faults.effects.base import Effect, EffectContext, FaultParams, param, require_disturber
 from glotouch_bt.robot import Array, Command, Observation
 from glotouch_bt.robot.simulation import PathBlocked
 
 Which = Literal["nearest", "farthest", "random"]
 SLIDE_S = 0.5
-"""A knocked object has come to rest by then."""
-ASK_AGAIN_S = 0.05
-"""A fault that has no room asks again after so long."""
-WAYS = 12
-"""So many directions, evenly spaced from the one that was drawn, are tried."""
-WHICH = "Which object: nearest to or farthest from the pads, or any"
+"""Time after which a knocked object has come to rest."""
+RETRY_S = 0.05
+"""Time after which a blocked fault is tried again."""
+DIRECTIONS = 12
+"""Number of evenly spaced directions that are tried, from the drawn one on."""
 
 
 class ObjectParams(FaultParams):
     """Parameters of faults that choose an object."""
 
-    which: Which = param(WHICH, default="nearest")
+    which: Which = param("Object: nearest to or farthest from the pads, or any", default="nearest")
 
 
 class WorldEffect(Effect):
-    """Acts once: when it begins, or as soon after that as there is room."""
+    """Actions once: when it begins, or as soon after that as there is room."""
 
-    def __init__(self, params: Any, scene: Scene) -> None:
-        super().__init__(params, scene)
-        self.hands = require_disturber(scene)
-        self._why = ""
+    def __init__(self, params: Any, context: EffectContext) -> None:
+        super().__init__(params, context)
+        self.disturber = require_disturber(context)
+        self._obstacle = ""
 
     def begin(self) -> None:
         """See `Effect`."""
-        self._since_s = self.scene.sensed.now_s
+        self._since_s = self.context.sensed.now_s
         self.draw()
         self._try()
 
     def command(self, command: Command) -> Command:
-        """See `Effect`; the command is left as it is."""
-        if not self.acts.times and self.scene.sensed.now_s >= self._again_s - 1e-9:
+        """See `Effect`. The command is not altered."""
+        if not self.actions.count and self.context.sensed.now_s >= self._again_s - 1e-9:
             self._try()
         return command
 
     def end(self) -> None:
         """See `Effect`."""
-        if not self.acts.times:
-            self.acts.notes.append(f"never had room: {self._why}")
+        if not self.actions.count:
+            self.actions.notes.append(f"never had room: {self._obstacle}")
 
     def draw(self) -> None:
-        """Choose what shall happen, once."""
+        """Draw the random choices, once."""
 
     def act(self) -> None:
-        """Do it, and count it.
+        """Change the world and count it.
 
         Raises:
-            PathBlocked: Not now.
+            PathBlocked: It is not possible now.
         """
         raise NotImplementedError
 
     def _try(self) -> None:
-        now_s = self.scene.sensed.now_s
+        now_s = self.context.sensed.now_s
         try:
             self.act()
         except PathBlocked as e:
-            self._why, self._again_s = str(e), now_s + ASK_AGAIN_S
+            self._obstacle, self._again_s = str(e), now_s + RETRY_S
             return
-        if self._why:
-            self.acts.notes.append(f"after {now_s - self._since_s:.2f} s without room: {self._why}")
+        if self._obstacle:
+            self.actions.notes.append(f"after {now_s - self._since_s:.2f} s without room: {self._obstacle}")
 
-    def some_way(self, first_rad: float, go: Callable[[float], object]) -> None:
-        """Go in the drawn direction, or in the nearest to it that has room.
+    def try_directions(self, first_rad: float, go: Callable[[float], object]) -> None:
+        """Call `go` with the drawn direction, or with the nearest to it that has room.
 
         Raises:
-            PathBlocked: None has; why the first has not.
+            PathBlocked: No direction has room; says why the first has none.
         """
         refused: PathBlocked | None = None
-        for k in range(WAYS):
+        for k in range(DIRECTIONS):
             turn = (k + 1) // 2 * (1 if k % 2 else -1)
             try:
-                go(first_rad + turn * 2.0 * math.pi / WAYS)
+                go(first_rad + turn * 2.0 * math.pi / DIRECTIONS)
                 return
             except PathBlocked as e:
                 refused = refused or e
@@ -96,73 +95,75 @@ class WorldEffect(Effect):
         raise refused
 
     def chosen(self, which: Which) -> int:
-        """Index of the object the plan means."""
-        places = self.hands.places_B_m()
+        """Return the index of the object that the plan names."""
+        places = self.disturber.places_B_m()
         if which == "random":
-            return int(self.scene.rng.integers(len(places)))
-        away = np.linalg.norm(places[:, :2] - self.scene.sensed.position_B_P[-1, :2], axis=1)
+            return int(self.context.rng.integers(len(places)))
+        away = np.linalg.norm(places[:, :2] - self.context.sensed.position_B_P[-1, :2], axis=1)
         return int(away.argmin() if which == "nearest" else away.argmax())
 
     def note(self, index: int, before_B_m: Array, what: str) -> None:
-        """Write down what was done to an object."""
-        moved = float(np.linalg.norm(self.hands.places_B_m()[index] - before_B_m[index]))
-        self.acts.moved_m = max(self.acts.moved_m, moved)
-        self.acts.times += 1
-        self.acts.notes.append(f"object {index} {what}")
+        """Note what was done to an object."""
+        moved = float(np.linalg.norm(self.disturber.places_B_m()[index] - before_B_m[index]))
+        self.actions.moved_m = max(self.actions.moved_m, moved)
+        self.actions.count += 1
+        self.actions.notes.append(f"object {index} {what}")
 
 
-class ShoveParams(ObjectParams):
+class ObjectShovedParams(ObjectParams):
     """Parameters of `object_shoved`."""
 
-    speed_m_s: float = param("Speed the knock gives it", unit="m/s", default=0.5, gt=0.0, le=3.0)
+    speed_m_s: float = param("Speed after the knock", unit="m/s", default=0.5, gt=0.0, le=3.0)
 
 
-class Shove(WorldEffect):
-    """An object is knocked and slides: some 20 mm at 0.5 m/s, in a random direction, but not into the robot."""
+class ObjectShoved(WorldEffect):
+    """An object is knocked and slides in a random direction away from the robot, about 20 mm at 0.5 m/s."""
 
-    Params = ShoveParams
-    params: ShoveParams
+    Params = ObjectShovedParams
+    params: ObjectShovedParams
 
     def draw(self) -> None:
         """See `WorldEffect`."""
-        self._index, self._angle = self.chosen(self.params.which), float(self.scene.rng.uniform(-np.pi, np.pi))
+        self._index, self._angle = self.chosen(self.params.which), float(self.context.rng.uniform(-np.pi, np.pi))
         self._until_s = -math.inf
 
     def act(self) -> None:
         """See `WorldEffect`."""
         speed = self.params.speed_m_s
-        self._before = self.hands.places_B_m()
-        self.some_way(self._angle, lambda a: self.hands.shove(self._index, speed * np.array([np.cos(a), np.sin(a)])))
-        self._until_s = self.scene.sensed.now_s + SLIDE_S
+        self._before = self.disturber.places_B_m()
+        self.try_directions(
+            self._angle, lambda a: self.disturber.shove(self._index, speed * np.array([np.cos(a), np.sin(a)]))
+        )
+        self._until_s = self.context.sensed.now_s + SLIDE_S
         self.note(self._index, self._before, f"shoved at {speed:g} m/s")
 
     def sense(self, observation: Observation) -> Observation:
-        """See `Effect`; nothing is altered, how far it slid is measured."""
+        """See `Effect`. Alters nothing; measures how far the object slid."""
         if observation.now_s < self._until_s:
-            slid = float(np.linalg.norm((self.hands.places_B_m() - self._before)[self._index]))
-            self.acts.moved_m = max(self.acts.moved_m, slid)
+            slid = float(np.linalg.norm((self.disturber.places_B_m() - self._before)[self._index]))
+            self.actions.moved_m = max(self.actions.moved_m, slid)
         return observation
 
 
-class Topple(WorldEffect):
-    """An object is laid on its side, where there is room for that."""
+class ObjectToppled(WorldEffect):
+    """An object is laid on its side where there is room."""
 
     Params = ObjectParams
     params: ObjectParams
 
     def draw(self) -> None:
         """See `WorldEffect`."""
-        self._index, self._angle = self.chosen(self.params.which), float(self.scene.rng.uniform(-np.pi, np.pi))
+        self._index, self._angle = self.chosen(self.params.which), float(self.context.rng.uniform(-np.pi, np.pi))
 
     def act(self) -> None:
         """See `WorldEffect`."""
-        before = self.hands.places_B_m()
-        self.some_way(self._angle, lambda a: self.hands.topple(self._index, a))
+        before = self.disturber.places_B_m()
+        self.try_directions(self._angle, lambda a: self.disturber.topple(self._index, a))
         self.note(self._index, before, "toppled")
 
 
-class Remove(WorldEffect):
-    """An object is taken away."""
+class ObjectRemoved(WorldEffect):
+    """An object is removed."""
 
     Params = ObjectParams
     params: ObjectParams
@@ -173,13 +174,13 @@ class Remove(WorldEffect):
 
     def act(self) -> None:
         """See `WorldEffect`."""
-        before = self.hands.places_B_m()
-        self.hands.remove(self._index)
+        before = self.disturber.places_B_m()
+        self.disturber.remove(self._index)
         self.note(self._index, before, "taken away")
 
 
-class Add(WorldEffect):
-    """An object that was not there at first is put where its layout has it."""
+class ObjectAdded(WorldEffect):
+    """An object missing at first is put at its place of the layout."""
 
     Params = ObjectParams
     params: ObjectParams
@@ -187,32 +188,32 @@ class Add(WorldEffect):
     def prepare(self) -> None:
         """See `Effect`."""
         self._index = self.chosen(self.params.which)
-        self.hands.remove(self._index)
+        self.disturber.remove(self._index)
 
     def act(self) -> None:
         """See `WorldEffect`."""
-        before = self.hands.places_B_m()
-        self.hands.put_back(self._index)
+        before = self.disturber.places_B_m()
+        self.disturber.put_back(self._index)
         self.note(self._index, before, "added")
 
 
-class OffsetParams(FaultParams):
+class ContainerOffsetParams(FaultParams):
     """Parameters of `container_offset`."""
 
-    shift_m: tuple[float, float] = param("How far the container is moved, in B", unit="m", default=(0.01, 0.005))
-    yaw_rad: float = param("and turned about its middle", unit="rad", default=0.0, ge=-0.5, le=0.5)
+    shift_m: tuple[float, float] = param("Shift of the container in B", unit="m", default=(0.01, 0.005))
+    yaw_rad: float = param("Rotation about its middle", unit="rad", default=0.0, ge=-0.5, le=0.5)
 
 
 class ContainerOffset(WorldEffect):
-    """The container is moved, with all that is in it; nobody is told."""
+    """The container is moved with its content."""
 
-    Params = OffsetParams
-    params: OffsetParams
+    Params = ContainerOffsetParams
+    params: ContainerOffsetParams
 
     def act(self) -> None:
         """See `WorldEffect`."""
         p = self.params
-        self.hands.shift_container(np.array(p.shift_m), p.yaw_rad)
-        self.acts.times += 1
-        self.acts.moved_m = float(np.hypot(*p.shift_m))
-        self.acts.notes.append(f"container moved by {1e3 * self.acts.moved_m:.1f} mm")
+        self.disturber.shift_container(np.array(p.shift_m), p.yaw_rad)
+        self.actions.count += 1
+        self.actions.moved_m = float(np.hypot(*p.shift_m))
+        self.actions.notes.append(f"container moved by {1e3 * self.actions.moved_m:.1f} mm")

@@ -1,17 +1,17 @@
-"""TODO door of glotouch_bt/mission/checkpoint."""
+"""Save a running mission after every skill, and continue it from a checkpoint in a new process."""
 
 from glotouch_bt.mission.checkpoint.codec import decode, encode
-from glotouch_bt.mission.checkpoint.store import FILE, CheckpointFile, Row
+from glotouch_bt.mission.checkpoint.store import CHECKPOINT_FILE, CheckpointFile, CheckpointRow
 from glotouch_bt.mission.checkpoint.world_check import WorldChanged
 from glotouch_bt.mission.checkpoint.writer import CheckpointHooks, CheckpointWriter, ResumePoint, RunState
 
 __all__ = [
-    "FILE",
+    "CHECKPOINT_FILE",
     "CheckpointFile",
     "CheckpointHooks",
     "CheckpointWriter",
     "ResumePoint",
-    "Row",
+    "CheckpointRow",
     "RunState",
     "WorldChanged",
     "decode",

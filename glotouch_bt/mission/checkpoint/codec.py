@@ -1,9 +1,8 @@
-"""Values to bytes and back, for checkpoints: what skills write to ports, and what a robot says of its state.
+"""Encode checkpoint values (port values, robot state) as MessagePack and decode them.
 
-Plain data, tuples, mappings, sets, numpy arrays and generators, enums and dataclasses, as MessagePack. Reading runs no
-code of the file: it can only name dataclasses and enums, and only those of `known_packages`; they are made without
-their `__init__`, so that not one bit of a kept value is normalised again. What was one object stays one object
-(values compared by identity go on doing so), and arrays keep dtype, order and whether they may be written to.
+Supported: plain data, tuples, mappings, sets, deques, numpy arrays and generators, enums and dataclasses. Decoding runs
+no code from the file: it can only name dataclasses and enums of `known_packages`. They are created without `__init__`,
+so that values come back to the bit. Shared objects stay shared; arrays keep dtype, order and the writeable flag.
 """
 
 from __future__ import annotations
@@ -24,23 +23,23 @@ from glotouch_bt.robot import BadInput, GlotouchError
 
 OWN_PACKAGES = ("glotouch_bt", "glotouch_skills", "glotouch_backends")
 GROUPS = ("glotouch_bt.skills", "glotouch_bt.backends")
-DEEPEST = 200
-"""Nesting that is refused: no value of a mission is that deep, a value that contains itself is."""
-_SMALLEST, _LARGEST = -(2**63), 2**64 - 1
-# One-letter marks of what is not plain; every non-plain value is a list [mark, ...].
+MAX_DEPTH = 200
+"""Deepest nesting that is encoded; only a value that contains itself is deeper."""
+_MIN_INT, _MAX_INT = -(2**63), 2**64 - 1
+# One-letter tags; every value that MessagePack has no type for is a list [tag, ...].
 _TUPLE, _LIST, _MAP, _SET, _FROZENSET, _DEQUE = "t", "l", "m", "s", "f", "q"
 _ARRAY, _NUMBER, _BIG, _GENERATOR = "a", "n", "i", "g"
 _ENUM, _DATA, _AGAIN = "e", "d", "r"
 _DTYPES = "biufc"
 
 
-class CannotKeep(GlotouchError):
-    """A value of a kind that a checkpoint cannot hold."""
+class NotEncodable(GlotouchError):
+    """A value of a type that a checkpoint cannot hold."""
 
 
 @lru_cache(maxsize=1)
 def known_packages() -> frozenset[str]:
-    """Top-level packages whose dataclasses and enums may be named: ours, and those that provide a skill or backend."""
+    """Return the top-level packages whose classes a file may name: ours and those that provide skills or backends."""
     provided = {e.module.partition(".")[0] for group in GROUPS for e in entry_points(group=group)}
     return frozenset(provided | set(OWN_PACKAGES))
 
@@ -48,73 +47,71 @@ def known_packages() -> frozenset[str]:
 _DAMAGED = (
     msgspec.MsgspecError, ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError, OverflowError,
 )  # fmt: skip
-"""What reading damaged bytes can raise."""
+"""Errors that decoding damaged bytes can raise."""
 
 
 def encode(value: object) -> bytes:
-    """A value as bytes.
+    """Return a value as bytes.
 
     Raises:
-        CannotKeep: It holds something that cannot be kept; the message says what, and where in it.
+        NotEncodable: Some part of it cannot be encoded; the message names the part and its type.
     """
     return msgspec.msgpack.encode(Encoder().plain(value))
 
 
 def decode(data: bytes) -> Any:
-    """What `encode` was given.
+    """Return the value that `encode` was given.
 
     Raises:
-        BadInput: Not from `encode`, from another version of a class, or of a class of a package not known here.
+        BadInput: The bytes are damaged, or name a class that is unknown here or of another version.
     """
     try:
         return _Decoder().value(msgspec.msgpack.decode(data))
     except BadInput:
         raise
     except _DAMAGED as e:
-        raise BadInput(f"kept values cannot be read ({type(e).__name__}: {e})") from e
+        raise BadInput(f"checkpoint values cannot be read ({type(e).__name__}: {e})") from e
 
 
 def encode_parts(parts: Mapping[str, object]) -> tuple[bytes, dict[str, str]]:
-    """A mapping as bytes, less what cannot be kept; and of that, by name, why.
+    """Encode a mapping without the values that cannot be encoded; also return why, by name.
 
-    What one part shares with another stays one object.
+    Objects shared between the values stay shared.
     """
-    encoder, kept, lacking = Encoder(), [], {}
+    encoder, encoded, lacking = Encoder(), [], {}
     encoder.reserve()
     for name, value in parts.items():
         try:
-            kept.append([name, encoder.plain(value, name)])
-        except CannotKeep as e:
+            encoded.append([name, encoder.plain(value, name)])
+        except NotEncodable as e:
             lacking[name] = str(e)
-    return msgspec.msgpack.encode([_MAP, *kept]), lacking
+    return msgspec.msgpack.encode([_MAP, *encoded]), lacking
 
 
 class Encoder:
-    """One message: objects met again within it become references."""
+    """Encoder of one message; an object met again becomes a reference."""
 
     def __init__(self) -> None:
-        self._seen: dict[int, int] = {}
-        self._kept: list[object] = []  # keeps the objects alive, so that an id means one object
+        self._numbers: dict[int, int] = {}  # by id
+        self._objects: list[object] = []  # keeps them alive: an id then names one object
 
     def reserve(self) -> None:
-        """Count an object that the caller writes itself, round those to come."""
-        self._kept.append(self)
+        """Count an enclosing object that the caller writes itself."""
+        self._objects.append(self)
 
     def plain(self, value: object, where: str = "value") -> Any:
-        """`value` as what MessagePack holds.
-
-        A value that cannot be kept leaves nothing behind: the next one may be tried.
+        """Return `value` in the types of MessagePack. After an error the encoder can be used on.
 
         Raises:
-            CannotKeep: See `encode`.
+            NotEncodable: See `encode`.
         """
-        before = len(self._kept)
+        before = len(self._objects)
         try:
             return self._plain(value, where, 0)
-        except CannotKeep:
-            for lost in self._kept[before:]:
-                del self._seen[id(lost)]
-            del self._kept[before:]
+        except NotEncodable:
+            for dropped in self._objects[before:]:
+                del self._numbers[id(dropped)]
+            del self._objects[before:]
             raise
 
     def _plain(self, value: Any, where: str, depth: int) -> Any:
@@ -122,18 +119,18 @@ class Encoder:
         if value is None or kind in (bool, str, bytes, float):
             return value
         if kind is int:
-            return value if _SMALLEST <= value <= _LARGEST else [_BIG, str(value)]
-        if depth > DEEPEST:
-            raise CannotKeep(f"{where}: nested deeper than {DEEPEST}")
-        number = self._seen.get(id(value))
+            return value if _MIN_INT <= value <= _MAX_INT else [_BIG, str(value)]
+        if depth > MAX_DEPTH:
+            raise NotEncodable(f"{where}: nested deeper than {MAX_DEPTH}")
+        number = self._numbers.get(id(value))
         if number is not None:
             return [_AGAIN, number]
         if isinstance(value, np.generic):
             return [_NUMBER, _dtype(value.dtype, where), value.tobytes()]
         if isinstance(value, Enum):
             return [_ENUM, _class_name(kind, where), value.name]
-        self._seen[id(value)] = len(self._kept)
-        self._kept.append(value)
+        self._numbers[id(value)] = len(self._objects)
+        self._objects.append(value)
         return self._compound(value, kind, where, depth + 1)
 
     def _compound(self, value: Any, kind: type, where: str, depth: int) -> Any:
@@ -164,7 +161,7 @@ class Encoder:
         if kind is np.random.Generator:
             bits = value.bit_generator
             return [_GENERATOR, type(bits).__name__, self._plain(bits.state, f"{where} state", depth)]
-        raise CannotKeep(f"{where} is a {kind.__module__}.{kind.__qualname__}, which cannot be kept")
+        raise NotEncodable(f"{where} is a {kind.__module__}.{kind.__qualname__}, which a checkpoint cannot hold")
 
 
 def _array(value: np.ndarray[Any, Any], where: str) -> list[Any]:
@@ -175,34 +172,35 @@ def _array(value: np.ndarray[Any, Any], where: str) -> list[Any]:
 
 def _dtype(dtype: np.dtype[Any], where: str) -> str:
     if dtype.kind not in _DTYPES:
-        raise CannotKeep(f"{where} is an array of {dtype}, which cannot be kept")
+        raise NotEncodable(f"{where} is an array of {dtype}, which a checkpoint cannot hold")
     return dtype.str
 
 
 def _class_name(kind: type, where: str) -> str:
-    if kind.__module__.partition(".")[0] not in known_packages() or "<locals>" in kind.__qualname__:
-        raise CannotKeep(f"{where} is a {kind.__module__}.{kind.__qualname__}: of no package that provides a skill")
-    return f"{kind.__module__}:{kind.__qualname__}"
+    module, name = kind.__module__, kind.__qualname__
+    if module.partition(".")[0] not in known_packages() or "<locals>" in name:
+        raise NotEncodable(f"{where} is a {module}.{name}; its package provides no skill or backend")
+    return f"{module}:{name}"
 
 
 @lru_cache(maxsize=512)
 def _named_class(name: str) -> type:
-    """A dataclass or enum of a known package.
+    """Return a dataclass or enum of a known package.
 
     Raises:
-        BadInput: No such class here, or one that a file may not name.
+        BadInput: There is no such class, or a file may not name it.
     """
     module, _, qualname = name.partition(":")
     if module.partition(".")[0] not in known_packages():
-        raise BadInput(f"kept values name {name}, of a package that provides no skill or backend here")
+        raise BadInput(f"the checkpoint names {name}; its package provides no skill or backend here")
     try:
         found: Any = importlib.import_module(module)
         for part in qualname.split("."):
             found = vars(found)[part]
     except (ImportError, KeyError, TypeError, ValueError, AttributeError) as e:
-        raise BadInput(f"kept values name {name}, which does not exist here: they are of another version") from e
+        raise BadInput(f"the checkpoint names {name}, which does not exist here: it is of another version") from e
     if not (isinstance(found, type) and (dataclasses.is_dataclass(found) or issubclass(found, Enum))):
-        raise BadInput(f"kept values name {name}, which is neither a dataclass nor an enum")
+        raise BadInput(f"the checkpoint names {name}, which is neither a dataclass nor an enum")
     return found
 
 
@@ -224,7 +222,7 @@ class _Decoder:
     def value(self, plain: Any) -> Any:
         if not isinstance(plain, list):
             if isinstance(plain, dict):
-                raise BadInput("kept values cannot be read (an unmarked mapping)")
+                raise BadInput("checkpoint values cannot be read (a mapping without a tag)")
             return plain
         mark, *rest = plain
         if mark == _AGAIN:
@@ -236,10 +234,10 @@ class _Decoder:
         if mark == _ENUM:
             kind = _named_class(rest[0])
             if not issubclass(kind, Enum) or rest[1] not in kind.__members__:
-                raise BadInput(f"kept values name {rest[0]}.{rest[1]}, which does not exist here")
+                raise BadInput(f"the checkpoint names {rest[0]}.{rest[1]}, which does not exist here")
             return kind.__members__[rest[1]]
         number = len(self._made)
-        self._made.append(None)  # the place of this object; what is inside comes after it
+        self._made.append(None)  # its number comes before those of the objects inside
         made = self._read[mark](rest)
         self._made[number] = made
         return made
@@ -271,7 +269,7 @@ class _Decoder:
 
     def _generator(self, rest: list[Any]) -> Any:
         if rest[0] not in ("PCG64", "PCG64DXSM", "MT19937", "Philox", "SFC64"):
-            raise BadInput(f"kept values name the bit generator {rest[0]!r}, which is not known")
+            raise BadInput(f"the checkpoint names the bit generator {rest[0]!r}, which is unknown")
         bits = getattr(np.random, rest[0])()
         bits.state = self.value(rest[1])
         return np.random.Generator(bits)
@@ -279,12 +277,12 @@ class _Decoder:
     def _data(self, rest: list[Any]) -> Any:
         kind = _named_class(rest[0])
         if not dataclasses.is_dataclass(kind):
-            raise BadInput(f"kept values name {rest[0]} as a dataclass; it is none")
+            raise BadInput(f"the checkpoint names {rest[0]} as a dataclass, which it is not")
         given, known = [n for n, _ in rest[1:]], [f.name for f in dataclasses.fields(kind)]
         if given != known:
             raise BadInput(
-                f"kept values have {rest[0]} with fields {', '.join(given)}; here it has {', '.join(known)}: "
-                "they are of another version"
+                f"the checkpoint has {rest[0]} with fields {', '.join(given)}; here it has {', '.join(known)}: "
+                "it is of another version"
             )
         made = object.__new__(kind)
         for name, plain in rest[1:]:
@@ -295,5 +293,5 @@ class _Decoder:
 def _known_dtype(name: object) -> np.dtype[Any]:
     dtype = np.dtype(str(name))
     if dtype.kind not in _DTYPES or dtype.names is not None:
-        raise BadInput(f"kept values have an array of {name!r}, which is not read")
+        raise BadInput(f"the checkpoint holds an array of {name!r}, which is not supported")
     return dtype

@@ -1,7 +1,7 @@
-"""checkpoint.sqlite: a row for each skill that ended, with all that is needed to go on from there.
+"""The file checkpoint.sqlite: one row per finished skill, with everything needed to continue from there.
 
-SQLite in WAL mode, one transaction a row: a process that is killed leaves every row it had written. What a row holds
-is MessagePack (`values`), compressed; `glotouch resume` reads it, and so does any tool that reads SQLite:
+SQLite in WAL mode, one transaction a row: a killed process leaves every row it has written. The content of a row is
+compressed MessagePack (`codec`). `glotouch resume` reads the file, and so does any SQLite tool:
 
     sqlite3 checkpoint.sqlite 'SELECT number, stamp_s, node, status, length(state), length(world) FROM checkpoint'
 """
@@ -21,7 +21,7 @@ import zstandard
 from glotouch_bt.mission.checkpoint.codec import decode
 from glotouch_bt.robot import BadInput, GlotouchError
 
-FILE = "checkpoint.sqlite"
+CHECKPOINT_FILE = "checkpoint.sqlite"
 FORMAT = 2
 _MARK = 0x474C4F54  # "GLOT", SQLite's application_id
 _TABLES = """
@@ -41,17 +41,17 @@ CREATE TABLE checkpoint (
 
 
 @dataclass(frozen=True)
-class Row:
+class CheckpointRow:
     """One checkpoint without its content.
 
     Attributes:
-        number: 0 is before the first tick.
+        number: Its number; 0 was taken before the first tick.
         stamp_s: Robot clock.
         node: Path of the skill that ended, or empty.
-        status: How it ended.
-        begun: Paths of the nodes that began since the row before.
-        lacking: What could not be kept, and why.
-        record_bytes: Length of the record up to here, or None.
+        status: Status it ended with.
+        begun: Paths of the nodes that started since the previous row.
+        lacking: Values that could not be saved, with the reason.
+        record_bytes: Length of the record at that time, or None.
         has_world: It holds the state of a simulated world.
     """
 
@@ -72,7 +72,7 @@ class CheckpointFile:
         path: An existing file; `create` makes one.
 
     Raises:
-        BadInput: It is none, or of another format.
+        BadInput: It is not a checkpoint file, or of another format.
     """
 
     def __init__(self, path: Path) -> None:
@@ -96,10 +96,10 @@ class CheckpointFile:
 
     @classmethod
     def create(cls, path: Path, run: Mapping[str, object]) -> CheckpointFile:
-        """A new file for a run described by JSON data; replaces what is there.
+        """Create the file of a run that JSON data describe; replace an existing one.
 
         Raises:
-            GlotouchError: The disk refused.
+            GlotouchError: The file cannot be written.
         """
         for name in (path.name, f"{path.name}-wal", f"{path.name}-shm"):
             path.with_name(name).unlink(missing_ok=True)
@@ -113,20 +113,20 @@ class CheckpointFile:
 
     @property
     def run(self) -> dict[str, Any]:
-        """What is known of the run."""
+        """The run's description and end, as written by `create` and `note`."""
         with self._errors():
             return {k: json.loads(v) for k, v in self._db.execute("SELECT key, value FROM run")}
 
     def note(self, key: str, value: object) -> None:
-        """Set one item of `run`; errors as in `add`."""
+        """Set one item of `run`; raises as `add`."""
         with self._writing():
             self._db.execute("INSERT OR REPLACE INTO run VALUES (?, ?)", (key, json.dumps(value)))
 
-    def add(self, row: Row, state: bytes, world: bytes | None) -> None:
-        """Append a checkpoint, in one transaction.
+    def add(self, row: CheckpointRow, state: bytes, world: bytes | None) -> None:
+        """Append a checkpoint in one transaction.
 
         Raises:
-            GlotouchError: The disk refused.
+            GlotouchError: The file cannot be written.
         """
         pack = zstandard.ZstdCompressor(level=1).compress
         values = (
@@ -136,17 +136,17 @@ class CheckpointFile:
         with self._writing():
             self._db.execute("INSERT INTO checkpoint VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", values)
 
-    def rows(self) -> list[Row]:
-        """All checkpoints, oldest first."""
-        asked = "SELECT number, stamp_s, node, status, begun, lacking, record_bytes, world IS NOT NULL FROM checkpoint"
+    def rows(self) -> list[CheckpointRow]:
+        """Return all checkpoints, oldest first."""
+        query = "SELECT number, stamp_s, node, status, begun, lacking, record_bytes, world IS NOT NULL FROM checkpoint"
         with self._errors():
             return [
-                Row(n, t, node, status, tuple(json.loads(begun)), json.loads(lacking), size, bool(world))
-                for n, t, node, status, begun, lacking, size, world in self._db.execute(f"{asked} ORDER BY number")
+                CheckpointRow(n, t, node, status, tuple(json.loads(begun)), json.loads(lacking), size, bool(world))
+                for n, t, node, status, begun, lacking, size, world in self._db.execute(f"{query} ORDER BY number")
             ]
 
     def state(self, number: int) -> dict[str, Any]:
-        """The state of one checkpoint.
+        """Return the state of one checkpoint.
 
         Raises:
             BadInput: It cannot be read, or is of another version.
@@ -157,24 +157,24 @@ class CheckpointFile:
         return found
 
     def world(self, number: int) -> Mapping[str, Any] | None:
-        """The simulated world of one checkpoint, or None; errors as for `state`."""
+        """Return the simulated world of one checkpoint, or None; raises as `state`."""
         found = self._content("world", number)
         if not (found is None or isinstance(found, dict)):
             raise BadInput(f"{self.path}: checkpoint {number} is damaged")
         return found
 
     def drop_after(self, number: int) -> None:
-        """Forget every later checkpoint; errors as in `add`."""
+        """Delete every later checkpoint; raises as `add`."""
         with self._writing():
             self._db.execute("DELETE FROM checkpoint WHERE number > ?", (number,))
 
     def copy_to(self, path: Path) -> None:
-        """A copy with all that has been written, in one file."""
+        """Write a copy with all committed rows, as one file."""
         with self._errors(), closing(sqlite3.connect(path)) as target:
             self._db.backup(target)
 
     def close(self) -> None:
-        """Fold the write-ahead log into the file, so that the file alone is the whole; idempotent."""
+        """Merge the write-ahead log into the file and close it; idempotent."""
         self._db.close()
 
     def _content(self, column: str, number: int) -> object:
@@ -193,7 +193,7 @@ class CheckpointFile:
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        """One transaction."""
+        """Run the block in one transaction."""
         try:
             with self._db:
                 yield
@@ -209,8 +209,11 @@ class CheckpointFile:
 
 
 def _connect(path: Path) -> sqlite3.Connection:
-    """WAL with `synchronous=NORMAL`: a killed process loses no transaction; a power cut may lose the newest, never the
-    file. No checkpoint of the log in between: that would wait for the disk within a tick."""
+    """Connect in WAL mode with `synchronous=NORMAL`.
+
+    A killed process loses no transaction; a power cut may lose the newest ones but does not corrupt the file. The log
+    is not merged while running, because a merge would wait for the disk within a tick.
+    """
     db = sqlite3.connect(path, timeout=5.0)
     try:
         for pragma in ("journal_mode = WAL", "synchronous = NORMAL", "wal_autocheckpoint = 0"):

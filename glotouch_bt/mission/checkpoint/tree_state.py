@@ -1,9 +1,8 @@
-"""How far a tree has come, at the moment one of its skills ended; and a fresh tree brought to that moment.
+"""Save the state of a tree at the moment a skill ends, and restore a newly built tree to it.
 
-The moment lies inside a tick: the skill has ended, nothing above has reacted to it yet, and the next skill has done
-nothing. A tree that is brought there hands the skill's end up once more in its first tick, and so goes on exactly as
-the first one did. What else had finished earlier in that tick is handed up again, too; what was running beside it (in
-a parallel) starts from its beginning.
+The moment lies inside a tick: the skill has ended, its parent has not reacted, and the next skill has not started. In
+its first tick the restored tree reports the end of that skill once more, and of every node that had ended earlier in
+the same tick. It then continues exactly as the first tree did. A skill that ran in parallel starts again.
 """
 
 from __future__ import annotations
@@ -24,11 +23,11 @@ from glotouch_bt.skill import Skill
 
 
 def tree_state(tree: BuiltTree, finished: Sequence[Behaviour]) -> dict[str, Any]:
-    """How far the tree has come.
+    """Return the state of a tree inside a tick.
 
     Args:
-        tree: A tree in the midst of a tick.
-        finished: The nodes that have ended in this tick so far, in their order; the last one has just done so.
+        tree: The tree.
+        finished: The nodes that have ended in this tick so far, in order; the last one has just ended.
     """
     return {
         "finished": tuple(tree.paths[n.id] for n in finished),
@@ -46,26 +45,24 @@ def _node_state(node: Behaviour, tree: BuiltTree) -> dict[str, Any]:
         state["progress"] = node.progress
     if getattr(node, "reason", None) is not None:
         state["reason"] = node.reason
-    if isinstance(node, Skill):
-        remembered = node.remember()
-        if remembered is not None:
-            state["remembered"] = remembered
+    if isinstance(node, Skill) and (remembered := node.remember()) is not None:
+        state["remembered"] = remembered
     return state
 
 
-class TreeState:
-    """A fresh tree brought to where another one stood; tick it once, then call `done`.
+class RestoredTree:
+    """A newly built tree restored to a saved state. Tick it once, then call `done`.
 
     Args:
         tree: The same tree, built anew.
-        state: What `tree_state` gave.
+        state: Result of `tree_state`.
 
     Raises:
         BadInput: The state is of another tree.
     """
 
     def __init__(self, tree: BuiltTree, state: Mapping[str, Any]) -> None:
-        self._handed_up: list[Behaviour] = []
+        self._replayed: list[Behaviour] = []
         nodes = _by_path(tree)
         if state["nodes"].keys() != nodes.keys():
             odd = ", ".join(sorted(state["nodes"].keys() ^ nodes.keys())[:3])
@@ -73,25 +70,26 @@ class TreeState:
         for path, node in nodes.items():
             _set_node(node, state["nodes"][path], nodes)
         for path in state["finished"]:
-            self._hand_up(nodes[path])
+            self._replay_end(nodes[path])
         if state["finished"]:
             ended = nodes[state["finished"][-1]]
             for node in (ended, *_ancestors(ended)):
                 node.status = Status.RUNNING
 
     def replays(self, node: Behaviour) -> bool:
-        """The node's end is not a new one: it is being handed up once more."""
-        return node in self._handed_up
+        """Return True if the node's end was reported before the checkpoint."""
+        return node in self._replayed
 
     def done(self) -> None:
-        """The first tick is over."""
-        for node in self._handed_up:
+        """End the replay after the first tick."""
+        for node in self._replayed:
             vars(node).pop("tick", None)
-        self._handed_up = []
+        self._replayed = []
 
-    def _hand_up(self, node: Behaviour) -> None:
+    def _replay_end(self, node: Behaviour) -> None:
+        """Let the node report its final status in its next tick instead of running."""
         final = node.status
-        if final not in (Status.SUCCESS, Status.FAILURE):  # broken off again by what ended after it
+        if final not in (Status.SUCCESS, Status.FAILURE):  # preempted by a node that ended later in the tick
             return
 
         def tick() -> Iterator[Behaviour]:
@@ -100,19 +98,19 @@ class TreeState:
             yield node
 
         node.tick = tick
-        self._handed_up.append(node)
+        self._replayed.append(node)
 
 
 def start_at(tree: BuiltTree, state: Mapping[str, Any], path: str) -> None:
-    """Bring a fresh tree to where a node is about to begin, whatever the state's own next one is.
+    """Prepare a newly built tree to start at a given node.
 
-    What comes before it in a sequence counts as done, in a selector as failed. Loops, retries and timeouts round it go
-    on if they were under way, else they begin; a for_each has its item in place.
+    Earlier siblings count as succeeded in a sequence and as failed in a selector. Enclosing loops, retries and timeouts
+    continue if they were running, otherwise they start; a for_each sets its item.
 
     Args:
-        tree: The same tree, built anew; its ports hold the state's values.
-        state: What `tree_state` gave; may have been taken anywhere in the mission.
-        path: Of the node.
+        tree: The same tree, built anew; its ports hold the saved values.
+        state: Result of `tree_state`, taken anywhere in the mission.
+        path: Path of the node.
     """
     nodes = _by_path(tree)
     for other, node in nodes.items():
@@ -148,7 +146,7 @@ def _ancestors(node: Behaviour) -> Iterator[Behaviour]:
 
 def _set_node(node: Behaviour, state: Mapping[str, Any], nodes: Mapping[str, Behaviour]) -> None:
     status = Status(state["status"])
-    # A skill that was under way starts from its beginning: to py_trees that is a node without a status.
+    # A running skill starts again: to py_trees a node with status INVALID.
     node.status = Status.INVALID if isinstance(node, Skill) and status is Status.RUNNING else status
     node.feedback_message = state.get("feedback", "")
     if isinstance(node, Composite):

@@ -1,4 +1,4 @@
-"""TODO door of glotouch_bt/mission/run."""
+"""Run a loaded mission: the tick loop, pauses, the safe stop, and the watchdog over a hanging skill."""
 
 from glotouch_bt.mission.execution.control import Control, TimedPauses
 from glotouch_bt.mission.execution.runner import Outcome, default_arm, run_mission

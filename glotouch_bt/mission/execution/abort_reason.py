@@ -1,4 +1,4 @@
-"""What ends a mission from outside the tree, in words and numbers."""
+"""The reason why a mission was aborted from outside the tree."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from glotouch_bt.robot import BackendError, GuardTripped
 from glotouch_bt.skill import Reason
 
 
-def why_aborted(error: BaseException, node: str) -> Failure:
-    """What was raised at a node, as the end of a mission: a code, words, and the numbers it carries."""
+def abort_failure(error: BaseException, node: str) -> Failure:
+    """Return the error raised at a node as a failure with a code, a message and the numbers the error carries."""
     if isinstance(error, WorldChanged):
         return Failure(error.reason.node, str(error), error.reason)
     if isinstance(error, KeyboardInterrupt):
@@ -30,7 +30,7 @@ def why_aborted(error: BaseException, node: str) -> Failure:
 
 
 def _evidence(error: BaseException) -> dict[str, float | int | str]:
-    """The numbers an error carries."""
+    """Return the values a backend error carries, by name."""
     if not isinstance(error, BackendError):
         return {}
     names = ("guard", "quantity", "value", "limit", "stamp_s", "age_s", "max_age_s")

@@ -1,7 +1,7 @@
-"""The gate between a tick and its cycle: while the mission is paused, what a skill commands waits until it may be sent.
+"""The pause gate between a tick and its control cycle: it delays a skill's command while the mission is paused.
 
-A motion under way stops by itself (`motion.PauseSignal`) and goes on listening. Anything else waits here: a command the
-arm would begin at rest is not sent, the arm holds, and nobody is ticked, so that no skill notices but for the clock.
+A motion in progress stops itself (`motion.PauseSignal`). Every other command, which starts from rest, waits here: the
+arm holds and the tree is not ticked, so a skill sees no difference except the clock.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from glotouch_bt.robot import HOLD, Command, Observation
 from glotouch_bt.skill import Context
 
 PAUSE, PAUSED, RESUMED = "pause", "paused", "resumed"
-"""Events: asked for, the arm stands, going on."""
+"""Event kinds: a pause was requested; the arm stands; the mission continues."""
 
 
 class PauseGate:
-    """See the module's text.
+    """Hold back commands during a pause and record pause events.
 
     Args:
-        control: Who asks for pauses.
-        context: Of the run; `context.paused_s` is kept here.
-        cycle: Sends one command and sets `context.observation`; raises what ends the run.
-        paced: The robot's clock is the wall's.
+        control: Source of pause requests.
+        context: Context of the run; `context.paused_s` is updated here.
+        cycle: Sends one command and sets `context.observation`; may raise to end the run.
+        paced: The robot clock is the wall clock.
 
     Attributes:
-        pause_signal: What the arm's motions read.
+        pause_signal: The request as the arm's motions read it.
     """
 
     def __init__(
@@ -39,11 +39,11 @@ class PauseGate:
         self.pause_signal = PauseSignal()
         context.arm.pause_signal = self.pause_signal
         self._standing = False
-        self._looked_s = 0.0
+        self._updated_s = 0.0
         self._last = HOLD
 
-    def look(self, ticks: int) -> None:
-        """Before a tick: is a pause wanted?"""
+    def update(self, ticks: int) -> None:
+        """Ask for a pause request; call before each tick."""
         now_s = self._context.observation.now_s
         wanted = self._control.wants_pause(ticks, now_s)
         if wanted is not self.pause_signal.requested:
@@ -52,57 +52,56 @@ class PauseGate:
             self._standing = False
         elif wanted and self.pause_signal.standing:
             if self._standing:
-                self._context.paused_s += now_s - self._looked_s
-            self._stands("on the way")
+                self._context.paused_s += now_s - self._updated_s
+            self._record_standing("on the way")
         if self._standing and not self._paced:
-            self._control.rest(now_s - self._looked_s)
-        self._looked_s = now_s
+            self._control.rest(now_s - self._updated_s)
+        self._updated_s = now_s
 
-    def begins(self, style: Style) -> None:
-        """A skill that declares this has begun."""
+    def on_skill_started(self, style: Style) -> None:
+        """Adopt the pause style of the skill that has just started."""
         self.pause_signal.style = style
 
     def send(self, command: Command, ticks: int) -> None:
-        """Send a skill's command, when it may be sent."""
-        if self.pause_signal.requested and self._holds_back():
-            self._wait(ticks)
+        """Send a skill's command, after a pause if one is due now."""
+        if self.pause_signal.requested and self._can_pause_here():
+            self._hold_until_resumed(ticks)
         self._cycle(command)
         self._last = command
 
-    def _holds_back(self) -> bool:
-        """The arm stands where the last motion ended, and nothing is under way that must be finished first."""
+    def _can_pause_here(self) -> bool:
+        """Return True if the arm is at rest and no motion handles or defers the pause."""
         motion = self._last.motion
         at_rest = motion is None or not (np.count_nonzero(motion.dq) or np.count_nonzero(motion.ddq))
         return at_rest and not self.pause_signal.handled and not self.pause_signal.deferred
 
-    def _wait(self, ticks: int) -> None:
-        """Hold until the pause is over."""
+    def _hold_until_resumed(self, ticks: int) -> None:
         context = self._context
-        waiting = self._waiting(ticks)
-        command = next(waiting)
+        pause = self._pause_motion(ticks)
+        command = next(pause)
         while True:
             before_s = context.observation.now_s
             observation = self._cycle(command)
             context.paused_s += observation.now_s - before_s
             try:
-                command = waiting.send(observation)
+                command = pause.send(observation)
             except StopIteration:
                 return
 
-    def _waiting(self, ticks: int) -> Motion[None]:
+    def _pause_motion(self, ticks: int) -> Motion[None]:
         arm, way = self._context.arm, None
         if self.pause_signal.style == "retreat":
             way = yield from arm.retreat()
-        self._stands("backed off" if way else "at rest")
+        self._record_standing("backed off" if way else "at rest")
         while True:
             yield HOLD
-            self.look(ticks)
+            self.update(ticks)
             if not self.pause_signal.requested:
                 break
         if way is not None:
             yield from arm.return_to_contact(way)
 
-    def _stands(self, where: str) -> None:
+    def _record_standing(self, where: str) -> None:
         if not self._standing:
             self._standing = True
             self._event(PAUSED, self._context.observation.now_s, where=where, style=self.pause_signal.style)

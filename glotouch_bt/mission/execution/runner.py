@@ -1,4 +1,4 @@
-"""The tick loop: one tick a control period, on the robot's clock. Whatever happens, the arm ends holding."""
+"""The tick loop: one tick per control period, on the robot clock. However a mission ends, the arm is held."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from glotouch_bt.mission.checkpoint import CheckpointHooks, CheckpointWriter, ResumePoint, RunState, WorldChanged
-from glotouch_bt.mission.execution.abort_reason import why_aborted
+from glotouch_bt.mission.execution.abort_reason import abort_failure
 from glotouch_bt.mission.execution.control import Control, Preempted
 from glotouch_bt.mission.execution.pause_gate import PauseGate
-from glotouch_bt.mission.execution.safe_stop import end_high
+from glotouch_bt.mission.execution.safe_stop import stop_safely
 from glotouch_bt.mission.execution.watchdog import STUCK_S, SkillHung, Stuck, Watchdog, deferred_interrupt
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.record import Record, RecordedRequests, Rounding, RunSummary
-from glotouch_bt.mission.tree import BuiltTree, Failure, ReasonBook, build_tree, sensed
+from glotouch_bt.mission.tree import Failure, ReasonBook, build_tree, sensed
 from glotouch_bt.robot import HOLD, Command, GuardTripped, Observation, Robot, World
 from glotouch_bt.robot.supervision import GuardFinding, SupervisionLimits, Supervisor
 from glotouch_bt.skill import Context, Reason, Skill
@@ -26,8 +26,9 @@ if TYPE_CHECKING:
     from glotouch_bt.motion import Arm
 
 PROGRESS_EVERY_S = 0.5
+"""Robot time between two progress reports."""
 ROUNDING_S = 1e-6
-"""Stamps are rounded to less than this."""
+"""Upper bound of the rounding error of a stamp."""
 
 
 @dataclass
@@ -35,19 +36,19 @@ class Outcome:
     """How a mission ended.
 
     Attributes:
-        status: success, failure (the tree failed, or time ran out), aborted (stopped from outside or by a fault).
+        status: success; failure (the tree failed or time ran out); aborted (stopped from outside or by a fault).
+        summary: Counts and decisions.
         chain: Why it did not succeed, root cause last.
-        error: What was raised, if it was aborted.
+        error: The error that aborted it.
         start_s, end_s: Robot clock at the first and the last tick.
         ticks: Ticks done.
         paused_s: Robot time in which it was paused.
-        guards: How often each guard of the supervision found something.
-        ending: What was done after a stop was asked for, in words.
-        found: Counts and decisions.
+        guards: Findings of the supervision, by guard.
+        safe_stop: What the arm did after a stop was requested, in words.
     """
 
     status: Literal["success", "failure", "aborted"]
-    found: RunSummary
+    summary: RunSummary
     chain: list[Failure] = field(default_factory=list)
     error: BaseException | None = None
     start_s: float = 0.0
@@ -55,7 +56,7 @@ class Outcome:
     ticks: int = 0
     paused_s: float = 0.0
     guards: dict[str, int] = field(default_factory=dict)
-    ending: str = ""
+    safe_stop: str = ""
 
     @property
     def reasons(self) -> list[str]:
@@ -63,12 +64,12 @@ class Outcome:
         return [str(f) for f in self.chain]
 
     def abort(self, error: BaseException, node: str) -> None:
-        """It ended by what was raised at a node."""
-        self.status, self.error, self.chain = "aborted", error, [why_aborted(error, node)]
+        """Set the outcome to aborted by an error raised at a node."""
+        self.status, self.error, self.chain = "aborted", error, [abort_failure(error, node)]
 
 
 def default_arm(robot: Robot, world: World) -> Arm:
-    """The motion room's arm for a robot."""
+    """Return the motion generators for a robot in a world."""
     from glotouch_bt.motion import Arm
 
     return Arm(robot.description, robot.limits, world, robot.period_s)
@@ -85,57 +86,69 @@ def run_mission(
     control: Control | None = None,
     supervision: SupervisionLimits | None = None,
     stuck_s: float = STUCK_S,
-    on_lost: Callable[[Stuck, Outcome], None] | None = None,
+    on_unresponsive: Callable[[Stuck, Outcome], None] | None = None,
     checkpoints: CheckpointWriter | None = None,
     resume_point: ResumePoint | None = None,
 ) -> Outcome:
     """Tick a mission to its end.
 
-    Never raises for what happens while ticking: a guard, a safety stop, a failing backend, a fault in a skill, one that
-    hangs, a stop from outside and Ctrl-C all give an `aborted` outcome whose `error` says what it was. The arm is held
-    in every case. What goes wrong before the first tick (an arm that cannot be planned for) does raise.
+    Errors while ticking (a guard, a safety stop, a backend or skill error, a hanging skill, a requested stop, Ctrl-C)
+    give an `aborted` outcome with the error in `error`; the arm is held in every case. Errors before the first tick,
+    for example an arm that cannot be planned for, are raised.
 
     Args:
         mission: A checked mission.
-        robot: An open robot; it is supervised (`robot.supervision`) from the first cycle on.
-        record: Where everything sensed, commanded, ticked and decided goes; not closed here.
+        robot: An open robot; supervised (`robot.supervision`) from the first cycle on.
+        record: Receives everything sensed, commanded, ticked and decided; not closed here.
         make_arm: Makes the motion generators.
         on_progress: Called about twice a second of robot time with (robot time since start, summary).
-        timeout_s: Longest duration on the robot's clock, without pauses (default: the mission's).
-        control: Who may pause and stop it.
-        supervision: What the guards tolerate.
+        timeout_s: Longest duration on the robot clock, without pauses (default: the mission's).
+        control: Source of pause and stop requests.
+        supervision: Limits of the guards.
         stuck_s: Longest wall time of one tick and its cycle.
-        on_lost: Called, from another thread, when a tick does not come back and cannot be broken off; it should write
+        on_unresponsive: Called from another thread when a tick neither returns nor can be interrupted. It should save
             what it can and end the process.
         checkpoints: Writes a checkpoint whenever a skill has ended.
-        resume_point: A checkpoint to go on from; where it says so, the robot has been put back to it already.
+        resume_point: Checkpoint to continue from; with `same_world` the robot has been restored to it already.
     """
-    summary, device = RunSummary(record), robot
-    robot = supervisor = Supervisor(robot, supervision)
-    supervisor.on_finding = lambda finding: _note_finding(summary, finding)
-    arm = make_arm(robot, mission.world)
-    observation = robot.observe()
+    summary = RunSummary(record)
+    supervisor = Supervisor(robot, supervision)
+    supervisor.on_finding = lambda finding: _record_finding(summary, finding)
+    arm = make_arm(supervisor, mission.world)
+    observation = supervisor.observe()
     rounding = Rounding(observation.q.shape[1])
     observation = rounding(observation)
     arm.sync(observation)
     if resume_point is None or not resume_point.same_world:
-        summary.block(observation, HOLD)  # a replay begins where the robot did
+        summary.block(observation, HOLD)  # the first block of a replay
     context = Context(
-        world=mission.world, arm=arm, requests=robot, journal=summary, observation=observation, command=HOLD
+        world=mission.world, arm=arm, requests=supervisor, journal=summary, observation=observation, command=HOLD
     )
-    context.requests = requests = RecordedRequests(robot, summary, lambda: context.observation.now_s)
+    context.requests = requests = RecordedRequests(supervisor, summary, lambda: context.observation.now_s)
     tree = build_tree(mission.spec, context, mission.name)
     outcome = Outcome("aborted", summary, start_s=observation.now_s)
-    loop = _Loop(tree, context, robot, summary, rounding, on_progress, control or Control(), outcome)
-    loop.begin(device, requests, supervisor.counts, CheckpointHooks(checkpoints, resume_point))
+    state = RunState(
+        tree=tree,
+        context=context,
+        robot=robot,
+        summary=summary,
+        book=ReasonBook(),
+        requests=requests,
+        status={node.id: Status.INVALID for node in tree.root.iterate()},
+        guards=supervisor.counts,
+        start_s=outcome.start_s,
+    )
+    hooks = CheckpointHooks(checkpoints, resume_point)
+    loop = _TickLoop(state, supervisor, rounding, outcome, control or Control(), hooks, on_progress)
+    loop.begin()
 
-    def lost(stuck: Stuck) -> None:
-        if on_lost is not None:
+    def unresponsive(stuck: Stuck) -> None:
+        if on_unresponsive is not None:
             outcome.end_s, outcome.paused_s = context.observation.now_s, context.paused_s
             outcome.abort(stuck.error(), stuck.node)
-            on_lost(stuck, outcome)
+            on_unresponsive(stuck, outcome)
 
-    watchdog = loop.watchdog = Watchdog(robot, lambda: summary.node or mission.name, stuck_s, lost)
+    watchdog = loop.watchdog = Watchdog(supervisor, lambda: summary.node or mission.name, stuck_s, unresponsive)
     with deferred_interrupt(watchdog) as interrupted:
         try:
             with watchdog:
@@ -143,35 +156,30 @@ def run_mission(
                     loop.run(mission.timeout_s if timeout_s is None else timeout_s, interrupted)
                 except Preempted as e:
                     outcome.abort(e, loop.node_of(e))
-                    loop.end(interrupted)
-        except BaseException as e:  # a skill may raise what is no Exception: SystemExit, a cancelled task, a panic
+                    loop.stop_safely(interrupted)
+        except BaseException as e:  # also SystemExit, a cancelled task, or a panic of compiled code
             interrupted.raising = False
-            error = watchdog.stuck.error() if watchdog.stuck is not None else e
-            if isinstance(error, GuardTripped):
-                supervisor.trip_by(error)
-            outcome.abort(error, error.node if isinstance(error, SkillHung) else loop.node_of(e))
-            if isinstance(error, SkillHung):
-                summary.event("stuck", context.observation.now_s, {"node": error.node, "stack": error.stack})
+            loop.abort(e)
         finally:
             interrupted.raising = False
-            robot.hold()
+            supervisor.hold()
             outcome.end_s, outcome.paused_s = context.observation.now_s, context.paused_s
             outcome.guards = dict(supervisor.counts)
-            interrupted.raising = True  # what a skill does when it is closed may take for ever
-            _preempt(tree.root)
+            interrupted.raising = True  # closing a skill may hang
+            _close_running(tree.root)
             interrupted.raising = False
-            summary.settle()
+            summary.flush()
             tree.forget()
     return outcome
 
 
-def _note_finding(summary: RunSummary, finding: GuardFinding) -> None:
+def _record_finding(summary: RunSummary, finding: GuardFinding) -> None:
     data = {"guard": finding.guard, "what": finding.what, "value": finding.value, "limit": finding.limit}
     summary.event("guard", finding.stamp_s, {**data, "node": summary.node, "fatal": finding.fatal})
 
 
-def _preempt(root: Behaviour) -> None:
-    """Close what still runs (its `finally` blocks), after the arm holds; a fault in there hides no earlier one."""
+def _close_running(root: Behaviour) -> None:
+    """Close running nodes (their `finally` blocks) after the arm holds; an error there hides no earlier one."""
     if root.status is Status.RUNNING:
         try:
             root.stop(Status.INVALID)
@@ -179,74 +187,73 @@ def _preempt(root: Behaviour) -> None:
             root.feedback_message = f"could not be closed: {e}"
 
 
-class _Loop:
+class _TickLoop:
+    """Tick the tree, send its commands, and record what changes.
+
+    Attributes:
+        watchdog: Told of every completed cycle.
+    """
+
     def __init__(
         self,
-        tree: BuiltTree,
-        context: Context,
-        robot: Robot,
-        summary: RunSummary,
+        state: RunState,
+        supervisor: Supervisor,
         rounding: Rounding,
-        on_progress: Callable[[float, RunSummary], None] | None,
-        control: Control,
         outcome: Outcome,
+        control: Control,
+        hooks: CheckpointHooks,
+        on_progress: Callable[[float, RunSummary], None] | None,
     ) -> None:
-        self._rounding, self._control, self._outcome = rounding, control, outcome
-        self._gate = PauseGate(control, context, self._cycle, paced=robot.paced)
+        self._state, self._tree, self._context, self._summary = state, state.tree, state.context, state.summary
+        self._supervisor, self._rounding, self._outcome = supervisor, rounding, outcome
+        self._control, self._hooks, self._on_progress = control, hooks, on_progress
+        self._gate = PauseGate(control, state.context, self._cycle, paced=supervisor.paced)
         self._next_progress_s = outcome.start_s
         self._interrupted: Callable[[], bool] = lambda: False
+        self._nodes = list(state.tree.root.iterate())
         self.watchdog: Watchdog | None = None
-        self._tree, self._context, self._robot, self._summary = tree, context, robot, summary
-        self._on_progress = on_progress
-        self._book = ReasonBook()
-        self._nodes = list(tree.root.iterate())
-        self._status: dict[object, Status] = {n.id: Status.INVALID for n in self._nodes}
-        self._written: dict[str, object] = {}
-        self._keeping = CheckpointHooks()
 
-    def begin(
-        self, device: Robot, requests: RecordedRequests, guards: dict[str, int], keeping: CheckpointHooks
-    ) -> None:
-        """Take up a checkpoint, or write the first one.
+    def begin(self) -> None:
+        """Restore the resume point, or write the first checkpoint.
 
         Raises:
-            BadInput: The checkpoint is not of this mission.
+            BadInput: The checkpoint is of another mission.
         """
-        self._keeping, outcome = keeping, self._outcome
-        held = (self._tree, self._context, device, self._summary, self._book, requests, self._status, self._written)
-        work = RunState(*held, guards=guards, start_s=outcome.start_s)
-        keeping.begin(work)
-        outcome.start_s, outcome.ticks = work.start_s, work.ticks
+        self._hooks.begin(self._state)
+        self._outcome.start_s, self._outcome.ticks = self._state.start_s, self._state.ticks
 
     def run(self, timeout_s: float, interrupted: Callable[[], bool]) -> None:
-        """Tick until the root has decided; fills the outcome.
+        """Tick until the root has a result, and fill the outcome.
 
         Raises:
-            Preempted: A stop was asked for.
+            Preempted: A stop was requested.
         """
         context, root, outcome, gate = self._context, self._tree.root, self._outcome, self._gate
         self._interrupted = interrupted
-        if self._keeping.look_first is not None:
-            self._look_first(self._keeping.look_first)
+        if self._hooks.world_check is not None:
+            self._check_world(self._hooks.world_check)
         while True:
-            self._heed()
+            self._raise_if_stopped()
             if context.mission_s - outcome.start_s >= timeout_s - ROUNDING_S:
-                self._time_out(outcome, timeout_s)
+                self._time_out(timeout_s)
                 return
-            gate.look(outcome.ticks)
+            gate.update(outcome.ticks)
             context.command = HOLD
             self._tick(context.observation.now_s)
             outcome.ticks += 1
+            if root.status is Status.SUCCESS:
+                outcome.status = "success"
+                return
             if root.status is not Status.RUNNING:
-                self._decide(outcome, root)
+                outcome.status, outcome.chain = "failure", self._state.book.of(root).chain()
                 return
             gate.send(context.command, outcome.ticks)
 
-    def _look_first(self, skill: Skill) -> None:
-        """A resumed mission looks at its world before it goes on.
+    def _check_world(self, skill: Skill) -> None:
+        """Run the world check of a resumed mission.
 
         Raises:
-            WorldChanged: It is not as it was.
+            WorldChanged: The world differs from the checkpoint.
         """
         context = self._context
         self._summary.node = skill.name
@@ -259,32 +266,42 @@ class _Loop:
                 raise WorldChanged(skill.reason or Reason("world_changed", skill.feedback_message, node=skill.name))
             self._gate.send(context.command, self._outcome.ticks)
 
-    def end(self, interrupted: Callable[[], bool]) -> None:
-        """After a stop: close what runs, bring the arm to rest, raise it if it is free."""
-        _preempt(self._tree.root)
-        self._gate.pause_signal.requested = False
-        ending = end_high(self._context)
-        try:
-            command = next(ending)
-            while not interrupted():
-                command = ending.send(self._cycle(command, heed=False))
-        except StopIteration as end:
-            self._outcome.ending = end.value
-        except Exception as e:
-            self._outcome.ending = f"held where it was: {type(e).__name__}: {e}"
-        self._summary.event("ending", self._context.observation.now_s, {"done": self._outcome.ending})
+    def abort(self, error: BaseException) -> None:
+        """Set the outcome to aborted by an error raised inside the loop."""
+        stuck = None if self.watchdog is None else self.watchdog.stuck
+        cause = error if stuck is None else stuck.error()
+        if isinstance(cause, GuardTripped):
+            self._supervisor.trip_by(cause)
+        self._outcome.abort(cause, cause.node if isinstance(cause, SkillHung) else self.node_of(error))
+        if isinstance(cause, SkillHung):
+            now_s = self._context.observation.now_s
+            self._summary.event("stuck", now_s, {"node": cause.node, "stack": cause.stack})
 
-    def _heed(self) -> None:
-        """Someone may have asked for an end."""
+    def stop_safely(self, interrupted: Callable[[], bool]) -> None:
+        """Close the running nodes, bring the arm to rest, and raise it if it is free."""
+        _close_running(self._tree.root)
+        self._gate.pause_signal.requested = False
+        motion = stop_safely(self._context)
+        try:
+            command = next(motion)
+            while not interrupted():
+                command = motion.send(self._cycle(command, stoppable=False))
+        except StopIteration as end:
+            self._outcome.safe_stop = end.value
+        except Exception as e:
+            self._outcome.safe_stop = f"held where it was: {type(e).__name__}: {e}"
+        self._summary.event("ending", self._context.observation.now_s, {"done": self._outcome.safe_stop})
+
+    def _raise_if_stopped(self) -> None:
         if self._interrupted():
             raise KeyboardInterrupt
         if self._control.stopped is not None:
             raise Preempted(self._control.stopped)
 
-    def _cycle(self, command: Command, *, heed: bool = True) -> Observation:
-        """One control period."""
+    def _cycle(self, command: Command, *, stoppable: bool = True) -> Observation:
+        """Do one control period."""
         context, now_s = self._context, self._context.observation.now_s
-        observation = self._rounding(self._robot.cycle(command))
+        observation = self._rounding(self._supervisor.cycle(command))
         context.observation = observation
         self._summary.block(observation, command)
         if self.watchdog is not None:
@@ -292,19 +309,19 @@ class _Loop:
         if self._on_progress is not None and now_s >= self._next_progress_s:
             self._next_progress_s = now_s + PROGRESS_EVERY_S
             self._on_progress(now_s - self._outcome.start_s, self._summary)
-        if heed:
-            self._heed()
+        if stoppable:
+            self._raise_if_stopped()
         return observation
 
     def running_node(self) -> str:
-        """The running leaf, or the root."""
+        """Return the path of the running leaf, or of the root."""
         running = [n for n in self._nodes if n.status is Status.RUNNING and not n.children]
         return self._tree.paths[(running[0] if running else self._tree.root).id]
 
     def node_of(self, error: BaseException) -> str:
-        """The node that raised: the innermost one on the error's traceback; else the running one.
+        """Return the path of the innermost node on the error's traceback, else of the running node.
 
-        A node that raises in its first update has no status yet, so that its status cannot tell.
+        A node that raises in its first update has no status yet, so the status alone is not enough.
         """
         found: str | None = None
         cause: BaseException | None = error
@@ -319,53 +336,47 @@ class _Loop:
         return found or self.running_node()
 
     def _tick(self, now_s: float) -> None:
-        """Tick the tree once and write down what changed. Unchanged RUNNING nodes, nearly all, cost one comparison."""
+        """Tick the tree once and record changes. A node that keeps running costs one comparison."""
         changed = False
-        status = self._status
+        status, book, hooks = self._state.status, self._state.book, self._hooks
         for node in self._tree.root.tick():
             if node.status is Status.RUNNING and status[node.id] is Status.RUNNING:
                 continue
             changed = True
-            again = self._keeping.hands_up_again(node)
+            again = hooks.replays_end(node)
             if node.status is Status.FAILURE:
-                self._book.note(node, sensed(self._context.observation))
+                book.note(node, sensed(self._context.observation))
                 if isinstance(node, Skill) and not again:
-                    self._summary.event("failure", now_s, self._book.of(node).as_dict())
+                    self._summary.event("failure", now_s, book.of(node).as_dict())
             if node.status is not Status.RUNNING:
-                self._keeping.ended(node, self._outcome.ticks)
+                hooks.on_node_ended(node, self._outcome.ticks)
         if changed:
-            self._keeping.tick_over()
+            hooks.on_tick_done()
             self._record_changes(now_s)
 
     def _record_changes(self, now_s: float) -> None:
         changes: list[tuple[str, object, object]] = []
         for node in self._nodes:
-            old, new = self._status[node.id], node.status
+            old, new = self._state.status[node.id], node.status
             if new is old:
                 continue
             changes.append((self._tree.paths[node.id], old, new))
-            self._status[node.id] = new
+            self._state.status[node.id] = new
             if new is Status.RUNNING and not node.children:
                 self._summary.node = self._tree.paths[node.id]
                 if isinstance(node, Skill):
-                    self._gate.begins(node.PAUSE)
+                    self._gate.on_skill_started(node.PAUSE)
         if changes:
             self._summary.tick(now_s, changes)
-            self._keeping.began([path for path, _, new in changes if new is Status.RUNNING])
+            self._hooks.on_nodes_started([path for path, _, new in changes if new is Status.RUNNING])
         for key in self._tree.keys:
             value = self._tree.value(key)
-            if value is not None and value is not self._written.get(key):
-                self._written[key] = value
+            if value is not None and value is not self._state.written.get(key):
+                self._state.written[key] = value
                 self._summary.port(now_s, key, value)
 
-    def _decide(self, outcome: Outcome, root: Behaviour) -> None:
-        if root.status is Status.SUCCESS:
-            outcome.status = "success"
-            return
-        outcome.status, outcome.chain = "failure", self._book.of(root).chain()
-
-    def _time_out(self, outcome: Outcome, timeout_s: float) -> None:
+    def _time_out(self, timeout_s: float) -> None:
         node = self.running_node()
         reason = Reason("mission_timeout", f"the mission took longer than {timeout_s:g} s", node=node)
         text = f"was running when the mission's {timeout_s:g} s were over"
-        outcome.status, outcome.chain = "failure", [Failure(node, text, reason)]
+        self._outcome.status, self._outcome.chain = "failure", [Failure(node, text, reason)]

@@ -1,4 +1,4 @@
-"""How a mission ends that is asked to stop: the arm comes to rest, rises if it is free, and is held."""
+"""The safe stop: the arm comes to rest, rises out of the container if it is free, and holds."""
 
 from __future__ import annotations
 
@@ -9,18 +9,23 @@ from glotouch_bt.robot import MotionRefused, Observation
 from glotouch_bt.skill import Context, SkillFailed, come_to_rest
 
 RISE_M_S = 0.05
-RISE_N = 3.0
-"""More than this beside what was felt at rest stops the rise: something holds the hand."""
+"""Speed of the rise, m/s."""
+MAX_RISE_FORCE_N = 3.0
+"""Stop the rise when the force differs from the one at rest by more than this: something holds the hand."""
 GRIPPING_N = 1.0
+"""Gripper force above which the jaws hold something."""
 OVER_RIM_M = 0.03
-LONGEST_RISE_M = 0.35
+"""Clearance of the lowest part above the container's rim."""
+MAX_RISE_M = 0.35
+"""Longest rise."""
 REST_S = 0.1
+"""Time over which the force at rest is averaged."""
 
 
-def end_high(context: Context) -> Motion[str]:
-    """Stop, and go straight up until what is lowest is above the container's rim; what was done, in words.
+def stop_safely(context: Context) -> Motion[str]:
+    """Come to rest, then rise until the lowest part is above the container's rim; return what was done, in words.
 
-    Jaws that hold something other than the probe stay where they are: it would be torn out or dropped.
+    Do not rise if the jaws hold an object other than the probe: the rise could tear it out or drop it.
     """
     arm = context.arm
     try:
@@ -33,16 +38,17 @@ def end_high(context: Context) -> Motion[str]:
     world, hand = context.world, arm.description.gripper
     below_m = world.probe.grasp_to_tip_m if arm.scene.holding_tool else hand.fingertip_below_P_m
     height_m = float(world.container.pose_B_K.inverse().apply(arm.pose_B_P.position_m)[2])
-    up_m = min(world.container.interior_m[2] + below_m + OVER_RIM_M - height_m, LONGEST_RISE_M)
+    up_m = min(world.container.interior_m[2] + below_m + OVER_RIM_M - height_m, MAX_RISE_M)
     if up_m < 1e-3:
         return "stopped and held above the container"
     rest_N = np.concatenate([b.wrench_S[:, :3] for b in blocks]).mean(axis=0)
 
-    def held_back(seen: Observation) -> str | None:
-        return "held back" if np.linalg.norm(seen.wrench_S[:, :3].mean(axis=0) - rest_N) > RISE_N else None
+    def guard(seen: Observation) -> str | None:
+        excess_N = np.linalg.norm(seen.wrench_S[:, :3].mean(axis=0) - rest_N)
+        return "held back" if excess_N > MAX_RISE_FORCE_N else None
 
     try:
-        result = yield from arm.shift([0.0, 0.0, up_m], RISE_M_S, guard=held_back, check=False, what="rise")
+        result = yield from arm.shift([0.0, 0.0, up_m], RISE_M_S, guard=guard, check=False, what="rise")
     except MotionRefused as refusal:
         return f"stopped and held: {refusal}"
     if result.stop is not None:

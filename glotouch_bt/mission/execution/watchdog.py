@@ -1,4 +1,4 @@
-"""A skill that blocks the process cannot be ticked out: a thread notices, holds the arm, and breaks it off."""
+"""A watchdog thread that holds the arm and interrupts a skill whose tick does not return."""
 
 from __future__ import annotations
 
@@ -17,60 +17,60 @@ from typing import Self
 from glotouch_bt.robot import GlotouchError, Robot
 
 HOLD_AFTER_S = 0.25
-"""A paced robot that was told to move and gets no further command is held after this wall time. Source: ours, 25
-periods; drivers hold by themselves, this is for those that do not."""
+"""Hold a paced robot that gets no command for this wall time: 25 periods. For drivers that do not hold by themselves.
+Source: ours."""
 STUCK_S = 120.0
-"""Longest wall time of one tick, with what it waits for in its cycle. Source: ours; the longest ticks of the shipped
-skills build a target's model, 20 s on a busy machine."""
+"""Longest wall time of one tick and its cycle. Source: ours; the longest ticks of the shipped skills build a target's
+model, 20 s on a busy machine."""
 GRACE_S = 10.0
-"""What cannot be broken off within this time more, never will."""
+"""Additional wall time in which an interrupted tick must return before the process is given up."""
 
 
 class SkillHung(GlotouchError):
-    """A tick did not come back.
+    """A tick did not return.
 
     Args:
         node: Path of the node that was running.
         seconds: Wall time waited.
-        stack: Of the stuck thread, as `traceback` formats it.
+        stack: Stack of the stuck thread, as `traceback` formats it.
     """
 
     def __init__(self, node: str, seconds: float, stack: str) -> None:
         last = [line.strip() for line in stack.splitlines() if line.strip().startswith("File")]
-        super().__init__(f"{node} has not come back for {seconds:.1f} s; it was at {last[-1] if last else '?'}")
+        super().__init__(f"{node} has not returned for {seconds:.1f} s; it was at {last[-1] if last else '?'}")
         self.node, self.seconds, self.stack = node, seconds, stack
 
 
-class BrokenOff(BaseException):
-    """Raised inside the stuck thread; no `except Exception` of a skill catches it."""
+class TickInterrupted(BaseException):
+    """Raised inside the stuck thread. Not an `Exception`, so that no skill catches it by accident."""
 
 
 @dataclass
 class Stuck:
-    """What the watchdog saw: the node, the wall time it waited, and the stack of the thread."""
+    """A stuck tick: the running node, the wall time waited, and the stack of the thread."""
 
     node: str
     seconds: float
     stack: str
 
     def error(self) -> SkillHung:
-        """As an error."""
+        """Return it as an error."""
         return SkillHung(self.node, self.seconds, self.stack)
 
 
 class Watchdog:
-    """Watches the thread that made it. Use as a context manager round the tick loop; call `beat` once a cycle.
+    """Watch the thread that creates it. Use as a context manager around the tick loop; call `beat` once a cycle.
 
     Args:
-        robot: Held when it is paced and no command comes.
-        node: Path of the running node.
+        robot: Robot to hold if it is paced and gets no command.
+        node: Returns the path of the running node.
         stuck_s: Longest wall time between two beats; see `STUCK_S`.
-        on_lost: Called from the watching thread with what was seen, if the stuck one cannot be broken off; it is
-            expected to end the process.
+        on_unresponsive: Called from the watchdog thread if the stuck tick cannot be interrupted; it should end the
+            process.
         grace_s: See `GRACE_S`.
 
     Attributes:
-        stuck: What was seen, once it was.
+        stuck: The stuck tick, once seen.
     """
 
     def __init__(
@@ -78,11 +78,11 @@ class Watchdog:
         robot: Robot,
         node: Callable[[], str],
         stuck_s: float,
-        on_lost: Callable[[Stuck], None] | None = None,
+        on_unresponsive: Callable[[Stuck], None] | None = None,
         *,
         grace_s: float = GRACE_S,
     ) -> None:
-        self._robot, self._node, self._stuck_s, self._on_lost = robot, node, stuck_s, on_lost
+        self._robot, self._node, self._stuck_s, self._on_lost = robot, node, stuck_s, on_unresponsive
         self._grace_s = grace_s
         self._watched = threading.get_ident()
         self._main = threading.current_thread() is threading.main_thread()
@@ -92,12 +92,12 @@ class Watchdog:
         self.stuck: Stuck | None = None
 
     @property
-    def breaking_off(self) -> bool:
-        """It has seen a stuck tick, and watches still."""
+    def interrupting(self) -> bool:
+        """True after a stuck tick was seen and until the watch ends."""
         return self.stuck is not None and not self._over.is_set()
 
     def beat(self) -> None:
-        """The watched thread is alive."""
+        """Report that the watched thread is alive."""
         self._beat_s = time.monotonic()
 
     def __enter__(self) -> Self:
@@ -111,21 +111,21 @@ class Watchdog:
 
     def _watch(self) -> None:
         paced = getattr(self._robot, "paced", False)
-        look_every_s = min(0.25 * self._stuck_s, 0.5 * HOLD_AFTER_S if paced else 0.5)
-        held_for = told = 0.0
-        while not self._over.wait(look_every_s):
+        interval_s = min(0.25 * self._stuck_s, 0.5 * HOLD_AFTER_S if paced else 0.5)
+        held_beat_s = interrupted_s = 0.0
+        while not self._over.wait(interval_s):
             beat_s = self._beat_s
             silent_s = time.monotonic() - beat_s
-            if paced and silent_s > HOLD_AFTER_S and held_for != beat_s:
-                held_for = beat_s
+            if paced and silent_s > HOLD_AFTER_S and held_beat_s != beat_s:
+                held_beat_s = beat_s
                 self._robot.hold()
             if silent_s <= self._stuck_s:
                 continue
             if self.stuck is None:
                 self.stuck = Stuck(self._node(), silent_s, self._stack())
-            if time.monotonic() - told > 0.5 * self._stuck_s:
-                told = time.monotonic()
-                self._break_off()
+            if time.monotonic() - interrupted_s > 0.5 * self._stuck_s:
+                interrupted_s = time.monotonic()
+                self._interrupt()
             if silent_s > self._stuck_s + self._grace_s and self._on_lost is not None:
                 self._on_lost(self.stuck)
 
@@ -133,35 +133,35 @@ class Watchdog:
         frame = sys._current_frames().get(self._watched)
         return "".join(traceback.format_stack(frame)) if frame is not None else ""
 
-    def _break_off(self) -> None:
-        """Make the watched thread raise `BrokenOff` (the main thread by its handler, which also ends a sleep)."""
+    def _interrupt(self) -> None:
+        """Make the watched thread raise `TickInterrupted`; a signal to the main thread also ends a sleep."""
         if self._main:
             signal.pthread_kill(self._watched, signal.SIGINT)
         else:
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(self._watched), ctypes.py_object(BrokenOff))
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(self._watched), ctypes.py_object(TickInterrupted))
 
 
 class Interrupts:
-    """Whether Ctrl-C was pressed.
+    """State of Ctrl-C; calling it returns `pressed`.
 
     Attributes:
-        pressed: It was.
-        raising: A second one raises at once. False while nothing may be left half done.
+        pressed: Ctrl-C was pressed.
+        raising: A second Ctrl-C raises at once. False while clean-up must complete.
     """
 
     def __init__(self, raising: bool = True) -> None:
         self.pressed, self.raising = False, raising
 
     def __call__(self) -> bool:
-        """It was pressed."""
+        """Return True if Ctrl-C was pressed."""
         return self.pressed
 
 
 @contextmanager
 def deferred_interrupt(watchdog: Watchdog | None = None, *, raising: bool = True) -> Iterator[Interrupts]:
-    """Ctrl-C sets a flag, so that it takes effect between two cycles; a second Ctrl-C raises at once (`raising`).
+    """Defer Ctrl-C to the end of the control cycle; a second Ctrl-C raises at once if `raising`.
 
-    The same signal is what a watchdog breaks a stuck tick off with.
+    The watchdog uses the same signal to interrupt a stuck tick.
     """
     interrupts = Interrupts(raising)
     if threading.current_thread() is not threading.main_thread():
@@ -169,8 +169,8 @@ def deferred_interrupt(watchdog: Watchdog | None = None, *, raising: bool = True
         return
 
     def handler(number: int, frame: object) -> None:
-        if watchdog is not None and watchdog.breaking_off:
-            raise BrokenOff
+        if watchdog is not None and watchdog.interrupting:
+            raise TickInterrupted
         if interrupts.pressed and interrupts.raising:
             raise KeyboardInterrupt
         interrupts.pressed = True

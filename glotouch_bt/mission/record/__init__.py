@@ -1,9 +1,9 @@
-"""TODO door of glotouch_bt/mission/record."""
+"""Write and read the record of a run: one MCAP file with everything sensed, commanded, ticked and decided."""
 
+from glotouch_bt.mission.record.mcap_chunks import read_chunks
 from glotouch_bt.mission.record.mcap_json import Json, to_json
 from glotouch_bt.mission.record.mcap_packing import join, unpack
 from glotouch_bt.mission.record.mcap_schemas import EVENT_PREFIX
-from glotouch_bt.mission.record.reading import read_chunks
 from glotouch_bt.mission.record.recorded_requests import REQUEST_DONE, RecordedRequests
 from glotouch_bt.mission.record.recorder import RESULT_ATTACHMENT, RUN_ATTACHMENT, Recorder
 from glotouch_bt.mission.record.rounding import STAMP_S, Rounding, to_step

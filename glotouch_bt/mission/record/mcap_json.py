@@ -1,4 +1,4 @@
-"""Any value a skill journals, as JSON that every reader accepts: no NaN, no arrays, no addresses, no clocks."""
+"""Convert any value that a skill records to strict JSON: no NaN, no arrays, no memory addresses."""
 
 from __future__ import annotations
 
@@ -17,22 +17,25 @@ from glotouch_bt.robot import Pose
 Json = None | bool | int | float | str | list["Json"] | dict[str, "Json"]
 
 DECIMALS = 9
+"""Decimals kept in small arrays."""
 LARGE_DECIMALS = 6
+"""Decimals kept in large arrays."""
 LARGE = 64
-_DEEPEST = 24
+"""An array with more elements than this is large."""
+_MAX_DEPTH = 24
 
 
 def to_json(value: object, *, summarise: bool = False, depth: int = 0) -> Json:
-    """`value` as plain JSON data.
+    """Return `value` as plain JSON data.
 
     Dataclasses and pydantic models become objects of their fields, poses {position_m, quat}, arrays nested lists
-    (rounded to 1e-9; arrays of more than 64 numbers, such as depth maps, to 1e-6, a micrometre). Numbers that are not
-    finite become null. What has no JSON form becomes "<its type's name>".
+    (rounded to 1e-9, large arrays such as depth maps to 1e-6). Numbers that are not finite become null. A value without
+    a JSON form becomes "<name of its type>".
 
     Args:
-        value: Anything.
-        summarise: Write arrays of more than 64 numbers as {shape, min, max} only.
-        depth: How deep `value` is nested already.
+        value: Any value.
+        summarise: Write large arrays as {shape, min, max} only.
+        depth: Nesting depth of `value`.
     """
     if value is None or isinstance(value, bool | str):
         return value
@@ -46,7 +49,7 @@ def to_json(value: object, *, summarise: bool = False, depth: int = 0) -> Json:
         return float(value) if math.isfinite(value) else None
     if isinstance(value, np.ndarray):
         return _array(value, summarise)
-    if depth >= _DEEPEST:
+    if depth >= _MAX_DEPTH:
         return f"<{type(value).__name__}>"
     if isinstance(value, Pose):
         return {"position_m": _array(value.position_m, False), "quat": _array(value.quat, False)}
@@ -67,7 +70,7 @@ def to_json(value: object, *, summarise: bool = False, depth: int = 0) -> Json:
 
 
 def dumps(value: object, *, summarise: bool = False) -> bytes:
-    """`to_json(value)` as compact UTF-8 text."""
+    """Return `to_json(value)` as compact UTF-8 text."""
     return json.dumps(to_json(value, summarise=summarise), separators=(",", ":"), allow_nan=False).encode()
 
 

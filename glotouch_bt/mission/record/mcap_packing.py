@@ -1,8 +1,8 @@
-"""Columns of numbers as a compact binary message that says its own layout: the full-rate part of a record.
+"""Pack columns of numbers into a compact binary message that describes its own layout: the full-rate data of a record.
 
-A column is rounded to a stated step, differenced along time until it is small, and written byte plane by byte plane, so
-that the chunk compression of the file finds mostly zeros. The message is a Protocol Buffers message of one schema
-(`PACKED_DESCRIPTOR`), so any MCAP tool can open it; docs/reference/record.md says how to unpack it by hand.
+A column is rounded to a given step, differenced along time, and written byte plane by byte plane, so that the chunk
+compression of the file finds mostly zeros. The message is a Protocol Buffers message of one schema
+(`PACKED_DESCRIPTOR`), so any MCAP tool can open it; docs/reference/record.md explains how to unpack it by hand.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ _NAN = -(2**31)
 
 @dataclass(frozen=True)
 class Column:
-    """How one quantity is packed.
+    """The layout of one packed quantity.
 
     Attributes:
-        name: Name with its unit and frame.
-        shape: Shape of one row; () is a number.
-        step: What values are rounded to, in the unit of the name.
-        order: How often the column is differenced along time (0 white noise, 1 steps, 2 smooth motion).
+        name: Name with unit and frame.
+        shape: Shape of one row; () for a number.
+        step: Rounding step, in the unit of the name.
+        order: Number of differences along time (0 for white noise, 1 for steps, 2 for smooth motion).
     """
 
     name: str
@@ -38,7 +38,7 @@ class Column:
 
     @property
     def width(self) -> int:
-        """Numbers in one row."""
+        """Count of numbers in one row."""
         return math.prod(self.shape)
 
     def __str__(self) -> str:
@@ -46,18 +46,18 @@ class Column:
 
     @classmethod
     def parse(cls, text: str) -> Column:
-        """The column a layout's word describes."""
+        """Return the column that one word of a layout describes."""
         name, shape, step, order = text.split(":")
         return cls(name, () if shape == "1" else tuple(int(s) for s in shape.split("x")), float(step), int(order))
 
 
 def pack(start_ns: int, columns: Sequence[Column], values: Sequence[npt.ArrayLike]) -> bytes:
-    """One packed message.
+    """Return one packed message.
 
     Args:
         start_ns: Robot clock of the first row, ns.
-        columns: How each quantity is packed; all have the same number of rows.
-        values: One array (rows, *shape) for each column. NaN and infinities come back as NaN.
+        columns: Layout of each quantity.
+        values: One array (rows, *shape) for each column, all of equal length. Infinities are read back as NaN.
     """
     blocks: list[bytes] = []
     rows = 0
@@ -73,7 +73,7 @@ def pack(start_ns: int, columns: Sequence[Column], values: Sequence[npt.ArrayLik
             steps = np.clip(np.where(finite, scaled, 0.0), _NAN + 1, 2**31 - 1).astype(np.int32)
             steps[~finite] = _NAN
         for _ in range(column.order):
-            steps[1:] -= steps[:-1].copy()  # wraps modulo 2^32 where it must; the sum wraps back
+            steps[1:] -= steps[:-1].copy()  # may wrap modulo 2^32; the sum wraps back
         planes = np.ascontiguousarray(steps.astype("<i4")).view(np.uint8).reshape(rows, column.width, 4)
         blocks.append(planes.transpose(1, 2, 0).tobytes())
     layout = " ".join(map(str, columns)).encode()
@@ -89,7 +89,7 @@ def pack(start_ns: int, columns: Sequence[Column], values: Sequence[npt.ArrayLik
 
 
 def unpack(message: bytes) -> tuple[int, dict[str, Array]]:
-    """The start stamp in ns and the columns (rows, *shape) of a packed message.
+    """Return the start stamp in ns and the columns (rows, *shape) of a packed message.
 
     Raises:
         GlotouchError: The bytes are not a packed message.
@@ -129,7 +129,7 @@ def unpack(message: bytes) -> tuple[int, dict[str, Array]]:
 
 
 def join(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
-    """Unpacked messages of one channel, one after the other."""
+    """Concatenate the unpacked messages of one channel."""
     if not parts:
         return {}
     return {name: np.concatenate([p[name] for p in parts]) for name in parts[0]}
@@ -164,7 +164,7 @@ def _field(number: int, data: bytes) -> bytes:
 
 
 def _packed_descriptor() -> bytes:
-    """A serialised FileDescriptorSet of the schema (descriptor.proto's field numbers), as MCAP asks of protobuf."""
+    """Return the schema as a serialised FileDescriptorSet, as MCAP requires (field numbers of descriptor.proto)."""
     package, name = PACKED_NAME.split(".")
     int64, uint32, string, raw = 3, 13, 9, 12
     fields = b""

@@ -1,7 +1,6 @@
-"""Plottable JSON messages of many control cycles at once: one format operation a channel, no loop over samples.
+"""Format the plottable JSON messages of many control cycles with one format operation per channel.
 
-Each function returns the messages of one channel, one a row, in the order of the rows. Numbers that are not finite
-become null.
+Each function returns the messages of one channel, one per row, in order. Numbers that are not finite become null.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ _TIME = '{"sec":%d,"nsec":%d}'
 
 
 def _rows(template: str, stamps_ns: Stamps, *columns: npt.ArrayLike) -> list[bytes]:
-    """`template` filled once a row: sec and nsec first, then the columns side by side."""
+    """Fill `template` once per row: sec and nsec first, then the columns side by side."""
     if len(stamps_ns) == 0:
         return []
     blocks: list[Any] = [stamps_ns // 10**9, stamps_ns % 10**9, *columns]
@@ -33,14 +32,14 @@ def _rows(template: str, stamps_ns: Stamps, *columns: npt.ArrayLike) -> list[byt
 
 
 def wrench(stamps_ns: Stamps, wrench_S: Array) -> list[bytes]:
-    """`wrench_S` (n, 6): force N, torque Nm."""
+    """Return glotouch.Wrench of `wrench_S` (n, 6): force N, torque Nm."""
     xyz = '{"x":%.4f,"y":%.4f,"z":%.4f}'
     tail = '{"x":%.5f,"y":%.5f,"z":%.5f}'
     return _rows(f'{{"timestamp":{_TIME},"frame_id":"S","force":{xyz},"torque":{tail}}}', stamps_ns, wrench_S)
 
 
 def pose(stamps_ns: Stamps, position_B_P: Array, quat_B_P: Array) -> list[bytes]:
-    """foxglove.PoseInFrame of the pads' mid-point: (n, 3) m and (n, 4) w x y z."""
+    """Return foxglove.PoseInFrame of P in B: (n, 3) m and (n, 4) w x y z."""
     return _rows(
         f'{{"timestamp":{_TIME},"frame_id":"B","pose":{{"position":{{"x":%.6f,"y":%.6f,"z":%.6f}},'
         '"orientation":{"x":%.7f,"y":%.7f,"z":%.7f,"w":%.7f}}}',
@@ -51,7 +50,7 @@ def pose(stamps_ns: Stamps, position_B_P: Array, quat_B_P: Array) -> list[bytes]
 
 
 def transforms(stamps_ns: Stamps, position_B_P: Array, quat_B_P: Array) -> list[bytes]:
-    """foxglove.FrameTransforms: P in B."""
+    """Return foxglove.FrameTransforms of P in B: (n, 3) m and (n, 4) w x y z."""
     return _rows(
         f'{{"transforms":[{{"timestamp":{_TIME},"parent_frame_id":"B","child_frame_id":"P",'
         '"translation":{"x":%.6f,"y":%.6f,"z":%.6f},"rotation":{"x":%.7f,"y":%.7f,"z":%.7f,"w":%.7f}}]}',
@@ -62,21 +61,21 @@ def transforms(stamps_ns: Stamps, position_B_P: Array, quat_B_P: Array) -> list[
 
 
 def joints(stamps_ns: Stamps, q: Array, dq: Array) -> list[bytes]:
-    """foxglove.JointStates: (n, dof) rad and rad/s; joints are named joint1, joint2, ..."""
+    """Return foxglove.JointStates of (n, dof) rad and rad/s; joints are named joint1, joint2, ..."""
     each = ",".join(f'{{"name":"joint{i + 1}","position":%.6f,"velocity":%.5f}}' for i in range(q.shape[1]))
     table = np.stack([q, dq], axis=2)
     return _rows(f'{{"timestamp":{_TIME},"joints":[{each}]}}', stamps_ns, table)
 
 
 def gripper(stamps_ns: Stamps, aperture_m: Array, force_N: Array, moving: Array) -> list[bytes]:
-    """Jaws as last reported: (n,) each; `moving` is 0 or 1."""
+    """Return glotouch.Gripper of the jaws' last report: (n,) each; `moving` is 0 or 1."""
     return _rows(
         f'{{"timestamp":{_TIME},"aperture_m":%.6f,"force_N":%.3f,"moving":%d}}', stamps_ns, aperture_m, force_N, moving
     )
 
 
 def depth_image(stamp_ns: int, frame_id: str, depth_m: Array) -> bytes:
-    """foxglove.RawImage, 32FC1, of one depth map in metres (rounded to a micrometre)."""
+    """Return foxglove.RawImage, 32FC1, of one depth map in m, rounded to 1e-6 m."""
     rows, cols = depth_m.shape
     data = base64.b64encode(np.round(depth_m, 6).astype("<f4").tobytes()).decode()
     head = f'{{"timestamp":{_TIME},' % divmod(stamp_ns, 10**9)

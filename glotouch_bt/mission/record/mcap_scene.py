@@ -1,6 +1,6 @@
-"""The 3D view of a record: the container, and contacts and contours as they are found (foxglove.SceneUpdate, /tf).
+"""The 3D view of a record: the container, contacts and contours (foxglove.SceneUpdate, /tf).
 
-Everything is drawn in the frame K, which is fixed in B by the run description's `pose_B_K`.
+Everything is drawn in frame K; the run description's `pose_B_K` places K in B.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _CONTOUR = {"r": 0.10, "g": 0.40, "b": 0.78, "a": 1.0}
 
 
 def container_scene(run: dict[str, Json]) -> Iterator[Message]:
-    """The transform of K and the container's walls, as far as the run description names them (pose_B_K, interior_m)."""
+    """Yield the transform of K and the container's walls, if the run description has pose_B_K and interior_m."""
     container = run.get("container")
     inside = container if isinstance(container, dict) else run
     pose = run.get("pose_B_K", inside.get("pose_B_K"))
@@ -47,11 +47,11 @@ def container_scene(run: dict[str, Json]) -> Iterator[Message]:
             ]
             yield _entity(0, "container", cubes=walls)
     except (KeyError, TypeError, ValueError):
-        return  # a description without usable numbers has no picture; the numbers themselves are in run.json
+        return  # without usable numbers there is nothing to draw; run.json holds them as given
 
 
 def event_scene(kind: str, stamp_ns: int, data: Json) -> Iterator[Message]:
-    """What a contact or candidate event adds to the picture."""
+    """Yield what a contact or candidate event adds to the view."""
     if not isinstance(data, dict):
         return
     try:
@@ -88,11 +88,11 @@ def event_scene(kind: str, stamp_ns: int, data: Json) -> Iterator[Message]:
             }
             yield _entity(stamp_ns, f"candidate {candidate['index']}", lines=[line], texts=[text])
     except (AttributeError, KeyError, TypeError, ValueError):
-        return  # an event of another shape is recorded all the same, only not drawn
+        return  # an event of another shape is recorded but not drawn
 
 
 def _outline(contour: Any) -> list[tuple[float, float]]:
-    """Closed polyline in K of a recorded contour."""
+    """Return the closed polyline in K of a recorded contour."""
     if contour.get("family") == "free":
         corners = [_floats(p, 2) for p in contour["boundary_K_m"]]
         if len(corners) < 3:
@@ -112,7 +112,7 @@ def _outline(contour: Any) -> list[tuple[float, float]]:
 def _floats(value: Any, n: int) -> tuple[float, ...]:
     numbers = tuple(float(v) for v in value)
     if len(numbers) != n:
-        raise ValueError(f"{len(numbers)} numbers where {n} are needed")
+        raise ValueError(f"{len(numbers)} numbers instead of {n}")
     return numbers
 
 

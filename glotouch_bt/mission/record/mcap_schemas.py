@@ -1,4 +1,4 @@
-"""The channels of a record and the schemas of their messages. The table for people is docs/reference/record.md.
+"""The channels of a record and the schemas of their messages. docs/reference/record.md has them as a table.
 
 Messages with a `foxglove.` name follow the Foxglove schemas (docs.foxglove.dev/docs/sdk/schemas), JSON encoding.
 """
@@ -124,7 +124,7 @@ EVENT_PREFIX = "/events/"
 
 @dataclass(frozen=True)
 class Schema:
-    """One schema as MCAP stores it, and the encoding of messages that follow it."""
+    """One schema as MCAP stores it, and the encoding of its messages."""
 
     name: str
     encoding: str
@@ -133,7 +133,7 @@ class Schema:
 
 
 def schema_of(topic: str) -> Schema:
-    """The schema of a topic's messages; every topic that is not in `CHANNELS` carries events."""
+    """Return the schema of a topic's messages; a topic that is not in `CHANNELS` carries events."""
     name = CHANNELS.get(topic, "glotouch.Event")
     if name == PACKED_NAME:
         return Schema(name, "protobuf", PACKED_DESCRIPTOR, "protobuf")

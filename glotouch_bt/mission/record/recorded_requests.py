@@ -1,68 +1,59 @@
-"""Slow requests (tare, payload) with their beginning and end on the record: a replay sees no device finish them."""
+"""Record start and end of slow requests (tare, payload), because a replay has no device to finish them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Protocol
+from collections.abc import Callable
 
 from glotouch_bt.mission.record.mcap_json import to_json
 from glotouch_bt.robot import Request, Ticket
-from glotouch_bt.skill import RobotRequests
+from glotouch_bt.skill import Journal, RobotRequests
 
 REQUEST, REQUEST_DONE = "request", "request_done"
 
 
-class Events(Protocol):
-    """Where the events go."""
-
-    def event(self, kind: str, stamp_s: float, data: Mapping[str, object]) -> None:
-        """One event."""
-        ...
-
-
 class RecordedRequests:
-    """Passes requests on to a robot; events say when each was started and when it was first seen to be done.
+    """Forward requests to a robot; record when each one starts and when it is first seen to be done.
 
     Args:
         requests: The robot.
-        events: Where the events go.
-        now_s: The robot's clock.
+        journal: Receives the events.
+        now_s: Returns the robot clock.
 
     Attributes:
         count: Requests so far.
     """
 
-    def __init__(self, requests: RobotRequests, events: Events, now_s: Callable[[], float]) -> None:
-        self._requests, self._events, self._now_s = requests, events, now_s
+    def __init__(self, requests: RobotRequests, journal: Journal, now_s: Callable[[], float]) -> None:
+        self._requests, self._journal, self._now_s = requests, journal, now_s
         self.count = 0
 
     def start(self, request: Request) -> Ticket:
-        """Begin a request; see `Robot.start`."""
+        """Start a request; see `Robot.start`."""
         number, self.count = self.count, self.count + 1
         asked = {"number": number, "request": type(request).__name__, "values": to_json(request)}
-        self._events.event(REQUEST, self._now_s(), asked)
+        self._journal.event(REQUEST, self._now_s(), asked)
         ticket = self._requests.start(request)
-        return _JournaledTicket(ticket, lambda error: self._done(number, error))
+        return _RecordedTicket(ticket, lambda error: self._done(number, error))
 
     def _done(self, number: int, error: str | None) -> None:
-        self._events.event(REQUEST_DONE, self._now_s(), {"number": number, "error": error})
+        self._journal.event(REQUEST_DONE, self._now_s(), {"number": number, "error": error})
 
 
-class _JournaledTicket:
+class _RecordedTicket:
     def __init__(self, ticket: Ticket, on_done: Callable[[str | None], None]) -> None:
         self._ticket, self._on_done = ticket, on_done
-        self._told = False
+        self._reported = False
 
     @property
     def done(self) -> bool:
-        """As the robot says."""
+        """True once the robot has done it."""
         done = self._ticket.done
-        if done and not self._told:
-            self._told = True
+        if done and not self._reported:
+            self._reported = True
             self._on_done(self._ticket.error)
         return done
 
     @property
     def error(self) -> str | None:
-        """As the robot says."""
+        """The robot's error, if it failed."""
         return self._ticket.error

@@ -1,9 +1,9 @@
-"""The record of a run: everything sensed, commanded, ticked and decided, in one MCAP file with Foxglove's schemas.
+"""Write the record of a run: everything sensed, commanded, ticked and decided, in one MCAP file (Foxglove schemas).
 
-A control cycle costs two list appends; every `batch_cycles` the pending cycles are encoded at once and flushed, so a
-file whose writer died is readable up to the last batch. Channels, schemas and packing: docs/reference/record.md.
+A control cycle costs two list appends; every `batch_cycles` cycles the pending ones are encoded and flushed, so the
+file of a killed process is readable up to its last batch. Channels, schemas and packing: docs/reference/record.md.
 
-Times are the robot's clock (log time = publish time); no wall clock enters, so the same inputs give the same bytes.
+Times are the robot clock (log time = publish time). No wall clock enters: the same inputs give the same bytes.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from glotouch_bt.mission.record import mcap_plots as plots
+from glotouch_bt.mission.record.mcap_chunks import RecordChunk
 from glotouch_bt.mission.record.mcap_json import dumps, to_json
 from glotouch_bt.mission.record.mcap_packing import Column, pack
 from glotouch_bt.mission.record.mcap_scene import container_scene, event_scene
 from glotouch_bt.mission.record.mcap_schemas import EVENT_PREFIX, schema_of
-from glotouch_bt.mission.record.reading import WrittenChunk
 from glotouch_bt.mission.record.rounding import (
     APERTURE_M,
     DEPTH_M,
@@ -45,17 +45,16 @@ IMAGE_EVERY_S = 0.1
 
 
 class Recorder:
-    """Writes run.mcap; also the `Journal` that skills write to. Use as a context manager, or call `close` in a finally.
+    """Writes run.mcap, and is the `Journal` of the skills. Use as a context manager, or call `close` in a finally.
 
-    Arrays handed to `block` are kept by reference until the next flush: the backend must hand out fresh arrays each
-    cycle and nobody may write into them.
+    Arrays given to `block` are held by reference until the next flush: they must not be written to afterwards.
 
     Args:
         path: The file; its folder must exist.
-        run: What is known beforehand (mission, seed, conditions, pose_B_K, container, probe, ...); any value
+        run: Description of the run (mission, seed, conditions, pose_B_K, container, probe, ...); any value
             `mcap_json.to_json` takes. Stored as the attachment run.json and as the metadata record "run".
-        batch_cycles: Control cycles encoded at a time; a killed process loses at most these, and the cycle that does it
-            lasts longer: by 1.6 ms at 50, by 18 ms at 500, where an arm that is paced notices.
+        batch_cycles: Control cycles encoded at a time. A killed process loses at most these. The encoding cycle lasts
+            longer, by 1.6 ms at 50 and by 18 ms at 500, which a paced arm notices.
 
     Raises:
         BadInput: The file cannot be written.
@@ -89,7 +88,7 @@ class Recorder:
         self._file.flush()
 
     def block(self, observation: Observation, command: Command) -> None:
-        """Keep one control cycle: what was sensed in it and the command it was given."""
+        """Record one control cycle: the sensed block and the command."""
         self._observations.append(observation)
         self._commands.append(command)
         if len(self._observations) >= self._batch:
@@ -101,28 +100,28 @@ class Recorder:
             self._message(stamp_s, "/tree/ticks", {"node": node, "old": _status(old), "new": _status(new)})
 
     def event(self, kind: str, stamp_s: float, data: Mapping[str, object]) -> None:
-        """Record what a skill found or decided, on the channel /events/<kind>."""
+        """Record an event of a skill, on the channel /events/<kind>."""
         plain = to_json(data)
         self._message(stamp_s, EVENT_PREFIX + kind, {"kind": kind, "data": plain})
         for topic, message in event_scene(kind, _ns(stamp_s), plain):
             self._put(_ns(stamp_s), topic, message)
 
     def port(self, stamp_s: float, key: str, value: object) -> None:
-        """Record a blackboard write; large arrays are summarised (their full values are in the events)."""
+        """Record a blackboard write; large arrays are summarised (the events hold them in full)."""
         self._message(stamp_s, "/tree/ports", {"key": key, "value": to_json(value, summarise=True)})
 
     def flush(self) -> int:
-        """Write all that is pending; the length of the file so far, which a reader needs nothing beyond."""
+        """Write everything pending; return the length of the file, which is readable up to there."""
         self._flush()
         self._file.flush()
         return self._file.tell()
 
     def state(self) -> dict[str, int]:
-        """What a record that goes on from here must know, to write what this one would have."""
+        """Return what a record that continues from here needs to write the same bytes as this one."""
         return {"cycles": self._cycles, "next_image_ns": self._next_image_ns}
 
-    def go_on_from(self, chunks: Iterable[WrittenChunk], state: Mapping[str, int]) -> None:
-        """Begin with what another record of the same run had written, instead of the scene.
+    def continue_from(self, chunks: Iterable[RecordChunk], state: Mapping[str, int]) -> None:
+        """Start with the content of another record of the same run.
 
         Args:
             chunks: Its chunks.
@@ -137,7 +136,7 @@ class Recorder:
         self._cycles, self._next_image_ns = state["cycles"], state["next_image_ns"]
 
     def close(self, result: Mapping[str, object] | None = None) -> None:
-        """Write what is pending, the result (without its wall times) and the index; idempotent."""
+        """Write everything pending, the result (without its wall times) and the index; idempotent."""
         if self._closed:
             return
         try:
@@ -151,13 +150,13 @@ class Recorder:
             raise GlotouchError(f"{self.path}: the record could not be finished ({e.strerror})") from e
         finally:
             self._closed = True
-            with suppress(OSError):  # what it still holds was refused before
+            with suppress(OSError):  # the refused bytes are refused again
                 self._file.close()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, tb: TracebackType | None) -> None:
+    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, trace: TracebackType | None) -> None:
         self.close()
 
     def _message(self, stamp_s: float, topic: str, body: dict[str, Any]) -> None:
@@ -207,7 +206,7 @@ class Recorder:
         self._pending.extend(zip(log_ns, [channel] * len(messages), messages, strict=True))
 
     def _encode_samples(self, observations: list[Observation]) -> None:
-        """The full-rate block, and its decimation to plots: the newest sample of every second cycle."""
+        """Write the full-rate samples, and the newest sample of every second cycle as plots."""
         stamp_s = np.concatenate([o.stamp_s for o in observations])
         q = np.concatenate([o.q for o in observations])
         dq = np.concatenate([o.dq for o in observations])
@@ -239,7 +238,7 @@ class Recorder:
         self._put_rows("/joints", ns[::2], plots.joints(ns[::2], q[pick[::2]], dq[pick[::2]]))
 
     def _encode_cycles(self, observations: list[Observation], commands: list[Command]) -> None:
-        """What is said once a cycle: the jaws, and the command."""
+        """Write the data of each cycle: the jaws and the command."""
         stamp_s = np.array([o.stamp_s[-1] for o in observations])
         jaws = np.array([(o.gripper.stamp_s, o.gripper.aperture_m, o.gripper.force_N) for o in observations])
         moving = np.array([o.gripper.moving for o in observations], dtype=np.float64)
@@ -279,11 +278,11 @@ class Recorder:
         self._put_rows("/gripper", ns, plots.gripper(ns, jaws[pick, 1], jaws[pick, 2], moving[pick]))
 
     def _encode_tactile(self, observations: list[Observation]) -> None:
-        """Every pair of depth maps packed, and at most ten pairs a second as images."""
-        taken = [(o.tactile, o.now_s) for o in observations if o.tactile is not None]
-        if not taken:
+        """Write every pair of depth maps packed, and at most ten pairs a second as images."""
+        arrived = [(o.tactile, o.now_s) for o in observations if o.tactile is not None]
+        if not arrived:
             return
-        frames = [frame for frame, _ in taken]
+        frames = [frame for frame, _ in arrived]
         start_ns = _ns(frames[0].stamp_s)
         shape = (frames[0].left_m.shape[0], frames[0].left_m.shape[1])
         columns = (
@@ -292,7 +291,7 @@ class Recorder:
             Column("left_m", shape, DEPTH_M, 0),
             Column("right_m", shape, DEPTH_M, 0),
         )
-        stamps = np.array([(f.stamp_s, arrived_s) for f, arrived_s in taken]).T - start_ns * 1e-9
+        stamps = np.array([(f.stamp_s, arrived_s) for f, arrived_s in arrived]).T - start_ns * 1e-9
         values = (*stamps, np.stack([f.left_m for f in frames]), np.stack([f.right_m for f in frames]))
         self._put(start_ns, "/packed/tactile", pack(start_ns, columns, values))
         for frame in frames:
@@ -308,5 +307,5 @@ def _ns(stamp_s: float) -> int:
 
 
 def _status(status: object) -> str:
-    """A py_trees Status or its name."""
+    """Return the name of a py_trees Status, or the name given."""
     return str(getattr(status, "value", status))

@@ -1,6 +1,6 @@
-"""To what the record rounds, and the same rounding for what skills are given: a replay then gets the very same numbers.
+"""Round observations to the steps of the record before skills see them, so that a replay gets the same numbers.
 
-Each step is far below the noise of its sensor (nominal: 0.05 N, 0.1 mm of aperture, micrometres of gel).
+Each step is far below the noise of its sensor (nominal: 0.05 N, 0.1 mm of aperture, micrometres of gel depth).
 """
 
 from __future__ import annotations
@@ -9,18 +9,27 @@ import numpy as np
 
 from glotouch_bt.robot import Array, GripperState, Observation, TactileFrame
 
-STAMP_S, JOINT_RAD, JOINT_RAD_S, POSITION_M, QUATERNION = 1e-7, 1e-7, 1e-6, 1e-7, 1e-8
-FORCE_N, TORQUE_NM, APERTURE_M, SPEED_M_S, DEPTH_M = 1e-4, 1e-5, 1e-7, 1e-6, 1e-6
+# Rounding step of each quantity, in the unit of its name.
+STAMP_S = 1e-7
+JOINT_RAD = 1e-7
+JOINT_RAD_S = 1e-6
+POSITION_M = 1e-7
+QUATERNION = 1e-8
+FORCE_N = 1e-4
+TORQUE_NM = 1e-5
+APERTURE_M = 1e-7
+SPEED_M_S = 1e-6
+DEPTH_M = 1e-6
 
 
 def to_step(values: Array, step: float) -> Array:
-    """Nearest multiples of `step`, by the arithmetic of `mcap_packing` (so that packing them loses nothing)."""
+    """Round to multiples of `step` with the arithmetic of `mcap_packing`, so that packing loses nothing."""
     rounded: Array = np.rint(values * (1.0 / step)) * step
     return rounded
 
 
 class Rounding:
-    """Rounds the observations of one robot; the steps of a whole block are laid out once.
+    """Rounds the observations of one robot.
 
     Args:
         dof: Number of joints.
@@ -35,9 +44,9 @@ class Rounding:
         self._dq, self._p, self._w, self._f = a, a + dof, a + dof + 3, a + dof + 7
 
     def __call__(self, o: Observation) -> Observation:
-        """The observation as the record will hold it."""
+        """Return the observation as the record will hold it."""
         parts = (o.stamp_s[:, None], o.q, o.dq, o.position_B_P, o.quat_B_P, o.wrench_S)
-        block = np.concatenate(parts, axis=1)  # a copy: rounded in place
+        block = np.concatenate(parts, axis=1)  # a copy, rounded in place
         block *= self._inverse
         np.rint(block, out=block)
         block *= self._step
@@ -57,4 +66,4 @@ class Rounding:
 
 def _number(value: float, step: float) -> float:
     scaled = value * (1.0 / step)
-    return round(scaled) * step if abs(scaled) < 2**53 else value  # NaN and infinities stay what they are
+    return round(scaled) * step if abs(scaled) < 2**53 else value  # NaN and infinities pass unchanged

@@ -1,4 +1,4 @@
-"""What a run has found so far: counts for the progress line, and the decisions that go into result.json."""
+"""Summarise a run while it is recorded: counts for the progress line, and decisions for result.json."""
 
 from __future__ import annotations
 
@@ -12,55 +12,57 @@ from glotouch_bt.robot import Array, Command, Observation
 
 
 class Record(Protocol):
-    """What the runner writes to; `mission.record.Recorder` is one."""
+    """Receiver of everything the runner records, for example `Recorder`."""
 
     def block(self, observation: Observation, command: Command) -> None:
-        """One control cycle."""
+        """Record one control cycle."""
         ...
 
     def tick(self, stamp_s: float, changes: Sequence[tuple[str, object, object]]) -> None:
-        """Nodes whose status changed: (path, old, new)."""
+        """Record nodes whose status changed: (path, old, new)."""
         ...
 
     def event(self, kind: str, stamp_s: float, data: Mapping[str, object]) -> None:
-        """What a skill found or decided."""
+        """Record an event of a skill."""
         ...
 
     def port(self, stamp_s: float, key: str, value: object) -> None:
-        """A blackboard write."""
+        """Record a blackboard write."""
         ...
 
 
 class NullRecord:
-    """Records nothing."""
+    """A record that drops everything."""
 
     def block(self, observation: Observation, command: Command) -> None:
-        """Nothing."""
+        """Drop it."""
 
     def tick(self, stamp_s: float, changes: Sequence[tuple[str, object, object]]) -> None:
-        """Nothing."""
+        """Drop it."""
 
     def event(self, kind: str, stamp_s: float, data: Mapping[str, object]) -> None:
-        """Nothing."""
+        """Drop it."""
 
     def port(self, stamp_s: float, key: str, value: object) -> None:
-        """Nothing."""
+        """Drop it."""
 
 
-_NOT_COUNTED = ("_record", "_pending")
+_NOT_SAVED = ("_record", "_pending")
+BATCH = 200
+"""Control cycles measured at a time."""
 
 
 class RunSummary:
-    """A record that passes everything on and keeps count.
+    """A record that forwards everything and keeps counts.
 
     Attributes:
         contacts: Contact events so far.
-        candidates: Data of each candidate event, without its contacts.
+        candidates: Data of each candidate, without its contacts.
         ranking: Data of the last ranking event, or None.
         last_event: (robot time, kind) of the last event.
-        node: Path of the last leaf that began.
+        node: Path of the last leaf that started.
         peak_force_N: Largest norm of the sensed wrist force.
-        probe_path_m: Way of P while the probe was in the jaws (between `tool` events).
+        probe_path_m: Length of the path of P while the probe was in the jaws (between `tool` events).
     """
 
     def __init__(self, record: Record) -> None:
@@ -77,14 +79,14 @@ class RunSummary:
         self._pending: list[Observation] = []
 
     def block(self, observation: Observation, command: Command) -> None:
-        """Pass on, and measure (in batches: this is called every cycle)."""
+        """Forward and measure, in batches."""
         self._record.block(observation, command)
         self._pending.append(observation)
-        if len(self._pending) >= 200:
-            self.settle()
+        if len(self._pending) >= BATCH:
+            self.flush()
 
-    def settle(self) -> None:
-        """Bring the measured quantities up to date."""
+    def flush(self) -> None:
+        """Update the measured quantities."""
         if not self._pending:
             return
         blocks, self._pending = self._pending, []
@@ -98,38 +100,38 @@ class RunSummary:
         self._last_P_m = track[-1]
 
     def state(self) -> dict[str, Any]:
-        """All that was counted, for a checkpoint; settled."""
-        self.settle()
-        return {name: value for name, value in vars(self).items() if name not in _NOT_COUNTED}
+        """Return everything counted, for a checkpoint."""
+        self.flush()
+        return {name: value for name, value in vars(self).items() if name not in _NOT_SAVED}
 
-    def take_up(self, state: Mapping[str, Any]) -> None:
-        """Go on counting from a `state`."""
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from a `state`."""
         vars(self).update({name: value for name, value in state.items() if name in vars(self)})
 
     def tick(self, stamp_s: float, changes: Sequence[tuple[str, object, object]]) -> None:
-        """Pass on."""
+        """Forward."""
         self._record.tick(stamp_s, changes)
 
     def port(self, stamp_s: float, key: str, value: object) -> None:
-        """Pass on."""
+        """Forward."""
         self._record.port(stamp_s, key, value)
 
     def event(self, kind: str, stamp_s: float, data: Mapping[str, object]) -> None:
-        """Pass on, and keep what the result needs."""
+        """Forward, and store what the result needs."""
         self._record.event(kind, stamp_s, data)
         self.last_event = (stamp_s, kind)
         if kind == "contact":
             self.contacts += 1
         elif kind == "candidate":
-            self._keep(_candidate(to_json(data.get("candidate", data))))
+            self._store(_candidate(to_json(data.get("candidate", data))))
         elif kind == "ranking":
             self.ranking = to_json(data.get("ranking", data), summarise=True)
         elif kind == "tool":
-            self.settle()
+            self.flush()
             self._probe_held = bool(data.get("held", False))
 
-    def _keep(self, candidate: Json) -> None:
-        """A candidate that comes again, measured better, replaces what was known of it."""
+    def _store(self, candidate: Json) -> None:
+        """Store a candidate; a candidate measured again replaces its earlier entry."""
         index = candidate.get("index") if isinstance(candidate, dict) else None
         for i, known in enumerate(self.candidates):
             if index is not None and isinstance(known, dict) and known.get("index") == index:
@@ -139,13 +141,13 @@ class RunSummary:
 
 
 def _candidate(data: Json) -> Json:
-    """A candidate without its raw contacts and residuals (they are in the record)."""
+    """Return a candidate without its raw contacts and residuals, which the record holds."""
     if not isinstance(data, dict):
         return data
-    kept: dict[str, Json] = {k: v for k, v in data.items() if k not in ("contacts", "node")}
-    contour = kept.get("contour")
+    short: dict[str, Json] = {k: v for k, v in data.items() if k not in ("contacts", "node")}
+    contour = short.get("contour")
     if isinstance(contour, dict):
-        kept["contour"] = {k: v for k, v in contour.items() if k != "residuals_m"}
+        short["contour"] = {k: v for k, v in contour.items() if k != "residuals_m"}
     if isinstance(data.get("contacts"), list):
-        kept["contacts"] = len(data["contacts"])  # type: ignore[arg-type]
-    return kept
+        short["contacts"] = len(data["contacts"])  # type: ignore[arg-type]
+    return short

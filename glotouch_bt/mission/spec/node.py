@@ -73,6 +73,14 @@ class NodeSpec:
         for child in self.children:
             yield from child.walk()
 
+    def paths(self, above: str) -> dict[str, NodeSpec]:
+        """Return this node and all below by path, parents first; `above` is the parent's path."""
+        path = f"{above}/{self.name}"
+        found = {path: self}
+        for child in self.children:
+            found |= child.paths(path)
+        return found
+
 
 def number_names(root: NodeSpec) -> None:
     """Make names unique: the second `squeeze` becomes `squeeze 2`."""

@@ -1,4 +1,4 @@
-"""A run done again from its record, without a robot: every fit, match and decision of it, beside what it was then."""
+"""Replay a run from its record without a robot, and compare every event and decision with the recorded ones."""
 
 from glotouch_bt.runs.replay.decisions import replay_decisions
 from glotouch_bt.runs.replay.run import replay

@@ -1,4 +1,4 @@
-"""What differs between what a run found and what its replay finds."""
+"""Compare the events and status changes of a run with those of its replay."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from glotouch_bt.report import Event
+from glotouch_bt.report import RecordedEvent
 
 
 @dataclass(frozen=True)
-class Difference:
-    """One thing that is not the same.
+class ReplayDifference:
+    """One difference between a run and its replay.
 
     Attributes:
         stamp_s: Robot clock.
         kind: Kind of event, or ``tick``.
-        where: Which one, and the path to the value in it.
-        then, now: Values in the run and in the replay; None: not there.
+        where: Number of the event of its kind, and the path to the value in it.
+        then, now: Values in the run and in the replay; None if missing.
     """
 
     stamp_s: float
@@ -31,13 +31,13 @@ class Difference:
 
 
 def compare_events(
-    then: Sequence[Event], now: Sequence[Event], tolerance: float
-) -> tuple[list[Difference], dict[str, int], dict[str, tuple[float, str]]]:
-    """Differences of events, kind by kind in their order; how many were compared; the largest difference of a number.
+    then: Sequence[RecordedEvent], now: Sequence[RecordedEvent], tolerance: float
+) -> tuple[list[ReplayDifference], dict[str, int], dict[str, tuple[float, str]]]:
+    """Return the differences of events, the number compared, and the largest numeric difference, by kind.
 
-    One difference an event is given: the first value, in the event's own order, that is not the same.
+    At most one difference per event is listed: the first value that differs.
     """
-    differences: list[Difference] = []
+    differences: list[ReplayDifference] = []
     compared: dict[str, int] = {}
     largest: dict[str, tuple[float, str]] = {}
     for kind in dict.fromkeys(e.kind for e in (*then, *now)):
@@ -45,37 +45,39 @@ def compare_events(
         compared[kind] = min(len(old), len(new))
         worst = (0.0, "")
         for i, (a, b) in enumerate(zip(old, new, strict=False)):
-            found = _Compared(tolerance)
-            found.values(a.data, b.data, "")
-            if found.largest[0] > worst[0]:
-                worst = (found.largest[0], f"{i + 1}{found.largest[1]}")
-            if found.first is not None:
-                path, was, is_ = found.first
-                differences.append(Difference(a.stamp_s, kind, f"{i + 1}{path}", was, is_))
+            comparison = _Comparison(tolerance)
+            comparison.values(a.data, b.data, "")
+            if comparison.largest[0] > worst[0]:
+                worst = (comparison.largest[0], f"{i + 1}{comparison.largest[1]}")
+            if comparison.first is not None:
+                path, was, is_ = comparison.first
+                differences.append(ReplayDifference(a.stamp_s, kind, f"{i + 1}{path}", was, is_))
         largest[kind] = worst
         for i, e in enumerate(old[len(new) :], start=len(new) + 1):
-            differences.append(Difference(e.stamp_s, kind, f"{i}", e.data.get("node", "there"), None))
+            differences.append(ReplayDifference(e.stamp_s, kind, f"{i}", e.data.get("node", "there"), None))
         for i, e in enumerate(new[len(old) :], start=len(old) + 1):
-            differences.append(Difference(e.stamp_s, kind, f"{i}", None, e.data.get("node", "there")))
+            differences.append(ReplayDifference(e.stamp_s, kind, f"{i}", None, e.data.get("node", "there")))
     return differences, compared, largest
 
 
-def compare_ticks(then: Sequence[tuple[float, str, str]], now: Sequence[tuple[float, str, str]]) -> list[Difference]:
-    """The first node that changed its status otherwise; what follows from it is not listed."""
+def compare_ticks(
+    then: Sequence[tuple[float, str, str]], now: Sequence[tuple[float, str, str]]
+) -> list[ReplayDifference]:
+    """Return the first status change that differs, as a list of at most one difference."""
     for (stamp_s, node, state), (_, node_now, state_now) in zip(then, now, strict=False):
         if (node, state) != (node_now, state_now):
-            return [Difference(stamp_s, "tick", "", f"{node} {state}", f"{node_now} {state_now}")]
+            return [ReplayDifference(stamp_s, "tick", "", f"{node} {state}", f"{node_now} {state_now}")]
     return []
 
 
-class _Compared:
+class _Comparison:
     def __init__(self, tolerance: float) -> None:
         self._tolerance = tolerance
         self.first: tuple[str, Any, Any] | None = None
         self.largest = (0.0, "")
 
     def values(self, a: Any, b: Any, path: str) -> None:
-        """Compare two values of JSON, deeply."""
+        """Compare two JSON values recursively."""
         if isinstance(a, dict) and isinstance(b, dict):
             for key in dict.fromkeys((*a, *b)):
                 self.values(a.get(key), b.get(key), f"{path}.{key}")
@@ -85,10 +87,10 @@ class _Compared:
             for i, (x, y) in enumerate(zip(a, b, strict=False)):
                 self.values(x, y, f"{path}[{i}]")
         elif _number(a) and _number(b):
-            off = abs(a - b)
-            if off > self.largest[0]:
-                self.largest = (off, path)
-            if off > self._tolerance * max(1.0, abs(a)):
+            error = abs(a - b)
+            if error > self.largest[0]:
+                self.largest = (error, path)
+            if error > self._tolerance * max(1.0, abs(a)):
                 self._differ(path, a, b)
         elif a != b:
             self._differ(path, a, b)

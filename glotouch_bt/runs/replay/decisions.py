@@ -1,6 +1,6 @@
-"""The decisions of a run made again from the TouchSets it recorded: whatever changed before them, each stands alone.
+"""Repeat the recognition decisions of a run from its recorded TouchSets, each on its own.
 
-For the question "what would today's matcher have said of what was felt then?"; also for records of older versions.
+This shows what the present matcher decides on recorded data, also of older versions.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ class Decision:
 
     Attributes:
         stamp_s: Robot clock.
-        target: Name of the object looked for.
-        matcher: Which matcher decided.
+        target: Name of the target object.
+        matcher: Name of the matcher.
         then: As recorded: {matches: [{index, probability, ...}], accepted, reasons, ...}.
-        now: The ranking of the same TouchSets by the present code.
+        now: Ranking of the same TouchSets by the present code.
     """
 
     stamp_s: float
@@ -42,7 +42,7 @@ class Decision:
 
     @property
     def same(self) -> bool:
-        """The same candidate first, and accepted or not alike."""
+        """True if the best candidate and its acceptance agree."""
         first = self.then["matches"][0]["index"] if self.then.get("matches") else None
         return first == self.now.best.index and bool(self.then.get("accepted")) == self.now.accepted
 
@@ -56,14 +56,14 @@ class Decision:
 
 
 def replay_decisions(folder: Path, *, objects: Path | None = None) -> list[Decision]:
-    """Match again what each decision of a run had before it.
+    """Repeat each decision of a run on the TouchSets recorded before it.
 
     Args:
         folder: The run's folder.
-        objects: Where its STL files are now, if not where they were.
+        objects: Folder of its STL files, if they have moved.
 
     Raises:
-        BadInput: There is no run, its mission cannot be loaded any more, or its record is not as this version reads it.
+        BadInput: There is no run, its mission cannot be loaded, or its record is of an unknown version.
     """
     record = read_run(folder)
     mission = load_mission(record.path.parent / "mission.yaml", objects=objects)
@@ -74,7 +74,7 @@ def replay_decisions(folder: Path, *, objects: Path | None = None) -> list[Decis
     for event in record.events:
         if event.kind == "touchset":
             touchset = _touchset(event.data.get("touchset"), record)
-            felt[touchset.candidate.index] = touchset  # felt again: the newest holds all layers
+            felt[touchset.candidate.index] = touchset  # the newest holds all layers
         elif event.kind == "ranking":
             target, matcher = str(event.data["target"]), str(event.data.get("matcher", "likelihood"))
             then = event.data["ranking"]
@@ -91,11 +91,11 @@ def _touchset(data: object, record: RunRecord) -> TouchSet:
     try:
         return msgspec.convert(_finite(data), TouchSet, dec_hook=_array, strict=False)
     except (msgspec.ValidationError, GlotouchError, ValueError) as e:
-        raise BadInput(f"{record.path}: a TouchSet in it is not as this version reads it ({e})") from e
+        raise BadInput(f"{record.path}: it holds a TouchSet of an unknown version ({e})") from e
 
 
 def _finite(data: Any) -> Any:
-    """JSON has no NaN: the record wrote null for it."""
+    """Replace null by NaN, which JSON cannot hold."""
     if isinstance(data, dict):
         return {k: _finite(v) for k, v in data.items()}
     if isinstance(data, list):

@@ -1,8 +1,7 @@
-"""A robot that senses what another one sensed: the blocks of a record, one a cycle, whatever it is told.
+"""A robot that returns the recorded blocks of another one, one per cycle, whatever the command.
 
-It compares what it is told with what the recorded robot was told. While both agree, the skills stand where they stood
-then and every fit and decision is made again from the same data. From the first command that differs on, the recorded
-data are answers to other commands; `parted` says where that was.
+It compares each command with the recorded one. While they agree, every fit and decision is repeated on the same data.
+After the first command that differs (`divergence`), the recorded data no longer match the commands.
 """
 
 from __future__ import annotations
@@ -26,22 +25,25 @@ from glotouch_bt.robot import (
     Ticket,
 )
 
-SAME_RAD, SAME_M, SAME_M_S, SAME_N = 1e-4, 1e-5, 1e-4, 1e-2
-"""Commands agree within this: a hundred times what the record's rounding moves them by, far below what is noticed."""
+# Tolerances of equal commands: a hundred times the rounding of the record, far below a relevant difference.
+SAME_RAD = 1e-4
+SAME_M = 1e-5
+SAME_M_S = 1e-4
+SAME_N = 1e-2
 
 
 class RecordEnded(BackendError):
-    """The replay asked for a cycle that the record does not have."""
+    """The replay needs a cycle that the record does not have."""
 
 
 @dataclass(frozen=True)
-class Parting:
-    """The first command that was not the recorded one.
+class Divergence:
+    """The first command that differs from the recorded one.
 
     Attributes:
         cycle: Its number; the first command is 1.
         stamp_s: Robot clock at the end of that cycle.
-        what: What differed, with both values.
+        what: The difference, with both values.
     """
 
     cycle: int
@@ -50,13 +52,13 @@ class Parting:
 
 
 class ReplayedRobot(Robot):
-    """See the module's text.
+    """A robot that returns recorded blocks.
 
     Args:
         description, limits, period_s: Of the recorded robot.
         samples, cycles, tactile: The record's columns (`report.RunRecord`); row 0 of `cycles` was sensed before the
             first command.
-        done_s: Robot clock at which each slow request was seen to be done, by its number, and its error.
+        done_s: Robot clock at which each slow request was done, and its error, by its number.
     """
 
     def __init__(
@@ -79,44 +81,44 @@ class ReplayedRobot(Robot):
         self._at = 0
         self._requests = 0
         self._observation = self._block(0)
-        self.parted: Parting | None = None
+        self.divergence: Divergence | None = None
 
     @property
     def left(self) -> int:
-        """Recorded cycles not yet used."""
+        """Number of recorded cycles not yet used."""
         return len(self._ends) - 1 - self._at
 
     def observe(self) -> Observation:
-        """The newest block."""
+        """Return the newest block."""
         return self._observation
 
     def cycle(self, command: Command) -> Observation:
-        """The next recorded block.
+        """Return the next recorded block.
 
         Raises:
-            RecordEnded: There is none.
+            RecordEnded: The record has no more blocks.
         """
         if self._at + 1 >= len(self._ends):
-            raise RecordEnded(f"the record ends at t={self._observation.now_s:.3f} s; the replay would go on")
+            raise RecordEnded(f"the record ends at t={self._observation.now_s:.3f} s; the replay needs more")
         self._at += 1
-        if self.parted is None:
+        if self.divergence is None:
             what = self._difference(command, self._at)
             if what:
-                self.parted = Parting(self._at, float(self._cycles["stamp_s"][self._at]), what)
+                self.divergence = Divergence(self._at, float(self._cycles["stamp_s"][self._at]), what)
         self._observation = self._block(self._at)
         return self._observation
 
     def start(self, request: Request) -> Ticket:
-        """A request that is done when the recorded one was."""
+        """Start a request that is done when the recorded one was."""
         stamp_s, error = self._done_s.get(self._requests, (np.inf, None))
         self._requests += 1
         return _Ticket(self, stamp_s, error)
 
     def hold(self) -> None:
-        """Nothing moves."""
+        """Do nothing."""
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing."""
 
     def _block(self, i: int) -> Observation:
         rows = slice(int(self._ends[i - 1]) if i else 0, int(self._ends[i]))
@@ -144,18 +146,18 @@ class ReplayedRobot(Robot):
         )
 
     def _difference(self, command: Command, i: int) -> str:
-        """What this command and the recorded one of cycle i differ in, in words; empty if in nothing."""
+        """Return how a command differs from the recorded one of cycle i, in words; empty if it does not."""
         c = self._cycles
         was = c["command_q"][i]
         if (command.motion is None) != bool(np.isnan(was[0])):
-            return "one holds, the other moves: the record " + ("holds" if np.isnan(was[0]) else "moves")
+            return "one holds and the other moves: the record " + ("holds" if np.isnan(was[0]) else "moves")
         if command.motion is not None:
             worst = float(np.abs(command.motion.q - was).max())
             if worst > SAME_RAD:
                 return f"a joint setpoint differs by {worst:.2g} rad"
         target, asked = command.gripper, not np.isnan(c["command_aperture_m"][i])
         if (target is not None) != asked:
-            return "the jaws are told something in one only: " + ("the record" if asked else "the replay")
+            return "only one commands the jaws: " + ("the record" if asked else "the replay")
         if target is not None:
             for name, is_, tolerance in (
                 ("aperture_m", target.aperture_m, SAME_M),
@@ -166,7 +168,7 @@ class ReplayedRobot(Robot):
                 if abs(is_ - then) > tolerance:
                     return f"the jaws' {name} is {is_:.6g}, it was {then:.6g}"
         if command.tactile != bool(c["command_tactile"][i]):
-            return "depth maps are asked for in one only"
+            return "only one requests depth maps"
         return ""
 
 
@@ -176,7 +178,7 @@ class _Ticket:
 
     @property
     def done(self) -> bool:
-        """At the recorded time (half a sample early: stamps are rounded)."""
+        """True from the recorded time on, half a sample early because stamps are rounded."""
         return self._robot.observe().now_s >= self._done_s - 0.0005
 
     @property

@@ -1,4 +1,4 @@
-"""A replay for people and for programs."""
+"""The result of a replay as text and as JSON data."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ from glotouch_bt.runs.replay.run import Replay
 
 
 def as_dict(replay: Replay) -> dict[str, Any]:
-    """For --json."""
-    parted = replay.parted
+    """Return the JSON data of `--json`."""
+    divergence = replay.divergence
     return {
         "same": replay.same,
         "status": {"then": replay.statuses[0], "now": replay.statuses[1]},
-        "parted": None if parted is None else {"cycle": parted.cycle, "stamp_s": parted.stamp_s, "what": parted.what},
+        "parted": None
+        if divergence is None
+        else {"cycle": divergence.cycle, "stamp_s": divergence.stamp_s, "what": divergence.what},
         "record_ended": replay.ended,
         "compared": dict(replay.compared),
         "largest_difference": {k: {"value": v, "where": where} for k, (v, where) in replay.largest.items() if where},
@@ -28,32 +30,32 @@ def as_dict(replay: Replay) -> dict[str, Any]:
 
 
 def as_lines(replay: Replay, shown: int) -> list[str]:
-    """For a terminal: what was compared, where the replay parted from the run, the first differences."""
+    """For a terminal: what was compared, where the replay divergence from the run, the first differences."""
     compared = ", ".join(f"{n} {kind}" for kind, n in replay.compared.items() if n)
     lines = [f"compared: {compared or 'nothing'}"]
     if replay.cut_s is not None:
-        lines.append(f"the record is cut off or damaged at t={replay.cut_s:.2f} s: nothing after that is replayed")
+        lines.append(f"the record is cut off or damaged at t={replay.cut_s:.2f} s: the rest is not replayed")
     if replay.same:
         worst = max((v for v, _ in replay.largest.values()), default=0.0)
         then = replay.statuses[0]
-        return [*lines, f"the same: every event and every decision, ends with {then} (largest difference {worst:.1g})"]
-    if replay.parted is not None:
-        p = replay.parted
-        lines.append(f"parts from the run in cycle {p.cycle}, t={p.stamp_s:.2f} s: {p.what}")
-        lines.append("  (what comes after answers other commands than it was given: read the first differences)")
+        return [*lines, f"the same: every event and every decision; ends with {then} (largest difference {worst:.1g})"]
+    if replay.divergence is not None:
+        p = replay.divergence
+        lines.append(f"differs from the run from cycle {p.cycle}, t={p.stamp_s:.2f} s: {p.what}")
+        lines.append("  (later observations do not match the commands: read the first differences)")
     then, now = replay.statuses
     if then != now:
         lines.append(f"ended with {then}; the replay ends with {now}")
         lines += [f"  {r}" for r in replay.outcome.reasons]
     lines += [f"  {d}" for d in replay.differences[:shown]]
-    left = len(replay.differences) - shown
-    if left > 0:
-        lines.append(f"  ... and {left} more (--json gives all)")
+    hidden = len(replay.differences) - shown
+    if hidden > 0:
+        lines.append(f"  ... and {hidden} more (--json gives all)")
     return lines
 
 
 def decision_as_dict(decision: Decision) -> dict[str, Any]:
-    """For --json."""
+    """Return the JSON data of `--json`."""
     return {
         "stamp_s": decision.stamp_s,
         "target": decision.target,

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from glotouch_bt.faults import CATALOGUE, FaultPlan, FaultSpec, Lasting, Repeat, When
+from glotouch_bt.faults import CATALOGUE, Duration, FaultPlan, FaultSpec, Repeat, When
 from glotouch_bt.mission.spec import Place
 from glotouch_bt.robot import BadInput, UnknownName
 
@@ -23,14 +23,14 @@ class Case:
     Attributes:
         fault: Name in the catalogue, and of the case.
         given: Parameters that differ from the defaults.
-        lasting: Duration.
+        duration: Duration.
         skills: Skills it can affect.
         warm_up_s: Least run time before the fault begins.
     """
 
     fault: str
     given: Mapping[str, Any] = field(default_factory=dict)
-    lasting: Lasting = field(default_factory=lambda: Lasting(duration_s=2.0))
+    duration: Duration = field(default_factory=lambda: Duration(duration_s=2.0))
     skills: tuple[str, ...] = SKILLS
     warm_up_s: float = 0.5
 
@@ -47,27 +47,27 @@ class Case:
             kind,
             kind.effect.Params(**self.given),
             When(node=skill, after_s=after_s),
-            self.lasting,
+            self.duration,
             Repeat(),
             Place("bench faults"),
         )
         return FaultPlan(f"{self.fault} in {skill}", (spec,))
 
 
-def _s(seconds: float) -> Lasting:
-    return Lasting(duration_s=seconds)
+def _s(seconds: float) -> Duration:
+    return Duration(duration_s=seconds)
 
 
 LEARNING_S = 8.0
 """Warm-up of faults seen by noise: supervision learns the sensor's noise in 5 s, again after a resume."""
-EVER = Lasting(until="ever")
-_NODE = Lasting(until="node")  # a world fault may wait for free space while the skill runs; it is never undone
+EVER = Duration(until="ever")
+_NODE = Duration(until="node")  # a world fault may wait for free space while the skill runs; it is never undone
 CASES: tuple[Case, ...] = (
     Case("wrench_off", warm_up_s=LEARNING_S),
     Case("wrench_stuck", warm_up_s=LEARNING_S),
-    Case("wrench_garbage", lasting=_s(0.2)),
+    Case("wrench_garbage", duration=_s(0.2)),
     Case("wrench_bias", {"force_N": (2.0, 1.0, 3.0)}, EVER),
-    Case("wrench_drift", lasting=_s(10.0)),
+    Case("wrench_drift", duration=_s(10.0)),
     Case("wrench_scale"),
     Case("wrench_noise"),
     Case("wrench_delay"),
@@ -77,24 +77,24 @@ CASES: tuple[Case, ...] = (
     Case("following_error", {"offset_rad": 0.03}),
     Case("lost_cycle"),
     Case("slow_cycle", {"periods": 2, "share": 0.02}),
-    Case("stale_data", lasting=_s(0.3)),
+    Case("stale_data", duration=_s(0.3)),
     Case("robot_fault"),
     Case("exception"),
-    Case("stale_tare", lasting=EVER, skills=("tool_pickup", "tool_return")),
-    Case("touch_dead", lasting=EVER, skills=("squeeze",)),
-    Case("touch_frozen", lasting=EVER, skills=("squeeze",)),
-    Case("touch_dropped", lasting=_s(5.0), skills=("squeeze",)),
-    Case("touch_swapped", lasting=EVER, skills=("squeeze",)),
-    Case("gel_offset", lasting=EVER, skills=("squeeze",)),
-    Case("grip_stall", lasting=_NODE, skills=_JAWS),
-    Case("grip_short", lasting=_NODE, skills=_JAWS),
-    Case("grip_slip", lasting=EVER, skills=("tool_pickup", "grasp")),
-    Case("grip_drop", lasting=_s(1.0), skills=(*_PROBING, "tool_return", "lift")),
-    Case("object_shoved", lasting=_NODE, skills=_AMONG_OBJECTS),
-    Case("object_toppled", lasting=_NODE, skills=_AMONG_OBJECTS),
-    Case("object_removed", lasting=_NODE, skills=_AMONG_OBJECTS),
-    Case("wrong_scale_stl", lasting=EVER, skills=("tool_pickup",)),
-    Case("container_offset", lasting=_NODE, skills=_AMONG_OBJECTS),
+    Case("stale_tare", duration=EVER, skills=("tool_pickup", "tool_return")),
+    Case("touch_dead", duration=EVER, skills=("squeeze",)),
+    Case("touch_frozen", duration=EVER, skills=("squeeze",)),
+    Case("touch_dropped", duration=_s(5.0), skills=("squeeze",)),
+    Case("touch_swapped", duration=EVER, skills=("squeeze",)),
+    Case("gel_offset", duration=EVER, skills=("squeeze",)),
+    Case("grip_stall", duration=_NODE, skills=_JAWS),
+    Case("grip_short", duration=_NODE, skills=_JAWS),
+    Case("grip_slip", duration=EVER, skills=("tool_pickup", "grasp")),
+    Case("grip_drop", duration=_s(1.0), skills=(*_PROBING, "tool_return", "lift")),
+    Case("object_shoved", duration=_NODE, skills=_AMONG_OBJECTS),
+    Case("object_toppled", duration=_NODE, skills=_AMONG_OBJECTS),
+    Case("object_removed", duration=_NODE, skills=_AMONG_OBJECTS),
+    Case("wrong_scale_stl", duration=EVER, skills=("tool_pickup",)),
+    Case("container_offset", duration=_NODE, skills=_AMONG_OBJECTS),
 )
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from glotouch_bt.faults import CATALOGUE, FaultInjector, FaultPlan, FaultSpec, Lasting, ListeningRecord, Repeat, When
+from glotouch_bt.faults import CATALOGUE, Duration, FaultInjector, FaultPlan, FaultSpec, ListeningRecord, Repeat, When
 from glotouch_bt.mission import Mission, load_mission, split_settings
 from glotouch_bt.mission.execution import Outcome, run_mission
 from glotouch_bt.mission.read import load_conditions
@@ -131,7 +131,7 @@ class _Forking(FaultInjector):
 
 def _fault(name: str) -> FaultSpec:
     kind = CATALOGUE[name]
-    return FaultSpec(name, kind, kind.effect.Params(), When(), Lasting(until="ever"), Repeat(), Place("exhaustive"))
+    return FaultSpec(name, kind, kind.effect.Params(), When(), Duration(until="ever"), Repeat(), Place("exhaustive"))
 
 
 def run_exhaustive(study: Exhaustive, on_progress: Callable[[int, str], None] | None = None) -> dict[str, Any]:

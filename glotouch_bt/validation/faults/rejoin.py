@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from glotouch_bt.faults import FaultPlan
-from glotouch_bt.mission.checkpoint import FILE, CheckpointFile, Row, decode, encode
+from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile, CheckpointRow, decode, encode
 from glotouch_bt.robot import BadInput
 
 KNOWN = ("tree", "arm", "preempted", "paused_s", "status", "ticks", "requests")
@@ -38,14 +38,14 @@ class TwinWatch(CheckpointFile):
         self._twin = CheckpointFile(twin)
         self._stamps = {(r.number, r.stamp_s) for r in self._twin.rows()}
         (spec,) = plan.faults
-        lasting = spec.lasting
+        duration = spec.duration
         self._begins_s, self._node = begins_s, str(spec.when.node)
-        self._until_node = lasting.until == "node"
-        self._over_s = math.inf if lasting.until is not None else begins_s + (lasting.duration_s or 0.0)
-        if lasting.cycles is not None:
+        self._until_node = duration.until == "node"
+        self._over_s = math.inf if duration.until is not None else begins_s + (duration.duration_s or 0.0)
+        if duration.cycles is not None:
             self._over_s = begins_s + 1.0
 
-    def add(self, row: Row, state: bytes, world: bytes | None) -> None:
+    def add(self, row: CheckpointRow, state: bytes, world: bytes | None) -> None:
         """See `CheckpointFile`.
 
         Raises:
@@ -62,7 +62,7 @@ class TwinWatch(CheckpointFile):
         super().close()
         self._twin.close()
 
-    def _same(self, row: Row, state: bytes, world: bytes) -> bool:
+    def _same(self, row: CheckpointRow, state: bytes, world: bytes) -> bool:
         try:
             if (row.number, row.stamp_s) not in self._stamps:
                 return False
@@ -81,4 +81,4 @@ def _known(state: dict[str, Any]) -> bytes:
 
 def watched(folder: Path, twin: Path, plan: FaultPlan, begins_s: float) -> TwinWatch:
     """Return the watched checkpoints of a trial in `folder`."""
-    return TwinWatch(folder / FILE, twin / FILE, plan, begins_s)
+    return TwinWatch(folder / CHECKPOINT_FILE, twin / CHECKPOINT_FILE, plan, begins_s)

@@ -10,12 +10,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from glotouch_bt.faults import FaultPlan
-from glotouch_bt.mission.checkpoint import FILE, CheckpointFile, Row
-from glotouch_bt.runs import ResumableRun, copy_run, find, installed_versions
+from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile, CheckpointRow
+from glotouch_bt.runs import ResumableRun, copy_run, find_resumable, installed_versions
 from glotouch_bt.validation.faults.rejoin import watched
 
 
-def _first(rows: list[Row], node: str) -> tuple[str, Row, int] | None:
+def _first(rows: list[CheckpointRow], node: str) -> tuple[str, CheckpointRow, int] | None:
     """Return (path of the node, last checkpoint before its start, index of that row)."""
     for i, row in enumerate(rows[1:]):
         for path in row.begun:
@@ -37,7 +37,7 @@ def start_from(twin: Path, out: Path, plan: FaultPlan, warm_up_s: float) -> Resu
         BadInput: The twin's checkpoints cannot be used.
     """
     (spec,) = plan.faults
-    file = CheckpointFile(twin / FILE)
+    file = CheckpointFile(twin / CHECKPOINT_FILE)
     try:
         rows = file.rows()
     finally:
@@ -50,6 +50,6 @@ def start_from(twin: Path, out: Path, plan: FaultPlan, warm_up_s: float) -> Resu
     soon = [r for r in rows[: index + 1] if r.stamp_s <= begins_s - warm_up_s] or rows[:1]
     shutil.rmtree(out, ignore_errors=True)
     copy_run(twin, out)
-    resumable = find(out, path, installed_versions())
+    resumable = find_resumable(out, path, installed_versions())
     resumable.file.close()
     return replace(resumable, file=watched(out, twin, plan, begins_s), row=soon[-1], start="")

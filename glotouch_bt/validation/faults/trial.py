@@ -13,7 +13,7 @@ from types import FrameType
 from typing import Any
 
 from glotouch_bt.faults import CATALOGUE, FaultPlan
-from glotouch_bt.mission.checkpoint import FILE as CHECKPOINTS
+from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE
 from glotouch_bt.report import read_run
 from glotouch_bt.robot import BadInput
 from glotouch_bt.runs import EARLIER, RunRequest, launch
@@ -159,7 +159,7 @@ def _launched(request: RunRequest, twin: Path | None) -> Mapping[str, Any]:
 def _tidy(folder: Path, everything: bool) -> None:
     """Remove files that the twin has or that can be regenerated; with `everything`, the record too."""
     shutil.rmtree(folder / EARLIER, ignore_errors=True)
-    for file in folder.glob(f"{CHECKPOINTS}*"):
+    for file in folder.glob(f"{CHECKPOINT_FILE}*"):
         file.unlink()
     if everything:
         for name in ("run.mcap", "truth.json", "mission.yaml"):

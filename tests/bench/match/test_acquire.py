@@ -15,7 +15,7 @@ from glotouch_bt.bench.match.acquire import acquire_layout, from_json, layout_of
 from glotouch_bt.bench.match.dataset import Layout, read_dataset, read_layout, write_layout
 from glotouch_bt.mission.record.mcap_json import to_json
 from glotouch_bt.perception.touch import Contour, TouchSet
-from glotouch_bt.report.run_record import Event, RunRecord
+from glotouch_bt.report.run_record import RecordedEvent, RunRecord
 from glotouch_bt.robot import BadInput, Pose
 from tests.bench.match.conftest import a_layout, touchset
 
@@ -31,7 +31,7 @@ def a_record(touchsets, start, end, status="success", chain=()):
     record = RunRecord(Path("run.mcap"), run={"seed": 7, "pose_B_K": to_json(POSE_B_K)})
     record.result = {"conditions": "harsh", "status": status, "reason_chain": list(chain), "sim_time_s": 500.0}
     record.truth = {"start": start, "end": end}
-    record.events = [Event(float(k), "touchset", {"touchset": to_json(t)}) for k, t in enumerate(touchsets)]
+    record.events = [RecordedEvent(float(k), "touchset", {"touchset": to_json(t)}) for k, t in enumerate(touchsets)]
     return record
 
 

@@ -15,7 +15,7 @@ from glotouch_bt.bench.search.bench import SearchCampaign, run_campaign
 from glotouch_bt.bench.search.scoring import Found, TrueLayout, discovered_at, score
 from glotouch_bt.bench.search.summary import correlation, quantiles, summarise
 from glotouch_bt.bench.search.trial import Way, _result_of, recorded_folders
-from glotouch_bt.report.run_record import Event, RunRecord, Tick
+from glotouch_bt.report.run_record import RecordedEvent, RunRecord, Tick
 from glotouch_bt.robot import BadInput
 from glotouch_bt.runs.launch import RunRequest
 
@@ -130,7 +130,7 @@ def test_travel_of_a_record_counts_from_the_first_sweep_to_the_last_trace():
         Path("x"),
         run={"pose_B_K": {"position_m": [0.6, 0.0, -0.2], "quat": [1.0, 0.0, 0.0, 0.0]}},
         samples={"stamp_s": t, "position_B_P": position + np.array([0.6, 0.0, 0.0])},
-        events=[Event(0.0, "tool", {"held": True})],
+        events=[RecordedEvent(0.0, "tool", {"held": True})],
         ticks=[Tick(1.0, "a/guarded_sweep", "INVALID", "RUNNING"), Tick(3.0, "a/orbit_probe", "RUNNING", "SUCCESS")],
     )
     way = Way.of(record)

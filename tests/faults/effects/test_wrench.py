@@ -115,4 +115,4 @@ def test_a_stale_tare_is_acknowledged_and_not_done(pair: Make) -> None:
     assert polls == 5
     assert ticket.error is None
     assert np.abs(made.injector.cycle(HOLD).wrench_S[:, 5]).min() > 3.0  # 5 +- 1: not tared
-    assert made.proof.acts.times == 1
+    assert made.proof.actions.count == 1

@@ -16,22 +16,22 @@ import pytest
 import zstandard
 
 from glotouch_bt.mission.checkpoint.codec import encode
-from glotouch_bt.mission.checkpoint.store import FILE, CheckpointFile, Row
-from glotouch_bt.mission.record.reading import read_chunks
+from glotouch_bt.mission.checkpoint.store import CHECKPOINT_FILE, CheckpointFile, CheckpointRow
+from glotouch_bt.mission.record.mcap_chunks import read_chunks
 from glotouch_bt.mission.record.recorder import Recorder
 from glotouch_bt.report.run_record import read_run
 from glotouch_bt.robot import HOLD, BadInput, GlotouchError, GripperState, Observation
 
 
-def row(number: int, **fields: Any) -> Row:
+def row(number: int, **fields: Any) -> CheckpointRow:
     given = {"stamp_s": 1.5 * number, "node": f"m/step {number}", "status": "SUCCESS", "begun": ("m/a", "m/b")}
     given |= {"lacking": {}, "record_bytes": 100 * number, "has_world": False} | fields
-    return Row(number, **given)
+    return CheckpointRow(number, **given)
 
 
 @pytest.fixture
 def file(tmp_path: Path) -> CheckpointFile:
-    return CheckpointFile.create(tmp_path / FILE, {"seed": 3, "request": {"mission": "m"}})
+    return CheckpointFile.create(tmp_path / CHECKPOINT_FILE, {"seed": 3, "request": {"mission": "m"}})
 
 
 def test_rows_states_and_worlds_come_back(file: CheckpointFile) -> None:
@@ -56,7 +56,7 @@ def test_a_closed_file_is_the_whole_and_a_copy_of_an_open_one_too(file: Checkpoi
     file.add(row(0), encode({"ticks": 1}), None)
     file.copy_to(tmp_path / "copy.sqlite")
     file.close()
-    assert not file.path.with_name(f"{FILE}-wal").exists()
+    assert not file.path.with_name(f"{CHECKPOINT_FILE}-wal").exists()
     for path in (file.path, tmp_path / "copy.sqlite"):
         again = CheckpointFile(path)
         assert again.state(0) == {"ticks": 1}
@@ -68,16 +68,17 @@ def test_a_killed_writer_leaves_every_row_it_had_written(tmp_path: Path) -> None
     script = f"""
         import os, signal
         from pathlib import Path
-        from glotouch_bt.mission.checkpoint import CheckpointFile, Row
-        from glotouch_bt.mission.values import encode
-        file = CheckpointFile.create(Path({str(tmp_path / FILE)!r}), {{}})
+        from glotouch_bt.mission.checkpoint import CheckpointFile, CheckpointRow
+        from glotouch_bt.mission.checkpoint import encode
+        file = CheckpointFile.create(Path({str(tmp_path / CHECKPOINT_FILE)!r}), {{}})
         for n in range(7):
-            file.add(Row(n, 0.1 * n, "", "", (), {{}}, None, False), encode({{"n": n, "x": b"x" * 20000}}), None)
+            row = CheckpointRow(n, 0.1 * n, "", "", (), {{}}, None, False)
+            file.add(row, encode({{"n": n, "x": b"x" * 20000}}), None)
         os.kill(os.getpid(), signal.SIGKILL)
     """
     done = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], check=False)
     assert done.returncode == -signal.SIGKILL
-    file = CheckpointFile(tmp_path / FILE)
+    file = CheckpointFile(tmp_path / CHECKPOINT_FILE)
     assert [r.number for r in file.rows()] == list(range(7))
     assert file.state(6)["n"] == 6
     file.add(row(7), encode({}), None)
@@ -87,11 +88,11 @@ def test_a_killed_writer_leaves_every_row_it_had_written(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("content", [b"", b"not a database", b"SQLite format 3\0" + b"\0" * 200])
 def test_what_is_no_checkpoint_is_said_to_be_none(tmp_path: Path, content: bytes) -> None:
-    (tmp_path / FILE).write_bytes(content)
-    with pytest.raises(BadInput, match=FILE):
-        CheckpointFile(tmp_path / FILE)
+    (tmp_path / CHECKPOINT_FILE).write_bytes(content)
+    with pytest.raises(BadInput, match=CHECKPOINT_FILE):
+        CheckpointFile(tmp_path / CHECKPOINT_FILE)
     with pytest.raises(BadInput, match="no checkpoint here"):
-        CheckpointFile(tmp_path / "nowhere" / FILE)
+        CheckpointFile(tmp_path / "nowhere" / CHECKPOINT_FILE)
 
 
 def test_another_format_is_said_to_be_one(file: CheckpointFile) -> None:
@@ -111,7 +112,7 @@ def test_a_damaged_row_is_refused_and_names_the_file(file: CheckpointFile, blob:
         db.execute("UPDATE checkpoint SET state = ?", (blob,))
     db.close()
     again = CheckpointFile(file.path)
-    with pytest.raises(BadInput, match=FILE):
+    with pytest.raises(BadInput, match=CHECKPOINT_FILE):
         again.state(0)
     with pytest.raises(BadInput, match="no checkpoint 5"):
         again.state(5)
@@ -120,7 +121,7 @@ def test_a_damaged_row_is_refused_and_names_the_file(file: CheckpointFile, blob:
 
 def test_a_folder_that_is_not_there_is_one_message(tmp_path: Path) -> None:
     with pytest.raises(GlotouchError, match="cannot be written"):
-        CheckpointFile.create(tmp_path / "none" / FILE, {})
+        CheckpointFile.create(tmp_path / "none" / CHECKPOINT_FILE, {})
 
 
 def observation(now_s: float) -> Observation:
@@ -158,7 +159,7 @@ def test_a_record_that_goes_on_is_the_one_that_was_never_broken_off(tmp_path: Pa
     length, state = flushed[209]
     (tmp_path / "cut.mcap").write_bytes(data[: length + 1234])
     with Recorder(tmp_path / "again.mcap", run, batch_cycles=50) as again:
-        again.go_on_from(read_chunks(tmp_path / "cut.mcap", length), state)
+        again.continue_from(read_chunks(tmp_path / "cut.mcap", length), state)
         write(again, 210, 400, {})
     assert (tmp_path / "again.mcap").read_bytes() == data
     assert read_run(tmp_path / "again.mcap").complete

@@ -19,7 +19,7 @@ import pytest
 from typer.testing import CliRunner
 
 from glotouch_bt import cli
-from glotouch_bt.mission.checkpoint.store import FILE
+from glotouch_bt.mission.checkpoint.store import CHECKPOINT_FILE
 from glotouch_bt.report import read_run
 
 HOUSE = Path(__file__).parents[2] / "support" / "fake_cli.py"
@@ -79,7 +79,7 @@ def told(folder: Path) -> dict[str, Any]:
 
 def checkpoints(folder: Path) -> int:
     try:
-        with sqlite3.connect(f"file:{folder / FILE}?mode=ro", uri=True) as db:
+        with sqlite3.connect(f"file:{folder / CHECKPOINT_FILE}?mode=ro", uri=True) as db:
             count: int = db.execute("SELECT count(*) FROM checkpoint").fetchone()[0]
     except sqlite3.Error:
         return 0
@@ -246,15 +246,19 @@ def test_what_cannot_be_resumed_is_one_message(twin: Path, tmp_path: Path) -> No
     assert "did you mean 'third'" in refused(twin, "--from", "thrid", "--out", tmp_path / "x")
     copy = tmp_path / "copy"
     copy.mkdir()
-    (copy / FILE).write_bytes((twin / FILE).read_bytes())
-    with sqlite3.connect(copy / FILE) as db:
+    (copy / CHECKPOINT_FILE).write_bytes((twin / CHECKPOINT_FILE).read_bytes())
+    with sqlite3.connect(copy / CHECKPOINT_FILE) as db:
         db.execute("UPDATE run SET value = '{}' WHERE key = 'mission'")
     db.close()
-    assert "cannot be had again" in refused(copy, "--from", "third")
-    with sqlite3.connect(copy / FILE) as db:
+    assert "cannot be loaded again" in refused(copy, "--from", "third")
+    with sqlite3.connect(copy / CHECKPOINT_FILE) as db:
         db.execute("DELETE FROM checkpoint")
         db.execute("UPDATE run SET value = 'null' WHERE key = 'ended'")
     db.close()
     assert "before its first checkpoint" in refused(copy)
     assert not (tmp_path / "x").exists()
-    assert os.listdir(copy) == [FILE] or set(os.listdir(copy)) <= {FILE, f"{FILE}-wal", f"{FILE}-shm"}
+    assert os.listdir(copy) == [CHECKPOINT_FILE] or set(os.listdir(copy)) <= {
+        CHECKPOINT_FILE,
+        f"{CHECKPOINT_FILE}-wal",
+        f"{CHECKPOINT_FILE}-shm",
+    }

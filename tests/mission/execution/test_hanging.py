@@ -12,12 +12,12 @@ from typing import Any, ClassVar
 
 import pytest
 from py_trees.common import Status
-from tests.mission.run.test_pause import Events
 
 from glotouch_bt.mission.execution.runner import Outcome, run_mission
 from glotouch_bt.mission.execution.watchdog import SkillHung, Stuck, Watchdog
 from glotouch_bt.robot import HOLD, BackendError, GlotouchError, MotionRefused, ParamError, StaleReading
 from glotouch_bt.skill import Out, Skill, SkillFailed, SkillRun
+from tests.mission.execution.test_pause import Events
 
 
 class Forever(Skill):
@@ -170,16 +170,16 @@ def test_what_cannot_be_broken_off_is_handed_to_the_last_resort(robot: Any) -> N
     lost = threading.Event()
     seen: list[Stuck] = []
 
-    def on_lost(stuck: Stuck) -> None:
+    def on_unresponsive(stuck: Stuck) -> None:
         seen.append(stuck)
         lost.set()
 
-    dog = Watchdog(robot, lambda: "m/node", 0.05, on_lost, grace_s=0.05)
-    dog._break_off = lambda: None  # type: ignore[method-assign]
+    dog = Watchdog(robot, lambda: "m/node", 0.05, on_unresponsive, grace_s=0.05)
+    dog._interrupt = lambda: None  # type: ignore[method-assign]
     with dog:
         assert lost.wait(10.0)
     assert seen[0].node == "m/node"
-    assert "on_lost" not in seen[0].stack
+    assert "on_unresponsive" not in seen[0].stack
 
 
 def test_a_busy_mission_is_not_taken_for_a_stuck_one(go: Any, robot: Any) -> None:

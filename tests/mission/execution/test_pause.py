@@ -322,7 +322,7 @@ def test_a_stop_in_a_motion_brakes_and_rises(on_fake: Any) -> None:
     robot = Stops()
     outcome, record = on_fake("  - sway\n", robot, control)
     assert outcome.chain[-1].as_dict()["code"] == "preempted"
-    assert "raised" in outcome.ending or "above the container" in outcome.ending
+    assert "raised" in outcome.safe_stop or "above the container" in outcome.safe_stop
     assert record.kinds()[-1] == "ending"
     assert not record.commands[-1].motion or not record.commands[-1].motion.dq.any()
 
@@ -338,5 +338,5 @@ def test_a_stop_with_something_in_the_jaws_stays_where_it_is(on_fake: Any) -> No
 
     robot = Stops(grip_width_m=0.04)
     outcome, _ = on_fake("  - squeezes\n", robot, control)
-    assert outcome.ending == "stopped and held: the jaws hold something"
+    assert outcome.safe_stop == "stopped and held: the jaws hold something"
     assert all(c.motion is None for c in robot.commands)

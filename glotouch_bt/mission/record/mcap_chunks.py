@@ -1,4 +1,4 @@
-"""The chunks of a record as they were written, up to a length: what a resumed run's record begins with."""
+"""Read the first chunks of a record, which the record of a resumed run starts with."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from glotouch_bt.robot import BadInput
 
 
 @dataclass
-class WrittenChunk:
+class RecordChunk:
     """One chunk of a record.
 
     Attributes:
-        topics: Of the channels that begin in it, in their order.
-        messages: (log time ns, topic, message), in their order.
+        topics: Topics of the channels that start in it, in order.
+        messages: (log time ns, topic, message), in order.
     """
 
     topics: list[str] = field(default_factory=list)
     messages: list[tuple[int, str, bytes]] = field(default_factory=list)
 
 
-def read_chunks(path: Path, length: int) -> Iterator[WrittenChunk]:
-    """Each chunk, in the order written.
+def read_chunks(path: Path, length: int) -> Iterator[RecordChunk]:
+    """Yield each chunk, in the order written.
 
     Args:
-        path: The record; it may have been cut off beyond `length`.
-        length: Bytes to read; the end of a chunk.
+        path: The record; it may end anywhere beyond `length`.
+        length: Bytes to read, up to the end of a chunk.
 
     Raises:
         BadInput: The record is shorter, or damaged within that length.
@@ -50,7 +50,7 @@ def read_chunks(path: Path, length: int) -> Iterator[WrittenChunk]:
     try:
         for item in StreamReader(stream, emit_chunks=True).records:
             if isinstance(item, Chunk):
-                chunk = WrittenChunk()
+                chunk = RecordChunk()
                 for inside in breakup_chunk(item):
                     if isinstance(inside, Channel):
                         topics[inside.id] = inside.topic
