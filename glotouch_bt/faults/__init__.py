@@ -12,11 +12,11 @@ from glotouch_bt.faults.trigger import Duration, Repeat, When
 
 __all__ = [
     "CATALOGUE",
+    "Duration",
     "FaultInjector",
     "FaultKind",
     "FaultPlan",
     "FaultSpec",
-    "Duration",
     "ListeningRecord",
     "Repeat",
     "When",

@@ -3,4 +3,4 @@
 from glotouch_bt.report.run_record import PortWrite, RecordedEvent, RunRecord, Tick, read_run
 from glotouch_bt.report.write import write_report
 
-__all__ = ["RecordedEvent", "PortWrite", "RunRecord", "Tick", "read_run", "write_report"]
+__all__ = ["PortWrite", "RecordedEvent", "RunRecord", "Tick", "read_run", "write_report"]

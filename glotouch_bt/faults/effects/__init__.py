@@ -3,4 +3,4 @@
 from glotouch_bt.faults.effects.base import Actions, Effect, EffectContext, FaultParams, samples_altered
 from glotouch_bt.faults.effects.model import WrongScaleStlParams
 
-__all__ = ["Actions", "Effect", "FaultParams", "WrongScaleStlParams", "EffectContext", "samples_altered"]
+__all__ = ["Actions", "Effect", "EffectContext", "FaultParams", "WrongScaleStlParams", "samples_altered"]

@@ -13,7 +13,7 @@ from glotouch_bt.robot import Array, BadInput, Command, Observation, Request, Ro
 from glotouch_bt.robot.simulation import Disturber
 from glotouch_bt.skill import param
 
-__all__ = ["Effect", "FaultParams", "EffectContext", "param"]
+__all__ = ["Effect", "EffectContext", "FaultParams", "param"]
 
 Cycle = Callable[[Command], Observation]
 
