@@ -23,7 +23,7 @@ check: $(VENV)/.dev
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# The environment with the `glotouch` command in it: `make .venv`.
+# The environment with the `glotouch` command and pytest, for tests of missions: `make .venv`.
 $(VENV): requirements.txt pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "Python 3.11 or newer is needed: make PYTHON=python3.11")'
 	rm -rf $(VENV)
@@ -58,7 +58,7 @@ results-page: $(VENV)/.dev
 # Renew the pinned, hashed requirements (no registry address is written).
 PIP_COMPILE = $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras --no-emit-options --no-header
 pins: $(VENV)/.dev
-	$(PIP_COMPILE) --build-deps-for editable -o requirements.txt pyproject.toml
+	$(PIP_COMPILE) --build-deps-for editable --extra test -o requirements.txt pyproject.toml
 	$(PIP_COMPILE) --build-deps-for editable --extra dev -c requirements.txt -o requirements-dev.txt pyproject.toml
 
 clean:

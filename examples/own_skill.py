@@ -5,7 +5,6 @@ A package makes its skills known to `glotouch run` through an entry point; see d
 
 import tempfile
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 
@@ -34,7 +33,7 @@ class MeasureNoise(gt.Skill):
     Params = NoiseParams
     params: NoiseParams
 
-    FAILURES: ClassVar[dict[str, str]] = {"too_noisy": "the wrist force is not steady"}
+    TOO_NOISY = gt.Failure("too_noisy", "the wrist force is not steady", advice="wait until nothing touches the arm")
 
     noise_N = gt.Out(float, "largest standard deviation of a force component, N")
 
@@ -47,7 +46,7 @@ class MeasureNoise(gt.Skill):
             forces_N.append(observation.wrench_S[:, :3])
         noise_N = float(np.concatenate(forces_N).std(axis=0).max())
         if noise_N > self.params.max_noise_N:
-            raise gt.SkillFailed("too_noisy", f"the force varies by {noise_N:.2f} N", noise_N=noise_N)
+            raise self.TOO_NOISY(f"the force varies by {noise_N:.2f} N", noise_N=noise_N)
         self.noise_N = noise_N
 
 

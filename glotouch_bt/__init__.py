@@ -33,7 +33,7 @@ if TYPE_CHECKING:
         SafetyStop,
     )
     from glotouch_bt.runs import RunResult
-    from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
+    from glotouch_bt.skill import Failure, In, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 
 __getattr__ = lazy_door(
     __name__,
@@ -57,6 +57,7 @@ __getattr__ = lazy_door(
     Robot="robot",
     SafetyStop="robot",
     RunResult="runs",
+    Failure="skill",
     In="skill",
     Out="skill",
     Skill="skill",
@@ -71,6 +72,7 @@ __all__ = [
     "BackendError",
     "BadInput",
     "Command",
+    "Failure",
     "FaultPlan",
     "Finding",
     "GlotouchError",

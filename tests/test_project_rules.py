@@ -1,8 +1,9 @@
-"""The house rules that tools can check: imports run downward, everything public is described, nothing leaks in."""
+"""Rules of the project that a test can check: layers, docstrings, banned calls, the contents of a wheel."""
 
 from __future__ import annotations
 
 import ast
+import os
 import re
 import shutil
 import subprocess
@@ -15,7 +16,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("glotouch_bt", "glotouch_skills", "glotouch_backends", "glotouch_missions")
-LONGEST = 400
+MAX_LINES = 400
 
 
 def sources(*folders: str) -> list[Path]:
@@ -23,7 +24,7 @@ def sources(*folders: str) -> list[Path]:
 
 
 def committed() -> list[Path]:
-    """Every file git knows; skips where there is no repository."""
+    """Return every file of the repository; skip where there is none."""
     if not (ROOT / ".git").exists() or shutil.which("git") is None:
         pytest.skip("not a git checkout")
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True).stdout
@@ -43,7 +44,7 @@ def test_imports_run_downward() -> None:
 
 
 def undescribed(tree: ast.Module) -> Iterator[str]:
-    """Public functions, classes and methods without a docstring; what overrides is described where it is declared."""
+    """Yield public functions, classes and methods without a docstring, except overrides."""
     if ast.get_docstring(tree) is None and tree.body:
         yield "the module"
     stack: list[tuple[str, ast.AST]] = [("", tree)]
@@ -67,7 +68,7 @@ def test_everything_public_is_described(path: Path) -> None:
 
 
 def test_files_stay_short() -> None:
-    long = {shown(p): n for p in sources(*PACKAGES, "tests") if (n := len(p.read_text().splitlines())) > LONGEST}
+    long = {shown(p): n for p in sources(*PACKAGES, "tests") if (n := len(p.read_text().splitlines())) > MAX_LINES}
     assert long == {}, "split them"
 
 
@@ -78,8 +79,7 @@ def test_files_stay_short() -> None:
         ("sleeping, but for the driver's one clock", r"\btime\.sleep\((?!left\))", PACKAGES),
         ("uninitialised memory", r"\bnp\.empty(_like)?\(", PACKAGES),
         ("global random numbers", r"\bnp\.random\.(seed|rand|randn|normal|uniform)\b|^import random$", PACKAGES),
-        ("a backend's name", r"(?i)mujoco|flexiv|xense|rizon", ("skills",)),
-        ("a backend's import", r"^\s*(from|import) backends\b", ("glotouch_bt", "skills")),
+        ("a backend's name", r"(?i)mujoco|flexiv|xense|rizon", ("glotouch_skills",)),
     ],
 )
 def test_banned(what: str, pattern: str, folders: tuple[str, ...]) -> None:
@@ -91,8 +91,8 @@ def test_banned(what: str, pattern: str, folders: tuple[str, ...]) -> None:
 
 
 def test_no_code_knows_an_object_by_name() -> None:
-    """No string of the code is the name of a shipped object (missions and their defaults are not code)."""
-    names = {p.stem for p in (ROOT / "missions" / "objects").glob("*.stl")}
+    """No string in the code is the name of a shipped object; missions are not code."""
+    names = {p.stem for p in (ROOT / "glotouch_missions" / "objects").glob("*.stl")}
     assert names
     found = [
         f"{shown(path)}:{node.lineno}: {node.value!r}"
@@ -127,25 +127,32 @@ def test_no_registry_host_or_machine_path_is_committed() -> None:
 
 
 def test_backends_and_skills_are_regular_packages() -> None:
-    """Else, with `backends/` itself on the path, our folder would shadow `import mujoco`."""
-    for name in ("backends", "backends/mujoco", "skills", "missions"):
+    """A namespace package named `mujoco` would shadow `import mujoco` when its parent folder is on the path."""
+    for name in ("glotouch_backends", "glotouch_backends/mujoco", "glotouch_skills", "glotouch_missions"):
         assert (ROOT / name / "__init__.py").is_file()
     assert not list((ROOT / "tests").rglob("__init__.py")), "tests are imported by path"
 
 
-@pytest.mark.slow
-def test_an_installed_wheel_carries_everything(tmp_path: Path) -> None:
-    """Missions, worlds, conditions, meshes and their hulls are package data; every entry point's module is inside."""
-    source = tmp_path / "source"
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A wheel of the committed files."""
+    folder = tmp_path_factory.mktemp("wheel")
+    source = folder / "source"
     for path in committed():
         if path.relative_to(ROOT).parts[0] in (*PACKAGES, "pyproject.toml", "README.md", "LICENSE"):
             target = source / path.relative_to(ROOT)
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path, target)
     command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
-    done = subprocess.run([*command, str(source), "-w", str(tmp_path)], capture_output=True, text=True, check=False)
+    done = subprocess.run([*command, str(source), "-w", str(folder)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    (wheel,) = tmp_path.glob("*.whl")
+    (made,) = folder.glob("*.whl")
+    return made
+
+
+@pytest.mark.slow
+def test_a_wheel_carries_everything(wheel: Path) -> None:
+    """Missions, worlds, conditions, meshes and hulls are package data; the wheel has the module of each entry point."""
     with zipfile.ZipFile(wheel) as archive:
         inside = set(archive.namelist())
         (entry_points,) = (n for n in inside if n.endswith("entry_points.txt"))
@@ -156,14 +163,42 @@ def test_an_installed_wheel_carries_everything(tmp_path: Path) -> None:
         if p.relative_to(ROOT).parts[0] in PACKAGES and p.suffix in (".py", ".yaml", ".stl", ".npz")
     }
     assert expected - inside == set()
-    for kind in (
-        "glotouch_missions/worlds/",
-        "glotouch_missions/conditions/",
-        "glotouch_missions/objects/",
-        "glotouch_missions/hulls/",
-    ):
-        assert any(n.startswith(kind) for n in inside), kind
-    assert not [n for n in inside if n.startswith("tests/")]
+    for kind in ("worlds", "conditions", "faults", "objects", "hulls"):
+        assert any(n.startswith(f"glotouch_missions/{kind}/") for n in inside), kind
+    assert "glotouch_bt/py.typed" in inside
+    assert not [n for n in inside if n.startswith(("tests/", "examples/"))]
     for module in re.findall(r"= *([\w.]+):", points):
         path = module.replace(".", "/")
         assert f"{path}.py" in inside or f"{path}/__init__.py" in inside, module
+
+
+SCRIPT = """
+import backends, missions, skills
+import glotouch_bt as gt
+
+print(gt.__file__)
+print(gt.check("retrieve"))
+print(gt.run("calibrate", backend="fake").status)
+"""
+
+
+@pytest.mark.slow
+def test_a_user_s_own_folders_do_not_break_an_installed_wheel(wheel: Path, tmp_path: Path) -> None:
+    """Packages named skills, backends and missions stand beside the user's script."""
+    site, work = tmp_path / "site", tmp_path / "work"
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(site)
+    for name in ("skills", "backends", "missions"):
+        (work / name).mkdir(parents=True)
+        (work / name / "__init__.py").write_text("")
+    (work / "script.py").write_text(SCRIPT)
+    environment = {**os.environ, "PYTHONPATH": str(site)}
+    for words in (["script.py"], ["-m", "glotouch_bt.cli", "check", "retrieve"]):
+        done = subprocess.run(
+            [sys.executable, *words], cwd=work, env=environment, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        if words == ["script.py"]:
+            assert done.stdout.splitlines() == [str(site / "glotouch_bt" / "__init__.py"), "()", "failure"]
+        else:
+            assert "retrieve: ok" in done.stdout

@@ -25,6 +25,7 @@ NAMES = {
     "BackendError",
     "BadInput",
     "Command",
+    "Failure",
     "FaultPlan",
     "Finding",
     "GlotouchError",
@@ -63,6 +64,7 @@ NOT_IN_EXAMPLES = {
     "Robot",
     "RunRecord",
     "SafetyStop",
+    "SkillFailed",
 }
 """Types that a script meets without naming them, and errors."""
 WALL_TIMES = ("wall_time_s", "wall_open_s")
