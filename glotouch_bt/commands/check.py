@@ -15,7 +15,7 @@ from glotouch_bt.commands.output import print_json
 
 @guarded
 def check(
-    missions: Annotated[list[str], typer.Argument(metavar="MISSION...", help="mission files or shipped names")],
+    missions: Annotated[list[str], typer.Argument(metavar="MISSION", help="mission files or shipped names")],
     set_: Settings = None,
     objects: Objects = None,
     strict: Annotated[bool, typer.Option("--strict", help="treat warnings as errors")] = False,

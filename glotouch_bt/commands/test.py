@@ -13,7 +13,7 @@ from glotouch_bt.commands.options import MissionName
 @guarded
 def run_tests(
     mission: MissionName,
-    tests: Annotated[list[str] | None, typer.Argument(metavar="TESTS...", help="test files or folders")] = None,
+    tests: Annotated[list[str] | None, typer.Argument(metavar="TESTS", help="test files or folders")] = None,
     coverage: Annotated[
         float | None,
         typer.Option(
