@@ -138,13 +138,3 @@ class StateSets:
             else:
                 found.add(0)
         return frozenset(found)
-
-    def holds(self, given: int, state: Sequence[int]) -> bool:
-        """Return True if a state (a value for each variable) is in the set."""
-        for variable in range(len(self._sizes) - 1, -1, -1):
-            at, children = self._nodes[given]
-            if at == variable:
-                given = children[state[variable]]
-            elif state[variable]:
-                return False
-        return given == START

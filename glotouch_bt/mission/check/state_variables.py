@@ -34,7 +34,6 @@ class StateVariables:
         self.keys = {key: i for i, key in enumerate(kinds)}
         self.resources = {name: len(self.keys) + i for i, name in enumerate(self._states)}
         self.lost = len(self.keys) + len(self.resources)
-        self.names = (*self.keys, *self.resources)
         sizes = [*(len(k) for k in self._kinds.values()), *(len(s) for s in self._states.values()), 2]
         self.sets = StateSets(sizes)
         self.start = START

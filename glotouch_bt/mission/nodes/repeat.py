@@ -15,9 +15,9 @@ from glotouch_bt.mission.nodes.base import (
     BtcppForm,
     BuildContext,
     ConditionSettings,
+    CountedLoop,
     DataFlowAnalysis,
     LoopKind,
-    MissionDecorator,
     NodeKind,
     NodeReader,
     Pass,
@@ -51,21 +51,6 @@ class RepeatSettings(Settings):
         if isinstance(self.until, str):
             return ConditionSettings(port=self.until, equals=True)
         return self.until
-
-
-class CountedLoop(MissionDecorator):
-    """Counts passes of its child."""
-
-    kept = ("_passes",)
-
-    def __init__(self, name: str, child: Behaviour, limit: int) -> None:
-        super().__init__(name, child)
-        self._limit, self._passes = limit, 0
-
-    def initialise(self) -> None:
-        """Start counting passes."""
-        super().initialise()
-        self._passes = 0
 
 
 class RepeatTimes(CountedLoop):

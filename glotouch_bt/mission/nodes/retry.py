@@ -6,7 +6,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from pydantic import Field
 
-from glotouch_bt.mission.nodes.base import BtcppForm, BuildContext, LoopKind, MissionDecorator
+from glotouch_bt.mission.nodes.base import BtcppForm, BuildContext, CountedLoop, LoopKind
 from glotouch_bt.mission.spec import NodeSpec, Settings
 
 
@@ -16,29 +16,18 @@ class RetrySettings(Settings):
     attempts: int = Field(description="how often in all", ge=1, le=10_000)
 
 
-class Retry(MissionDecorator):
+class Retry(CountedLoop):
     """Run the child until it succeeds. FAILURE when all attempts have failed."""
-
-    kept = ("_failures",)
-
-    def __init__(self, name: str, child: Behaviour, attempts: int) -> None:
-        super().__init__(name, child)
-        self._attempts, self._failures = attempts, 0
-
-    def initialise(self) -> None:
-        """Start counting."""
-        super().initialise()
-        self._failures = 0
 
     def update(self) -> Status:
         """Count a failed attempt."""
         if self.decorated.status is not Status.FAILURE:
             return self.decorated.status
-        self._failures += 1
-        if self._failures < self._attempts:
+        self._passes += 1
+        if self._passes < self._limit:
             return Status.RUNNING
-        tried = f"{self._attempts} attempt{'s' if self._attempts > 1 else ''}"
-        return self.fail("retries_ran_out", f"failed {self._failures} of {tried}")
+        tried = f"{self._limit} attempt{'s' if self._limit > 1 else ''}"
+        return self.fail("retries_ran_out", f"failed {self._passes} of {tried}")
 
 
 class RetryKind(LoopKind):

@@ -14,7 +14,13 @@ from glotouch_bt.mission.nodes.base.analysis import (
     Values,
     VariableTable,
 )
-from glotouch_bt.mission.nodes.base.behaviours import BuildContext, Keys, MissionDecorator, OutcomeDecorator
+from glotouch_bt.mission.nodes.base.behaviours import (
+    BuildContext,
+    CountedLoop,
+    Keys,
+    MissionDecorator,
+    OutcomeDecorator,
+)
 from glotouch_bt.mission.nodes.base.comparison import ConditionSettings, holds, in_code, in_words
 from glotouch_bt.mission.nodes.base.composite import CompositeKind
 from glotouch_bt.mission.nodes.base.kind import (
@@ -44,6 +50,7 @@ __all__ = [
     "BuildContext",
     "CompositeKind",
     "ConditionSettings",
+    "CountedLoop",
     "DataFlowAnalysis",
     "ExitStates",
     "Keys",

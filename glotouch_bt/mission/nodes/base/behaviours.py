@@ -126,3 +126,18 @@ class OutcomeDecorator(MissionDecorator):
         if status is Status.SUCCESS:
             return self.fail("failed", f"{self.decorated.name!r} succeeded, which counts as a failure here")
         return Status.FAILURE
+
+
+class CountedLoop(MissionDecorator):
+    """A loop that counts its finished passes; a subclass ends it at `limit`."""
+
+    kept = ("_passes",)
+
+    def __init__(self, name: str, child: Behaviour, limit: int) -> None:
+        super().__init__(name, child)
+        self._limit, self._passes = limit, 0
+
+    def initialise(self) -> None:
+        """Start counting passes."""
+        super().initialise()
+        self._passes = 0
