@@ -11,7 +11,7 @@ from glotouch_bt.mission import Mission
 from glotouch_bt.mission.execution import default_arm, run_mission
 from glotouch_bt.mission.record import NullRecord, Record
 from glotouch_bt.mission.spec import NodeSpec
-from glotouch_bt.mission.tree import Failure
+from glotouch_bt.mission.tree import NodeFailure
 from glotouch_bt.mission_testing import casting
 from glotouch_bt.mission_testing.call import Call
 from glotouch_bt.mission_testing.casting import ScriptError
@@ -48,7 +48,7 @@ class ScriptedRun:
         self.mission = mission
         self.status: Literal["success", "failure", "aborted"] = outcome.status
         self.calls: tuple[Call, ...] = tuple(stage.calls)
-        self.chain: tuple[Failure, ...] = tuple(outcome.chain)
+        self.chain: tuple[NodeFailure, ...] = tuple(outcome.chain)
         self.error: BaseException | None = outcome.error
         self.ticks: int = outcome.ticks
         self.duration_s: float = round(outcome.end_s - outcome.start_s, 9)

@@ -5,15 +5,15 @@ from __future__ import annotations
 from glotouch_bt.mission.checkpoint import WorldChanged
 from glotouch_bt.mission.execution.control import Preempted
 from glotouch_bt.mission.execution.watchdog import SkillHung
-from glotouch_bt.mission.tree import Failure
+from glotouch_bt.mission.tree import NodeFailure
 from glotouch_bt.robot import BackendError, GuardTripped
 from glotouch_bt.skill import Reason
 
 
-def abort_failure(error: BaseException, node: str) -> Failure:
+def abort_failure(error: BaseException, node: str) -> NodeFailure:
     """Return the error raised at a node as a failure with a code, a message and the numbers the error carries."""
     if isinstance(error, WorldChanged):
-        return Failure(error.reason.node, str(error), error.reason)
+        return NodeFailure(error.reason.node, str(error), error.reason)
     if isinstance(error, KeyboardInterrupt):
         code, text = "interrupted", "stopped by the operator"
     elif isinstance(error, Preempted):
@@ -26,7 +26,7 @@ def abort_failure(error: BaseException, node: str) -> Failure:
         code, text = _snake(type(error).__name__), str(error)
     else:
         code, text = "fault", f"{type(error).__name__}: {error}"
-    return Failure(node, text, Reason(code, text, _evidence(error), node=node))
+    return NodeFailure(node, text, Reason(code, text, _evidence(error), node=node))
 
 
 def _evidence(error: BaseException) -> dict[str, float | int | str]:

@@ -17,7 +17,7 @@ from glotouch_bt.mission.execution.safe_stop import stop_safely
 from glotouch_bt.mission.execution.watchdog import STUCK_S, SkillHung, Stuck, Watchdog, deferred_interrupt
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.record import Record, RecordedRequests, Rounding, RunSummary
-from glotouch_bt.mission.tree import Failure, ReasonBook, build_tree, sensed
+from glotouch_bt.mission.tree import NodeFailure, ReasonBook, build_tree, sensed
 from glotouch_bt.robot import HOLD, Command, GuardTripped, Observation, Robot, World
 from glotouch_bt.robot.supervision import GuardFinding, SupervisionLimits, Supervisor
 from glotouch_bt.skill import Context, Reason, Skill
@@ -49,7 +49,7 @@ class Outcome:
 
     status: Literal["success", "failure", "aborted"]
     summary: RunSummary
-    chain: list[Failure] = field(default_factory=list)
+    chain: list[NodeFailure] = field(default_factory=list)
     error: BaseException | None = None
     start_s: float = 0.0
     end_s: float = 0.0
@@ -379,4 +379,4 @@ class _TickLoop:
         node = self.running_node()
         reason = Reason("mission_timeout", f"the mission took longer than {timeout_s:g} s", node=node)
         text = f"was running when the mission's {timeout_s:g} s were over"
-        self._outcome.status, self._outcome.chain = "failure", [Failure(node, text, reason)]
+        self._outcome.status, self._outcome.chain = "failure", [NodeFailure(node, text, reason)]

@@ -1,6 +1,6 @@
 """From a checked tree to py_trees nodes, and from their failures to the chain that explains a failed mission."""
 
 from glotouch_bt.mission.tree.build import BuiltTree, build_tree
-from glotouch_bt.mission.tree.failure_chain import Failure, ReasonBook, sensed
+from glotouch_bt.mission.tree.failure_chain import NodeFailure, ReasonBook, sensed
 
-__all__ = ["BuiltTree", "Failure", "ReasonBook", "build_tree", "sensed"]
+__all__ = ["BuiltTree", "NodeFailure", "ReasonBook", "build_tree", "sensed"]

@@ -15,7 +15,7 @@ from glotouch_bt.skill import Reason, Skill
 
 
 @dataclass(frozen=True)
-class Failure:
+class NodeFailure:
     """One node's failure.
 
     Attributes:
@@ -30,20 +30,20 @@ class Failure:
     node: str
     text: str
     reason: Reason
-    causes: tuple[Failure, ...] = ()
+    causes: tuple[NodeFailure, ...] = ()
     skill: bool = True
     sensed: Mapping[str, float] = field(default_factory=dict)
 
-    def main(self) -> Failure | None:
+    def main(self) -> NodeFailure | None:
         """Return the cause to follow: the first one that ends in a skill's failure, else the first one."""
         return next((c for c in self.causes if c.root().skill), self.causes[0] if self.causes else None)
 
-    def root(self) -> Failure:
+    def root(self) -> NodeFailure:
         """Return the deepest failure along the main causes."""
         below = self.main()
         return self if below is None else below.root()
 
-    def chain(self) -> list[Failure]:
+    def chain(self) -> list[NodeFailure]:
         """Return this failure and its main causes, the root cause last."""
         below = self.main()
         return [self, *(below.chain() if below else ())]
@@ -75,13 +75,13 @@ class ReasonBook:
     """
 
     def __init__(self) -> None:
-        self._last: dict[object, Failure] = {}
+        self._last: dict[object, NodeFailure] = {}
 
-    def noted(self) -> dict[object, Failure]:
+    def noted(self) -> dict[object, NodeFailure]:
         """Return the last failure of each node that has failed, by node id."""
         return dict(self._last)
 
-    def take_up(self, noted: Mapping[object, Failure]) -> None:
+    def take_up(self, noted: Mapping[object, NodeFailure]) -> None:
         """Start with the failures that another book has noted."""
         self._last = dict(noted)
 
@@ -90,23 +90,23 @@ class ReasonBook:
         failure = self._explain(node)
         self._last[node.id] = replace(failure, sensed=sensed) if sensed and failure.skill else failure
 
-    def of(self, node: Behaviour) -> Failure:
+    def of(self, node: Behaviour) -> NodeFailure:
         """Return the last failure of a node."""
         return self._last.get(node.id) or self._explain(node)
 
-    def _explain(self, node: Behaviour) -> Failure:
+    def _explain(self, node: Behaviour) -> NodeFailure:
         if isinstance(node, Skill):
             reason = node.reason or Reason("failed", node.feedback_message or "gave no reason", node=node.name)
             advice = f" ({reason.advice})" if reason.advice else ""
-            return Failure(node.name, f"{reason.code}: {reason.message}{advice}", reason)
+            return NodeFailure(node.name, f"{reason.code}: {reason.message}{advice}", reason)
         causes = self._causes(node)
         own: Reason | None = getattr(node, "reason", None)
         if own is None:
             code, text = _words(node, causes)
             own = Reason(code, text, node=node.name)
-        return Failure(node.name, own.message, own, causes, skill=False)
+        return NodeFailure(node.name, own.message, own, causes, skill=False)
 
-    def _causes(self, node: Behaviour) -> tuple[Failure, ...]:
+    def _causes(self, node: Behaviour) -> tuple[NodeFailure, ...]:
         """Return what failed below a node: of a selector every branch, of others the last failure."""
         if isinstance(node, Selector):
             return tuple(self._last[c.id] for c in node.children if c.id in self._last)
@@ -114,7 +114,7 @@ class ReasonBook:
         return tuple(self.of(c) for c in (failed[:1] if isinstance(node, Sequence) else failed))
 
 
-def _words(node: Behaviour, causes: tuple[Failure, ...]) -> tuple[str, str]:
+def _words(node: Behaviour, causes: tuple[NodeFailure, ...]) -> tuple[str, str]:
     """Return code and clause of a node that failed because of its children."""
     below = f"{causes[0].node!r} failed" if causes else node.feedback_message or "failed"
     if isinstance(node, Selector):

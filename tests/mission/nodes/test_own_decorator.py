@@ -21,7 +21,7 @@ TREE = "  - find\n  - quorum: {successes: 2, of: 3, do: {act: {script: SFS}}}\n"
 
 
 def test_it_is_read_with_its_settings_and_its_child(load: Callable[..., Any]) -> None:
-    _, node = load(TREE).tree.children
+    _, node = load(TREE).spec.children
     assert (node.kind, node.name, node.settings) == ("quorum", "quorum", QuorumSettings(successes=2, of=3))
     assert [c.name for c in node.children] == ["act"]
 
@@ -66,7 +66,7 @@ def test_it_ticks(script: str, expected: str, built: Callable[[str], Any], robot
 
 
 def test_its_loop_bound_is_counted(load: Callable[..., Any]) -> None:
-    tree = load(TREE).tree
+    tree = load(TREE).spec
     assert str(kind_of(tree).max_runs(tree)) == "4"
 
 
