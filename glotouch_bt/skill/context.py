@@ -1,4 +1,4 @@
-"""What the runner lends to every skill: the world, the arm, the record, the newest observation."""
+"""Context that the runner gives to every skill: the world, the arm, the record, the newest observation."""
 
 from __future__ import annotations
 
@@ -14,12 +14,16 @@ if TYPE_CHECKING:
 
 SkillRun = Generator[Command, Observation, None]
 
-REST_RAD_S, REST_PERIODS, LONGEST_BRAKING_PERIODS = 0.01, 5, 300
-"""The arm stands once every joint was this slow for so many periods; it must within the last number of them."""
+REST_RAD_S = 0.01
+"""Joint speed below which a joint is at rest."""
+REST_PERIODS = 5
+"""Consecutive control periods for which every joint must be at rest."""
+MAX_BRAKING_PERIODS = 300
+"""Longest wait for the arm to come to rest, in control periods."""
 
 
 class Journal(Protocol):
-    """Where skills write what they found; the runner's record implements it."""
+    """Where skills write events; the runner's record implements it."""
 
     def event(self, kind: str, stamp_s: float, data: Mapping[str, object]) -> None:
         """Record one event: `kind` (contact, candidate, touchset, ranking, ...) with JSON-able data or arrays."""
@@ -27,16 +31,16 @@ class Journal(Protocol):
 
 
 class RobotRequests(Protocol):
-    """The part of a Robot a skill may call directly; everything else goes through yielded commands."""
+    """Requests that a skill may make of the robot directly; everything else goes through yielded commands."""
 
     def start(self, request: Request) -> Ticket:
-        """Begin a slow request; keep yielding and poll the ticket."""
+        """Start a slow request; keep yielding and poll the ticket."""
         ...
 
 
 @dataclass
 class Context:
-    """What the runner lends to every skill.
+    """Context that the runner gives to every skill.
 
     Attributes:
         world: The nominal world.
@@ -44,8 +48,8 @@ class Context:
         requests: Tare and payload.
         journal: The run's record.
         observation: The newest observation; set by the runner before each tick.
-        command: What the active skill wants next; reset to hold by the runner before each tick.
-        preempted: A skill was broken off, and no other has made sure since that the arm stands.
+        command: Next command of the active skill; the runner resets it to hold before each tick.
+        preempted: A skill was preempted, and no skill has waited since for the arm to come to rest.
         paused_s: Robot time so far in which the mission was paused.
     """
 
@@ -60,18 +64,18 @@ class Context:
 
     @property
     def mission_s(self) -> float:
-        """The clock of timeouts: the robot's, which stands still while the mission is paused."""
+        """Mission clock for timeouts: the robot's, stopped during pauses."""
         return self.observation.now_s - self.paused_s
 
 
 def come_to_rest(context: Context) -> SkillRun:
-    """Hold until the braking arm stands, then plan from where it stands.
+    """Hold until the braking arm is at rest, then plan from there.
 
     Raises:
         SkillFailed: `not_at_rest` if it still moves after 300 control periods.
     """
     still = 0
-    for _ in range(LONGEST_BRAKING_PERIODS):
+    for _ in range(MAX_BRAKING_PERIODS):
         observation = yield HOLD
         still = still + 1 if bool((abs(observation.dq) < REST_RAD_S).all()) else 0
         if still >= REST_PERIODS:

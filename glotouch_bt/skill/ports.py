@@ -16,7 +16,7 @@ class Port(Generic[T]):
     def __init__(
         self, data_type: type[T], description: str, *, key: str | None = None, element: type | None = None
     ) -> None:
-        """`element`: type of the items, when the data type is a tuple (checked through for_each)."""
+        """`element`: type of the items of a tuple, which the checker follows through for_each."""
         self.data_type, self.description, self._key, self.element = data_type, description, key, element
         self.name = ""
 
@@ -25,12 +25,12 @@ class Port(Generic[T]):
 
     @property
     def key(self) -> str:
-        """Blackboard key this port is wired to unless the mission says otherwise."""
+        """Blackboard key of the port unless the mission rewires it."""
         return self._key or self.name
 
 
 class In(Port[T]):
-    """An input port: read as an attribute. `required=False` gives None when nobody wrote it."""
+    """An input port: read as an attribute. With `required=False` it is None until it is written."""
 
     def __init__(
         self,
@@ -57,9 +57,9 @@ class In(Port[T]):
 
 
 class Out(Port[T]):
-    """An output port: written as an attribute. `always=True` promises that it is written even when the skill fails.
+    """An output port: written as an attribute. `always=True` promises that it is written even if the skill fails.
 
-    `on_success`, `on_failure`: the value it then has, where the outcome says it all; `glotouch check` counts on it.
+    `on_success`, `on_failure`: its value after that outcome, if it is always the same; `glotouch check` relies on it.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""What a skill is: a py_trees leaf with typed ports whose body is a generator of commands.
+"""Base class of skills: a py_trees leaf with typed ports whose body is a generator of commands.
 
     class Approach(Skill):
         "Advance until touch. SUCCESS: touched."
@@ -18,9 +18,9 @@
                 raise self.NO_TOUCH(f"no touch in {self.params.travel_m} m")
             self.contact = ...
 
-`run` returns: SUCCESS. `SkillFailed` or `MotionRefused`: FAILURE with its reason. Anything else reaches the runner,
-which holds the arm. A preempted skill's generator is closed (its `finally` blocks run) and the arm is held; since it
-brakes past its last setpoint, the next skill first waits for it to stand and takes up the setpoint from there.
+If `run` returns, the skill succeeds. If it raises `SkillFailed` or `MotionRefused`, the skill fails with that reason.
+Any other exception reaches the runner, which holds the arm. On preemption the generator is closed (its `finally` blocks
+run) and the arm is held. The arm brakes past its last setpoint, so the next skill first waits until it is at rest.
 """
 
 from __future__ import annotations
@@ -51,30 +51,29 @@ from glotouch_bt.skill.ports import In, Out, Port
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 UNCHANGED = "unchanged"
-"""In `FAILURE_STATES`: the resource may be in the state in which the skill found it."""
+"""In `FAILURE_STATES`: the resource may be in the state it had before."""
 
 
 class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: ignore[call-arg]
-    """Base class of every skill; see the module's text. Subclass names are not used: entry points name skills.
+    """Base class of every skill; see the module's text. Entry points name the skills, not the class names.
 
-    What a skill promises about things that are no ports, for `glotouch check`; left out, it promises and asks nothing.
-    A resource is a name, `hand` above all, whose states are names too: a mission begins with the hand `empty`. A state
-    says what skills did on purpose. What was lost against their will is a fault: the next skill that needs it notices.
+    The class attributes declare to `glotouch check` what the ports cannot: the states of resources. A resource, above
+    all the `hand`, has named states; a mission begins with the hand `empty`. A state is what skills brought about on
+    purpose. An accidental loss is a fault, which the next skill that needs the resource detects.
 
     Attributes:
-        PRECONDITIONS: States of resources in which it may start.
-        POSTCONDITIONS: Their states after SUCCESS; of those not named, what they were.
-        FAILURE_STATES: What they may be after FAILURE (`UNCHANGED`: what they were); of those not named, what they were
-            or what they are after SUCCESS.
-        RESTORED_BY: Of what it leaves, what should not outlast a mission unsaid, and the skill that puts it back.
-        USES: What it has for itself while it runs: no two skills that use the same may run at once.
+        PRECONDITIONS: States of resources in which the skill may start.
+        POSTCONDITIONS: States after SUCCESS; resources not named keep theirs.
+        FAILURE_STATES: Possible states after FAILURE (`UNCHANGED`: as before). Resources not named are as before or as
+            after SUCCESS.
+        RESTORED_BY: For a state that should not last to the mission's end: the skill that undoes it.
+        USES: Resources used exclusively: two skills that use the same one must not run at once.
         FAILURES: Failures of the shared motions that it uses; its own are class attributes.
-        PAUSE: What a pause does to it: `hold` (a motion stops where it is along its path, and its guard goes on
-            listening), `retreat` (the same, and a guarded motion also backs off a few millimetres the way it came),
-            `finish` (the present motion is made to its end). All under `arm.pause_signal.finishing()`, as all that
-            moves the jaws, is finished in any case. A skill never notices: timeouts and durations do not run.
-        MAX_DURATION_S: Longest duration of one run on the mission's clock: a skill that never ends gets FAILURE
-            `skill_timeout`.
+        PAUSE: Effect of a pause: `hold` (the motion stops on its path and its guard stays active), `retreat` (also, a
+            guarded motion backs off a few millimetres along its path), or `finish` (the present motion is completed).
+            Jaw motions, and anything under `arm.pause_signal.finishing()`, are always completed. Timeouts and durations
+            do not run during a pause.
+        MAX_DURATION_S: Longest run on the mission's clock; then the skill fails with `skill_timeout`.
     """
 
     PRECONDITIONS: ClassVar[Mapping[str, frozenset[str]]] = NOTHING
@@ -115,30 +114,30 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
 
     @classmethod
     def default_keys(cls) -> dict[str, str]:
-        """Blackboard key of each port where a mission does not rewire it."""
+        """Return the blackboard key of each port that a mission does not rewire."""
         return {n: getattr(cls, n).key for n in (*cls.INPUT_PORTS, *cls.OUTPUT_PORTS)}
 
     def run(self) -> SkillRun:
-        """The skill's body; see the module's text."""
+        """Execute the skill; see the module's text."""
         raise NotImplementedError(f"{type(self).__name__} has no run()")
 
     def write_port(self, name: str, value: object) -> None:
-        """Write an output port (the public door to py_trees' protected setter)."""
+        """Write an output port."""
         self._set_output(name, value)
 
     def event(self, kind: str, **data: object) -> None:
-        """Record an event of this skill at the robot's present time."""
+        """Record an event of this skill at the present robot time."""
         self.context.journal.event(kind, self.context.observation.now_s, {"node": self.name, **data})
 
     def remember(self) -> object:
-        """What this skill knows from one run to the next beyond its ports, for a checkpoint; None: nothing.
+        """Return the state that this skill keeps between runs beyond its ports, for a checkpoint, or None.
 
-        Plain values, arrays and dataclasses (`mission.values`). Override together with `recall`.
+        It consists of plain values, arrays and dataclasses. Override together with `recall`.
         """
         return None
 
     def recall(self, remembered: Any) -> None:
-        """Take up what `remember` gave, in a new process."""
+        """Restore what `remember` returned, in a new process."""
 
     def initialise(self) -> None:
         """Start the body; its first command comes with the first update."""
@@ -152,11 +151,11 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
             yield from come_to_rest(self.context)
         body: Generator[Command, Observation, object] = self.run()
         returned = yield from body
-        if returned is not None:  # a status, most likely: it would pass as success
+        if returned is not None:  # most likely a status, which would be taken for success
             raise TypeError(f"run() returned {returned!r}; it returns nothing, and raises SkillFailed to fail")
 
     def update(self) -> Status:
-        """Hand the newest observation to the body, take its next command."""
+        """Send the newest observation to the body and take its next command."""
         assert self._run is not None
         if self.context.mission_s - self._begun_s > self.MAX_DURATION_S:
             return self._too_long()
@@ -178,7 +177,7 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
         return Status.RUNNING
 
     def _too_long(self) -> Status:
-        self.context.preempted = True  # it may be broken off in a motion
+        self.context.preempted = True  # it may be in a motion
         message = f"it took longer than {self.MAX_DURATION_S:g} s, the longest a {type(self).__name__} may take"
         return self._fail(SKILL_TIMEOUT(message, limit_s=self.MAX_DURATION_S, since_s=self._begun_s).reason)
 
@@ -195,7 +194,7 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
         return Status.FAILURE
 
     def terminate(self, new_status: Status) -> None:
-        """Close the body; a preempted skill leaves the arm holding."""
+        """Close the body; after a preemption, hold the arm."""
         preempted = self._run is not None and new_status is Status.INVALID
         try:
             if self._run is not None:

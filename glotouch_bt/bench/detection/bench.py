@@ -19,7 +19,7 @@ from glotouch_bt.bench.statistics import wilson
 from glotouch_bt.mission.read import load_conditions, load_world
 from glotouch_bt.perception.touch import GuardParams, Payload
 from glotouch_bt.robot import RobotDescription
-from glotouch_bt.skill.probing import LISTENING_ACCELERATION_M_S2, LISTENING_JERK_M_S3
+from glotouch_bt.skill.probing import GUARDED_ACCELERATION_M_S2, GUARDED_JERK_M_S3
 
 PUSH_N = 0.6
 FORCES_N = (0.10, 0.12, 0.14, 0.16, 0.18, 0.20, 0.25, 0.30, 0.40, 0.60)

@@ -1,4 +1,4 @@
-"""Touching with the held probe: the guarded moves that several skills share. All positions are ball centres in K."""
+"""Guarded moves of the held probe. All positions are ball centres in K."""
 
 from __future__ import annotations
 
@@ -28,10 +28,15 @@ from glotouch_bt.skill.context import Context
 from glotouch_bt.skill.failures import Failure
 from glotouch_bt.skill.probing.held_tool import HeldTool
 
-REST_S, LONGEST_REST_S = 0.12, 0.6
-"""The wrench and the twist must have been steady for so long before a guard listens; waited for at most so long."""
-LISTENING_ACCELERATION_M_S2, LISTENING_JERK_M_S3 = 0.5, 20.0
-"""Limits while a guard listens. With its inertia taken out, the hand leaves below 0.05 N at the tip (simulation)."""
+REST_S = 0.12
+"""Time for which wrench and twist must be steady before a guarded move."""
+MAX_REST_S = 0.6
+"""Longest wait for that."""
+GUARDED_ACCELERATION_M_S2 = 0.5
+"""Acceleration limit of a guarded move. With the hand's inertia compensated, less than 0.05 N of it remain at the tip
+(simulation)."""
+GUARDED_JERK_M_S3 = 20.0
+"""Jerk limit of a guarded move, from the same simulation."""
 
 HARD_CONTACT = Failure(
     "hard_contact",
@@ -54,16 +59,16 @@ class Probed:
 
 
 class Prober:
-    """Moves the ball of the held probe about, listening at the wrist.
+    """Move the ball of the held probe, guarded by the wrist sensor.
 
     Args:
         context: The skill's context.
         tool: The held probe.
-        guard: Contact thresholds; the sensor's latency is the tool's, where it may have been measured.
-        carried: What hangs below the wrist; by default the described hand, and the world's probe if it is held.
+        guard: Contact thresholds; the sensor's latency is taken from the tool.
+        carried: Load below the wrist; by default the described hand, and the world's probe if it is held.
 
     Attributes:
-        resting_up_N: Force straight up on the wrist at each rest so far.
+        resting_up_N: Upward force on the wrist at each rest so far.
     """
 
     FAILURES: ClassVar = (HARD_CONTACT,)
@@ -87,38 +92,38 @@ class Prober:
 
     @property
     def tip_K_m(self) -> Array:
-        """(3,) where the ball's centre is commanded to be."""
+        """(3,) commanded position of the ball's centre."""
         return self._tool.tip_K_m(self._world, self._context.arm.pose_B_P)
 
     def rest(self) -> Motion[Baseline]:
-        """Hold still until wrench and twist have settled, at most `LONGEST_REST_S`; the wrench of "nothing touched".
+        """Hold still until wrench and twist have settled, at most `MAX_REST_S`; return the wrench without contact.
 
-        If no time has passed since the last rest, that one stands.
+        If no time has passed since the last rest, return its result.
         """
         if self._rested is not None and self._rested[0] == self._context.observation.now_s:
             return self._rested[1]
         period_s = self._context.arm.period_s
         window: deque[Observation] = deque(maxlen=round(REST_S / period_s))
-        for _ in range(round(LONGEST_REST_S / period_s)):
+        for _ in range(round(MAX_REST_S / period_s)):
             (seen,) = yield from self._context.arm.hold(period_s)
             if window and seen.stamp_s[0] - window[-1].now_s > period_s:
-                window.clear()  # a pause: what was sensed before it is old
+                window.clear()  # a pause: samples from before it are too old
             window.append(seen)
             if len(window) == window.maxlen and settled(list(window)):
                 break
-        inertia = self._inertia()  # where there is none, what measuring it adds in noise
+        inertia = self._inertia()  # at rest this is only its measurement noise
         baseline = fit_baseline(np.concatenate([o.wrench_S - inertia(o) for o in window]))
         self._rested = (window[-1].now_s, baseline)
         self.resting_up_N.append(float((self._context.arm.pose_B_P.rotation @ baseline.median[:3])[2]))
         return baseline
 
     def move(self, tip_K_m: Array, speed_m_s: float, *, any_direction: bool = False) -> Motion[Probed]:
-        """Straight guarded move of the ball to `tip_K_m` (3,).
+        """Move the ball straight to `tip_K_m` (3,) under a guard.
 
-        Stops at the first contact that opposes the motion, or, with `any_direction`, at any (a graze too).
+        Stop at the first contact that opposes the motion or, with `any_direction`, at any contact, even a graze.
 
         Raises:
-            SkillFailed: `hard_contact`: the wrench passed a hard limit on the way; the arm stands.
+            SkillFailed: `hard_contact`; the arm has stopped.
             MotionRefused: The way is not clear.
         """
         step = np.asarray(tip_K_m, dtype=np.float64) - self.tip_K_m
@@ -126,37 +131,37 @@ class Prober:
         if length < 1e-4:
             return Probed(None, self.tip_K_m[None, :])
         step_B = self._world.container.pose_B_K.rotation @ step
-        guard = yield from self._listen(step_B / length, any_direction)
+        guard = yield from self._guard_for(step_B / length, any_direction)
         result = yield from self._context.arm.shift(
             step_B,
             speed_m_s,
-            acceleration_m_s2=LISTENING_ACCELERATION_M_S2,
-            jerk_m_s3=LISTENING_JERK_M_S3,
+            acceleration_m_s2=GUARDED_ACCELERATION_M_S2,
+            jerk_m_s3=GUARDED_JERK_M_S3,
             guard=guard,
         )
         return self._outcome(result, step / length)
 
     def retreat(self, direction_K: Array, distance_m: float, speed_m_s: float) -> Motion[None]:
-        """Unguarded move away from a contact along `direction_K` (3,), then rest until the wrench has settled."""
+        """Move away from a contact along `direction_K` (3,), unguarded, then rest until the wrench has settled."""
         step_B = self._world.container.pose_B_K.rotation @ (np.asarray(direction_K) * distance_m)
         yield from self._context.arm.shift(step_B, speed_m_s)
         yield from self.rest()
 
     def hop(self, tip_K_m: Array, height_K_m: float, speed_m_s: float) -> Motion[None]:
-        """Straight up until the ball's centre is at `height_K_m`, then across to above `tip_K_m`; unguarded."""
+        """Raise the ball's centre to `height_K_m`, then move across to above `tip_K_m`, unguarded."""
         tip = self.tip_K_m
         for goal in (np.array([tip[0], tip[1], height_K_m]), np.array([tip_K_m[0], tip_K_m[1], height_K_m])):
             if np.linalg.norm(goal - self.tip_K_m) > 1e-4:
                 yield from self._context.arm.line(self._tool.pose_B_P(self._world, goal), speed_m_s)
 
-    def _listen(self, direction_B: Array, any_direction: bool) -> Motion[_Listener]:
+    def _guard_for(self, direction_B: Array, any_direction: bool) -> Motion[_TwoGuards]:
         baseline = yield from self.rest()
         arm, params = self._context.arm, self._guard
         gripper = arm.description.gripper
         inertial = self._inertia()
         approach_B = None if any_direction else direction_B
         soft = ContactGuard(baseline, approach_B, self._tool.tip_P_m, gripper.pose_E_P, params, inertial)
-        return _Listener(HardStop(baseline, params), soft)
+        return _TwoGuards(HardStop(baseline, params), soft)
 
     def _inertia(self) -> MeasuredInertia:
         gripper = self._context.arm.description.gripper
@@ -190,8 +195,8 @@ class Prober:
         return Contact(onset.stamp_s, tip_K, approach_K, reaction, point, norm, push)
 
 
-class _Listener:
-    """Both rules on the same samples; what passes a hard limit is no touch, whatever the soft rule says."""
+class _TwoGuards:
+    """Apply the hard and the soft rule to the same samples; a hard stop takes precedence."""
 
     def __init__(self, hard: HardStop, soft: ContactGuard) -> None:
         self._hard, self._soft = hard, soft
@@ -200,5 +205,5 @@ class _Listener:
         return self._hard(observation) or self._soft(observation)
 
     def standing(self, observation: Observation) -> HardTrip | Onset | None:
-        """While a paused motion stands."""
+        """Check while a paused motion stands still."""
         return self._hard(observation) or self._soft.standing(observation)

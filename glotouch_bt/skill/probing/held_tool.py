@@ -1,4 +1,4 @@
-"""What the hand knows about the tool it touches with: the probe in its jaws, or its own fingers."""
+"""The tool that touches: the probe in the jaws, or the fingers themselves."""
 
 from __future__ import annotations
 
@@ -16,18 +16,17 @@ class HeldTool:
     """The probe in the jaws, or the bare fingers.
 
     Attributes:
-        tip_P_m: (3,) the tool's reference point in P: the centre of the ball, or of the fingers' lower end.
-        tip_radius_m: Ball radius; of fingers, the radius of a disc as large as their section.
+        tip_P_m: (3,) reference point in P: centre of the ball, or of the fingers' lower end.
+        tip_radius_m: Ball radius; for fingers, radius of the disc of equal area.
         shaft_radius_m: Shaft radius.
         aperture_m: Reported aperture with the handle between the pads.
         yaw_B_rad: Yaw of x_P in B at which the probe was grasped; the hand keeps it while it probes.
-        floor_z_K_m: Height of the floor in K as the tip felt it; 0 if registration and grasp were perfect.
-            Heights measured with this tool subtract it.
-        section: Its planar section about the reference point, in P's x and y; None: the ball's disc.
-        latency_s: Age of a wrench sample when it arrives, as believed.
-        tip_sd_m: Standard deviation of the reference point in P, per planar axis; None: not calibrated.
-        corner_K_m: (2,) where the calibration found the container's corner it touched, in K as registered; None: not
-            calibrated.
+        floor_z_K_m: Height of the floor in K as measured with the tip; 0 if registration and grasp are perfect.
+            Subtract it from heights measured with this tool.
+        section: Planar section about the reference point, in P's x and y; None: the ball's disc.
+        latency_s: Estimated age of a wrench sample when it arrives.
+        tip_sd_m: Standard deviation of the reference point in P, per planar axis; None if not calibrated.
+        corner_K_m: (2,) position of the container's corner found by the calibration, in K; None if not calibrated.
     """
 
     tip_P_m: Array
@@ -43,21 +42,21 @@ class HeldTool:
 
     @property
     def round(self) -> bool:
-        """True if its section is a disc: then outlines are fitted to its centres, else to contact points."""
+        """True if the section is a disc. Outlines are then fitted to its centres, otherwise to contact points."""
         return self.section is None or isinstance(self.section, Disc)
 
     def tip_K_m(self, world: World, pose_B_P: Pose) -> Array:
-        """(3,) reference point in K for a pose of the pads' mid-point in B."""
+        """Return the reference point (3,) in K for a pose of the pads' mid-point in B."""
         return world.container.pose_B_K.inverse().apply(pose_B_P.apply(self.tip_P_m))
 
     def contact_point_K_m(self, world: World, pose_B_P: Pose, approach_K: Array, reaction_K: Array | None) -> Array:
-        """(2,) contact point in K: the support-plane intercept of the tool's section (paper III-B).
+        """Return the contact point (2,) in K: the support-plane intercept of the tool's section (paper III-B).
 
         Args:
             world: The nominal world.
-            pose_B_P: The hand at the onset.
-            approach_K: (2,) or (3,) direction the tool moved in.
-            reaction_K: (2,) or (3,) direction of the force it felt, or None.
+            pose_B_P: Hand pose at the onset.
+            approach_K: (2,) or (3,) direction of motion.
+            reaction_K: (2,) or (3,) direction of the measured force, or None.
         """
         section = self.section or Disc(self.tip_radius_m)
         axes = (world.container.pose_B_K.rotation.T @ pose_B_P.rotation)[:2, :2]
@@ -66,9 +65,9 @@ class HeldTool:
         return section_point(tip, section, axes, np.asarray(approach_K)[:2], reaction)
 
     def pose_B_P(self, world: World, tip_K_m: Array, yaw_B_rad: float | None = None) -> Pose:
-        """Pose of P that brings the reference point to `tip_K_m` (3,), the hand pointing down.
+        """Return the downward pose of P that brings the reference point to `tip_K_m` (3,).
 
-        `yaw_B_rad`: another yaw than that of the grasp.
+        `yaw_B_rad` replaces the yaw of the grasp.
         """
         yaw = self.yaw_B_rad if yaw_B_rad is None else yaw_B_rad
         turned = Pose.pointing_down(world.container.pose_B_K.apply(tip_K_m), yaw)

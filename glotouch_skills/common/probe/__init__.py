@@ -1,4 +1,4 @@
-"""TODO door of glotouch_skills/common/probe."""
+"""Motions of the held probe that several skills share: drive plans, touch the floor, return the probe."""
 
 from glotouch_skills.common.probe.floor_contact import FEEL_FLOOR_FAILURES, FLOOR_SEARCH_M, feel_floor
 from glotouch_skills.common.probe.free_corner import corner_place, corner_walls, quiet_corner

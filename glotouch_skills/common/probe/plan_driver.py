@@ -19,13 +19,13 @@ from glotouch_bt.skill.probing import HeldTool, Prober
 from glotouch_skills.common.hand import GRAVITY_M_S2, rise_clear, weigh_N
 
 AT_HEIGHT_M = 0.004
-"""The ball counts as lowered within this of the sensing height."""
+"""The ball is at sensing height within this tolerance."""
 HELD_TOLERANCE_M = 0.004
-"""The tool is still held if the jaws are this near to where they closed on it: as for taking it."""
-LIGHTER = 0.5
-"""A share of the probe's weight that is missing all at once: it is weighed in free air."""
+"""The tool is held if the aperture is within this of the one at which the jaws closed on it."""
+MAX_LOST_SHARE = 0.5
+"""Weigh the probe in free air if more than this share of its weight disappears from one rest to the next."""
 OFF_TOP_M = 0.006
-"""The ball is raised so far off what it landed on."""
+"""Raise the ball by this much from what it landed on."""
 
 TOOL_LOST = Failure(
     "tool_lost",
@@ -48,12 +48,12 @@ class ExploringSpeeds:
 
 
 class Explorer:
-    """Moves the ball as a plan asks.
+    """Execute plans of ball moves.
 
     Args:
         context: The skill's context.
         tool: The held probe.
-        speeds: How fast and how high.
+        speeds: Speeds and heights.
         journal: Called with (kind, data) of every event: "contact", "sweep" (the path at sensing height), "note".
     """
 
@@ -72,7 +72,7 @@ class Explorer:
 
     @property
     def tip_K_m(self) -> Array:
-        """(2,) where the ball is."""
+        """(2,) position of the ball in K."""
         return self._prober.tip_K_m[:2]
 
     @property
@@ -113,7 +113,7 @@ class Explorer:
         return MoveOutcome(self.tip_K_m, path[:, :2], contact)
 
     def _require_tool(self) -> None:
-        """The jaws must be as far apart as when they took the tool; without it nothing would ever be touched."""
+        """Check that the aperture is the one at which the tool was taken; without the tool nothing would be touched."""
         apart, taken = self._arm.aperture_m, self._tool.aperture_m
         if abs(apart - taken) > HELD_TOLERANCE_M:
             raise TOOL_LOST(
@@ -122,20 +122,20 @@ class Explorer:
             )
 
     def _require_weight(self) -> Motion[None]:
-        """The resting wrist must not become lighter at once by as much as the probe weighs, nor stay so in free air.
+        """Check that the probe's weight does not disappear from one rest to the next, and stay missing in free air.
 
-        From one rest to the next, for a tare drifts farther than that in minutes.
+        Only consecutive rests are compared: over minutes, the tare drifts by more than that.
         """
         rests = self._prober.resting_up_N
         steps = [(b - a, a) for a, b in pairwise(rests)]
         del rests[:-1]
         step_N, before_N = max(steps, default=(0.0, 0.0))
-        if not step_N > LIGHTER * self._weight_N:
+        if not step_N > MAX_LOST_SHARE * self._weight_N:
             return
         tip = self._prober.tip_K_m
         yield from rise_clear(self._arm)
         missing_N = -(yield from weigh_N(self._arm)) - before_N
-        if missing_N > LIGHTER * self._weight_N:
+        if missing_N > MAX_LOST_SHARE * self._weight_N:
             raise TOOL_LOST(
                 f"the hand is lighter by {missing_N:.2f} N than a moment ago, the probe weighs {self._weight_N:.2f} N",
                 advice="look with tool_check",

@@ -1,4 +1,4 @@
-"""Putting the probe into its holder: shared by `tool_return` and `stow`."""
+"""Put the probe into its holder."""
 
 from __future__ import annotations
 
@@ -24,16 +24,18 @@ from glotouch_skills.common.hand import (
 from glotouch_skills.common.probe.plan_driver import HELD_TOLERANCE_M
 
 OVER_HOLDER_M = 0.002
-"""This near to the holder's axis the probe is in it, or on its way in (the skill was broken off there)."""
-NEAR_M, LAST_M_S = 0.02, 0.01
-"""From so far above its place it is lowered slowly, by the second."""
-THERE_M = 0.001
-"""So near to its place it may have been let go of already."""
-STANDS_N = 6.0
-"""Change of force at which it stands before its time: it slipped down in the jaws, or hangs askew and meets the top of
-the holder, which gives nothing: 37 N/mm in the simulation, and the arm goes on for two periods."""
-OVER_STOWED_M = 0.08
-"""The empty hand rises so far from the stowed probe's handle."""
+"""Within this distance of the holder's axis, the probe is in the holder or entering it (after a preemption)."""
+SLOW_FROM_M = 0.02
+"""Height above its place from which the probe is lowered slowly."""
+SLOW_M_S = 0.01
+"""Largest speed from there."""
+IN_PLACE_M = 0.001
+"""Within this distance of its place, the probe may have been released already."""
+MAX_INSERT_FORCE_N = 6.0
+"""Change of force that ends the insertion: the probe slipped down in the jaws, or hangs tilted and meets the top of the
+holder. The holder is stiff (37 N/mm in the simulation), and the arm moves on for two periods."""
+RISE_M = 0.08
+"""Height by which the empty hand rises from the stowed probe's handle."""
 
 TOOL_LOST = Failure(
     "tool_lost",
@@ -45,10 +47,11 @@ RETURN_PROBE_FAILURES = (TOOL_LOST, REQUEST_FAILED)
 
 @dataclasses.dataclass(frozen=True)
 class Dropped:
-    """The move ended because the jaws were not on the handle any more.
+    """The move ended because the jaws no longer held the handle.
 
     Attributes:
-        apart_m: Their opening; with_it_m: that with the handle between them.
+        apart_m: Aperture then.
+        with_it_m: Aperture with the handle between the jaws.
     """
 
     apart_m: float
@@ -60,11 +63,11 @@ class Dropped:
 
 @dataclasses.dataclass(frozen=True)
 class Lowering:
-    """A guard of the probe's way into its holder: it is held all the way, and neither presses nor outliers.
+    """Guard of the insertion: trip if the probe is no longer held, presses, or leaves its line.
 
     Attributes:
-        straight: What it may press and how far it may stray.
-        aperture_m: Opening of the jaws with the handle between them.
+        straight: Guard of force and line.
+        aperture_m: Aperture with the handle between the jaws.
     """
 
     straight: StraightGuard
@@ -81,17 +84,18 @@ class Lowering:
 def return_probe(
     context: Context, yaw_B_rad: float, aperture_m: float, *, speed_m_s: float, insert_speed_m_s: float
 ) -> SkillRun:
-    """Over the holder, in until it stands, open the jaws, rise, tell the controller, tare.
+    """Carry the probe over the holder, insert it, release it, rise, set the payload, tare.
 
     Args:
         context: The skill's.
         yaw_B_rad: Yaw of x_P in B at which the probe was grasped.
-        aperture_m: Opening of the jaws with the handle between them.
-        speed_m_s, insert_speed_m_s: With the probe in the hand; into the holder.
+        aperture_m: Aperture with the handle between the jaws.
+        speed_m_s: Speed with the probe in the hand.
+        insert_speed_m_s: Speed into the holder.
 
     Raises:
-        SkillFailed: `request_failed`; the probe stands in its holder. `tool_lost`; it was dropped on the way.
-        MotionRefused: The holder cannot be reached, or the probe does not go in: the hand has risen with it again.
+        SkillFailed: `request_failed`, with the probe in its holder; `tool_lost`, if it was dropped on the way.
+        MotionRefused: The holder cannot be reached, or the probe does not go in; the hand has risen with it.
         GuardTripped: The arm does not follow its setpoints; the probe is held.
     """
     arm, world = context.arm, context.world
@@ -101,33 +105,33 @@ def return_probe(
     if here[2] > above.position_m[2] or np.linalg.norm(here[:2] - above.position_m[:2]) > OVER_HOLDER_M:
         height = max(float(here[2]), float(above.position_m[2]))
         yield from arm.transit(above, height_B_m=height, speed_m_s=speed_m_s)
-    near = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, NEAR_M]))
+    near = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, SLOW_FROM_M]))
     if float(arm.pose_B_P.position_m[2]) > float(near.position_m[2]):
-        moved = yield from _lower(context, near, insert_speed_m_s, aperture_m, STANDS_N)
+        moved = yield from _lower(context, near, insert_speed_m_s, aperture_m, MAX_INSERT_FORCE_N)
         if (why := describe_stop(moved)) is not None:
-            yield from _rise(context, insert_speed_m_s)  # what is pressed on is not left pressed on
+            yield from _rise(context, insert_speed_m_s)  # do not keep pressing on the holder
             raise MotionRefused("into the holder", why)
-    moved = yield from _lower(context, grasp, min(LAST_M_S, insert_speed_m_s), aperture_m, STANDS_N)
+    moved = yield from _lower(context, grasp, min(SLOW_M_S, insert_speed_m_s), aperture_m, MAX_INSERT_FORCE_N)
     why = describe_stop(moved)
     if isinstance(moved.stop, Strayed):
         yield from _rise(context, insert_speed_m_s)
         raise MotionRefused("into the holder", str(why))
     yield from arm.jaws(min(aperture_m + 0.03, arm.description.gripper.stroke_m), speed_m_s=0.08)
     arm.scene.hold_tool(False)
-    yield from arm.shift(np.array([0.0, 0.0, OVER_STOWED_M]), 0.08, check=False)
+    yield from arm.shift(np.array([0.0, 0.0, RISE_M]), 0.08, check=False)
     yield from nothing_in_hand(context)
 
 
 def _lower(context: Context, goal: Pose, speed_m_s: float, aperture_m: float, max_N: float) -> Motion[MoveResult]:
-    """Down to `goal`, until something presses with more than `max_N`.
+    """Move down to `goal`, until the force changes by more than `max_N`.
 
     Raises:
         SkillFailed: `tool_lost`; the hand has risen again.
     """
     arm = context.arm
     straight = yield from straight_guard(arm, DOWN_B, max_N)
-    released = not arm.scene.holding_tool or np.linalg.norm(goal.position_m - arm.pose_B_P.position_m) < THERE_M
-    guard = straight if released else Lowering(straight, aperture_m)  # let go of, where the skill was broken off
+    released = not arm.scene.holding_tool or np.linalg.norm(goal.position_m - arm.pose_B_P.position_m) < IN_PLACE_M
+    guard = straight if released else Lowering(straight, aperture_m)  # released before a preemption
     moved = yield from arm.line(goal, speed_m_s, check=False, guard=guard)
     if not isinstance(moved.stop, Dropped):
         return moved
@@ -141,13 +145,13 @@ def _lower(context: Context, goal: Pose, speed_m_s: float, aperture_m: float, ma
 
 
 def _rise(context: Context, speed_m_s: float) -> SkillRun:
-    """Straight up, off what was met."""
+    """Move straight up, off the obstacle."""
     guard = yield from straight_guard(context.arm, UP_B, CAUGHT_N)
-    yield from context.arm.shift(OVER_STOWED_M * UP_B, speed_m_s, check=False, guard=guard)
+    yield from context.arm.shift(RISE_M * UP_B, speed_m_s, check=False, guard=guard)
 
 
 def nothing_in_hand(context: Context) -> SkillRun:
-    """Tell the controller that the hand is empty, and zero the wrist.
+    """Set the payload to an empty hand, and tare.
 
     Raises:
         SkillFailed: `request_failed`.

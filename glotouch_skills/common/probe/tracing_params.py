@@ -1,4 +1,4 @@
-"""What every skill that traces lets a mission set; how well an outline must be known is each one's own."""
+"""Parameters common to the skills that trace outlines."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class TracingParams(SkillParams):
     height_m: float = param("Ball centre above the floor while tracing", unit="m", default=0.018, ge=0.009, le=0.06)
 
     def rule(self) -> TraceParams:
-        """As the plans take them."""
+        """Return them as the trace plan takes them."""
         return TraceParams(
             clearance_m=self.clearance_m,
             centre_sd_m=self.centre_sd_m,
@@ -37,7 +37,7 @@ class TracingParams(SkillParams):
         )
 
     def speeds(self) -> ExploringSpeeds:
-        """As the driver of plans takes them."""
+        """Return them as the plan driver takes them."""
         return ExploringSpeeds(
             step_m_s=self.orbit_speed_m_s,
             probe_m_s=self.probe_speed_m_s,

@@ -9,7 +9,7 @@ import pytest
 
 from glotouch_bt.perception.touch import GuardParams
 from glotouch_bt.skill import SkillFailed
-from glotouch_bt.skill.probing.guarded_probe import LONGEST_REST_S, REST_S, Prober
+from glotouch_bt.skill.probing.guarded_probe import MAX_REST_S, REST_S, Prober
 
 START = np.array([-0.05, 0.1, 0.06])
 
