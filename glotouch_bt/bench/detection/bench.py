@@ -119,7 +119,7 @@ def _synthetic(
     conditions, probe, gripper = load_conditions(name), load_world(WORLD).probe, description.gripper
     tip_P = np.array([0.0, 0.0, probe.grasp_to_tip_m])
     hand = Hand(Payload.hand(gripper, probe), tip_P, gripper.pose_E_P)
-    pace, guard = Pace(LISTENING_ACCELERATION_M_S2, LISTENING_JERK_M_S3), GuardParams()
+    pace, guard = Pace(GUARDED_ACCELERATION_M_S2, GUARDED_JERK_M_S3), GuardParams()
     result: dict[str, Any] = {}
     for key, compensate, hours in (("false_alarms", True, study.hours), ("uncompensated", False, 0.1 * study.hours)):
         result[key] = false_alarms(hand, conditions, guard, pace, study.seeds, hours=hours, compensate=compensate)

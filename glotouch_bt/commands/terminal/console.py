@@ -168,3 +168,7 @@ def print_skill(d: dict[str, Any]) -> None:
     sys.stdout.write("\n")
     sys.stdout.flush()
     print_table("ports", ("", "name", "type", "key", "description"), ports)
+    sys.stdout.write("\n")
+    sys.stdout.flush()
+    failures = [(f["code"], f["meaning"], f["advice"]) for f in d["failures"]]
+    print_table("failures", ("code", "meaning", "advice"), failures)

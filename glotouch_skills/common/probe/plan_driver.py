@@ -80,7 +80,7 @@ class Explorer:
         return self._tool.floor_z_K_m + self._speeds.height_m
 
     def run(self, plan: SearchPlan[T]) -> Motion[T]:
-        """All of a plan; what the plan returns.
+        """Execute a plan and return its result.
 
         Raises:
             SkillFailed: `tool_lost`, `hard_contact`.

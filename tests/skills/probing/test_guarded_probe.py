@@ -79,7 +79,7 @@ def test_a_rest_lasts_until_the_wrench_is_steady_and_no_longer_than_allowed(make
         next(again)
     assert b.context.observation.now_s == before
     # A force that swings is waited for; one that goes on swinging is not waited for without end.
-    for ends_s, max_delay_s in ((before + 0.3, 0.3 + REST_S + 0.05), (np.inf, LONGEST_REST_S)):
+    for ends_s, max_delay_s in ((before + 0.3, 0.3 + REST_S + 0.05), (np.inf, MAX_REST_S)):
         b, prober = make(swinging(ends_s))
         b.go(b.arm.hold(max(before - b.context.observation.now_s, 0.01)))
         begin = b.context.observation.now_s
