@@ -1,4 +1,4 @@
-"""Before a broken-off mission goes on in a world that nobody held still: is what it believes of it still so?"""
+"""Check the world before an interrupted mission resumes: is it still as the mission knows it?"""
 
 from __future__ import annotations
 
@@ -24,12 +24,16 @@ from glotouch_bt.skill.probing import HeldTool, Prober
 from glotouch_skills.common.hand import REQUEST_FAILED, finish, rise_clear
 from glotouch_skills.common.probe import FEEL_FLOOR_FAILURES, HELD_TOLERANCE_M, feel_floor
 
-GRIPPING_N = 1.0
+MIN_GRIP_N = 1.0
+"""Jaw force above which the jaws hold something."""
 DIRECTIONS = 24
-BEFORE_M, BEYOND_M = 0.012, 0.008
-"""A candidate is approached from so far outside its outline to so far inside."""
-ROOM_M = 0.006
-"""Room that the tool keeps from everything else where it is lowered."""
+"""Number of approach directions to consider."""
+BEFORE_M = 0.012
+"""Start the approach of a candidate this far outside its outline."""
+BEYOND_M = 0.008
+"""End it this far inside."""
+CLEAR_M = 0.006
+"""Clearance of the tool from everything else where it is lowered."""
 
 
 class RecheckParams(SkillParams):
@@ -38,22 +42,23 @@ class RecheckParams(SkillParams):
     speed_m_s: float = param("Speed above everything", unit="m/s", default=0.10, gt=0.0, le=0.15)
     touch_m_s: float = param("Speed towards a candidate", unit="m/s", default=0.03, gt=0.0, le=0.08)
     height_m: float = param("Touching height above the floor", unit="m", default=0.018, ge=0.009, le=0.06)
-    moved_m: float = param("A candidate may have moved so far", unit="m", default=0.006, gt=0.0, le=0.02)
-    slip_m: float = param("The floor may be felt so far from where it was", unit="m", default=0.002, gt=0.0, le=0.005)
-    headroom_m: float = param("Tool's height above the floor on the way", unit="m", default=0.13, ge=0.05, le=0.2)
+    moved_m: float = param("Largest displacement of a candidate", unit="m", default=0.006, gt=0.0, le=0.02)
+    slip_m: float = param("Largest change of the floor's height", unit="m", default=0.002, gt=0.0, le=0.005)
+    headroom_m: float = param("Height of the tool above the floor on the way", unit="m", default=0.13, ge=0.05, le=0.2)
     may_be_gone: bool = param("The probe may have been put back meanwhile", default=False)
     touch: bool = param("Touch one of the candidates", default=True)
-    corner_gap_m: float = param("Ball centre to each wall where the floor is felt", unit="m", default=0.014, ge=0.008)
+    corner_gap_m: float = param(
+        "Distance of the ball's centre from each wall where the floor is touched", unit="m", default=0.014, ge=0.008
+    )
 
 
 class Recheck(Skill):
-    """Come to rest, rise, tell the controller what is in the hand, zero the wrist; then look, by touch.
+    """Come to rest, rise, set the payload, tare, and check the world by touch.
 
-    With the probe in the hand: the jaws must be as far apart as they were, and the floor be felt where it was. If
-    candidates are known, the one that is easiest to reach is touched from its side. An object in the hand is left as
-    it is: jaws that hold nothing more are noticed.
+    With the probe in the hand, the aperture and the floor's height must be as before. If candidates are known, the one
+    with the most free space is touched from its side. An object in the hand is not moved; only its loss is detected.
 
-    SUCCESS: what could be looked at is as it was.
+    SUCCESS: everything that could be checked is as before.
     """
 
     Params = RecheckParams
@@ -100,7 +105,7 @@ class Recheck(Skill):
             yield from self._ready(held=True)
             found["floor_z_K_m"] = yield from self._floor(self.tool)
             found["candidate"] = yield from self._touch_one(self.tool, self.tool.tip_radius_m)
-        elif held_m is not None and context.observation.gripper.force_N > GRIPPING_N:
+        elif held_m is not None and context.observation.gripper.force_N > MIN_GRIP_N:
             found["object"] = True
         elif held_m is not None:
             raise self.OBJECT_LOST(
@@ -124,7 +129,7 @@ class Recheck(Skill):
             )
 
     def _ready(self, *, held: bool) -> SkillRun:
-        """High, with the payload known and the wrist zeroed: a controller that was restarted knows neither."""
+        """Rise, set the payload and tare: a restarted controller knows neither payload nor tare."""
         arm, probe = self.context.arm, self.context.world.probe
         yield from rise_clear(arm, self.params.speed_m_s)
         mass, below = (probe.mass_kg, probe.com_below_grasp_m) if held else (0.0, 0.0)
@@ -147,7 +152,7 @@ class Recheck(Skill):
         return floor_m
 
     def _touch_with_fingers(self) -> Motion[int | None]:
-        """As with the probe, with the closed fingers."""
+        """Touch a candidate with the closed fingers, as with the probe."""
         if not (self.candidates and self.params.touch):
             return None
         arm = self.context.arm
@@ -166,9 +171,9 @@ class Recheck(Skill):
         return (yield from self._touch_one(fingers, float(np.min(half))))
 
     def _touch_one(self, tool: HeldTool, min_m: float) -> Motion[int | None]:
-        """Touch a candidate from its side; its index, or None: none is known, or none can be reached.
+        """Touch a candidate from its side; return its index, or None if none is known or reachable.
 
-        `min_m`: the tool reaches at least so far from its middle.
+        `min_m`: least distance from the tool's middle to its boundary.
         """
         p = self.params
         for candidate, start, goal in self._ways(tool, min_m):
@@ -201,10 +206,10 @@ class Recheck(Skill):
         )
 
     def _ways(self, tool: HeldTool, min_m: float) -> list[tuple[Candidate, Array, Array]]:
-        """(candidate, where to be lowered, where to go) with the most room first; places (2,) in K."""
+        """Return (candidate, start, goal), the most free space first; places (2,) in K."""
         p = self.params
         known: tuple[Candidate, ...] = (self.candidates or ()) if p.touch else ()
-        half = 0.5 * np.array(self.context.world.container.interior_m[:2]) - tool.tip_radius_m - ROOM_M
+        half = 0.5 * np.array(self.context.world.container.interior_m[:2]) - tool.tip_radius_m - CLEAR_M
         ways: list[tuple[float, int, Candidate, Array, Array]] = []
         for candidate in known:
             others = [c.contour for c in known if c is not candidate]
@@ -215,16 +220,17 @@ class Recheck(Skill):
                 start = edge + out * (tool.tip_radius_m + BEFORE_M)
                 if (np.abs(start) > half).any():
                     continue
-                room = min((float(signed_distance(c, start[None])[0]) for c in others), default=np.inf)
-                room = min(room - tool.tip_radius_m, float((half - np.abs(start)).min()) + ROOM_M)
-                if room >= ROOM_M:
+                free = min((float(signed_distance(c, start[None])[0]) for c in others), default=np.inf)
+                free = min(free - tool.tip_radius_m, float((half - np.abs(start)).min()) + CLEAR_M)
+                if free >= CLEAR_M:
                     goal = edge + out * (min_m - BEYOND_M)
-                    ways.append((-room, len(ways), candidate, start, goal))
+                    ways.append((-free, len(ways), candidate, start, goal))
         return [(c, start, goal) for _, _, c, start, goal in sorted(ways, key=lambda w: w[:2])][: 2 * len(known)]
 
 
 def _reach_m(candidate: Candidate, out: Array) -> float:
-    """How far from its centre the outline ends in the direction `out` (2,): bisection on the signed distance."""
+    """Return the distance from the centre to the outline in direction `out` (2,), by bisection on the signed
+    distance."""
     contour = candidate.contour
     near, far = 0.0, contour.radius_m + 0.02
     for _ in range(30):

@@ -1,4 +1,4 @@
-"""TODO door of glotouch_skills/common/planning."""
+"""Plans that several skills share: stances of the open hand, closures, grasps, and the target's model."""
 
 from glotouch_skills.common.planning.grasp_holds import SHIFTS_M
 from glotouch_skills.common.planning.grasp_plan import GraspPlan, plan_grasp

@@ -1,7 +1,7 @@
-"""Where a mesh can be held between two parallel pads: every yaw, place and height, from the tables of its model.
+"""Rate the holds of a mesh between two parallel pads, at every yaw, place and height, from the tables of its model.
 
-A hold is good if both gels touch much of it, if they touch it opposite to each other, and if the centre of mass is near
-the line between them; and if it stays good when the pose is a little off. All coordinates are the hand's: x_P along the
+A good hold has large contacts on both gels, opposite to each other, with the centre of mass near the line between them,
+and stays good if the pose is slightly wrong. All coordinates are the hand's: x_P along the
 jaws' width and y_P towards the left jaw, from the middle of the mesh's footprint; z above the floor.
 """
 
@@ -22,35 +22,34 @@ if TYPE_CHECKING:
 
 Index = npt.NDArray[np.intp]
 AREA_SCALE = 0.15
-"""Contact area, as a fraction of the pad, that counts as half of a good hold."""
+"""Contact area, as a fraction of the pad, that halves a hold's worth."""
 LEVER_SCALE_M = 0.015
 """Distance of the pads from the centre of mass that halves a hold's worth: the object would turn about the pads."""
 OPPOSITE_M = 0.006
-"""Distance between the middles of the two contacts that halves it: the pads would turn the object while they close."""
+"""Offset between the middles of the two contacts that halves it: closing pads would turn the object."""
 STEEP = 0.6
 """Mean slope under a pad that halves it. Source: the least pad friction of CONDITIONS (harsh)."""
 FINGER_M = 0.001
-"""The object may reach so much farther towards a finger, anywhere in front of it, than towards its pad: a pad stands a
-little proud of its finger and its gel gives, and what the fingers hold the pads do not."""
+"""The object may reach this much farther towards a finger than towards its pad: the pad protrudes a little and its gel
+yields. An object that reaches farther is held by the fingers, not the pads."""
 SHIFTS_M = 0.016
-"""Places farther than this along x_P from the centre of mass are not looked at."""
+"""Largest distance of a hold from the centre of mass along x_P."""
 YAW_STEP = 2
-"""Every second yaw of the tables: 10 degrees."""
+"""Use every second yaw of the tables, which is every 10 degrees."""
 
 
 @dataclass(frozen=True)
 class Holds:
-    """All holds looked at, as arrays (yaws, shifts, heights).
+    """All rated holds, as arrays (yaws, shifts, heights).
 
     Attributes:
         phi_rad: (yaws,) yaw of x_P against the mesh, half a turn.
         l_m: (shifts,) of the pads along x_P.
         z_m: (heights,) of the pads' mid-point.
         worth: 0..1.
-        width_m: Opening of the jaws that touch; NaN where one meets nothing.
+        width_m: Aperture of the touching jaws; NaN where one touches nothing.
         middle_m: y_P of the pads' mid-point then.
-        opening_m: Least opening, about that middle, with which the fingers pass the whole of the object on their way
-            down.
+        opening_m: Least aperture, about that middle, with which the descending fingers clear the object.
     """
 
     phi_rad: Array
@@ -63,10 +62,10 @@ class Holds:
 
 
 def holds_of(model: TargetModel, com_m: Array, gripper: Gripper, lowest_m: float, force_N: float) -> Holds:
-    """Judge all holds.
+    """Rate all holds.
 
     Args:
-        model: The mesh's.
+        model: Tables of the mesh.
         com_m: (3,) its centre of mass, in the mesh's frame.
         gripper: Pads, fingers and stroke.
         lowest_m: Least height of the pads' mid-point.
@@ -103,7 +102,7 @@ def holds_of(model: TargetModel, com_m: Array, gripper: Gripper, lowest_m: float
 
 @dataclass(frozen=True)
 class _Felt:
-    """One pad's contact, arrays (yaws, shifts, heights); middle_m is (along x_P, up) from the pad's own."""
+    """Contact of one pad, arrays (yaws, shifts, heights); middle_m is (along x_P, up) from the pad's middle."""
 
     area: Array
     middle_m: tuple[Array, Array]
@@ -111,7 +110,7 @@ class _Felt:
 
 
 def _felt(fine: Array32, yaws: Index, near: Index, heights: Index, model: TargetModel, force_N: float) -> _Felt:
-    """What a gel shows in every window."""
+    """Return the contact of a gel in every window."""
     rows, cols = FINE
     windows = np.lib.stride_tricks.sliding_window_view(fine[yaws], (cols, rows), axis=(1, 2))
     seen = windows[:, ::STRIDE, ::STRIDE][:, near][:, :, heights]  # (yaws, shifts, heights, cols, rows)
@@ -133,7 +132,7 @@ def _felt(fine: Array32, yaws: Index, near: Index, heights: Index, model: Target
 
 
 def _mean_slope(depth: Array, pressed: npt.NDArray[np.bool_], axis: int, step_m: float) -> Array:
-    """Mean slope of what is pressed along one axis of the window."""
+    """Return the mean slope of the contact along one axis of the window."""
     both = np.take(pressed, range(1, pressed.shape[axis]), axis) & np.take(
         pressed, range(pressed.shape[axis] - 1), axis
     )
@@ -142,7 +141,7 @@ def _mean_slope(depth: Array, pressed: npt.NDArray[np.bool_], axis: int, step_m:
 
 
 def _column(fine: Array32, yaws: Index, near: Index, heights: Index, gripper: Gripper, model: TargetModel) -> Array:
-    """How far the object reaches to one side in front of a finger, from its tip up, at every hold."""
+    """Return the object's reach to one side in front of a finger, from its tip upwards, at every hold."""
     rows, cols = FINE
     step_l, step_z = model.pad.window_m[0] / cols, model.pad.window_m[1] / rows
     wide = 2 * int(np.ceil(gripper.finger.half_m[0] / step_l)) + 1
@@ -154,6 +153,6 @@ def _column(fine: Array32, yaws: Index, near: Index, heights: Index, gripper: Gr
 
 
 def _blurred(worth: Array) -> Array:
-    """The mean over poses a little off: 10 degrees, 2.3 mm, 2.7 mm to either side."""
+    """Return the mean over pose errors of up to 10 degrees, 2.3 mm and 2.7 mm to either side."""
     turned = scipy.ndimage.uniform_filter1d(worth, 3, axis=0, mode="nearest")
     return np.asarray(scipy.ndimage.uniform_filter(turned, (1, 3, 3), mode="nearest"))

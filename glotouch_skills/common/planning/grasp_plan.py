@@ -1,6 +1,6 @@
-"""Where to take hold of a recognised object: where its mesh, standing at the fitted pose, is held best.
+"""Plan the grasp of a recognised object: the best hold of its mesh at the fitted pose.
 
-The closures already felt on it say how far that pose can be believed, and are what is left to do if it cannot.
+The widths measured by the closures decide whether that pose is credible. If not, the grasps repeat closures.
 """
 
 from __future__ import annotations
@@ -22,22 +22,37 @@ if TYPE_CHECKING:
     from glotouch_bt.perception.recognition import TargetModel
 
 STALENESS = 0.7
-"""What a felt hold is worth after each later sequence: squeezing turns and shifts the object."""
+"""Factor on the worth of a closure for each later sequence: squeezing turns and shifts the object."""
 ALTERNATIVES = 5
+"""Largest number of alternative grasps."""
 FITTED = 3
-"""So many of the grasps come from the fitted pose, if it can be believed."""
-APART_RAD, APART_M = math.radians(25.0), 0.012
-"""Two grasps from the fitted pose differ in yaw or place by at least one of these: what spoils one spares the other."""
+"""Largest number of grasps at the fitted pose, if it is credible."""
+APART_RAD = math.radians(25.0)
+"""Two grasps at the fitted pose differ in yaw by at least this, or in place by `APART_M`, so that one cause does not
+spoil both."""
+APART_M = 0.012
+"""See `APART_RAD`."""
 MIN_WORTH = 0.02
-BELIEVED_M = 0.002
-"""The pose is believed if the mesh standing there is as wide as was felt: three quarters of the closures within this of
-one offset. Wider than the width's scatter in recognition, for the place of the closures is off too."""
-MIN_OFFSET_M, GREATEST_OFFSET_M = -0.004, 0.0015
-"""The offset, of what was felt against the mesh: both gels give, and the jaws' zero is off (CONDITIONS)."""
+"""Least worth of a hold at the fitted pose (0..1)."""
+MAX_MISFIT_M = 0.002
+"""The pose is credible if, after removal of one offset, the widths of three quarters of the closures are within this of
+the mesh. Larger than the scatter of widths in recognition, because the place of a closure is uncertain, too."""
+MIN_OFFSET_M = -0.004
+"""Least offset of measured widths from the mesh: both gels yield, and the jaws' zero is off (CONDITIONS)."""
+MAX_OFFSET_M = 0.0015
+"""Largest such offset."""
 MIN_LAYERS = 3
+"""Least number of widths for judging the pose."""
 FORCE_N = 30.0
-FARTHEST_M, WIDEST_M, GREATEST_ZERO_M, LARGEST_YAW_RAD = 2.0, 0.5, 0.005, 4.0 * math.pi
-"""Beyond what any box, jaws or turn need: such a number was meant in millimetres or degrees."""
+"""Jaw force of a grasp."""
+MAX_PLACE_M = 2.0
+"""Larger coordinates were meant in millimetres."""
+MAX_WIDTH_M = 0.5
+"""Larger apertures were meant in millimetres."""
+MAX_ZERO_M = 0.005
+"""Closed jaws may report an aperture down to minus this."""
+MAX_YAW_RAD = 4.0 * math.pi
+"""Larger yaws were meant in degrees."""
 
 
 @dataclass(frozen=True)
@@ -48,10 +63,10 @@ class GraspPlan:
         candidate: Index of the candidate.
         position_K_m: (3,) pads' mid-point in K (z above the floor).
         yaw_rad: Direction of x_P in K.
-        aperture_m: Opening felt or expected there; the jaws must stop near it.
-        opening_m: Opening to go in with.
-        alternatives: Other grasps of the same object, the better ones first.
-        source: `fitted` to the mesh, or where it was `felt`.
+        aperture_m: Measured or expected aperture there; the jaws must stop near it.
+        opening_m: Aperture during the descent.
+        alternatives: Other grasps of the same object, best first.
+        source: `fitted` (from the mesh) or `felt` (from a closure).
     """
 
     candidate: int
@@ -64,31 +79,31 @@ class GraspPlan:
 
     def __post_init__(self) -> None:
         position_K_m = np.asarray(self.position_K_m)
-        if position_K_m.shape != (3,) or not (np.abs(position_K_m) <= FARTHEST_M).all():
-            raise ParamError("position_K_m", position_K_m.tolist(), f"[x, y, z] in metres, up to {FARTHEST_M:g} each")
-        if not abs(self.yaw_rad) <= LARGEST_YAW_RAD:
-            raise ParamError("yaw_rad", self.yaw_rad, f"radians, up to {LARGEST_YAW_RAD:.4g} either way")
-        for name in ("aperture_m", "opening_m"):  # of closed jaws, too, whose zero is a little off
-            if not -GREATEST_ZERO_M <= getattr(self, name) <= WIDEST_M:
-                raise ParamError(name, getattr(self, name), f"in metres, {-GREATEST_ZERO_M:g} to {WIDEST_M:g}")
+        if position_K_m.shape != (3,) or not (np.abs(position_K_m) <= MAX_PLACE_M).all():
+            raise ParamError("position_K_m", position_K_m.tolist(), f"[x, y, z] in metres, up to {MAX_PLACE_M:g} each")
+        if not abs(self.yaw_rad) <= MAX_YAW_RAD:
+            raise ParamError("yaw_rad", self.yaw_rad, f"radians, up to {MAX_YAW_RAD:.4g} either way")
+        for name in ("aperture_m", "opening_m"):  # closed jaws may report a little less than zero
+            if not -MAX_ZERO_M <= getattr(self, name) <= MAX_WIDTH_M:
+                raise ParamError(name, getattr(self, name), f"in metres, {-MAX_ZERO_M:g} to {MAX_WIDTH_M:g}")
 
 
 def plan_grasp(
     touchset: TouchSet, match: Match, mesh: Mesh, model: TargetModel, gripper: Gripper, side_gap_m: float = 0.010
 ) -> GraspPlan:
-    """The best grasp and the next ones.
+    """Return the best grasp, with the next best as its alternatives.
 
     Args:
-        touchset: What was felt of the object.
+        touchset: Touches of the object.
         match: Its fit to the target.
         mesh: The target.
         model: The target's tables.
-        gripper: The hand.
-        side_gap_m: Open jaw to the object, each side.
+        gripper: The robot's gripper.
+        side_gap_m: Gap between open jaw and object on each side.
     """
     com = np.asarray(mesh.as_trimesh().center_mass)
     fitted: list[GraspPlan] = []
-    if match.fit is not None and misfit_m(touchset, match, model) <= BELIEVED_M:
+    if match.fit is not None and misfit_m(touchset, match, model) <= MAX_MISFIT_M:
         holds = holds_of(model, com, gripper, lowest_pads_m(model.height_m, gripper), FORCE_N)
         fitted = _fitted(touchset.candidate.index, match, model, holds, side_gap_m)
     felt = _felt(touchset, _placed(com, match), side_gap_m)
@@ -97,7 +112,7 @@ def plan_grasp(
 
 
 def misfit_m(touchset: TouchSet, match: Match, model: TargetModel) -> float:
-    """How far the widths felt are from those of the mesh at the fitted pose; infinite if few were or all are off."""
+    """Return the misfit of the measured widths to the mesh at the fitted pose, m; infinite if it cannot be judged."""
     theta = match.pose_K_O[2]
     middle = _placed(np.array([*model.centre_m, 0.0]), match)[:2]
     off = []
@@ -110,20 +125,20 @@ def misfit_m(touchset: TouchSet, match: Match, model: TargetModel) -> float:
     if len(off) < MIN_LAYERS:
         return math.inf
     offset = float(np.median(off))
-    if not MIN_OFFSET_M <= offset <= GREATEST_OFFSET_M:
+    if not MIN_OFFSET_M <= offset <= MAX_OFFSET_M:
         return math.inf
     return float(np.quantile(np.abs(np.array(off) - offset), 0.75))
 
 
 def _placed(point_O_m: Array, match: Match) -> Array:
-    """A point (3,) of the mesh in K."""
+    """Return a point (3,) of the mesh in K."""
     x, y, theta = match.pose_K_O
     c, s = math.cos(theta), math.sin(theta)
     return np.array([x + c * point_O_m[0] - s * point_O_m[1], y + s * point_O_m[0] + c * point_O_m[1], point_O_m[2]])
 
 
 def _fitted(index: int, match: Match, model: TargetModel, holds: Holds, side_gap_m: float) -> list[GraspPlan]:
-    """The best holds of the mesh, each a little apart from the others."""
+    """Return the best holds of the mesh that differ enough from each other."""
     middle = _placed(np.array([*model.centre_m, 0.0]), match)
     chosen: list[GraspPlan] = []
     for flat in np.argsort(-holds.worth, axis=None, kind="stable")[:2000].tolist():
@@ -155,7 +170,7 @@ def _near(place_K_m: Array, yaw_rad: float, other: GraspPlan) -> bool:
 
 
 def _felt(touchset: TouchSet, com_K: Array, side_gap_m: float) -> list[GraspPlan]:
-    """The closures felt: large two-sided contact, near the centre of mass, felt late. Each was reached once."""
+    """Return the closures as grasps, best first: large two-sided contact, near the centre of mass, recent."""
 
     def worth(layer: Layer, later: int) -> float:
         areas = [patch_statistics(d).area_fraction for d in (layer.left_m, layer.right_m)]
@@ -180,6 +195,6 @@ def _felt(touchset: TouchSet, com_K: Array, side_gap_m: float) -> list[GraspPlan
 
 
 def _extent(candidate: Candidate, layer: Layer) -> float:
-    """How wide the object was traced across the layer's closing direction, or felt there if that is wider."""
+    """Return the traced extent along the layer's closing direction, or the measured aperture if that is larger."""
     low, high = candidate.span_m(layer.yaw_rad + 0.5 * np.pi)
     return max(high - low, layer.aperture_m)

@@ -1,4 +1,4 @@
-"""The moves every squeeze is made of: down over a candidate with open jaws, one closure, up again."""
+"""Moves of a squeeze: descend over a candidate with open jaws, close once, rise."""
 
 from __future__ import annotations
 
@@ -15,53 +15,61 @@ from glotouch_skills.common.hand import close_compliantly, glide, release
 from glotouch_skills.common.planning.squeeze_plan import Stance
 
 HAND_CLEARANCE_M = 0.005
-"""Fingertips stay this far above the floor, and the hand's body this far above a candidate's top."""
+"""Least distance of the fingertips from the floor, and of the hand's body from a candidate's top."""
 MIN_GAP_M = 0.003
-"""Two closures nearer to each other than this are one."""
+"""Least height between two different closures."""
 OVER_TOP_M = 0.02
-"""From so far above a candidate's top the hand goes down carefully."""
-HASTE = 3.0
-"""Speed above that place against the careful one."""
+"""Height above a candidate's top from which the descent is slow."""
+FAST_DESCENT_RATIO = 3.0
+"""Speed of the descent above that height over the slow speed."""
 OPENING_M_S = 0.2
+"""Speed at which the empty jaws open."""
 
 
 class ClosureParams(SkillParams):
-    """What all squeezing skills take.
+    """Parameters of all squeezing skills.
 
-    The descent is slow for the worst it may meet: both fingertips flat on a rigid foot. At 15 mm/s that was 26 N before
-    the first sample could show it and 34 N 10 ms later (simulated; it goes with the speed); the hard limit is 30 N.
+    The descent is slow because of the worst case: both fingertips flat on a rigid foot. At 15 mm/s, the force reached
+    26 N before the first sample could show it and 34 N 10 ms later (simulated; proportional to the speed). The hard
+    limit is 30 N.
     """
 
     force_N: float = param("Closing force of one jaw", unit="N", default=10.0, gt=0.0, le=10.0)
     closing_speed_m_s: float = param("Closing speed", unit="m/s", default=0.03, gt=0.0, le=0.2)
     layers: int = param("Closures per sequence", default=4, ge=1, le=10)
     layer_gap_m: float = param("Least distance between two layers", unit="m", default=0.012, ge=0.002, le=0.05)
-    side_gap_m: float = param("Open jaw to the contour, each side", unit="m", default=0.010, ge=0.004, le=0.03)
+    side_gap_m: float = param(
+        "Gap between open jaw and contour on each side", unit="m", default=0.010, ge=0.004, le=0.03
+    )
     travel_speed_m_s: float = param("Speed of the empty hand", unit="m/s", default=0.25, gt=0.0, le=0.25)
-    descent_speed_m_s: float = param("Speed down beside the object", unit="m/s", default=0.010, gt=0.0, le=0.04)
-    headroom_m: float = param("Fingertips above the floor on the way", unit="m", default=0.13, ge=0.05, le=0.25)
-    settle_s: float = param("How long the plateau is watched", unit="s", default=0.15, ge=0.05, le=1.0)
+    descent_speed_m_s: float = param(
+        "Speed of the descent beside the object", unit="m/s", default=0.010, gt=0.0, le=0.04
+    )
+    headroom_m: float = param(
+        "Height of the fingertips above the floor on the way", unit="m", default=0.13, ge=0.05, le=0.25
+    )
+    settle_s: float = param("Duration of measuring the plateau", unit="s", default=0.15, ge=0.05, le=1.0)
     top_overlap_m: float = param(
-        "Pad centre of the highest layer below the top", unit="m", default=0.008, ge=0.0, le=0.03
+        "Highest layer: distance of the pad centre below the top", unit="m", default=0.008, ge=0.0, le=0.03
     )
 
 
 def body_bottom_m(gripper: Gripper) -> float:
-    """How far the gripper's body reaches below the flange."""
+    """Return how far the gripper's body reaches below the flange."""
     return max(b.centre_m[2] + b.half_m[2] for b in gripper.body)
 
 
 def lowest_pads_m(height_m: float, gripper: Gripper) -> float:
-    """Least height of the pads' mid-point over an object of a height: fingertips over the floor, body over its top."""
+    """Return the least height of the pads' mid-point: fingertips clear of the floor, body clear of the object's top."""
     body_above_P = gripper.pose_E_P.position_m[2] - body_bottom_m(gripper)
     return float(max(gripper.fingertip_below_P_m, height_m - body_above_P) + HAND_CLEARANCE_M)
 
 
 def layer_heights(candidate: Candidate, gripper: Gripper, p: ClosureParams) -> Array:
-    """Pad-centre heights above the floor, lowest first.
+    """Return the pad-centre heights above the floor, lowest first.
 
-    A low object is squeezed up to where only the lower half of the pads still feels it: one layer a sequence would
-    leave no spare.
+    A low object is squeezed up to where only the lower half of the pads touches it, since a single layer a sequence
+    would leave no spare.
     """
     lowest = lowest_pads_m(candidate.height_m, gripper)
     highest = max(candidate.height_m - p.top_overlap_m, min(lowest + p.layer_gap_m, candidate.height_m), lowest)
@@ -71,17 +79,17 @@ def layer_heights(candidate: Candidate, gripper: Gripper, p: ClosureParams) -> A
 
 
 class Squeezing:
-    """One hand over one candidate.
+    """The hand over one candidate.
 
     Args:
-        context: Of the skill.
-        candidate: What is squeezed.
-        at: Where the open hand stands.
-        params: How.
-        zero: What the jaws report too much; taken off every aperture.
+        context: The skill's context.
+        candidate: Object to squeeze.
+        at: Stance of the open hand.
+        params: Parameters of the closures.
+        zero: Offset of the reported aperture, subtracted from every aperture.
 
     Attributes:
-        yaw_K_rad: Direction of x_P the hand really takes (`at`'s or its half turn).
+        yaw_K_rad: Direction of x_P that the hand takes: that of `at`, or its half turn.
     """
 
     def __init__(
@@ -94,10 +102,10 @@ class Squeezing:
         self.yaw_K_rad = hand_pose_B(arm, container, np.zeros(3), at.yaw_K_rad).yaw_rad - container.pose_B_K.yaw_rad
 
     def go_down(self, height_m: float) -> Motion[None]:
-        """Over the candidate with open jaws, and down to `height_m`.
+        """Move over the candidate with open jaws and descend to `height_m`.
 
         Raises:
-            MotionRefused: No way there, or the fingers met something; the hand is high again.
+            MotionRefused: There is no way, or the fingers touched something; the hand is high again.
         """
         arm, p = self._context.arm, self._p
         tips = arm.description.gripper.fingertip_below_P_m
@@ -106,21 +114,21 @@ class Squeezing:
         travel_z = max(float(arm.pose_B_P.position_m[2]), float(above.position_m[2]))
         yield from arm.transit(above, height_B_m=travel_z, speed_m_s=p.travel_speed_m_s)
         near = min(self.candidate.height_m + OVER_TOP_M, p.headroom_m) + tips
-        yield from glide(self._context, self._pose(near), HASTE * p.descent_speed_m_s)
+        yield from glide(self._context, self._pose(near), FAST_DESCENT_RATIO * p.descent_speed_m_s)
         if not (yield from self.move_to(height_m)):
             height = pads_height_m(self._context)
             yield from self.rise()
             raise MotionRefused("squeeze", f"the fingers met something {height * 1e3:.0f} mm above the floor")
 
     def move_to(self, height_m: float) -> Motion[bool]:
-        """Up or down beside the object, jaws open; False if the fingers met something."""
+        """Move up or down beside the object with open jaws; return False if the fingers touched something."""
         return (yield from glide(self._context, self._pose(height_m), self._p.descent_speed_m_s))
 
     def close(self) -> Motion[tuple[Layer, ObjectMotion]]:
-        """One closure where the hand is; the jaws are open again afterwards, and a pause comes then.
+        """Close once where the hand is, and open again; a pause waits until then.
 
         Raises:
-            MotionRefused: The hand was pressed too hard; the jaws are open.
+            MotionRefused: The force on the hand was too large; the jaws are open.
         """
         with self._context.arm.pause_signal.finishing():
             return (yield from self._close())
@@ -154,7 +162,7 @@ class Squeezing:
         return replace(layer, aperture_m=true_m, zero_sd_m=self._zero.sd_m), object_motion
 
     def rise(self) -> Motion[None]:
-        """Straight up to travelling height."""
+        """Rise to travelling height."""
         arm = self._context.arm
         above = self._pose(self._p.headroom_m + arm.description.gripper.fingertip_below_P_m)
         yield from arm.line(above, self._p.travel_speed_m_s, check=False)
@@ -180,5 +188,5 @@ def disturbance(candidate: Candidate, layer: Layer, object_motion: ObjectMotion)
 
 
 def pads_height_m(context: Context) -> float:
-    """Pads' mid-point above the container floor, as commanded."""
+    """Return the commanded height of the pads' mid-point above the container floor."""
     return float(context.world.container.pose_B_K.inverse().apply(context.arm.pose_B_P.position_m)[2])

@@ -1,4 +1,4 @@
-"""Where the open jaws may stand: at three yaws over a round candidate, on three parallel tracks over a box."""
+"""Stances of the open jaws: three yaws over a round candidate, three parallel tracks over a box."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ from glotouch_bt.robot import HOLD, Array, Container, Gripper, MotionRefused
 from glotouch_skills.common.hand import CLEARANCE_M, require_clear
 
 MIN_SIDE_GAP_M = 0.004
+"""Least gap between open jaw and object on each side."""
 TURNS_RAD = np.deg2rad([0.0, 60.0, -60.0])
+"""Yaws of the three sequences on a round candidate, relative to the base yaw."""
 BASES_RAD = np.deg2rad([0.0, 15.0, -15.0, 30.0])
-"""Base yaws tried for a round candidate; with the three turns they cover half a circle every 15 degrees."""
-LEEWAY_RAD = np.deg2rad([0.0, 8.0, -8.0])
-"""Turns away from each of its three yaws tried when there is no room."""
-SLACK_RAD = np.deg2rad([0.0, 6.0, -6.0])
-"""Turns away from a box's long side tried when a track has no room."""
+"""Base yaws to try on a round candidate; with the three turns, they cover half a circle in steps of 15 degrees."""
+ROUND_DEVIATIONS_RAD = np.deg2rad([0.0, 8.0, -8.0])
+"""Deviations from each of the three yaws to try where the hand would collide."""
+TRACK_DEVIATIONS_RAD = np.deg2rad([0.0, 6.0, -6.0])
+"""Deviations from a box's long side to try where a track would collide."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ class Stance:
     Attributes:
         position_K_m: (2,) pads' mid-point.
         yaw_K_rad: Direction of x_P.
-        opening_m: Aperture to go down with.
+        opening_m: Aperture during the descent.
     """
 
     position_K_m: Array
@@ -38,7 +40,7 @@ class Stance:
 
 
 def stance(candidate: Candidate, along_m: float, yaw_K_rad: float, side_gap_m: float, stroke_m: float) -> Stance | None:
-    """The hand `along_m` from the candidate's centre along `yaw_K_rad`, midway of its traced extent across.
+    """Return the stance `along_m` from the candidate's centre along `yaw_K_rad`, in the middle of its extent across.
 
     None if the candidate does not fit between the jaws there.
     """
@@ -52,32 +54,35 @@ def stance(candidate: Candidate, along_m: float, yaw_K_rad: float, side_gap_m: f
 
 
 def schemes(candidate: Candidate, gripper: Gripper) -> list[list[list[tuple[float, float]]]]:
-    """Ways to take three sequences, the preferred one first: for each sequence its (along, yaw) alternatives.
+    """Return schemes of three sequences, preferred first; each sequence is a list of (along, yaw) alternatives.
 
-    A free outline is turned about from the direction of its long side. If it is squeezed like a box, but not all of its
-    tracks have room, it may be turned about all the same.
+    For a free outline, the yaws start from its long side. One that is squeezed like a box may also be squeezed at three
+    yaws, if some of its tracks would collide.
     """
     contour = candidate.contour
     first = contour.yaw_rad if contour.family == "free" else 0.0
     turned = [
-        [[(0.0, float(first + base + turn + away)) for away in LEEWAY_RAD] for turn in TURNS_RAD] for base in BASES_RAD
+        [[(0.0, float(first + base + turn + away)) for away in ROUND_DEVIATIONS_RAD] for turn in TURNS_RAD]
+        for base in BASES_RAD
     ]
     if contour.kind == "round":
         return turned
     reach = max(0.5 * contour.size_m[0] - 0.5 * gripper.pad_window_m[0], 0.0)
     track = min(0.25 * contour.size_m[0], reach)
-    tracks = [[(t, contour.yaw_rad + float(s)) for s in SLACK_RAD] for t in (-track, 0.0, track)]
+    tracks = [[(t, contour.yaw_rad + float(s)) for s in TRACK_DEVIATIONS_RAD] for t in (-track, 0.0, track)]
     return [tracks, *turned] if contour.family == "free" else [tracks]
 
 
 def plan_stances(
     candidate: Candidate, arm: Arm, container: Container, pads_height_m: float, side_gaps_m: Sequence[float]
 ) -> Motion[tuple[list[Stance], list[str]]]:
-    """The scheme with the most sequences that have room, and why others have none. Holds the arm one period a check.
+    """Return the stances of the scheme with the most free sequences, and the refusals of the others.
+
+    Hold the arm for one period a check.
 
     Args:
-        candidate: What to squeeze.
-        arm: Its scene must know the other candidates.
+        candidate: Object to squeeze.
+        arm: Arm whose scene has the other candidates as obstacles.
         container: The registered container.
         pads_height_m: Lowest height of P above the floor.
         side_gaps_m: Gaps between open jaw and object to try, widest first.
@@ -88,7 +93,7 @@ def plan_stances(
     for scheme in schemes(candidate, gripper):
         found: list[Stance] = []
         for alternatives in scheme:
-            chosen = yield from _first_with_room(
+            chosen = yield from _first_free(
                 candidate, alternatives, arm, container, pads_height_m, side_gaps_m, refusals
             )
             if chosen is not None:
@@ -100,7 +105,7 @@ def plan_stances(
     return best, refusals
 
 
-def _first_with_room(
+def _first_free(
     candidate: Candidate,
     alternatives: Sequence[tuple[float, float]],
     arm: Arm,

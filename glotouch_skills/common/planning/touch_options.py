@@ -1,4 +1,4 @@
-"""Which closures could be made next, and what each costs in time: the choices of adaptive touching."""
+"""Options of adaptive touching: the closures that could be made next, and the time of each."""
 
 from __future__ import annotations
 
@@ -10,15 +10,21 @@ import numpy as np
 from glotouch_bt.perception.recognition import Closure
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import Array, Gripper
-from glotouch_skills.common.planning.squeeze_motion import HASTE, OVER_TOP_M, ClosureParams, layer_heights
+from glotouch_skills.common.planning.squeeze_motion import FAST_DESCENT_RATIO, OVER_TOP_M, ClosureParams, layer_heights
 from glotouch_skills.common.planning.squeeze_plan import Stance, schemes, stance
 
 YAWS_RAD = np.deg2rad(np.arange(0.0, 180.0, 30.0))
-"""Jaw directions over a candidate without tracks; parallel jaws look the same after half a turn."""
-SAME_M, SAME_RAD = 0.004, np.deg2rad(8.0)
-"""Nearer than this to a closure already made, another one tells nothing new."""
-CLOSURE_S, TURN_S, STOP_S = 1.6, 1.5, 0.6
-"""Robot time of one closure with opening again, of turning the hand over a candidate, and of each start and stop."""
+"""Jaw yaws over a candidate without tracks; half a turn suffices for parallel jaws."""
+SAME_M = 0.004
+"""A closure within this distance of an earlier one gives no new information ..."""
+SAME_RAD = np.deg2rad(8.0)
+"""... if its yaw is also within this."""
+CLOSURE_S = 1.6
+"""Robot time of closing and opening once."""
+TURN_S = 1.5
+"""Robot time of turning the hand over a candidate."""
+STOP_S = 0.6
+"""Robot time of each start and stop."""
 
 
 @dataclass(frozen=True)
@@ -26,10 +32,10 @@ class Option:
     """One closure that could be made next.
 
     Attributes:
-        at: Where the open hand stands.
+        at: Stance of the open hand.
         closure: The closure.
-        seconds: Robot time until it is done, from where the hand is now.
-        after: Closures that the same stance then offers for `more_s` each.
+        seconds: Robot time from now until it is done.
+        after: Closures that the same stance then allows, `more_s` each.
         more_s: Robot time of one of `after`.
     """
 
@@ -42,12 +48,12 @@ class Option:
 
 @dataclass(frozen=True)
 class Standing:
-    """The open hand, down beside a candidate.
+    """The open hand, lowered beside a candidate.
 
     Attributes:
         candidate: Index.
         at: Its stance.
-        height_m: Of the pads.
+        height_m: Height of the pads.
     """
 
     candidate: int
@@ -56,10 +62,7 @@ class Standing:
 
 
 def stances_over(candidate: Candidate, gripper: Gripper, side_gap_m: float) -> list[Stance]:
-    """Every stance worth thinking of: half a circle of yaws, and along the tracks of what is long.
-
-    A candidate that is neither a circle nor a rectangle gets both.
-    """
+    """Return the stances to consider: half a circle of yaws and, for a box-like candidate, its tracks."""
     contour = candidate.contour
     places = [(0.0, float(contour.yaw_rad + y)) for y in YAWS_RAD]
     if contour.kind == "box":
@@ -72,17 +75,17 @@ def stances_over(candidate: Candidate, gripper: Gripper, side_gap_m: float) -> l
 def options(
     touchsets: Sequence[TouchSet], standing: Standing | None, hand_K_m: Array, gripper: Gripper, p: ClosureParams
 ) -> list[Option]:
-    """All closures that could come next and are not yet made.
+    """Return all closures that could come next and were not made yet.
 
-    A new stance begins with its lowest closure, which centres the candidate where it cannot topple; higher ones follow
-    without rising, in any choice of heights but upwards.
+    A new stance begins with its lowest closure, which centres the candidate where it cannot topple. Higher ones follow
+    in ascending order, at any of the heights.
 
     Args:
-        touchsets: What was felt; one a candidate.
-        standing: Where the open hand is down, or None if it is high.
+        touchsets: Touches so far, one set a candidate.
+        standing: Stance of the lowered open hand, or None if it is high.
         hand_K_m: (3,) pads' mid-point.
-        gripper: Of the robot.
-        p: How closures are made.
+        gripper: The robot's gripper.
+        p: Parameters of the closures.
     """
     out: list[Option] = []
     for touchset in touchsets:
@@ -105,11 +108,11 @@ def options(
 
 
 def best_rates(options: Sequence[Option], gains: Sequence[Array]) -> Array:
-    """(n,) expected nats per second of each option: alone, or with the best closure that the same stance offers next.
+    """Return the expected nats per second (n,) of each option, alone or with the best next closure of its stance.
 
     Args:
-        options: The choices.
-        gains: For each, the gain of its closure and then of those in `after`.
+        options: The options.
+        gains: For each, the gain of its closure, then of those in `after`.
     """
     rates = []
     for option, gain in zip(options, gains, strict=True):
@@ -124,7 +127,7 @@ def _closure(candidate: Candidate, at: Stance, height_m: float) -> Closure:
 
 
 def _used(touchset: TouchSet, at: Stance) -> bool:
-    """A sequence was taken there, or half a turn from there."""
+    """Return True if a sequence was taken at this stance or half a turn from it."""
     for s in touchset.sequences:
         turn = (s.yaw_rad - at.yaw_K_rad + 0.5 * np.pi) % np.pi - 0.5 * np.pi
         if abs(turn) < SAME_RAD and float(np.linalg.norm(s.position_K_m - at.position_K_m)) < SAME_M:
@@ -133,11 +136,15 @@ def _used(touchset: TouchSet, at: Stance) -> bool:
 
 
 def _travel_s(candidate: Candidate, at: Stance, height_m: float, hand_K_m: Array, p: ClosureParams) -> float:
-    """Up, across and down to `height_m` beside the candidate."""
+    """Return the time of moving up, across and down to `height_m` beside the candidate."""
     high = p.headroom_m
     across = float(np.linalg.norm(at.position_K_m - hand_K_m[:2]))
     up = max(high - float(hand_K_m[2]), 0.0)
     careful = max(min(candidate.height_m + OVER_TOP_M, high) - height_m, 0.0)
     quick = max(high - candidate.height_m - OVER_TOP_M, 0.0)
-    way = (up + across) / p.travel_speed_m_s + quick / (HASTE * p.descent_speed_m_s) + careful / p.descent_speed_m_s
+    way = (
+        (up + across) / p.travel_speed_m_s
+        + quick / (FAST_DESCENT_RATIO * p.descent_speed_m_s)
+        + careful / p.descent_speed_m_s
+    )
     return way + TURN_S + 4 * STOP_S

@@ -16,7 +16,7 @@ from glotouch_bt.robot.scene.meshes import Mesh
 from glotouch_skills.common.planning.grasp_holds import holds_of
 from glotouch_skills.common.planning.grasp_plan import (
     ALTERNATIVES,
-    BELIEVED_M,
+    MAX_MISFIT_M,
     STALENESS,
     GraspPlan,
     misfit_m,
@@ -158,7 +158,7 @@ def test_a_pose_that_contradicts_what_was_felt_is_not_believed(plan, touched, ba
     wide = SHORT * math.cos(0.3) + LONG * math.sin(0.3)
     felt = (*ends(0.0, 0.0, 0.0), *(layer(0.03, yaw_rad=0.3 * s, aperture_m=wide) for s in (1, 1, -1, -1)))
     right, wrong = (matched(yaw=yaw, fitted=True) for yaw in (0.0, off_rad))
-    assert misfit_m(touched(felt), wrong, bar[1]) > BELIEVED_M
+    assert misfit_m(touched(felt), wrong, bar[1]) > MAX_MISFIT_M
     assert plan(touched(felt), wrong, bar[0]).source == "felt"
     assert misfit_m(touched(ends(0.0, 0.0, 0.0)), right, bar[1]) < 1e-4
 
