@@ -27,7 +27,9 @@ from glotouch_bt.robot import (
 from glotouch_bt.robot.simulation import Disturber, Referee
 
 SETTLE_S = 0.6
+"""Simulated time in which the world comes to rest. Source: ours."""
 START_APERTURE_M = 0.040
+"""Aperture of the jaws at the start. Source: ours."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,7 +28,7 @@ _UPPER_M, _FORE_M, _SHOULDER_M, _HAND_M = 0.40, 0.40, 0.30, 0.30
 
 
 def _fake_arm() -> RobotDescription:
-    """Seven revolute joints, z y z y z y z, in a straight column at q = 0. All numbers are made up."""
+    """Return an arm of seven revolute joints, z y z y z y z, straight up at q = 0. All numbers are made up."""
     heights = (0.15, _SHOULDER_M - 0.15, 0.20, _UPPER_M - 0.20, 0.20, _FORE_M - 0.20, 0.05)
     joints = []
     for i, height in enumerate(heights):

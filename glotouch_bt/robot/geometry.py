@@ -130,7 +130,7 @@ class Pose:
         return float(np.arctan2(r[1, 0], r[0, 0]))
 
     def __matmul__(self, other: Pose) -> Pose:
-        """Chain: pose_A_C = pose_A_B @ pose_B_C."""
+        """Return the composed pose: pose_A_C = pose_A_B @ pose_B_C."""
         return Pose.from_matrix(self.position_m + self.rotation @ other.position_m, self.rotation @ other.rotation)
 
     def inverse(self) -> Pose:

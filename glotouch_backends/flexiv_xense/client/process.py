@@ -14,6 +14,7 @@ from glotouch_backends.options import WorldOptions
 from glotouch_bt.robot import BackendError, Conditions, World
 
 END_S = 15.0
+"""Longest wait for a process to end before it is killed."""
 INSTALLED, HERE = "glotouch_driver", "glotouch_backends.flexiv_xense.driver"
 CELL = "glotouch_backends.flexiv_xense.simulated.cell"
 

@@ -25,7 +25,6 @@ from glotouch_backends.flexiv_xense.driver import (
     TareRequest,
 )
 from glotouch_bt.robot import (
-    HOLD,
     Array,
     BackendError,
     Command,
@@ -147,10 +146,6 @@ class FlexivXenseRobot(Robot):
         if self.process is not None:
             self.process.end()
         self.link.close()
-
-    def rest(self) -> Observation:
-        """Run one period without a command."""
-        return self.cycle(HOLD)
 
     def _setpoint(self, motion: JointSetpoint) -> Setpoint:
         """Return the message of a setpoint: its pose, and the twist of its joint velocities.

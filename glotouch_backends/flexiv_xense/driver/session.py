@@ -86,11 +86,6 @@ class DriverSession:
         return bool(self._rows)
 
     @property
-    def moving(self) -> bool:
-        """The last setpoint had a speed and no hold has followed it."""
-        return self._last is not None and self._rest is None and any(self._last.twist)
-
-    @property
     def speed_m_s(self) -> float:
         """Speed of P over the last `SPEED_SAMPLES`."""
         (begin, first), (end, last) = self._track[0], self._track[-1]

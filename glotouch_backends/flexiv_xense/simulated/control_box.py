@@ -19,10 +19,25 @@ from glotouch_backends.flexiv_xense.simulated.vendor_api import (
 )
 from glotouch_bt.robot import Pose
 
-# Durations in s. ASSUMED: the vendor documents only that these calls block, and "a few seconds" for the brakes.
-CONNECT_S, UNREACHABLE_S, REQUEST_S, BRAKES_S, SWITCH_S, PRIMITIVE_S = 0.5, 3.1, 0.005, 2.0, 0.05, 0.1
-CLEAR_MINOR_S, CLEAR_CRITICAL_S = 1.0, 10.0
+# All durations are ASSUMED: the vendor documents only that these calls block, and "a few seconds" for the brakes.
+CONNECT_S = 0.5
+"""Duration of connecting to an arm."""
+UNREACHABLE_S = 3.1
+"""Time until an unreachable arm is reported."""
+REQUEST_S = 0.005
+"""Duration of a short request."""
+BRAKES_S = 2.0
+"""Duration of releasing the brakes."""
+SWITCH_S = 0.05
+"""Duration of switching the mode or the tool."""
+PRIMITIVE_S = 0.1
+"""Duration of starting a primitive."""
+CLEAR_MINOR_S = 1.0
+"""Duration of clearing a minor fault."""
+CLEAR_CRITICAL_S = 10.0
+"""Duration of clearing a critical fault."""
 POLL_S = 0.001
+"""Interval between two checks while waiting."""
 UNLICENSED = (Mode.NRT_PLAN_EXECUTION, Mode.NRT_SUPER_PRIMITIVE)
 NOT_ZEROED = 301004
 """Event when the force sensor was not zeroed. Source: user reports of a Rizon 4s; the text is ours."""

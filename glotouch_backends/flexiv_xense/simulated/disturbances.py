@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from glotouch_backends.flexiv_xense.simulated.arm import SimulatedArm
 from glotouch_backends.flexiv_xense.simulated.control_box import ControlBox
 from glotouch_backends.flexiv_xense.simulated.vendor_api import GripperLink, PadLink
 from glotouch_backends.mujoco.simulation import MujocoReferee, Simulated
 from glotouch_bt.robot import UnknownName
 
+NAMES = ("fault", "estop", "reduced", "link", "frozen", "gripper", "pads frozen", "pads missing")
 COLLISION = 200101
 """Number of the collision event. Source: ours."""
 
@@ -35,49 +35,28 @@ class DisturbingReferee(MujocoReferee):
         Raises:
             UnknownName: There is no such disturbance.
         """
-        ways = {
-            "fault": self._fault,
-            "estop": self._estop,
-            "reduced": self._reduced,
-            "link": self._link,
-            "frozen": self._frozen,
-            "gripper": self._gripper_link,
-            "pads frozen": self._pads_frozen,
-            "pads missing": self._pads_missing,
-        }
-        if name not in ways:
-            raise UnknownName("disturbance", name, ways)
-        ways[name]()
-
-    @property
-    def _arm(self) -> SimulatedArm:
-        return self._box.arm
-
-    def _fault(self) -> None:
-        self._box.fail(COLLISION, "a collision has been detected")
-
-    def _estop(self) -> None:
-        self._box.estop_released = self._box.enabled = False
-        self._box.halt()
-
-    def _reduced(self) -> None:
-        self._box.reduced = True
-        self._box.halt()
-
-    def _link(self) -> None:
-        self._box.linked = False
-        self._arm.lose_link()
-
-    def _frozen(self) -> None:
-        self._box.frozen = True
-
-    def _gripper_link(self) -> None:
-        self._gripper.linked = False
-
-    def _pads_frozen(self) -> None:
-        for pad in self._pads:
-            pad.frozen = True
-
-    def _pads_missing(self) -> None:
-        for pad in self._pads:
-            pad.missing = True
+        box = self._box
+        match name:
+            case "fault":
+                box.fail(COLLISION, "a collision has been detected")
+            case "estop":
+                box.estop_released = box.enabled = False
+                box.halt()
+            case "reduced":
+                box.reduced = True
+                box.halt()
+            case "link":
+                box.linked = False
+                box.arm.lose_link()
+            case "frozen":
+                box.frozen = True
+            case "gripper":
+                self._gripper.linked = False
+            case "pads frozen":
+                for pad in self._pads:
+                    pad.frozen = True
+            case "pads missing":
+                for pad in self._pads:
+                    pad.missing = True
+            case _:
+                raise UnknownName("disturbance", name, NAMES)

@@ -15,7 +15,9 @@ from glotouch_backends.flexiv_xense.simulated.vendor_api import flexivrdk, xense
 from glotouch_backends.flexiv_xense.simulated.wire import CALL, NEW, REFEREE, Reference
 
 CONNECT_S = 120.0
+"""Longest wait for a cell to accept a connection."""
 RETRY_S = 0.05
+"""Interval between two attempts."""
 
 
 class CellLink:

@@ -38,7 +38,7 @@ class SimulatedWorld:
         options: WorldOptions,
         description: RobotDescription = RIZON4_XENSE,
     ) -> None:
-        self.world, self.conditions, self.seed, self.description = world, conditions, seed, description
+        self.world, self.description = world, description
         self.truth, self.model, self.data, self.handles = build_world(description, world, conditions, seed, options)
         self.trace: ControlTrace | None = None
         self.peak_force_N = 0.0

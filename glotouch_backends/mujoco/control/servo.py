@@ -78,11 +78,6 @@ class Servo:
         """Setpoint (dof,) at the end of the last period, rad."""
         return np.asarray(self._knots[2])
 
-    @property
-    def moving(self) -> bool:
-        """True while the setpoint has a velocity."""
-        return bool(self._knots[3].any())
-
     def reset(self, q: Array) -> None:
         """Set the setpoint to `q` (dof,) at rest, without a ramp."""
         self._knots[0] = self._knots[2] = q

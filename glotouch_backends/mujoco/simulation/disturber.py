@@ -12,9 +12,8 @@ from typing import Protocol
 import mujoco
 import numpy as np
 
-from glotouch_backends.mujoco.model import Handles
 from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, body_pose
-from glotouch_backends.mujoco.simulation.clearance import MotionClearance
+from glotouch_backends.mujoco.simulation.clearance import MotionClearance, Posed
 from glotouch_backends.mujoco.truth import Truth, rotation_vector
 from glotouch_bt.robot import Array, BadInput, Pose, World
 
@@ -32,14 +31,11 @@ MIN_FRICTION = 0.3
 """Friction coefficient that gives the longest slide of a knocked object. Source: ours."""
 
 
-class Disturbed(Protocol):
+class Disturbed(Posed, Protocol):
     """The parts of a simulated robot that its disturber may change."""
 
     world: World
     truth: Truth
-    model: mujoco.MjModel
-    data: mujoco.MjData
-    handles: Handles
 
 
 class MujocoDisturber:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from typing import Protocol
 
-import mujoco
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from glotouch_backends.mujoco.model import Handles
 from glotouch_backends.mujoco.sensing import body_pose
 from glotouch_backends.mujoco.simulation.control_trace import ControlTrace
-from glotouch_backends.mujoco.truth import Truth
-from glotouch_bt.robot import Array, Pose, World
+from glotouch_backends.mujoco.simulation.disturber import Disturbed
+from glotouch_bt.robot import Array, Pose
 from glotouch_bt.robot.simulation import BareSteps, TrueObject
 
 MAX_STOWED_OFFSET_M = 0.005
@@ -21,14 +19,9 @@ MIN_STOWED_COSINE = 0.996
 """... and tilted by less than 5 degrees (cosine). Source: ours."""
 
 
-class Simulated(Protocol):
+class Simulated(Disturbed, Protocol):
     """The parts of a simulated robot that its referee reads."""
 
-    world: World
-    truth: Truth
-    model: mujoco.MjModel
-    data: mujoco.MjData
-    handles: Handles
     peak_force_N: float
     trace: ControlTrace | None
 

@@ -42,9 +42,11 @@ FIXED: Mapping[str, frozenset[str]] = {
 """Attributes, by class, that follow from world, conditions, seed and options alone."""
 
 AWAKE = ("nbody_awake", "nparent_awake", "ntree_awake", "nv_awake")
+"""Counters of mjData of what is awake."""
 BULKY = ("bvh_", "mesh_", "tex_", "hfield_", "skin_", "flex", "names", "paths", "text_")
 """Prefixes of arrays of the model that no run changes and that are too large to compare each time."""
 DRAWN_ONLY = ("bvh_active", "bvh_aabb_dyn")
+"""Arrays of mjData that only rendering uses."""
 
 
 class SnapshotStore:

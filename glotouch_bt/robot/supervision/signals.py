@@ -30,7 +30,7 @@ class WrenchSignalGuard:
         self.reset()
 
     def reset(self) -> None:
-        """Learn anew."""
+        """Forget what was learnt about the noise."""
         self._noisy_periods = self._same_periods = 0
         self._noise_N = 0.0
 
@@ -89,7 +89,7 @@ class TactileSignalGuard:
         self.reset()
 
     def reset(self) -> None:
-        """Learn anew."""
+        """Forget what was learnt about the noise."""
         self._since_s: float | None = None
         self._last: TactileFrame | None = None
         self._different = self._equal = 0

@@ -49,11 +49,6 @@ class Supervisor(Robot):
         self._error: BackendError | None = None
 
     @property
-    def inner(self) -> Robot:
-        """The supervised robot."""
-        return self._robot
-
-    @property
     def paced(self) -> bool:  # type: ignore[override]
         """See `Robot`."""
         return self._robot.paced

@@ -302,7 +302,6 @@ def test_the_supervisor_has_the_properties_of_its_robot() -> None:
     device = Device()
     robot, _ = supervised(device)
     assert (robot.description, robot.limits, robot.period_s) == (device.description, device.limits, device.period_s)
-    assert robot.inner is device
     assert robot.snapshot() is None
     with robot:
         assert robot.observe() is device.observe()

@@ -14,8 +14,14 @@ from glotouch_backends.flexiv_xense.driver import Clock
 from glotouch_backends.flexiv_xense.simulated.hand import SimulatedHand
 
 MM = 1e-3
-UNREACHABLE_S, CONNECT_S, FIRST_S = 7.5, 0.3, 0.02
+UNREACHABLE_S = 7.5
+"""Time until an unreachable gripper is reported. ASSUMED."""
+CONNECT_S = 0.3
+"""Duration of connecting. ASSUMED."""
+FIRST_S = 0.02
+"""Time from connecting to the first status. ASSUMED."""
 TEMPERATURE_C = 31.0
+"""Reported temperature. ASSUMED."""
 
 
 class GripperLink:

@@ -22,7 +22,10 @@ from glotouch_backends.flexiv_xense.simulated.vendor_api.flexiv_types import EPO
 Floats = npt.NDArray[np.floating[Any]]
 SHAPE = (700, 400)
 MM = 1e-3
-CREATE_S, CALIBRATE_S = 0.5, 0.2
+CREATE_S = 0.5
+"""Duration of opening a sensor. ASSUMED."""
+CALIBRATE_S = 0.2
+"""Duration of calibrating a sensor. ASSUMED."""
 PRESSED_MM = 0.2
 """Smallest depth that calibration subtracts: noise and offsets stay, as with the real sensor. ASSUMED."""
 

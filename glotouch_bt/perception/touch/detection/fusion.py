@@ -11,18 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glotouch_bt.robot import Array, Pose, frozen_array
+from glotouch_bt.robot import Array, Pose, cross_matrix, frozen_array
 
 SD_FLOOR_N = 0.005
 """Minimum force noise: an ideal sensor must not give infinite weights or a zero onset threshold."""
 SD_FLOOR_NM = 0.0003
 """Minimum torque noise, for the same reason."""
-
-
-def cross_matrix(p: Array) -> Array:
-    """Return the matrix [p] (3, 3) with [p] f = p x f."""
-    x, y, z = p
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 @dataclass(frozen=True)
