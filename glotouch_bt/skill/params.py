@@ -26,5 +26,5 @@ def param(
         default: Its default; none: it is required.
         rules: Rules of pydantic (ge, le, gt, ...).
     """
-    extra = {"unit": unit, "names": names} | ({"formerly": formerly} if formerly else {})
+    extra: dict[str, Any] = {"unit": unit, "names": names} | ({"formerly": formerly} if formerly else {})
     return Field(default, description=description, json_schema_extra=extra, **rules)

@@ -16,23 +16,28 @@ from glotouch_skills.common.probe import Explorer, ExploringSpeeds
 class GuardedSweepParams(SkillParams):
     """Parameters of `guarded_sweep`."""
 
-    expected_objects: int = param("How many objects the container holds", default=5, ge=1, le=20)
+    expected_objects: int = param("Number of objects in the container", default=5, ge=1, le=20)
     policy: Literal["expected_find", "nearest_frontier", "random_descent"] = param(
-        "Where to go next: the most expected finds for the way, or one of the paper's two", default="expected_find"
+        "How to choose the next place: most expected finds for the distance, or one of the paper's two policies",
+        default="expected_find",
     )
-    height_m: float = param("Ball centre above the floor while sweeping", unit="m", default=0.018, ge=0.009, le=0.06)
+    height_m: float = param(
+        "Height of the ball's centre above the floor while sweeping", unit="m", default=0.018, ge=0.009, le=0.06
+    )
     speed_m_s: float = param("Sweeping speed", unit="m/s", default=0.04, gt=0.0, le=0.08)
     travel_speed_m_s: float = param("Speed above the objects", unit="m/s", default=0.10, gt=0.0, le=0.15)
     headroom_m: float = param(
-        "Ball's height above the floor when crossing objects", unit="m", default=0.13, ge=0.02, le=0.2
+        "Height of the ball above the floor when crossing objects", unit="m", default=0.13, ge=0.02, le=0.2
     )
-    wall_gap_m: float = param("Ball centre kept from the walls", unit="m", default=0.012, ge=0.008, le=0.05)
+    wall_gap_m: float = param(
+        "Distance of the ball's centre from the walls", unit="m", default=0.012, ge=0.008, le=0.05
+    )
 
 
 class GuardedSweep(Skill):
-    """Sweep, as the policy says, until an object that is not traced yet is touched; retreat from it.
+    """Sweep by the policy until an object that is not yet traced is touched, and retreat from it.
 
-    SUCCESS: something was touched; `contact` says where, the probe has retreated from it.
+    SUCCESS: something was touched; `contact` is the contact, and the probe has retreated.
     """
 
     PAUSE = "retreat"

@@ -1,4 +1,4 @@
-"""Trace a touched object: probe it from where most is learnt, until its outline is known."""
+"""Trace a touched object: probe it where its outline is least certain, until the outline is known."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from glotouch_bt.skill.probing import HeldTool
 from glotouch_skills.common.probe import Explorer, TracingParams
 
 NEAR_M = 0.015
-"""Farther than this from the first contact the ball goes back to it from above: a trace that was broken off may have
-left it on the object's other side."""
+"""Farther than this from the first contact, the ball returns to it from above: a preempted trace may have left the ball
+on the object's other side."""
 
 
 class OrbitProbeParams(TracingParams):
@@ -36,13 +36,14 @@ class OrbitProbeParams(TracingParams):
 
 
 class OrbitProbe(Skill):
-    """From one contact to a candidate: centre, outline, how far it was pushed. Its height is touched by `touch_top`.
+    """Trace a candidate from its first contact: centre, outline and displacement. `touch_top` measures its height.
 
-    Contacts are made where the outline is least known for the way there, until the fit's covariance is small enough.
-    A contact that cannot belong to the object is set aside. The defaults give a coarse outline, so that the next object
-    is found soon; `refine_outline` makes it exact once all are found.
+    Make contacts where the outline is least certain for the distance, until the fit's covariance is small enough. Set
+    aside a contact that cannot belong to the object. The defaults give a coarse outline, so that the next object is
+    found soon; `refine_outline` refines it once all are found.
 
-    SUCCESS: `candidates` has a new one, or knows one better that was traced in part; the map keeps out of its envelope.
+    SUCCESS: `candidates` has a new candidate, or a better outline of a partly traced one; the map excludes its
+    envelope.
     """
 
     PAUSE = "retreat"
@@ -70,7 +71,7 @@ class OrbitProbe(Skill):
     previous = In(tuple, "candidates so far", key="candidates", required=False)
     map = Out(SearchMap, "the search map with the object excluded")
     candidates = Out(tuple, "candidates, the new one last", element=Candidate)
-    found = Out(int, "how many objects are traced")
+    found = Out(int, "number of traced objects")
     complete = Out(bool, "all expected objects are traced")
 
     def run(self) -> SkillRun:
@@ -120,5 +121,5 @@ class OrbitProbe(Skill):
 
 
 def _back_to(first: Contact, clearance_m: float) -> SearchPlan[None]:
-    """Over the object, and down again beside its first contact."""
+    """Move over the object, and down again beside its first contact."""
     yield Move("hop", first.tip_K_m[:2] - clearance_m * first.approach_K[:2])

@@ -1,4 +1,4 @@
-"""Trace on what was traced in haste: from above, where its outline is least certain, until it is known well."""
+"""Refine a coarse outline: descend where it is least certain, and trace until it is known well."""
 
 from __future__ import annotations
 
@@ -14,25 +14,27 @@ from glotouch_bt.skill.probing import HeldTool
 from glotouch_skills.common.probe import Explorer, TracingParams
 
 GAP_M = (0.004, 0.020)
-"""So far from every contact the outline begins to be, and is fully, what no family of outlines may have thought of:
-with contacts all round even their hull has the object's centre, where a limb was missed no family has."""
+"""Distances from the nearest contact at which the outline begins to count as unknown, and counts fully so. A limb in
+the gap between contacts fits no family of outlines; with contacts all round, even their hull has the right centre."""
 
 
 class RefineOutlineParams(TracingParams):
     """Parameters of `refine_outline`; contacts it had before count."""
 
-    wall_gap_m: float = param("Ball centre kept from the walls", unit="m", default=0.012, ge=0.008, le=0.05)
-    hop_m: float = param("A way over the top counts as so much travel", unit="m", default=0.1, ge=0.02, le=1.0)
+    wall_gap_m: float = param(
+        "Distance of the ball's centre from the walls", unit="m", default=0.012, ge=0.008, le=0.05
+    )
+    hop_m: float = param("Travel that a way over the top counts as", unit="m", default=0.1, ge=0.02, le=1.0)
 
     def rule(self) -> TraceParams:
-        """As the plans take them: the gaps between contacts are closed, also on the far side."""
+        """Return them as the trace plan takes them, closing the gaps between contacts also on the far side."""
         return replace(super().rule(), hop_m=self.hop_m, keen=2.0, odd_near_m=GAP_M[0], odd_far_m=GAP_M[1])
 
 
 class RefineOutline(Skill):
-    """From a candidate known well enough to find it again to one known well enough to squeeze and to grasp.
+    """Refine a coarsely traced candidate until it can be squeezed and grasped.
 
-    SUCCESS: `refined` is the candidate with what its new contacts say. An outline known well already is left as it is.
+    SUCCESS: `refined` is the candidate with its new contacts. An outline that is known well already stays unchanged.
     """
 
     PAUSE = "retreat"

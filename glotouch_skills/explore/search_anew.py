@@ -1,4 +1,4 @@
-"""Forget where the probe has been: what it passed without touching anything may not have been free."""
+"""Clear the searched area: without a sound probe, a place passed without contact may not be free."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from glotouch_bt.skill import Failure, In, Out, Skill, SkillRun
 
 
 class SearchAnew(Skill):
-    """After a search with a probe that had slipped or was lost: keep the objects that were traced, forget the rest.
+    """Keep the traced objects and clear the rest of the map, after a search with a slipped or lost probe.
 
-    SUCCESS: `map` holds the traced objects and no place that was passed or given up.
+    SUCCESS: `map` has the traced objects, but no searched or dropped place.
     """
 
     NOTHING_SEARCHED = Failure("nothing_searched", "there is no map yet", advice="sweep first, with guarded_sweep")

@@ -1,4 +1,4 @@
-"""Touch the top of a traced object: how high is it?"""
+"""Measure the height of a traced object by touching its top."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool, Prober
 
-RIM_PLACES, RIM_INSET_M = 4, 0.003
-"""Where a hollow object is touched: so far inside of so many places of its rim, a quarter of the way round apart."""
+RIM_PLACES = 4
+"""Number of places on the rim of a hollow object to touch, evenly spaced."""
+RIM_INSET_M = 0.003
+"""Distance of these places inside the rim."""
 
 
 class TouchTopParams(SkillParams):
@@ -23,20 +25,20 @@ class TouchTopParams(SkillParams):
 
     down_speed_m_s: float = param("Speed down onto the top", unit="m/s", default=0.02, gt=0.0, le=0.06)
     pass_speed_m_s: float = param("Speed of the passes above it", unit="m/s", default=0.04, gt=0.0, le=0.06)
-    feel_speed_m_s: float = param("Speed of those that are likely to meet something", unit="m/s", default=0.02, gt=0.0,
+    feel_speed_m_s: float = param("Speed of passes likely to touch something", unit="m/s", default=0.02, gt=0.0,
                                   le=0.06)  # fmt: skip
     travel_speed_m_s: float = param("Speed above all objects", unit="m/s", default=0.10, gt=0.0, le=0.15)
-    clearance_m: float = param("Passes go so far above what is known", unit="m", default=0.0008, ge=0.0003, le=0.01)
-    inset_m: float = param("Passes keep so far inside the outline", unit="m", default=0.010, ge=0.0, le=0.03)
-    reach_m: float = param("No place is farther from the passes", unit="m", default=0.014, ge=0.003, le=0.05)
-    headroom_m: float = param("Ball's height above the floor when crossing an object", unit="m", default=0.13,
+    clearance_m: float = param("Height of the passes above the known top", unit="m", default=0.0008, ge=0.0003, le=0.01)
+    inset_m: float = param("Distance of the passes inside the outline", unit="m", default=0.010, ge=0.0, le=0.03)
+    reach_m: float = param("Largest distance of any place from the passes", unit="m", default=0.014, ge=0.003, le=0.05)
+    headroom_m: float = param("Height of the ball above the floor when crossing an object", unit="m", default=0.13,
                               ge=0.02, le=0.2)  # fmt: skip
 
 
 class TouchTop(Skill):
-    """From a traced candidate to its height: touch down in the middle, pass above it, touch whatever is higher.
+    """Measure a traced candidate's height: touch down in its middle, pass above it, touch whatever is higher.
 
-    SUCCESS: `measured` is the candidate with the height of the highest place found.
+    SUCCESS: `measured` is the candidate with the height of its highest touched place.
     """
 
     PAUSE = "retreat"
@@ -74,7 +76,7 @@ class TouchTop(Skill):
             )
         height = float(top.ball_K_m[2]) - tool.tip_radius_m - tool.floor_z_K_m
         self.measured = replace(candidate, height_m=height)
-        self.event("candidate", candidate=self.measured)  # the last word on this candidate: now with its height
+        self.event("candidate", candidate=self.measured)  # the final record of this candidate, with its height
         self.event("top", candidate=candidate.index, height_m=height, touches=top.touches, passed=top.passed)
 
     def _plan(self, candidate: Candidate, touched_m: float) -> TopPlan:
@@ -99,7 +101,7 @@ class TouchTop(Skill):
         return np.asarray(rim + RIM_INSET_M * inwards / far)
 
     def _drive(self, prober: Prober, plan: TopPlan) -> Motion[Top]:
-        """Make the plan's moves until it ends."""
+        """Execute the plan and return its result."""
         move = next(plan)
         while True:
             met = yield from self._make(prober, move)

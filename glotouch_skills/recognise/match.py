@@ -17,19 +17,19 @@ class MatchParams(SkillParams):
     """Parameters of `match`."""
 
     target: str = param("The object to find: an STL file, or the name of one in the world's object folder", names="stl")
-    matcher: Literal["likelihood", "paper"] = param("How candidates are compared", default="likelihood")
+    matcher: Literal["likelihood", "paper"] = param("Method of comparing candidates", default="likelihood")
 
 
 class Match(Skill):
-    """Rank all TouchSets against the target's STL and plan the grasp of the best.
+    """Rank all TouchSets against the target's STL and plan the grasp of the best candidate.
 
-    SUCCESS: the best candidate is surely enough the target and was felt enough; `plan` says how to grasp it.
+    SUCCESS: the best candidate is the target with enough certainty and evidence; `plan` is its grasp.
     """
 
     Params = MatchParams
     params: MatchParams
 
-    USES: ClassVar = frozenset({"arm"})  # it holds the arm while it thinks
+    USES: ClassVar = frozenset({"arm"})  # it holds the arm while it computes
 
     NOT_RECOGNISED = Failure(
         "not_recognised",
@@ -48,11 +48,11 @@ class Match(Skill):
     )
     FAILURES: ClassVar = (TOO_LOW,)
 
-    touchsets = In(tuple, "one TouchSet per candidate squeezed", element=TouchSet, required=False)
+    touchsets = In(tuple, "one TouchSet for each squeezed candidate", element=TouchSet, required=False)
     known = In(
         tuple, "all candidates, to say which were not squeezed", key="candidates", element=Candidate, required=False
     )
-    rejected = In(tuple, "indices of candidates that were found not to be it", required=False)
+    rejected = In(tuple, "indices of candidates that are not the target", required=False)
     ranking = Out(Ranking, "all candidates, best first")
     plan = Out(GraspPlan, "how to grasp the best one")
 
@@ -92,7 +92,7 @@ class Match(Skill):
 
 
 def _advice(ranking: Ranking) -> str:
-    """What would help most."""
+    """Return the advice with the most informative next touch."""
     c = ranking.next_touch
     if c is None:
         return "touch more"

@@ -1,4 +1,4 @@
-"""What was put back is not what it was taken for: forget what was felt of it, or leave it alone for good."""
+"""Handle an object that was put back because it is not the target: drop its touches, or reject it for good."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from glotouch_skills.common.planning import GraspPlan
 class RejectParams(SkillParams):
     """Parameters of `reject`."""
 
-    most: int = param("So many objects may be taken in vain", default=2, ge=0, le=20)
+    most: int = param("Largest number of objects taken in vain", default=2, ge=0, le=20)
 
 
 class Reject(Skill):
-    """Take the touches of the object that was put back out of what is known.
+    """Remove the touches of the object that was put back.
 
-    An object that cannot be the target is not looked at again. One that was not where its touches said may be touched
-    and taken once more; after that it is left alone, too.
+    An object that cannot be the target is rejected. One that did not match its touches may be touched and taken once
+    more; after that it is rejected, too.
 
-    SUCCESS: `touchsets` holds the others; `rejected` names what is left alone.
+    SUCCESS: `touchsets` has the other objects; `rejected` has the rejected ones.
     """
 
     Params = RejectParams
@@ -38,11 +38,11 @@ class Reject(Skill):
 
     made = In(GraspPlan, "how it was taken")
     impossible = In(bool, "it cannot be the target")
-    felt = In(tuple, "what was felt", key="touchsets", element=TouchSet)
-    before_rejected = In(tuple, "indices of candidates left alone so far", key="rejected", required=False)
+    felt = In(tuple, "touches so far", key="touchsets", element=TouchSet)
+    before_rejected = In(tuple, "indices of candidates rejected so far", key="rejected", required=False)
     before_doubted = In(tuple, "indices of candidates taken in vain so far", key="doubted", required=False)
-    touchsets = Out(tuple, "what was felt of the others", element=TouchSet)
-    rejected = Out(tuple, "indices of candidates left alone", element=int)
+    touchsets = Out(tuple, "touches of the others", element=TouchSet)
+    rejected = Out(tuple, "indices of rejected candidates", element=int)
     doubted = Out(tuple, "indices of candidates taken in vain", element=int)
 
     def run(self) -> SkillRun:

@@ -28,12 +28,12 @@ class SqueezeParams(ClosureParams):
 
 
 class Squeeze(Skill):
-    """Force-limited closures on one candidate.
+    """Squeeze one candidate with limited force at several heights.
 
-    A round candidate is squeezed at three yaws, 60 degrees apart; a box-like one on three parallel tracks across
-    its short side. Layers go from low to high: the first closure centres the object where it cannot topple.
+    A round candidate is squeezed at three yaws, 60 degrees apart; a box-like one on three parallel tracks across its
+    short side. Heights ascend: the first closure centres the object where it cannot topple.
 
-    SUCCESS: at least one stable layer; `touchset` holds all of them.
+    SUCCESS: there is at least one stable layer; `touchset` has all layers.
     """
 
     Params = SqueezeParams
@@ -56,10 +56,10 @@ class Squeeze(Skill):
     )
     FAILURES: ClassVar = (MOTION_REFUSED.with_meaning("the hand cannot be brought over the object"),)
 
-    candidate = In(Candidate, "what to squeeze")
+    candidate = In(Candidate, "object to squeeze")
     known = In(tuple, "all candidates, to keep clear of", key="candidates", element=Candidate, required=False)
-    jaw_zero = In(JawZero, "what the jaws report too much", required=False)
-    touchset = Out(TouchSet, "what was felt")
+    jaw_zero = In(JawZero, "offset of the reported aperture", required=False)
+    touchset = Out(TouchSet, "the touches")
 
     def run(self) -> SkillRun:
         """See the class."""
@@ -96,8 +96,8 @@ class Squeeze(Skill):
     def _sequence(self, candidate: Candidate, at: Stance, heights: Array) -> Motion[TouchSequence]:
         """Open over the candidate, close at each height from below, rise.
 
-        A height that gives no layer is tried once more a little beside it. What fails there too slopes or stands free,
-        and does so higher up: the sequence ends.
+        Retry a height without a stable layer once, at a height nearby. If the hand cannot close there either, end the
+        sequence: higher up the object slopes or stands free, too.
         """
         hand = Squeezing(self.context, candidate, at, self.params, self.jaw_zero)
         layers: list[Layer] = []
@@ -114,9 +114,9 @@ class Squeeze(Skill):
         return TouchSequence(np.asarray(at.position_K_m), hand.yaw_K_rad, tuple(layers))
 
     def _layer(self, hand: Squeezing, height_m: float) -> Motion[Layer | None]:
-        """One closure; None if it could not be made."""
+        """Make one closure; return its layer, or None if it could not be made."""
         if not (yield from hand.move_to(height_m)):
-            return None  # caught under something that sticks out
+            return None  # caught under a protruding part
         try:
             layer, object_motion = yield from hand.close()
         except MotionRefused as refusal:
@@ -128,7 +128,7 @@ class Squeeze(Skill):
 
 
 def _elsewhere(heights: Array) -> list[float]:
-    """For each height another one to try: half way to the next, of the highest half way to the one before."""
+    """Return for each height another one to try: half way to the next or, for the highest, to the one before."""
     if len(heights) == 1:
         return [float(heights[0]) + MIN_GAP_M]
     gaps = np.diff(heights)

@@ -1,4 +1,4 @@
-"""Touch where it tells most, until it is known which candidate is the target: one closure a call."""
+"""Make the most informative closure, one a call, until it is known which candidate is the target."""
 
 from __future__ import annotations
 
@@ -42,29 +42,28 @@ from glotouch_skills.common.planning import (
 if TYPE_CHECKING:
     from glotouch_bt.perception.recognition import Belief, TargetModel
 
-MAX_IN_VAIN = 4
-"""Closures without a plateau, after which a candidate is left alone: it is not where it was traced."""
+MAX_VAIN_CLOSURES = 4
+"""Number of closures without any plateau after which a candidate is skipped: it is not where it was traced."""
 
 STILL_THERE_M = 0.003
-"""A hand that stood beside a candidate before a break still does if it is this near."""
+"""After a resume, the hand still stands beside its candidate if it moved by less than this."""
 
 
 class TouchNextParams(ClosureParams):
     """Parameters of `touch_next`."""
 
     target: str = param("The object to find: an STL file, or the name of one in the world's object folder", names="stl")
-    confidence: float = param("Probability that is enough", default=0.95, gt=0.5, lt=1.0)
-    min_gain_nats: float = param(
-        "Expected gain below which no closure is worth it", default=0.005, ge=0.0, formerly="least_gain_nats"
-    )
+    confidence: float = param("Sufficient probability", default=0.95, gt=0.5, lt=1.0)
+    min_gain_nats: float = param("Least expected gain of a closure", default=0.005, ge=0.0, formerly="least_gain_nats")
 
 
 class TouchNext(Skill):
-    """Make the closure, of all candidates, yaws and heights, that is expected to tell most in its time.
+    """Make the closure with the largest expected information gain per time, over all candidates, yaws and heights.
 
-    Repeat it until `decided`. SUCCESS: one closure was tried, or `decided` is now true: one candidate, or none of them,
-    is the target with the wanted confidence, or nothing more can be learned; the hand is then high again. `match` says
-    which.
+    Repeat it until `decided`; then `match` says which candidate is the target.
+
+    SUCCESS: one closure was tried, or `decided` is true and the hand is high: one candidate, or none, is the target
+    with the required confidence, or no closure would be informative.
     """
 
     Params = TouchNextParams
@@ -82,12 +81,12 @@ class TouchNext(Skill):
     )
     FAILURES: ClassVar = (TOO_LOW, MOTION_REFUSED.with_meaning("the hand cannot rise"))
 
-    candidates = In(tuple, "what may be touched", element=Candidate)
-    felt = In(tuple, "what was felt so far", key="touchsets", element=TouchSet, required=False)
-    rejected = In(tuple, "indices of candidates to be left alone", required=False)
-    jaw_zero = In(JawZero, "what the jaws report too much", required=False)
-    touchsets = Out(tuple, "what was felt, one TouchSet per candidate", element=TouchSet)
-    decided = Out(bool, "no further closure is wanted")
+    candidates = In(tuple, "objects that may be touched", element=Candidate)
+    felt = In(tuple, "touches so far", key="touchsets", element=TouchSet, required=False)
+    rejected = In(tuple, "indices of rejected candidates", required=False)
+    jaw_zero = In(JawZero, "offset of the reported aperture", required=False)
+    touchsets = Out(tuple, "touches, one TouchSet for each candidate", element=TouchSet)
+    decided = Out(bool, "no further closure is needed")
 
     def __init__(self, name: str, params: SkillParams, context: Context) -> None:
         super().__init__(name, params, context)
@@ -98,14 +97,14 @@ class TouchNext(Skill):
         self._stood_B_m: Array | None = None
 
     def remember(self) -> object:
-        """See `Skill`: what was refused, and over which candidate the hand stands, down beside it."""
+        """See `Skill`: the refused options, and the stance of a lowered hand."""
         down = None
         if self._down is not None:
             down = (self._down.candidate, self._down.at, self.context.arm.pose_B_P.position_m)
         return {"refused": tuple(sorted(self._refused)), "down": down}
 
     def recall(self, remembered: Any) -> None:
-        """See `Skill`. The hand counts as down only if it is still there when the skill begins."""
+        """See `Skill`. The hand counts as lowered only if it has not moved when the skill begins."""
         self._refused = set(remembered["refused"])
         if remembered["down"] is not None:
             candidate, at, self._stood_B_m = remembered["down"]
@@ -123,14 +122,14 @@ class TouchNext(Skill):
             touchsets = tuple(felt.get(c.index, TouchSet(c, ())) for c in wanted)
             self._refused.clear()
             self._down = None
-        down, self._down = self._down, None  # if this is broken off, nobody knows where the hand stands
+        down, self._down = self._down, None  # after a preemption the hand's place is unknown
         stood, self._stood_B_m = self._stood_B_m, None
         if stood is not None and np.linalg.norm(self.context.arm.pose_B_P.position_m - stood) > STILL_THERE_M:
             down = None
         self.touchsets, self.decided = touchsets, False
-        yield HOLD  # thinking takes longer than a control period; on hardware the arm holds meanwhile
+        yield HOLD  # the computation takes longer than a control period; on hardware the arm holds meanwhile
         belief = recognition.believe(self._target_model(), touchsets)
-        self._hopeless = frozenset(t.candidate.index for t in touchsets if _in_vain(t) >= MAX_IN_VAIN)
+        self._hopeless = frozenset(t.candidate.index for t in touchsets if _in_vain(t) >= MAX_VAIN_CLOSURES)
         why = self._enough(belief)
         chosen = None if why else self._choose(belief, down)
         if chosen is None:
@@ -157,7 +156,7 @@ class TouchNext(Skill):
         )
 
     def _target_model(self) -> TargetModel:
-        """Kept on disk and in memory.
+        """Return the target's model, kept in memory.
 
         Raises:
             SkillFailed: `too_low`.
@@ -168,10 +167,10 @@ class TouchNext(Skill):
         return self._model
 
     def _enough(self, belief: Belief) -> str:
-        """Why no further closure is wanted, or empty.
+        """Return why no further closure is needed, or an empty text.
 
-        That none of them is the target is believed once each was felt, and the likeliest as often as would be needed to
-        take it: contours and single closures do not send the robot home.
+        Conclude that the target is absent only when every candidate was touched, and the likeliest as often as taking
+        it would require. Outlines and single closures do not suffice.
         """
         ranking = belief.ranking
         best = max(ranking.matches, key=lambda m: m.probability)
@@ -182,7 +181,7 @@ class TouchNext(Skill):
         return ""
 
     def _choose(self, belief: Belief, down: Squeezing | None) -> Option | None:
-        """The most telling closure for its time that can be made; None if none tells enough."""
+        """Return the feasible closure with the most gain per time, or None if none gains enough."""
         p, arm = self.params, self.context.arm
         pose_K_P = self.context.world.container.pose_B_K.inverse() @ arm.pose_B_P
         standing = None
@@ -210,20 +209,20 @@ class TouchNext(Skill):
     def _first(
         self, belief: Belief, found: list[Option], gains: list[Array], score: Array, down: Squeezing | None
     ) -> Option | None:
-        """The option of the highest positive score that has room."""
+        """Return the feasible option of the highest positive score."""
         for i in np.argsort(-score, kind="stable").tolist():
             if score[i] <= 0.0:
                 break
             option: Option = found[i]
             if _key(option) in self._refused:
                 continue
-            if self._has_room(belief, option, down):
+            if self._fits(belief, option, down):
                 return replace(option, closure=replace(option.closure, gain_nats=float(gains[i][0])))
             self._refused.add(_key(option))
         return None
 
     def _wanted(self, belief: Belief) -> set[int]:
-        """Candidates to be touched whatever it tells, for a decision that is only short of evidence; mostly none."""
+        """Return candidates to touch whatever the gain, where a decision lacks only evidence; mostly none."""
         ranking, confidence = belief.ranking, self.params.confidence
         if max(m.probability for m in ranking.matches) >= confidence:
             return _short_of_evidence(belief)
@@ -232,8 +231,8 @@ class TouchNext(Skill):
             return (unfelt or _short_of_evidence(belief)) - self._hopeless
         return set()
 
-    def _has_room(self, belief: Belief, option: Option, down: Squeezing | None) -> bool:
-        """The open hand fits beside the neighbours; where it stands already it does."""
+    def _fits(self, belief: Belief, option: Option, down: Squeezing | None) -> bool:
+        """Return True if the open hand fits beside the neighbours, as it does where it already stands."""
         if down is not None and option.at is down.at:
             return True
         arm = self.context.arm
@@ -252,7 +251,7 @@ class TouchNext(Skill):
     def _touch(
         self, candidates: tuple[Candidate, ...], chosen: Option, down: Squeezing | None
     ) -> Motion[tuple[Squeezing, Layer]]:
-        """Go there and close.
+        """Move to the option's stance and close.
 
         Raises:
             MotionRefused: It could not be made; the hand is high.
@@ -279,7 +278,7 @@ class TouchNext(Skill):
         return hand, layer
 
     def _rise(self, down: Squeezing | None) -> Motion[None]:
-        """Straight up, if the hand is low (after a preemption nobody knows over what)."""
+        """Rise if the hand is low; after a preemption, from an unknown stance."""
         if down is not None:
             yield from down.rise()
             return
@@ -305,7 +304,7 @@ class TouchNext(Skill):
 
 
 def _with_layer(touchset: TouchSet, hand: Squeezing, layer: Layer) -> TouchSet:
-    """With one more layer: in the sequence of the hand's stance, or in a new one."""
+    """Return the TouchSet with one more layer, in the sequence of the hand's stance or in a new one."""
     last = touchset.sequences[-1] if touchset.sequences else None
     if last is not None and last.position_K_m is hand.at.position_K_m:
         return replace(touchset, sequences=(*touchset.sequences[:-1], replace(last, layers=(*last.layers, layer))))
@@ -314,18 +313,18 @@ def _with_layer(touchset: TouchSet, hand: Squeezing, layer: Layer) -> TouchSet:
 
 
 def _short_of_evidence(belief: Belief) -> set[int]:
-    """The likeliest candidate, if it was not felt by both pads as often as a decision needs."""
+    """Return the likeliest candidate if both pads did not touch it as often as a decision requires."""
     best = max(belief.ranking.matches, key=lambda m: m.probability)
     return {best.index} if best.evidence < belief.params.evidence else set()
 
 
 def _in_vain(touchset: TouchSet) -> int:
-    """Closures without a plateau, if there was never one with."""
+    """Return the number of closures if none had a plateau, else 0."""
     return 0 if any(layer.stable for layer in touchset.layers) else len(touchset.layers)
 
 
 def _key(option: Option) -> tuple[int, int, int, int]:
-    """Candidate, yaw in degrees, height and place along the jaws' width in mm: for what was refused."""
+    """Return the key of a refused option: candidate, yaw in degrees, height and place along x_P in mm."""
     at = option.at
     along = float(at.position_K_m @ [np.cos(at.yaw_K_rad), np.sin(at.yaw_K_rad)])
     c = option.closure

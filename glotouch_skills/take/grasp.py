@@ -1,4 +1,4 @@
-"""Take hold of the chosen object."""
+"""Grasp the chosen object."""
 
 from __future__ import annotations
 
@@ -20,20 +20,24 @@ class GraspParams(SkillParams):
     force_N: float = param("Jaw force", unit="N", default=30.0, gt=0.0, le=30.0)
     closing_speed_m_s: float = param("Closing speed", unit="m/s", default=0.03, gt=0.0, le=0.2)
     travel_speed_m_s: float = param("Speed above the objects", unit="m/s", default=0.25, gt=0.0, le=0.25)
-    descent_speed_m_s: float = param("Speed down beside the object", unit="m/s", default=0.010, gt=0.0, le=0.04)
-    headroom_m: float = param("Fingertips above the floor on the way", unit="m", default=0.14, ge=0.05, le=0.25)
+    descent_speed_m_s: float = param(
+        "Speed of the descent beside the object", unit="m/s", default=0.010, gt=0.0, le=0.04
+    )
+    headroom_m: float = param(
+        "Height of the fingertips above the floor on the way", unit="m", default=0.14, ge=0.05, le=0.25
+    )
     side_gap_m: float = param("Least gap between open jaw and object", unit="m", default=0.005, ge=0.001, le=0.03)
     min_aperture_m: float = param(
-        "Closed farther than this: nothing held", unit="m", default=0.003, ge=0.0, formerly="least_aperture_m"
+        "Least aperture of jaws that hold something", unit="m", default=0.003, ge=0.0, formerly="least_aperture_m"
     )
 
 
 class Grasp(Skill):
-    """Go down over the object with open jaws and close on it with limited force; try the plan's alternatives in turn.
+    """Descend over the object with open jaws and close with limited force; try the plan's alternatives in turn.
 
-    Grasps of the plan that were made before (and did not last) come last.
+    Grasps that were made before, and did not last, come last.
 
-    SUCCESS: the jaws stopped on something; `grip_m` is their aperture, `made` the grasp.
+    SUCCESS: the jaws stopped on an object; `grip_m` is their aperture, `made` the grasp.
     """
 
     Params = GraspParams
@@ -51,7 +55,7 @@ class Grasp(Skill):
         advice="the object or a neighbour was moved; squeeze it again",
     )
 
-    plan = In(GraspPlan, "where and how wide")
+    plan = In(GraspPlan, "the planned grasps")
     known = In(tuple, "all candidates, to keep clear of", key="candidates", element=Candidate, required=False)
     before = In(tuple, "grasps made before", key="tried", required=False)
     grip_m = Out(float, "aperture of the closed jaws, m")
@@ -77,7 +81,7 @@ class Grasp(Skill):
         raise self.NO_GRASP(f"none of {len(tried)} grasps could be made; the last: {tried[-1]}", grasps=len(tried))
 
     def _attempt(self, plan: GraspPlan) -> Motion[float]:
-        """One grasp; the aperture of the closed jaws.
+        """Make one grasp and return the aperture of the closed jaws.
 
         Raises:
             MotionRefused: It could not be made; the hand is above the objects with open jaws.
@@ -111,10 +115,10 @@ class Grasp(Skill):
         return state.aperture_m
 
     def _opening(self, goal: Pose, plan: GraspPlan) -> float:
-        """The plan's opening, or a narrower one where neighbours leave no room for it.
+        """Return the plan's opening, or a narrower one where the hand would collide with neighbours.
 
         Raises:
-            MotionRefused: Not even the narrowest has room.
+            MotionRefused: Even the narrowest collides.
         """
         stroke = self.context.arm.description.gripper.stroke_m
         widest = min(plan.opening_m, stroke)
@@ -130,6 +134,6 @@ class Grasp(Skill):
 
 
 def _same(one: GraspPlan, other: GraspPlan) -> bool:
-    """Both take the same object at the same place."""
+    """Return True if both take the same object at the same place."""
     alike = (one.candidate, one.yaw_rad) == (other.candidate, other.yaw_rad)
     return alike and bool((one.position_K_m == other.position_K_m).all())

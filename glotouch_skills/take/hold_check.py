@@ -1,4 +1,4 @@
-"""Is what was lifted held as it was taken? Weight, opening and both gels are asked; two of three must say so."""
+"""Check that the lifted object is held as it was taken, by two of weight, aperture and gels."""
 
 from __future__ import annotations
 
@@ -15,19 +15,21 @@ from glotouch_skills.common.hand import weigh_N
 class HoldCheckParams(SkillParams):
     """Parameters of `hold_check`."""
 
-    look_s: float = param("How long gels and jaws are watched", unit="s", default=0.2, ge=0.05, le=2.0)
-    weight_kept: float = param("Least share of the weight felt when it was lifted", default=0.6, gt=0.0, le=1.0)
-    slip_m: float = param("The jaws may have moved so far since they closed", unit="m", default=0.004, gt=0.0, le=0.02)
+    look_s: float = param("Time for which gels and jaws are measured", unit="s", default=0.2, ge=0.05, le=2.0)
+    weight_kept: float = param("Least share of the weight measured at the lift", default=0.6, gt=0.0, le=1.0)
+    slip_m: float = param(
+        "Largest change of the aperture since the jaws closed", unit="m", default=0.004, gt=0.0, le=0.02
+    )
 
 
 class HoldCheck(Skill):
-    """Stand still with what was lifted and look whether it is held as it was taken.
+    """Stand still with the lifted object and check that it is held as it was taken.
 
-    Its weight must be what it was, the jaws as far apart as when they closed, and gels must be touched. One of the
-    three may err (a drifting wrist, a stuck report, a frozen image): two decide. Jaws that moved far are a slip
-    whatever the others say: it hangs by another place now.
+    Weight and aperture must be as before, and a gel must be touched. One of the three may be wrong (a drifting wrist, a
+    stuck report, a frozen image), so two decide. A large change of the aperture is always a slip: the object then hangs
+    by another place.
 
-    SUCCESS: it is held.
+    SUCCESS: the object is held.
     """
 
     Params = HoldCheckParams
@@ -83,5 +85,5 @@ class HoldCheck(Skill):
 
 
 def _touched(frame: TactileFrame) -> int:
-    """How many of the two gels something presses on."""
+    """Return how many of the two gels are touched."""
     return sum(patch_statistics(d).valid for d in (frame.left_m, frame.right_m))

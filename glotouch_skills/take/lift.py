@@ -1,4 +1,4 @@
-"""Lift what is held and make sure that it came along."""
+"""Lift the grasped object and check that it came along."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from glotouch_skills.common.hand import weigh_N
 class LiftParams(SkillParams):
     """Parameters of `lift`."""
 
-    height_m: float = param("How far to lift", unit="m", default=0.15, gt=0.0, le=0.3)
+    height_m: float = param("Height of the lift", unit="m", default=0.15, gt=0.0, le=0.3)
     speed_m_s: float = param("Lifting speed", unit="m/s", default=0.06, gt=0.0, le=0.2)
     min_weight_N: float = param(
-        "Less weight than this in the hand: nothing lifted", unit="N", default=0.3, ge=0.0, formerly="least_weight_N"
+        "Least weight of a lifted object", unit="N", default=0.3, ge=0.0, formerly="least_weight_N"
     )
     min_aperture_m: float = param(
-        "Closed farther than this: it was lost", unit="m", default=0.003, ge=0.0, formerly="least_aperture_m"
+        "Least aperture of jaws that hold something", unit="m", default=0.003, ge=0.0, formerly="least_aperture_m"
     )
 
 
 class Lift(Skill):
     """Raise the hand and check weight and aperture at the top.
 
-    SUCCESS: something with weight hangs in the closed jaws; the arm holds it up.
+    SUCCESS: an object with weight hangs in the jaws, and the arm holds it up.
     """
 
     Params = LiftParams
     params: LiftParams
 
     PRECONDITIONS: ClassVar = {"hand": frozenset({"object"})}
-    # `lost` is a verdict by weight and aperture: something light may still be between the pads.
+    # `lost` is decided by weight and aperture: a light object may still be between the pads.
     FAILURE_STATES: ClassVar = {"hand": frozenset({"object", "empty"})}
     USES: ClassVar = frozenset({"arm"})
 

@@ -1,4 +1,4 @@
-"""Can what hangs in the hand be the target? By its width where it is held, and by its weight."""
+"""Check by width and weight whether the object in the hand can be the target."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ if TYPE_CHECKING:
     from glotouch_bt.perception.recognition import TargetModel
 
 HEIGHT_SLACK_M = 0.006
-"""It may be held so much higher or lower on its body than planned: it was lifted at an edge, or stands on something."""
+"""The object may be held this much higher or lower than planned: it was lifted at an edge, or stood on something."""
 
 
 class ObjectCheckParams(SkillParams):
     """Parameters of `object_check`.
 
-    A gel gives by its depth at most, so the jaws stop between the width of the mesh and that less both depths: 0.8 to
-    3.0 mm below it on 14 of 14 retrieved objects (30 N, gels of 1.5 mm). Densities reach from balsa wood to steel: the
-    weight tells only what cannot be.
+    A gel yields by its depth at most, so the aperture is between the mesh's width and that width less both depths. It
+    was 0.8 to 3.0 mm below the width for 14 of 14 retrieved objects (30 N, gels of 1.5 mm). Densities range from balsa
+    wood to steel, so the weight only excludes the impossible.
     """
 
     target: str = param("The object wanted: an STL file, or the name of one in the world's object folder", names="stl")
-    width_m: float = param("The jaws may stop so far beside that", unit="m", default=0.0025, gt=0.0, le=0.02)
+    width_m: float = param("Largest deviation from that range", unit="m", default=0.0025, gt=0.0, le=0.02)
     lightest_kg_m3: float = param("Least density of the target", unit="kg/m3", default=100.0, gt=0.0)
     heaviest_kg_m3: float = param("Largest density of the target", unit="kg/m3", default=8000.0, gt=0.0)
 
 
 class ObjectCheck(Skill):
-    """Compare the width in the jaws with what the plan said, and the weight with the mesh's volume.
+    """Compare the aperture with the planned width, and the weight with the mesh's volume.
 
-    SUCCESS: it can be the target; `fits` is true.
+    SUCCESS: the object can be the target; `fits` is true.
     """
 
     Params = ObjectCheckParams
@@ -43,7 +43,7 @@ class ObjectCheck(Skill):
 
     PRECONDITIONS: ClassVar = {"hand": frozenset({"object"})}
     POSTCONDITIONS: ClassVar = {"hand": "object"}
-    USES: ClassVar = frozenset({"arm"})  # it holds the arm while it thinks
+    USES: ClassVar = frozenset({"arm"})  # it holds the arm while it computes
 
     NOT_AS_FELT = Failure(
         "not_as_felt",
@@ -108,14 +108,14 @@ class ObjectCheck(Skill):
 
 
 def misfit_m(width_m: Array, grip_m: float, give_m: float) -> Array:
-    """How far jaws that stopped at `grip_m` are from where they may stop on a width: up to `give_m` below it."""
+    """Return the distance of `grip_m` from the valid range, which reaches from the width to `give_m` below it."""
     return np.asarray(np.maximum(np.maximum(grip_m - width_m, width_m - give_m - grip_m), 0.0))
 
 
 def widths_m(model: TargetModel, height_m: float) -> Array:
-    """The model's widths about a height, at any yaw (n,).
+    """Return the model's widths (n,) near a height, at any yaw.
 
-    Only where a grasp would be planned, not over the ends of the mesh, where anything is narrow.
+    Use only places where a grasp would be planned, since anything is narrow at the ends of the mesh.
     """
     level = np.abs(model.z_m - height_m) <= HEIGHT_SLACK_M
     inner = np.abs(model.l_m) <= SHIFTS_M

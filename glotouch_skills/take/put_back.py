@@ -1,4 +1,4 @@
-"""Set down what is in the hand where it was taken."""
+"""Put the object in the hand back where it was taken."""
 
 from __future__ import annotations
 
@@ -13,32 +13,32 @@ from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Skill, Ski
 from glotouch_skills.common.hand import glide, keeping_clear_of, release, rise_clear
 from glotouch_skills.common.planning import GraspPlan
 
-OVER_M = 0.03
-"""From so far above its place it is lowered carefully."""
-REST_S = 1.5
-"""Jaws that lost what they held close; after so long they stand."""
-SHORT_M = 0.0015
-"""So far above its place it is let go: what is pressed on the floor by a stiff arm is pressed hard."""
+SLOW_FROM_M = 0.03
+"""Height above its place from which the object is lowered slowly."""
+JAW_REST_S = 1.5
+"""Longest wait for jaws that lost their object to stop closing."""
+RELEASE_HEIGHT_M = 0.0015
+"""Release the object at this height above its place: a stiff arm would press it hard on the floor."""
 
 
 class PutBackParams(SkillParams):
     """Parameters of `put_back`."""
 
     speed_m_s: float = param("Speed high above the objects", unit="m/s", default=0.10, gt=0.0, le=0.25)
-    approach_speed_m_s: float = param("Speed of going down to just above its place", unit="m/s", default=0.02, gt=0.0,
+    approach_speed_m_s: float = param("Speed of the descent to just above its place", unit="m/s", default=0.02, gt=0.0,
                                       le=0.10)  # fmt: skip
     lower_speed_m_s: float = param("Speed of setting down", unit="m/s", default=0.008, gt=0.0, le=0.04)
-    drop_m: float = param("It may stand so far above its place when it is let go", unit="m", default=0.015, ge=0.0,
+    drop_m: float = param("Largest height above its place at which it may be released", unit="m", default=0.015, ge=0.0,
                           le=0.05)  # fmt: skip
     min_aperture_m: float = param(
-        "Closed farther than this: nothing held", unit="m", default=0.003, ge=0.0, formerly="least_aperture_m"
+        "Least aperture of jaws that hold something", unit="m", default=0.003, ge=0.0, formerly="least_aperture_m"
     )
 
 
 class PutBack(Skill):
-    """Rise, lower what is in the hand to where it was taken, open gently, rise again. Empty jaws only open.
+    """Rise, lower the object to where it was taken, open gently, rise again. Empty jaws only open.
 
-    It is let go of when it stands: just above where it was taken, or where it meets something on the way down.
+    The object is released just above where it was taken, or where it touches something on the way down.
 
     SUCCESS: the jaws are open and high.
     """
@@ -75,10 +75,10 @@ class PutBack(Skill):
             return
         opening = min(max(made.opening_m, opening), arm.description.gripper.stroke_m)
         container = self.context.world.container
-        place = hand_pose_B(arm, container, made.position_K_m + np.array([0.0, 0.0, SHORT_M]), made.yaw_rad)
+        place = hand_pose_B(arm, container, made.position_K_m + np.array([0.0, 0.0, RELEASE_HEIGHT_M]), made.yaw_rad)
         high = float(arm.pose_B_P.position_m[2])
         over = Pose(np.array([*place.position_m[:2], high]), place.quat)
-        near = Pose(place.position_m + np.array([0.0, 0.0, OVER_M]), place.quat)
+        near = Pose(place.position_m + np.array([0.0, 0.0, SLOW_FROM_M]), place.quat)
         others = [c for c in self.known or () if c.index != made.candidate]
         with keeping_clear_of(arm, others):
             if np.linalg.norm(over.position_m - arm.pose_B_P.position_m) > 1e-3:
@@ -96,10 +96,10 @@ class PutBack(Skill):
         self.event("put_back", candidate=made.candidate, above_m=above)
 
     def _let_jaws_rest(self) -> SkillRun:
-        """Jaws that are still closing would be taken for jaws that hold something."""
+        """Wait until the jaws rest: jaws that are still closing would look like jaws that hold something."""
         arm = self.context.arm
         watch = JawRestDetector(arm.period_s)
-        for _ in range(round(REST_S / arm.period_s)):
+        for _ in range(round(JAW_REST_S / arm.period_s)):
             (seen,) = yield from arm.hold(arm.period_s)
             if watch.still(seen.now_s, seen.gripper):
                 return

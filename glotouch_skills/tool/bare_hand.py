@@ -1,4 +1,4 @@
-"""Touch with the fingers themselves: the closed hand as a tool with the fingers' outline as its section."""
+"""Make the closed hand the tool: its section is the outline of the fingers."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from glotouch_skills.common.hand import REQUEST_FAILED, finish
 from glotouch_skills.common.probe import corner_place
 
 TRAVEL_M_S = 0.1
+"""Speed on the way to the corner."""
 
 
 class BareHandParams(SkillParams):
@@ -23,15 +24,15 @@ class BareHandParams(SkillParams):
     aperture_m: float = param("Opening of the jaws while touching", unit="m", default=0.0, ge=0.0, le=0.085)
     yaw_deg: float = param("Direction of the fingers' width in B", unit="deg", default=0.0, ge=-180.0, le=180.0)
     corner_gap_m: float = param(
-        "The hand is brought over the corner by the holder, so far from both walls, where it can be lowered",
+        "Distance of the hand from both walls of the corner near the holder, over which it can be lowered",
         unit="m", default=0.026, ge=0.02, le=0.05,
     )  # fmt: skip
 
 
 class BareHand(Skill):
-    """Close the empty jaws, go over an empty corner, turn to the yaw kept while touching, zero the wrist sensor.
+    """Close the empty jaws, move over a free corner, turn to the yaw kept while touching, and tare.
 
-    SUCCESS: `tool` is the hand: it touches with the outline of its fingers.
+    SUCCESS: `tool` is the hand, whose section is the outline of its fingers.
     """
 
     Params = BareHandParams

@@ -1,4 +1,4 @@
-"""Whatever happened: rise clear of everything and put the probe away if it is held."""
+"""End safely: rise clear of everything and return the probe if it is held."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, Skill, SkillPa
 from glotouch_skills.common.hand import GRAVITY_M_S2, RISE_M_S, rise_clear, weigh_N
 from glotouch_skills.common.probe import HELD_TOLERANCE_M, RETURN_PROBE_FAILURES, nothing_in_hand, return_probe
 
-MIN_HELD_M, MIN_HELD_N = 0.003, 1.0
-"""Jaws farther apart than this that still press hold something."""
+MIN_HELD_M = 0.003
+"""The jaws hold something if the aperture is larger than this ..."""
+MIN_HELD_N = 1.0
+"""... and the jaw force larger than this."""
 
 
 class StowParams(SkillParams):
@@ -23,12 +25,12 @@ class StowParams(SkillParams):
 
 
 class Stow(Skill):
-    """Rise clear of the container, return a held probe to its holder, and hold. For endings, and for going on without.
+    """Rise clear of the container and return a held probe to its holder, to end a mission or go on without the probe.
 
-    It asks for no port, and may start with anything in the hand. If jaws and weight say that the probe was lost, the
-    hand is empty from now on; an object in the jaws is kept, for it must not fall from here.
+    The skill has no input port and may start with anything in the hand. If aperture and weight show that the probe was
+    lost, the hand counts as empty. An object in the jaws is kept, so that it does not fall.
 
-    SUCCESS: the hand is high and empty, the wrist zeroed.
+    SUCCESS: the hand is high and empty, the wrist tared.
     """
 
     Params = StowParams
@@ -75,6 +77,6 @@ class Stow(Skill):
         yield from nothing_in_hand(self.context)
 
     def _weighs(self, probe: Probe) -> Motion[bool]:
-        """True if the wrist, zeroed with the probe in the hand, does not miss its weight."""
+        """Return True if the wrist, tared with the probe in the hand, does not miss its weight."""
         missing_N = -(yield from weigh_N(self.context.arm))
         return missing_N < 0.5 * probe.mass_kg * GRAVITY_M_S2

@@ -1,4 +1,4 @@
-"""Zero the wrist sensor again."""
+"""Tare the wrist sensor."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from glotouch_skills.common.hand import REQUEST_FAILED, RISE_M_S, finish, rise_c
 class TareParams(SkillParams):
     """Parameters of `tare`."""
 
-    settle_s: float = param("Stands still so long first", unit="s", default=0.2, ge=0.0, le=2.0)
+    settle_s: float = param("Time of standing still first", unit="s", default=0.2, ge=0.0, le=2.0)
     speed_m_s: float = param("Speed of rising to free air", unit="m/s", default=RISE_M_S, gt=0.0, le=0.15)
 
 
 class Tare(Skill):
-    """Rise to free air if need be, stand still, zero the wrist sensor with what the controller knows is in the hand.
+    """Rise to free air if necessary, stand still, and tare the wrist sensor with the payload that the controller knows.
 
-    SUCCESS: the sensor reads nothing now.
+    SUCCESS: the sensor reads zero.
     """
 
     Params = TareParams
     params: TareParams
 
-    # An object in the hand, whose weight the controller does not know, would be zeroed away.
+    # The weight of an object in the hand, unknown to the controller, would be tared away.
     PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "probe"})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = (REQUEST_FAILED, MOTION_REFUSED.with_meaning("the hand cannot rise"))

@@ -1,4 +1,4 @@
-"""Find out where the ball is in the hand, and how late the wrist sensor reports, by touching the container's walls."""
+"""Measure the ball's place in the hand and the wrist sensor's latency by touching the container's walls."""
 
 from __future__ import annotations
 
@@ -17,44 +17,48 @@ from glotouch_skills.common.hand import may_touch
 from glotouch_skills.common.probe import corner_place, corner_walls, quiet_corner
 
 NEAR_M = 0.012
-"""So near to its corner in the plane the ball is taken straight there, else over the walls."""
+"""Within this planar distance of its corner, the ball moves straight there, otherwise over the walls."""
 LOW_M = 0.020
-"""Ball centre above the floor where it starts to rise."""
+"""Height of the ball's centre above the floor where it starts to rise."""
 TOUCH_SD_M = 3e-5
-"""Standard deviation of one touch: an onset is dated to a millisecond or two, and the handle gives a little."""
-LARGEST_RESIDUAL_M = 4e-4
-"""Touches that disagree by more were not of these walls, or the probe slipped in the jaws between them."""
-RISE_ACCELERATION_M_S2, RISE_JERK_M_S3 = 1.0, 20.0
-"""How the hand is shaken to be heard in the wrist: the robot-wide limits."""
+"""Standard deviation of one touch: the onset is known to 1 to 2 ms, and the handle yields a little."""
+MAX_RESIDUAL_M = 4e-4
+"""Touches that disagree by more were not of these walls, or the probe slipped between them."""
+RISE_ACCELERATION_M_S2 = 1.0
+"""Acceleration of the rise that excites the wrist sensor: the robot-wide limit."""
+RISE_JERK_M_S3 = 20.0
+"""Jerk of that rise: the robot-wide limit."""
 RATE_HZ = 1000.0
-"""Samples are laid on a grid of this rate: some may be missing."""
+"""Interpolate the samples to this rate, since some may be missing."""
 
 
 class ToolCalibrateParams(SkillParams):
     """Parameters of `tool_calibrate`.
 
-    Ball centre to wall and height leave the ball room to be centimetres from where it is believed to be, and keep the
-    shaft of a tilted probe off the wall's upper edge.
+    The defaults allow the ball to be centimetres from its nominal place, and keep the shaft of a tilted probe off the
+    wall's upper edge.
     """
 
     gap_m: float = param("Ball centre to each wall of the corner where it turns", unit="m", default=0.018, ge=0.012,
                          le=0.05)  # fmt: skip
-    below_edge_m: float = param("Ball centre below the walls' upper edge", unit="m", default=0.020, ge=0.010, le=0.06)
-    turn_deg: float = param("The hand is turned so far either way", unit="deg", default=90.0, ge=20.0, le=90.0)
+    below_edge_m: float = param(
+        "Depth of the ball's centre below the walls' upper edge", unit="m", default=0.020, ge=0.010, le=0.06
+    )
+    turn_deg: float = param("Turn of the hand to either side", unit="deg", default=90.0, ge=20.0, le=90.0)
     speed_m_s: float = param("Speed towards the walls", unit="m/s", default=0.015, gt=0.0, le=0.03)
     travel_speed_m_s: float = param("Speed between touches", unit="m/s", default=0.10, gt=0.0, le=0.15)
-    search_m: float = param("The walls are looked for so far past their place", unit="m", default=0.010, ge=0.001,
+    search_m: float = param("Search for the walls this far past their nominal place", unit="m", default=0.010, ge=0.001,
                             le=0.02)  # fmt: skip
 
 
 class ToolCalibrate(Skill):
     """Touch the two walls of the corner nearest to the holder with the hand straight and turned to either side.
 
-    How far apart the ball seems to be from the same wall at different yaws is how far it is from where it should hang;
-    the walls' own places cancel. Rising to the touching height shakes the hand: the delay of the wrist's force behind
-    the hand's acceleration is the sensor's latency.
+    Touches of the same wall at different yaws give the ball's offset from its nominal place in the hand; the errors of
+    the walls cancel. The rise to the touching height accelerates the hand: the delay of the wrist's force behind the
+    acceleration is the sensor's latency.
 
-    SUCCESS: `tool` says where the ball is in the hand, how well that is known, and the sensor's latency.
+    SUCCESS: `tool` has the ball's place in the hand, its standard deviation, and the sensor's latency.
     """
 
     PAUSE = "retreat"
@@ -109,7 +113,7 @@ class ToolCalibrate(Skill):
         self.tool = self._measured(listening, found)
 
     def _enter(self, tool: HeldTool, place: Array) -> Motion[None]:
-        """To just above the floor of the corner, from wherever the ball hangs."""
+        """Move to just above the floor of the corner, from anywhere."""
         world, p = self.context.world, self.params
         prober = Prober(self.context, tool, GuardParams(latency_s=tool.latency_s))
         if np.linalg.norm(prober.tip_K_m[:2] - place[:2]) > NEAR_M:
@@ -119,7 +123,7 @@ class ToolCalibrate(Skill):
         yield from self.context.arm.line(tool.pose_B_P(world, low), p.travel_speed_m_s)
 
     def _rise(self, tool: HeldTool, place: Array) -> Motion[tuple[float, float]]:
-        """Up to the touching height; the wrist sensor's latency and its standard deviation, s. Pauses come later."""
+        """Rise to the touching height; return the sensor's latency and its standard deviation, s. A pause waits."""
         with self.context.arm.pause_signal.finishing():
             return (yield from self._measured_rise(tool, place))
 
@@ -143,14 +147,14 @@ class ToolCalibrate(Skill):
         return wrench_delay(height, force, RATE_HZ)
 
     def _turn(self, tool: HeldTool, place: Array, yaw_B_rad: float) -> Motion[None]:
-        """About the vertical through the ball, through the grasp's yaw, so that the last joint stays off its stops."""
+        """Turn about the vertical through the ball, via the grasp's yaw to keep the last joint off its stops."""
         for yaw in (tool.yaw_B_rad, yaw_B_rad):
             goal = tool.pose_B_P(self.context.world, place, yaw)
             if abs(_wrapped(self.context.arm.pose_B_P.yaw_rad - yaw)) > 1e-3:
                 yield from self.context.arm.line(goal, self.params.travel_speed_m_s)
 
     def _touch_walls(self, tool: HeldTool, place: Array) -> Motion[list[WallTouch]]:
-        """One touch of each wall, from `place` and back."""
+        """Touch each wall once, from `place` and back."""
         p, arm = self.params, self.context.arm
         prober = Prober(self.context, tool, GuardParams(latency_s=tool.latency_s))
         sides = quiet_corner(self.context.world)
@@ -177,9 +181,9 @@ class ToolCalibrate(Skill):
         return found
 
     def _measured(self, tool: HeldTool, found: TipCalibration) -> HeldTool:
-        """The tool with what was found, if the touches agree."""
+        """Return the tool with the measured values, if the touches agree."""
         worst = float(np.abs(found.residuals_m).max())
-        if worst > LARGEST_RESIDUAL_M:
+        if worst > MAX_RESIDUAL_M:
             raise self.SLIPPED(f"touches of the walls disagree by {worst * 1e3:.2f} mm", residual_m=worst)
         latency = max(tool.latency_s + found.late_s, 0.0)
         measured = dataclasses.replace(

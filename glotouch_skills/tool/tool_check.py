@@ -1,4 +1,4 @@
-"""Is the probe still in the hand as it was? By the jaws' opening, by its weight, and where they differ by the floor."""
+"""Check that the probe is held as it was, by aperture and weight and, where they disagree, by touching the floor."""
 
 from __future__ import annotations
 
@@ -26,22 +26,24 @@ from glotouch_skills.common.probe import FEEL_FLOOR_FAILURES, HELD_TOLERANCE_M, 
 class ToolCheckParams(SkillParams):
     """Parameters of `tool_check`."""
 
-    light: float = param("Share of its weight that may be missing", default=0.5, gt=0.0, lt=1.0)
-    askew: float = param("Sine of the tilt at which it hangs askew, by its moment", default=0.25, gt=0.0, lt=1.0)
-    slip_m: float = param("The floor may be felt so far from where it was", unit="m", default=0.002, gt=0.0, le=0.005)
+    light: float = param("Largest share of its weight that may be missing", default=0.5, gt=0.0, lt=1.0)
+    askew: float = param("Sine of the largest tilt, from its moment", default=0.25, gt=0.0, lt=1.0)
+    slip_m: float = param("Largest change of the floor's height", unit="m", default=0.002, gt=0.0, le=0.005)
     touch: bool = param("Touch the floor even if jaws and weight agree", default=False)
     speed_m_s: float = param("Speed with the probe in the hand", unit="m/s", default=0.10, gt=0.0, le=0.15)
-    corner_gap_m: float = param("Ball centre to each wall at that corner", unit="m", default=0.014, ge=0.008, le=0.05)
+    corner_gap_m: float = param(
+        "Distance of the ball's centre from each wall of that corner", unit="m", default=0.014, ge=0.008, le=0.05
+    )
 
 
 class ToolCheck(Skill):
-    """Rise to free air and look: are the jaws as far apart as with the handle, does the probe weigh on the wrist?
+    """Rise to free air and compare aperture and weight with those of the held probe.
 
-    If both say so, it is held; if both say no, it is lost. If they differ (a drifted tare weighs, too; a stuck report
-    of the jaws shows nothing) the floor is touched in a free corner: without a probe nothing is met there. A probe that
-    turned in the jaws weighs as before, but aside: its moment tells, and it touches nothing more.
+    If both agree, the probe is held; if both disagree, it is lost. If one disagrees (a drifted tare looks like a
+    weight, and a frozen jaw report hides a loss), touch the floor in a free corner: without a probe nothing is touched
+    there. A probe that turned in the jaws weighs the same, but its moment shows the tilt; then nothing more is touched.
 
-    A hand that let go of it on purpose (`tool_return`, `stow`) need not look.
+    No check is needed after the probe was released on purpose (`tool_return`, `stow`).
 
     SUCCESS: the probe is held as it was taken.
     """
@@ -49,7 +51,7 @@ class ToolCheck(Skill):
     Params = ToolCheckParams
     params: ToolCheckParams
 
-    # On success it is known to be there, whatever happened before.
+    # After success the probe is in the hand, whatever happened before.
     PRECONDITIONS: ClassVar = {"hand": frozenset({"probe", "empty", "untared"})}
     POSTCONDITIONS: ClassVar = {"hand": "probe"}
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED})}
@@ -72,7 +74,7 @@ class ToolCheck(Skill):
     )
 
     taken = In(HeldTool, "the probe as it was taken", key="tool")
-    tool = Out(HeldTool, "the probe, the jaws as far apart as they are said to be now")
+    tool = Out(HeldTool, "the probe with its present aperture")
     tool_lost = Out(bool, "the probe is not in the hand", always=True)
 
     def run(self) -> SkillRun:
@@ -117,7 +119,7 @@ class ToolCheck(Skill):
         self.tool = replace(tool, aperture_m=apart)
 
     def _refuse_askew(self, moment_Nm: float, level_Nm: float) -> None:
-        """Refuse a probe that turned in the jaws; held level, its weight would turn the hand with `level_Nm`."""
+        """Refuse a probe that turned in the jaws; held horizontally, its weight would give a moment of `level_Nm`."""
         if not moment_Nm <= self.params.askew * level_Nm:
             raise self.TOOL_SLIPPED(
                 f"the probe hangs askew: its weight turns the hand with {moment_Nm * 1e3:.1f} mNm, hanging straight it "

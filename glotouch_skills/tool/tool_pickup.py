@@ -1,4 +1,4 @@
-"""Take the probe out of its holder and feel the floor with it."""
+"""Take the probe out of its holder and touch the floor with it."""
 
 from __future__ import annotations
 
@@ -25,14 +25,16 @@ from glotouch_skills.common.hand import (
 )
 from glotouch_skills.common.probe import FEEL_FLOOR_FAILURES, FLOOR_SEARCH_M, feel_floor
 
-MET_N = 8.0
-"""Change of force at which the open hand goes no farther down over the handle; unhindered it is below 2 N."""
-STUCK_N, OUT_M_S = 25.0, 0.05
-"""Change of force at which the probe is drawn out of its holder no farther, and how fast it is at most. At that speed
-a probe held by 3 N/mm is pulled by 2.5 N more until the arm stands: below the hard limit. A ball that snags on its slot
-pulls with up to 23 N (harsh, simulated), and comes out."""
+MAX_APPROACH_FORCE_N = 8.0
+"""Change of force that stops the open hand above the handle; without an obstacle it stays below 2 N."""
+MAX_PULL_FORCE_N = 25.0
+"""Change of force that stops the extraction. A ball that snags on its slot needs up to 23 N and comes out (harsh,
+simulated)."""
+MAX_PULL_M_S = 0.05
+"""Largest speed of the extraction. At this speed, a probe stuck with 3 N/mm is pulled by 2.5 N more until the arm
+stops, which stays below the hard limit."""
 HANDLE_TOLERANCE_M = 0.004
-"""The jaws hold the handle if they are this near to its width: twice the largest bias of their report, and its give."""
+"""The jaws hold the handle if the aperture is within this of its width: twice the largest bias, and compliance."""
 
 
 class ToolPickupParams(SkillParams):
@@ -41,16 +43,18 @@ class ToolPickupParams(SkillParams):
     grip_N: float = param("Jaw force on the handle", unit="N", default=60.0, gt=0.0, le=60.0)
     speed_m_s: float = param("Speed with the probe in the hand", unit="m/s", default=0.10, gt=0.0, le=0.15)
     free_speed_m_s: float = param("Speed of the empty hand", unit="m/s", default=0.25, gt=0.0, le=0.25)
-    floor_touch: bool = param("Touch the floor in a free corner to learn its height", default=True)
-    corner_gap_m: float = param("Ball centre to each wall at that corner", unit="m", default=0.014, ge=0.008, le=0.05)
+    floor_touch: bool = param("Touch the floor in a free corner to measure its height", default=True)
+    corner_gap_m: float = param(
+        "Distance of the ball's centre from each wall of that corner", unit="m", default=0.014, ge=0.008, le=0.05
+    )
 
 
 class ToolPickup(Skill):
-    """Grasp the probe in its holder, draw it out, tell the controller its weight, tare, and touch the floor.
+    """Grasp the probe in its holder, pull it out, set the payload, tare, and touch the floor.
 
-    Started with the probe in the jaws (it was broken off before), it goes on from there and never lets go of it.
+    If the probe is already in the jaws (after a preemption), continue from there without releasing it.
 
-    SUCCESS: the probe is held and its floor height is known.
+    SUCCESS: the probe is held and the floor's height is known.
     """
 
     PAUSE = "retreat"
@@ -91,7 +95,7 @@ class ToolPickup(Skill):
     )
 
     tool = Out(HeldTool, "the probe in the jaws")
-    jaw_zero = Out(JawZero, "what the jaws report too much, by the handle's width")
+    jaw_zero = Out(JawZero, "offset of the reported aperture, from the handle's width")
 
     def run(self) -> SkillRun:
         """See the class."""
@@ -109,7 +113,7 @@ class ToolPickup(Skill):
             weight_N = yield from weigh_N(arm)
         if weight_N < 0.5 * probe.mass_kg * GRAVITY_M_S2:
             apart = arm.aperture_m
-            arm.scene.hold_tool(self._handle_wide(apart))  # what they may hold is not dropped: the wrist may be wrong
+            arm.scene.hold_tool(self._handle_wide(apart))  # keep a possible probe: the wrist may be wrong
             raise self.PROBE_NOT_LIFTED(
                 f"the hand carries {weight_N:.2f} N; the probe weighs {probe.mass_kg * GRAVITY_M_S2:.2f} N; the jaws "
                 f"are {apart * 1e3:.1f} mm apart, the handle is {probe.handle_m[1] * 1e3:.1f}",
@@ -136,11 +140,11 @@ class ToolPickup(Skill):
         self.tool = tool
 
     def _handle_wide(self, aperture_m: float) -> bool:
-        """True if the jaws are as far apart as the handle is wide."""
+        """Return True if the aperture is the handle's width."""
         return abs(aperture_m - self.context.world.probe.handle_m[1]) <= HANDLE_TOLERANCE_M
 
     def _grip(self, yaw_B_rad: float) -> Motion[float]:
-        """Go down over the stowed probe with open jaws and close them on its handle; their aperture."""
+        """Descend over the stowed probe with open jaws, close on its handle, and return the aperture."""
         arm, world, p = self.context.arm, self.context.world, self.params
         grasp = Pose.pointing_down(world.holder.pose_B_grasp.position_m, yaw_B_rad)
         above = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, 0.06]))
@@ -152,7 +156,7 @@ class ToolPickup(Skill):
         )
         yield from finish(self.context.requests.start(Tare()), "tare")
         with may_touch(arm, "hand", "probe", "holder"):
-            guard = yield from straight_guard(arm, DOWN_B, MET_N)
+            guard = yield from straight_guard(arm, DOWN_B, MAX_APPROACH_FORCE_N)
             moved = yield from arm.line(grasp, 0.05, guard=guard)
             if (why := describe_stop(moved)) is not None:
                 yield from arm.line(above, 0.05)
@@ -173,7 +177,7 @@ class ToolPickup(Skill):
         return state.aperture_m
 
     def _rise(self, short_m: float) -> Motion[None]:
-        """Straight up until the ball is well above the holder, from `short_m` below the stowed probe's grasp.
+        """Rise until the ball is well above the holder, from `short_m` below the grasp of the stowed probe.
 
         Raises:
             SkillFailed: `hard_contact`.
@@ -182,14 +186,14 @@ class ToolPickup(Skill):
         arm, up = self.context.arm, self.context.world.probe.length_m + 0.06 + short_m
         if up <= 1e-4:
             return
-        guard = yield from straight_guard(arm, UP_B, STUCK_N)
-        speed_m_s = min(self.params.speed_m_s, OUT_M_S)
+        guard = yield from straight_guard(arm, UP_B, MAX_PULL_FORCE_N)
+        speed_m_s = min(self.params.speed_m_s, MAX_PULL_M_S)
         moved = yield from arm.shift(up * UP_B, speed_m_s, check=False, guard=guard)
         if (why := describe_stop(moved)) is not None:
             raise self.HARD_CONTACT(f"the probe does not come out of its holder: {why}", travelled_m=moved.travelled_m)
 
     def _feel_floor(self, tool: HeldTool) -> Motion[HeldTool]:
-        """Learn the floor's height in the corner nearest to the holder."""
+        """Measure the floor's height in the corner nearest to the holder."""
         floor_z = yield from feel_floor(self.context, tool, self.params.corner_gap_m, self.params.speed_m_s)
         if floor_z is None:
             raise self.NO_FLOOR(

@@ -17,9 +17,9 @@ class ToolReturnParams(SkillParams):
 
 
 class ToolReturn(Skill):
-    """Carry the probe over its holder, lower it in, open the jaws, rise, and tare the empty hand.
+    """Carry the probe over its holder, insert it, open the jaws, rise, and tare the empty hand.
 
-    The probe is let go of nowhere but in the holder, also when the skill is broken off.
+    The probe is released only in the holder, also on preemption.
 
     SUCCESS: the jaws are empty and above the holder.
     """
@@ -27,7 +27,7 @@ class ToolReturn(Skill):
     Params = ToolReturnParams
     params: ToolReturnParams
 
-    # `untared`: let go of, but not yet zeroed without it; nothing but this skill or `tool_pickup` may follow.
+    # `untared`: the probe is released, but the wrist is not yet tared; only this skill or `tool_pickup` may follow.
     PRECONDITIONS: ClassVar = {"hand": frozenset({"probe", "untared"})}
     POSTCONDITIONS: ClassVar = {"hand": "empty"}
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "untared"})}

@@ -1,4 +1,4 @@
-"""Does the wrist sensor read nothing in free air? A tare that drifted or went stale shows there."""
+"""Check that the wrist sensor reads zero in free air; a drifted or stale tare shows there."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from glotouch_skills.common.hand import RISE_M_S, STAND_S, rise_clear
 class WristCheckParams(SkillParams):
     """Parameters of `wrist_check`.
 
-    Half a newton is what the force drifts in five minutes at worst (harsh: 0.1 N/sqrt(min), two standard deviations),
-    and far below what a closure reacts to (3 N).
+    In five minutes the force drifts by half a newton at worst (harsh: 0.1 N/sqrt(min), two standard deviations). A
+    closure reacts to 3 N.
     """
 
     force_N: float = param("Largest force in free air", unit="N", default=0.5, gt=0.0, le=10.0)
     torque_Nm: float = param("Largest torque about the sensor in free air", unit="Nm", default=0.10, gt=0.0, le=3.0)
-    look_s: float = param("How long is looked", unit="s", default=0.15, ge=0.02, le=2.0)
+    look_s: float = param("Time over which the wrench is averaged", unit="s", default=0.15, ge=0.02, le=2.0)
     speed_m_s: float = param("Speed of rising to free air", unit="m/s", default=RISE_M_S, gt=0.0, le=0.15)
 
 
 class WristCheck(Skill):
-    """Rise to free air if need be, stand still, and look at the tared wrist: it must read nothing.
+    """Rise to free air if necessary, stand still, and check the tared wrist.
 
     SUCCESS: force and torque are within bounds.
     """

@@ -139,7 +139,7 @@ def test_a_candidate_that_is_gone_is_left_alone(make) -> None:
     """Nothing is ever felt: each candidate gets a few closures, then it ends."""
     b, skill = make(Oracle(right=1, enough=3), grip_width_m=None)
     repeat(b, skill)
-    assert [len(t.layers) for t in skill.touchsets] == [module.MAX_IN_VAIN] * 2
+    assert [len(t.layers) for t in skill.touchsets] == [module.MAX_VAIN_CLOSURES] * 2
     assert not any(layer.stable for t in skill.touchsets for layer in t.layers)
 
 

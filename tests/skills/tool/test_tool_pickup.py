@@ -10,7 +10,7 @@ from py_trees.common import Status
 
 from glotouch_bt.robot import GuardTripped
 from glotouch_skills.common.hand.line_guard import MAX_OFF_LINE_M
-from glotouch_skills.tool.tool_pickup import MET_N, STUCK_N, ToolPickup
+from glotouch_skills.tool.tool_pickup import MAX_APPROACH_FORCE_N, MAX_PULL_FORCE_N, ToolPickup
 
 STOWED = np.array([0.45, -0.32, -0.06])
 WEIGHT_N = 0.060 * 9.81
@@ -99,7 +99,7 @@ def test_a_probe_that_is_stuck_in_its_holder_is_not_torn_out(make) -> None:
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "hard_contact")
     assert b.arm.scene.holding_tool, "it is still in the jaws"
     assert b.arm.aperture_m < 0.0161
-    assert STUCK_N < b.robot.peak_force_N < b.robot.limits.hard_force_N
+    assert MAX_PULL_FORCE_N < b.robot.peak_force_N < b.robot.limits.hard_force_N
     assert not b.arm.scene._allowed
 
 
@@ -116,7 +116,7 @@ def test_an_open_hand_that_meets_something_on_the_way_down_does_not_press_on(mak
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "hard_contact")
     assert not b.arm.scene.holding_tool
     assert b.arm.pose_B_P.position_m[2] > STOWED[2] + 0.05
-    assert MET_N < b.robot.peak_force_N < 2.0 * MET_N
+    assert MAX_APPROACH_FORCE_N < b.robot.peak_force_N < 2.0 * MAX_APPROACH_FORCE_N
     assert not b.arm.scene._allowed
 
 
