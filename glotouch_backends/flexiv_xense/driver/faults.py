@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from .messages import ArmEvent
+from .messages import ArmEvent, Failed
 
 
 class DeviceFault(Exception):
@@ -25,6 +25,19 @@ class DeviceFault(Exception):
         super().__init__(message)
         self.kind, self.message, self.events = kind, message, tuple(events)
         self.age_s, self.limit_s = age_s, limit_s
+
+    def answer(self, number: int) -> Failed:
+        """Return the message that reports this fault as the answer to a request."""
+        cause = "" if self.__cause__ is None else f"{type(self.__cause__).__name__}: {self.__cause__}"
+        return Failed(
+            number=number,
+            kind=self.kind,
+            message=self.message,
+            cause=cause,
+            events=self.events,
+            age_s=self.age_s,
+            limit_s=self.limit_s,
+        )
 
 
 class CommandRefused(Exception):

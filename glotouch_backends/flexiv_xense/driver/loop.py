@@ -20,7 +20,6 @@ from .messages import (
     Accepted,
     Beat,
     Cycle,
-    Failed,
     HoldRequest,
     PayloadRequest,
     Quit,
@@ -66,18 +65,7 @@ class _DriverLoop:
             self._log("fault", kind=error.kind, message=error.message)
             with suppress(DeviceFault):  # the arm may be the device that failed
                 session.hold()
-        cause = "" if error.__cause__ is None else f"{type(error.__cause__).__name__}: {error.__cause__}"
-        self._socket.send(
-            Failed(
-                number=number,
-                kind=error.kind,
-                message=error.message,
-                cause=cause,
-                events=error.events,
-                age_s=error.age_s,
-                limit_s=error.limit_s,
-            )
-        )
+        self._socket.send(error.answer(number))
 
     def _answer(self, request: Request) -> bool:
         """Answer a request other than a cycle; return False to end the loop."""
@@ -96,7 +84,7 @@ class _DriverLoop:
             ask = getattr(session.devices.vendor, "referee", None)
             if ask is None:
                 fault = DeviceFault("vendor", "there is no referee: the devices are real")
-                self._socket.send(Failed(number=request.number, kind=fault.kind, message=fault.message))
+                self._socket.send(fault.answer(request.number))
             else:
                 self._socket.send(RefereeAnswer(number=request.number, answer=ask(request.question)))
         elif isinstance(request, Quit):

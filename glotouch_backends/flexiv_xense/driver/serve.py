@@ -56,8 +56,7 @@ def serve(socket: DriverSocket, log: Log, stopping: Callable[[], bool], *, forev
         devices = connect_devices(request, lambda text: socket.send(OpenProgress(text)))
     except DeviceFault as e:
         log("not opened", kind=e.kind, message=e.message)
-        cause = "" if e.__cause__ is None else f"{type(e.__cause__).__name__}: {e.__cause__}"
-        socket.send(Failed(number=request.number, kind=e.kind, message=e.message, cause=cause, events=e.events))
+        socket.send(e.answer(request.number))
         return 1
     try:
         session = DriverSession(devices, request)
@@ -69,7 +68,7 @@ def serve(socket: DriverSocket, log: Log, stopping: Callable[[], bool], *, forev
         loop.run(request.period_s)
     except DeviceFault as e:
         log("fault", kind=e.kind, message=e.message)
-        socket.send(Failed(number=request.number, kind=e.kind, message=e.message, events=e.events))
+        socket.send(e.answer(request.number))
         return 1
     finally:
         if request.move:
