@@ -1,4 +1,4 @@
-"""What a person looks at after a run: `write_report` makes report.html, `read_run` gives its arrays and events."""
+"""The report of a run: `read_run` returns its arrays and events, `write_report` writes report.html."""
 
 from glotouch_bt.report.run_record import PortWrite, RecordedEvent, RunRecord, Tick, read_run
 from glotouch_bt.report.write import write_report

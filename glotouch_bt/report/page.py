@@ -1,28 +1,29 @@
-"""The report's page: one self-contained HTML file, light and dark, no script and nothing from the network."""
+"""The HTML of the report: one self-contained page, light and dark, without scripts or network access."""
 
 from __future__ import annotations
 
 import html
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 from glotouch_bt.report.style import CSS
 
 
 def esc(value: object) -> str:
-    """Text safe inside HTML and SVG, attributes included."""
+    """Escape text for HTML and SVG, attributes included."""
     return html.escape(str(value), quote=True)
 
 
 def number(value: object, digits: int = 1, unit: str = "", scale: float = 1.0) -> str:
-    """A number for people, or an en dash for what is missing or not finite."""
+    """Format a number, or an en dash if it is missing or not finite."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         return "–"
     return f"{value * scale:.{digits}f}{' ' if unit else ''}{unit}".replace("-", "−", 1)
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], numeric_from: int = 1) -> str:
-    """An HTML table; cells are HTML already. Columns from `numeric_from` on are aligned right."""
+    """Return an HTML table of HTML cells; columns from `numeric_from` on are right-aligned."""
     titles = "".join(f"<th{' class=n' if i >= numeric_from else ''}>{h}</th>" for i, h in enumerate(head))
     body = "".join(
         "<tr>" + "".join(f"<td{' class=n' if i >= numeric_from else ''}>{c}</td>" for i, c in enumerate(row)) + "</tr>"
@@ -32,17 +33,28 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], numeric_from: int 
 
 
 def section(title: str, lead: str, body: str) -> str:
-    """A titled part of the page with one sentence that says how to read it."""
+    """Return a titled section of the page; `lead` explains how to read it."""
     return f'<section><h2>{esc(title)}</h2><p class="lead">{lead}</p>{body}</section>'
 
 
 def legend(entries: Iterable[tuple[str, str]]) -> str:
-    """Keys of a chart: (CSS class of the swatch, HTML label)."""
+    """Return the legend of a chart from (CSS class of the swatch, HTML label)."""
     return '<p class="legend">' + "".join(f'<span><i class="{c}"></i>{label}</span>' for c, label in entries) + "</p>"
 
 
+def short_text(value: Any) -> str:
+    """Return a value as one line: numbers to four digits, lists and objects shortened."""
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list):
+        return "[" + ", ".join(short_text(v) for v in value[:8]) + (", …]" if len(value) > 8 else "]")
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{k}: {short_text(v)}" for k, v in list(value.items())[:10]) + "}"
+    return str(value)
+
+
 def page(title: str, body: str) -> str:
-    """The whole document."""
+    """Return the whole document."""
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'

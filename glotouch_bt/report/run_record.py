@@ -1,7 +1,6 @@
-"""A run's folder read back: the arrays and events of run.mcap, result.json, and the truth if a study wrote it.
+"""Read a run's folder: the arrays and events of run.mcap, result.json, and truth.json of a simulation.
 
-Everything is optional but the record itself: a run that died early has few parts, and a record whose writer was killed
-is read up to its last complete chunk.
+Only the record is required. The record of a killed process is read up to its last complete chunk.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ _SCHEMA, _CHANNEL, _MESSAGE = 0x03, 0x04, 0x05
 
 @dataclass(frozen=True)
 class RecordedEvent:
-    """Something a skill found or decided: `data` as plain JSON (arrays are nested lists)."""
+    """An event of a skill; `data` is plain JSON (arrays are nested lists)."""
 
     stamp_s: float
     kind: str
@@ -41,7 +40,7 @@ class RecordedEvent:
 
 @dataclass(frozen=True)
 class Tick:
-    """A tree node changed its status."""
+    """A status change of a tree node."""
 
     stamp_s: float
     node: str
@@ -60,7 +59,7 @@ class PortWrite:
 
 @dataclass
 class RunRecord:
-    """One run.
+    """The content of one run's folder.
 
     Attributes:
         path: The record's file.
@@ -87,19 +86,19 @@ class RunRecord:
     complete: bool = False
 
     def of_kind(self, *kinds: str) -> list[RecordedEvent]:
-        """The events of these kinds."""
+        """Return the events of these kinds."""
         return [e for e in self.events if e.kind in kinds]
 
     @property
     def span_s(self) -> tuple[float, float]:
-        """Robot clock from the first to the last thing recorded; (0, 0) if nothing was."""
+        """Robot clock of the first and the last entry; (0, 0) if there is none."""
         stamps = [e.stamp_s for e in self.events] + [t.stamp_s for t in self.ticks]
         if len(self.samples.get("stamp_s", ())):
             stamps += [float(self.samples["stamp_s"][0]), float(self.samples["stamp_s"][-1])]
         return (min(stamps), max(stamps)) if stamps else (0.0, 0.0)
 
     def of_run(self, *path: str) -> Any:
-        """A value of the run's description, by its path of keys; None if it is not there."""
+        """Return a value of the run's description by its path of keys, or None."""
         value: Any = self.run
         for key in path:
             value = value.get(key) if isinstance(value, dict) else None
@@ -162,13 +161,13 @@ def read_run(path: str | Path) -> RunRecord:
     packed: dict[str, list[dict[str, Array]]] = {name: [] for name in _PACKED.values()}
     try:
         for topic, log_ns, data in _messages(file, record):
-            _take(record, packed, topic, log_ns, data)
+            _store(record, packed, topic, log_ns, data)
     except McapError as e:
         if type(e).__name__ == "InvalidMagic":
             raise BadInput(f"{file}: is not an MCAP record") from e
         record.complete = False
     except (struct.error, zstandard.ZstdError, OSError, ValueError, OverflowError):
-        record.complete = False  # a cut or damaged tail: what came before it stands
+        record.complete = False  # a cut or damaged tail; what came before is valid
     record.samples, record.cycles, record.tactile = (join(packed[n]) for n in ("samples", "cycles", "tactile"))
     folder = file.parent
     result = _json_file(folder / RESULT_NAME)
@@ -178,7 +177,7 @@ def read_run(path: str | Path) -> RunRecord:
 
 
 def _messages(file: Path, record: RunRecord) -> Iterator[tuple[str, int, bytes]]:
-    """Topic, log time in ns and bytes of every message but the plots, which the packed channels hold in full."""
+    """Yield topic, log time in ns and bytes of every message except plots (the packed channels hold their data)."""
     topics: dict[int, str] = {}
     with file.open("rb") as f:
         for item in StreamReader(f, emit_chunks=True).records:
@@ -195,7 +194,7 @@ def _messages(file: Path, record: RunRecord) -> Iterator[tuple[str, int, bytes]]
 
 
 def _of_chunk(chunk: Chunk, topics: dict[int, str]) -> Iterator[tuple[str, int, bytes]]:
-    """The messages of one chunk that are not plots; mcap's own reader takes ten times as long over the plots."""
+    """Yield the messages of one chunk except plots. The reader of `mcap` would take ten times as long."""
     if chunk.compression != "zstd":
         for r in breakup_chunk(chunk):
             if type(r).__name__ == "Channel":
@@ -224,7 +223,7 @@ def _wanted(topic: str) -> bool:
     return topic.startswith((EVENT_PREFIX, "/packed/", "/tree/"))
 
 
-def _take(record: RunRecord, packed: dict[str, list[dict[str, Array]]], topic: str, log_ns: int, data: bytes) -> None:
+def _store(record: RunRecord, packed: dict[str, list[dict[str, Array]]], topic: str, log_ns: int, data: bytes) -> None:
     if topic in _PACKED:
         start_ns, columns = unpack(data)
         for name in ("stamp_s", "gripper_stamp_s", "arrived_s"):
@@ -243,7 +242,7 @@ def _take(record: RunRecord, packed: dict[str, list[dict[str, Array]]], topic: s
 
 
 def _json_file(path: Path) -> Any:
-    """The file's content, or None if there is none or it is not JSON (a run that was killed while writing it)."""
+    """Return the file's content, or None if there is no file or it is not JSON."""
     try:
         return json.loads(path.read_text())
     except (OSError, ValueError):

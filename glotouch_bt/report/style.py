@@ -1,4 +1,4 @@
-"""The report's look: CSS with one set of variables for light and one for dark."""
+"""The CSS of the report, with one set of variables for light and one for dark."""
 
 CSS = """
 :root{color-scheme:light dark;--bg:#f5f6f8;--card:#fff;--ink:#14181f;--soft:#5a6472;--line:#dfe3e8;--grid:#e9ecf0;

@@ -1,4 +1,4 @@
-"""Small pieces of SVG: scales, ticks, axes, polylines. Colours are the page's CSS variables."""
+"""SVG elements: scales, ticks, axes, polylines. Colours are CSS variables of the page."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ class AxisScale:
     end: float
 
     def __call__(self, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Pixels of values of any shape."""
+        """Return the pixels of values of any shape."""
         span = self.high - self.low or 1.0
         return self.start + (np.asarray(value, dtype=np.float64) - self.low) / span * (self.end - self.start)
 
     def at(self, value: float) -> float:
-        """One value's pixel."""
+        """Return the pixel of one value."""
         return float(self(value))
 
     def ticks(self, about: int = 6) -> list[float]:
-        """Round values inside the range, roughly `about` of them."""
+        """Return about `about` round values inside the range."""
         span = self.high - self.low
         if not (span > 0 and math.isfinite(span)):
             return [self.low]
@@ -41,28 +41,28 @@ class AxisScale:
 
 
 def points(x: npt.ArrayLike, y: npt.ArrayLike) -> str:
-    """The `points` attribute of pixel coordinates, to a tenth of a pixel."""
+    """Return the `points` attribute of pixel coordinates, to a tenth of a pixel."""
     return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(np.ravel(x).tolist(), np.ravel(y).tolist(), strict=True))
 
 
 def polyline(x: npt.ArrayLike, y: npt.ArrayLike, style: str, closed: bool = False) -> str:
-    """A line through pixel coordinates."""
+    """Return a line through pixel coordinates."""
     name = "polygon" if closed else "polyline"
     return f'<{name} points="{points(x, y)}" style="{style}"/>'
 
 
 def label(x: float, y: float, text: str, css: str = "") -> str:
-    """Text (escaped already) at a pixel."""
+    """Return a label at a pixel; `text` is escaped already."""
     return f'<text x="{x:.1f}" y="{y:.1f}"' + (f' class="{css}"' if css else "") + f">{text}</text>"
 
 
 def tick_text(value: float) -> str:
-    """A tick's value without noise digits."""
+    """Format a tick without rounding noise."""
     return f"{value:.10g}".replace("-", "−")
 
 
 def x_axis(scale: AxisScale, top: float, bottom: float, title: str, about: int = 9) -> str:
-    """Grid lines, tick labels and the title under a chart."""
+    """Return grid lines, tick labels and the title below a chart."""
     out = []
     for t in scale.ticks(about):
         x = scale.at(t)
@@ -74,7 +74,7 @@ def x_axis(scale: AxisScale, top: float, bottom: float, title: str, about: int =
 
 
 def y_axis(scale: AxisScale, left: float, right: float, title: str, about: int = 5) -> str:
-    """Grid lines, tick labels and the title above a chart."""
+    """Return grid lines, tick labels and the title above a chart."""
     out = []
     for t in scale.ticks(about):
         y = scale.at(t)
@@ -86,5 +86,5 @@ def y_axis(scale: AxisScale, left: float, right: float, title: str, about: int =
 
 
 def picture(width: float, height: float, body: str, title: str) -> str:
-    """An SVG element that fills its column; `title` (escaped already) is what a screen reader says."""
+    """Return an SVG element as wide as its column; `title` (escaped already) is for screen readers."""
     return f'<svg viewBox="0 0 {width:.0f} {height:.0f}" role="img" aria-label="{title}">{body}</svg>'

@@ -1,4 +1,4 @@
-"""The truth of a simulated run, as far as a study wrote it: outlines of the real objects in K, for comparison only."""
+"""The true outlines of a simulated run's objects in K, from truth.json, for comparison only."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from glotouch_bt.robot import Array
 
 @dataclass(frozen=True)
 class TrueOutline:
-    """One object as it really stood.
+    """The true place of one object.
 
     Attributes:
         name: STL stem.
@@ -27,22 +27,22 @@ class TrueOutline:
 
     @property
     def centre_K_m(self) -> Array:
-        """(2,) middle of the outline's bounding box at the start."""
+        """Middle (2,) of the outline's bounding box at the start."""
         return np.asarray(0.5 * (self.start_K_m.min(axis=0) + self.start_K_m.max(axis=0)))
 
     @property
     def moved_m(self) -> float:
-        """How far the outline's corners went, on average; 0 if the end is not known."""
+        """Mean displacement of the outline's corners; 0 if the end is unknown."""
         if self.end_K_m is None or self.end_K_m.shape != self.start_K_m.shape:
             return 0.0
         return float(np.linalg.norm(self.end_K_m - self.start_K_m, axis=1).mean())
 
 
 def true_outlines(record: RunRecord) -> list[TrueOutline]:
-    """The objects of truth.json.
+    """Return the objects of truth.json.
 
     It is a list of {name, outline_B_m: {start, end}}; `outline_B_m` as a bare list is the start, and
-    {start: [...], end: [...]} with a list of objects each is understood too. What cannot be read is left out.
+    {start: [...], end: [...]} with a list of objects each is accepted, too. Unreadable entries are left out.
     """
     pose = record.pose_B_K
     if pose is None:
@@ -74,7 +74,7 @@ def true_outlines(record: RunRecord) -> list[TrueOutline]:
 
 
 def _polygon(item: dict[str, Any], when: str, bare: bool = True) -> Array | None:
-    """(n, 2) in B of one object, from any of the forms it is written in."""
+    """Return the outline (n, 2) in B of one object, from any of the accepted forms."""
     both = item.get("outline_B_m")
     nested = item.get(when)
     candidates = [

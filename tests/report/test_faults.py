@@ -7,8 +7,8 @@ from pathlib import Path
 from glotouch_bt.faults import FaultInjector
 from glotouch_bt.faults.plan import check_plan
 from glotouch_bt.mission.read.yaml_source import parse_yaml
-from glotouch_bt.report.faults import faults_section
 from glotouch_bt.report.run_record import RunRecord
+from glotouch_bt.report.sections.faults import faults_section
 from glotouch_bt.robot import HOLD
 from glotouch_bt.robot.fake import FakeRobot
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from glotouch_bt.mission.record.mcap_scene import event_scene
-from glotouch_bt.report.map import contour_of
+from glotouch_bt.report.sections.map import contour_of
 
 CORNERS = [[0.02, 0.0], [0.0, 0.03], [-0.02, 0.0]]
 

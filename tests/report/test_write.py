@@ -12,8 +12,8 @@ import pytest
 
 from glotouch_bt.mission.record.recorder import Recorder
 from glotouch_bt.report import read_run, write_report
-from glotouch_bt.report.map import tip_path_K_m
-from glotouch_bt.report.timeline import spans
+from glotouch_bt.report.sections.map import tip_path_K_m
+from glotouch_bt.report.sections.timeline import spans
 from glotouch_bt.report.truth import true_outlines
 from glotouch_bt.robot import BadInput
 

@@ -1,4 +1,4 @@
-"""When each node of the tree ran, and how it ended."""
+"""The section of the timeline: when each node of the tree ran, and how it ended."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from glotouch_bt.report.page import esc, legend, section
 from glotouch_bt.report.run_record import RunRecord
 from glotouch_bt.report.svg import AxisScale, label, picture, x_axis
 
-ROWS = 60
+MAX_ROWS = 60
+"""Nodes shown."""
 _COLOUR = {"SUCCESS": "var(--good)", "FAILURE": "var(--bad)"}
 
 
@@ -23,7 +24,7 @@ class Span:
 
 
 def spans(record: RunRecord) -> list[Span]:
-    """All runs of all nodes, in the order they began. A node that never ended gets the status RUNNING."""
+    """Return all runs of all nodes in order of their start; a run without an end has the status RUNNING."""
     begun: dict[str, float] = {}
     out: list[Span] = []
     for tick in record.ticks:
@@ -39,15 +40,15 @@ def spans(record: RunRecord) -> list[Span]:
 
 
 def timeline_section(record: RunRecord) -> str:
-    """The section, or nothing if no tick was recorded."""
+    """Return the section, or nothing if no tick was recorded."""
     found = spans(record)
     if not found:
         return ""
     nodes = _ordered([s.node for s in found])
     total = len(nodes)
-    if total > ROWS:  # the upper levels tell the story
-        depth = max(d for d in range(1, 40) if sum(n.count("/") < d for n in nodes) <= ROWS or d == 1)
-        nodes = [n for n in nodes if n.count("/") < depth][:ROWS]
+    if total > MAX_ROWS:  # show the upper levels
+        depth = max(d for d in range(1, 40) if sum(n.count("/") < d for n in nodes) <= MAX_ROWS or d == 1)
+        nodes = [n for n in nodes if n.count("/") < depth][:MAX_ROWS]
     start_s, end_s = record.span_s
     width, left, right, row, top = 1060.0, 250.0, 1050.0, 22.0, 8.0
     bottom = top + row * len(nodes) + 4
@@ -81,14 +82,14 @@ def timeline_section(record: RunRecord) -> str:
     keys = [("k-good", "succeeded"), ("k-bad", "failed"), ("k-idle", "stopped or still running")]
     more = f" The {len(nodes)} upper nodes of {total} are shown." if len(nodes) < total else ""
     lead = (
-        "Each line is a node of the mission's tree, children indented; a bar is one run of it, a diamond an instant "
-        f"answer.{more}"
+        "Each line is a node of the mission's tree, with its children indented. A bar is one run of the node; a "
+        f"diamond is a run that ended in the same tick.{more}"
     )
     return section("Timeline of the tree", lead, chart + legend(keys))
 
 
 def _ordered(nodes: list[str]) -> list[str]:
-    """Each node once, parents above their children, siblings in the order they first ran."""
+    """Return each node once, parents before children, siblings in the order of their first run."""
     first: dict[str, int] = {}
     for i, n in enumerate(nodes):
         for cut in [k for k, c in enumerate(n) if c == "/"] + [len(n)]:

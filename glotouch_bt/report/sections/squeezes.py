@@ -1,4 +1,4 @@
-"""The depth maps of every squeeze as small pictures on one colour scale."""
+"""The section of the squeezes: every depth map as a small picture, on one colour scale."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ MISSING = 255
 
 
 def palette() -> npt.NDArray[np.uint8]:
-    """(255, 3) colours from no indentation to the deepest."""
+    """Return colours (255, 3) from no indentation to the deepest."""
     at = np.linspace(0, len(_ANCHORS) - 1, 255)
     ramp = [np.interp(at, np.arange(len(_ANCHORS)), _ANCHORS[:, k]) for k in range(3)]
     return np.stack(ramp, axis=1).round().astype(np.uint8)
 
 
 def depth_png(depth_m: Array, deepest_m: float) -> bytes:
-    """A PNG of one depth map; taxels that delivered nothing are transparent."""
+    """Return a PNG of one depth map; taxels without data are transparent."""
     level = np.clip(np.nan_to_num(depth_m / deepest_m, nan=0.0), 0.0, 1.0) * 254
     pixels = np.where(np.isfinite(depth_m), level.round(), MISSING).astype(np.uint8)
     image = Image.fromarray(pixels).convert("L")
@@ -39,8 +39,8 @@ def depth_png(depth_m: Array, deepest_m: float) -> bytes:
     return out.getvalue()
 
 
-def depth_section(record: RunRecord) -> str:
-    """All squeezes: a row for each closure sequence, a pair of pads for each height."""
+def squeezes_section(record: RunRecord) -> str:
+    """Return a row for each closure sequence and a pair of pads for each height, or nothing."""
     sets = [e.data["touchset"] for e in record.of_kind("touchset") if isinstance(e.data.get("touchset"), dict)]
     if not sets:
         return ""
@@ -56,10 +56,9 @@ def depth_section(record: RunRecord) -> str:
         f"{number(deepest, 2, 'mm', 1e3)}</p>"
     )
     lead = (
-        "What the two gel pads felt each time the jaws closed: left pad and right pad side by side, the upper edge "
-        "nearest the wrist. Each row is one sequence of closures from low to high; beneath, the height of the pads "
-        "above the floor, the opening between them, and the force. Faded pictures did not come to rest and carry no "
-        "weight."
+        "The indentation of the two gel pads at each closure of the jaws, left and right pad side by side, upper edge "
+        "towards the wrist. Each row is one sequence of closures from low to high. Captions give the height of the "
+        "pads above the floor, the opening and the force. Faded closures did not come to rest and are not used."
     )
     return section("Squeezes", lead, bar + f'<div class="sets">{"".join(_set(s, deepest) for s in sets)}</div>')
 
@@ -69,7 +68,7 @@ def _layers(touchset: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _pads(layer: dict[str, Any]) -> list[Array]:
-    """Left and right depth map of a recorded layer; missing taxels are null there and NaN here."""
+    """Return the left and right depth map of a recorded layer, with NaN for null."""
     out = []
     for key in ("left_m", "right_m"):
         try:

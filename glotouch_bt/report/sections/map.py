@@ -1,4 +1,4 @@
-"""The map: the container from above with the probe's path, contacts, fitted contours, the jaws, and the truth."""
+"""The section of the map: the container from above with path, contacts, fitted contours, jaws, and the truth."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from glotouch_bt.perception.touch import Contour
-from glotouch_bt.report.force import contact_of
 from glotouch_bt.report.page import esc, legend, number, section, table
 from glotouch_bt.report.run_record import RunRecord
+from glotouch_bt.report.sections.force import contact_of
 from glotouch_bt.report.svg import AxisScale, label, picture, points, polyline
 from glotouch_bt.report.truth import TrueOutline, true_outlines
 from glotouch_bt.robot import Array
@@ -19,7 +19,7 @@ PATH_POINTS = 4000
 
 
 def candidates(record: RunRecord) -> list[dict[str, Any]]:
-    """The candidates found, last word on each index, by index."""
+    """Return the last entry of each candidate, in order of index."""
     found: dict[int, dict[str, Any]] = {}
     for e in record.of_kind("candidate", "touchset"):
         holder = e.data.get("touchset") if e.kind == "touchset" else e.data
@@ -30,7 +30,7 @@ def candidates(record: RunRecord) -> list[dict[str, Any]]:
 
 
 def contour_of(candidate: dict[str, Any]) -> Contour | None:
-    """The contour of a recorded candidate, or None if it is not one."""
+    """Return the contour of a recorded candidate, or None if it is invalid."""
     c: Any = candidate.get("contour")
     try:
         return Contour(
@@ -48,7 +48,7 @@ def contour_of(candidate: dict[str, Any]) -> Contour | None:
 
 
 def _corners(contour: dict[str, Any]) -> Array:
-    """(n, 2) corners of a recorded free outline; ValueError if they are none."""
+    """Return the corners (n, 2) of a recorded free outline; raise ValueError if they are invalid."""
     corners = np.asarray(contour["boundary_K_m"], float)
     if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3 or not np.isfinite(corners).all():
         raise ValueError("not the corners of an outline")
@@ -56,7 +56,7 @@ def _corners(contour: dict[str, Any]) -> Array:
 
 
 def tip_path_K_m(record: RunRecord) -> Array:
-    """(n, 3) path of the probe's ball in K while the probe was held; NaN rows are breaks; (0, 3) if it is not known."""
+    """Return the path (n, 3) of the probe's ball in K while it was held; NaN rows are gaps; (0, 3) if unknown."""
     nothing = np.zeros((0, 3))
     pose, stamp = record.pose_B_K, record.samples.get("stamp_s")
     if pose is None or stamp is None or len(stamp) == 0:
@@ -74,18 +74,18 @@ def tip_path_K_m(record: RunRecord) -> Array:
 
 
 def map_section(record: RunRecord) -> str:
-    """The map and the table of candidates, or nothing if the container is not known."""
+    """Return the map and the table of candidates, or nothing if the container is unknown."""
     interior = record.interior_m
     if interior is None:
         return ""
     truth = true_outlines(record)
     found = candidates(record)
     lead = (
-        "The container from above (x to the right, y up, millimetres from its middle). The probe's ball moved along "
-        "the grey path; where it touched, the outline of an object was fitted."
+        "The container from above (x to the right, y up, millimetres from its middle). The grey line is the path of "
+        "the probe's ball; outlines are fitted to its contacts."
     )
     if truth:
-        lead += " Green is where the objects really stood: known in simulation only, and to this report only."
+        lead += " Green shows the true outlines, which are known in simulation only and used in this report only."
     return section("Map", lead, _picture(record, interior, found, truth) + _table(found, truth))
 
 
@@ -170,7 +170,7 @@ def _picture(
 
 
 def _path(record: RunRecord, x: AxisScale, y: AxisScale, interior: tuple[float, float, float]) -> str:
-    """The probe's path inside the container, broken where it leaves it."""
+    """Return the probe's path inside the container, with gaps where it leaves it."""
     tip = tip_path_K_m(record)
     if len(tip) == 0 or not np.isfinite(tip).any():
         pieces = [np.asarray(e.data.get("path_K_m") or [], float) for e in record.of_kind("sweep")]
@@ -185,7 +185,7 @@ def _path(record: RunRecord, x: AxisScale, y: AxisScale, interior: tuple[float, 
 
 
 def _jaws(record: RunRecord, x: AxisScale, y: AxisScale) -> list[str]:
-    """The two pads at every stable closure, as lines along x_P at half the aperture to either side."""
+    """Return the two pads of the first closure of each sequence, as lines along x_P."""
     out: list[str] = []
     for e in record.of_kind("touchset"):
         touchset = e.data.get("touchset")

@@ -1,4 +1,4 @@
-"""The decision: every candidate's loss or probability, what it is made of, and the gates or reasons."""
+"""The section of the recognition: loss or probability of each candidate, its terms, and the gates or reasons."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from glotouch_bt.report.svg import AxisScale, label, picture, x_axis
 COLOURS = 6
 
 
-def ranking_section(record: RunRecord) -> str:
-    """The last ranking made, or nothing."""
+def recognition_section(record: RunRecord) -> str:
+    """Return the last ranking, or nothing."""
     events = record.of_kind("ranking")
     if not events:
         return ""
@@ -27,21 +27,20 @@ def ranking_section(record: RunRecord) -> str:
         return _by_probability(ranking, matches, names, esc(target))
     matches.sort(key=lambda m: (_loss(m), str(m.get("index"))))
     lead = (
-        f"How badly each candidate fits {esc(target)}: the loss, least first. The best is taken only if it leads "
-        "clearly (margin), fits well (loss) and was felt enough (evidence)."
+        f"The loss of each candidate as {esc(target)}, lowest first. The best is accepted only if its margin, loss and "
+        "evidence pass the gates."
     )
     body = _gates(ranking, data, matches) + _bars(matches, names) + _table(matches, names, accepted)
     return section("Recognition", lead, body)
 
 
 def _by_probability(ranking: dict[str, Any], matches: list[dict[str, Any]], names: list[str], target: str) -> str:
-    """Of a matcher that decides on probability: shares of the candidates and of none, as they are in the record."""
+    """Return the section for a matcher with probabilities: of each candidate and of none."""
     accepted = bool(ranking.get("accepted"))
     matches = sorted(matches, key=lambda m: -(_share(m) or 0.0))
     lead = (
-        f"How probable it is that each candidate, or none of them, is {target}, after all that was felt. The best is "
-        "taken only if it is probable enough and was felt enough. The terms say what speaks for it (positive) or for "
-        "some other object, in nats."
+        f"The probability that each candidate, or none of them, is {target}. The best is accepted only if its "
+        "probability and its evidence are high enough. The terms are in nats; positive values support the target."
     )
     shares = [(f"candidate {esc(m.get('index', '?'))}", _share(m) or 0.0) for m in matches]
     absent = ranking.get("p_absent")
@@ -57,7 +56,7 @@ def _share(match: dict[str, Any]) -> float | None:
 
 
 def _share_bars(shares: list[tuple[str, float]]) -> str:
-    """One bar a hypothesis, from 0 to 1."""
+    """Return one bar per hypothesis, from 0 to 1."""
     width, left, right, row, top = 1060.0, 110.0, 980.0, 30.0, 14.0
     bottom = top + row * len(shares)
     x = AxisScale(0.0, 1.0, left, right)
@@ -73,12 +72,12 @@ def _share_bars(shares: list[tuple[str, float]]) -> str:
     return f'<div style="margin-top:18px">{picture(width, bottom + 38, "".join(out), "probabilities")}</div>'
 
 
-def _verdict(ranking: dict[str, Any]) -> str:
-    """Accepted or not, and why not."""
+def _verdict(ranking: dict[str, Any], details: str = "") -> str:
+    """Return accepted or not, with the reasons."""
     accepted = bool(ranking.get("accepted"))
     chip = '<span class="chip good">accepted</span>' if accepted else '<span class="chip bad">not accepted</span>'
     reasons = "".join(f"<li>{esc(r)}</li>" for r in ranking.get("reasons") or [])
-    return f"<p>{chip}</p>" + (f"<ul>{reasons}</ul>" if reasons else "")
+    return f"<p>{chip}</p>{details}" + (f"<ul>{reasons}</ul>" if reasons else "")
 
 
 def _loss(match: dict[str, Any]) -> float:
@@ -87,8 +86,6 @@ def _loss(match: dict[str, Any]) -> float:
 
 
 def _gates(ranking: dict[str, Any], data: dict[str, Any], matches: list[dict[str, Any]]) -> str:
-    accepted = bool(ranking.get("accepted"))
-    chip = '<span class="chip good">accepted</span>' if accepted else '<span class="chip bad">not accepted</span>'
     found = data.get("gates") or ranking.get("gates")
     gates: dict[str, Any] = found if isinstance(found, dict) else {}
     best = matches[0] if matches else {}
@@ -107,12 +104,11 @@ def _gates(ranking: dict[str, Any], data: dict[str, Any], matches: list[dict[str
             shown = "no second"
         need = f"{sense} {number(limit, 3)}" if isinstance(limit, int | float) else "–"
         rows.append([name, shown, need, verdict or "–"])
-    reasons = "".join(f"<li>{esc(r)}</li>" for r in ranking.get("reasons") or [])
-    return f"<p>{chip}</p>" + table(["gate", "found", "needed", ""], rows) + (f"<ul>{reasons}</ul>" if reasons else "")
+    return _verdict(ranking, table(["gate", "found", "needed", ""], rows))
 
 
 def _bars(matches: list[dict[str, Any]], names: list[str]) -> str:
-    """One bar a candidate, split into the terms where they add up to the loss."""
+    """Return one bar per candidate, split into terms if these add up to the loss."""
     finite = [m for m in matches if math.isfinite(_loss(m))]
     if not finite:
         return ""
@@ -127,7 +123,7 @@ def _bars(matches: list[dict[str, Any]], names: list[str]) -> str:
             label(left - 12, y + 16, f"candidate {esc(m.get('index', '?'))}", "ink e" + (" b" if i == 0 else ""))
         )
         if not math.isfinite(_loss(m)):
-            out.append(label(left + 6, y + 16, "nothing was felt"))
+            out.append(label(left + 6, y + 16, "no data"))
             continue
         at = left
         parts = [(n, float(m["terms"].get(n) or 0.0)) for n in names] if split and names else [("loss", _loss(m))]

@@ -1,4 +1,4 @@
-"""The force trace of a run, and every contact stop close up."""
+"""The section of the wrist force: the whole trace, and each contact stop in detail."""
 
 from __future__ import annotations
 
@@ -13,24 +13,27 @@ from glotouch_bt.report.svg import AxisScale, label, picture, polyline, x_axis, 
 from glotouch_bt.robot import Array
 
 BINS = 1000
-CLOSE_UPS = 48
+"""Points of a trace."""
+MAX_CLOSE_UPS = 48
+"""Contact stops shown in detail."""
 CLOSE_UP_S = 0.12
+"""Time shown before and after an onset."""
 
 
 def contact_of(event: RecordedEvent) -> dict[str, Any]:
-    """The contact an event carries; empty if it has none."""
+    """Return the contact of an event, or an empty dict."""
     value = event.data.get("contact")
     return value if isinstance(value, dict) else {}
 
 
 def contact_stamp_s(event: RecordedEvent) -> float:
-    """Robot clock at the onset of an event's contact."""
+    """Return the robot clock at the onset of an event's contact."""
     stamp = contact_of(event).get("stamp_s")
     return float(stamp) if isinstance(stamp, int | float) else event.stamp_s
 
 
 def envelope(stamp_s: Array, value: Array, bins: int) -> tuple[Array, Array, Array, Array]:
-    """Time (m,), least, median and largest of `value` in at most `bins` equal stretches of samples."""
+    """Return time (m,), minimum, median and maximum of `value` in at most `bins` equal intervals of samples."""
     edges = np.unique(np.linspace(0, len(value), min(bins, len(value)) + 1).astype(int))
     low = np.minimum.reduceat(value, edges[:-1])
     high = np.maximum.reduceat(value, edges[:-1])
@@ -40,22 +43,22 @@ def envelope(stamp_s: Array, value: Array, bins: int) -> tuple[Array, Array, Arr
 
 
 def force_section(record: RunRecord) -> str:
-    """The section, or nothing if no force was recorded."""
+    """Return the section, or nothing if no force was recorded."""
     if len(record.samples.get("stamp_s", ())) < 2:
         return ""
     stamp = record.samples["stamp_s"]
     force = np.nan_to_num(np.linalg.norm(record.samples["force_S_N"], axis=1))
     contacts = record.of_kind("contact")
     body = _trace(record, stamp, force, contacts)
-    keys = [("k-force", "size of the wrist force |F|, least to largest in each moment")]
+    keys = [("k-force", "magnitude of the wrist force |F|, minimum to maximum of each interval")]
     if contacts:
         keys.append(("k-contact", f"contact stop ({len(contacts)})"))
     body += legend(keys)
     if contacts:
         body += _close_ups(stamp, record.samples["force_S_N"], contacts)
     lead = (
-        "What the wrist felt from start to end, after the last zeroing of the sensor. Each dot is a place where the "
-        "arm stopped because it touched something; below, the jaws' opening at the same times."
+        "The wrist force over the whole run, relative to the last tare. Each dot is a contact stop. "
+        "The chart below shows the opening of the jaws."
     )
     return section("Force", lead, body)
 
@@ -97,16 +100,16 @@ def _trace(record: RunRecord, stamp: Array, force: Array, contacts: list[Recorde
         out.append(x_axis(x, top2, bottom2, "robot clock, s"))
         out.append(y_axis(y2, left, right, "jaw opening, mm", about=3))
         t2, low2, median2, high2 = envelope(cycles["stamp_s"], aperture, BINS)
-        edge = np.where(high2 - median2 > median2 - low2, high2, low2)  # the turning points, not the smooth middle
+        edge = np.where(high2 - median2 > median2 - low2, high2, low2)  # keeps the turning points
         out.append(polyline(x(t2), y2(edge), "fill:none;stroke:var(--t1);stroke-width:1.4"))
         height = bottom2 + 40
     return picture(width, height, "".join(out), "wrist force over time with contact stops")
 
 
 def _close_ups(stamp: Array, force_S_N: Array, contacts: list[RecordedEvent]) -> str:
-    """One small chart a contact: the force's change around the onset."""
+    """Return one small chart per contact: the force change around the onset."""
     figures: list[str] = []
-    for i, e in enumerate(contacts[:CLOSE_UPS]):
+    for i, e in enumerate(contacts[:MAX_CLOSE_UPS]):
         at = contact_stamp_s(e)
         a, b = np.searchsorted(stamp, [at - CLOSE_UP_S, at + CLOSE_UP_S])
         if b - a < 4:
@@ -129,7 +132,7 @@ def _close_ups(stamp: Array, force_S_N: Array, contacts: list[RecordedEvent]) ->
         )
     if not figures:
         return ""
-    more = f" The first {CLOSE_UPS} of {len(contacts)} are shown." if len(contacts) > CLOSE_UPS else ""
+    more = f" The first {MAX_CLOSE_UPS} of {len(contacts)} are shown." if len(contacts) > MAX_CLOSE_UPS else ""
     return (
         f"<details open><summary>Contact stops close up: force change from {esc(int(CLOSE_UP_S * 1e3))} ms before to "
         f"{int(CLOSE_UP_S * 1e3)} ms after each onset (dashed).{more}</summary>"

@@ -1,4 +1,4 @@
-"""What was broken on purpose in a run, and who noticed."""
+"""The section of injected faults: their effect, and who saw them."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from glotouch_bt.report.run_record import RunRecord
 
 
 def faults_section(record: RunRecord) -> str:
-    """A line a fault of the run's plan, or nothing if it had none."""
+    """Return one line per fault of the run's plan, or nothing without a plan."""
     faults = record.result.get("faults")
     if not isinstance(faults, list) or not faults:
         return ""
     rows = [_row(f) for f in faults]
     lead = (
-        "These faults were injected on purpose. What they altered is counted against what the device delivered; seen "
-        "is who reacted first after that."
+        "These faults were injected on purpose. Altered counts the changes to the device's data and commands. Seen by "
+        "names the first reaction after the first change."
     )
     head = ("fault", "began, s", "in", "altered", "seen by", "after", "then ran")
     return section("Injected faults", lead, table(head, rows, numeric_from=99))
