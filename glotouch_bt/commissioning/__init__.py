@@ -1,4 +1,4 @@
-"""TODO door of glotouch_bt/commissioning."""
+"""First tests of a robot: the doctor, the registration of the container, and the timing of the link."""
 
 from glotouch_bt.commissioning.doctor import DoctorFinding, nearly_empty, run_doctor
 from glotouch_bt.commissioning.link import LinkStudy, run_study

@@ -1,7 +1,7 @@
-"""A first run_doctor to a robot: looks first, then asks before everything that moves. Works with any backend.
+"""Test a robot step by step before its first mission; ask before every motion. Works with any backend.
 
-Each step returns findings: what was measured, whether it is good, and what to do if it is not. Nothing is changed on
-the robot and nothing is written to files: a person decides what to do with the findings.
+Each step yields findings: the measurement, a verdict, and advice. The doctor changes no setting of the robot and writes
+no files.
 """
 
 from __future__ import annotations
@@ -32,37 +32,53 @@ from glotouch_bt.robot import (
 T = TypeVar("T")
 Ask = Callable[[str], bool]
 
-LOOK_S, FRAMES_S = 5.0, 1.5
-GAP_FACTOR = 3.0
-RATE_Hz = 900.0
-BIAS_N = 5.0
-"""A static wrench beyond this after taring calls for the vendor's torque sensor calibration."""
-NOISE_N = 0.3
-TARE_PERIODS = 500
-AGREE_M, AGREE_DEG = 0.005, 0.5
-JAW_N, JAW_M_S, JAW_STEP_M = 5.0, 0.02, 0.005
+OBSERVE_S = 5.0
+"""Duration of a measurement at rest."""
+FRAMES_S = 1.5
+"""Duration of a measurement of the gel pads."""
+MAX_GAP_FACTOR = 3.0
+"""Largest gap between samples, relative to the median."""
+MIN_RATE_HZ = 900.0
+"""Lowest sample rate; guards and onsets are tuned for 1000 Hz."""
+MAX_BIAS_N = 5.0
+"""Largest force at rest after a tare; beyond it the vendor's torque sensor calibration is needed."""
+MAX_NOISE_N = 0.3
+"""Largest standard deviation and drift of the force at rest."""
+MAX_TARE_PERIODS = 500
+"""Longest wait for a tare."""
+MAX_KINEMATIC_ERROR_M = 0.005
+"""Largest position difference between our and the robot's tool pose."""
+MAX_KINEMATIC_ERROR_DEG = 0.5
+"""Largest rotation between our and the robot's tool pose."""
+JAW_N = 5.0
+"""Force of the jaws during the test."""
+JAW_M_S = 0.02
+"""Speed of the jaws during the test."""
+JAW_STEP_M = 0.005
+"""First motion of the jaws."""
 PRESSED_M = 1e-4
+"""Indentation that counts as a press."""
 
 
 @runtime_checkable
 class ObservableBackend(Protocol):
-    """A backend that can connect without enabling or commanding anything."""
+    """A backend that can connect without enabling the robot."""
 
     def look(self, world: World, conditions: Conditions, options: Mapping[str, object]) -> Robot:
-        """A robot that can only be observed."""
+        """Return a robot that can only be observed."""
         ...
 
 
 @runtime_checkable
 class DeviceInformation(Protocol):
-    """A robot that knows what its devices say about themselves."""
+    """A robot with information about its devices."""
 
     info: dict[str, str]
 
 
 @dataclass(frozen=True)
 class DoctorFinding:
-    """One thing found; `good` is None if nobody can say."""
+    """One finding; `good` is None if it has no verdict."""
 
     step: str
     what: str
@@ -71,12 +87,12 @@ class DoctorFinding:
     values: Mapping[str, Any] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return it as JSON data."""
         return asdict(self)
 
 
 def drive(robot: Robot, motion: Motion[T]) -> T:
-    """Run a motion to its end; the arm holds afterwards."""
+    """Run a motion to its end and hold the arm; return the motion's result."""
     command = next(motion)
     try:
         while True:
@@ -89,12 +105,12 @@ def drive(robot: Robot, motion: Motion[T]) -> T:
 
 
 def rest(robot: Robot, duration_s: float, command: Command = HOLD) -> list[Observation]:
-    """Observations of a while at rest."""
+    """Return the observations of a period at rest."""
     return [robot.cycle(command) for _ in range(round(duration_s / robot.period_s))]
 
 
 def nearly_empty(world: World) -> World:
-    """For simulated robots: the world with one object only, as a container cannot be without."""
+    """Return a simulated world with one object, the fewest a container can hold."""
     objects = world.objects
     names = objects.names or tuple(sorted(p.stem for p in objects.folder.glob("*.stl")))
     return replace(world, objects=replace(objects, names=names[:1]))
@@ -103,12 +119,12 @@ def nearly_empty(world: World) -> World:
 def run_doctor(
     backend: Backend, world: World, conditions: Conditions, options: Mapping[str, object], ask: Ask, *, sure: bool
 ) -> Iterator[DoctorFinding]:
-    """The whole run_doctor; a generator, so that every finding is told when it is found.
+    """Run all steps; yield each finding as soon as it is known.
 
     Args:
-        backend, world, conditions, options: What to open.
-        ask: Puts a yes/no question to the person there.
-        sure: False when nobody is there to be asked what they see (a dry run).
+        backend, world, conditions, options: The robot to open.
+        ask: Asks the operator a yes/no question.
+        sure: False if no operator can say what they see (a dry run).
     """
     looking = backend.look(world, conditions, options) if isinstance(backend, ObservableBackend) else None
     if looking is not None:
@@ -116,7 +132,7 @@ def run_doctor(
             yield from facts(looking)
             yield from rates(looking)
             yield from wrist(looking, "as found")
-        if not ask("Everything so far was looking. Enable the arm (brakes are released, it holds still)?"):
+        if not ask("So far the arm was only observed. Enable it (the brakes are released, it holds still)?"):
             return
     with backend.open(world, conditions, 0, options) as robot:
         if looking is None:
@@ -134,7 +150,7 @@ def run_doctor(
 
 
 def facts(robot: Robot) -> Iterator[DoctorFinding]:
-    """What the devices say about themselves."""
+    """Report the information of the devices."""
     if isinstance(robot, DeviceInformation):
         for name, value in robot.info.items():
             yield DoctorFinding("facts", name, None, value)
@@ -142,8 +158,8 @@ def facts(robot: Robot) -> Iterator[DoctorFinding]:
 
 
 def rates(robot: Robot) -> Iterator[DoctorFinding]:
-    """Samples a second, gaps between them, and whether the clock runs forward."""
-    seen = rest(robot, LOOK_S)
+    """Check the sample rate, the gaps between samples, and that the clock runs forward."""
+    seen = rest(robot, OBSERVE_S)
     stamps = np.concatenate([o.stamp_s for o in seen])
     steps = np.diff(stamps)
     rate = float(1.0 / steps.mean())
@@ -152,51 +168,53 @@ def rates(robot: Robot) -> Iterator[DoctorFinding]:
     yield DoctorFinding(
         "rates", "clock", forward, "runs forward" if forward else "jumped back", {"samples": len(stamps)}
     )
-    text = f"{rate:.0f} samples a second; guards and onsets are made for 1000"
-    yield DoctorFinding("rates", "samples", rate > RATE_Hz, text, {"rate_Hz": rate})
+    text = f"{rate:.0f} samples a second; guards and onsets are tuned for 1000"
+    yield DoctorFinding("rates", "samples", rate > MIN_RATE_HZ, text, {"rate_Hz": rate})
     text = f"longest gap {gap * 1e3:.1f} ms (usually {typical * 1e3:.1f} ms)"
-    yield DoctorFinding("rates", "gaps", gap < max(GAP_FACTOR * typical, robot.period_s), text, {"gap_s": gap})
+    yield DoctorFinding("rates", "gaps", gap < max(MAX_GAP_FACTOR * typical, robot.period_s), text, {"gap_s": gap})
 
 
 def _tared(robot: Robot) -> Motion[None]:
     ticket = robot.start(Tare())
-    for _ in range(TARE_PERIODS):
+    for _ in range(MAX_TARE_PERIODS):
         yield HOLD
         if ticket.done:
             break
 
 
 def wrist(robot: Robot, when: str) -> Iterator[DoctorFinding]:
-    """Bias and noise of the wrench at rest."""
-    wrench = np.concatenate([o.wrench_S for o in rest(robot, LOOK_S)])
+    """Check bias, noise and drift of the wrench at rest."""
+    wrench = np.concatenate([o.wrench_S for o in rest(robot, OBSERVE_S)])
     bias, sd = wrench.mean(axis=0), wrench.std(axis=0)
     size = float(np.linalg.norm(bias[:3]))
-    good = None if when != "tared" else size < BIAS_N
-    advice = "; zero it again with nothing touching, or calibrate the arm's torque sensors" if good is False else ""
+    good = None if when != "tared" else size < MAX_BIAS_N
+    advice = "; tare it again without contact, or calibrate the arm's torque sensors" if good is False else ""
     values = {"bias": bias.round(4).tolist(), "sd": sd.round(5).tolist()}
     yield DoctorFinding("wrist", "bias", good, f"{size:.2f} N {when}{advice}", values)
     worst = float(sd[:3].max())
     text = f"{worst:.3f} N standard deviation on the worst axis (missions were measured at 0.05)"
-    yield DoctorFinding("wrist", "noise", worst < NOISE_N, text, {"sd_N": worst})
+    yield DoctorFinding("wrist", "noise", worst < MAX_NOISE_N, text, {"sd_N": worst})
     wander = float(np.linalg.norm(wrench[-500:, :3].mean(axis=0) - wrench[:500, :3].mean(axis=0)))
-    yield DoctorFinding("wrist", "drift", wander < NOISE_N, f"{wander:.3f} N over {LOOK_S:g} s", {"drift_N": wander})
+    yield DoctorFinding(
+        "wrist", "drift", wander < MAX_NOISE_N, f"{wander:.3f} N over {OBSERVE_S:g} s", {"drift_N": wander}
+    )
 
 
 def place(robot: Robot, world: World) -> Iterator[DoctorFinding]:
-    """Does the arm stand where our kinematics say it stands?"""
+    """Compare the tool pose that the robot reports with our kinematics."""
     observation = robot.cycle(HOLD)
     arm = Arm(robot.description, robot.limits, world, robot.period_s)
     ours, theirs = arm.kinematics.fk(observation.q[-1]), observation.pose_B_P
     away = float(np.linalg.norm(ours.position_m - theirs.position_m))
     turned = float(np.degrees(2.0 * np.arccos(min(1.0, abs(float(ours.quat @ theirs.quat))))))
-    text = f"the tool is {away * 1e3:.2f} mm and {turned:.2f} deg from where its joints put it by our numbers"
-    good = away < AGREE_M and turned < AGREE_DEG
+    text = f"the tool is {away * 1e3:.2f} mm and {turned:.2f} deg from where our kinematics have it"
+    good = away < MAX_KINEMATIC_ERROR_M and turned < MAX_KINEMATIC_ERROR_DEG
     advice = "" if good else "; use the arm's own calibrated kinematics, and measure the tool"
     yield DoctorFinding("place", "kinematics", good, text + advice, {"away_m": away, "turned_deg": turned})
 
 
 def jaws(robot: Robot, ask: Ask | None) -> Iterator[DoctorFinding]:
-    """Direction and stroke, at low force."""
+    """Check direction and stroke of the jaws at low force."""
     hand = robot.description.gripper
     first = robot.cycle(HOLD).gripper.aperture_m
     further = first + JAW_STEP_M <= hand.stroke_m
@@ -205,7 +223,7 @@ def jaws(robot: Robot, ask: Ask | None) -> Iterator[DoctorFinding]:
     moved = last - first
     good = moved * (goal - first) > 0.0 and abs(last - goal) < 1e-3
     values = {"from_m": first, "to_m": last}
-    yield DoctorFinding("jaws", "answer", good, f"told {goal * 1e3:.1f} mm, reports {last * 1e3:.1f} mm", values)
+    yield DoctorFinding("jaws", "answer", good, f"commanded {goal * 1e3:.1f} mm, reports {last * 1e3:.1f} mm", values)
     if ask is not None:
         seen = ask(f"Did the jaws {'OPEN' if further else 'CLOSE'}?")
         advice = "" if seen else ": the gripper's scale is reversed; do not run a mission"
@@ -222,7 +240,7 @@ def jaws(robot: Robot, ask: Ask | None) -> Iterator[DoctorFinding]:
 
 
 def _jaws_to(robot: Robot, aperture_m: float) -> float:
-    """Where the jaws are after having been told to go somewhere and come to rest."""
+    """Move the jaws and return their aperture at rest."""
     command = Command(gripper=GripperTarget(aperture_m, JAW_M_S, JAW_N))
     for _ in range(round((0.085 / JAW_M_S + 2.0) / robot.period_s)):
         state = robot.cycle(command).gripper
@@ -233,7 +251,7 @@ def _jaws_to(robot: Robot, aperture_m: float) -> float:
 
 
 def pads(robot: Robot, ask: Ask | None) -> Iterator[DoctorFinding]:
-    """Rate, noise and dead taxels untouched; then which pad, and which part of it, a press shows on."""
+    """Check rate, noise and dead taxels of the untouched pads; then where a press is seen."""
     frames = _frames(robot)
     if len(frames) < 2:
         yield DoctorFinding("pads", "frames", False, f"{len(frames)} frames in {FRAMES_S:g} s")
@@ -265,7 +283,7 @@ def _frames(robot: Robot) -> list[TactileFrame]:
 
 
 def _pressed(before: TactileFrame, now: TactileFrame) -> DoctorFinding:
-    """Where a press shows; it should be on the left map, in the lower rows, at high columns."""
+    """Check the place of a press, which must be on the left map, in the lower half of the rows, at high columns."""
     found = {}
     for side in ("left", "right"):
         change: Array = np.nan_to_num(getattr(now, f"{side}_m") - getattr(before, f"{side}_m"))
@@ -286,7 +304,7 @@ def _pressed(before: TactileFrame, now: TactileFrame) -> DoctorFinding:
 
 
 def walls(robot: Robot, world: World) -> Iterator[DoctorFinding]:
-    """Where the container is, by touch."""
+    """Register the container by touch."""
     arm = Arm(robot.description, robot.limits, world, robot.period_s)
     arm.sync(robot.observe())
     _jaws_to(robot, 0.0)
@@ -306,7 +324,7 @@ def _registered(found: Registration) -> DoctorFinding:
     yaw = float(np.degrees(found.yaw_rad))
     where, turn = found.pose_B_K.position_m.round(4).tolist(), float(np.degrees(found.pose_B_K.yaw_rad))
     text = (
-        f"the container is {x:+.1f}, {y:+.1f}, {z:+.1f} mm and {yaw:+.2f} deg from where the world file has it "
+        f"the container is {x:+.1f}, {y:+.1f}, {z:+.1f} mm and {yaw:+.2f} deg from its pose in the world file "
         f"(touches agree within {found.residual_m * 1e3:.2f} mm, at most {found.peak_N:.1f} N); "
         f"pose_B_K: {{position_m: {where}, yaw_deg: {turn:.2f}}}"
     )

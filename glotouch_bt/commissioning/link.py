@@ -1,4 +1,4 @@
-"""How long one cycle through a backend takes: the setpoint out, the state in, over a minute at the control rate."""
+"""Measure the duration of one cycle through a backend, from the setpoint to the new state."""
 
 from __future__ import annotations
 
@@ -16,17 +16,19 @@ from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.motion import Kinematics
 from glotouch_bt.robot import Array, Command, JointSetpoint, load_backend
 
-SWAY_RAD, SWAY_S = 0.004, 4.0
-"""The first joint sways by this while measuring: every setpoint differs from the last."""
+SWAY_RAD = 0.004
+"""Amplitude of the first joint's sway while measuring, so that every setpoint is new."""
+SWAY_S = 4.0
+"""Period of the sway."""
 
 
 @runtime_checkable
 class LatencyReporting(Protocol):
-    """A robot that knows how late its last cycle was.
+    """A robot that measures the latency of its last cycle.
 
     Attributes:
-        latency_s: From the call to the device having the setpoint, and from the newest sample's reading to the
-            observation, without the wait for the period's end between them.
+        latency_s: Time from the call to the setpoint at the device, plus time from the newest sample to the
+            observation, without the wait for the end of the period.
         late_periods: Control periods that passed without a command.
     """
 
@@ -36,13 +38,13 @@ class LatencyReporting(Protocol):
 
 @dataclass(frozen=True)
 class LinkStudy:
-    """What to measure.
+    """A measurement to be done.
 
     Attributes:
         backend: Registered name.
         options: Backend options.
-        duration_s: On the robot's clock.
-        mission: Whose world is opened.
+        duration_s: Duration on the robot clock.
+        mission: Mission whose world is opened.
         out: Folder for summary.json.
     """
 
@@ -54,7 +56,7 @@ class LinkStudy:
 
 
 def sway(q0: Array, period_s: float, k: int, kinematics: Kinematics) -> JointSetpoint:
-    """The k-th setpoint of a slow sway of the first joint, starting from rest at q0 (dof,)."""
+    """Return the k-th setpoint of a slow sway of the first joint, from rest at q0 (dof,) rad."""
     w, t = 2.0 * np.pi / SWAY_S, (k + 1) * period_s
     unit = np.eye(len(q0))[0]
     q = q0 + SWAY_RAD * (1.0 - np.cos(w * t)) * unit
@@ -63,13 +65,13 @@ def sway(q0: Array, period_s: float, k: int, kinematics: Kinematics) -> JointSet
 
 
 def percentiles_ms(times_s: Array) -> dict[str, float]:
-    """p50, p99, p99.9 and the greatest of durations (n,), in milliseconds."""
+    """Return p50, p99, p99.9 and the maximum of durations (n,), in ms."""
     values = np.percentile(1e3 * times_s, [50.0, 99.0, 99.9, 100.0])
     return {name: round(float(v), 4) for name, v in zip(("p50", "p99", "p99.9", "max"), values, strict=True)}
 
 
 def run_study(study: LinkStudy, on_progress: Callable[[float], None] | None = None) -> dict[str, Any]:
-    """Cycle for the whole duration; writes and returns the summary.
+    """Cycle for the whole duration; write and return the summary.
 
     Raises:
         BackendError: The backend did not open or broke down.
