@@ -1,9 +1,9 @@
 """Fault injection: checked fault plans, the catalogue of faults, and the robot wrapper that applies them.
 
-To add a fault, write its effect in `effects` and one row in `catalogue`.
+To add a fault, write its effect in `effects` and one row in `effects.catalogue`.
 """
 
-from glotouch_bt.faults.catalogue import CATALOGUE, FaultKind
+from glotouch_bt.faults.effects import CATALOGUE, FaultKind
 from glotouch_bt.faults.injector import FaultInjector
 from glotouch_bt.faults.models import wrong_models
 from glotouch_bt.faults.plan import FaultPlan, FaultSpec, check_plan, read_plan

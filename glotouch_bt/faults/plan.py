@@ -18,8 +18,7 @@ from typing import TypeVar
 
 from pydantic import BaseModel
 
-from glotouch_bt.faults.catalogue import CATALOGUE, FaultKind
-from glotouch_bt.faults.effects import FaultParams
+from glotouch_bt.faults.effects import CATALOGUE, FaultKind, FaultParams
 from glotouch_bt.faults.trigger import Duration, Repeat, When, matches
 from glotouch_bt.mission.read import find_shipped, read_yaml, shown, validate
 from glotouch_bt.mission.spec import Findings, Map, MissionFaults, Node, NodeSpec, Place, Scalar, Seq, split_quantity

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from glotouch_bt.cli import app
-from glotouch_bt.faults.catalogue import CATALOGUE
+from glotouch_bt.faults.effects.catalogue import CATALOGUE
 from glotouch_bt.mission.record.recorder import Recorder
 from glotouch_bt.robot import GlotouchError
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glotouch_bt.faults import FaultInjector
-from glotouch_bt.faults.catalogue import CATALOGUE, CAUSE_PATTERNS
+from glotouch_bt.faults.effects.catalogue import CATALOGUE, CAUSE_PATTERNS
 from glotouch_bt.faults.plan import check_plan, read_plan
 from glotouch_bt.faults.trigger import Duration, When
 from glotouch_bt.mission.load import load_mission

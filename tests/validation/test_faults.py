@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from glotouch_bt.faults.catalogue import CATALOGUE
+from glotouch_bt.faults.effects.catalogue import CATALOGUE
 from glotouch_bt.mission.checkpoint.store import CheckpointRow
 from glotouch_bt.robot import BadInput, UnknownName
 from glotouch_bt.robot.fake import FakeRobot

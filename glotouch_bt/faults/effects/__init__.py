@@ -1,6 +1,16 @@
-"""The effects of faults: one class per fault, one file per channel. An effect never knows a plan or a trigger."""
+"""The effects of faults, one class per fault and one file per channel, and their catalogue. No plans, no triggers."""
 
 from glotouch_bt.faults.effects.base import Actions, Effect, EffectContext, FaultParams, samples_altered
+from glotouch_bt.faults.effects.catalogue import CATALOGUE, FaultKind
 from glotouch_bt.faults.effects.model import WrongScaleStlParams
 
-__all__ = ["Actions", "Effect", "EffectContext", "FaultParams", "WrongScaleStlParams", "samples_altered"]
+__all__ = [
+    "CATALOGUE",
+    "FaultKind",
+    "Actions",
+    "Effect",
+    "EffectContext",
+    "FaultParams",
+    "WrongScaleStlParams",
+    "samples_altered",
+]

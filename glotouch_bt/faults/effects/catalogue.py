@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from glotouch_bt.faults.effects import Effect, arm, gripper, model, process, tactile, world, wrench
+from glotouch_bt.faults.effects import arm, gripper, model, process, tactile, world, wrench
+from glotouch_bt.faults.effects.base import Effect
 from glotouch_bt.mission.read import unit_of
 
 CHANNELS = ("wrench", "touch", "gripper", "arm", "world", "model", "process")
