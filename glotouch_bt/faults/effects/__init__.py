@@ -6,10 +6,10 @@ from glotouch_bt.faults.effects.model import WrongScaleStlParams
 
 __all__ = [
     "CATALOGUE",
-    "FaultKind",
     "Actions",
     "Effect",
     "EffectContext",
+    "FaultKind",
     "FaultParams",
     "WrongScaleStlParams",
     "samples_altered",
