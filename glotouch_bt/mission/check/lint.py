@@ -1,7 +1,4 @@
-"""What is surely or probably not meant: two skills at once on one arm, loops that nothing ends, nodes without effect.
-
-None of it needs more than the tree and the sets of its analysis.
-"""
+"""Report what is probably not meant: two skills at once on one arm, loops that nothing ends, nodes without effect."""
 
 from __future__ import annotations
 
@@ -10,25 +7,26 @@ from glotouch_bt.mission.check.requirements import verdicts
 from glotouch_bt.mission.nodes import EMPTY, UNSET, kind_of
 from glotouch_bt.mission.spec import Findings, NodeSpec, Place
 
-ENDLESS_RUNS = 1_000_000
+MAX_RUNS = 1_000_000
+"""Report a mission whose loops allow more skill runs than this."""
 
 
-def check_habits(flow: DataFlow, findings: Findings, timeout_s: float) -> None:
+def check_lint(flow: DataFlow, findings: Findings, timeout_s: float) -> None:
     """Report what is probably not meant.
 
     Args:
-        flow: The analysis; lenient, if there are mistakes, so that what follows from them is not reported.
-        findings: Where it goes.
+        flow: The analysis; the lenient one if there are mistakes, so that their consequences are not reported.
+        findings: Where findings go.
         timeout_s: Longest duration of the mission.
     """
-    _Habits(flow, findings).look(flow.tree, (), timeout_s)
+    _Lint(flow, findings).look(flow.tree, (), timeout_s)
     runs = kind_of(flow.tree).max_runs(flow.tree)
-    if runs.fixed > ENDLESS_RUNS:
+    if runs.fixed > MAX_RUNS:
         what = f"loops within loops: up to {runs} runs of skills"
         findings.add(flow.tree.place, "practically_endless", what)
 
 
-class _Habits:
+class _Lint:
     def __init__(self, flow: DataFlow, findings: Findings) -> None:
         self._flow, self._findings = flow, findings
         self._read = {w.key for n in flow.tree.walk() for w in n.reads.values()}
@@ -139,7 +137,7 @@ class _Habits:
                 self._findings.add(wire.place, "unused_key", what, hint=near, node=node.name)
 
     def _gathered(self, node: NodeSpec) -> None:
-        """What is gathered may be for the record only, unless somebody reads a key of such a name, never written."""
+        """Report a gathered key that no node reads, if a similar name is read and never written."""
         for port, (_, target) in kind_of(node).gathers(node).items():
             if target not in self._read:
                 name = target.rpartition("/")[2]
@@ -167,7 +165,7 @@ class _Habits:
 
 
 def _users(node: NodeSpec) -> dict[str, NodeSpec]:
-    """What is used in a subtree, and the first skill that does."""
+    """Return what the skills of a subtree use, each with the first skill that uses it."""
     found: dict[str, NodeSpec] = {}
     for below in node.walk():
         for thing in below.skill_type.USES if below.skill_type is not None else ():

@@ -1,4 +1,4 @@
-"""From the sets of a tree's analysis to findings: what is looked at and not there, never reached, or out of place."""
+"""Turn the analysis of a tree into findings: inputs that are missing or wrong, unreachable nodes, wrong ends."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from typing import Any, get_type_hints
 
 from glotouch_bt.mission.check.counterexample import Goal, StepBudget, shortest_path
 from glotouch_bt.mission.check.data_flow import DataFlow
-from glotouch_bt.mission.check.lint import check_habits
+from glotouch_bt.mission.check.lint import check_lint
 from glotouch_bt.mission.check.requirements import all_requirements, same_quantity
 from glotouch_bt.mission.check.state_variables import StateVariables
 from glotouch_bt.mission.nodes import ANYTHING, EMPTY, UNSET, Requirement, ValueKind, kind_of
 from glotouch_bt.mission.spec import Findings, NodeSpec, Place
 
 MAX_PATHS = 40
-"""Findings beyond so many are reported without a path."""
-DEEPEST_PYTHON = 50_000
+"""Number of findings that are reported with a path; later ones come without."""
+MAX_RECURSION = 50_000
+"""Recursion limit of the interpreter while the sets are computed: they recurse as deep as there are keys."""
 
 
 def check_flow(
@@ -30,7 +31,7 @@ def check_flow(
     Args:
         tree: Its root, names numbered.
         findings: Where faults go.
-        leaves: States in which the mission says it leaves resources after success, and where it says so.
+        leaves: States in which the mission promises to leave resources after success, and the place of the promise.
         timeout_s: Longest duration of the mission.
     """
     with _deep_recursion():
@@ -39,23 +40,23 @@ def check_flow(
         exact = DataFlow(tree, variables, requirements)
         blocked = any(exact.entered.get(id(n), EMPTY) == EMPTY for n in tree.walk())
         lenient = DataFlow(tree, variables, requirements, lenient=True) if blocked else exact
-        _Judge(exact, lenient, findings).all(leaves)
-        check_habits(lenient, findings, timeout_s)
+        _Rules(exact, lenient, findings).all(leaves)
+        check_lint(lenient, findings, timeout_s)
 
 
 @contextmanager
 def _deep_recursion() -> Iterator[None]:
-    """Diagrams are as deep as there are keys; see `configurations`."""
+    """Raise the recursion limit; see `state_sets`."""
     before = sys.getrecursionlimit()
-    sys.setrecursionlimit(max(before, DEEPEST_PYTHON))
+    sys.setrecursionlimit(max(before, MAX_RECURSION))
     try:
         yield
     finally:
         sys.setrecursionlimit(before)
 
 
-class _Judge:
-    """Findings about what is entered in a run come from the exact sets, those behind a mistake from the lenient."""
+class _Rules:
+    """Nodes that some run enters are judged by the exact sets, nodes after a mistake by the lenient ones."""
 
     def __init__(self, exact: DataFlow, lenient: DataFlow, findings: Findings) -> None:
         self._exact, self._lenient, self._findings = exact, lenient, findings
@@ -67,7 +68,7 @@ class _Judge:
     def all(self, leaves: Mapping[str, tuple[frozenset[str], Place]]) -> None:
         for node in self._exact.tree.walk():
             for requirement in self._exact.requirements[id(node)]:
-                self._demand(requirement)
+                self._requirement(requirement)
             self._ordered_by(node)
         self._never_written_inputs()
         self._unreachable(self._exact.tree)
@@ -75,13 +76,13 @@ class _Judge:
 
     # -- keys and resources ------------------------------------------------------------------------------------------
 
-    def _demand(self, requirement: Requirement) -> None:
+    def _requirement(self, requirement: Requirement) -> None:
         flow = self._exact if self._exact.looked.get(requirement, EMPTY) != EMPTY else self._lenient
-        asked = flow.judged(requirement)
-        if asked == EMPTY:
+        looked = flow.judged(requirement)
+        if looked == EMPTY:
             return
-        found = self._sets.values(asked, requirement.variable)
-        if requirement.unset == "not always":  # what a mistake before it kept from being written is no mistake here
+        found = self._sets.values(looked, requirement.variable)
+        if requirement.unset == "not always":  # a key that only an earlier mistake leaves unwritten is no mistake here
             found |= self._sets.values(self._lenient.judged(requirement), requirement.variable) - {ANYTHING}
         wrong = found - requirement.good - {UNSET}
         if requirement.of_resource:
@@ -92,13 +93,13 @@ class _Judge:
         if optional and not self._exact.has_unknown and not self._writers.get(requirement.key):
             self._unwritten.setdefault(requirement.key.rpartition("/")[2], []).append(requirement)
         if self._never_written(requirement, found):
-            self._unset(flow, requirement, asked)
+            self._unset(flow, requirement, looked)
         elif UNSET in found and UNSET not in requirement.good:
             by = ", ".join(f"{n.name!r} (line {p.line})" for n, p in self._places(requirement))
             what = f"{_reader(requirement)}, which is written only on some paths to it, by {by}"
             path = self._path(flow, requirement, {UNSET})
             self._findings.add(requirement.place, "port_maybe_unset", what, path=path, node=requirement.node.name)
-        alike: dict[ValueKind, set[int]] = {}  # what differs in its value only is one mistake
+        alike: dict[ValueKind, set[int]] = {}  # kinds that differ only in their value are one mistake
         for value in sorted(wrong):
             alike.setdefault(dataclasses.replace(self._variables.kind(requirement.key, value), value=None), set()).add(
                 value
@@ -116,17 +117,17 @@ class _Judge:
 
     def _never_written(self, requirement: Requirement, found: frozenset[int]) -> bool:
         if requirement.unset == "allowed":
-            # A test of whether it is set makes sense only if somebody sets it.
+            # A test of `is_set` makes sense only if some node writes the key.
             tested = not requirement.node.children and kind_of(requirement.node).comparison(requirement.node)
             return bool(tested) and not self._writers.get(requirement.key)
         return found == {UNSET}
 
     def _places(self, requirement: Requirement) -> list[tuple[NodeSpec, Place]]:
-        """Who writes a key, each once; the reader itself last."""
+        """Return the writers of a key with their places, each once, the reader itself last."""
         found = {n.name: (n, p) for n, p, _ in self._writers.get(requirement.key, [])}
         return sorted(found.values(), key=lambda w: (w[0] is requirement.node, w[1]))
 
-    def _unset(self, flow: DataFlow, requirement: Requirement, asked: int) -> None:
+    def _unset(self, flow: DataFlow, requirement: Requirement, looked: int) -> None:
         what = f"{_reader(requirement)}, which no node writes before it"
         name = requirement.key.rpartition("/")[2]
         inside = {k.partition("@")[0] for k in self._writers if k != requirement.key and k.rpartition("/")[2] == name}
@@ -139,7 +140,7 @@ class _Judge:
         written = sorted(
             key
             for key, variable in self._variables.keys.items()
-            if "@" not in key.removeprefix(prefix) and self._sets.values(asked, variable) - {UNSET}
+            if "@" not in key.removeprefix(prefix) and self._sets.values(looked, variable) - {UNSET}
         )
         names = [k.rpartition("/")[2] for k in written if k.rpartition("/")[0] == prefix]
         near = Findings.near(requirement.key.rpartition("/")[2], names)
@@ -200,7 +201,7 @@ class _Judge:
             self._findings.unknown(node.place, "unknown_field", kind, field, _fields(element))
 
     def _unreachable(self, node: NodeSpec) -> None:
-        """The topmost nodes that are never entered."""
+        """Report the topmost nodes that are never entered."""
         for i, child in enumerate(node.children):
             if self._lenient.entered.get(id(child), EMPTY) == EMPTY:
                 before = node.children[i - 1] if i else node
@@ -213,7 +214,7 @@ class _Judge:
     def _end(self, leaves: Mapping[str, tuple[frozenset[str], Place]]) -> None:
         end, variables = self._exact.end.success, self._variables
         tree = self._exact.tree
-        if not len(self._findings):  # how a mission with a mistake in it ends says little
+        if not len(self._findings):  # with a mistake in it, the end of a mission says little
             self._outcomes()
         for resource, variable in variables.resources.items():
             found = self._sets.values(end, variable)
@@ -257,7 +258,7 @@ class _Judge:
 
 
 def _writers(tree: NodeSpec, variables: StateVariables) -> dict[str, list[tuple[NodeSpec, Place, list[ValueKind]]]]:
-    """Who writes each key, where it says so, and what kinds of values."""
+    """Return, for each key, its writers, their places, and the kinds of values they write."""
     found: dict[str, list[tuple[NodeSpec, Place, list[ValueKind]]]] = {}
     for node in tree.walk():
         for port, wire in node.writes.items():
@@ -271,7 +272,7 @@ def _states(names: Sequence[str], values: frozenset[int]) -> str:
 
 
 def _fields(kind: type) -> list[str]:
-    """What values of a type can be put in order by: their public numbers and texts, as far as types are said."""
+    """Return the public attributes of a type that are numbers or texts, as far as types are declared."""
     hints = _hints(kind)
     for name in dir(kind):
         attribute = inspect.getattr_static(kind, name)
