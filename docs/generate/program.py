@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 import typing
 from enum import Enum
 from typing import Any
@@ -13,6 +14,8 @@ from markdown_text import NOTE, cell, code, prose, table
 import glotouch_bt
 from glotouch_bt.cli import app
 
+MAX_WIDTH = 90
+"""Characters of a signature on one line."""
 CLI = """# Command line
 
 Exit codes: 0 done, 1 the mission failed (with reasons) or a check found mistakes in a mission, 2 bad input, 3 a
@@ -116,7 +119,13 @@ def _signature(name: str, found: Any) -> str:
         shown = ""
     for prefix in ("glotouch_bt.", "collections.abc.", "pathlib.", "numpy.typing."):
         shown = shown.replace(prefix, "")
-    return f"{name}{shown}".replace("'", "")
+    shown = re.sub(r"(: |-> )'([^']*)'", r"\1\2", shown)
+    text = f"{name}{shown}"
+    if len(text) <= MAX_WIDTH:
+        return text
+    inside, _, after = shown.removeprefix("(").rpartition(")")
+    parts = re.split(r", (?=[*\w]+(?:: | = |$|,))", inside)
+    return f"{name}(\n" + "".join(f"        {part},\n" for part in parts) + f"    ){after}"
 
 
 def _members(kind: type) -> list[tuple[str, Any]]:
