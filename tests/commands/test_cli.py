@@ -1,4 +1,4 @@
-"""The command line: exit codes, one readable message, JSON, and nothing left behind after bad input."""
+"""The command line: help, exit codes, one message for an error, JSON, and no files after bad input."""
 
 from __future__ import annotations
 
@@ -12,16 +12,19 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
 import yaml
 from typer.testing import CliRunner
 
-from glotouch_bt import cli
+from glotouch_bt import __version__, cli
+from glotouch_bt.commands import COMMANDS
 from glotouch_bt.mission.read import library
 from glotouch_bt.mission.read.library import shipped
+from glotouch_bt.robot import BadInput
+from glotouch_bt.runs.folder import locked
 
 
 @pytest.fixture
@@ -30,11 +33,36 @@ def command() -> Iterator[CliRunner]:
     cli._debug = False
 
 
-def test_help_is_quick_and_lists_all_commands(command: CliRunner) -> None:
+def test_help_groups_the_commands_by_use(command: CliRunner) -> None:
     done = command.invoke(cli.app, ["--help"])
     assert done.exit_code == 0
-    for name in ("run", "check", "skills", "backends", "tree", "report", "schema"):
-        assert f"\n  {name} " in done.output
+    assert [use for use in re.findall(r"^(\S.*):$", done.output, re.MULTILINE) if use != "Options"] == [
+        "Run missions", "Write missions", "Robots and faults", "Measure"
+    ]  # fmt: skip
+    listed = re.findall(r"^  (\w+)  ", done.output, re.MULTILINE)
+    assert listed[0] == "run"
+    assert set(listed) == {name for commands in COMMANDS.values() for name in commands} | {"bench"}
+    assert "..." not in done.output.split("Run missions")[1], "each line shows its whole sentence"
+
+
+def test_version(command: CliRunner) -> None:
+    assert command.invoke(cli.app, ["--version"]).output == f"glotouch {__version__}\n"
+
+
+def test_completion_of_commands() -> None:
+    code = "import sys; sys.argv = ['glotouch']; from glotouch_bt.cli import main; main()"
+    words = {"_GLOTOUCH_COMPLETE": "complete_bash", "COMP_WORDS": "glotouch rep", "COMP_CWORD": "1"}
+    done = subprocess.run([sys.executable, "-c", code], env={**os.environ, **words}, capture_output=True, text=True)
+    assert done.stdout.split() == ["replay", "report"]
+
+
+def test_other_systems_get_a_sentence(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+    with pytest.raises(BadInput, match="runs need Linux or macOS"), locked(tmp_path):
+        pass
+    monkeypatch.setattr(cli, "os", SimpleNamespace(name="nt"))
+    with pytest.raises(SystemExit, match="use Linux or macOS, or WSL 2 or Docker on Windows"):
+        cli.main()
 
 
 def test_help_imports_nothing_heavy() -> None:
@@ -127,6 +155,20 @@ def test_skills_and_backends_as_json(command: CliRunner) -> None:
     assert [p["name"] for p in squeeze["outputs"]] == ["touchset"]
     backends = json.loads(command.invoke(cli.app, ["backends", "--json"]).stdout)
     assert "mujoco" in [b["name"] for b in backends]
+
+
+def test_missions_and_nodes(command: CliRunner) -> None:
+    missions = {m["name"]: m for m in json.loads(command.invoke(cli.app, ["missions", "--json"]).stdout)}
+    assert set(missions) == set(shipped(""))
+    (target, *_) = missions["retrieve"]["parameters"]
+    assert (target["name"], target["type"], target["default"]) == ("target", "stl", "wukong")
+    nodes = {n["name"]: n for n in json.loads(command.invoke(cli.app, ["nodes", "--json"]).stdout)}
+    assert [s["name"] for s in nodes["retry"]["settings"]] == ["attempts"]
+    assert "attempts" in command.invoke(cli.app, ["nodes", "retry"]).stdout
+    assert "conditions: harsh, ideal, nominal" in command.invoke(cli.app, ["missions"]).stdout
+    assert "expected_objects" in command.invoke(cli.app, ["missions", "retrieve"]).stdout
+    for words in (["missions", "retriev"], ["nodes", "rety"]):
+        assert "did you mean" in command.invoke(cli.app, words).stderr
 
 
 def test_schema_accepts_the_shipped_missions(command: CliRunner) -> None:

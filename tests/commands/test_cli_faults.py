@@ -80,6 +80,14 @@ def test_what_cannot_be_tried_is_said_before_anything_runs(words: list[str], sai
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("name", ["faults", "resume"])
+def test_a_mission_without_the_needed_parameters_is_named(name: str, tmp_path: Path) -> None:
+    done = runner.invoke(app, ["bench", name, "--mission", "calibrate", "--out", str(tmp_path / "out")])
+    assert done.exit_code == 2
+    assert "--mission calibrate: this experiment sets the parameters target, expected_objects" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_disk_that_refuses_the_record_hides_no_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     close, closed = Recorder.close, []
 

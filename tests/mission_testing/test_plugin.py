@@ -86,6 +86,16 @@ def test_a_mission_is_found_beside_the_test_too(folder: pytest.Pytester) -> None
     folder.runpytest_inprocess("deep").assert_outcomes(passed=1)
 
 
+def test_a_mission_is_found_above_the_test(folder: pytest.Pytester) -> None:
+    """pytest is started in a folder above the package whose missions its tests name."""
+    tests, missions = folder.path / "package/tests/deep", folder.path / "package/missions"
+    tests.mkdir(parents=True)
+    missions.mkdir()
+    (missions / "mine.yaml").write_text(MISSION)
+    (tests / "test_it.py").write_text(WEAK.replace("missions/put_back", "missions/mine"))
+    folder.runpytest_inprocess("package").assert_outcomes(passed=1)
+
+
 def test_a_mission_that_does_not_pass_the_check_fails_its_test(folder: pytest.Pytester) -> None:
     Path(folder.path / "missions/put_back.yaml").write_text(MISSION.replace("tool_return", "tool_retrun"))
     folder.makepyfile(WEAK)
