@@ -40,7 +40,7 @@ def judge(point: tuple[float, float] | None) -> None:
     skill._judge(candidate("round", (0.0, 0.0), (0.06, 0.06)), None if point is None else np.array(point))
 
 
-def test_a_contact_on_the_outline_is_the_candidate_and_any_other_is_not() -> None:
+def test_recheck__candidate_moved__unless_the_contact_is_on_the_outline() -> None:
     judge((0.034, 0.0))
     judge((0.0, -0.026))
     for point in ((0.040, 0.0), (0.0, 0.020), None):
@@ -78,9 +78,7 @@ class Stood(Recheck):
 
 
 @pytest.mark.parametrize(("aperture_mm", "held"), [(15.0, True), (40.0, False)])
-def test_a_probe_that_may_have_been_put_back_counts_as_held_only_between_the_jaws(
-    aperture_mm: float, held: bool
-) -> None:
+def test_recheck__tool_lost__aperture_decides_whether_the_probe_is_held(aperture_mm: float, held: bool) -> None:
     told: list[bool] = []
     arm = SimpleNamespace(
         aperture_m=1e-3 * aperture_mm, scene=SimpleNamespace(holding_tool=True, hold_tool=told.append)

@@ -78,7 +78,7 @@ def swept(upto_m: float) -> SearchMap:
 
 
 @pytest.mark.parametrize("policy", ["expected_find", "nearest_frontier"])
-def test_search_exhausted(make, policy: str) -> None:
+def test_guarded_sweep__search_exhausted(make, policy: str) -> None:
     """What is left of the empty box is swept, and that ends; nothing was touched on the way."""
     belief = swept(0.12)
     b, skill = make(stands=False, start=(-0.05, 0.1, 0.018), inputs={"previous": belief}, policy=policy)
@@ -104,7 +104,7 @@ def test_what_was_touched_by_the_way_is_looked_at_first(make) -> None:
     np.testing.assert_allclose(skill.contact.tip_K_m, tip, atol=8e-4)
 
 
-def test_a_lid_keeps_the_ball_out(make) -> None:
+def test_guarded_sweep__search_exhausted__a_lid_covers_the_container(make) -> None:
     """No move in is possible: each is refused with its reason, its place given up, and the search says so."""
     b, skill = make(start=(-0.05, 0.1, 0.14))
     b.arm.scene.add_obstacle("lid", "box", centre_K_m=(0, 0), size_m=(0.3, 0.4), height_m=0.02, base_K_m=0.06)
@@ -115,7 +115,7 @@ def test_a_lid_keeps_the_ball_out(make) -> None:
     assert len(skill.map.dropped) > 0
 
 
-def test_a_lost_tool_ends_it(make, tool) -> None:
+def test_guarded_sweep__tool_lost(make, tool) -> None:
     """The jaws are not as far apart as with the tool between them: nothing moves."""
     b, skill = make(inputs={"tool": dataclasses.replace(tool, aperture_m=tool.aperture_m + 0.005)})
     begun = len(b.commands)

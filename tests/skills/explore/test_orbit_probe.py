@@ -81,7 +81,7 @@ def test_what_is_touched_by_the_way_becomes_a_hint(make, monkeypatch: pytest.Mon
     assert [h is c for h, c in zip(skill.map.hints, (old, stray), strict=True)] == [True, True]
 
 
-def test_a_lost_tool_ends_it(make) -> None:
+def test_orbit_probe__tool_lost(make) -> None:
     b, skill = make()
     b.go(b.arm.jaws(0.03, speed_m_s=0.2))
     begun = len(b.commands)
@@ -90,7 +90,7 @@ def test_a_lost_tool_ends_it(make) -> None:
     assert not [c for c in b.commands[begun:] if c.motion is not None]
 
 
-def test_known_object(make) -> None:
+def test_orbit_probe__known_object(make) -> None:
     contour = fit_contour(
         np.array([[np.cos(a), np.sin(a)] for a in np.linspace(0, 6, 9)]) * (RADIUS + BALL) + POST, BALL
     )
@@ -102,7 +102,7 @@ def test_known_object(make) -> None:
     assert not [c for c in b.commands if c.motion is not None and c.motion.dq.any()][200:], "it does not go round"
 
 
-def test_not_traced(make) -> None:
+def test_orbit_probe__not_traced(make) -> None:
     """What was touched is gone: nothing is met on the way round, and the place is dropped from the search."""
     b, skill = make(stands=False)
     b.run(skill)

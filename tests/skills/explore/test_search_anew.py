@@ -24,7 +24,7 @@ def test_objects_are_kept_and_ways_forgotten(bench, found) -> None:
     assert after.covered_fraction(0.03) < 0.5 * before.covered_fraction(0.03)
 
 
-def test_nothing_to_forget(bench) -> None:
+def test_search_anew__nothing_searched(bench) -> None:
     b = bench()
     skill = b.make(SearchAnew)
     b.run(skill)

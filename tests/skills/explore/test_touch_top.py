@@ -200,7 +200,7 @@ def test_a_chimney_beside_the_middle(make, things) -> None:
     assert skill.measured.height_m == pytest.approx(TOP + 0.02, abs=1e-3)
 
 
-def test_no_top(make) -> None:
+def test_touch_top__no_top(make) -> None:
     """The object is gone: the reason says so, and the candidate is as high as its sides were touched."""
     b, skill = make([])
     b.run(skill)

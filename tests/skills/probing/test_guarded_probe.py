@@ -54,7 +54,7 @@ def test_a_gentle_touch_from_above_is_found(make) -> None:
     assert not probed.contact.pushed_K_m.any()
 
 
-def test_a_hard_contact_ends_the_move_and_says_so(make) -> None:
+def test_guarded_probe__hard_contact(make) -> None:
     b, prober = make(plate(24.0, 0.04))
     with pytest.raises(SkillFailed) as failed:
         b.go(prober.move(START - [0, 0, 0.04], 0.03))

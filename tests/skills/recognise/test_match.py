@@ -61,13 +61,13 @@ def test_the_target_is_recognised_and_its_grasp_planned(make, touchsets, target:
 
 
 @pytest.mark.parametrize("none", [None, ()])
-def test_no_touch(make, none) -> None:
+def test_match__no_touch(make, none) -> None:
     b, skill = make("block", none)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_touch")
 
 
-def test_not_recognised(make, touchsets) -> None:
+def test_match__not_recognised(make, touchsets) -> None:
     """Two alike: whichever is best, it is not surely the target. The ranking is written all the same."""
     twin = replace(touchsets[0], candidate=replace(touchsets[0].candidate, index=1))
     b, skill = make("block", (touchsets[0], twin))

@@ -42,7 +42,7 @@ def test_what_was_not_as_felt_may_be_touched_once_more(bench, touchsets) -> None
     assert (again.status, again.rejected) == (Status.SUCCESS, (1,))
 
 
-def test_only_so_many(bench, touchsets) -> None:
+def test_reject__wrong_object__too_many_in_vain(bench, touchsets) -> None:
     skill = rejected(bench, touchsets, 2, True, before_doubted=(0, 1), before_rejected=(0, 1))
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "wrong_object")
     assert skill.rejected == (0, 1, 2)

@@ -62,7 +62,7 @@ def test_a_low_thing_gets_one_closure(make, found) -> None:
     assert [len(s.layers) for s in skill.touchset.sequences] == [1, 1, 1]
 
 
-def test_nothing_felt(make) -> None:
+def test_squeeze__nothing_felt(make) -> None:
     b, skill = make(grip_width_m=None)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "nothing_felt")
@@ -70,14 +70,14 @@ def test_nothing_felt(make) -> None:
     assert not any(layer.stable for layer in event["touchset"].layers)
 
 
-def test_no_squeeze(make, found) -> None:
+def test_squeeze__no_squeeze(make, found) -> None:
     b, skill = make(found.round((0, 0), 0.045))
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_squeeze")
     assert not [c for c in b.commands if c.motion is not None], "nothing moves towards what cannot be squeezed"
 
 
-def test_no_room_among_neighbours(make, found) -> None:
+def test_squeeze__no_squeeze__neighbours_too_near(make, found) -> None:
     ring = tuple(
         found.round((0.058 * np.cos(a), 0.02 + 0.058 * np.sin(a)), 0.028, index=int(a) + 1) for a in np.arange(6)
     )
@@ -88,7 +88,7 @@ def test_no_room_among_neighbours(make, found) -> None:
     assert not [o for o in b.arm.scene.obstacles if o.startswith("candidate")]
 
 
-def test_fingers_on_something_rise_again(make, things) -> None:
+def test_squeeze__no_squeeze__fingers_touch_and_rise_again(make, things) -> None:
     """Something lies where nothing was traced: every sequence is given up, and the hand is high again."""
     b, skill = make(stuff=[things.floor(0.045)], tip_P_m=0.022)
     b.run(skill)

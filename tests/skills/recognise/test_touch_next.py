@@ -151,7 +151,7 @@ def test_fingers_on_something_cost_a_choice_not_the_mission(make, things) -> Non
     assert pads_height(b) > 0.13
 
 
-def test_no_candidates_and_an_unusable_target(make, found) -> None:
+def test_touch_next__no_candidates__or_unusable_target(make, found) -> None:
     b, skill = make(Oracle(right=1, enough=3), things=(found.round((0, 0), 0.025),))
     b.run(skill, 0)
     empty = b.make(TouchNext, inputs={"candidates": ()}, target="can")

@@ -37,7 +37,7 @@ def test_the_jaws_close_at_the_place(make) -> None:
     assert (targets[1].force_N, targets[-1].force_N) == (3.0, 30.0)
 
 
-def test_nothing_between_the_jaws_is_no_grasp(make) -> None:
+def test_grasp__no_grasp__jaws_close_on_nothing(make) -> None:
     b, skill = make(grip_width_m=None)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_grasp")
@@ -46,7 +46,7 @@ def test_nothing_between_the_jaws_is_no_grasp(make) -> None:
     assert float(b.arm.pose_B_P.position_m[2]) > -0.2 + 0.14
 
 
-def test_fingers_on_something_is_no_grasp(make, things) -> None:
+def test_grasp__no_grasp__fingers_touch_on_the_way_down(make, things) -> None:
     b, skill = make(stuff=[things.floor(0.05)])
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_grasp")
@@ -68,7 +68,7 @@ def test_the_next_best_is_tried_when_there_is_no_room(make, found) -> None:
     assert not [o for o in b.arm.scene.obstacles if o.startswith("candidate")]
 
 
-def test_beside_the_wall_no_grasp_is_possible_and_nothing_moves(make) -> None:
+def test_grasp__no_grasp__beside_the_wall_nothing_moves(make) -> None:
     b, skill = make(replace(PLAN, position_K_m=np.array([0.0, 0.17, 0.03])))
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_grasp")

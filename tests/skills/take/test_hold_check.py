@@ -57,7 +57,7 @@ def test_one_witness_may_err(make, kw) -> None:
     ],
     ids=["weight and gels", "weight and jaws", "jaws and gels"],
 )
-def test_lost(make, kw) -> None:
+def test_hold_check__lost(make, kw) -> None:
     b, skill = make(**kw)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "lost")
@@ -65,7 +65,7 @@ def test_lost(make, kw) -> None:
 
 
 @pytest.mark.parametrize("grip_m", [0.045, 0.035])
-def test_slipped(make, grip_m: float) -> None:
+def test_hold_check__slipped(make, grip_m: float) -> None:
     b, skill = make(grip_m=grip_m)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "slipped")

@@ -38,7 +38,7 @@ def test_the_weight_is_what_hangs_in_the_hand(make) -> None:
 
 
 @pytest.mark.parametrize(("weight_N", "width_m"), [(0.1, 0.04), (2.5, None)], ids=["no weight", "closed jaws"])
-def test_lost(make, weight_N: float, width_m: float | None) -> None:
+def test_lift__lost(make, weight_N: float, width_m: float | None) -> None:
     b, skill = make(weight_N, width_m)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "lost")

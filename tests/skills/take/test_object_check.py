@@ -43,14 +43,14 @@ def test_as_planned(judged, grip_m: float) -> None:
     assert (skill.fits, skill.impossible) == (True, False)
 
 
-def test_as_wide_as_the_other_side(judged) -> None:
+def test_object_check__not_as_felt__wide_as_the_other_side(judged) -> None:
     skill = judged(0.049)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "not_as_felt")
     assert (skill.fits, skill.impossible) == (False, False)
 
 
 @pytest.mark.parametrize("grip_m", [0.020, 0.072])
-def test_nowhere_so_wide(judged, grip_m: float) -> None:
+def test_object_check__wrong_object__no_such_width(judged, grip_m: float) -> None:
     """The block is 35 mm across at least, 61 mm over its corners at most."""
     skill = judged(grip_m)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "wrong_object")
@@ -61,7 +61,7 @@ def test_nowhere_so_wide(judged, grip_m: float) -> None:
 
 
 @pytest.mark.parametrize("weight_N", [0.05, 9.0])
-def test_neither_of_wood_nor_of_steel(judged, weight_N: float) -> None:
+def test_object_check__wrong_object__impossible_weight(judged, weight_N: float) -> None:
     skill = judged(0.035, weight_N)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "wrong_object")
     light, heavy = (9.81 * d * float(np.prod(SIDES_M)) for d in (100.0, 8000.0))
@@ -69,6 +69,6 @@ def test_neither_of_wood_nor_of_steel(judged, weight_N: float) -> None:
     assert skill.reason.evidence["heavy_N"] == pytest.approx(heavy, rel=1e-3)
 
 
-def test_above_its_top_nothing_is_known(judged) -> None:
+def test_object_check__wrong_object__held_above_the_top_of_the_target(judged) -> None:
     skill = judged(0.020, plan=dataclasses.replace(PLAN, position_K_m=np.array([0.0, 0.0, 0.2])))
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "wrong_object")

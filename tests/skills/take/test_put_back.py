@@ -57,7 +57,7 @@ def test_it_may_stand_a_little_higher(make, things) -> None:
     assert 0.004 < min(b.opened, key=lambda p: p[2])[2] - OVER_B_M[2] < 0.014
 
 
-def test_something_in_the_way_it_is_kept(make, things) -> None:
+def test_put_back__in_the_way__the_object_is_kept(make, things) -> None:
     b, skill = make(things=[things.floor(0.05)])
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "in_the_way")

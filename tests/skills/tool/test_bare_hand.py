@@ -35,7 +35,7 @@ def test_the_hand_is_a_tool(bench) -> None:
     assert point == pytest.approx(0.011 * ahead[:2], abs=1e-9)
 
 
-def test_not_with_the_probe_in_the_jaws(bench) -> None:
+def test_bare_hand__probe_held(bench) -> None:
     b = bench()
     b.arm.scene.hold_tool(True)
     skill = b.make(BareHand)

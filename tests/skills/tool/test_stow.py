@@ -55,7 +55,7 @@ def test_what_weighs_is_held_whatever_the_jaws_report(make) -> None:
     np.testing.assert_allclose(b.arm.pose_B_P.position_m, STOWED + np.array([0, 0, 0.08]), atol=1e-4)
 
 
-def test_a_caught_hand_does_not_pull(bench, tool) -> None:
+def test_stow__motion_refused__a_caught_hand_does_not_pull(bench, tool) -> None:
     """Something holds it from 20 mm above where it begins, with 3 N/mm."""
     tie_m: list[float] = []
     b = bench(grip_width_m=0.016, weight_N=lambda p, aperture: 3000.0 * max(p[2] - tie_m[0], 0.0) if tie_m else 0.0)
@@ -77,7 +77,7 @@ def test_a_lost_probe(make) -> None:
     assert float(b.arm.pose_B_P.position_m[2]) > -0.2 + 0.13
 
 
-def test_an_object_is_kept(make) -> None:
+def test_stow__object_held__an_object_is_kept(make) -> None:
     b, skill = make(grip_width_m=0.04, probe=False)
     begun = len(b.commands)
     b.run(skill)

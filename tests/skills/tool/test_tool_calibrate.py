@@ -75,14 +75,14 @@ def test_the_fake_wrist_reports_at_once(make) -> None:
     assert skill.tool.latency_s == pytest.approx(0.0, abs=6e-3), "the fake's inertia comes a period at a time"
 
 
-def test_no_wall(make) -> None:
+def test_tool_calibrate__no_wall(make) -> None:
     b, skill = make(things=[])
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_wall")
     assert not b.arm.scene._allowed
 
 
-def test_slipped(make) -> None:
+def test_tool_calibrate__slipped(make) -> None:
     """The probe shifts in the jaws between the touches: here the walls move instead."""
     touched = []
 
@@ -97,7 +97,7 @@ def test_slipped(make) -> None:
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "slipped")
 
 
-def test_motion_refused(make) -> None:
+def test_tool_calibrate__motion_refused(make) -> None:
     b, skill = make()
     b.arm.scene.add_obstacle("crate", "box", centre_K_m=(-0.13, -0.18), size_m=(0.06, 0.06), height_m=0.3)
     b.run(skill)

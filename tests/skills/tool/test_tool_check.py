@@ -46,7 +46,7 @@ def test_held(make, lighter_N: float) -> None:
     assert lowest_m(b) == before, "the floor was not touched"
 
 
-def test_jaws_closed_and_lighter_it_is_lost_and_the_floor_is_not_touched(make) -> None:
+def test_tool_check__tool_lost__aperture_and_weight_agree_without_touching_the_floor(make) -> None:
     b, skill = make(0.59, jaws_m=0.0)
     begun = lowest_m(b)
     b.run(skill)
@@ -58,7 +58,9 @@ def test_jaws_closed_and_lighter_it_is_lost_and_the_floor_is_not_touched(make) -
 
 
 @pytest.mark.parametrize(("lighter_N", "jaws_m"), [(0.59, 0.016), (0.0, 0.0)], ids=["weight", "jaws"])
-def test_where_the_two_differ_the_floor_decides(make, lighter_N: float, jaws_m: float) -> None:
+def test_tool_check__tool_lost__the_floor_decides_if_aperture_and_weight_disagree(
+    make, lighter_N: float, jaws_m: float
+) -> None:
     b, skill = make(lighter_N, jaws_m)
     b.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message  # a drifted tare, or jaws that report wrongly
@@ -69,7 +71,7 @@ def test_where_the_two_differ_the_floor_decides(make, lighter_N: float, jaws_m: 
     assert "nothing was met where the floor is" in skill.reason.message
 
 
-def test_slipped_in_the_jaws(make, tool) -> None:
+def test_tool_check__tool_slipped__floor_height_changed(make, tool) -> None:
     b, skill = make(floor_m=0.003, touch=True)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "tool_slipped")
@@ -81,7 +83,7 @@ def test_slipped_in_the_jaws(make, tool) -> None:
     assert skill.status is Status.SUCCESS, skill.feedback_message
 
 
-def test_a_hand_that_put_it_away_need_not_look(make) -> None:
+def test_tool_check__tool_lost__at_once_after_the_probe_was_returned(make) -> None:
     b, skill = make()
     b.arm.scene.hold_tool(False)
     b.run(skill)
@@ -94,7 +96,7 @@ def test_broken_off_anywhere(make, preempt_all_along) -> None:
 
 @pytest.mark.parametrize(("tilt_deg", "held"), [(10.0, True), (20.0, False)])
 @pytest.mark.parametrize("about", [0.0, 1.0, 2.5])
-def test_turned_in_the_jaws(make, tilt_deg: float, held: bool, about: float) -> None:
+def test_tool_check__tool_slipped__tilted_in_the_jaws(make, tilt_deg: float, held: bool, about: float) -> None:
     """It weighs as before and fills the jaws; its centre of mass hangs aside. A spin about the hand's axis is none."""
     probe = make()[0].world.probe
     moment = 9.81 * probe.mass_kg * probe.com_below_grasp_m * np.sin(np.radians(tilt_deg))

@@ -56,7 +56,7 @@ def test_without_the_touch_the_floor_is_where_it_is_said_to_be(make) -> None:
 
 
 @pytest.mark.parametrize("width_m", [None, 0.030], ids=["empty", "something wide"])
-def test_no_probe(make, width_m: float | None) -> None:
+def test_tool_pickup__no_probe(make, width_m: float | None) -> None:
     b, skill = make(grip_width_m=width_m)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_probe")
@@ -65,7 +65,7 @@ def test_no_probe(make, width_m: float | None) -> None:
     assert b.arm.aperture_m > 0.04, "the jaws are open again"
 
 
-def test_probe_not_lifted(make) -> None:
+def test_tool_pickup__probe_not_lifted(make) -> None:
     b, skill = make(weight_N=lambda position, aperture: 0.0)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "probe_not_lifted")
@@ -73,7 +73,7 @@ def test_probe_not_lifted(make) -> None:
     assert b.arm.aperture_m == pytest.approx(0.016, abs=1e-3)
 
 
-def test_probe_not_lifted_and_the_jaws_have_closed(make) -> None:
+def test_tool_pickup__probe_not_lifted__jaws_have_closed(make) -> None:
     b, skill = make(weight_N=lambda position, aperture: 0.0)
     cycle = b.robot.cycle
 
@@ -88,7 +88,7 @@ def test_probe_not_lifted_and_the_jaws_have_closed(make) -> None:
     assert not b.arm.scene.holding_tool
 
 
-def test_a_probe_that_is_stuck_in_its_holder_is_not_torn_out(make) -> None:
+def test_tool_pickup__hard_contact__probe_stuck_in_its_holder(make) -> None:
     """A spring of 3 N/mm holds it: the rise ends before the robot's own limit does."""
 
     def stuck(position_B, aperture: float) -> float:
@@ -103,7 +103,7 @@ def test_a_probe_that_is_stuck_in_its_holder_is_not_torn_out(make) -> None:
     assert not b.arm.scene._allowed
 
 
-def test_an_open_hand_that_meets_something_on_the_way_down_does_not_press_on(make) -> None:
+def test_tool_pickup__hard_contact__obstacle_above_the_handle(make) -> None:
     """A spring of 3 N/mm, 10 mm above the handle's place."""
     top_m = STOWED[2] + 0.010
 
@@ -140,7 +140,7 @@ def test_an_arm_that_goes_astray_in_the_holder_is_stopped(make) -> None:
     assert MAX_OFF_LINE_M < max(far_m) < 0.003
 
 
-def test_no_floor(make) -> None:
+def test_tool_pickup__no_floor(make) -> None:
     b, skill = make(floor_m=-0.02)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_floor")
@@ -148,7 +148,7 @@ def test_no_floor(make) -> None:
     assert not b.arm.scene._allowed
 
 
-def test_motion_refused(make) -> None:
+def test_tool_pickup__motion_refused(make) -> None:
     """A thing in the way up to which the hand would have to go through."""
     b, skill = make()
     K = b.world.container.pose_B_K.inverse().apply(b.world.holder.pose_B_grasp.position_m)
@@ -159,7 +159,7 @@ def test_motion_refused(make) -> None:
     assert not b.arm.scene._allowed
 
 
-def test_a_failed_request(make, monkeypatch) -> None:
+def test_tool_pickup__request_failed(make, monkeypatch) -> None:
     b, skill = make()
 
     class Broken:

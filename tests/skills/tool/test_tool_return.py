@@ -48,7 +48,7 @@ def test_the_probe_is_put_back(make) -> None:
     assert len(opened) == 1
 
 
-def test_motion_refused(make) -> None:
+def test_tool_return__motion_refused(make) -> None:
     b, skill = make()
     # A bar between the container and the holder, as high as the hand.
     b.arm.scene.add_obstacle("bar", "box", centre_K_m=(-0.1, -0.2), size_m=(0.6, 0.02), height_m=0.5)
@@ -57,7 +57,7 @@ def test_motion_refused(make) -> None:
     assert b.arm.scene.holding_tool
 
 
-def test_a_failed_request(make, monkeypatch) -> None:
+def test_tool_return__request_failed(make, monkeypatch) -> None:
     b, skill = make()
 
     class Broken:
@@ -73,7 +73,7 @@ def test_broken_off_anywhere_it_lets_go_in_the_holder_only(make, preempt_all_alo
 
 
 @pytest.mark.parametrize("above_m", [0.12, 0.05, 0.01])
-def test_a_probe_that_is_dropped_on_the_way_in_is_noticed(make, above_m: float) -> None:
+def test_tool_return__tool_lost__dropped_on_the_way_in(make, above_m: float) -> None:
     """The jaws close on nothing: the hand goes no farther down, rises, and the scene says that it is empty."""
     b, skill = make()
     cycle, lowest = b.robot.cycle, [np.inf]
@@ -96,7 +96,7 @@ def test_a_probe_that_is_dropped_on_the_way_in_is_noticed(make, above_m: float) 
 
 
 @pytest.mark.parametrize("above_m", [0.12, 0.05])
-def test_what_does_not_go_in_is_not_left_pressed_on(make, above_m: float) -> None:
+def test_tool_return__motion_refused__a_blocked_probe_is_lifted_off(make, above_m: float) -> None:
     """A probe that hangs askew meets the holder's top: the hand stops, rises with it, and says so."""
     b, skill = make()
     cycle, lowest = b.robot.cycle, [np.inf]

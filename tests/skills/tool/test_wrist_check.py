@@ -40,7 +40,7 @@ def test_within_bounds(make, pull_N: float) -> None:
 
 
 @pytest.mark.parametrize("pull_N", [0.55, -3.0, float("nan")])
-def test_off_zero(make, pull_N: float) -> None:
+def test_wrist_check__off_zero(make, pull_N: float) -> None:
     b = make(pull_N)
     skill = b.make(WristCheck)
     b.run(skill)
@@ -50,7 +50,7 @@ def test_off_zero(make, pull_N: float) -> None:
     assert limit == 0.5
 
 
-def test_a_torque_alone_is_off_zero(bench) -> None:
+def test_wrist_check__off_zero__by_torque_alone(bench) -> None:
     b = bench()
     b.robot.wrench = lambda stamp, position, quat: np.tile([0.0, 0.0, 0.0, 0.0, 0.3, 0.0], (len(stamp), 1))
     skill = b.make(WristCheck)
@@ -68,7 +68,7 @@ def test_a_tare_makes_it_read_nothing_again(make) -> None:
     assert check.status is Status.SUCCESS, check.feedback_message
 
 
-def test_a_request_that_fails(make, monkeypatch) -> None:
+def test_wrist_check__request_failed(make, monkeypatch) -> None:
     b = make()
 
     class Broken:

@@ -30,7 +30,7 @@ def test_done_at_once_costs_no_period() -> None:
 
 
 @pytest.mark.parametrize(("after", "error", "words"), [(3, "no power", "no power"), (10**6, None, "timed out")])
-def test_request_failed(after: int, error: str | None, words: str) -> None:
+def test_wait_for__request_failed(after: int, error: str | None, words: str) -> None:
     with pytest.raises(SkillFailed, match=words) as caught:
         periods(SimpleNamespace(done=False, error=error), after)
     assert caught.value.reason.code == "request_failed"

@@ -85,7 +85,7 @@ def test_what_is_refused_is_felt_as_that(make) -> None:
 
 
 @pytest.mark.parametrize(("off_mm", "lost"), [(3.9, False), (4.1, True), (-4.1, True)])
-def test_the_tool_is_lost_when_the_jaws_are_not_as_far_apart(make, tool, off_mm: float, lost: bool) -> None:
+def test_plan_driver__tool_lost__aperture_changed(make, tool, off_mm: float, lost: bool) -> None:
     b, explorer, _ = make(tool=dataclasses.replace(tool, aperture_m=0.016 + 1e-3 * off_mm))
     move = Move("sweep", np.array([0.0, 0.06]))
     if not lost:
