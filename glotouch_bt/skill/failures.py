@@ -64,13 +64,13 @@ MOTION_REFUSED = Failure("motion_refused", "the way is not clear", advice="move 
 """Given for every `MotionRefused` that a skill does not handle."""
 NOT_AT_REST = Failure(
     "not_at_rest",
-    "the arm still moves after the skill before was broken off",
-    advice="something pushes it, or the servo does not settle",
+    "the arm still moves after the previous skill was preempted",
+    advice="something pushes the arm, or the servo does not settle",
 )
 SKILL_TIMEOUT = Failure(
     "skill_timeout",
-    "it took longer than its class allows",
-    advice="it hangs, or its task is larger than foreseen",
+    "the skill took longer than its class allows",
+    advice="the skill hangs, or its task is larger than expected",
 )
 GENERAL_FAILURES = (NOT_AT_REST, SKILL_TIMEOUT)
 """Failures of the base class, which every skill can have."""

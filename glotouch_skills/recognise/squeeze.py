@@ -51,8 +51,8 @@ class Squeeze(Skill):
     )
     NO_SQUEEZE = Failure(
         "no_squeeze",
-        "the object does not fit between the open jaws, or its neighbours leave the fingers no room",
-        advice="neighbours or walls leave the jaws no room; take away what stands beside it, or trace it again",
+        "the object does not fit between the open jaws, or the fingers would collide with its neighbours",
+        advice="neighbours or walls are too near; remove the neighbour, or trace the object again",
     )
     FAILURES: ClassVar = (MOTION_REFUSED.with_meaning("the hand cannot be brought over the object"),)
 

@@ -50,7 +50,7 @@ class Grasp(Skill):
 
     NO_GRASP = Failure(
         "no_grasp",
-        "no grasp of the plan could be made: no room, the fingers met something on the way down, or the jaws "
+        "no grasp of the plan could be made: the hand would collide, the fingers touched something, or the jaws "
         "closed on nothing; the hand has risen, jaws open",
         advice="the object or a neighbour was moved; squeeze it again",
     )

@@ -54,7 +54,7 @@ class PutBack(Skill):
     IN_THE_WAY = Failure(
         "in_the_way",
         "the object met something high above its place; it is still held, and high",
-        advice="something else stands there now; set it down by hand",
+        advice="another object stands there now; set the object down by hand",
     )
     FAILURES: ClassVar = (
         MOTION_REFUSED.with_meaning("the place cannot be reached, with the object still held, or the jaws were caught"),

@@ -44,7 +44,7 @@ class Stow(Skill):
     OBJECT_HELD = Failure(
         "object_held",
         "the jaws hold something that is not the probe, and keep it; the hand is high",
-        advice="take it out of the jaws by hand",
+        advice="remove the object from the jaws by hand",
     )
     FAILURES: ClassVar = (
         *RETURN_PROBE_FAILURES,

@@ -60,13 +60,13 @@ class ToolCheck(Skill):
     TOOL_LOST = Failure(
         "tool_lost",
         "the probe is not in the hand",
-        advice="it lies in the container or beside it; take it out by hand and put it into its holder",
+        advice="the probe lies in or beside the container; put it into its holder by hand",
     )
     TOOL_SLIPPED = Failure(
         "tool_slipped",
         "the probe is held, but its ball is not where it was: it hangs askew, or the floor was felt too high "
         "or too low",
-        advice="put it back into its holder and take it anew",
+        advice="return the probe to its holder and pick it up again",
     )
     FAILURES: ClassVar = (
         *FEEL_FLOOR_FAILURES,

@@ -30,7 +30,7 @@ OFF_TOP_M = 0.006
 TOOL_LOST = Failure(
     "tool_lost",
     "the jaws are not as far apart as when they took the tool, or the hand is lighter by the weight of the probe",
-    advice="the tool lies in the container or beside it; take it out by hand",
+    advice="the tool lies in or beside the container; remove it by hand",
 )
 
 
@@ -138,7 +138,7 @@ class Explorer:
         if missing_N > MAX_LOST_SHARE * self._weight_N:
             raise TOOL_LOST(
                 f"the hand is lighter by {missing_N:.2f} N than a moment ago, the probe weighs {self._weight_N:.2f} N",
-                advice="look with tool_check",
+                advice="check the probe with tool_check",
                 missing_N=missing_N,
                 weight_N=self._weight_N,
             )

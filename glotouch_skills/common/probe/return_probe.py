@@ -40,7 +40,7 @@ RISE_M = 0.08
 TOOL_LOST = Failure(
     "tool_lost",
     "the probe was dropped on its way into the holder; the hand is empty and above it",
-    advice="it stands in its holder or lies beside it; put it there by hand",
+    advice="the probe is in its holder or beside it; insert it by hand",
 )
 RETURN_PROBE_FAILURES = (TOOL_LOST, REQUEST_FAILED)
 
