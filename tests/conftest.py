@@ -9,18 +9,20 @@ import pytest
 
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.spec import Finding, MissionFaults
+from glotouch_bt.validation.seeded_mistakes.bench import alarms
 
 
 @pytest.fixture
 def found_in(tmp_path: Path) -> Callable[..., list[Finding]]:
-    """What reading a mission's text finds, its warnings too; keywords: settings."""
+    """Return the findings of a mission's text, without unwritten optional inputs unless `every`; keywords: settings."""
 
-    def found(text: str, **settings: str) -> list[Finding]:
+    def found(text: str, *, every: bool = False, **settings: str) -> list[Finding]:
         path = tmp_path / "m.yaml"
         path.write_text(text)
         try:
-            return list(load_mission(path, settings).warnings)
+            made = list(load_mission(path, settings).warnings)
         except MissionFaults as e:
-            return [*e.findings, *e.warnings]
+            made = [*e.findings, *e.warnings]
+        return made if every else alarms(made)
 
     return found

@@ -1,4 +1,4 @@
-"""A mission file to a checked mission, or to one report of everything that is wrong with it."""
+"""Load a mission file: return the checked mission, or report everything that is wrong with it."""
 
 from __future__ import annotations
 
@@ -61,12 +61,12 @@ class Mission:
         description: One line for people.
         world: The nominal world it runs in.
         parameters: Values in use, in their declared units.
-        stl_parameters: Names of those parameters that name an object.
+        stl_parameters: Names of the parameters that name an object.
         spec: The checked tree, as plain node specifications.
         timeout_s: Longest duration on the robot's clock.
-        file: Where it came from.
+        file: The file it was read from.
         document: The mission as plain data with the values in use and its subtrees, for the run's folder.
-        warnings: What the check found that may be meant as it is.
+        warnings: Findings that may be intended.
     """
 
     name: str
@@ -82,7 +82,7 @@ class Mission:
 
     @property
     def tree(self) -> Behaviour:
-        """A new py_trees tree of the mission, to look at (`py_trees.display`). It has no robot and cannot be ticked."""
+        """A new py_trees tree of the mission for `py_trees.display`. It has no robot and cannot be ticked."""
         from glotouch_bt.mission.tree import build_tree
 
         nothing: Any = None
@@ -91,7 +91,7 @@ class Mission:
         return built.root
 
     def resolved_yaml(self) -> str:
-        """The document as YAML text."""
+        """Return the document as YAML text."""
         return str(yaml.safe_dump(dict(self.document), sort_keys=False, allow_unicode=True, width=110))
 
 
@@ -111,8 +111,8 @@ def load_mission(
         objects: A folder of STL files to use instead of the world's.
 
     Raises:
-        MissionFaults: Everything that is wrong with it, each with its place. (A `BadInput`.)
-        BadInput: It cannot be read at all.
+        MissionFaults: It has errors; each has its place. (A `BadInput`.)
+        BadInput: The file cannot be read.
     """
     path = find_shipped("", str(given), "mission")
     findings = Findings()
@@ -123,12 +123,12 @@ def load_mission(
 
 
 def split_settings(mission: Mission, settings: Mapping[str, object]) -> dict[str, object]:
-    """The `--set` values that no mission parameter takes; they are backend options.
+    """Return the `--set` values that the mission does not declare; they are backend options.
 
-    Text that begins as a JSON object or list does is read as one: `--set 'layout={"apple": [0, 0.05, 0]}'`.
+    Text that begins like a JSON object or list is read as one: `--set 'layout={"apple": [0, 0.05, 0]}'`.
 
     Raises:
-        BadInput: It begins so, but is not JSON.
+        BadInput: It begins like JSON but is not.
     """
     return {k: _option(k, v) for k, v in settings.items() if k not in mission.parameters}
 
@@ -175,7 +175,7 @@ def _read(
     check_used(source.get("parameters"), tree_node, findings)
     for key, _ in entries_of(source.get("subtrees")):
         if f"carried {key.value}" not in reading.sources.values():
-            findings.add(key.place, "unused_subtree", f"no node uses the subtree {key.value!r}, which is not looked at")
+            findings.add(key.place, "unused_subtree", f"no node uses the subtree {key.value!r}, so it is not checked")
     check_flow(tree, findings, _leaves(source, findings), timeout_s)
     if world is None or len(findings):
         return None
@@ -236,7 +236,7 @@ def _world(source: Map, path: Path, objects: Path | None, findings: Findings) ->
 
 
 def _find_world(given: str, mission: Path) -> Path | None:
-    """Relative to the mission's file, else to the shipped missions; a bare name is a shipped world."""
+    """Return the path of a world, relative to the mission's file or to the shipped missions; None: there is none."""
     names = [given] if given.endswith((".yaml", ".yml")) else [given, f"worlds/{given}.yaml"]
     for root in (mission.parent, shipped_root()):
         for name in names:
@@ -246,7 +246,7 @@ def _find_world(given: str, mission: Path) -> Path | None:
 
 
 def _carried(source: Map, findings: Findings) -> dict[str, Node]:
-    """Subtrees that stand in the mission itself, by name."""
+    """Return the subtrees that stand in the mission itself, by name."""
     node = source.get("subtrees")
     if node is None:
         return {}
@@ -257,7 +257,7 @@ def _carried(source: Map, findings: Findings) -> dict[str, Node]:
 
 
 def _leaves(source: Map, findings: Findings) -> dict[str, tuple[frozenset[str], Place]]:
-    """The states in which the mission says it leaves resources when it succeeds."""
+    """Return the states in which the mission declares to leave each resource on success, and the place of each."""
     node = source.get("leaves")
     found: dict[str, tuple[frozenset[str], Place]] = {}
     if node is None:
@@ -278,7 +278,7 @@ def _leaves(source: Map, findings: Findings) -> dict[str, tuple[frozenset[str], 
 def _document(
     source: Map, name: str, world: object, parameters: Mapping[str, Parameter], reading: Reading
 ) -> dict[str, Any]:
-    """The mission with the values in use and every subtree it uses: it needs no other file but the world's."""
+    """Return the mission with the values in use and every subtree it uses. It needs no other file but the world's."""
     document: dict[str, Any] = {"mission": name, "world": world}
     for key in ("description", "timeout_s", "leaves"):
         node: Node | None = source.get(key)

@@ -95,7 +95,7 @@ CASES = [
     ("run survey --objects file", "--objects file: is not a folder with .stl files in it"),
     # worlds that cannot be
     ("run survey --objects many", "12 objects do not fit into the container"),
-    ("run tiny.yaml", "do not fit into the container: no room found for 'a'"),
+    ("run tiny.yaml", "do not fit into the container: no place found for 'a'"),
     ("run negative.yaml", "negative_world.yaml:4:15: container.interior_m = -0.4: must be finite and positive"),
     ("run flat.yaml", "flat_world.yaml:4:15: "),
     ("run world.yaml", "world.yaml:2:8: unknown world 'container_fve'; did you mean 'worlds/container_five.yaml'?"),
@@ -105,7 +105,7 @@ CASES = [
     ("run merge.yaml", "merge.yaml:4:13: merge keys (<<) are not allowed"),
     ("run code.yaml", "code.yaml:4:5: tags (tag:yaml.org,2002:python/object/apply:os.mkdir) are not allowed"),
     ("run tag.yaml", "tag.yaml:1:10: tags (!secret) are not allowed"),
-    ("run twice.yaml", "twice.yaml:2:1: key 'mission' stands twice (first at line 1)"),
+    ("run twice.yaml", "twice.yaml:2:1: duplicate key 'mission' (first at line 1)"),
     ("run deep.yaml", "nested deeper than"),
     ("run syntax.yaml", "syntax.yaml:5:1: not valid YAML"),
     ("run blank.yaml", "blank.yaml: holds no YAML document"),

@@ -1,4 +1,4 @@
-"""TODO door of glotouch_bt/mission/read."""
+"""Read YAML into nodes, parameters, worlds and conditions. Faults become findings with places; nothing is run."""
 
 from glotouch_bt.mission.read.fields import unit_of, validate
 from glotouch_bt.mission.read.library import (

@@ -1,4 +1,4 @@
-"""A positioned mapping against a pydantic model: every fault becomes a finding at its own line and column."""
+"""Validate a mapping with source positions by a pydantic model. Each fault becomes a finding with its position."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from glotouch_bt.mission.spec import Findings, Map, Node, Place, Scalar, Seq, co
 
 M = TypeVar("M", bound=BaseModel)
 
-# pydantic's error types in our words; {} are its context values
 _WORDS = {
     "several": "{rules}",
     "int_type": "must be a whole number",
@@ -37,6 +36,7 @@ _WORDS = {
     "too_short": "must have at least {min_length} items",
     "too_long": "must have at most {max_length} items",
 }
+"""Messages by pydantic's error type; {} are its context values."""
 
 
 _SCALARS = {"string_type", "int_type", "float_type", "bool_type"}
@@ -47,7 +47,7 @@ NOTHING: Mapping[str, str] = MappingProxyType({})
 
 
 class Poison:
-    """Marks a value that already has a finding, so that no second one is reported for it."""
+    """A value that already has a finding, so that no second one is reported for it."""
 
 
 POISON = Poison()
@@ -77,15 +77,15 @@ def validate(
     where: Place | None = None,
     beside: Mapping[str, str] = NOTHING,
 ) -> M | None:
-    """Make a model from a mapping; None if that gave findings.
+    """Return a model made from a mapping; None if that gave findings.
 
     Args:
         model: The pydantic model; its fields may declare a unit.
-        given: What was written.
-        what: What is being filled, for messages (``skill 'squeeze'``).
+        given: The mapping as written.
+        what: Name of the thing that the mapping describes, for messages (``skill 'squeeze'``).
         findings: Where faults go.
         where: Place of missing keys (default: the mapping).
-        beside: Names that belong to what is filled as well, and where they are written; empty: here.
+        beside: Other names that are valid here, each with the key under which it is written; empty: here.
     """
     given = _with_new_names(model, given, what, findings)
     values: dict[str, Any] = {}
@@ -96,7 +96,7 @@ def validate(
         field = model.model_fields.get(name)
         if field is None:
             if beside.get(name):
-                said = f"{name!r} is no parameter of {what}: it belongs under {beside[name]}:"
+                said = f"{name!r} is not a parameter of {what}: write it under {beside[name]}:"
                 findings.add(key.place, "unknown_parameter", said)
             else:
                 names = [*model.model_fields, *(n for n, under in beside.items() if not under)]
@@ -137,7 +137,7 @@ def _with_new_names(model: type[BaseModel], given: Map, what: str, findings: Fin
 
 
 def _check_span(node: Scalar, name: str, field: FieldInfo, findings: Findings) -> None:
-    """Report a parameter that may be given values which the field refuses; its present value is fine."""
+    """Report a parameter whose range includes values that the field refuses; its present value is valid."""
     unit = unit_of(field)
     for end in node.span or ():
         value = convert(end, node.unit, unit) if node.unit else end
@@ -151,14 +151,14 @@ def _check_span(node: Scalar, name: str, field: FieldInfo, findings: Findings) -
 
 
 def _of_the_right_branch(errors: Sequence[Any], given: Map) -> list[Any]:
-    """Where a mapping may stand beside plain values, pydantic complains that it is none of those, too."""
+    """Drop the errors that pydantic reports for the plain types of a union when a mapping was written."""
     deep = {e["loc"][0] for e in errors if len(e["loc"]) > 2}
     kept = [e for e in errors if not (len(e["loc"]) == 2 and e["loc"][0] in deep and e["type"] in _SCALARS)]
     return kept if kept and all(isinstance(given.get(str(n)), (Map, Seq)) for n in deep) else list(errors)
 
 
 def _one_a_scalar(errors: Sequence[Any], given: Map) -> list[Any]:
-    """Where a scalar fits none of the types a field may have, pydantic reports one error a type: make one of them."""
+    """Merge the errors that pydantic reports for each type of a union when a scalar fits none of them."""
     kept: dict[object, Any] = {}
     for i, error in enumerate(errors):
         name = error["loc"][0] if error["loc"] else ""
@@ -172,7 +172,7 @@ def _one_a_scalar(errors: Sequence[Any], given: Map) -> list[Any]:
 
 
 def _value(node: Node, unit: str, name: str, findings: Findings) -> Any:
-    """The plain value, quantities converted to the field's unit."""
+    """Return the plain value with quantities converted to the field's unit."""
     if isinstance(node, Seq):
         return [_value(i, unit, name, findings) for i in node.items]
     if isinstance(node, Map):
@@ -202,7 +202,7 @@ def _holds_poison(value: Any) -> bool:
 
 
 def locate(node: Node, loc: tuple[int | str, ...]) -> tuple[Node, Place, tuple[int | str, ...]]:
-    """Follow a pydantic location as far as the source goes: (node, place of its key or value, what is left)."""
+    """Follow a pydantic location through the source; return (node, place of its key or value, remaining location)."""
     place = node.place
     for i, step in enumerate(loc):
         if isinstance(node, Map) and isinstance(step, str) and (child := node.get(step)) is not None:
@@ -253,7 +253,7 @@ def _report(
 
 
 def _keys(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
-    """The keys valid at a location inside nested models; empty if it is not a plain nesting."""
+    """Return the valid keys at a location inside nested models; none if it is not a plain nesting."""
     for step in loc:
         if step == model.__name__:  # in a union pydantic names the branch
             continue
@@ -280,7 +280,7 @@ def _written(given: Map) -> set[str]:
 
 
 def _valid(field: FieldInfo | None, unit: str) -> str:
-    """The field's type, range and unit in words."""
+    """Return the field's type, range and unit in words."""
     kind = _kind_in_words(field.annotation) if field is not None else ""
     if field is None or not kind:
         return ""
@@ -294,7 +294,7 @@ def _valid(field: FieldInfo | None, unit: str) -> str:
 
 
 def _kind_in_words(annotation: Any) -> str:
-    """A field's type for people; empty where the rule says it already."""
+    """Return a field's type in words; empty where the message names it already."""
     origin, inside = get_origin(annotation), get_args(annotation)
     if origin is tuple:
         return "a list" if Ellipsis in inside else f"[{', '.join(map(_kind_in_words, inside))}]"

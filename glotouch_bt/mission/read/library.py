@@ -1,4 +1,4 @@
-"""Where shipped missions, worlds and conditions are, and which skills are installed."""
+"""Find shipped missions, worlds and conditions, and the installed skills."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ RESUME_CHECK_GROUP = "glotouch_bt.resume_check"
 
 
 def shipped_root() -> Path:
-    """The folder of shipped missions (a checkout's or the installed package's).
+    """Return the folder of shipped missions, of a checkout or of the installed package.
 
-    It stands beside this package; `import missions` may find a folder of that name where the user works instead.
+    It stands beside this package. An import could find a folder of the same name in the user's directory.
     """
     return Path(__file__).resolve().parents[3] / "glotouch_missions"
 
 
 def shipped(kind: str) -> dict[str, Path]:
-    """Shipped files by name; kind is "" (missions), "worlds" or "conditions"."""
+    """Return the shipped files by name; kind is "" (missions), "worlds" or "conditions"."""
     return {p.stem: p for p in sorted((shipped_root() / kind).glob("*.yaml"))}
 
 
 def find_shipped(kind: str, given: str, what: str) -> Path:
-    """A path as given, or the shipped file of that name.
+    """Return the path as given, or the shipped file of that name.
 
     Raises:
         UnknownName: Neither a file nor a shipped name.
@@ -49,7 +49,7 @@ def find_shipped(kind: str, given: str, what: str) -> Path:
 
 
 def shown(path: Path) -> str:
-    """How messages and records name a file: shipped ones relative to their root, so that they are alike everywhere."""
+    """Return the name of a file in messages and records. Shipped files are named relative to their root."""
     try:
         return f"glotouch_missions/{path.resolve().relative_to(shipped_root())}"
     except ValueError:
@@ -57,13 +57,13 @@ def shown(path: Path) -> str:
 
 
 class SkillRegistry(Mapping[str, type[Skill]]):
-    """Installed skills by name; a skill's module is imported when first asked for.
+    """Installed skills by name. A skill's module is imported on first use.
 
     Args:
         group: Entry-point group; that of mission skills, or `RESUME_CHECK_GROUP`.
 
     Raises:
-        UnknownName: On looking up a name that nobody registered.
+        UnknownName: On looking up a name that is not registered.
         BadInput: On looking up a skill whose module cannot be imported here.
     """
 

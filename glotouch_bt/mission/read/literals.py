@@ -1,4 +1,4 @@
-"""A value written in the mission for an input port, instead of a key: numbers, flags, or a dataclass's fields.
+"""Read a constant that a mission writes for an input port instead of a key: a number, a flag, or a dataclass's fields.
 
     grasp: {in: {plan: {position_K_m: [0.1, 0, 0.04], yaw_rad: 30 deg, ...}}}
 
@@ -21,14 +21,14 @@ class _Unusable(Exception):
 
 
 def is_literal(node: Node) -> bool:
-    """A value rather than the name of a key."""
+    """Return True for a value, False for the name of a key."""
     if not isinstance(node, Scalar) or not isinstance(node.value, str) or node.origin:
         return True
     return split_quantity(node.value) is not None  # no key begins with a digit
 
 
 def read_literal(node: Node, data_type: Any, port: str, findings: Findings) -> object | None:
-    """The value for a port of `data_type`; None if that gave findings."""
+    """Return the value for a port of `data_type`; None if that gave findings."""
     try:
         if dataclasses.is_dataclass(data_type) and isinstance(data_type, type) and isinstance(node, Map):
             return _dataclass(node, data_type, port, findings)
@@ -80,7 +80,7 @@ def _value(node: Node, kind: Any, name: str, findings: Findings) -> Any:
         numbers = _numbers(node, name, findings)
         wanted = [a for a in get_args(kind) if a is not Ellipsis]
         if not set(wanted) <= {int, float}:
-            return _wrong(node, name, "left out: what is in it cannot be written here", findings)
+            return _wrong(node, name, "left out: its items cannot be written in a mission", findings)
         if wanted and Ellipsis not in get_args(kind) and len(numbers) != len(wanted):
             return _wrong(node, name, f"a list of {len(wanted)} numbers", findings)
         return tuple(numbers)

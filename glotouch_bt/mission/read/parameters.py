@@ -74,11 +74,11 @@ def read_parameters(
     folder: Path | None,
     user: Place | None = None,
 ) -> dict[str, Parameter]:
-    """All parameters of a mission, or of a subtree; faults go to `findings`.
+    """Read all parameters of a mission or a subtree.
 
     Args:
         node: Its `parameters` section, or None.
-        overrides: Values given from outside, where they stand; only declared names are looked at.
+        overrides: Values given from outside, with their places; undeclared names are ignored.
         findings: Where faults go.
         folder: The world's folder of STL files; None leaves stl parameters unchecked.
         user: The node that uses the subtree; None: a mission, whose user is on the command line.
@@ -117,7 +117,7 @@ def read_parameters(
 
 
 def _sound(declared: Declaration, body: Map, findings: Findings) -> bool:
-    """What a declaration says makes sense as a whole."""
+    """Return True if a declaration is consistent; else it gave a finding."""
     if declared.unit and declared.unit not in UNITS:
         unit = body.get("unit") or body
         findings.unknown(unit.place, "wrong_unit", "unit", declared.unit, UNITS)
@@ -125,13 +125,13 @@ def _sound(declared: Declaration, body: Map, findings: Findings) -> bool:
     if declared.range and declared.range[0] > declared.range[1]:
         lo, hi = declared.range
         place = (body.get("range") or body).place
-        findings.add(place, "wrong_value", f"range = [{lo:g}, {hi:g}]: nothing is in it", valid="[lowest, highest]")
+        findings.add(place, "wrong_value", f"range = [{lo:g}, {hi:g}]: the range is empty", valid="[lowest, highest]")
         return False
     return True
 
 
 def _valued(name: str, declared: Declaration, given: Scalar, findings: Findings, folder: Path | None) -> Parameter:
-    """The parameter with the value given; without one if that gave findings."""
+    """Return the parameter with the given value; without a value if that gave findings."""
     lost = Parameter(name, declared, None)
     if given.poisoned:
         return lost
@@ -162,7 +162,7 @@ def _valued(name: str, declared: Declaration, given: Scalar, findings: Findings,
 
 
 def _converted(given: Scalar, unit: str, declared: Declaration) -> Value | None:
-    """The value in the parameter's unit; a whole number stays one.
+    """Return the value in the parameter's unit; a whole number stays one.
 
     Raises:
         ValueError: It measures something else.
@@ -175,7 +175,7 @@ def _converted(given: Scalar, unit: str, declared: Declaration) -> Value | None:
 
 
 def _check_span(name: str, given: Scalar, declared: Declaration, unit: str, findings: Findings) -> None:
-    """Report a parameter that may be given values which the one it is handed on to refuses."""
+    """Report a parameter whose range is wider than that of the parameter it is passed to."""
     if given.span is None or declared.range is None:
         return
     lo, hi = declared.range
@@ -187,7 +187,7 @@ def _check_span(name: str, given: Scalar, declared: Declaration, unit: str, find
 
 
 def from_command_line(name: str, given: str | Value, node: Node | None) -> Scalar:
-    """A `--set` value, its text read as the declared type; text that does not fit stays."""
+    """Return a `--set` value with its text converted to the declared type; text that does not fit stays text."""
     body = node.get(name) if isinstance(node, Map) else None
     kind = body.get("type") if isinstance(body, Map) else None
     return Scalar(_from_text(given, str(kind.value) if isinstance(kind, Scalar) else ""), Place(f"--set {name}"))
@@ -208,7 +208,7 @@ def _from_text(given: str | Value, kind: str) -> Value:
 
 
 def _fault(value: Value, declared: Declaration) -> str:
-    """Why a value does not fit its declaration, or empty."""
+    """Return why a value does not fit its declaration, or empty."""
     kinds: dict[str, tuple[type, ...]] = {
         "int": (int,),
         "float": (int, float),
@@ -236,7 +236,7 @@ def _valid(declared: Declaration) -> str:
 
 
 def stl_usable(name: str, folder: Path | None, place: Place, findings: Findings) -> bool:
-    """An object is named by its file in the objects' folder, or is a path to one; it must be a good solid."""
+    """Check an object: the name of a file in the objects' folder, or a path; the file must be a valid solid."""
     if folder is None:
         return True
     path = Path(name)
@@ -255,7 +255,7 @@ def stl_usable(name: str, folder: Path | None, place: Place, findings: Findings)
 
 @lru_cache(maxsize=256)
 def _fault_of_solid(path: Path, stamp: tuple[int, int] | None) -> str:
-    """Why a file is no good solid, or empty; a mission names it in many places. `stamp`: of the file as it is."""
+    """Return why a file is not a valid solid, or empty. `stamp`: its time and size, for the cache."""
     try:
         if stamp is None or not is_sound_stl(path):
             load_mesh(path)
@@ -265,7 +265,7 @@ def _fault_of_solid(path: Path, stamp: tuple[int, int] | None) -> str:
 
 
 def substitute(node: Node, parameters: Mapping[str, Parameter], findings: Findings) -> Node:
-    """The node with every `$name` replaced by its parameter's value."""
+    """Return the node with every `$name` replaced by its parameter's value."""
     if isinstance(node, Seq):
         return replace(node, items=tuple(substitute(i, parameters, findings) for i in node.items))
     if isinstance(node, Map):
@@ -302,7 +302,7 @@ def check_used(section: Node | None, tree: Node, findings: Findings) -> None:
 
 
 def resolved(node: Node | None, parameters: Mapping[str, Parameter]) -> dict[str, object]:
-    """The `parameters` section as plain data with the values in use as defaults."""
+    """Return the `parameters` section as plain data with the values in use as defaults."""
     if not isinstance(node, Map):
         return {}
     section = plain(node)

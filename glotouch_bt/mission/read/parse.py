@@ -1,4 +1,4 @@
-"""A tree as written to checked `NodeSpec`s. Faults are gathered, never raised; a faulty node stays in place."""
+"""Read a tree into checked `NodeSpec`s. Faults are gathered, not raised; a faulty node stays in the tree."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ from glotouch_bt.robot import BadInput
 from glotouch_bt.skill import Skill
 
 KEY = re.compile(r"[a-z][a-z0-9_]*")
-MAX_NODES, DEEPEST_NODE = 3000, 100
+MAX_NODES = 3000
+"""Largest number of nodes of a mission, subtrees included."""
+MAX_DEPTH = 100
+"""Largest depth of a tree, subtrees included."""
 TITLE, CHILD = {"name": ""}, {"name": "", "do": ""}
 
 
@@ -25,9 +28,9 @@ def parse_tree(node: Node, scope: Scope) -> NodeSpec:
     """Read one node and everything below it."""
     reading = scope.reading
     reading.nodes += 1
-    if reading.nodes > MAX_NODES or reading.depth >= DEEPEST_NODE:
+    if reading.nodes > MAX_NODES or reading.depth >= MAX_DEPTH:
         if reading.nodes <= MAX_NODES + 1:
-            what = f"more than {MAX_NODES} nodes, or nested deeper than {DEEPEST_NODE}"
+            what = f"more than {MAX_NODES} nodes, or nested deeper than {MAX_DEPTH}"
             scope.findings.add(node.place, "too_large", f"the tree has {what} (subtrees included)")
             reading.nodes = MAX_NODES + 1
         return _lost(node)
@@ -53,7 +56,9 @@ def _node(node: Node, scope: Scope) -> NodeSpec:
         key, body = node.entries[0]
         return _named(str(key.value), key.place, body, scope) if key.value in {*NODES, *scope.skills} else _lost(node)
     if not (isinstance(node, Scalar) and node.poisoned):
-        scope.findings.add(node.place, "not_a_node", "not a node", valid="a skill or node name, then its settings")
+        scope.findings.add(
+            node.place, "not_a_node", "a node is expected here", valid="a skill or node name, then its settings"
+        )
     return _lost(node)
 
 
@@ -94,7 +99,7 @@ def _children_of_unknown(body: Node, scope: Scope) -> tuple[NodeSpec, ...]:
 
 
 def _settings_map(name: str, place: Place, body: Node, scope: Scope) -> Map:
-    """The mapping after a node's name; an empty one if it is missing or wrong (then reported)."""
+    """Return the mapping after a node's name; an empty one if it is missing or wrong (then reported)."""
     if isinstance(body, Map):
         return body
     if not (isinstance(body, Scalar) and (body.value is None or body.poisoned)):
@@ -103,7 +108,7 @@ def _settings_map(name: str, place: Place, body: Node, scope: Scope) -> Map:
 
 
 def _take(given: Map, *names: str) -> tuple[dict[str, tuple[Place, Node]], Map]:
-    """Split off some keys: ({name: (key place, value)}, the rest)."""
+    """Split off some keys; return ({name: (place of the key, value)}, the rest)."""
     taken = {str(k.value): (k.place, v) for k, v in given.entries if k.value in names}
     return taken, replace(given, entries=tuple((k, v) for k, v in given.entries if k.value not in names))
 
@@ -119,7 +124,7 @@ def _title(taken: Mapping[str, tuple[Place, Node]], default: str, scope: Scope) 
 
 
 class _Reader:
-    """What node kinds use of this module."""
+    """The part of this module that node kinds use."""
 
     def __init__(self, scope: Scope) -> None:
         self._scope = scope
@@ -163,7 +168,7 @@ def _node_of_kind(kind: NodeKind, place: Place, body: Node, scope: Scope) -> Nod
 
 
 def _children(kind: NodeKind, below: Node | None, place: Place, scope: Scope) -> tuple[NodeSpec, ...]:
-    """Read what stands under `do`; none, and a finding, if nothing does."""
+    """Read the nodes under `do`; return none, with a finding, if there is none."""
     children: tuple[NodeSpec, ...] = ()
     if kind.children == "one":
         if below is None or (isinstance(below, Scalar) and below.value is None):
@@ -220,7 +225,7 @@ def _skill(name: str, skill: type[Skill], place: Place, body: Node, scope: Scope
 def _literals(
     skill: type[Skill], given: Node, place: Place, wires: dict[str, Wire], scope: Scope
 ) -> tuple[Node, dict[str, object]]:
-    """Values written for input ports: (what is left to wire, the values); each gets a key nobody else can name."""
+    """Read constants of input ports; return (entries left to wire, values). Missions cannot name their keys."""
     constants: dict[str, object] = {}
     if not isinstance(given, Map):
         return given, constants
@@ -245,7 +250,7 @@ def _rewire(name: str, direction: str, given: Node, wires: dict[str, Wire], skil
         port = str(key.value)
         if port not in wires:
             if port in skill.Params.model_fields:
-                what = f"{port!r} of skill {name!r} is a parameter, not a port: it stands outside of {direction}:"
+                what = f"{port!r} of skill {name!r} is a parameter, not a port: write it outside of {direction}:"
                 scope.findings.add(key.place, "unknown_port", what, valid=", ".join(wires) or "none")
             elif port in {**skill.INPUT_PORTS, **skill.OUTPUT_PORTS}:
                 where = "out" if direction == "in" else "in"

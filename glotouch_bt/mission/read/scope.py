@@ -1,4 +1,4 @@
-"""What a tree is read in: known skills, names and keys of the file at hand, and what is counted over all files."""
+"""The context in which a tree is read: known skills, keys of the present file, and counts over all files."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from glotouch_bt.skill import Skill
 
 @dataclass
 class Reading:
-    """What is counted and gathered while one mission is read, its subtrees included.
+    """Counts and subtrees that are gathered while one mission is read, its subtrees included.
 
     Attributes:
-        nodes: How many so far.
-        depth: Of the node being read.
-        subtrees, constants: How many so far; they number keys, alike wherever the text stands.
-        carried: The mission's own `subtrees` section, by name.
-        used: Every subtree that was read, by the name it is carried under.
-        sources: Where each of them came from: a file, or the name it was carried under.
+        nodes: Number of nodes read so far.
+        depth: Depth of the node being read.
+        subtrees, constants: Numbers read so far; keys are numbered by them, so they do not depend on file names.
+        carried: The subtrees in the mission's own `subtrees` section, by name.
+        used: Every subtree that was read, by its name in the document of the run.
+        sources: The source of each: a file, or its name in the `subtrees` section.
         renamed: Place of each `file` setting: the name.
     """
 
@@ -34,7 +34,7 @@ class Reading:
     renamed: dict[Place, str] = field(default_factory=dict)
 
     def carry(self, stem: str, source: str, tree: Node, at: Place) -> str:
-        """Note a subtree that a node at `at` uses; the name it is carried under."""
+        """Note a subtree that the node at `at` uses; return its name in the document of the run."""
         name, n = stem, 2
         while self.sources.get(name, source) != source:
             name, n = f"{stem}_{n}", n + 1
@@ -44,17 +44,17 @@ class Reading:
 
 @dataclass(frozen=True)
 class Scope:
-    """What a tree is read in.
+    """The context in which a tree is read.
 
     Attributes:
         skills: Known skills.
         findings: Where faults go.
         file: The file being read; subtrees are found relative to it.
         stl_folder: The world's objects, for stl parameters of subtrees.
-        prefix: Put before private keys ("" in the mission itself).
+        prefix: Prefix of private keys ("" in the mission itself).
         ports: Subtree key -> absolute key; None in the mission itself, where a key is its own name.
         trail: Files (or names of carried subtrees) being read, outermost first.
-        reading: What is counted on the way.
+        reading: Counts over all files.
     """
 
     skills: Mapping[str, type[Skill]]
@@ -67,5 +67,5 @@ class Scope:
     reading: Reading = field(default_factory=Reading)
 
     def key(self, name: str) -> str:
-        """The absolute key of a name used in this tree."""
+        """Return the absolute key of a name that is used in this tree."""
         return self.ports.get(name, self.prefix + name)

@@ -1,4 +1,4 @@
-"""A subtree as another file holds it, or the mission itself: found, read, its parameters given their values."""
+"""Find and read a subtree in another file or in the mission itself, and give its parameters their values."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from glotouch_bt.mission.read.yaml_source import read_yaml
 from glotouch_bt.mission.spec import Map, Node, Place, Scalar
 from glotouch_bt.robot import BadInput
 
-DEEPEST_SUBTREE = 8
+MAX_SUBTREE_DEPTH = 8
+"""Largest number of subtrees inside one another."""
 SUBTREE_KEYS = ("subtree", "description", "parameters", "tree")
 
 
 def handed_on(given: Map) -> tuple[dict[Scalar, Scalar], Map]:
-    """The values of a subtree's parameters, with the units and ranges they came with, by key; the settings, plain."""
+    """Return the values of a subtree's parameters with their units and ranges, by key, and the plain settings."""
     section = given.get("parameters")
     if not isinstance(section, Map):
         return {}, given
@@ -30,9 +31,9 @@ def handed_on(given: Map) -> tuple[dict[Scalar, Scalar], Map]:
 
 
 def find_subtree(given: str, at: Place, scope: Scope) -> tuple[Path, str, Node] | None:
-    """A subtree that the mission carries itself, or a file beside the present one, or a shipped file.
+    """Find a subtree: in the mission itself, else a file beside the present one, else a shipped file.
 
-    Returns: Its path, what tells it from others, and what stands there; None if that gave a finding.
+    Returns: Its path, its identity, and its content; None if that gave a finding.
     """
     if given in scope.reading.carried:
         path, identity = scope.file.parent / given, f"carried {given}"
@@ -40,7 +41,7 @@ def find_subtree(given: str, at: Place, scope: Scope) -> tuple[Path, str, Node] 
         beside, shipped = scope.file.parent / given, shipped_root() / given
         path = shipped if isfile(shipped) and not isfile(beside) else beside
         identity = str(path.resolve())
-    if identity in (*scope.trail, str(scope.file.resolve())) or len(scope.trail) >= DEEPEST_SUBTREE:
+    if identity in (*scope.trail, str(scope.file.resolve())) or len(scope.trail) >= MAX_SUBTREE_DEPTH:
         scope.findings.add(at, "subtree_loop", f"subtree {given!r} contains itself or is nested too deep")
         return None
     if given in scope.reading.carried:
@@ -54,14 +55,14 @@ def find_subtree(given: str, at: Place, scope: Scope) -> tuple[Path, str, Node] 
 
 
 def entries_of(node: Node | None) -> tuple[tuple[Scalar, Node], ...]:
-    """Of a mapping; of anything else none."""
+    """Return the entries of a mapping; none of anything else."""
     return node.entries if isinstance(node, Map) else ()
 
 
 def open_subtree(
     source: Node, values: Mapping[Scalar, Scalar], scope: Scope, at: Place
 ) -> tuple[dict[str, Parameter], Node | None]:
-    """The parameters and the tree of a subtree's file; no tree if it has none."""
+    """Return the parameters and the tree of a subtree's file; None if it has no tree."""
     if not isinstance(source, Map):
         scope.findings.add(at, "unusable_subtree", "a subtree file must be a mapping", valid=", ".join(SUBTREE_KEYS))
         return {}, None
@@ -84,7 +85,7 @@ def open_subtree(
 
 
 def _subtrees_near(scope: Scope) -> list[str]:
-    """What could have been named: the mission's own subtrees, shipped ones, files beside the present one."""
+    """Return the names that were possible: the mission's own subtrees, files beside the present one, shipped files."""
     here, shipped = scope.file.parent, shipped_root()
     files = [p.relative_to(here) for folder in (here, here / "subtrees") for p in folder.glob("*.yaml")]
     files += [p.relative_to(shipped) for p in (shipped / "subtrees").glob("*.yaml")]

@@ -1,4 +1,4 @@
-"""World and conditions files to their frozen values; every fault with its place."""
+"""Read world and conditions files into frozen values. Every fault has its place."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class _Section(BaseModel):
 
 
 class PoseSection(_Section):
-    """A planar pose: an origin and a turn about z."""
+    """A planar pose: an origin and a rotation about z."""
 
     position_m: Vec3 = Field(description="origin in B")
-    yaw_deg: float = Field(default=0.0, description="turn about z_B")
+    yaw_deg: float = Field(default=0.0, description="rotation about z_B")
 
 
 class ContainerSection(_Section):
@@ -53,26 +53,26 @@ class ProbeSection(_Section):
 
 
 class HolderSection(_Section):
-    """Where the probe stands; the grasp pose points down. See `robot.Holder`."""
+    """The place of the stowed probe; the grasp pose points down. See `robot.Holder`."""
 
     pose_B_grasp: PoseSection
     half_m: Vec3 = Holder.half_m
 
 
 class ObjectsSection(_Section):
-    """Which STL files are put in; see `robot.ObjectSet`."""
+    """The STL files of the objects in the container; see `robot.ObjectSet`."""
 
     folder: str = Field(description="folder of STL files, relative to the world's file")
     names: tuple[str, ...] = ()
     expected: int | None = Field(
-        default=None, ge=1, le=20, description="how many objects shall be in the folder or the names"
+        default=None, ge=1, le=20, description="required number of objects, in the folder or in names"
     )
     min_gap_m: float = Field(default=ObjectSet.min_gap_m, ge=0, le=1.0)
     min_wall_gap_m: float = Field(default=ObjectSet.min_wall_gap_m, ge=0, le=1.0)
 
 
 class WorldFile(_Section):
-    """A world as written."""
+    """A world file."""
 
     world: str = Field(description="its name")
     description: str = ""
@@ -90,7 +90,7 @@ ConditionsFile = create_model(  # type: ignore[call-overload]
 
 
 def read_world(node: Node, file: Path, findings: Findings, objects: Path | None = None) -> World | None:
-    """A world from its positioned source; None if that gave findings.
+    """Return a world from its source; None if that gave findings.
 
     Args:
         node: The file's content, or a mission's inline world.
@@ -160,7 +160,7 @@ def _objects(
         if name not in stems:
             findings.unknown(place, "no_such_stl", "object", name, stems)
         elif name in given.names[:i]:
-            findings.add(place, "wrong_value", f"objects.names: {name!r} stands twice")
+            findings.add(place, "wrong_value", f"objects.names: {name!r} is listed twice")
     count = len(given.names or stems)
     if given.expected is not None and count != given.expected:
         expected = node.get("expected") or node
@@ -184,10 +184,10 @@ def _section_place(node: Map, section: str, dotted: str) -> Place:
 
 
 def load_world(given: str, objects: Path | None = None) -> World:
-    """A world by path or shipped name.
+    """Load a world by path or shipped name.
 
     Raises:
-        BadInput: Unknown, unreadable, or faulty (all faults at once).
+        BadInput: It is unknown, unreadable or faulty (all faults at once).
     """
     path = find_shipped("worlds", given, "world")
     findings = Findings()
@@ -198,10 +198,10 @@ def load_world(given: str, objects: Path | None = None) -> World:
 
 
 def load_conditions(given: str) -> Conditions:
-    """A disturbance profile by path or shipped name; keys are the field names of `robot.Conditions`.
+    """Load a disturbance profile by path or shipped name; keys are the field names of `robot.Conditions`.
 
     Raises:
-        BadInput: Unknown, unreadable, or faulty (all faults at once).
+        BadInput: It is unknown, unreadable or faulty (all faults at once).
     """
     path = find_shipped("conditions", given, "conditions")
     findings = Findings()

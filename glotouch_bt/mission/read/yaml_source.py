@@ -1,6 +1,6 @@
-"""YAML text to plain nodes that remember where they stood. No tags, no anchors, no code; scalars as in YAML 1.2 core.
+"""Parse YAML text into nodes with source positions. Tags and anchors are refused; scalars are those of YAML 1.2 core.
 
-The event stream is read without recursion, so that no file can exhaust the stack; every limit is checked while reading.
+The event stream is read without recursion, so no file can exhaust the stack. Every limit is checked while reading.
 """
 
 from __future__ import annotations
@@ -17,8 +17,10 @@ import yaml
 from glotouch_bt.mission.spec import Map, Node, Place, Scalar, Seq
 from glotouch_bt.robot import BadInput
 
-LARGEST_BYTES = 1_000_000
-DEEPEST = 60
+MAX_BYTES = 1_000_000
+"""Largest size of a YAML file (bytes)."""
+MAX_DEPTH = 60
+"""Largest depth of collections inside one another."""
 
 _INT = re.compile(r"[-+]?[0-9]{1,18}")
 _FLOAT = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
@@ -31,10 +33,10 @@ def read_yaml(path: Path, shown: str | None = None) -> Node:
 
     Args:
         path: The file.
-        shown: How messages name the file (default: the path).
+        shown: Name of the file in messages (default: the path).
 
     Raises:
-        BadInput: Not readable, over a limit, not YAML, or with anchors, aliases, tags or a key twice; names the place.
+        BadInput: The file is not readable, over a limit, not YAML, or has anchors, aliases, tags or a duplicate key.
     """
     shown = shown or str(path)
     try:
@@ -43,8 +45,8 @@ def read_yaml(path: Path, shown: str | None = None) -> Node:
         found = path.stat()
         if not stat.S_ISREG(found.st_mode):  # a device or a pipe may have no end, or never begin
             raise BadInput(f"{shown}: is a device or a pipe, not a YAML file")
-        if found.st_size > LARGEST_BYTES:
-            raise BadInput(f"{shown}: is larger than {LARGEST_BYTES} bytes")
+        if found.st_size > MAX_BYTES:
+            raise BadInput(f"{shown}: is larger than {MAX_BYTES} bytes")
         data = path.read_bytes()
     except (OSError, ValueError) as e:
         raise BadInput(f"{shown}: cannot be read ({getattr(e, 'strerror', None) or e})") from e
@@ -72,8 +74,8 @@ def parse_yaml(data: bytes | str, shown: str) -> Node:
 
 
 def _decode(data: bytes | str, shown: str) -> str:
-    if len(data) > LARGEST_BYTES:
-        raise BadInput(f"{shown}: is larger than {LARGEST_BYTES} bytes")
+    if len(data) > MAX_BYTES:
+        raise BadInput(f"{shown}: is larger than {MAX_BYTES} bytes")
     if isinstance(data, str):
         return data
     try:
@@ -110,7 +112,7 @@ class _Open:
             raise BadInput(f"{key.place}: merge keys (<<) are not allowed")
         if key.value in self.seen:
             first = self.seen[key.value]
-            raise BadInput(f"{key.place}: key {key.value!r} stands twice (first at line {first.line})")
+            raise BadInput(f"{key.place}: duplicate key {key.value!r} (first at line {first.line})")
         self.seen[key.value] = key.place
 
     def close(self) -> Node:
@@ -129,12 +131,12 @@ def _build(loader: Any, shown: str) -> Node:
             break
         if isinstance(event, (yaml.StreamStartEvent, yaml.DocumentStartEvent, yaml.DocumentEndEvent)):
             if isinstance(event, yaml.DocumentStartEvent) and root is not None:
-                raise BadInput(f"{_place(event, shown)}: a second document; one document a file")
+                raise BadInput(f"{_place(event, shown)}: a second document; a file holds one document")
             continue
         _refuse(event, shown)
         if isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent)):
-            if len(stack) >= DEEPEST:
-                raise BadInput(f"{_place(event, shown)}: nested deeper than {DEEPEST} levels")
+            if len(stack) >= MAX_DEPTH:
+                raise BadInput(f"{_place(event, shown)}: nested deeper than {MAX_DEPTH} levels")
             stack.append(_Open(_place(event, shown), isinstance(event, yaml.MappingStartEvent)))
             continue
         node = _scalar(event, shown) if isinstance(event, yaml.ScalarEvent) else stack.pop().close()

@@ -1,4 +1,4 @@
-"""Scalars that carry a unit: as text (`40 mm`), or from a mission parameter that declares one."""
+"""Scalars with a unit, written as text (`40 mm`) or declared by a mission parameter."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from glotouch_bt.mission.spec.units import UNITS, base_of, convert, split_quanti
 
 
 def measured(given: Scalar) -> Scalar:
-    """`40 mm` as a number and its unit; anything else as it is."""
+    """Split `40 mm` into a number and its unit; return anything else unchanged."""
     quantity = split_quantity(given.value) if isinstance(given.value, str) else None
     return replace(given, value=quantity[0], unit=quantity[1]) if quantity else given
 
 
 def compared(given: Map, findings: Findings) -> tuple[Map, str]:
-    """A condition that compares with a plain SI number, and that number's SI unit if it was written with a unit."""
+    """Convert the number of a comparison to SI; return the comparison and the SI unit of a number with a unit."""
     base = ""
     entries: list[tuple[Scalar, Node]] = []
     for key, value in given.entries:

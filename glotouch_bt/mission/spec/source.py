@@ -1,4 +1,4 @@
-"""Parsed YAML values that remember where they stood in the file."""
+"""Parsed YAML values with their positions in the file."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 @dataclass(frozen=True, order=True)
 class Place:
-    """Where something stands in a file; line and column count from 1. Line 0: the command line, not a file."""
+    """A position in a file; line and column count from 1. Line 0: the command line, not a file."""
 
     file: str
     line: int = 0
@@ -25,11 +25,11 @@ class Scalar:
 
     Attributes:
         value: The value.
-        place: Where it stands.
+        place: Its position.
         unit: Unit of the number when it came from a mission parameter that declares one; else empty.
         origin: "$name" when it came from a mission parameter; else empty.
-        span: Least and largest value that parameter may be given, in its unit; or None.
-        poisoned: The value is not usable and has been reported already.
+        span: Range of that parameter, in its unit; or None.
+        poisoned: The value is unusable and already reported.
     """
 
     value: bool | int | float | str | None
@@ -50,24 +50,24 @@ class Seq:
 
 @dataclass(frozen=True)
 class Map:
-    """A mapping; keys are strings, no key twice."""
+    """A mapping; keys are strings, without duplicates."""
 
     entries: tuple[tuple[Scalar, Node], ...]
     place: Place
 
     def get(self, key: str) -> Node | None:
-        """The value of a key, or None."""
+        """Return the value of a key, or None."""
         return next((v for k, v in self.entries if k.value == key), None)
 
     def key_place(self, key: str) -> Place:
-        """Where a key stands (the mapping's own place if it has no such key)."""
+        """Return the position of a key (of the mapping if it has no such key)."""
         return next((k.place for k, _ in self.entries if k.value == key), self.place)
 
     def __contains__(self, key: str) -> bool:
         return self.get(key) is not None
 
     def keys(self) -> list[str]:
-        """All keys, in order."""
+        """Return all keys, in order."""
         return [str(k.value) for k, _ in self.entries]
 
 
@@ -75,7 +75,7 @@ Node = Scalar | Seq | Map
 
 
 def plain(node: Node, renamed: Mapping[Place, str] | None = None) -> Any:
-    """The node as dicts, lists and values; `renamed`: other text for the scalars at some places."""
+    """Return the node as dicts, lists and values; `renamed`: other text for the scalars at some positions."""
     if isinstance(node, Scalar):
         return renamed.get(node.place, node.value) if renamed else node.value
     if isinstance(node, Seq):

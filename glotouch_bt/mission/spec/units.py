@@ -1,11 +1,10 @@
-"""Numbers with units in YAML: `speed: 40 mm/s` for a parameter in m/s. Plain numbers are SI."""
+"""Units of numbers in YAML: `speed: 40 mm/s` for a parameter in m/s. Plain numbers are SI."""
 
 from __future__ import annotations
 
 import math
 import re
 
-# unit -> (SI unit it belongs to, factor). Angles are radians in SI.
 UNITS: dict[str, tuple[str, float]] = {
     "m": ("m", 1.0),
     "cm": ("m", 1e-2),
@@ -35,6 +34,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "kHz": ("Hz", 1e3),
     "%": ("", 1e-2),
 }
+"""Unit: (its SI unit, factor). The SI unit of angles is the radian."""
 
 # Longest first: `_m_s` before `_s`.
 _SUFFIXES: tuple[tuple[str, str], ...] = (
@@ -58,7 +58,7 @@ _QUANTITY = re.compile(
 
 
 def split_quantity(text: str) -> tuple[float, str] | None:
-    """("40 mm/s") -> (40.0, "mm/s"); None if the text is not a number followed by a unit-like word."""
+    """Split "40 mm/s" into (40.0, "mm/s"); return None if the text is not a number followed by a word like a unit."""
     found = _QUANTITY.fullmatch(text.strip())
     if not found or not math.isfinite(float(found[1])):
         return None
@@ -66,31 +66,31 @@ def split_quantity(text: str) -> tuple[float, str] | None:
 
 
 def unit_of_name(name: str) -> str:
-    """The unit a name carries as its suffix (`weight_N`), or empty."""
+    """Return the unit in the suffix of a name (`weight_N`), or empty."""
     return next((unit for suffix, unit in _SUFFIXES if name.endswith(suffix)), "")
 
 
 def base_of(unit: str) -> str:
-    """The SI unit of what a unit measures; empty: a bare number, or nobody knows the unit."""
+    """Return the SI unit of the same quantity; empty for a plain number or an unknown unit."""
     return UNITS.get(unit, ("", 1.0))[0]
 
 
 def units_for(unit: str) -> list[str]:
-    """The units that may be written where `unit` is expected."""
+    """Return the units that are valid where `unit` is expected."""
     base = UNITS.get(unit, (unit, 1.0))[0]
     return [u for u, (b, _) in UNITS.items() if b == base] or ([unit] if unit else [])
 
 
 def convert(value: float, unit: str, expected: str) -> float:
-    """A number in `unit`, in the expected unit.
+    """Convert a number from `unit` to the expected unit.
 
     Raises:
-        ValueError: They measure different things, or one is unknown.
+        ValueError: The units measure different quantities, or one is unknown.
     """
     if unit == expected:
         return value
     known = {**UNITS, "": ("", 1.0)}
     if unit not in known or expected not in known or known[unit][0] != known[expected][0]:
         raise ValueError(f"{unit!r} is not {expected!r}")
-    # One rounding to 15 digits: 40 mm/s is 0.04 m/s, not 0.040000000000000001 of a product's last bit.
+    # Round to 15 digits, so that 40 mm/s is exactly 0.04 m/s.
     return float(f"{value * known[unit][1] / known[expected][1]:.15g}")

@@ -1,4 +1,4 @@
-"""TODO door of glotouch_bt/robot/scene."""
+"""The nominal world, its objects (STL files) and random layouts, and the disturbances of a trial. Values only."""
 
 from glotouch_bt.robot.scene.conditions import Conditions
 from glotouch_bt.robot.scene.meshes import Mesh, is_sound_stl, load_folder, load_mesh

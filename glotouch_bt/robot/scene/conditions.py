@@ -1,7 +1,7 @@
-"""The disturbances a figure is measured under, as data. One frozen value; drawn per trial from the trial's seed.
+"""The disturbances of a trial, drawn from its seed.
 
-"sd" is one standard deviation; a pair is a uniform range. Zero everywhere is `ideal`. Profiles live in
-glotouch_missions/conditions/*.yaml whose keys are these field names.
+"sd" is one standard deviation; a pair is a uniform range. All zero is `ideal`. The profiles are in
+glotouch_missions/conditions/*.yaml; their keys are these field names.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True, kw_only=True)
 class Conditions:
-    """One disturbance profile; every field carries its unit."""
+    """One disturbance profile; each field name ends with its unit."""
 
     name: str = "ideal"
     force_noise_sd_N: float = 0.0

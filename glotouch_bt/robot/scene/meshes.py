@@ -1,4 +1,4 @@
-"""STL files as the world's objects: loaded, checked, and named by what is in them.
+"""Load and check the STL files of the world's objects.
 
 An object is a single watertight solid in metres, upright: its z axis is up and it stands on its lowest point.
 """
@@ -46,7 +46,7 @@ class Mesh:
         vertices_m: (v, 3), shifted so that the lowest vertex is at z = 0 and the middle of the bounding box at
             x = y = 0 (to a whole micrometre), wherever the file has its origin.
         faces: (f, 3) vertex indices, outward by the right-hand rule.
-        digest: SHA-256 of the geometry (not of the file's bytes); the key of every cache.
+        digest: SHA-256 of the geometry, not of the file; the key of every cache.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Mesh:
         return np.asarray(np.ptp(self.vertices_m, axis=0), dtype=np.float64)
 
     def as_trimesh(self) -> trimesh.Trimesh:
-        """The same solid as a trimesh object (unprocessed)."""
+        """Return the same solid as a trimesh object (unprocessed)."""
         return trimesh.Trimesh(self.vertices_m, self.faces, process=False)
 
 
@@ -105,12 +105,12 @@ def _in_one_piece(start: npt.NDArray[np.intp], end: npt.NDArray[np.intp]) -> boo
 def load_mesh(path: Path) -> Mesh:
     """Read one STL.
 
-    What exporters commonly get wrong and what has one clear meaning is mended: corners written twice, collapsed
-    triangles, faces turned inside out. Shells that touch, overlap or enclose a hollow are one object.
+    Common faults of exporters that have one clear meaning are repaired: duplicate corners, collapsed triangles, faces
+    with the wrong side outward. Shells that touch, overlap or enclose a hollow are one object.
 
     Raises:
-        BadInput: No such file, not an STL, not watertight, several bodies, or a size that cannot be metres. The message
-            names the file, what is wrong and what to do.
+        BadInput: There is no such file, or it is not an STL, not watertight, several bodies, or too large. The message
+            names the file, the fault and the remedy.
     """
     if not isfile(path):
         raise BadInput(f"{path}: no such STL file")
@@ -150,7 +150,7 @@ def _require_size(path: Path, mesh: trimesh.Trimesh) -> None:
 
 
 def _close(path: Path, mesh: trimesh.Trimesh) -> None:
-    """Join corners that are one point written twice, ever more freely, until no edge is open."""
+    """Join duplicate corners, with the tolerances of `MERGE_DECIMALS` in turn, until no edge is open."""
     for decimals in MERGE_DECIMALS:
         mesh.merge_vertices(digits_vertex=decimals)
         a, b, c = mesh.faces.T
@@ -163,8 +163,8 @@ def _close(path: Path, mesh: trimesh.Trimesh) -> None:
 def _orient(path: Path, mesh: trimesh.Trimesh) -> None:
     """Turn every face outwards.
 
-    Neighbours agree if they run through their common edge in opposite directions. In a graph with two nodes a face, as
-    it is and turned over, those that agree form two mirrored components a shell; one of them is chosen.
+    Neighbours agree if they traverse their common edge in opposite directions. Build a graph with two nodes for each
+    face, as it is and turned over. The nodes that agree form two mirrored components for each shell; choose one.
     """
     if not mesh.is_winding_consistent:
         n = len(mesh.faces)
@@ -188,13 +188,13 @@ def _orient(path: Path, mesh: trimesh.Trimesh) -> None:
 
 
 def _runs_forward(faces: npt.NDArray[np.int64], edges: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-    """(k,) whether face i (k, 3) runs along its edge i (k, 2) in the edge's own direction."""
+    """Return (k,) True where face i (k, 3) traverses its edge i (k, 2) in the direction of the edge."""
     following = np.roll(faces, -1, axis=1)
     return np.asarray(((faces == edges[:, :1]) & (following == edges[:, 1:])).any(axis=1))
 
 
 def _require_one_body(path: Path, mesh: trimesh.Trimesh) -> None:
-    """Shells whose bounding boxes hang together count as one object."""
+    """Count shells whose bounding boxes overlap as one object."""
     if mesh.body_count == 1:
         return
     label = trimesh.graph.connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces))
@@ -208,7 +208,7 @@ def _require_one_body(path: Path, mesh: trimesh.Trimesh) -> None:
 
 
 def load_folder(folder: Path, names: tuple[str, ...] = ()) -> list[Mesh]:
-    """Every STL of a folder sorted by name, or the named ones in order.
+    """Load every STL of a folder, sorted by name, or the named files in order.
 
     Raises:
         BadInput: The folder is missing or empty, a name is not in it, or a file is unusable.

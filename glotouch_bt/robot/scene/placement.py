@@ -1,6 +1,6 @@
-"""Random layouts: upright objects in the container, at a uniform position and yaw, none too near another or a wall.
+"""Random layouts: upright objects in the container at uniform positions and yaws, with gaps to each other and to walls.
 
-Rejection sampling, one object after another (largest first), restarted when it has painted itself into a corner.
+Rejection sampling of one object after another, largest first. It restarts when the next object does not fit.
 """
 
 from __future__ import annotations
@@ -17,13 +17,15 @@ from glotouch_bt.robot.scene.meshes import Mesh
 from glotouch_bt.robot.scene.streams import stream
 from glotouch_bt.robot.scene.world import World
 
-TRIES_PER_OBJECT = 400
-RESTARTS = 60
+MAX_TRIES_PER_OBJECT = 400
+"""Number of poses to try for one object before a restart."""
+MAX_RESTARTS = 60
+"""Number of layouts to try."""
 
 
 @dataclass(frozen=True)
 class Placement:
-    """Where one object stands: its mesh frame's origin on the floor, and yaw about z, in K."""
+    """The pose of one object in K: the origin of its mesh frame on the floor, and its yaw about z."""
 
     x_m: float
     y_m: float
@@ -31,19 +33,19 @@ class Placement:
 
 
 def outline(mesh: Mesh) -> Array:
-    """Convex outline (n, 2) of the whole mesh seen from above, anticlockwise, in the mesh frame, m."""
+    """Return the convex outline (n, 2) of the whole mesh from above, anticlockwise, in the mesh frame (m)."""
     xy = np.asarray(mesh.vertices_m)[:, :2]
     return np.asarray(xy[scipy.spatial.ConvexHull(xy).vertices], dtype=np.float64)
 
 
 def transformed(outline_m: Array, place: Placement) -> Array:
-    """The outline (n, 2) as placed."""
+    """Return the outline (n, 2) at a placement."""
     c, s = np.cos(place.yaw_rad), np.sin(place.yaw_rad)
     return np.asarray(outline_m @ np.array([[c, s], [-s, c]]) + (place.x_m, place.y_m))
 
 
 def _points_to_edges(points: Array, polygon: Array) -> float:
-    """Least distance from points (n, 2) to the closed boundary of polygon (m, 2)."""
+    """Return the least distance from points (n, 2) to the closed boundary of polygon (m, 2)."""
     a = polygon
     ab = np.roll(polygon, -1, axis=0) - a
     ap = points[:, None, :] - a[None, :, :]
@@ -52,7 +54,7 @@ def _points_to_edges(points: Array, polygon: Array) -> float:
 
 
 def gap(first: Array, second: Array) -> float:
-    """Distance between two convex polygons (n, 2), anticlockwise; 0 if they overlap.
+    """Return the distance between two convex polygons (n, 2), anticlockwise; 0 if they overlap.
 
     Two disjoint convex polygons are separated along the normal of an edge of one of them, and the nearest points
     include a vertex of one (Ericson, Real-Time Collision Detection, 5.4 and 9.1).
@@ -72,17 +74,17 @@ def gap(first: Array, second: Array) -> float:
 def _place_all(
     outlines: Sequence[Array], half: Array, min_gap_m: float, min_wall_gap_m: float, rng: np.random.Generator
 ) -> list[Placement] | int:
-    """One attempt at all outlines in the given order; the index that found no room if it fails."""
+    """Try to place all outlines in the given order; return the index that does not fit if it fails."""
     done: list[Placement] = []
     polygons: list[Array] = []
-    room = half - min_wall_gap_m
+    limit = half - min_wall_gap_m
     for i, shape in enumerate(outlines):
         reach = float(np.linalg.norm(shape, axis=1).max())
-        for _ in range(TRIES_PER_OBJECT):
+        for _ in range(MAX_TRIES_PER_OBJECT):
             x, y = rng.uniform(-half - reach, half + reach)
             place = Placement(float(x), float(y), float(rng.uniform(-np.pi, np.pi)))
             polygon = transformed(shape, place)
-            if (np.abs(polygon) > room).any():
+            if (np.abs(polygon) > limit).any():
                 continue
             if all(gap(polygon, other) >= min_gap_m for other in polygons):
                 done.append(place)
@@ -100,24 +102,24 @@ def place_objects(
     min_wall_gap_m: float,
     rng: np.random.Generator,
 ) -> list[Placement]:
-    """A random layout in K, in the order of `meshes`.
+    """Return a random layout in K, in the order of `meshes`.
 
     Args:
-        meshes: What to place.
+        meshes: The objects.
         interior_m: Interior size along x_K and y_K.
         min_gap_m: Least distance between the convex outlines of two objects.
         min_wall_gap_m: Least distance between an outline and a wall.
         rng: Source of all draws.
 
     Raises:
-        BadInput: They do not fit (or only by unlikely luck); says which object and how much room there is.
+        BadInput: They do not fit. The message names the object and the available area.
     """
     outlines = [outline(m) for m in meshes]
     half = 0.5 * np.array(interior_m)
     areas = [scipy.spatial.ConvexHull(o).volume for o in outlines]  # in the plane, scipy's volume is the area
     order = sorted(range(len(meshes)), key=lambda i: (-areas[i], i))
     failed = 0
-    for _ in range(RESTARTS):
+    for _ in range(MAX_RESTARTS):
         result = _place_all([outlines[i] for i in order], half, min_gap_m, min_wall_gap_m, rng)
         if isinstance(result, list):
             places: list[Placement] = [result[0]] * len(meshes) if result else []
@@ -127,7 +129,7 @@ def place_objects(
         failed = max(failed, result)
     name = meshes[order[failed]].name
     raise BadInput(
-        f"{len(meshes)} objects do not fit into the container: no room found for {name!r} after {RESTARTS} layouts "
+        f"{len(meshes)} objects do not fit into the container: no place found for {name!r} in {MAX_RESTARTS} layouts "
         f"(outlines cover {sum(areas) * 1e4:.0f} of {interior_m[0] * interior_m[1] * 1e4:.0f} cm2, gaps of "
         f"{min_gap_m * 1e3:.0f} mm between objects and {min_wall_gap_m * 1e3:.0f} mm to walls asked); "
         "use fewer or smaller objects, smaller gaps or a larger container"
@@ -135,7 +137,7 @@ def place_objects(
 
 
 def draw_layout(meshes: Sequence[Mesh], world: World, seed: int) -> list[Placement]:
-    """The layout of a trial: every simulator that asks with the same seed places the same objects alike.
+    """Return the layout of a trial. Every simulator places the same objects alike with the same seed.
 
     Raises:
         BadInput: As `place_objects`.

@@ -1,6 +1,6 @@
 """Random streams by purpose: a draw for one purpose never shifts the draws for another.
 
-So the layout of a seed stays the same whatever sensor noise is switched on: conditions compare seed by seed.
+The layout of a seed does not depend on the sensor noise, so conditions can be compared seed by seed.
 """
 
 from __future__ import annotations
@@ -11,5 +11,5 @@ import numpy as np
 
 
 def stream(seed: int, purpose: str) -> np.random.Generator:
-    """A generator for one purpose of one trial; same seed and purpose, same draws."""
+    """Return the generator for one purpose of one trial; the same seed and purpose give the same draws."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(zlib.crc32(purpose.encode()),)))

@@ -1,7 +1,7 @@
-"""The world as the robot is told it: container, probe, holder, and which objects may be inside.
+"""The nominal world: container, probe, holder, and the objects that may be inside.
 
 Frames: B arm base, z up. K container: origin at the centre of the interior floor, z up, x along its first side.
-What is told is nominal; the true world differs from it by the conditions (registration, payload, grasp offset).
+The true world differs from the nominal one by the conditions (registration, payload, grasp offset).
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 from glotouch_bt.robot.errors import ParamError
 from glotouch_bt.robot.geometry import Pose
 
-LARGEST_M = 3.0
-"""Of a container's side: three times an arm's reach; a larger one was meant in millimetres."""
+MAX_SIDE_M = 3.0
+"""Largest side of a container: three times the reach of an arm. A larger number was probably in millimetres."""
 
 
 def _positive(name: str, *values: float) -> None:
@@ -40,14 +40,14 @@ class Container:
 
     def __post_init__(self) -> None:
         _positive("container.interior_m", *self.interior_m)
-        if max(self.interior_m) > LARGEST_M:
-            raise ParamError("container.interior_m", self.interior_m, f"in metres, up to {LARGEST_M:g} each")
+        if max(self.interior_m) > MAX_SIDE_M:
+            raise ParamError("container.interior_m", self.interior_m, f"in metres, up to {MAX_SIDE_M:g} each")
         _positive("container.wall_m", self.wall_m)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Probe:
-    """The passive probe: a ball tip on a round shaft, with a prismatic handle the jaws close on.
+    """The passive probe: a ball tip on a round shaft, with a prismatic handle for the jaws.
 
     Probe frame T: origin at the centre of the ball, z towards the tip's far end (down when held tip-down).
 
@@ -56,7 +56,7 @@ class Probe:
         shaft_diameter_m: Shaft diameter.
         length_m: From the handle's lower face to the far end of the ball.
         handle_m: Handle size (x, y, z); the jaws close along its y.
-        grasp_to_tip_m: From the handle's centre, where P shall be, to the ball's centre.
+        grasp_to_tip_m: From the handle's centre, where P should be, to the ball's centre.
         mass_kg: Mass of the whole probe.
         com_below_grasp_m: Centre of mass, from the handle's centre towards the tip.
     """
@@ -79,10 +79,10 @@ class Probe:
 
 @dataclass(frozen=True, kw_only=True)
 class Holder:
-    """Where the probe stands when nobody holds it.
+    """The place of the stowed probe.
 
     Attributes:
-        pose_B_grasp: The pose P must have to grasp the stowed probe (z down); the handle's centre.
+        pose_B_grasp: Pose of P to grasp the stowed probe (z down); the handle's centre.
         half_m: Half size of the holder block, a box centred on the shaft whose top is just below the handle.
     """
 
@@ -92,7 +92,7 @@ class Holder:
 
 @dataclass(frozen=True, kw_only=True)
 class ObjectSet:
-    """Which objects are put into the container.
+    """The objects to put into the container.
 
     Attributes:
         folder: Directory of watertight STL files in metres, upright (z up).
@@ -109,9 +109,9 @@ class ObjectSet:
 
 @dataclass(frozen=True, kw_only=True)
 class World:
-    """Everything a backend needs to open and a skill may know.
+    """Everything that a backend needs to open and that a skill may know.
 
-    `objects` is what a simulator must place; a skill may use it only to load the STL of a target it was given by name.
+    A simulator places `objects`. A skill may use them only to load the STL of a target that was given by name.
     """
 
     name: str

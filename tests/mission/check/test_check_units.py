@@ -132,7 +132,7 @@ def test_a_unit_where_none_belongs(line: str, code: str, words: str, load: Load)
     [
         ("type: float, unit: mmm/s, default: 30", 30, "wrong_unit", "unknown unit 'mmm/s'"),
         ("type: float, unit: mm/s, default: 30 N", 45, "wrong_unit", "speed is in mm/s, not 'N'"),
-        ("type: float, unit: mm/s, default: 30, range: [60, 10]", 56, "wrong_value", "[60, 10]: nothing is in it"),
+        ("type: float, unit: mm/s, default: 30, range: [60, 10]", 56, "wrong_value", "[60, 10]: the range is empty"),
         ("type: int, default: 1.5 m", 31, "wrong_value", "must be a whole number"),
     ],
 )

@@ -81,4 +81,4 @@ def test_a_subtree_that_nobody_uses(found_in: Found) -> None:
 def test_a_setting_of_a_name_like_a_parameter() -> None:
     done = CliRunner().invoke(cli.app, ["check", "retrieve", "--set", "targt=apple"])
     assert done.exit_code == 0
-    assert "for the backend: targt; did you mean 'target'?" in done.stdout
+    assert "targt; did you mean 'target'?" in done.stdout

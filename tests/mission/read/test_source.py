@@ -9,7 +9,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glotouch_bt.mission.read.yaml_source import DEEPEST, parse_yaml, read_yaml
+from glotouch_bt.mission.read.yaml_source import MAX_DEPTH, parse_yaml, read_yaml
 from glotouch_bt.mission.spec.source import Map, Place, Scalar, plain
 from glotouch_bt.robot import BadInput
 
@@ -60,7 +60,7 @@ def test_scalars(text: str, value: object) -> None:
         ("# nothing", "f", "no YAML document"),
         ("a: \x01", "f:1:", ""),
         ("[" * 2000, "f:1:", "nested deeper"),
-        ("\n".join(" " * i + "a:" for i in range(200)), f"f:{DEEPEST + 1}:", "nested deeper"),
+        ("\n".join(" " * i + "a:" for i in range(200)), f"f:{MAX_DEPTH + 1}:", "nested deeper"),
         ("x" * 1_000_001, "f", "larger than"),
     ],
 )

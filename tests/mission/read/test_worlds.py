@@ -58,7 +58,7 @@ def test_the_shipped_conditions() -> None:
         ("wall_m: 0.008", "wall_m: -1", "8:11", "positive"),
         ("interior_m: [0.30, 0.40, 0.08]", "interior_m: [300, 400, 80]", "7:15", "must be in metres, up to 3 each"),
         ("min_gap_m: 0.030", "min_gap_m: 30", "15:14", "must be <= 1"),
-        ("expected: 5", "names: [apple, train, apple]", "14:25", "'apple' stands twice"),
+        ("expected: 5", "names: [apple, train, apple]", "14:25", "'apple' is listed twice"),
         ("interior_m: [0.30, 0.40, 0.08]", "interior_m: [0.30, 0.40]", "7:15", "interior_m"),
         ("yaw_deg: 0}", "yaw_deg: east}", "6:55", "must be a number"),
         ("folder: ../objects", "folder: ../nowhere", "13:11", "not a folder with .stl"),
