@@ -23,7 +23,7 @@ MISTAKES = [
     ("{touchset: touchsets}", "{touchset: candidates}", "port_type", "'squeeze all' (line 40) writes tuple of T"),
     ("{touchset: touchsets}", "{touchset: touchsets, candidate: touchsets}", "written_twice", "'touchsets'"),
     ("{touchset: touchsets}", "{touchset: candidate}", "written_twice", "'candidate'"),
-    ("{touchset: touchsets}", "{touchset: touch_sets}", "unused_key", "nobody writes 'touchsets'"),
+    ("{touchset: touchsets}", "{touchset: touch_sets}", "unused_key", "no node writes 'touchsets'"),
     ("order_by: quality", "order_by: contour", "unknown_field", "'contour'"),
     ("order_by: quality", "order_by: extent_K_m", "unknown_field", "'extent_K_m'"),
     ("order_by: quality", "order_by: span_m", "unknown_field", "'span_m'"),

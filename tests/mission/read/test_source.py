@@ -46,7 +46,7 @@ def test_scalars(text: str, value: object) -> None:
         ("a: [1]\nb: *x", "f:2:4", "aliases"),
         ("a: !!python/object/apply:os.system ['true']", "f:1:4", "tags"),
         ("a: !x 1", "f:1:4", "tags"),
-        ("a: 1\nb: 2\na: 3", "f:3:1", "twice"),
+        ("a: 1\nb: 2\na: 3", "f:3:1", "duplicate key"),
         ("a: {<<: 1}", "f:1:5", "merge"),
         ("a: 1\n---\nb: 1", "f:2:1", "second document"),
         ("? [1, 2]\n: 3", "f:1:3", "key"),
