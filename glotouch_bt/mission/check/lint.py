@@ -132,7 +132,7 @@ class _Lint:
         for port, wire in node.writes.items():
             if wire.place != node.place and wire.key not in self._read:
                 name = wire.key.rpartition("/")[2]
-                what = f"nobody reads {name!r}, to which {node.name!r} writes its {port!r}"
+                what = f"no node reads {name!r}, to which {node.name!r} writes its {port!r}"
                 near = self._findings.nearest(name, (k.rpartition("/")[2] for k in self._read))
                 self._findings.add(wire.place, "unused_key", what, hint=near, node=node.name)
 
@@ -143,7 +143,7 @@ class _Lint:
                 name = target.rpartition("/")[2]
                 missed = {k.rpartition("/")[2] for k in self._read - self._written}
                 if near := self._findings.nearest(name, missed):
-                    what = f"nobody reads {name!r}, in which {node.name!r} gathers, and nobody writes {near!r}"
+                    what = f"no node reads {name!r}, in which {node.name!r} gathers, and no node writes {near!r}"
                     self._findings.add(node.writes[port].place, "unused_key", what, hint=near, node=node.name)
 
     def _no_effect(self, node: NodeSpec) -> None:
