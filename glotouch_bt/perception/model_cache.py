@@ -1,8 +1,7 @@
-"""Target models kept on disk: built once an STL, then mapped into memory.
+"""Disk cache of target models, memory-mapped.
 
-One file a model, named by the hash of the mesh's geometry, the pad and the tables' version: a JSON header, then the
-tables as they lie in memory. Files are written beside and moved into place, so that a reader sees a whole one or none;
-one that does not check is built again. A folder that cannot be written is done without.
+One file per model, named by the hash of mesh geometry, pad and table version: a JSON header, then the raw tables. Files
+are moved into place atomically. A damaged file is rebuilt; an unwritable folder is ignored.
 """
 
 from __future__ import annotations
@@ -24,28 +23,30 @@ from glotouch_bt.robot import ParamError
 from glotouch_bt.robot.scene import Mesh
 
 MAGIC = b"glotouch-model-1\n"
+"""First bytes of a cache file."""
 ALIGN = 64
-KEPT = 32
-"""Models kept mapped in this process."""
+"""Alignment of the tables, bytes."""
+MAX_MAPPED = 32
+"""Maximum number of models mapped in this process."""
 _mapped: OrderedDict[Path, TargetModel] = OrderedDict()
 
 
 def cache_folder() -> Path:
-    """$XDG_CACHE_HOME/glotouch/models, or ~/.cache/glotouch/models."""
+    """Return $XDG_CACHE_HOME/glotouch/models, or ~/.cache/glotouch/models."""
     base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     return Path(base) / "glotouch" / "models"
 
 
 def target_model(mesh: Mesh, pad: PadSpec | None = None, folder: Path | None = None) -> TargetModel:
-    """The model of a mesh for a pad: mapped if it was built before (a few ms), else built (below a second) and kept.
+    """Return the model of a mesh for a pad: from the cache (a few ms), or built and cached (below a second).
 
     Args:
         mesh: The target.
-        pad: The pad; the default one if not given.
-        folder: Where models are kept; `cache_folder()` if not given.
+        pad: The pad; default `PadSpec()`.
+        folder: Cache folder; default `cache_folder()`.
 
     Raises:
-        ParamError: The mesh cannot be felt (too low for probe and pads).
+        ParamError: The mesh is too low for probe and pads.
     """
     pad = pad or PadSpec()
     path = (folder or cache_folder()) / f"{model_key(mesh, pad)}.model"
@@ -57,13 +58,13 @@ def target_model(mesh: Mesh, pad: PadSpec | None = None, folder: Path | None = N
         model = TargetModel.from_mesh(mesh, pad)
         _write(path, model)
     _mapped[path] = model
-    while len(_mapped) > KEPT:
+    while len(_mapped) > MAX_MAPPED:
         _mapped.popitem(last=False)
     return model
 
 
 def model_key(mesh: Mesh, pad: PadSpec) -> str:
-    """Hash of all that the tables depend on."""
+    """Return the hash of all inputs of the tables."""
     what = json.dumps([VERSION, mesh.digest, asdict(pad)], sort_keys=True)
     return hashlib.sha256(what.encode()).hexdigest()[:32]
 
@@ -96,11 +97,11 @@ def _write(path: Path, model: TargetModel) -> None:
             Path(part).unlink(missing_ok=True)
             raise
     except OSError:
-        return  # no room or no right to write: the model in memory serves as well
+        return  # disk full or not writable: use the model in memory
 
 
 def _read(path: Path, name: str) -> TargetModel | None:
-    """The kept model, or None if there is none or it is damaged."""
+    """Return the cached model, or None if it is missing or damaged."""
     try:
         raw = np.memmap(path, dtype=np.uint8, mode="r")
         size = len(MAGIC) + 16

@@ -128,7 +128,7 @@ class TouchNext(Skill):
             down = None
         self.touchsets, self.decided = touchsets, False
         yield HOLD  # the computation takes longer than a control period; on hardware the arm holds meanwhile
-        belief = recognition.believe(self._target_model(), touchsets)
+        belief = recognition.infer_belief(self._target_model(), touchsets)
         self._hopeless = frozenset(t.candidate.index for t in touchsets if _in_vain(t) >= MAX_VAIN_CLOSURES)
         why = self._enough(belief)
         chosen = None if why else self._choose(belief, down)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from glotouch_bt.bench.match.dataset import Layout
-from glotouch_bt.perception.recognition import Belief, Closure, Ranking, TargetModel, believe, expected_gain
+from glotouch_bt.perception.recognition import Belief, Closure, Ranking, TargetModel, expected_gain, infer_belief
 from glotouch_bt.perception.touch import TouchSet
 
 CONFIDENT = 0.95
@@ -117,13 +117,13 @@ def _until_sure(whole: Sequence[TouchSet], model: TargetModel, choose: Choice) -
     left = recorded_closures(whole)
     so_far = [partial(t, ()) for t in whole]
     shown: list[Shown] = []
-    belief = believe(model, so_far)
+    belief = infer_belief(model, so_far)
     while left and not sure(belief.ranking):
         new = left.pop(choose(left, whole, belief))
         shown.append(new)
         i = new.candidate
         so_far[i] = partial(whole[i], [s for s in shown if s.candidate == i])
-        belief = believe(model, so_far, before=belief)
+        belief = infer_belief(model, so_far, before=belief)
     return len(shown), belief.ranking
 
 

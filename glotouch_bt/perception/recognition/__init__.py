@@ -1,4 +1,4 @@
-"""Which of the touched candidates is the target: finite-window model of an STL, matchers, ranking. Pure.
+"""Recognition of the target among touched candidates: model of its STL, matchers, ranking.
 
 model = TargetModel.from_mesh(mesh, PadSpec())
 ranking = MATCHERS["likelihood"](model, touchsets)
@@ -10,19 +10,18 @@ from glotouch_bt.lazy import lazy_door
 from glotouch_bt.perception.recognition.decision import Closure, Fit, Gates, Match, Ranking, rank
 
 if TYPE_CHECKING:
-    from glotouch_bt.perception.recognition.gain import Belief, believe, expected_gain
-    from glotouch_bt.perception.recognition.matchers import DEFAULT_MATCHER, MATCHERS, Matcher
+    from glotouch_bt.perception.recognition.likelihood import Belief, expected_gain, infer_belief
+    from glotouch_bt.perception.recognition.matchers import MATCHERS, Matcher
     from glotouch_bt.perception.recognition.model import PadSpec, TargetModel
 
 __getattr__ = lazy_door(
     __name__,
-    **dict.fromkeys(("Belief", "believe", "expected_gain"), "gain"),
-    **dict.fromkeys(("DEFAULT_MATCHER", "MATCHERS", "Matcher"), "matchers"),
+    **dict.fromkeys(("Belief", "infer_belief", "expected_gain"), "likelihood"),
+    **dict.fromkeys(("MATCHERS", "Matcher"), "matchers"),
     **dict.fromkeys(("PadSpec", "TargetModel"), "model"),
 )
 
 __all__ = [
-    "DEFAULT_MATCHER",
     "MATCHERS",
     "Belief",
     "Closure",
@@ -33,7 +32,7 @@ __all__ = [
     "PadSpec",
     "Ranking",
     "TargetModel",
-    "believe",
+    "infer_belief",
     "expected_gain",
     "rank",
 ]

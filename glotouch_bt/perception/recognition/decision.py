@@ -1,4 +1,4 @@
-"""From losses to a decision: which candidate is the target, and is it sure enough to act on."""
+"""Ranking of candidates by loss and decision by gates."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from glotouch_bt.robot import Array, ParamError
 
 @dataclass(frozen=True)
 class Fit:
-    """The pose at which the loss is least.
+    """Nuisance parameters at the minimum of the loss.
 
     Attributes:
         yaw_rad: Yaw of the mesh's frame O in K, in (-pi, pi].
@@ -32,16 +32,16 @@ class Fit:
 
 @dataclass(frozen=True)
 class Match:
-    """How well one candidate's TouchSet fits the target.
+    """Match of one candidate's TouchSet with the target.
 
     Attributes:
-        index: The candidate's index.
-        loss: The matcher's loss, comparable within a ranking; infinite if it needs touches and there were none.
-        terms: What speaks for or against it, by the matcher's own names.
-        fit: The fitted pose; None if nothing was felt.
-        pose_K_O: (x, y, yaw) of the mesh's frame O in K, m and rad; the contour's centre and yaw if nothing was felt.
-        evidence: Layers both pads felt; all one-sided layers together add at most 1.
-        probability: That this candidate is the target, given all TouchSets of the ranking; NaN outside a ranking.
+        index: Index of the candidate.
+        loss: Loss of the matcher, comparable within a ranking; infinite without the touches it needs.
+        terms: Terms of the loss or the evidence, by the matcher's names.
+        fit: Fitted pose; None without contact.
+        pose_K_O: (x, y, yaw) of the mesh's frame O in K, m and rad; the contour's centre and yaw without contact.
+        evidence: Number of two-sided layers; all one-sided layers together add at most 1.
+        probability: Posterior probability that this candidate is the target; NaN outside a ranking.
     """
 
     index: int
@@ -55,14 +55,14 @@ class Match:
 
 @dataclass(frozen=True)
 class Closure:
-    """One closure of the jaws that could be made next.
+    """A possible next closure of the jaws.
 
     Attributes:
         candidate: Index of the candidate.
         yaw_K_rad: Direction of x_P in K.
-        height_m: Of the pads' mid-point above the floor.
+        height_m: Height of the pads' mid-point above the floor.
         position_K_m: (2,) pads' mid-point in K.
-        gain_nats: Expected information gain over "which candidate, or none, is the target"; NaN if not reckoned.
+        gain_nats: Expected information gain about which candidate, or none, is the target; NaN if not computed.
     """
 
     candidate: int
@@ -74,12 +74,12 @@ class Closure:
 
 @dataclass(frozen=True, kw_only=True)
 class Gates:
-    """What a decision needs.
+    """Conditions for accepting the best candidate.
 
     Attributes:
-        margin: Least difference between the best and the second loss.
-        loss: Largest loss of the best.
-        evidence: Least evidence of the best: layers felt by both pads.
+        margin: Minimum difference between the second and the best loss.
+        loss: Maximum loss of the best.
+        evidence: Minimum number of two-sided layers of the best.
     """
 
     margin: float = 0.1
@@ -95,16 +95,16 @@ class Gates:
 
 @dataclass(frozen=True)
 class Ranking:
-    """All candidates, best first, and whether the best may be taken for the target.
+    """Ranked candidates, and the decision about the best.
 
     Attributes:
-        matches: By increasing loss; ties by index.
-        margin: Second loss minus best loss; infinite for a single candidate that was felt, 0 if nothing was felt.
-        accepted: All gates passed.
-        reasons: What failed, in words; empty if accepted.
-        p_absent: Probability that none of them is the target; the matches' probabilities and this sum to 1.
-        next_touch: The closure that would help most; None if the matcher cannot tell.
-        gates: What it was decided by; None if by probability.
+        matches: Matches by increasing loss; ties by index.
+        margin: Second loss minus best loss; infinite for a single candidate with contact, 0 without any contact.
+        accepted: The best candidate is accepted as the target.
+        reasons: Failed conditions; empty if accepted.
+        p_absent: Probability that none is the target; it and the matches' probabilities sum to 1.
+        next_touch: The most informative next closure; None if the matcher gives none.
+        gates: Gates of the decision; None if decided by probability.
     """
 
     matches: tuple[Match, ...]
@@ -117,12 +117,12 @@ class Ranking:
 
     @property
     def best(self) -> Match:
-        """The match with the least loss."""
+        """The match with the minimum loss."""
         return self.matches[0]
 
 
 def rank(matches: Sequence[Match], gates: Gates | None = None) -> Ranking:
-    """Sort by loss and apply the gates (paper IV-C: margin, absolute fit, evidence). Says nothing of probabilities.
+    """Sort by loss and apply the gates (paper IV-C: margin, absolute fit, evidence). Probabilities are not set.
 
     Raises:
         ParamError: No match at all.

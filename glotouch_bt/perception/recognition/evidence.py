@@ -1,4 +1,4 @@
-"""A TouchSet as numbers: which layers count, how wide, what the pads showed."""
+"""Evidence of a TouchSet: rigid widths and pad images of its valid layers."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from glotouch_bt.perception.recognition.model import PadSpec, hand_axes, image_f
 from glotouch_bt.perception.touch import Layer, TouchSet
 from glotouch_bt.robot import Array
 
-THRESHOLD_M, SMALLEST_M2 = 6e-5, 6e-6
-"""Contact is deeper than this (three sd of a nominal taxel) over a connected patch of at least this area."""
+THRESHOLD_M = 6e-5
+"""Minimum indentation of a contact: three standard deviations of a nominal taxel."""
+MIN_AREA_M2 = 6e-6
+"""Minimum area of a connected contact patch."""
 ONE_SIDED = 0.35
-"""Weight of a layer that only one pad felt, against 1 for both."""
+"""Weight of a layer with one pad in contact, relative to 1 for both."""
 
 
 @dataclass(frozen=True)
@@ -23,15 +25,15 @@ class LayerEvidence:
     """One layer that carries evidence.
 
     Attributes:
-        sequence: Its sequence.
-        index: Its place in the sequence.
-        width_m: Rigid width: aperture plus what sank into the gels.
-        weight: 1 if both pads felt it, `ONE_SIDED` if one.
-        upper_only: One pad felt nothing, so the true width in the window is at most `width_m`.
-        yaw_rad: Of the hand in K.
+        sequence: Index of the sequence.
+        index: Index within the sequence.
+        width_m: Rigid width: aperture plus both indentations.
+        weight: 1 with both pads in contact, `ONE_SIDED` with one.
+        upper_only: Only one pad in contact: `width_m` is an upper bound of the width in the window.
+        yaw_rad: Yaw of the hand in K.
         along_m: x_P coordinate of the hand's middle, from the contour's centre.
-        height_m: Of the pads' mid-point.
-        images: (left, right) features (35,), or None for a pad that felt nothing.
+        height_m: Height of the pads' mid-point.
+        images: (left, right) features (35,); None for a pad without contact.
         sunk_m: (left, right) indentation of the highest point.
     """
 
@@ -49,12 +51,12 @@ class LayerEvidence:
 
 @dataclass(frozen=True)
 class Evidence:
-    """All of one TouchSet.
+    """Evidence of one TouchSet.
 
     Attributes:
-        layers: The layers that count.
+        layers: Layers that carry evidence.
         yaw_rad: (K,) yaw of each sequence in K.
-        weight: How much was felt: layers both pads felt, plus the others' weights, which together count at most one.
+        weight: Number of two-sided layers plus the weights of the others, which together count at most 1.
     """
 
     layers: tuple[LayerEvidence, ...]
@@ -63,7 +65,7 @@ class Evidence:
 
 
 def read_evidence(touchset: TouchSet, pad: PadSpec) -> Evidence:
-    """Reduce a TouchSet. Layers that are unstable, not finite or felt by neither pad are left out (paper IV-A).
+    """Extract the evidence of a TouchSet. Unstable, non-finite and contact-free layers are skipped (paper IV-A).
 
     Raises:
         ParamError: A depth map has fewer than 7 x 5 taxels.
@@ -113,9 +115,9 @@ def _usable(layer: Layer) -> bool:
 
 
 def contact_tops(maps_m: list[Array], pad: PadSpec) -> list[float]:
-    """Indentation of the deepest point of each map's largest patch, 0 without contact; maps (rows, cols) may differ.
+    """Return the maximum indentation in each map's largest patch, 0 without contact; map shapes may differ.
 
-    3 x 3 median first, so that one bright taxel does not count; a map with half its taxels dead shows nothing.
+    A 3 x 3 median removes single outliers. A map with more than half of its taxels dead counts as no contact.
     """
     out = [0.0] * len(maps_m)
     shapes = {m.shape for m in maps_m}
@@ -133,7 +135,7 @@ def contact_tops(maps_m: list[Array], pad: PadSpec) -> list[float]:
         if n == 0:
             continue
         count = np.bincount(labels.ravel(), minlength=n + 1)
-        least = SMALLEST_M2 * shape[0] * shape[1] / (pad.window_m[0] * pad.window_m[1])
+        least = MIN_AREA_M2 * shape[0] * shape[1] / (pad.window_m[0] * pad.window_m[1])
         for i, label in zip(where, labels, strict=True):
             own = np.unique(label)
             own = own[(own > 0) & (count[own] >= least)]

@@ -1,4 +1,4 @@
-"""The matchers by name: each ranks the TouchSets of all candidates against one target. Pure."""
+"""Matchers by name: each ranks the TouchSets of all candidates against one target."""
 
 from __future__ import annotations
 
@@ -7,19 +7,17 @@ from types import MappingProxyType
 from typing import Protocol
 
 from glotouch_bt.perception.recognition.decision import Ranking
-from glotouch_bt.perception.recognition.likelihood import believe, ranked
+from glotouch_bt.perception.recognition.likelihood import infer_belief, ranked
 from glotouch_bt.perception.recognition.model import TargetModel
 from glotouch_bt.perception.recognition.paper import paper_matcher
 from glotouch_bt.perception.touch import TouchSet
 
-DEFAULT_MATCHER = "likelihood"
-
 
 class Matcher(Protocol):
-    """What ranks candidates. Deterministic."""
+    """Deterministic ranking of candidates."""
 
     def __call__(self, model: TargetModel, touchsets: Sequence[TouchSet], /) -> Ranking:
-        """Rank; the probabilities and `p_absent` sum to 1.
+        """Rank the candidates; the probabilities and `p_absent` sum to 1.
 
         Raises:
             ParamError: No TouchSet at all, or two of the same candidate.
@@ -28,7 +26,7 @@ class Matcher(Protocol):
 
 
 def _likelihood(model: TargetModel, touchsets: Sequence[TouchSet]) -> Ranking:
-    return ranked(believe(model, touchsets))
+    return ranked(infer_belief(model, touchsets))
 
 
 MATCHERS: Mapping[str, Matcher] = MappingProxyType({"likelihood": _likelihood, "paper": paper_matcher()})

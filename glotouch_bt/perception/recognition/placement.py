@@ -1,4 +1,4 @@
-"""Where the target lies, from the pose that fits best: what a grasp needs."""
+"""Pose of the target in K from the best fit."""
 
 from __future__ import annotations
 
@@ -13,15 +13,17 @@ from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.robot import Array
 
 CENTRE_SD_M = 4e-3
+"""Standard deviation of the contour's centre."""
 ALONG_SD_M = 2.5e-3
+"""Standard deviation of the fitted shift along x_P."""
 ACROSS_SD_M = 1e-3
-"""Trust in the contour's centre, in the fitted shift along x_P, and in the jaws having centred the object along y_P."""
-OLDER = 0.5
-"""Weight of a sequence against the next one: squeezes move the object, the last says best where it lies."""
+"""Standard deviation of the position along y_P, where the jaws centre the object."""
+SEQUENCE_DISCOUNT = 0.5
+"""Weight of a sequence relative to the next one: squeezes move the object."""
 
 
-def unfelt_pose(touchset: TouchSet) -> tuple[float, float, float]:
-    """The contour's pose, for want of better."""
+def contour_pose(touchset: TouchSet) -> tuple[float, float, float]:
+    """Return the contour's pose (x, y, yaw) in K, used without contact evidence."""
     c = touchset.candidate.contour
     return float(c.centre_K_m[0]), float(c.centre_K_m[1]), float(c.yaw_rad)
 
@@ -36,15 +38,15 @@ def fitted_pose(
     scale: float,
     bias_m: float,
 ) -> tuple[Fit, tuple[float, float, float]]:
-    """Fit and pose_K_O (x, y, yaw) by weighted least squares over the layers.
+    """Return Fit and pose_K_O (x, y, yaw) by weighted least squares over the layers.
 
-    Each layer tells the object's place along x_P (fitted window shift) and, more sharply, along y_P: centring jaws put
-    the point halfway between the two supports, corrected for unequal sinking into the gels, at the hand's middle.
+    Each layer gives the position along x_P (fitted shift) and, more precisely, along y_P: the jaws centre the point
+    halfway between the two supports, corrected for unequal indentations.
 
     Args:
         model: The target.
-        touchset: What was felt.
-        e: The same, reduced.
+        touchset: Touches of the candidate.
+        e: Their evidence.
         yaw_index: Best relative yaw of the first sequence, in table steps (fractional).
         shift_m: (K,) best shift of each sequence.
         z0_m: Best height offset.
@@ -64,7 +66,7 @@ def fitted_pose(
     for layer in e.layers:
         raw = touchset.sequences[layer.sequence].layers[layer.index]
         x, y = hand_axes(np.asarray(raw.yaw_rad))
-        age = OLDER ** (last - layer.sequence) * layer.weight
+        age = SEQUENCE_DISCOUNT ** (last - layer.sequence) * layer.weight
         along = layer.along_m + float(shift_m[layer.sequence])
         w = age / ALONG_SD_M**2
         normal += w * np.outer(x, x)

@@ -32,7 +32,7 @@ def quick(made_up, monkeypatch):
     """Everything but the orchestration replaced by what can be worked out by hand."""
     monkeypatch.setattr(bench, "models_of", trials.models_of)
     monkeypatch.setattr(trials, "methods", lambda: dict.fromkeys((*chosen(()),), by_size))
-    monkeypatch.setattr(closures, "believe", lambda *known, **_: SimpleNamespace(ranking=by_size(*known)))
+    monkeypatch.setattr(closures, "infer_belief", lambda *known, **_: SimpleNamespace(ranking=by_size(*known)))
     monkeypatch.setattr(closures, "expected_gain", lambda belief, options: list(range(len(options))))
     monkeypatch.setattr(bench, "timing_task", lambda *_: {"new_stl_s": 0.5, "pair_ms": {"likelihood": 7.25}})
 

@@ -57,7 +57,7 @@ def surely_after(n):
 
 
 def believing(monkeypatch, matcher):
-    monkeypatch.setattr(closures, "believe", lambda *known, **_: SimpleNamespace(ranking=matcher(*known)))
+    monkeypatch.setattr(closures, "infer_belief", lambda *known, **_: SimpleNamespace(ranking=matcher(*known)))
 
 
 def test_how_many_until_sure(made_up, monkeypatch):

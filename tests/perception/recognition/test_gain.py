@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from glotouch_bt.perception.recognition import Closure, TargetModel
-from glotouch_bt.perception.recognition.gain import believe, closure_options, expected_gain, identify
+from glotouch_bt.perception.recognition.likelihood import closure_options, expected_gain, infer_belief
 from glotouch_bt.robot import ParamError
 from tests.support.acquisition import NOMINAL, acquire
 
@@ -37,7 +37,7 @@ def options(touchsets) -> list[Closure]:
 def test_gain_is_between_nothing_and_all_that_is_open(meshes, sets) -> None:
     model = TargetModel.from_mesh(meshes[0])
     for kept in (0, 1, 3):
-        belief = believe(model, [replace(t, sequences=t.sequences[:kept]) for t in sets])
+        belief = infer_belief(model, [replace(t, sequences=t.sequences[:kept]) for t in sets])
         gains = expected_gain(belief, options(sets))
         assert (gains >= 0).all()
         assert (gains <= entropy(belief.ranking) + 1e-9).all()
@@ -45,7 +45,7 @@ def test_gain_is_between_nothing_and_all_that_is_open(meshes, sets) -> None:
 
 def test_what_the_outline_leaves_open_is_worth_more_than_what_it_excludes(meshes, sets) -> None:
     """Before any closure: the two boxes are alike, the cylinder is surely no box."""
-    belief = believe(TargetModel.from_mesh(meshes[0]), [replace(t, sequences=()) for t in sets])
+    belief = infer_belief(TargetModel.from_mesh(meshes[0]), [replace(t, sequences=()) for t in sets])
     gains = expected_gain(belief, options(sets))
     best = {i: max(g for g, c in zip(gains, options(sets), strict=True) if c.candidate == i) for i in range(3)}
     assert best[0] > best[2]
@@ -55,7 +55,7 @@ def test_what_the_outline_leaves_open_is_worth_more_than_what_it_excludes(meshes
 def test_a_closure_made_before_is_worth_little(meshes, sets) -> None:
     twin = replace(sets[0], candidate=replace(sets[0].candidate, index=1))
     few = [replace(t, sequences=t.sequences[:1]) for t in (sets[0], twin)]
-    belief = believe(TargetModel.from_mesh(meshes[0]), few)
+    belief = infer_belief(TargetModel.from_mesh(meshes[0]), few)
     felt = belief.readings[0].sequences[0][0].layer
     again = few[0].sequences[felt.sequence].layers[felt.index]
     made = Closure(0, again.yaw_rad, again.height_m, np.asarray(again.position_K_m))
@@ -65,20 +65,7 @@ def test_a_closure_made_before_is_worth_little(meshes, sets) -> None:
 
 
 def test_closures_on_unknown_candidates_are_refused(meshes, sets) -> None:
-    belief = believe(TargetModel.from_mesh(meshes[0]), sets)
+    belief = infer_belief(TargetModel.from_mesh(meshes[0]), sets)
     with pytest.raises(ParamError, match="candidate"):
         expected_gain(belief, [Closure(9, 0.0, 0.03, np.zeros(2))])
     assert len(expected_gain(belief, [])) == 0
-
-
-def test_a_library_is_told_apart_and_strangers_are_none_of_it(meshes, sets, solids) -> None:
-    models = [TargetModel.from_mesh(m) for m in meshes]
-    for i, touchset in enumerate(sets):
-        shares, unknown = identify(models, touchset)
-        assert shares.sum() + unknown == pytest.approx(1.0)
-        assert int(np.argmax(shares)) == i
-        assert unknown < 0.1
-        others = [m for j, m in enumerate(models) if abs(j - i) > 1 or {i, j} == {1, 2}]
-        assert identify(others, touchset)[1] > 0.9
-    with pytest.raises(ParamError):
-        identify([], sets[0])

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from glotouch_bt.perception.recognition import MATCHERS, TargetModel
 from glotouch_bt.perception.recognition.evidence import read_evidence
-from glotouch_bt.perception.recognition.gain import believe
-from glotouch_bt.perception.recognition.likelihood.pair import compare, read_touchset, watched_turns
+from glotouch_bt.perception.recognition.likelihood import infer_belief
+from glotouch_bt.perception.recognition.likelihood.pair import compare, observed_turns, read_touchset
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
-from glotouch_bt.perception.recognition.likelihood.posterior import against_others, probabilities, ratios
+from glotouch_bt.perception.recognition.likelihood.posterior import log_ratio_to_others, probabilities, ratios
 from glotouch_bt.perception.touch import TouchSequence, TouchSet
 from glotouch_bt.robot import ParamError
 from tests.support.acquisition import HARSH, IDEAL, NOMINAL, acquire
@@ -247,7 +247,7 @@ def test_an_object_seen_to_turn_may_lie_at_another_yaw(meshes) -> None:
     one, *rest = later[0].layers
     seen = replace(later[0], layers=(replace(one, turn_rad=-turn), *rest))
     assert ratio(meshes[2], replace(unseen, sequences=(first, seen, *later[1:]))) > ratio(meshes[2], unseen) + 0.5
-    assert watched_turns(replace(unseen, sequences=(first, seen, *later[1:]))) == pytest.approx([0, turn, turn])
+    assert observed_turns(replace(unseen, sequences=(first, seen, *later[1:]))) == pytest.approx([0, turn, turn])
 
 
 def test_probabilities_against_bayes() -> None:
@@ -256,7 +256,7 @@ def test_probabilities_against_bayes() -> None:
     Target: 0.4 x 8 (the other one 0.75 + 0.25 x 2), 0.4 x 2 (0.75 + 0.25 x 4). None: 0.2 x 1.25 x 1.75.
     """
     p = LikelihoodParams(prior_absent=0.2, twin=0.25)
-    against = [against_others(np.log(8), np.log(4 / 8), p), against_others(np.log(2), 0.0, p)]
+    against = [log_ratio_to_others(np.log(8), np.log(4 / 8), p), log_ratio_to_others(np.log(2), 0.0, p)]
     shares, absent = probabilities(against, p)
     expected = np.array([0.4 * 8 * 1.25, 0.4 * 2 * 1.75, 0.2 * 1.25 * 1.75])
     np.testing.assert_allclose([*shares, absent], expected / expected.sum())
@@ -283,7 +283,7 @@ def test_what_fits_worse_than_a_twin_would_is_the_twin() -> None:
 def test_what_a_twin_shares_never_proves_much(candidates, share: float) -> None:
     """However well a candidate fits: its odds against none are at most those against its twin."""
     p = LikelihoodParams(twin=share)
-    shares, absent = probabilities([against_others(r, t, p) for r, t in candidates], p)
+    shares, absent = probabilities([log_ratio_to_others(r, t, p) for r, t in candidates], p)
     assert shares.sum() + absent == pytest.approx(1.0)
     twins = np.array([t for _, t in candidates])
     bound = (1 - p.prior_absent) / (p.prior_absent * share * len(candidates)) * np.exp(-twins)
@@ -295,15 +295,15 @@ def test_a_candidate_nobody_felt_keeps_the_weight_of_its_outline(meshes) -> None
     felt, _ = touched(meshes[0], NOMINAL, 41, 0)
     twin = replace(felt, candidate=replace(felt.candidate, index=1), sequences=())
     one = replace(felt, sequences=(replace(felt.sequences[0], layers=felt.sequences[0].layers[:1]),))
-    ranking = believe(TargetModel.from_mesh(meshes[0]), [one, twin]).ranking
+    ranking = infer_belief(TargetModel.from_mesh(meshes[0]), [one, twin]).ranking
     shares = {m.index: m.probability for m in ranking.matches}
     assert shares[1] > 0.1
-    nothing = believe(TargetModel.from_mesh(meshes[0]), [replace(one, sequences=()), twin]).ranking
+    nothing = infer_belief(TargetModel.from_mesh(meshes[0]), [replace(one, sequences=()), twin]).ranking
     assert nothing.matches[0].probability == pytest.approx(nothing.matches[1].probability)
 
 
 def test_belief_before_any_touch_is_not_sure(meshes) -> None:
     sets = [replace(touched(m, NOMINAL, 20 + i, i)[0], sequences=()) for i, m in enumerate(meshes)]
-    belief = believe(TargetModel.from_mesh(meshes[2]), sets)
+    belief = infer_belief(TargetModel.from_mesh(meshes[2]), sets)
     assert total(belief.ranking) == pytest.approx(1.0)
     assert not belief.ranking.accepted

@@ -32,7 +32,7 @@ class Oracle:
     def __init__(self, right: int | None, enough: int, evidence: float = 9.0) -> None:
         self.right, self.enough, self.evidence = right, enough, evidence
 
-    def believe(self, model, touchsets) -> SimpleNamespace:
+    def infer_belief(self, model, touchsets) -> SimpleNamespace:
         felt = {t.candidate.index: sum(layer.stable for layer in t.layers) for t in touchsets}
         known = sum(felt.values()) >= self.enough if self.right is None else felt[self.right] >= self.enough
         n = len(felt)
@@ -55,7 +55,7 @@ def make(bench, found, folder, monkeypatch):
     def make_one(oracle: Oracle, things=None, grip_width_m=WIDTH, stuff=(), tip_P_m=0.13, **params):
         b = bench(grip_width_m=grip_width_m, things=stuff, tip_P_m=tip_P_m)
         b.context.world = replace(b.world, objects=replace(b.world.objects, folder=folder))
-        monkeypatch.setattr(module, "believe", oracle.believe)
+        monkeypatch.setattr(module, "infer_belief", oracle.infer_belief)
         monkeypatch.setattr(module, "expected_gain", oracle.expected_gain)
         things = things or (found.round((0.0, -0.08), 0.025), found.round((0.0, 0.08), 0.025, index=1))
         return b, b.make(TouchNext, inputs={"candidates": things}, target="can", **params)
@@ -117,9 +117,9 @@ def test_it_ends_when_nothing_can_help(make) -> None:
 def test_sure_but_with_too_little_evidence_is_touched_again(make, monkeypatch) -> None:
     """Known from the first closure on, but taken only with evidence: the candidate itself is touched on."""
     oracle = Oracle(right=1, enough=1)
-    plain = oracle.believe
+    plain = oracle.infer_belief
 
-    def believe(model, touchsets):
+    def infer_belief(model, touchsets):
         belief = plain(model, touchsets)
         best = belief.ranking.matches[0]
         ranking = replace(belief.ranking, accepted=best.evidence >= belief.params.evidence)
@@ -129,7 +129,7 @@ def test_sure_but_with_too_little_evidence_is_touched_again(make, monkeypatch) -
         felt = any(t.layers for t in belief.touchsets)
         return np.array([0.5 if c.candidate == 1 and not felt else 0.0 for c in closures])
 
-    oracle.believe, oracle.expected_gain = believe, gain
+    oracle.infer_belief, oracle.expected_gain = infer_belief, gain
     b, skill = make(oracle)
     repeat(b, skill)
     assert [len(t.layers) for t in skill.touchsets] == [0, 2]

@@ -1,12 +1,11 @@
-"""Marginal likelihood of a TouchSet given an STL, against a background of other objects. Pure."""
+"""Marginal likelihood of a TouchSet given an STL, relative to a background of other objects."""
 
 from glotouch_bt.perception.recognition.likelihood.belief import (
     Belief,
-    believe,
     closure_options,
     expected_gain,
-    identify,
+    infer_belief,
     ranked,
 )
 
-__all__ = ["Belief", "believe", "closure_options", "expected_gain", "identify", "ranked"]
+__all__ = ["Belief", "infer_belief", "closure_options", "expected_gain", "ranked"]

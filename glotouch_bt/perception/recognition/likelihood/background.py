@@ -1,8 +1,8 @@
-"""What squeezing SOME object would feel like: the background every target is compared with.
+"""Background model: likelihood of a squeeze of SOME object.
 
-Pads: random local surfaces by formula (quadrics that end in edges, with steps and ridges), pressed into the same gel
-and seen through the same kernel as the target's images, so that a flat face, which any box has, proves little. Widths:
-a guess from what is known before the closure (the outline, the layer below, the same layer of the sequence before).
+Images: random local surfaces (quadrics with edges, steps and ridges) under the same gel model and kernel as the target,
+so that common features such as flat faces are weak evidence. Widths: prediction from the outline, the layer below and
+the same layer of the previous sequence.
 """
 
 from __future__ import annotations
@@ -22,14 +22,16 @@ from glotouch_bt.robot import Array
 
 Floats = npt.NDArray[np.floating]
 SURFACES = 1500
-"""Random surfaces: enough that two seeds give the same log density within 0.1."""
-WIDTH_SCALE_M, FIRST_SCALE_M = 2.5e-3, 4e-3
-"""How far a width is from the one below, or in the sequence before; and the first from the outline's span."""
+"""Number of random surfaces. Two seeds agree in log density within 0.1."""
+WIDTH_SCALE_M = 2.5e-3
+"""Cauchy scale of a width about that of the layer below or of the previous sequence."""
+FIRST_SCALE_M = 4e-3
+"""Cauchy scale of a first width about the outline's span."""
 
 
 @lru_cache(maxsize=8)
 def generic_features(pad: PadSpec) -> Array32:
-    """(SURFACES, 35) image features of random local surfaces; deterministic (0.1 s once)."""
+    """Return image features (SURFACES, 35) of random local surfaces; deterministic (0.1 s once)."""
     rng = np.random.default_rng(0)
     n = SURFACES
     u = ((np.arange(FINE[1]) + 0.5) / FINE[1] - 0.5) * pad.window_m[0]
@@ -44,7 +46,7 @@ def generic_features(pad: PadSpec) -> Array32:
 
     turn = draw(0, np.pi)
     a, b = np.cos(turn) * x + np.sin(turn) * z, -np.sin(turn) * x + np.cos(turn) * z
-    aligned = some(0.6)  # upright things have their curvatures along and across
+    aligned = some(0.6)  # upright objects have horizontal and vertical principal curvatures
     a, b = np.where(aligned, x, a), np.where(aligned, z, b)
     flat = rng.random((n, 1, 1)) < 0.25
     ka = np.where(np.logical_or(flat, some(0.2)), 0.0, 1 / np.exp(draw(math.log(0.006), math.log(0.06))))
@@ -66,7 +68,7 @@ def generic_features(pad: PadSpec) -> Array32:
 
 
 def image_kernel(squared: Array32, p: LikelihoodParams) -> Array32:
-    """An image's unnormalised density at mean squared feature distance `squared` from a prediction."""
+    """Return the unnormalised density of an image at mean squared feature distance `squared` from a prediction."""
     near = 1 + squared * np.float32(1 / p.image_scale**2)
     if p.image_order == 3.0:  # several times faster than a power
         return np.asarray(1 / (near * near * near))
@@ -74,15 +76,15 @@ def image_kernel(squared: Array32, p: LikelihoodParams) -> Array32:
 
 
 def log_kernel(squared: Floats, p: LikelihoodParams) -> Array32:
-    """Log of `image_kernel`."""
+    """Return the log of `image_kernel`."""
     return np.asarray(np.log(image_kernel(squared.astype(np.float32), p) + np.float32(1e-12)))
 
 
 def log_generic_images(layers: tuple[LayerEvidence, ...], pad: PadSpec, p: LikelihoodParams) -> Array:
-    """(n, 2) log density, in the units of `log_kernel`, of the (left, right) images of each layer; 0 without image.
+    """Return the background log density (n, 2), in units of `log_kernel`, of (left, right) images; 0 without image.
 
-    Any surface of the library, or one like those already felt beside it: below on the same pad, at the same place in
-    the sequence before, on the other pad. So a wall that goes on tells no more than its first image.
+    A mixture of the surface library and of neighbouring images: below on the same pad, at the same height in the
+    previous sequence, on the other pad. So repeated images of one wall are not independent evidence.
     """
     known: dict[tuple[int, int, int], Array32] = {
         (e.sequence, e.index, side): image.astype(np.float32)
@@ -115,13 +117,13 @@ def log_generic_images(layers: tuple[LayerEvidence, ...], pad: PadSpec, p: Likel
 
 
 def mean_squared(a: Array32, b: Array32) -> Array32:
-    """(len(a), len(b)) mean squared distance of features (.., 35)."""
+    """Return mean squared distances (len(a), len(b)) of features (.., 35)."""
     d = (a**2).sum(axis=1)[:, None] - 2 * a @ b.T + (b**2).sum(axis=1)[None]
     return np.asarray(np.maximum(d, 0) * np.float32(1 / a.shape[1]))
 
 
 def log_generic_widths(layers: tuple[LayerEvidence, ...], candidate: Candidate, p: LikelihoodParams) -> Array:
-    """(n,) log density (per metre) of each layer's width, given those felt before it and the traced outline."""
+    """Return the background log density (n,), per metre, of each width given earlier widths and the outline."""
     out = np.zeros(len(layers))
     known: dict[tuple[int, int], float] = {}
     for i, e in enumerate(layers):
@@ -130,7 +132,7 @@ def log_generic_widths(layers: tuple[LayerEvidence, ...], candidate: Candidate, 
         if not guesses:
             low, high = candidate.span_m(e.yaw_rad + 0.5 * math.pi)
             guesses = [(high - low, FIRST_SCALE_M)]
-        # Cauchy about each guess: an object may well have a step there.
+        # The Cauchy tails allow steps of the object.
         density = np.mean([s / math.pi / (s**2 + (e.width_m - w) ** 2) for w, s in guesses])
         out[i] = math.log((1 - p.width_outlier) * density + p.width_outlier / p.width_range_m)
         if not e.upper_only:

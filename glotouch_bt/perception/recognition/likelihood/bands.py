@@ -1,8 +1,7 @@
-"""A twin whose wall is moved at a whole height: a waist, a belt, a taper, another size.
+"""Likelihood of a twin that differs from the target by height bands: a waist, a belt, a taper, another size.
 
-The other twin (`volumes.width_ratios`) differs from place to place, so it also explains widths that scatter because the
-object was tilted, turned or pressed in. What differs at a height differs the same way from all sides: closures that are
-off together tell a twin from a bad closure.
+The twin of `volumes.width_ratios` differs locally, so it also explains scatter of widths by tilt or deformation. A band
+differs equally from all sides, so closures with a common residual distinguish a twin from a bad closure.
 """
 
 from __future__ import annotations
@@ -18,22 +17,22 @@ from glotouch_bt.perception.recognition.model import Array32
 from glotouch_bt.robot import Array
 
 BAND_M = 5e-3
-"""Closures within this of the lowest of a band are of one height; layers are 12 mm apart."""
+"""Height of a band, from its lowest closure; layers are 12 mm apart."""
 STEP_M = 3e-3
-"""Where half a cell of the pose's grid makes so much of a difference, the closure straddles a step: it says nothing."""
+"""Maximum change of the residual over half a grid cell; beyond it the closure is at a step and is ignored."""
 MOVED_M = np.linspace(-9e-3, 9e-3, 37)
-"""How far the wall may be moved: three standard deviations."""
+"""Grid of width differences of a twin: three standard deviations."""
 
 
 @dataclass(frozen=True)
 class Residual:
-    """One closure's width against the prediction about the best pose.
+    """Width residual of one closure near the best pose.
 
     Attributes:
-        off_m: (3, 3) measured minus predicted, at yaws and height offsets half a cell before, at and behind the best:
-            what the pose's grid leaves open is common to all closures too.
-        scale_m: Of its scatter.
-        height_m: Of the pads.
+        off_m: (3, 3) measured minus predicted width at yaws and height offsets half a cell around the best; the grid
+            error of the pose is common to all closures.
+        scale_m: Scale of its noise.
+        height_m: Height of the pads.
     """
 
     off_m: Array
@@ -42,7 +41,7 @@ class Residual:
 
 
 def residual(off_m: Array32, scale_m: Array32, height_m: float, at: tuple[int, int, int]) -> Residual | None:
-    """From (72, nd, nz) volumes at the best (yaw, shift, height offset); None for no closure, or on a step."""
+    """Return the residual from volumes (72, nd, nz) at the best (yaw, shift, height offset); None if undefined."""
     i, d, z = at
     middle = float(off_m[i, d, z])
     if not math.isfinite(middle):
@@ -56,15 +55,15 @@ def residual(off_m: Array32, scale_m: Array32, height_m: float, at: tuple[int, i
 
 
 def log_banded_twin(felt: list[Residual], bias_m: Array, log_bias: Array, p: LikelihoodParams) -> float:
-    """log p(widths | a twin that differs at heights) - log p(widths | target), not tempered; 0 if nothing was felt.
+    """Return log p(widths | banded twin) - log p(widths | target), not tempered; 0 without widths.
 
-    Every height differs with probability `twin_width`, by a Student's t of scale `twin_width_sd_m`; both are summed
-    over the aperture's bias and what the pose's grid leaves open.
+    Each band differs with probability `twin_width`, by a Student's t of scale `twin_width_sd_m`. Both likelihoods are
+    marginalised over the aperture bias and the pose within its grid cell.
 
     Args:
-        felt: Widths that are not merely bounds.
-        bias_m, log_bias: (nb,) values of the aperture's bias, and their log probabilities.
-        p: Spreads.
+        felt: Residuals of two-sided layers.
+        bias_m, log_bias: (nb,) aperture biases and their log probabilities.
+        p: Parameters.
     """
     if not felt:
         return 0.0

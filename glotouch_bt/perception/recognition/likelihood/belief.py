@@ -1,4 +1,4 @@
-"""What is believed after some touches: one value that ranks, and that predicts further touches."""
+"""Posterior over the target's identity after some touches, with ranking and predictions of further touches."""
 
 from __future__ import annotations
 
@@ -10,35 +10,39 @@ import numpy as np
 
 from glotouch_bt.perception.recognition.decision import Closure, Ranking
 from glotouch_bt.perception.recognition.likelihood.gain import Prediction, expected_gains, predict
-from glotouch_bt.perception.recognition.likelihood.pair import Pair, Reading, compare, read_touchset
+from glotouch_bt.perception.recognition.likelihood.pair import Pair, TouchSetReading, compare, read_touchset
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
-from glotouch_bt.perception.recognition.likelihood.posterior import decide, probabilities, ratios
+from glotouch_bt.perception.recognition.likelihood.posterior import decide
 from glotouch_bt.perception.recognition.model import TargetModel
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.robot import Array, ParamError
 
-OPTION_YAWS, OPTION_HEIGHTS = 6, 3
-"""Closures weighed for `Ranking.next_touch`: yaws over half a turn, and heights, through the middle of the contour."""
-LOWEST_M, TOP_OVERLAP_M = 0.020, 0.008
-"""Heights of the pads' mid-point that fingers reach (CONDITIONS): above the floor, and below the top."""
+OPTION_YAWS = 6
+"""Number of yaws over half a turn among the options for `Ranking.next_touch`."""
+OPTION_HEIGHTS = 3
+"""Number of heights among the options for `Ranking.next_touch`."""
+LOWEST_M = 0.020
+"""Minimum height of the pads' mid-point above the floor. Source: CONDITIONS."""
+TOP_OVERLAP_M = 0.008
+"""Minimum distance of the pads' mid-point below the top. Source: CONDITIONS."""
 
 
 @dataclass(frozen=True, eq=False)
 class Belief:
-    """State after some touches. A TouchSet may have no sequence yet: its contour and height alone speak then.
+    """Posterior after some touches. A TouchSet without sequences contributes contour and height.
 
     Attributes:
         model: The target.
-        touchsets: What was felt, one a candidate.
-        ranking: Over the candidates.
-        readings, pairs: The touchsets weighed, and the evidence, in the same order; reckoned if not given.
-        params: Of the likelihood.
+        touchsets: Touches, one per candidate.
+        ranking: Ranking of the candidates.
+        readings, pairs: Background and target evidence in the same order; computed if not given.
+        params: Parameters of the likelihood.
     """
 
     model: TargetModel
     touchsets: tuple[TouchSet, ...]
     ranking: Ranking
-    readings: tuple[Reading, ...] = ()
+    readings: tuple[TouchSetReading, ...] = ()
     pairs: tuple[Pair, ...] = ()
     params: LikelihoodParams = field(default_factory=LikelihoodParams)
 
@@ -49,20 +53,20 @@ class Belief:
             object.__setattr__(self, "pairs", tuple(compare(self.model, r, self.params) for r in readings))
 
     def predictions(self) -> dict[int, Prediction]:
-        """By candidate index."""
+        """Return the predictions by candidate index."""
         return {x.index: predict(self.model, r, x, self.params) for r, x in zip(self.readings, self.pairs, strict=True)}
 
 
-def believe(
+def infer_belief(
     model: TargetModel,
     touchsets: Sequence[TouchSet],
     params: LikelihoodParams | None = None,
     before: Belief | None = None,
 ) -> Belief:
-    """The belief after `touchsets`, one a candidate; of `before`, what is unchanged (by identity) is not reckoned anew.
+    """Compute the belief from `touchsets`, one per candidate; reuse pairs of unchanged touchsets of `before`.
 
     Raises:
-        ParamError: None at all, two of one candidate, or a candidate whose outline is not finite.
+        ParamError: No touchset, two of one candidate, or a non-finite outline.
     """
     p = params or LikelihoodParams()
     check(touchsets)
@@ -75,16 +79,16 @@ def believe(
 
 
 def check(touchsets: Sequence[TouchSet]) -> None:
-    """Refuse what cannot be ranked.
+    """Validate touchsets.
 
     Raises:
-        ParamError: See `believe`.
+        ParamError: See `infer_belief`.
     """
     indices = [t.candidate.index for t in touchsets]
     if not indices:
         raise ParamError("touchsets", 0, "at least one")
     if len(set(indices)) < len(indices):
-        raise ParamError("touchsets", indices, "one a candidate")
+        raise ParamError("touchsets", indices, "one per candidate")
     for t in touchsets:
         c = t.candidate.contour
         if not np.isfinite([*c.centre_K_m, *c.size_m, c.yaw_rad, t.candidate.height_m]).all():
@@ -92,10 +96,10 @@ def check(touchsets: Sequence[TouchSet]) -> None:
 
 
 def expected_gain(belief: Belief, closures: Sequence[Closure]) -> Array:
-    """(n,) expected information gain, nats, of each closure over "which candidate, or none, is the target".
+    """Return the expected information gain (n,), nats, of each closure about which candidate, or none, is the target.
 
     Raises:
-        ParamError: A closure on a candidate that is not in the belief.
+        ParamError: A closure on an unknown candidate.
     """
     known = {x.index for x in belief.pairs}
     for c in closures:
@@ -105,27 +109,8 @@ def expected_gain(belief: Belief, closures: Sequence[Closure]) -> Array:
     return expected_gains(belief.model, belief.predictions(), shares, belief.ranking.p_absent, closures, belief.params)
 
 
-def identify(
-    models: Sequence[TargetModel], touchset: TouchSet, params: LikelihoodParams | None = None
-) -> tuple[Array, float]:
-    """(n,) probability that the touched object is each of `models`, and that it is none of them; they sum to 1.
-
-    Raises:
-        ParamError: No model, models for different pads, or an outline that is not finite.
-    """
-    p = params or LikelihoodParams()
-    check((touchset,))
-    if not models:
-        raise ParamError("models", 0, "at least one")
-    if any(m.pad != models[0].pad for m in models):
-        raise ParamError("models", "of several pads", "of one pad")
-    reading = read_touchset(touchset, models[0].pad, p)
-    pairs = [compare(m, reading, p) for m in models]
-    return probabilities(ratios(pairs, p), p)
-
-
 def ranked(belief: Belief) -> Ranking:
-    """The ranking, with the closure that would help most if it is not accepted."""
+    """Return the ranking, with the most informative next closure unless it is accepted."""
     ranking = belief.ranking
     if ranking.accepted:
         return ranking
@@ -138,7 +123,7 @@ def ranked(belief: Belief) -> Ranking:
 
 
 def closure_options(touchset: TouchSet) -> list[Closure]:
-    """Closures through the middle of the contour: of a box across its sides, of a round one from all sides."""
+    """Return closures through the contour's centre: across the sides of a box, from all sides of a round object."""
     c = touchset.candidate.contour
     top = max(touchset.candidate.height_m - TOP_OVERLAP_M, LOWEST_M)
     heights = np.linspace(LOWEST_M, top, OPTION_HEIGHTS if top > LOWEST_M + 0.01 else 1)

@@ -1,8 +1,8 @@
-"""Expected information gain of closures, from a few weighted poses of the target and a few other objects.
+"""Expected information gain of closures, summed over a few poses of the target and a few other objects.
 
-A closure on candidate c multiplies the odds of c by one ratio r. Under "c is the target" its observation is what the
-STL shows at the true pose, one of the posterior's; under any other hypothesis it is what some object shows. Both are
-summed over as few points, and the entropy of {candidates, none} before and after compared.
+A closure on candidate c multiplies the odds of c by a likelihood ratio r. If c is the target, the observation follows
+from the STL at a pose of the posterior; otherwise from another object. The gain is the expected decrease of the entropy
+of {candidates, none}.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from glotouch_bt.perception.recognition.likelihood.background import (
     image_kernel,
     mean_squared,
 )
-from glotouch_bt.perception.recognition.likelihood.pair import Pair, Reading
+from glotouch_bt.perception.recognition.likelihood.pair import Pair, TouchSetReading
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.perception.recognition.likelihood.scalars import yaw_prior
 from glotouch_bt.perception.recognition.likelihood.volumes import T_PEAK, width_kernel
@@ -30,23 +30,30 @@ from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.perception.touch.calibration import MEASURED_SD_M
 from glotouch_bt.robot import Array
 
-POSES, OTHERS, SURFACES = 10, 16, 96
-"""Poses of the target, other objects, and background surfaces the sums run over."""
+POSES = 10
+"""Number of poses of the target."""
+OTHERS = 16
+"""Number of other objects."""
+SURFACES = 96
+"""Number of background surfaces."""
 UNEVEN_M = 4e-4
-"""What neighbouring cells of the width table differ by, mostly."""
-NEAR_M, NEAR_RAD = 0.008, math.radians(20.0)
-"""A closure this near to one already made (height and track; yaw) repeats it."""
+"""Typical difference of neighbouring cells of the width table."""
+NEAR_M = 0.008
+"""Position scale within which a closure repeats an earlier one."""
+NEAR_RAD = math.radians(20.0)
+"""Yaw scale within which a closure repeats an earlier one."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Where the target would lie if it were this candidate.
+    """Most probable poses of the target if it is this candidate.
 
     Attributes:
         candidate: The candidate.
-        yaw_index, z0_m, weight: (s,) its likeliest poses: relative yaw of a hand at `first_rad`, in table steps.
-        first_rad: That hand's yaw.
-        felt: (n, 4) closures made: x_K, y_K, height, yaw; widths_m (n,) what they measured.
+        yaw_index, z0_m, weight: (s,) poses: relative yaw at `first_rad` in table steps, height offset, weight.
+        first_rad: Yaw of that hand.
+        felt: (n, 4) closures so far: x_K, y_K, height, yaw.
+        widths_m: (n,) their widths.
     """
 
     candidate: Candidate
@@ -58,8 +65,8 @@ class Prediction:
     widths_m: Array
 
 
-def predict(model: TargetModel, reading: Reading, pair: Pair, p: LikelihoodParams) -> Prediction:
-    """The likeliest poses of a candidate, by weight."""
+def predict(model: TargetModel, reading: TouchSetReading, pair: Pair, p: LikelihoodParams) -> Prediction:
+    """Return the most probable poses of a candidate."""
     candidate = reading.touchset.candidate
     z0 = np.linspace(-p.z0_limit_m, p.z0_limit_m, p.z0_steps) if p.z0_steps > 1 else np.zeros(1)
     if pair.log_pose is None:
@@ -90,7 +97,7 @@ def expected_gains(
     closures: Sequence[Closure],
     p: LikelihoodParams,
 ) -> Array:
-    """(n,) nats, not negative. Shares and `p_absent` sum to 1."""
+    """Return the gains (n,), nats, not negative. Shares and `p_absent` sum to 1."""
     if not closures:
         return np.zeros(0)
     rest = np.array([*shares.values(), p_absent])
@@ -107,7 +114,7 @@ def expected_gains(
         where = [i for i, c in enumerate(closures) if c.candidate == candidate]
         mine = [closures[i] for i in where]
         width, sides, novelty = _at(model, q, mine)
-        # Ratios where the target is there (one a pose) and where some other object is (one a surface and quantile).
+        # Ratios for the target (one per pose), then for other objects (one per surface and quantile).
         ratio = _width_ratios(width, np.array([_guess(q, c) for c in mine]), quantile, q.weight, p)
         for side in sides:
             ratio += _image_ratios(side, library, others, generic_other, q.weight, p)
@@ -118,7 +125,7 @@ def expected_gains(
 
 
 def _width_ratios(width: Array, guess: Array, quantile: Array, weight: Array, p: LikelihoodParams) -> Array:
-    """(n, s + o) tempered log ratios of widths: predicted ones (n, s), then those of other objects."""
+    """Return tempered log ratios (n, s + o) of widths: of the target's poses, then of other objects."""
     middle, scale = guess[:, :1], guess[:, 1:]
     felt = np.isfinite(width)
     w = np.where(felt, width, 1.0)
@@ -134,7 +141,7 @@ def _width_ratios(width: Array, guess: Array, quantile: Array, weight: Array, p:
 def _image_ratios(
     side: Array32, library: Array32, others: Array32, generic_other: Array32, weight: Array, p: LikelihoodParams
 ) -> Array:
-    """(n, s + o) tempered log ratios of one pad's images: predicted ones (n, s, 35), then those of other objects."""
+    """Return tempered log ratios (n, s + o) of one pad's images: of the target's poses, then of other objects."""
     n, s, size = side.shape
     flat = side.reshape(-1, size)
     norm = (side**2).sum(axis=2)
@@ -146,11 +153,11 @@ def _image_ratios(
 
 
 def _gains(there: Array, weight: Array, not_there: Array, share: float, entropy: float) -> Array:
-    """(n,) entropy before minus its mean after one observation that concerns one candidate's odds only."""
+    """Return entropy minus its expectation (n,) after an observation that changes one candidate's odds."""
     if share <= 0 or share >= 1:
         return np.zeros(len(there))
     own = -(share * math.log(share) + (1 - share) * math.log1p(-share))
-    among = (entropy - own) / (1 - share)  # entropy of the others, given that it is not this one
+    among = (entropy - own) / (1 - share)  # entropy of the others, given that this one is not the target
     odds = math.log(share) - math.log1p(-share)
 
     def after(log_ratio: Array) -> Array:
@@ -163,7 +170,7 @@ def _gains(there: Array, weight: Array, not_there: Array, share: float, entropy:
 
 
 def _at(model: TargetModel, q: Prediction, closures: Sequence[Closure]) -> tuple[Array, tuple[Array32, Array32], Array]:
-    """Predicted widths (n, s), (left, right) features (n, s, 35), and how new each closure is (n,), 0..1."""
+    """Return predicted widths (n, s), (left, right) features (n, s, 35), and novelty of each closure (n,), 0..1."""
     n = len(model.phi_rad)
     yaw = np.array([c.yaw_K_rad for c in closures])
     height = np.array([c.height_m for c in closures])
@@ -189,7 +196,7 @@ def _at(model: TargetModel, q: Prediction, closures: Sequence[Closure]) -> tuple
 
 
 def _guess(q: Prediction, c: Closure) -> tuple[float, float]:
-    """Where the background expects the width, and how surely: the nearest closure made, or the outline's span."""
+    """Return the background's predicted width and its scale: from the nearest closure, or the outline's span."""
     if len(q.felt):
         turned = np.abs((q.felt[:, 3] - c.yaw_K_rad + np.pi / 2) % np.pi - np.pi / 2)
         at = int(np.argmin(np.abs(q.felt[:, 2] - c.height_m) + 0.03 * turned))

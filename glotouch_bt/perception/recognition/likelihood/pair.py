@@ -1,4 +1,4 @@
-"""One STL against one TouchSet: the marginal log ratio target : background, and the posterior of the pose."""
+"""Evidence of one TouchSet for one STL: marginal log ratio target : background, and pose posterior."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ from glotouch_bt.perception.recognition.likelihood.volumes import (
     Observed,
     image_ratios,
     log_sum,
-    slid,
+    marginalise_slide,
+    marginalise_turn,
     slide_matrix,
-    turned,
     width_ratios,
 )
 from glotouch_bt.perception.recognition.model import Array32, PadSpec, TargetModel
-from glotouch_bt.perception.recognition.placement import fitted_pose, unfelt_pose
+from glotouch_bt.perception.recognition.placement import contour_pose, fitted_pose
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.robot import Array
 
-_read: deque[tuple[TouchSet, PadSpec, LikelihoodParams, Reading]] = deque(maxlen=32)
+_read: deque[tuple[TouchSet, PadSpec, LikelihoodParams, TouchSetReading]] = deque(maxlen=32)
 
 PARALLEL_RAD = math.radians(10.0)
-"""Sequences whose hands differ by less (or by half a turn) are tracks along one axis."""
+"""Maximum yaw difference (modulo half a turn) of parallel tracks."""
 
 
 @dataclass(frozen=True)
-class Reading:
-    """A TouchSet and what the background makes of it; the same for every STL.
+class TouchSetReading:
+    """A TouchSet with its background densities; the same for every STL.
 
     Attributes:
-        touchset: What was felt.
-        evidence: The same, reduced.
-        sequences: Layers that count, with background densities, by sequence; sequences without any are left out.
+        touchset: The touches.
+        evidence: Their evidence.
+        sequences: Valid layers with background densities, by sequence; empty sequences are skipped.
     """
 
     touchset: TouchSet
@@ -58,15 +58,15 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Evidence of one pair.
+    """Evidence of one TouchSet for one STL.
 
     Attributes:
-        index: The candidate's index.
-        log_ratio: log p(TouchSet | target) - log p(TouchSet | just any object), tempered and calibrated.
-        log_twin: log p(TouchSet | a twin) - log p(TouchSet | target), by the widths, calibrated.
-        terms: What it is made of, nats before calibration: mode, height, contour; width and image at the best pose;
-            pose: what is gained or lost by not knowing the pose.
-        log_pose: (72, nz) posterior of (relative yaw of the first sequence, height offset); None if nothing was felt.
+        index: Index of the candidate.
+        log_ratio: log p(TouchSet | target) - log p(TouchSet | random object), tempered and calibrated.
+        log_twin: log p(TouchSet | twin) - log p(TouchSet | target), from the widths, calibrated.
+        terms: Terms of the ratio, nats before calibration: mode, height, contour; width and image at the best pose;
+            pose: effect of the marginalisation over the pose.
+        log_pose: (72, nz) posterior of (relative yaw of the first sequence, height offset); None without contact.
         first_rad: Yaw of the first sequence's hand.
         bias_m: Best aperture bias.
         fit, pose_K_O, evidence: As in `Match`.
@@ -84,8 +84,8 @@ class Pair:
     evidence: float
 
 
-def read_touchset(touchset: TouchSet, pad: PadSpec, p: LikelihoodParams) -> Reading:
-    """Reduce a TouchSet and weigh it under the background; the last ones read are remembered (by identity)."""
+def read_touchset(touchset: TouchSet, pad: PadSpec, p: LikelihoodParams) -> TouchSetReading:
+    """Compute evidence and background densities of a TouchSet; the newest results are cached by identity."""
     for known, spec, q, reading in _read:
         if known is touchset and spec == pad and q == p:
             return reading
@@ -94,18 +94,18 @@ def read_touchset(touchset: TouchSet, pad: PadSpec, p: LikelihoodParams) -> Read
     return reading
 
 
-def _read_touchset(touchset: TouchSet, pad: PadSpec, p: LikelihoodParams) -> Reading:
+def _read_touchset(touchset: TouchSet, pad: PadSpec, p: LikelihoodParams) -> TouchSetReading:
     e = read_evidence(touchset, pad)
     images = log_generic_images(e.layers, pad, p)
     widths = log_generic_widths(e.layers, touchset.candidate, p)
     seen: dict[int, list[Observed]] = {}
     for layer, width, image in zip(e.layers, widths, images, strict=True):
         seen.setdefault(layer.sequence, []).append(Observed(layer, float(width), (float(image[0]), float(image[1]))))
-    return Reading(touchset, e, tuple(tuple(v) for _, v in sorted(seen.items())))
+    return TouchSetReading(touchset, e, tuple(tuple(v) for _, v in sorted(seen.items())))
 
 
-def compare(model: TargetModel, reading: Reading, p: LikelihoodParams) -> Pair:
-    """Marginalise over bias, yaw, height offset, and each sequence's shift and turn."""
+def compare(model: TargetModel, reading: TouchSetReading, p: LikelihoodParams) -> Pair:
+    """Compute the evidence, marginalised over bias, yaw, height offset, and each sequence's shift and turn."""
     touchset = reading.touchset
     candidate = touchset.candidate
     terms = {
@@ -115,20 +115,20 @@ def compare(model: TargetModel, reading: Reading, p: LikelihoodParams) -> Pair:
     }
     if not reading.sequences:
         ratio = p.offset + p.slope * sum(terms.values())
-        return Pair(candidate.index, ratio, 0.0, terms, None, 0.0, 0.0, None, unfelt_pose(touchset), 0.0)
+        return Pair(candidate.index, ratio, 0.0, terms, None, 0.0, 0.0, None, contour_pose(touchset), 0.0)
     zero_sd = max(layer.zero_sd_m for layer in touchset.layers)
     grid = Grid.of(p, zero_sd)
     first = reading.sequences[0][0].layer.yaw_rad
     turns = np.array([seen[0].layer.yaw_rad - first for seen in reading.sequences])
     parallel = bool(np.abs((turns + np.pi / 2) % np.pi - np.pi / 2).max() < PARALLEL_RAD)
     common = yaw_prior(model, candidate, first, p)[None, :, None, None] + _log_normal(grid.z0_m, p.z0_sd_m)
-    if parallel:  # tracks share one shift along x_P, but for what each slides
+    if parallel:  # parallel tracks share one shift along x_P; each may slide
         common = common + shift_prior(model, candidate, 0.0, grid.shift_m, p)[None, :, :, None]
     twin = common.astype(np.float32)
     log_bias = _log_normal(grid.bias_m, zero_sd)
     joint = (common + log_bias[:, None, None, None]).astype(np.float32)
     slide = slide_matrix(grid, p)
-    moved = watched_turns(touchset)
+    moved = observed_turns(touchset)
     parts = []
     for seen, turn in zip(reading.sequences, turns, strict=True):
         flip = bool(np.cos(turn) < 0)
@@ -136,13 +136,13 @@ def compare(model: TargetModel, reading: Reading, p: LikelihoodParams) -> Pair:
         widths, twins, offs = width_ratios(model, seen, turn, grid, p)
         widths, twins = np.float32(p.temper_width) * widths, np.float32(p.temper_width) * twins
         images = np.float32(p.temper_image) * image_ratios(model, seen, turn, grid, p)
-        volume = np.concatenate([widths, twins]) + images[None]  # the twin's is one more bias
+        volume = np.concatenate([widths, twins]) + images[None]  # the twin is appended on the bias axis
         if parallel:
             volume = volume[:, :, ::-1] if flip else volume
-            mean = turned(slid(volume, slide), p, sd)
+            mean = marginalise_turn(marginalise_slide(volume, slide), p, sd)
         else:
             volume = volume + shift_prior(model, candidate, turn, grid.shift_m, p)[None, :, :, None].astype(np.float32)
-            mean = turned(log_sum(volume, 2), p, sd)[:, :, None]
+            mean = marginalise_turn(log_sum(volume, 2), p, sd)[:, :, None]
         joint, twin = joint + mean[:-1], twin + mean[-1:]
         parts.append((widths, images, volume, flip, offs))
     total = float(log_sum(joint.reshape(1, -1), 1)[0])
@@ -175,10 +175,10 @@ def compare(model: TargetModel, reading: Reading, p: LikelihoodParams) -> Pair:
     )  # fmt: skip
 
 
-def watched_turns(touchset: TouchSet) -> list[float]:
-    """How far the object was seen to turn, rad in all, from its first closure to the end of each sequence.
+def observed_turns(touchset: TouchSet) -> list[float]:
+    """Return the total observed turn, rad, from the first closure to the end of each sequence.
 
-    The turn of the very first closure is over before that closure feels anything; what nobody watched counts as none.
+    The turn of the first closure precedes its measurement and is excluded. Unobserved turns count as 0.
     """
     total, out = 0.0, []
     for k, sequence in enumerate(touchset.sequences):
@@ -194,7 +194,7 @@ def _log_normal(x: Array, sd: float) -> Array:
 
 
 def _refined(log_profile: Array32, i: int) -> float:
-    """Vertex of the parabola through the greatest value and its neighbours, in table steps."""
+    """Return the vertex of the parabola through the maximum and its neighbours, in table steps."""
     n = len(log_profile)
     a, b, c = float(log_profile[i - 1]), float(log_profile[i]), float(log_profile[(i + 1) % n])
     curve = a - 2 * b + c

@@ -1,4 +1,4 @@
-"""Spreads of the likelihood: one frozen set for every object. Sources: docs/explanation/recognition.md."""
+"""Parameters of the likelihood; their measurement is in docs/explanation/recognition.md."""
 
 from __future__ import annotations
 
@@ -10,39 +10,39 @@ from glotouch_bt.robot import ParamError
 
 @dataclass(frozen=True, kw_only=True)
 class LikelihoodParams:
-    """Nuisance, noise, tempering and prior.
+    """Nuisance, noise, tempering and prior, the same for every object.
 
     Attributes:
-        width_sd_m: Scale of a rigid width about the prediction at the right pose (Student's t).
-        width_rough: Share of the table's unevenness that is added to it: a pose lies between the cells.
-        width_outlier: Probability that a width has nothing to do with the prediction.
-        width_range_m: Such a width is uniform over this.
-        bias_span, bias_steps: Aperture bias, one a TouchSet: tried to so many of its standard deviations.
-        shift_sd_m, shift_limit_m, shift_steps: Object's middle along x_P about the contour's; one for all
-            parallel tracks, else one a sequence.
-        slide_sd_m: Spread of the object's own sliding along x_P between parallel tracks.
-        z0_sd_m, z0_limit_m, z0_steps: Floor's datum, one a TouchSet.
-        turn_sd_rad: Spread of the object's own turning between sequences.
-        slip: Probability that it turned to any yaw at all.
-        image_scale: Feature distance (sqrt(mm), RMS over 35 blocks) at which an image is half as good.
+        width_sd_m: Scale of a rigid width about its prediction (Student's t).
+        width_rough: Fraction of the table's unevenness added to this scale, for poses between the cells.
+        width_outlier: Probability of an outlier width.
+        width_range_m: Range of the uniform density of outlier widths.
+        bias_span, bias_steps: Grid of the aperture bias, one per TouchSet: limit in standard deviations, number.
+        shift_sd_m, shift_limit_m, shift_steps: Object's centre along x_P about the contour's: prior and grid; one for
+            all parallel tracks, else one per sequence.
+        slide_sd_m: Standard deviation of the slide along x_P between parallel tracks.
+        z0_sd_m, z0_limit_m, z0_steps: Height of the floor, one per TouchSet: prior and grid.
+        turn_sd_rad: Standard deviation of the object's turn between sequences.
+        slip: Probability of a turn to an arbitrary yaw.
+        image_scale: Feature distance (sqrt(mm), RMS over 35 blocks) that scales the image kernel.
         image_order: Half the effective number of independent blocks of an image.
-        image_outlier: Probability that an image shows something not in the STL's table.
-        image_alike: Probability, under the background, that an image is like one felt beside it.
-        height_sd_m: Spread of the top found.
-        height_lower: Probability that a lower place than the top was taken for it.
-        contour_sd_m: Spread of a fitted contour's side besides the traces' own.
-        contour_outlier: Probability that the contour is of a part of the object only.
-        yaw_sd_rad: Spread of a box contour's direction.
-        temper_width, temper_image: Powers that make correlated observations count as fewer.
+        image_outlier: Probability of an outlier image.
+        image_alike: Background probability that an image resembles a neighbouring one.
+        height_sd_m: Standard deviation of the measured top.
+        height_lower: Probability that a lower point was measured as the top.
+        contour_sd_m: Standard deviation of a contour's side, besides that of the traces.
+        contour_outlier: Probability that the contour covers only a part of the object.
+        yaw_sd_rad: Standard deviation of a box contour's direction.
+        temper_width, temper_image: Tempering exponents for correlated observations.
         slope, offset: Calibration: log odds against the background = offset + slope * summed log ratios.
-        prior_absent: Probability, before touching, that the target is none of the candidates.
-        twin: Probability that some other object is a twin: made much like the target.
-        twin_width: Probability that a closure, or a height, meets a place where a twin differs.
-        twin_width_sd_m: By how much it then does.
+        prior_absent: Prior probability that the target is none of the candidates.
+        twin: Prior probability that another object is a twin, i.e. similar to the target.
+        twin_width: Probability that a twin differs at a closure, or in a height band.
+        twin_width_sd_m: Scale of this difference.
         twin_slope: Calibration: log odds of a twin against the target = twin_slope * log ratio of their widths.
-        twin_fit: Power of how much better than a candidate a twin would fit (layers are correlated).
-        accept: Least probability of the best to act on.
-        evidence: Least number of layers both pads felt on the best.
+        twin_fit: Tempering exponent of a twin's better fit (layers are correlated).
+        accept: Minimum probability of an accepted candidate.
+        evidence: Minimum number of two-sided layers of an accepted candidate.
     """
 
     width_sd_m: float = 0.3e-3
@@ -90,7 +90,7 @@ class LikelihoodParams:
             if (f.name.endswith(("_sd_m", "_sd_rad", "_range_m")) or f.name.startswith("image_s")) and v == 0:
                 raise ParamError(f"likelihood.{f.name}", v, "positive")
             if f.name.endswith("_steps") and v % 2 == 0:
-                raise ParamError(f"likelihood.{f.name}", v, "odd, so that zero is tried")
+                raise ParamError(f"likelihood.{f.name}", v, "odd, so that the grid contains zero")
         for name in (
             "width_outlier",
             "slip",

@@ -1,11 +1,8 @@
-"""From the evidence of all candidates to probabilities and a decision.
+"""Posterior probabilities of all candidates, and the decision.
 
-Some other object is just any object or, with probability `twin`, a twin: one made much like the target. Given which
-candidate is the target, each other one is some other object; so the posterior odds of candidate i against "none of
-these" are its prior odds times its own ratio target : some other object, and all of them with "none" sum to 1. However
-much speaks for the target against just any object, that ratio is at most that against a twin: it grows only with
-closures that meet what a twin would differ in, and is less for a candidate that fits worse than the best of them does.
-As each object may be a twin, the best of many candidates is less sure than the best of few.
+Another object is random or, with probability `twin`, a twin: similar to the target. The posterior odds of candidate i
+against "none" are its prior odds times its ratio target : other object. This ratio is bounded by that against a twin,
+which grows only with closures where a twin would differ, and is smaller for a candidate that fits worse than the best.
 """
 
 from __future__ import annotations
@@ -21,37 +18,36 @@ from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParam
 from glotouch_bt.robot import Array, ParamError
 
 
-def against_others(log_ratio: float, log_twin: float, p: LikelihoodParams, missed: float = 0.0) -> float:
-    """log p(TouchSet | target) - log p(TouchSet | some other object) from a `Pair`'s two ratios.
+def log_ratio_to_others(log_ratio: float, log_twin: float, p: LikelihoodParams, missed: float = 0.0) -> float:
+    """Compute log p(TouchSet | target) - log p(TouchSet | other object) from the two ratios of a `Pair`.
 
     Args:
-        log_ratio, log_twin: Of the `Pair`, nats.
+        log_ratio, log_twin: Ratios of the `Pair`, nats.
         p: Priors.
-        missed: How much better a twin explains the TouchSet than the target does, where that is known, nats.
+        missed: Additional log likelihood of a twin, nats, if known.
     """
     return log_ratio - float(np.logaddexp(math.log1p(-p.twin), math.log(p.twin) + log_ratio + log_twin + missed))
 
 
 def ratios(pairs: Sequence[Pair], p: LikelihoodParams) -> list[float]:
-    """Target : some other object of every candidate, nats.
+    """Return the log ratios target : other object of all candidates, nats.
 
-    A twin fits its own closures as well as the target fits its: per layer that both pads felt, about as well as the
-    best of the candidates fits the target. What a candidate falls short of that speaks for its being the twin. This
-    tells two candidates apart by their images when no width can, as for an object and its mirror image.
+    A twin would fit its own closures as well as the best candidate fits the target, per two-sided layer. A worse fit is
+    evidence for the twin. This separates candidates by images where widths cannot, e.g. mirror images.
     """
     rates = [x.log_ratio / max(x.evidence, 1.0) for x in pairs]
     level = max(rates, default=0.0)
     return [
-        against_others(x.log_ratio, x.log_twin, p, p.twin_fit * max(level - rate, 0.0) * max(x.evidence, 1.0))
+        log_ratio_to_others(x.log_ratio, x.log_twin, p, p.twin_fit * max(level - rate, 0.0) * max(x.evidence, 1.0))
         for x, rate in zip(pairs, rates, strict=True)
     ]
 
 
 def probabilities(log_ratios: Sequence[float], p: LikelihoodParams) -> tuple[Array, float]:
-    """(n,) probability of each candidate, and of none; candidates share what the prior leaves equally.
+    """Return the probability (n,) of each candidate, and of none; the prior is uniform over candidates.
 
     Args:
-        log_ratios: (n,) target : some other object, nats.
+        log_ratios: (n,) target : other object, nats.
         p: Priors.
 
     Raises:
@@ -68,14 +64,14 @@ def probabilities(log_ratios: Sequence[float], p: LikelihoodParams) -> tuple[Arr
 
 
 def as_match(pair: Pair, ratio: float, probability: float) -> Match:
-    """Loss is -log P(target) by the ratio target : some other object (nats) at even odds: 0 is certain."""
+    """Build a Match; its loss is -log P(target) at even prior odds, 0 for certainty."""
     loss = float(np.logaddexp(0.0, -ratio))
     terms = pair.terms | {"twin": pair.log_twin}
     return Match(pair.index, loss, terms, pair.fit, pair.pose_K_O, pair.evidence, probability)
 
 
 def decide(pairs: Sequence[Pair], p: LikelihoodParams) -> Ranking:
-    """Sort by evidence; accept the best if it is probable enough and was felt by both pads often enough."""
+    """Rank by probability; accept the best if its probability and number of two-sided layers suffice."""
     against = ratios(pairs, p)
     shares, p_absent = probabilities(against, p)
     matches = [as_match(x, r, float(s)) for x, r, s in zip(pairs, against, shares, strict=True)]

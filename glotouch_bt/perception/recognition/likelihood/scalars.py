@@ -1,4 +1,4 @@
-"""Log ratios target : background of what the probe found: kind of contour, its size, the top. And pose priors."""
+"""Log ratios target : background of contour kind, contour size and height, and pose priors."""
 
 from __future__ import annotations
 
@@ -11,24 +11,26 @@ from glotouch_bt.perception.recognition.model import SENSING_M, TargetModel, han
 from glotouch_bt.perception.touch import Candidate, Contour
 from glotouch_bt.robot import Array
 
-SIZES_M, HEIGHTS_M = (0.020, 0.110), (0.018, 0.115)
-"""Sides and heights of "some object": uniform over these (objects of 4-11 cm, and what is traced of them)."""
-UNFELT_M = 0.003
-"""A candidate not higher than this above where its sides were touched: its top was not felt."""
+SIZES_M = (0.020, 0.110)
+"""Range of the uniform background density of a side (objects of 4-11 cm)."""
+HEIGHTS_M = (0.018, 0.115)
+"""Range of the uniform background density of a height."""
+UNMEASURED_TOP_M = 0.003
+"""Height above the sensing plane below which a candidate's top was not measured."""
 TAIL = 3.0
-"""Degrees of freedom of a contour's side: a trace errs by more than its scatter now and then."""
+"""Degrees of freedom of the Student's t of a contour's side."""
 
 
 def mode_ratio(model: TargetModel, candidate: Candidate) -> float:
-    """log P(kind | traces of the STL) - log 1/2."""
+    """Return log P(kind | traces of the STL) - log 1/2."""
     box = model.outline.p_box
     return math.log(2 * (box if candidate.contour.kind == "box" else 1 - box))
 
 
 def height_ratio(model: TargetModel, candidate: Candidate, p: LikelihoodParams) -> float:
-    """The top found: the model's, or a lower place taken for it; a top that was not felt only bounds it from below."""
+    """Return the log ratio of the measured top: the model's top, or a lower point of it; 0 if not measured."""
     low, high = HEIGHTS_M
-    if candidate.height_m < SENSING_M + UNFELT_M:
+    if candidate.height_m < SENSING_M + UNMEASURED_TOP_M:
         return 0.0
     z = (candidate.height_m - model.height_m) / p.height_sd_m
     top = _student(z) / p.height_sd_m
@@ -39,7 +41,7 @@ def height_ratio(model: TargetModel, candidate: Candidate, p: LikelihoodParams) 
 
 
 def contour_ratio(model: TargetModel, candidate: Candidate, p: LikelihoodParams) -> float:
-    """Sides of the contour against the model's own traces, fitted as the same kind."""
+    """Return the log ratio of the contour's sides, compared with the model's traces of the same kind."""
     contour = candidate.contour
     traced = model.outline.of(contour.kind)
     one = contour.family == "circle"
@@ -55,7 +57,7 @@ def contour_ratio(model: TargetModel, candidate: Candidate, p: LikelihoodParams)
 def shift_prior(
     model: TargetModel, candidate: Candidate, turn_rad: float, shift_m: Array, p: LikelihoodParams
 ) -> Array:
-    """(72, nd) log prior: the contour's centre is where the model's traces, fitted alike, have theirs."""
+    """Return the log prior (72, nd) of the shift: the contour's centre agrees with the model's traces."""
     traced = model.outline.of(candidate.contour.kind)
     x, _ = hand_axes(model.phi_rad + turn_rad)
     off = shift_m[None, :] - (x @ traced.centre_m)[:, None]
@@ -65,7 +67,7 @@ def shift_prior(
 
 
 def yaw_prior(model: TargetModel, candidate: Candidate, first_rad: float, p: LikelihoodParams) -> Array:
-    """(72,) log prior of the relative yaw of a hand at `first_rad`: a box's contour lies along the model's."""
+    """Return the log prior (72,) of the relative yaw of a hand at `first_rad`: a box is aligned with the model."""
     n = len(model.phi_rad)
     contour, o = candidate.contour, model.outline.as_box
     if contour.kind != "box":
@@ -79,13 +81,13 @@ def yaw_prior(model: TargetModel, candidate: Candidate, first_rad: float, p: Lik
 
 
 def _student(z: float) -> float:
-    """Density of Student's t with `TAIL` degrees of freedom."""
+    """Return the density of Student's t with `TAIL` degrees of freedom."""
     c = math.gamma(0.5 * (TAIL + 1)) / (math.sqrt(TAIL * math.pi) * math.gamma(0.5 * TAIL))
     return float(c * (1 + z * z / TAIL) ** (-0.5 * (TAIL + 1)))
 
 
 def _size_variance_m2(contour: Contour, side: int) -> float:
-    """Variance of a whole side from the fit's covariance of the half; 0 where the fit does not tell."""
+    """Return the variance of a whole side from the fit's covariance of the half; 0 if unknown."""
     at = {"circle": 2, "rectangle": 3 + side}.get(contour.family or "", len(contour.covariance))
     variance = 4.0 * float(contour.covariance[at, at]) if at < len(contour.covariance) else 0.0
     return variance if math.isfinite(variance) else 0.0

@@ -1,7 +1,7 @@
-"""Log ratios target : background of one sequence over the whole grid of nuisance poses.
+"""Log ratios target : background of one sequence over the grid of nuisance poses.
 
-Axes: (bias, yaw, shift, height offset). Yaw i means that the hand of the FIRST sequence meets the mesh at phi_i; the
-others follow by the known motion of the hand.
+Axes: (bias, yaw, shift, height offset). Yaw i is the relative yaw phi_i of the FIRST sequence's hand; the other hands
+follow from their known yaws.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ T_PEAK = 2 / (math.pi * math.sqrt(3))
 
 @dataclass(frozen=True)
 class Grid:
-    """The nuisance values tried: bias (nb,), shift (nd,), z0 (nz,), metres."""
+    """Grid of nuisance values: bias (nb,), shift (nd,), z0 (nz,), metres."""
 
     bias_m: Array
     shift_m: Array
@@ -35,7 +35,7 @@ class Grid:
 
     @classmethod
     def of(cls, p: LikelihoodParams, zero_sd_m: float) -> Grid:
-        """Evenly over the limits; `zero_sd_m` is what the aperture's bias is known to."""
+        """Build the grid; `zero_sd_m` is the standard deviation of the aperture bias."""
 
         def span(limit: float, n: int) -> Array:
             return np.linspace(-limit, limit, n) if n > 1 else np.zeros(1)
@@ -49,7 +49,7 @@ class Grid:
 
 @dataclass(frozen=True)
 class Observed:
-    """One layer and what the background makes of it: log densities of its width and of (left, right) images."""
+    """One layer with its background log densities of width and (left, right) images."""
 
     layer: LayerEvidence
     log_width: float
@@ -57,17 +57,17 @@ class Observed:
 
 
 def width_kernel(z: Floats) -> Floats:
-    """Student's t with three degrees of freedom, 1 at its peak: most widths are 0.3 mm off, a few 2 mm."""
+    """Return Student's t with three degrees of freedom, normalised to 1 at its peak."""
     return np.asarray((1 + z * z * np.float32(1 / 3)) ** -2)
 
 
 def width_ratios(
     model: TargetModel, seen: Sequence[Observed], turn_rad: float, grid: Grid, p: LikelihoodParams
 ) -> tuple[Array32, Array32, list[tuple[Array32, Array32]]]:
-    """(nb, 72, nd, nz) sum over layers of log p(width | pose) / p(width | background); (1, 72, nd, nz) of a twin; and
-    by how much each layer is off, and on what scale, (72, nd, nz).
+    """Return log ratios (nb, 72, nd, nz) summed over layers, those of a twin (1, 72, nd, nz), and residual and scale
+    (72, nd, nz) of each layer.
 
-    This twin is the target with its wall moved: a closure meets a place where it differs with probability `twin_width`.
+    The twin differs from the target at each closure independently with probability `twin_width`.
     """
     shape = (len(model.phi_rad), len(grid.shift_m), len(grid.z0_m))
     total, twin = np.zeros((len(grid.bias_m), *shape), dtype=np.float32), np.zeros((1, *shape), dtype=np.float32)
@@ -82,7 +82,7 @@ def width_ratios(
         sd = np.sqrt(sd * sd + np.float32(p.width_sd_m**2))
         offs.append((off[0], sd[0]))
         scale = (1 - p.width_outlier) * math.exp(-o.log_width)
-        if e.upper_only:  # the other finger touched outside its gel: the width is only bounded
+        if e.upper_only:  # contact of the other finger outside its gel: the width is an upper bound
             far_peak = np.float32(scale / p.width_range_m)
             peak = np.full((1, 1, 1, 1), far_peak)
             biased = np.minimum(off - bias, np.float32(0))
@@ -91,7 +91,7 @@ def width_ratios(
             far_peak = np.float32(scale * T_PEAK / p.twin_width_sd_m)
             peak = np.float32(scale * T_PEAK) / sd
             biased = off - bias
-        # A window beside the object (NaN) predicts no closure at all: as good as an outlier.
+        # An empty window (NaN) predicts no contact; only the outlier density remains.
         total += np.log(_or_none(width_kernel(biased / sd) * peak) + outlier)
         near, far = width_kernel(off / sd) * peak, width_kernel(off / far_sd) * far_peak
         twin += np.log(_or_none(near + np.float32(p.twin_width) * (far - near)) + outlier)
@@ -105,7 +105,7 @@ def _or_none(density: Floats) -> Floats:
 def image_ratios(
     model: TargetModel, seen: Sequence[Observed], turn_rad: float, grid: Grid, p: LikelihoodParams
 ) -> Array32:
-    """(72, nd, nz) sum over the images of log p(image | pose) / p(image | background)."""
+    """Return log ratios (72, nd, nz) of image densities, pose : background, summed over the images."""
     yaws = len(model.phi_rad)
     total = np.zeros((len(grid.z0_m), len(grid.shift_m), yaws), dtype=np.float32)
     turn = round(turn_rad / (2 * np.pi) * yaws)
@@ -118,11 +118,11 @@ def image_ratios(
             m = image.astype(np.float32)
             at = e.along_m + grid.shift_m
             roll = turn
-            if side == 1:  # the right pad sees the object from behind: its columns run the other way
+            if side == 1:  # the right pad views the opposite side: its columns are reversed
                 m = np.ascontiguousarray(m.reshape(POOLED)[:, ::-1]).reshape(-1)
                 at, roll = -at, turn + yaws // 2
             squared = _squared_distance(model, m, at, z_m)
-            # ((1 + d2) ** -order / background) (1 - outlier) + outlier, as one power
+            # (kernel / background) (1 - outlier) + outlier
             good = np.float32((1 - p.image_outlier) * math.exp(-o.log_images[side]))
             ratio = np.log(image_kernel(squared, p) * good + np.float32(p.image_outlier))
             roll %= yaws
@@ -132,7 +132,7 @@ def image_ratios(
 
 
 def _squared_distance(model: TargetModel, feature: Array32, l_m: Array, z_m: Array) -> Array32:
-    """(nz, nd, 72) mean squared distance of a feature (35,) to the table, interpolated between its cells."""
+    """Return mean squared distances (nz, nd, 72) of a feature (35,) to the table, interpolated between cells."""
     i, f = _positions(model.l_m, l_m)
     j, g = _positions(model.z_m, z_m)
     a, b = int(i.min()), int(i.max()) + 2
@@ -148,7 +148,7 @@ def _squared_distance(model: TargetModel, feature: Array32, l_m: Array, z_m: Arr
 
 
 def interpolated_width(model: TargetModel, l_m: Array, z_m: Array, turn_rad: float) -> Array32:
-    """(72, nl, nz) predicted widths at yaws phi + turn; NaN where a window is empty or outside the table."""
+    """Return predicted widths (72, nl, nz) at yaws phi + turn; NaN for empty windows and outside the table."""
     i, f = _positions(model.l_m, l_m)
     j, g = _positions(model.z_m, z_m)
     a, b = int(i.min()), int(i.max()) + 2
@@ -170,7 +170,7 @@ def interpolated_width(model: TargetModel, l_m: Array, z_m: Array, turn_rad: flo
 
 
 def nearest_unevenness(model: TargetModel, l_m: Array, z_m: Array, turn_rad: float) -> Array32:
-    """(72, nl, nz) unevenness of the nearest cells, at yaws phi + turn."""
+    """Return the unevenness (72, nl, nz) of the nearest cells, at yaws phi + turn."""
     i, j = (
         np.clip(np.rint((x - axis[0]) / (axis[1] - axis[0])), 0, len(axis) - 1).astype(np.int64)
         for axis, x in ((model.l_m, l_m), (model.z_m, z_m))
@@ -180,22 +180,22 @@ def nearest_unevenness(model: TargetModel, l_m: Array, z_m: Array, turn_rad: flo
 
 
 def _positions(axis: Array, x: Array) -> tuple[Index, Array32]:
-    """Lower cell and fraction of each x; clamped to the axis."""
+    """Return lower cell and fraction of each x, clamped to the axis."""
     last = len(axis) - 1
     t = np.minimum(np.maximum((x - axis[0]) * (last / (axis[-1] - axis[0])), 0.0), last - 1e-9)
-    i = t.astype(np.int64)  # towards 0, and t is not negative
+    i = t.astype(np.int64)  # floor, because t is not negative
     return i, (t - i).astype(np.float32)
 
 
 def log_sum(x: Array32, axis: int | tuple[int, ...]) -> Array32:
-    """log sum exp over axes, stable; -inf where all are."""
+    """Return the stable log-sum-exp over axes; -inf if all are."""
     top = x.max(axis=axis, keepdims=True)
     safe = np.where(np.isfinite(top), top, np.float32(0))
     return np.asarray(np.log(np.exp(x - safe).sum(axis=axis)) + np.squeeze(safe, axis=axis), dtype=np.float32)
 
 
-def turned(x: Array32, p: LikelihoodParams, sd_rad: float) -> Array32:
-    """Mean over the object's own turning, in probability: a normal of `sd_rad` over axis 1, and any yaw."""
+def marginalise_turn(x: Array32, p: LikelihoodParams, sd_rad: float) -> Array32:
+    """Marginalise over the object's turn along axis 1: a normal of `sd_rad`, and a uniform part of weight `slip`."""
     n = x.shape[1]
     step = 2 * math.pi / n
     reach = min(max(1, math.ceil(2 * sd_rad / step)), n // 2)
@@ -211,15 +211,15 @@ def turned(x: Array32, p: LikelihoodParams, sd_rad: float) -> Array32:
 
 
 def slide_matrix(grid: Grid, p: LikelihoodParams) -> Array32:
-    """(nd, nd) probability of shift i in one sequence, given shift j of the object as a whole."""
+    """Return the probability (nd, nd) of shift i in one sequence, given the common shift j."""
     off = (grid.shift_m[:, None] - grid.shift_m[None, :]) / p.slide_sd_m
     weight = np.exp(-0.5 * off**2)
     weight /= weight.sum(axis=0, keepdims=True)
     return np.asarray((1 - p.slip) * weight + p.slip / len(weight), dtype=np.float32)
 
 
-def slid(x: Array32, slide: Array32) -> Array32:
-    """Mean over the object's own sliding, in probability, over axis 2 of (nb, 72, nd, nz)."""
+def marginalise_slide(x: Array32, slide: Array32) -> Array32:
+    """Marginalise over the object's slide along axis 2 of (nb, 72, nd, nz)."""
     top = x.max(axis=2, keepdims=True)
     mixed = np.einsum("byiz,ij->byjz", np.exp(x - top), slide)
     return np.asarray(np.log(mixed) + top, dtype=np.float32)

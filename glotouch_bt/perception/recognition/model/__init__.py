@@ -1,4 +1,4 @@
-"""TODO door of glotouch_bt/perception/recognition/model."""
+"""Tactile model of a target computed from its mesh: support widths, pad images, traced outline, nonplanarity."""
 
 from glotouch_bt.perception.recognition.model.outline import (
     SENSING_M,

@@ -1,8 +1,7 @@
-"""What tracing a solid with the probe would report: its outline as a circle or a rectangle, and how far to trust it.
+"""Simulated tracing of a solid: its outline as a circle or a rectangle, and its standard deviation.
 
-The model is traced many times from different sides with the probe's own geometry, and each trace is fitted by the
-same code as the real contacts; so systematic errors of the fit (a leg taken for a side) are predicted instead of held
-against the target.
+The solid is traced many times with the probe's geometry, and each trace is fitted by the same code as real contacts. So
+systematic errors of the fit (e.g. a leg fitted as a side) are part of the prediction.
 """
 
 from __future__ import annotations
@@ -20,24 +19,32 @@ from glotouch_bt.robot import Array, ParamError
 if TYPE_CHECKING:
     import trimesh
 
-TIP_RADIUS_M, SHAFT_RADIUS_M, SHAFT_M = 0.006, 0.004, 0.100
-"""The probe of CONDITIONS (its shaft's lower part)."""
+TIP_RADIUS_M = 0.006
+"""Radius of the probe's ball. Source: CONDITIONS."""
+SHAFT_RADIUS_M = 0.004
+"""Radius of the probe's shaft. Source: CONDITIONS."""
+SHAFT_M = 0.100
+"""Length of the lower part of the shaft. Source: CONDITIONS."""
 SENSING_M = 0.018
-"""Height of the ball's centre while tracing."""
-TRACES, CONTACTS = 10, 10
-"""Simulated traces of a model, and contacts in each."""
-CONTACT_SD_M, MIDDLE_SD_M = 5e-4, 3e-3
-"""Scatter of one simulated contact, and of the point the probe aims at."""
+"""Height of the ball's centre during a trace."""
+TRACES = 10
+"""Number of simulated traces."""
+CONTACTS = 10
+"""Number of contacts per trace."""
+CONTACT_SD_M = 5e-4
+"""Standard deviation of a simulated contact."""
+MIDDLE_SD_M = 3e-3
+"""Standard deviation of the point that the probe aims at."""
 
 
 @dataclass(frozen=True)
 class KindFit:
-    """Traces fitted as one kind. Means over traces, with spreads (sd) from trace to trace.
+    """Traces fitted as one kind: averages and standard deviations over traces.
 
     Attributes:
-        centre_m, centre_sd_m: (2,) mean centre in the frame of the solid; scalar spread of one coordinate.
-        size_m, size_sd_m: (long, short), and the spread of either.
-        yaw_rad, yaw_sd_rad: Axis of the long side (mod pi) and its spread; 0 and pi for a circle.
+        centre_m, centre_sd_m: (2,) centre in the frame of the solid; standard deviation per coordinate.
+        size_m, size_sd_m: (long, short), and the standard deviation of each.
+        yaw_rad, yaw_sd_rad: Direction of the long side (mod pi) and its standard deviation; 0 and pi for a circle.
     """
 
     centre_m: Array
@@ -50,11 +57,11 @@ class KindFit:
 
 @dataclass(frozen=True)
 class Outline:
-    """A model's outline, as each kind.
+    """Outline of a model, as each kind.
 
     Attributes:
-        as_round, as_box: The traces fitted as that kind (those the fit itself called so, if at least three).
-        p_box: Probability that tracing calls it a box, by Laplace's rule.
+        as_round, as_box: Traces fitted as that kind (only those classified so, if at least three).
+        p_box: Probability that a trace is classified as a box, by Laplace's rule.
     """
 
     as_round: KindFit
@@ -62,12 +69,12 @@ class Outline:
     p_box: float
 
     def of(self, kind: ContourKind) -> KindFit:
-        """The fit as `kind`."""
+        """Return the fit as `kind`."""
         return self.as_box if kind == "box" else self.as_round
 
     @property
     def likely(self) -> KindFit:
-        """The fit as the likelier kind."""
+        """The fit as the more probable kind."""
         return self.as_box if self.p_box > 0.5 else self.as_round
 
 
@@ -75,7 +82,7 @@ def traced_outline(solid: trimesh.Trimesh, traces: int = TRACES) -> Outline:
     """Trace `solid` (z up, standing on z = 0) `traces` times and fit; deterministic.
 
     Raises:
-        ParamError: Fewer than 3 contacts can be made: the solid is lower than the probe's ball.
+        ParamError: Fewer than 3 contacts are possible: the solid is lower than the probe's ball.
     """
     rng = np.random.default_rng(0)
     middle = minimum_rectangle(np.asarray(solid.vertices)[:, :2])[3]
@@ -121,9 +128,9 @@ def _summary(fits: list[Contour]) -> KindFit:
 
 
 def traced_tips(solid: trimesh.Trimesh, aim_m: Array, contacts: int, start_rad: float) -> Array:
-    """Ball centres (k, 2) at first contact, coming radially towards `aim_m` from `contacts` evenly spread sides.
+    """Return ball centres (k, 2) at the first contact of radial approaches to `aim_m` from evenly spaced bearings.
 
-    The ball (or the shaft above it, on an overhang) stops where the first of a bundle of rays meets the surface.
+    The ball (or the shaft above it, at an overhang) stops where the first of a bundle of rays meets the surface.
     """
     a, b = np.meshgrid(np.linspace(-0.9, 0.9, 7), np.linspace(-0.9, 0.9, 7))
     disc = np.column_stack([a.ravel(), b.ravel()])
@@ -148,7 +155,7 @@ def traced_tips(solid: trimesh.Trimesh, aim_m: Array, contacts: int, start_rad: 
 
 
 def first_hit(solid: trimesh.Trimesh, origins_m: Array, directions: Array) -> Array:
-    """(n,) distance along each ray (n, 3) to the solid's first surface; inf where there is none."""
+    """Return the distance (n,) along each ray (n, 3) to the solid's first surface; inf without a hit."""
     hit = solid.ray.intersects_first(origins_m, directions)
     n, p = solid.face_normals[hit], solid.triangles[hit, 0]
     along = np.einsum("ij,ij->i", n, directions)
@@ -157,7 +164,7 @@ def first_hit(solid: trimesh.Trimesh, origins_m: Array, directions: Array) -> Ar
 
 
 def minimum_rectangle(points_m: Array) -> tuple[float, float, float, Array]:
-    """(long, short, yaw of the long side, centre (2,)) of the rectangle of least area round points (k, 2)."""
+    """Return (long, short, yaw of the long side, centre (2,)) of the minimum-area rectangle of points (k, 2)."""
     hull = points_m[scipy.spatial.ConvexHull(points_m).vertices]
     edges = np.roll(hull, -1, axis=0) - hull
     angles = np.arctan2(edges[:, 1], edges[:, 0])

@@ -1,4 +1,4 @@
-"""The gel pad as a sensor: its window, the Winkler gel, pooled images, the nonplanarity of a patch.
+"""Model of the gel pad: window, Winkler gel, pooled images and nonplanarity of a patch.
 
 Rows of a depth map run downwards, columns along +x_P for both pads (as in `robot.TactileFrame`). SI units.
 """
@@ -14,8 +14,10 @@ import scipy
 from glotouch_bt.robot import Array, ParamError
 
 Array32 = npt.NDArray[np.float32]
-POOLED = (7, 5)  # rows, columns of a pooled pad image (feasibility study)
-FINE = (21, 15)  # rows, columns of the window in the model's raster: three raster cells a pooled cell
+POOLED = (7, 5)
+"""Rows and columns of a pooled pad image. Source: feasibility study."""
+FINE = (21, 15)
+"""Rows and columns of the window in the model's raster: three raster cells per pooled cell."""
 
 
 @dataclass(frozen=True)
@@ -25,10 +27,10 @@ class PadSpec:
     Attributes:
         window_m: (width along x_P, length along z_P) of the gel; CONDITIONS.
         shape: (rows, cols) of the depth maps.
-        depth_m: Largest indentation the gel shows; CONDITIONS.
-        stiffness_N_m3: k; 0.2 N/mm3 (SIMULATION A4, assumed there).
-        limit_m: Indentation where the gel turns rigid; SIMULATION A4.
-        force_N: Jaw force assumed where a layer reports none.
+        depth_m: Maximum measured indentation. Source: CONDITIONS.
+        stiffness_N_m3: k. Source: 0.2 N/mm3, assumed in SIMULATION A4.
+        limit_m: Indentation at which the gel becomes rigid. Source: SIMULATION A4.
+        force_N: Jaw force of the tables.
     """
 
     window_m: tuple[float, float] = (0.0172, 0.0285)
@@ -49,10 +51,10 @@ class PadSpec:
 def gel_shift(
     heights_m: npt.NDArray[np.floating], cell_m2: float, force_N: float, pad: PadSpec
 ) -> npt.NDArray[np.floating]:
-    """How far the highest point sinks into the gel: s with sum k x / (1 - (x/limit)^2) dA = force, x = max(0, h + s).
+    """Solve for the indentation s of the highest point: sum k x / (1 - (x/limit)^2) dA = force, x = max(0, h + s).
 
     Args:
-        heights_m: (..., n) heights of the surface under the pad relative to its highest point; -inf: nothing there.
+        heights_m: (..., n) heights of the surface relative to its highest point; -inf: empty.
         cell_m2: Area of one of the n cells.
         force_N: Normal force of the pad.
         pad: The gel.
@@ -75,7 +77,7 @@ def gel_shift(
 
 
 def pool(depth_m: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
-    """Mean depth of 7 x 5 blocks, (..., rows, cols) -> (..., 35); NaN taxels are left out, an all-dead block is 0.
+    """Return the mean depth of 7 x 5 blocks, (..., rows, cols) -> (..., 35); NaN taxels are skipped, dead blocks are 0.
 
     Raises:
         ParamError: rows or cols are fewer than 7 or 5.
@@ -96,7 +98,7 @@ def pool(depth_m: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
 
 
 def _block_matrix(n: int, blocks: int, dtype: npt.DTypeLike) -> npt.NDArray[np.floating]:
-    """(blocks, n) averaging matrix; a cell that straddles two blocks is shared."""
+    """Return the averaging matrix (blocks, n); a cell that straddles two blocks is divided between them."""
     edges = np.linspace(0, n, blocks + 1)
     i = np.arange(n)
     cover = np.minimum(i + 1, edges[1:, None]) - np.maximum(i, edges[:-1, None])
@@ -105,19 +107,19 @@ def _block_matrix(n: int, blocks: int, dtype: npt.DTypeLike) -> npt.NDArray[np.f
 
 
 def image_feature(pooled_m: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
-    """Compressed depth sqrt(d + e) - sqrt(e) in sqrt(mm), e = 0.05 mm: edges (1 mm) and flats (0.15 mm) both count."""
+    """Compress depth to sqrt(d + e) - sqrt(e) in sqrt(mm), e = 0.05 mm: balances edges (1 mm) and flats (0.15 mm)."""
     e = np.asarray(0.05, dtype=pooled_m.dtype)
     return np.asarray(np.sqrt(np.maximum(pooled_m * np.asarray(1e3, pooled_m.dtype), 0) + e) - np.sqrt(e))
 
 
 @dataclass(frozen=True)
 class Patch:
-    """The support patch of one pad.
+    """Support patch of one pad.
 
     Attributes:
-        valid: Large and deep enough to count as contact.
+        valid: Large and deep enough for a contact.
         rho: Relative nonplanarity, eq. (relative_nonplanarity); NaN if not valid.
-        top_m: Indentation of the deepest point (3 x 3 median first, so that one bright taxel does not count).
+        top_m: Maximum indentation after a 3 x 3 median.
         area_m2: Area of the patch.
     """
 
@@ -128,7 +130,7 @@ class Patch:
 
 
 def patch_of(depth_m: Array, pad: PadSpec, threshold_m: float = 6e-5, smallest_m2: float = 6e-6) -> Patch:
-    """Largest connected patch above `threshold_m` of one depth map (rows, cols), its plane fit and rho.
+    """Find the largest connected patch above `threshold_m` in a depth map (rows, cols), and its rho.
 
     Eq. (relative_nonplanarity): RMS of the residual to the least-squares plane over the 90th percentile of the depth.
     """

@@ -1,4 +1,4 @@
-"""A TargetModel as plain numbers and arrays, and back: for whoever keeps models between runs. Pure."""
+"""Conversion of a TargetModel to plain numbers and arrays, and back, for caches."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from glotouch_bt.perception.recognition.model.target import TargetModel
 from glotouch_bt.robot import ParamError
 
 VERSION = 1
-"""Of what the tables hold; counts up whenever a table's meaning or its computation changes."""
+"""Version of the tables; increase it when a table's meaning or computation changes."""
 _NUMBERS = ("height_m", "rho", "rho_sd", "normal_dispersion", "anisotropy")
 
 
 def to_parts(model: TargetModel) -> tuple[dict[str, Any], dict[str, Array32]]:
-    """Facts that JSON can hold, and the tables by name (image tables are built if they are not yet)."""
+    """Return the JSON-compatible facts and the tables by name; build missing image tables."""
     facts = {
         "version": VERSION,
         "digest": model.digest,
@@ -45,10 +45,10 @@ def to_parts(model: TargetModel) -> tuple[dict[str, Any], dict[str, Array32]]:
 
 
 def from_parts(name: str, facts: Mapping[str, Any], arrays: Mapping[str, Array32]) -> TargetModel:
-    """The model again.
+    """Rebuild the model.
 
     Raises:
-        ParamError: Another version, or facts or tables that do not fit together.
+        ParamError: Another version, or inconsistent facts or tables.
     """
     if facts.get("version") != VERSION:
         raise ParamError("model version", facts.get("version"), f"{VERSION}")

@@ -1,9 +1,8 @@
-"""Side images of a solid: how far it reaches towards a pad, seen from every yaw.
+"""Side images of a solid: its reach towards a pad, at every yaw.
 
-`reach[i, j, h]` at relative yaw phi_i is the largest y of the surface on the line (x = l_j, z = z_h), written in the
-frame with x axis (cos phi, sin phi) and y axis (sin phi, -cos phi): the planar part of the pads' frame P for a hand
-turned by phi against the mesh. The left pad (at +y_P) feels this image; the right pad that of phi + 180 deg with l
-reversed.
+`reach[i, j, h]` at relative yaw phi_i is the maximum y of the surface on the line (x = l_j, z = z_h), in the frame with
+x axis (cos phi, sin phi) and y axis (sin phi, -cos phi): the planar part of P for a hand at yaw phi relative to the
+mesh. This is the image of the left pad (at +y_P); the right pad has that of phi + 180 deg with l reversed.
 """
 
 from __future__ import annotations
@@ -22,13 +21,13 @@ if TYPE_CHECKING:
 
 
 def hand_axes(phi_rad: Array) -> tuple[Array, Array]:
-    """x_P and y_P, each (..., 2), of a down-pointing hand at yaw `phi_rad` (see `Pose.pointing_down`)."""
+    """Return x_P and y_P, each (..., 2), of a down-pointing hand at yaw `phi_rad` (see `Pose.pointing_down`)."""
     c, s = np.cos(phi_rad), np.sin(phi_rad)
     return np.stack([c, s], axis=-1), np.stack([s, -c], axis=-1)
 
 
 def side_images(solid: trimesh.Trimesh, phi_rad: Array, l_m: Array, z_m: Array) -> Array32:
-    """Cast one ray a cell from outside along -y_P.
+    """Cast one ray per cell from outside along -y_P.
 
     Args:
         solid: Watertight mesh; its z axis up.
@@ -37,7 +36,7 @@ def side_images(solid: trimesh.Trimesh, phi_rad: Array, l_m: Array, z_m: Array) 
         z_m: (nz,) heights.
 
     Returns:
-        (n, nl, nz) reach in metres; -inf where the line meets nothing.
+        (n, nl, nz) reach in metres; -inf without a hit.
 
     Raises:
         ParamError: An empty grid.
@@ -56,7 +55,7 @@ def side_images(solid: trimesh.Trimesh, phi_rad: Array, l_m: Array, z_m: Array) 
 
 
 def window_max(reach: Array32) -> Array32:
-    """Largest reach in the pad's window (15 columns x 21 rows) round each cell: separable running maximum."""
+    """Return the maximum reach in the pad's window (15 columns x 21 rows) around each cell (separable filter)."""
     a = scipy.ndimage.maximum_filter1d(reach, FINE[1], axis=1, mode="constant", cval=-np.inf)
     return np.asarray(
         scipy.ndimage.maximum_filter1d(a, FINE[0], axis=2, mode="constant", cval=-np.inf), dtype=np.float32
@@ -64,5 +63,5 @@ def window_max(reach: Array32) -> Array32:
 
 
 def mirrored(table: Array32) -> Array32:
-    """The same table as the RIGHT pad sees it: yaw + 180 deg, l reversed. Needs an even count of yaws."""
+    """Return the table of the RIGHT pad: yaw + 180 deg, l reversed. Needs an even number of yaws."""
     return np.roll(table, -(table.shape[0] // 2), axis=0)[:, ::-1]

@@ -1,7 +1,7 @@
-"""What the pads would feel of a target, from its STL alone: support widths, pad images, contour, nonplanarity.
+"""Tactile model of a target from its STL: support widths, pad images, contour, nonplanarity.
 
-Everything is tabulated once per (mesh, pad) over relative yaw phi (hand against mesh), shift l along x_P from the
-middle of the mesh's footprint, and height z of the pads' mid-point above the floor.
+The tables are over relative yaw phi (hand against mesh), shift l along x_P from the middle of the mesh's footprint, and
+height z of the pads' mid-point above the floor.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ from glotouch_bt.robot import Array
 from glotouch_bt.robot.scene import Mesh
 
 YAWS = 72
+"""Number of relative yaws."""
 STRIDE = 2
-"""Table cells are two raster cells apart: 2.3 mm along x_P, 2.7 mm in height."""
-UNEVEN_M = 2e-3
-"""Neighbouring widths that differ by more are told apart by the pose, not by noise."""
+"""Number of raster cells per table cell: 2.3 mm along x_P, 2.7 mm in height."""
+MAX_UNEVENNESS_M = 2e-3
+"""Maximum unevenness between neighbouring widths; larger differences depend on the pose, not on noise."""
 _CACHE_SIZE = 64
 _cache: dict[tuple[str, PadSpec], TargetModel] = {}
 
@@ -32,21 +33,21 @@ class TargetModel:
     """Tables of one mesh for one pad. Build with `from_mesh`.
 
     Attributes:
-        name: The mesh's name, for people only.
-        digest: The mesh's content hash.
+        name: Name of the mesh, for display.
+        digest: Content hash of the mesh.
         pad: The pad.
         phi_rad: (72,) relative yaws, from 0, evenly over the full turn.
         l_m: (nl,) table shifts, symmetric about 0.
         z_m: (nz,) table heights of the pads' mid-point.
-        reach_m: (72, nl, nz) largest coordinate along y_P inside the left pad's window; NaN where it is empty.
-        fine_m: (72, fl, fz) side images the tables come from (see `raster`); -inf where empty.
-        outline: What tracing it would report, about `centre_m`.
-        centre_m: (2,) middle of the smallest rectangle round the footprint, in the mesh's frame O.
-        height_m: Top above the floor; what touching it from above finds.
+        reach_m: (72, nl, nz) maximum coordinate along y_P inside the left pad's window; NaN if empty.
+        fine_m: (72, fl, fz) side images, source of the tables (see `raster`); -inf if empty.
+        outline: Simulated traces, about `centre_m`.
+        centre_m: (2,) centre of the footprint's minimum-area rectangle, in the mesh's frame O.
+        height_m: Top above the floor.
         rho: Nonplanarity predicted for a 10 N touch, median over simulated touches (the paper's rho_M).
-        rho_sd: Its spread over touches (half the 16-84 % range).
+        rho_sd: Its deviation over touches (half the 16-84 % range).
         normal_dispersion: 1 - |mean normal| over touched patches, mean over touches (the paper's d_M).
-        anisotropy: 1 - short / long of the smallest rectangle round the footprint (the paper's a_M).
+        anisotropy: 1 - short / long of the footprint's minimum-area rectangle (the paper's a_M).
     """
 
     name: str
@@ -68,7 +69,7 @@ class TargetModel:
 
     @classmethod
     def from_mesh(cls, mesh: Mesh, pad: PadSpec | None = None) -> TargetModel:
-        """Build (about 0.3 s) or fetch from the in-memory cache, keyed by content and pad."""
+        """Build the model (about 0.3 s) or get it from the in-memory cache, keyed by content and pad."""
         pad = pad or PadSpec()
         key = (mesh.digest, pad)
         if key not in _cache:
@@ -79,34 +80,34 @@ class TargetModel:
 
     @cached_property
     def width_m(self) -> Array32:
-        """(72, nl, nz) support width W(l, z; phi), eq. (finite_window_width); NaN where a window is empty."""
+        """(72, nl, nz) support width W(l, z; phi), eq. (finite_window_width); NaN if a window is empty."""
         return self.reach_m + mirrored(self.reach_m)
 
     @cached_property
     def unevenness_m(self) -> Array32:
-        """(72, nl, nz) RMS change of `width_m` to the six cells beside, at most 2 mm."""
-        w, most = self.width_m, np.float32(UNEVEN_M**2)
+        """(72, nl, nz) RMS difference of `width_m` to the six neighbouring cells, at most MAX_UNEVENNESS_M each."""
+        w, most = self.width_m, np.float32(MAX_UNEVENNESS_M**2)
         total = np.zeros_like(w)
         for axis, wraps in ((0, True), (1, False), (2, False)):
             step = np.diff(w, axis=axis, append=w[:1] if wraps else np.take(w, [-1], axis=axis)) ** 2
-            step = np.fmin(step, most)  # beside an empty window, the most
+            step = np.fmin(step, most)  # fmin: the maximum beside an empty window
             total += step + np.roll(step, 1, axis=axis)
         return np.asarray(np.sqrt(total / 6))
 
     @property
     def narrowest_m(self) -> float:
-        """Least support width at the middle of the footprint, over all yaws and heights."""
+        """Minimum support width at the middle of the footprint, over all yaws and heights."""
         through = self.width_m[:, len(self.l_m) // 2]
         return float(np.nanmin(through)) if np.isfinite(through).any() else float("inf")
 
     @cached_property
     def middle_m(self) -> Array32:
-        """(72, nl, nz) y_P of the point halfway between the supports, where jaws that centre it have their middle."""
+        """(72, nl, nz) y_P of the point halfway between the supports, which the jaws centre."""
         return np.float32(0.5) * (self.reach_m - mirrored(self.reach_m))
 
     @property
     def images(self) -> Array32:
-        """(72, nl, nz, 35) image features the LEFT pad shows at `pad.force_N`; built at first use (0.4 s)."""
+        """(72, nl, nz, 35) image features of the LEFT pad at `pad.force_N`; built at first use (0.4 s)."""
         if "images" not in self._lazy:
             features = image_feature(pooled_images(self.fine_m, STRIDE, self.pad))
             self._lazy["images"] = np.ascontiguousarray(features.transpose(2, 1, 0, 3), dtype=np.float32)
@@ -114,7 +115,7 @@ class TargetModel:
 
     @property
     def images_by_height(self) -> Array32:
-        """The same as stored, (nz, nl, 72, 35): what lies under a few shifts at one height is one piece of memory."""
+        """The same in storage order (nz, nl, 72, 35), contiguous for neighbouring shifts at one height."""
         return self.images.transpose(2, 1, 0, 3)
 
     @property
@@ -126,7 +127,7 @@ class TargetModel:
         return self._lazy["image_norms"]
 
     def width_at(self, l_m: float, z_m: float, phi_rad: float) -> float:
-        """One support width by linear interpolation of the table; NaN outside it."""
+        """Return one support width by linear interpolation of the table; NaN outside it."""
         n = len(self.phi_rad)
         at = (phi_rad / (2 * np.pi) * n) % n
         i, f = int(at), at % 1.0
@@ -160,7 +161,7 @@ def _build(mesh: Mesh, pad: PadSpec) -> TargetModel:
     radius = float(np.hypot(*np.abs(solid.vertices[:, :2]).max(axis=0)))
     n = int(np.ceil((radius + 0.5 * pad.window_m[0]) / (STRIDE * step_l))) * STRIDE + FINE[1] // 2
     fine_l = np.asarray(np.arange(-n, n + 1) * step_l, dtype=np.float64)
-    # Heights: pad centres from 8 mm to 8 mm above the top; the raster reaches half a window farther on both sides.
+    # Heights: pad centres from 8 mm up to 8 mm above the top; the raster extends half a window on both sides.
     centres = np.asarray(np.arange(0.008, top + 0.008, STRIDE * step_z), dtype=np.float64)
     half = FINE[0] // 2
     rows = np.arange(STRIDE * (len(centres) - 1) + 1 + 2 * half) - half

@@ -1,4 +1,4 @@
-"""L_width: the coupled and the independent branch, each minimised, mixed by p_c (eq. soft_action_graph)."""
+"""L_width: minimisation of the coupled and the independent branch, mixed by p_c (eq. soft_action_graph)."""
 
 from __future__ import annotations
 
@@ -9,28 +9,30 @@ import numpy as np
 import numpy.typing as npt
 
 from glotouch_bt.perception.recognition.model import Array32, TargetModel
-from glotouch_bt.perception.recognition.paper.observation import Observation, SequenceReading
+from glotouch_bt.perception.recognition.paper.observation import PaperObservation, SequenceReading
 from glotouch_bt.perception.recognition.paper.params import PaperParams
 from glotouch_bt.perception.recognition.paper.residuals import Sums, cross_sums, joined, residual_units, sequence_sums
 from glotouch_bt.perception.recognition.paper.widths import Hypotheses, predicted_widths, width_tables
 from glotouch_bt.robot import Array
 
-COARSE_BIAS_M, FINE_BIAS_M = 1e-3, 1e-4
-"""Steps of the aperture bias for all hypotheses, and for the best of them."""
+COARSE_BIAS_M = 1e-3
+"""Step of the aperture bias for all hypotheses."""
+FINE_BIAS_M = 1e-4
+"""Step of the aperture bias for the best hypotheses."""
 REFINED = 24
-"""Hypotheses whose bias is refined."""
+"""Number of hypotheses with a refined bias."""
 TIE = 1e-3
-"""Preference, at the edge of the grid, for the centre: where the loss is flat the object is where its contour was."""
+"""Penalty at the edge of the grid, which resolves a flat loss towards the contour's centre."""
 
 
 @dataclass(frozen=True)
 class BranchFit:
-    """Where one branch (or one sequence of the independent branch) is least.
+    """Minimum of one branch, or of one sequence of the independent branch.
 
     Attributes:
         loss: G plus the scale prior.
-        yaw_index: Relative yaw in steps of the full turn.
-        scale, shift_m, z0_m, bias_m: The nuisance parameters there.
+        yaw_index: Relative yaw in table steps.
+        scale, shift_m, z0_m, bias_m: Nuisance parameters at the minimum.
     """
 
     loss: float
@@ -43,12 +45,12 @@ class BranchFit:
 
 @dataclass(frozen=True)
 class WidthFit:
-    """Both branches.
+    """Fit of both branches.
 
     Attributes:
         loss: L_width.
-        coupled: The shared pose.
-        independent: One fit a sequence.
+        coupled: Fit of one shared pose.
+        independent: One fit per sequence.
     """
 
     loss: float
@@ -56,7 +58,7 @@ class WidthFit:
     independent: tuple[BranchFit, ...]
 
 
-def fit_widths(model: TargetModel, seen: Observation, p: PaperParams) -> WidthFit:
+def fit_widths(model: TargetModel, seen: PaperObservation, p: PaperParams) -> WidthFit:
     """Minimise both branches. Needs at least one sequence."""
     grid = Hypotheses.of(model, p)
     tables = width_tables(model, p.scales)
@@ -79,7 +81,7 @@ def fit_widths(model: TargetModel, seen: Observation, p: PaperParams) -> WidthFi
 
 
 def bias_grid(limit_m: float, step_m: float) -> Array:
-    """Biases within +-limit, zero among them."""
+    """Return biases within +-limit, including zero."""
     n = int(np.ceil(limit_m / step_m - 1e-9))
     return np.linspace(-limit_m, limit_m, 2 * n + 1) if n else np.zeros(1)
 
@@ -88,7 +90,7 @@ def _least(
     sums: Sums, readings: Sequence[SequenceReading], residuals: Sequence[Array32], prior: Array32, tie: Array32,
     grid: Hypotheses,     p: PaperParams,
 ) -> BranchFit:  # fmt: skip
-    """Least G + prior: over the coarse biases for all hypotheses, over the fine ones for the best."""
+    """Minimise G + prior over coarse biases for all hypotheses, then over fine biases for the best."""
     coarse = sums.loss(bias_grid(p.bias_limit_m, COARSE_BIAS_M), p).min(axis=0) + prior + tie
     n = min(REFINED, coarse.size)
     chosen = np.sort(np.argpartition(coarse, n - 1)[:n])
@@ -105,7 +107,7 @@ def _taken(
     sums: Sums, readings: Sequence[SequenceReading], residuals: Sequence[Array32], chosen: npt.NDArray[np.intp],
     bias_m: Array, p: PaperParams,
 ) -> Sums:  # fmt: skip
-    """The same sums at `chosen` hypotheses only and for other biases, which touch H_a alone."""
+    """Return the sums at `chosen` hypotheses for other biases, which affect H_a only."""
     only_absolute = p.only("absolute") if p.w_absolute > 0 else p
     fine = [
         sequence_sums(np.asarray(r[:, chosen]), s.weight, bias_m, only_absolute).absolute

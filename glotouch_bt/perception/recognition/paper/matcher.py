@@ -14,25 +14,25 @@ import numpy as np
 from glotouch_bt.perception.recognition.decision import Gates, Match, Ranking, rank
 from glotouch_bt.perception.recognition.model import TargetModel
 from glotouch_bt.perception.recognition.paper.branches import fit_widths
-from glotouch_bt.perception.recognition.paper.observation import Observation, read_observation
+from glotouch_bt.perception.recognition.paper.observation import PaperObservation, read_observation
 from glotouch_bt.perception.recognition.paper.params import PaperParams
 from glotouch_bt.perception.recognition.paper.pose import pose_of_fit
-from glotouch_bt.perception.recognition.placement import unfelt_pose
+from glotouch_bt.perception.recognition.placement import contour_pose
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.robot import ParamError
 
 PAPER_GATES = Gates(margin=0.1, loss=1.0, evidence=2.5)
-"""The paper names the three gates and gives no values. Its own loss matrix has right pairs up to 0.90 and its least
-mean margin is 0.15, so 1.0 and 0.1 are the round numbers beyond; evidence as everywhere in this project."""
+"""Default gates. The paper gives no values; its correct pairs have losses up to 0.90 and its minimum mean margin is
+0.15, rounded to 1.0 and 0.1. The evidence is that of `Gates`."""
 
 
 def paper_match(model: TargetModel, touchset: TouchSet, params: PaperParams | None = None) -> Match:
-    """Loss of one pair; deterministic. A TouchSet that no pad felt has infinite loss and evidence 0."""
+    """Compute the match of one pair. A TouchSet without contact has infinite loss and evidence 0."""
     p = params or PaperParams()
     index = touchset.candidate.index
     seen = read_observation(touchset, model.pad, p)
     if not seen.sequences:
-        return Match(index, math.inf, {}, None, unfelt_pose(touchset), 0.0)
+        return Match(index, math.inf, {}, None, contour_pose(touchset), 0.0)
     widths = fit_widths(model, seen, p)
     terms = {"width": widths.loss}
     if p.depth > 0:
@@ -41,15 +41,15 @@ def paper_match(model: TargetModel, touchset: TouchSet, params: PaperParams | No
     if p.mode > 0:
         terms["mode"] = mode_loss(seen.p_coupled, model.anisotropy, p)
     loss = float(sum(terms.values()))
-    if not math.isfinite(loss):  # no hypothesis has support under any layer: an object that cannot be the target
-        return Match(index, math.inf, terms, None, unfelt_pose(touchset), seen.evidence)
+    if not math.isfinite(loss):  # no hypothesis has support in any layer
+        return Match(index, math.inf, terms, None, contour_pose(touchset), seen.evidence)
     centre = np.asarray(touchset.candidate.contour.centre_K_m, dtype=np.float64)
     fit, pose = pose_of_fit(model, seen, widths, centre, p)
     return Match(index, loss, terms, fit, pose, seen.evidence)
 
 
-def depth_loss(seen: Observation, rho_model: float, dispersion: float, p: PaperParams) -> float:
-    """Eq. (depth_loss), without lambda_D. 0 where no patch is valid: the mean of q_D is 0 there.
+def depth_loss(seen: PaperObservation, rho_model: float, dispersion: float, p: PaperParams) -> float:
+    """Compute eq. (depth_loss) without lambda_D; 0 if no patch is valid.
 
     Args:
         seen: Nonplanarity rho_k and valid fraction q_{D,k} of all sequences.
@@ -66,16 +66,16 @@ def depth_loss(seen: Observation, rho_model: float, dispersion: float, p: PaperP
 
 
 def mode_loss(p_coupled: float, anisotropy: float, p: PaperParams) -> float:
-    """Eq. (collection_mode)."""
+    """Compute eq. (collection_mode)."""
     return p.mode * anisotropy**2 * (1 - p_coupled)
 
 
 def paper_rank(
     model: TargetModel, touchsets: Sequence[TouchSet], params: PaperParams | None = None, gates: Gates = PAPER_GATES
 ) -> Ranking:
-    """Rank all candidates; accepted by margin, absolute fit and evidence alone.
+    """Rank all candidates and decide by margin, absolute fit and evidence.
 
-    Probabilities are the softmax of -loss and p_absent is 0: the paper has neither, and they are not calibrated.
+    Probabilities are the uncalibrated softmax of -loss, and p_absent is 0: the paper defines neither.
 
     Raises:
         ParamError: No TouchSet at all, or two of the same candidate.
@@ -87,7 +87,7 @@ def paper_rank(
     losses = np.array([m.loss for m in ranking.matches])
     weight = np.ones(len(losses))
     if np.isfinite(losses[0]):
-        weight = np.exp(losses[0] - losses)  # of an infinite loss: 0
+        weight = np.exp(losses[0] - losses)  # 0 for an infinite loss
     shares = weight / weight.sum()
     matches = tuple(replace(m, probability=float(x)) for m, x in zip(ranking.matches, shares, strict=True))
     return replace(ranking, matches=matches, p_absent=0.0)
@@ -95,7 +95,7 @@ def paper_rank(
 
 @dataclass(frozen=True)
 class PaperMatcher:
-    """A Matcher: `paper_rank` with these parameters and gates."""
+    """Matcher that calls `paper_rank` with fixed parameters and gates."""
 
     params: PaperParams
     gates: Gates
@@ -106,5 +106,5 @@ class PaperMatcher:
 
 
 def paper_matcher(params: PaperParams | None = None, gates: Gates = PAPER_GATES) -> PaperMatcher:
-    """A Matcher with these parameters."""
+    """Return a Matcher with these parameters."""
     return PaperMatcher(params or PaperParams(), gates)

@@ -1,4 +1,4 @@
-"""A TouchSet as the quantities of the paper's section IV-A: openings, evidence, nonplanarity, action graph."""
+"""Quantities of the paper's section IV-A from a TouchSet: openings, evidence, nonplanarity, action graph."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from glotouch_bt.perception.recognition.paper.params import PaperParams
 from glotouch_bt.perception.touch import Layer, TouchSequence, TouchSet
 from glotouch_bt.robot import Array
 
-NOT_FELT = Patch(False, float("nan"), 0.0, 0.0)
+NO_CONTACT = Patch(False, float("nan"), 0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class SequenceReading:
-    """One closure sequence k; only layers that at least one pad felt.
+    """One closure sequence k; only layers with contact.
 
     Attributes:
-        index: Which sequence of the TouchSet.
+        index: Index of the sequence in the TouchSet.
         yaw_rad: Reference yaw of x_P in K.
         along_m: a_k, longitudinal coordinate of the reference pose, from the contour's centre.
         opening_m: (H,) measured openings y_{k,h}.
         height_m: (H,) pads' mid-point above the floor.
         weight: (H,) evidence w.
-        bilateral: (H,) both pads felt it.
-        across_m: (H,) y_P coordinate, from the contour's centre, of the point halfway between the two surfaces touched.
+        bilateral: (H,) True with both pads in contact.
+        across_m: (H,) y_P coordinate, from the contour's centre, of the point halfway between the touched surfaces.
         rho: rho_k, median nonplanarity over valid patches; NaN without any.
         q_depth: q_{D,k}, valid patches over pads of stable layers.
     """
@@ -46,14 +46,14 @@ class SequenceReading:
 
 
 @dataclass(frozen=True)
-class Observation:
-    """One TouchSet.
+class PaperObservation:
+    """Quantities of one TouchSet.
 
     Attributes:
-        sequences: Those with at least one layer that counts.
+        sequences: Sequences with at least one valid layer.
         p_coupled: p_c.
-        rho, q_depth: (K,) of all sequences, also those without a layer that counts.
-        evidence: Layers both pads felt; all one-sided layers together add at most 1.
+        rho, q_depth: (K,) of all sequences, including those without a valid layer.
+        evidence: Number of two-sided layers; all one-sided layers together add at most 1.
     """
 
     sequences: tuple[SequenceReading, ...]
@@ -63,8 +63,8 @@ class Observation:
     evidence: float
 
 
-def read_observation(touchset: TouchSet, pad: PadSpec, p: PaperParams) -> Observation:
-    """Reduce a TouchSet. Unstable or unreadable layers are skipped, layers that neither pad felt carry no evidence."""
+def read_observation(touchset: TouchSet, pad: PadSpec, p: PaperParams) -> PaperObservation:
+    """Extract the quantities of a TouchSet. Unstable, non-finite and contact-free layers are skipped."""
     usable = [(k, s) for k, s in enumerate(touchset.sequences) if _has_pose(s)]
     centre = np.asarray(touchset.candidate.contour.centre_K_m, dtype=np.float64)
     positions = np.array([s.position_K_m for _, s in usable], dtype=np.float64).reshape(-1, 2)
@@ -80,15 +80,15 @@ def read_observation(touchset: TouchSet, pad: PadSpec, p: PaperParams) -> Observ
             readings.append(reading)
     both = sum(int(r.bilateral.sum()) for r in readings)
     single = sum(float(r.weight[~r.bilateral].sum()) for r in readings)
-    return Observation(
+    return PaperObservation(
         tuple(readings), coupled_probability(positions, yaws, p), np.array(rho), np.array(q), both + min(single, 1.0)
     )
 
 
 def longitudinal_axis(positions_K_m: Array, yaw_rad: float) -> Array:
-    """(2,) first right singular vector of the centred positions (K, 2), turned to agree with x_P at `yaw_rad`.
+    """Return the first right singular vector (2,) of the centred positions (K, 2), with the sign of x_P at `yaw_rad`.
 
-    Where all positions are one point every axis is singular and x_P itself is taken.
+    If all positions coincide, return x_P.
     """
     x, _ = hand_axes(np.asarray(yaw_rad))
     if len(positions_K_m) < 2:
@@ -101,12 +101,11 @@ def longitudinal_axis(positions_K_m: Array, yaw_rad: float) -> Array:
 
 
 def coupled_probability(positions_K_m: Array, yaw_rad: Array, p: PaperParams) -> float:
-    """p_c of eq. (coupled_probability).
+    """Compute p_c of eq. (coupled_probability).
 
     Args:
         positions_K_m: (K, 2) reference positions of the open hand.
-        yaw_rad: (K,) its yaws. The hand points down, so yaw is its whole rotation; half a turn gives the same closing
-            line and counts as none.
+        yaw_rad: (K,) yaws of the down-pointing hand. Yaws that differ by half a turn are equal.
         p: Scales and floors.
     """
     if len(yaw_rad) == 0:
@@ -128,7 +127,7 @@ def _has_pose(s: TouchSequence) -> bool:
 
 
 def _patch(depth_m: Array, pad: PadSpec) -> Patch:
-    return patch_of(depth_m, pad) if depth_m.ndim == 2 and depth_m.size else NOT_FELT
+    return patch_of(depth_m, pad) if depth_m.ndim == 2 and depth_m.size else NO_CONTACT
 
 
 def _readable(layer: Layer) -> bool:

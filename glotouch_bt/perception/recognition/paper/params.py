@@ -1,4 +1,4 @@
-"""Weights, scales and search ranges of the paper's matching loss. Reasons: docs/explanation/paper_matcher.md."""
+"""Weights, scales and search ranges of the paper's matching loss; reasons in docs/explanation/paper_matcher.md."""
 
 from __future__ import annotations
 
@@ -22,31 +22,29 @@ TERMS: dict[str, tuple[str, ...]] = {
     "depth": ("depth",),
     "mode": ("mode",),
 }
-"""Every term of the loss and the weights that switch it."""
-WIDTH_TERMS = ("absolute", "centred", "vertical", "cross", "coverage", "bias", "scale")
-"""The terms of L_width: what the paper's ablation calls "width/action only"."""
+"""Terms of the loss, with the weights that switch them off."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PaperParams:
-    """One frozen set for every object. Dimensionless unless the name carries a unit; the paper gives no values.
+    """Parameters, the same for every object. Dimensionless unless the name has a unit; the paper gives no values.
 
     Attributes:
-        unit_m: One unit of residual.
-        huber: Residual, in units, where Huber turns linear.
+        unit_m: Unit of a residual.
+        huber: Residual, in units, at which the Huber loss becomes linear.
         w_absolute, w_centred, w_vertical, w_cross: w_a, w_c, w_v, w_x.
         coverage: lambda_C.
         bias: lambda_b.
         bias_unit_m: b_0.
-        bias_limit_m: Largest aperture bias tried; 0 fits none.
-        shift_m, shift_steps: Window shifts delta tried within +-shift_m; odd.
-        z0_m, z0_steps: Height offsets z_0 tried within +-z0_m; odd.
-        scales: Model scales s tried.
+        bias_limit_m: Maximum aperture bias; 0 disables the bias.
+        shift_m, shift_steps: Grid of window shifts delta: limit and odd number.
+        z0_m, z0_steps: Grid of height offsets z_0: limit and odd number.
+        scales: Model scales s.
         scale_prior, scale_anisotropy: lambda_s = scale_prior (1 + scale_anisotropy a_M).
-        unilateral: Weight w of a layer that one pad felt, against 1 for both.
-        pair_gap_m: Layers of two sequences at most this far apart in height are the same layer of Delta_a.
+        unilateral: Weight w of a layer with one pad in contact, relative to 1 for both.
+        pair_gap_m: Maximum height difference of layers that Delta_a compares.
         tau_t_m, tau_R_rad, floor_t_m, floor_R_rad: Scales and floors of eq. (coupled_probability).
-        branch: Mixed by p_c, or one branch alone.
+        branch: Both branches mixed by p_c, or one branch.
         depth, depth_anisotropy: lambda_D0 and gamma.
         depth_sd: sigma_D.
         depth_eps: epsilon of I_M.
@@ -99,16 +97,16 @@ class PaperParams:
                 raise ParamError(f"paper.{name}", getattr(self, name), "positive")
         for name in ("shift_steps", "z0_steps"):
             if getattr(self, name) < 1 or getattr(self, name) % 2 == 0:
-                raise ParamError(f"paper.{name}", getattr(self, name), "odd, so that zero is tried")
+                raise ParamError(f"paper.{name}", getattr(self, name), "odd, so that the grid contains zero")
         if not 0.5 <= min(self.scales) <= max(self.scales) <= 2.0:
             raise ParamError("paper.scales", self.scales, "within 0.5 .. 2")
         if self.unilateral > 1:
-            raise ParamError("paper.unilateral", self.unilateral, "<= 1: one pad tells no more than two")
+            raise ParamError("paper.unilateral", self.unilateral, "<= 1, the weight of a two-sided layer")
         if self.branch not in ("mixed", "coupled", "independent"):
             raise ParamError("paper.branch", self.branch, "mixed, coupled or independent")
 
     def only(self, *terms: str) -> PaperParams:
-        """The same loss with every term but `terms` switched off.
+        """Switch off all terms but `terms`.
 
         Raises:
             ParamError: An unknown term.
@@ -116,7 +114,7 @@ class PaperParams:
         return self._off(t for t in TERMS if t not in _known(terms))
 
     def without(self, *terms: str) -> PaperParams:
-        """The same loss with `terms` switched off.
+        """Switch off `terms`.
 
         Raises:
             ParamError: An unknown term.
@@ -128,15 +126,15 @@ class PaperParams:
         return replace(self, **off)  # type: ignore[arg-type]
 
     def width_only(self) -> PaperParams:
-        """First row of the paper's ablation: width/action alone."""
+        """Return the first row of the paper's ablation: width and action only."""
         return self.without("depth", "mode")
 
     def width_depth(self) -> PaperParams:
-        """Second row: + local depth."""
+        """Return the second row: plus local depth."""
         return self.without("mode")
 
     def ablation(self) -> dict[str, PaperParams]:
-        """The three rows of the paper's progressive ablation, in its order."""
+        """Return the three rows of the paper's ablation, in its order."""
         return {"width": self.width_only(), "+ depth": self.width_depth(), "+ mode (full)": self}
 
 

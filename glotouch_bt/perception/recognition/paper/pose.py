@@ -1,4 +1,4 @@
-"""Where the target lies: the contour's centre, corrected by the local contact centres (paper IV-C); yaw of the fit."""
+"""Pose of the target: contour centre corrected by the local contact centres (paper IV-C), yaw of the fit."""
 
 from __future__ import annotations
 
@@ -9,22 +9,25 @@ import numpy as np
 from glotouch_bt.perception.recognition.decision import Fit
 from glotouch_bt.perception.recognition.model import TargetModel, hand_axes
 from glotouch_bt.perception.recognition.paper.branches import BranchFit, WidthFit
-from glotouch_bt.perception.recognition.paper.observation import Observation, SequenceReading
+from glotouch_bt.perception.recognition.paper.observation import PaperObservation, SequenceReading
 from glotouch_bt.perception.recognition.paper.params import PaperParams
 from glotouch_bt.perception.recognition.paper.widths import WidthTable, width_tables
 from glotouch_bt.robot import Array
 
-CENTRE_SD_M, ALONG_SD_M, ACROSS_SD_M = 4e-3, 8e-3, 1e-3
-"""Trust in the contour's centre, in the fitted window shift, and in jaws that hold the object about their middle."""
+CENTRE_SD_M = 4e-3
+"""Standard deviation of the contour's centre."""
+ALONG_SD_M = 8e-3
+"""Standard deviation of the fitted window shift."""
+ACROSS_SD_M = 1e-3
+"""Standard deviation of the position along y_P, where the jaws centre the object."""
 
 
 def pose_of_fit(
-    model: TargetModel, seen: Observation, widths: WidthFit, centre_K_m: Array, p: PaperParams
+    model: TargetModel, seen: PaperObservation, widths: WidthFit, centre_K_m: Array, p: PaperParams
 ) -> tuple[Fit, tuple[float, float, float]]:
-    """Fit and (x, y, yaw) of the mesh's frame O in K, the place by least squares over the sequences.
+    """Return Fit and (x, y, yaw) of the mesh's frame O in K; the position by least squares over the sequences.
 
-    The coupled pose serves every sequence if they are likelier coupled than not; otherwise each has its own and the yaw
-    is that of the one that fits best.
+    If p_c >= 0.5 all sequences use the coupled pose. Otherwise each uses its own, and the yaw is that of the best fit.
     """
     tables = dict(zip(p.scales, width_tables(model, p.scales), strict=True))
     if seen.p_coupled >= 0.5:
@@ -40,7 +43,7 @@ def pose_of_fit(
         x_K, y_K = hand_axes(np.asarray(frame))
         normal += np.outer(x_K, x_K) / ALONG_SD_M**2
         right -= fit.shift_m * x_K / ALONG_SD_M**2
-        side = math.copysign(1.0, math.cos(reading.yaw_rad - frame))  # a hand turned by 180 deg counts across backwards
+        side = math.copysign(1.0, math.cos(reading.yaw_rad - frame))  # y_P is reversed for a hand turned by 180 deg
         across = _across(tables[fit.scale], reading, fit, side)
         if across is not None:
             normal += np.outer(y_K, y_K) / ACROSS_SD_M**2
@@ -57,7 +60,7 @@ def pose_of_fit(
 
 
 def _across(table: WidthTable, reading: SequenceReading, fit: BranchFit, side: float) -> float | None:
-    """Mean, over two-sided layers, of where along y_P the footprint's middle must be; None without any."""
+    """Return the footprint's middle along y_P, averaged over two-sided layers; None without any."""
     found: list[float] = []
     j = round((reading.along_m + fit.shift_m - table.l_m[0]) / (table.l_m[1] - table.l_m[0]))
     for height, across, both in zip(reading.height_m, reading.across_m, reading.bilateral, strict=True):

@@ -1,8 +1,7 @@
-"""The residual families of eq. (width_sensor_loss) for one sequence, as sums that both branches share.
+"""Residual families of eq. (width_sensor_loss) per sequence, as sums shared by both branches.
 
-A weighted Huber RMS is sqrt(sum w rho(r) / sum w), rho(r) = r^2 for |r| <= c and 2 c |r| - c^2 beyond: equal to the
-plain RMS for small residuals, so its unit is the residual's. The coupled branch adds the numerators and denominators of
-the sequences, the independent one takes each by itself.
+The weighted Huber RMS is sqrt(sum w rho(r) / sum w), rho(r) = r^2 for |r| <= c and 2 c |r| - c^2 beyond: the plain RMS
+for small residuals. The coupled branch adds the sums of all sequences; the independent branch uses them separately.
 """
 
 from __future__ import annotations
@@ -20,14 +19,14 @@ from glotouch_bt.robot import Array
 
 
 def huber(r: Array32, c: float) -> Array32:
-    """rho(r), elementwise: r^2 within c, 2 c |r| - c^2 beyond."""
+    """Compute rho(r) elementwise: r^2 within c, 2 c |r| - c^2 beyond."""
     a = np.abs(r)
     m = np.minimum(a, np.float32(c))
     return np.asarray(m * (2 * a - m), dtype=np.float32)
 
 
 def rms(numerator: Array32, denominator: Array32) -> Array32:
-    """sqrt(numerator / denominator), 0 where there is nothing to compare."""
+    """Compute sqrt(numerator / denominator), 0 for an empty sum."""
     return np.sqrt(numerator / np.maximum(denominator, np.float32(1e-9)))
 
 
@@ -41,7 +40,7 @@ class Sums:
         centred: (N,).
         vertical, vertical_weight: (N,).
         cross, cross_weight: (N,) or 0.
-        supported, taken: (N,) layers with finite predicted support, and how many there are.
+        supported, taken: (N,) number of layers with finite predicted support, and of all layers.
     """
 
     absolute: Array32
@@ -55,7 +54,7 @@ class Sums:
     taken: int
 
     def loss(self, bias_m: Array, p: PaperParams) -> Array32:
-        """G of eq. (width_sensor_loss), (B, N); infinite where no layer has support (H is 0/0 there)."""
+        """Compute G of eq. (width_sensor_loss), (B, N); infinite if no layer has support."""
         shape = np.float32(p.w_centred) * rms(self.centred, self.weight)
         shape = shape + np.float32(p.w_vertical) * rms(self.vertical, self.vertical_weight)
         if p.w_cross > 0 and not isinstance(self.cross, float):
@@ -67,13 +66,13 @@ class Sums:
 
 
 def residual_units(reading: SequenceReading, predicted_m: Array32, p: PaperParams) -> Array32:
-    """(H, N) measured opening minus predicted width, in units, bias not taken off; NaN without support."""
+    """Return measured opening minus predicted width (H, N), in units, without bias; NaN without support."""
     r = np.float32(1.0) * reading.opening_m.astype(np.float32)[:, None] - predicted_m
     return np.asarray(r * np.float32(1 / p.unit_m), dtype=np.float32)
 
 
 def sequence_sums(r: Array32, weight: Array, bias_m: Array, p: PaperParams) -> Sums:
-    """Sums of one sequence.
+    """Compute the sums of one sequence.
 
     Args:
         r: (H, N) residuals in units, lowest layer first; NaN without support.
@@ -102,7 +101,7 @@ def sequence_sums(r: Array32, weight: Array, bias_m: Array, p: PaperParams) -> S
 
 
 def joined(sums: Sequence[Sums], cross: tuple[Array32, Array32] | None) -> Sums:
-    """All sequences at one shared pose, with the cross-action sums."""
+    """Add the sums of all sequences at one shared pose, with the cross-action sums."""
 
     def add(name: str) -> Array32:
         return np.asarray(sum(getattr(s, name) for s in sums), dtype=np.float32)
@@ -117,7 +116,7 @@ def joined(sums: Sequence[Sums], cross: tuple[Array32, Array32] | None) -> Sums:
 def cross_sums(
     readings: Sequence[SequenceReading], residuals: Sequence[Array32], p: PaperParams
 ) -> tuple[Array32, Array32] | None:
-    """Delta_a: neighbours along a_k compared at the same layer; None where no two layers are comparable."""
+    """Compute the sums of Delta_a between neighbours along a_k at equal heights; None without comparable layers."""
     order = sorted(range(len(readings)), key=lambda k: readings[k].along_m)
     numerator: Array32 | None = None
     denominator: Array32 | None = None

@@ -1,7 +1,7 @@
-"""Support widths of the target at every hypothesis: eq. (finite_window_width), with scale.
+"""Support widths of the target for all hypotheses: eq. (finite_window_width), with scale.
 
-A solid of scale s in a window of fixed size is the unscaled solid in a window of 1/s that size, times s. The window is
-a whole, odd number of raster cells, so its sides are exact at s = 1 and within one cell (1.2 x 1.4 mm) elsewhere.
+A solid of scale s in a fixed window equals s times the unscaled solid in a window scaled by 1/s. The window is an odd
+number of raster cells: exact at s = 1, within one cell (1.2 x 1.4 mm) elsewhere.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ class WidthTable:
     Attributes:
         scale: s.
         l_m, z_m: (nl,), (nz,) coordinates of the SCALED model: along the window from the footprint's middle; height.
-        width_m: (yaws, nl, nz); where a pad's window is empty, the largest of the neighbours, for interpolation.
-        supported: (yaws, nl, nz) no window is empty.
+        width_m: (yaws, nl, nz) widths; for an empty window the maximum of the neighbours, for interpolation.
+        supported: (yaws, nl, nz) True if no window is empty.
         middle_m: (yaws, nl, nz) closing-direction coordinate halfway between the two supports.
     """
 
@@ -43,7 +43,7 @@ class WidthTable:
 
 
 def width_tables(model: TargetModel, scales: tuple[float, ...]) -> tuple[WidthTable, ...]:
-    """One table a scale, kept in memory by the mesh's content."""
+    """Return one table per scale, cached in memory by the mesh's content."""
     key = (model.digest, model.pad, scales)
     if key not in _cache:
         while len(_cache) >= _CACHE_SIZE:
@@ -79,7 +79,7 @@ class Hypotheses:
 
     Attributes:
         scale, shift_m, z0_m: (ns,), (nd,), (nz,) values.
-        yaws: Count of relative yaws over the full turn; half of them are the scan's reflections.
+        yaws: Number of relative yaws over the full turn; half of them are the scan's reflections.
     """
 
     scale: Array
@@ -89,7 +89,7 @@ class Hypotheses:
 
     @classmethod
     def of(cls, model: TargetModel, p: PaperParams) -> Hypotheses:
-        """What `p` asks for."""
+        """Build the grid from parameters."""
         return cls(np.array(p.scales), len(model.phi_rad), span(p.shift_m, p.shift_steps), span(p.z0_m, p.z0_steps))
 
     @property
@@ -104,24 +104,24 @@ class Hypotheses:
 
     @property
     def off_centre(self) -> Array32:
-        """(N,) (delta / largest)^2 + (z_0 / largest)^2, from 0 to 2."""
+        """(N,) (delta / max)^2 + (z_0 / max)^2, from 0 to 2."""
         d, z = (np.square(v / max(float(np.abs(v).max()), 1e-9)) for v in (self.shift_m, self.z0_m))
         one = (d[:, None] + z[None, :]).reshape(-1).astype(np.float32)
         return np.tile(one, len(self.scale) * self.yaws)
 
 
 def span(limit: float, n: int) -> Array:
-    """n values evenly over +-limit; zero if n is 1."""
+    """Return n evenly spaced values over +-limit; zero for n = 1."""
     return np.linspace(-limit, limit, n) if n > 1 else np.zeros(1)
 
 
 def predicted_widths(tables: tuple[WidthTable, ...], along_m: float, height_m: Array, grid: Hypotheses) -> Array32:
-    """(H, N) widths W(a + delta, z + z_0; s, theta) of one sequence at every hypothesis; NaN without support.
+    """Return widths W(a + delta, z + z_0; s, theta), (H, N), of one sequence for all hypotheses; NaN without support.
 
-    Widths are interpolated; whether there is support is what the nearest table cell says.
+    Widths are interpolated; support is that of the nearest table cell.
 
     Args:
-        tables: One a scale of `grid`.
+        tables: One per scale of `grid`.
         along_m: a_k.
         height_m: (H,) layer heights.
         grid: The hypotheses.
@@ -141,7 +141,7 @@ def predicted_widths(tables: tuple[WidthTable, ...], along_m: float, height_m: A
 
 
 def _positions(axis: Array, x: Array) -> tuple[Index, Array32, Index]:
-    """Cell and fraction for linear interpolation, and nearest cell; the fraction is NaN outside the axis."""
+    """Return cell and fraction for linear interpolation, and the nearest cell; the fraction is NaN outside the axis."""
     t = (x - axis[0]) / (axis[1] - axis[0])
     i = np.clip(np.floor(t).astype(np.int64), 0, len(axis) - 2)
     f = np.where((t >= -0.5) & (t <= len(axis) - 0.5), np.clip(t - i, 0, 1), np.nan)

@@ -1,4 +1,4 @@
-"""TODO door of glotouch_bt/perception/recognition/synthetic."""
+"""Simulated pad images and patch statistics of a mesh's side images."""
 
 from glotouch_bt.perception.recognition.synthetic.touches import pooled_images, simulated_statistics, touch_windows
 

@@ -1,4 +1,4 @@
-"""Simulated touches of a side image: pad images and what their patches look like (RECOGNITION, ill-defined point 1)."""
+"""Simulated touches of side images: pad images and patch statistics (RECOGNITION, ill-defined point 1)."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from numpy.lib.stride_tricks import sliding_window_view
 from glotouch_bt.perception.recognition.model import FINE, POOLED, Array32, PadSpec, gel_shift, patch_of
 
 LEVELS = 24
-"""Steps of the height histogram that stands for the gel's force balance."""
+"""Number of levels of the height histogram in the gel's force balance."""
 
 
 def pooled_images(fine_m: Array32, stride: int, pad: PadSpec) -> Array32:
-    """Depth in 7 x 5 blocks (row-major, rows downwards) for the left pad at every table cell.
+    """Compute the depth in 7 x 5 blocks (row-major, rows downwards) of the left pad at every table cell.
 
     Args:
         fine_m: (n, fl, fz) side images.
@@ -30,7 +30,7 @@ def pooled_images(fine_m: Array32, stride: int, pad: PadSpec) -> Array32:
 
 
 def touch_windows(h: Array32, pad: PadSpec) -> Array32:
-    """Pooled images (n, 35) of surfaces under the whole window, heights (n, 15, 21): along x_P, upwards; -inf: none."""
+    """Compute pooled images (n, 35) of surface heights (n, 15, 21) in a window: along x_P, upwards; -inf: empty."""
     top = h.max(axis=(1, 2), keepdims=True)
     pooled = np.zeros((len(h), POOLED[0] * POOLED[1]), dtype=np.float32)
     some = np.isfinite(top).reshape(-1)
@@ -45,7 +45,7 @@ def touch_windows(h: Array32, pad: PadSpec) -> Array32:
 
 
 def _fast_shift(rel_m: Array32, pad: PadSpec) -> Array32:
-    """`gel_shift` through a histogram of the heights: one pass over the cells instead of one an iteration."""
+    """Compute `gel_shift` with a histogram of the heights: one pass over the cells instead of one per iteration."""
     m = len(rel_m)
     step = pad.depth_m / LEVELS
     level = np.minimum(rel_m * np.float32(-1 / step), np.float32(LEVELS)).astype(np.int32)  # 0 is the top
@@ -63,7 +63,7 @@ def _fast_shift(rel_m: Array32, pad: PadSpec) -> Array32:
 
 
 def simulated_statistics(fine_m: Array32, stride: int, pad: PadSpec) -> tuple[float, float, float]:
-    """(rho_M, its spread, d_M) over touches at every third yaw, shifts within 12 mm and four heights."""
+    """Return (rho_M, its deviation, d_M) over touches at every third yaw, shifts within 12 mm and four heights."""
     yaws, fl, fz = fine_m.shape
     coarse = PadSpec(pad.window_m, FINE, pad.depth_m, pad.stiffness_N_m3, pad.limit_m, pad.force_N)
     cell = pad.window_m[0] * pad.window_m[1] / (FINE[0] * FINE[1])
