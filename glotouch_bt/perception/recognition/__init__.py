@@ -32,7 +32,7 @@ __all__ = [
     "PadSpec",
     "Ranking",
     "TargetModel",
-    "infer_belief",
     "expected_gain",
+    "infer_belief",
     "rank",
 ]

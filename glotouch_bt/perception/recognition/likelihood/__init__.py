@@ -8,4 +8,4 @@ from glotouch_bt.perception.recognition.likelihood.belief import (
     ranked,
 )
 
-__all__ = ["Belief", "infer_belief", "closure_options", "expected_gain", "ranked"]
+__all__ = ["Belief", "closure_options", "expected_gain", "infer_belief", "ranked"]
