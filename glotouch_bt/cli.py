@@ -13,7 +13,8 @@ import typer
 from typer.core import TyperGroup
 
 from glotouch_bt import __version__
-from glotouch_bt.commands import COMMANDS, bench, set_debug
+from glotouch_bt.commands import COMMANDS, bench
+from glotouch_bt.commands.shared import set_debug
 
 
 class GroupedHelp(TyperGroup):

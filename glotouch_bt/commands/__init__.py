@@ -9,7 +9,6 @@ from glotouch_bt.commands.backends import backends
 from glotouch_bt.commands.bench import bench
 from glotouch_bt.commands.check import check
 from glotouch_bt.commands.doctor import doctor
-from glotouch_bt.commands.errors import set_debug
 from glotouch_bt.commands.faults import faults
 from glotouch_bt.commands.missions import missions
 from glotouch_bt.commands.nodes import nodes
@@ -22,7 +21,7 @@ from glotouch_bt.commands.skills import skills
 from glotouch_bt.commands.test import run_tests
 from glotouch_bt.commands.tree import tree
 
-__all__ = ["COMMANDS", "bench", "set_debug"]
+__all__ = ["COMMANDS", "bench"]
 
 COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
     "Run missions": {"run": run, "resume": resume, "replay": replay, "report": report},

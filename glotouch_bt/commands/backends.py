@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.options import Json
-from glotouch_bt.commands.output import print_json
+from glotouch_bt.commands.shared import Json, guarded, print_json
 
 
 @guarded

@@ -8,9 +8,7 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.options import Json, Objects, Settings, read_settings
-from glotouch_bt.commands.output import print_json
+from glotouch_bt.commands.shared import Json, Objects, Settings, guarded, print_json, read_settings
 
 
 @guarded

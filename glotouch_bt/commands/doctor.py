@@ -7,9 +7,7 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.options import Backend, BackendSettings, Conditions, Json, read_settings
-from glotouch_bt.commands.output import print_json
+from glotouch_bt.commands.shared import Backend, BackendSettings, Conditions, Json, guarded, print_json, read_settings
 
 
 @guarded

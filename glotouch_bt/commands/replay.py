@@ -8,9 +8,7 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.options import Json, RunFolderArgument
-from glotouch_bt.commands.output import print_json
+from glotouch_bt.commands.shared import Json, RunFolderArgument, guarded, print_json
 
 MAX_DIFFERENCES = 12
 """Number of differences to print."""

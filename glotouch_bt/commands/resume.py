@@ -8,9 +8,7 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.options import Json
-from glotouch_bt.commands.output import print_json
+from glotouch_bt.commands.shared import Json, guarded, print_json
 
 
 @guarded
@@ -29,7 +27,7 @@ def resume(
 
     After a crash, a kill, Ctrl-C or a safety stop. Finished skills do not run again.
     """
-    from glotouch_bt.commands.operator import Operator, operated
+    from glotouch_bt.commands.shared import Operator, operated
     from glotouch_bt.commands.terminal import RunProgress, print_end
     from glotouch_bt.runs import ResumableRun
     from glotouch_bt.runs import resume as resume_run

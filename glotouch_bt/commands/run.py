@@ -7,8 +7,16 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.options import Backend, Conditions, Json, MissionName, Objects, Settings, read_settings
+from glotouch_bt.commands.shared import (
+    Backend,
+    Conditions,
+    Json,
+    MissionName,
+    Objects,
+    Settings,
+    guarded,
+    read_settings,
+)
 
 
 @guarded
@@ -28,7 +36,7 @@ def run(
 
     `p` or SIGUSR1 pauses and continues it, SIGTERM ends it safely.
     """
-    from glotouch_bt.commands.operator import Operator, operated
+    from glotouch_bt.commands.shared import Operator, operated
     from glotouch_bt.commands.terminal import RunProgress, print_end
     from glotouch_bt.runs import RunRequest, launch
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.output import print_json
+from glotouch_bt.commands.shared import guarded, print_json
 
 
 @guarded

@@ -6,9 +6,7 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.options import Json
-from glotouch_bt.commands.output import print_json
+from glotouch_bt.commands.shared import Json, guarded, print_json
 
 
 @guarded

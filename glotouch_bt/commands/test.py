@@ -6,8 +6,7 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.options import MissionName
+from glotouch_bt.commands.shared import MissionName, guarded
 
 
 @guarded

@@ -9,8 +9,7 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.options import MissionName, Objects, Settings, read_settings
+from glotouch_bt.commands.shared import MissionName, Objects, Settings, guarded, read_settings
 
 
 class TreeFormat(StrEnum):

@@ -72,7 +72,7 @@ def in_turn(left: Sequence[Shown], whole: Sequence[TouchSet], belief: Belief) ->
     return next(i for i, s in enumerate(left) if s.candidate == turn)
 
 
-def most_informative(left: Sequence[Shown], whole: Sequence[TouchSet], belief: Belief) -> int:
+def by_information_gain(left: Sequence[Shown], whole: Sequence[TouchSet], belief: Belief) -> int:
     """Choose the closure with the greatest expected information gain."""
     return int(np.argmax(expected_gain(belief, [closure_of(whole[s.candidate], s) for s in left])))
 
@@ -83,7 +83,7 @@ def closure_of(touchset: TouchSet, shown: Shown) -> Closure:
     return Closure(touchset.candidate.index, layer.yaw_rad, layer.height_m, np.asarray(layer.position_K_m))
 
 
-ORDERS: dict[str, Choice] = {"recorded": in_order, "in_turn": in_turn, "adaptive": most_informative}
+ORDERS: dict[str, Choice] = {"recorded": in_order, "in_turn": in_turn, "adaptive": by_information_gain}
 
 
 def closures_to_confidence(layout: Layout, models: Mapping[str, TargetModel]) -> list[dict[str, Any]]:

@@ -8,8 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from glotouch_bt.commands.bench.shared import print_summary, worker_pool
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.options import (
+from glotouch_bt.commands.shared import (
     BenchFolder,
     Conditions,
     FirstSeed,
@@ -18,6 +17,7 @@ from glotouch_bt.commands.options import (
     Workers,
     bench_folder,
     check_names,
+    guarded,
 )
 
 

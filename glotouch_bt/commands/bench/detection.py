@@ -9,15 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from glotouch_bt.commands.bench.shared import print_summary
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.options import (
-    Backend,
-    BenchFolder,
-    FirstSeed,
-    SummaryJson,
-    bench_folder,
-    check_names,
-)
+from glotouch_bt.commands.shared import Backend, BenchFolder, FirstSeed, SummaryJson, bench_folder, check_names, guarded
 
 
 @guarded

@@ -10,8 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from glotouch_bt.commands.bench.shared import print_summary, worker_pool
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.options import (
+from glotouch_bt.commands.shared import (
     BenchFolder,
     Conditions,
     FewObjects,
@@ -25,9 +24,10 @@ from glotouch_bt.commands.options import (
     bench_folder,
     check_names,
     check_parameters,
+    guarded,
+    print_json,
     read_settings,
 )
-from glotouch_bt.commands.output import print_json
 
 
 @guarded

@@ -10,8 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from glotouch_bt.commands.bench.shared import print_summary, worker_pool
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.options import BenchFolder, FirstSeed, SummaryJson, Workers, bench_folder
+from glotouch_bt.commands.shared import BenchFolder, FirstSeed, SummaryJson, Workers, bench_folder, guarded
 
 
 @guarded

@@ -7,16 +7,16 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.options import (
+from glotouch_bt.commands.shared import (
     Backend,
     BackendSettings,
     BenchFolder,
     SummaryJson,
     bench_folder,
+    guarded,
+    print_json,
     read_settings,
 )
-from glotouch_bt.commands.output import print_json
 
 
 @guarded

@@ -7,8 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.options import (
+from glotouch_bt.commands.shared import (
     Backend,
     BenchFolder,
     Conditions,
@@ -19,9 +18,10 @@ from glotouch_bt.commands.options import (
     Trials,
     bench_folder,
     check_names,
+    guarded,
+    print_json,
     read_settings,
 )
-from glotouch_bt.commands.output import print_json
 
 
 @guarded

@@ -10,8 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from glotouch_bt.commands.bench.shared import print_summary, worker_pool
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.options import (
+from glotouch_bt.commands.shared import (
     Backend,
     BenchFolder,
     Conditions,
@@ -22,6 +21,7 @@ from glotouch_bt.commands.options import (
     Workers,
     bench_folder,
     check_names,
+    guarded,
 )
 
 

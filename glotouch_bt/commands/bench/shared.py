@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from glotouch_bt.commands.output import print_json
+from glotouch_bt.commands.shared import print_json
 
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor

@@ -9,8 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from glotouch_bt.commands.bench.shared import print_summary
-from glotouch_bt.commands.errors import guarded
-from glotouch_bt.commands.options import (
+from glotouch_bt.commands.shared import (
     Backend,
     BenchFolder,
     Conditions,
@@ -20,6 +19,7 @@ from glotouch_bt.commands.options import (
     SummaryJson,
     Trials,
     bench_folder,
+    guarded,
     read_settings,
 )
 

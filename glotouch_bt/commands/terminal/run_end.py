@@ -7,7 +7,7 @@ import sys
 import traceback
 from typing import TYPE_CHECKING
 
-from glotouch_bt.commands.errors import showing_tracebacks
+from glotouch_bt.commands.shared import showing_tracebacks
 from glotouch_bt.commands.terminal.console import print_error, print_result
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from glotouch_bt.commands.operator import operated
+from glotouch_bt.commands.shared.operator import operated
 from glotouch_bt.mission.execution.control import Control, Preempted, TimedPauses
 from glotouch_bt.mission.execution.runner import Outcome, run_mission
 from glotouch_bt.mission.record.run_summary import NullRecord
@@ -175,7 +175,7 @@ def test_keys_pause_in_the_foreground_and_the_shell_has_its_own_in_the_backgroun
 
 OPERATED = """
 import os, signal, sys, termios, time
-from glotouch_bt.commands.operator import operated
+from glotouch_bt.commands.shared.operator import operated
 from glotouch_bt.mission.control import Control
 
 def say(word):

@@ -13,7 +13,7 @@ from typing import ParamSpec
 
 import typer
 
-from glotouch_bt.commands.output import tolerant_streams
+from glotouch_bt.commands.shared.output import tolerant_streams
 
 P = ParamSpec("P")
 _debug: list[bool] = []

@@ -1,0 +1,56 @@
+"""Shared by several commands: options, error messages and exit codes, JSON output, the operator's signals and keys."""
+
+from glotouch_bt.commands.shared.errors import guarded, set_debug, showing_tracebacks
+from glotouch_bt.commands.shared.operator import Operator, operated
+from glotouch_bt.commands.shared.options import (
+    Backend,
+    BackendSettings,
+    BenchFolder,
+    Conditions,
+    FewObjects,
+    FirstSeed,
+    Json,
+    KeepTrials,
+    MissionName,
+    MissionSettings,
+    Objects,
+    RunFolderArgument,
+    Settings,
+    SummaryJson,
+    Trials,
+    Workers,
+    bench_folder,
+    check_names,
+    check_parameters,
+    read_settings,
+)
+from glotouch_bt.commands.shared.output import print_json
+
+__all__ = [
+    "Backend",
+    "BackendSettings",
+    "BenchFolder",
+    "Conditions",
+    "FewObjects",
+    "FirstSeed",
+    "Json",
+    "KeepTrials",
+    "MissionName",
+    "MissionSettings",
+    "Objects",
+    "Operator",
+    "RunFolderArgument",
+    "Settings",
+    "SummaryJson",
+    "Trials",
+    "Workers",
+    "bench_folder",
+    "check_names",
+    "check_parameters",
+    "guarded",
+    "operated",
+    "print_json",
+    "read_settings",
+    "set_debug",
+    "showing_tracebacks",
+]
