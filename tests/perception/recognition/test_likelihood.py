@@ -225,7 +225,7 @@ def test_bad_input_is_refused(meshes) -> None:
     model = TargetModel.from_mesh(meshes[0])
     with pytest.raises(ParamError, match="at least one"):
         likelihood(model, [])
-    with pytest.raises(ParamError, match="one a candidate"):
+    with pytest.raises(ParamError, match="one per candidate"):
         likelihood(model, [touchset, touchset])
     lost = replace(touchset.candidate, height_m=float("nan"))
     with pytest.raises(ParamError, match="finite"):

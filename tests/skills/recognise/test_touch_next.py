@@ -55,8 +55,8 @@ def make(bench, found, folder, monkeypatch):
     def make_one(oracle: Oracle, things=None, grip_width_m=WIDTH, stuff=(), tip_P_m=0.13, **params):
         b = bench(grip_width_m=grip_width_m, things=stuff, tip_P_m=tip_P_m)
         b.context.world = replace(b.world, objects=replace(b.world.objects, folder=folder))
-        monkeypatch.setattr(module, "infer_belief", oracle.infer_belief)
-        monkeypatch.setattr(module, "expected_gain", oracle.expected_gain)
+        monkeypatch.setattr(module.recognition, "infer_belief", oracle.infer_belief)
+        monkeypatch.setattr(module.recognition, "expected_gain", oracle.expected_gain)
         things = things or (found.round((0.0, -0.08), 0.025), found.round((0.0, 0.08), 0.025, index=1))
         return b, b.make(TouchNext, inputs={"candidates": things}, target="can", **params)
 
