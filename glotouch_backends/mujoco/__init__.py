@@ -3,5 +3,3 @@
 from glotouch_backends.mujoco.backend import MujocoBackend, build_world
 from glotouch_backends.mujoco.robot import MAX_HELD_DISTANCE_M
 from glotouch_backends.mujoco.truth import Truth
-
-__all__ = ["MAX_HELD_DISTANCE_M", "MujocoBackend", "Truth", "build_world"]

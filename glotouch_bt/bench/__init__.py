@@ -3,14 +3,3 @@
 from glotouch_bt.bench.retrieve import RetrieveCampaign, run_campaign, targets_of
 from glotouch_bt.bench.speed import SpeedStudy, run_study
 from glotouch_bt.bench.statistics import Rate, bootstrap_mean, wilson
-
-__all__ = [
-    "Rate",
-    "RetrieveCampaign",
-    "SpeedStudy",
-    "bootstrap_mean",
-    "run_campaign",
-    "run_study",
-    "targets_of",
-    "wilson",
-]

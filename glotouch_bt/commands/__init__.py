@@ -21,8 +21,6 @@ from glotouch_bt.commands.skills import skills
 from glotouch_bt.commands.test import run_tests
 from glotouch_bt.commands.tree import tree
 
-__all__ = ["COMMANDS", "bench"]
-
 COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
     "Run missions": {"run": run, "resume": resume, "replay": replay, "report": report},
     "Write missions": {

@@ -2,5 +2,3 @@
 
 from glotouch_bt.commissioning.doctor import DoctorFinding, nearly_empty, run_doctor
 from glotouch_bt.commissioning.link import LinkStudy, run_study
-
-__all__ = ["DoctorFinding", "LinkStudy", "nearly_empty", "run_doctor", "run_study"]

@@ -1,5 +1,3 @@
 """Missions: YAML to a checked tree, one tick a control period, a result with reasons."""
 
 from glotouch_bt.mission.load import Mission, load_mission, split_settings
-
-__all__ = ["Mission", "load_mission", "split_settings"]

@@ -5,16 +5,3 @@ from glotouch_bt.runs.launch import RunRequest, RunResult, launch
 from glotouch_bt.runs.result import installed_versions
 from glotouch_bt.runs.resume import resume
 from glotouch_bt.runs.resume_point import EARLIER, ResumableRun, copy_run, find_resumable
-
-__all__ = [
-    "EARLIER",
-    "ResumableRun",
-    "RunFolder",
-    "RunRequest",
-    "RunResult",
-    "copy_run",
-    "find_resumable",
-    "installed_versions",
-    "launch",
-    "resume",
-]

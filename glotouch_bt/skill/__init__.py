@@ -5,22 +5,3 @@ from glotouch_bt.skill.failures import MOTION_REFUSED, Failure, Reason, SkillFai
 from glotouch_bt.skill.params import SkillParams, param
 from glotouch_bt.skill.ports import In, Out
 from glotouch_bt.skill.skill import UNCHANGED, Skill
-
-__all__ = [
-    "MOTION_REFUSED",
-    "UNCHANGED",
-    "Context",
-    "Failure",
-    "In",
-    "Journal",
-    "Out",
-    "Reason",
-    "RobotRequests",
-    "Skill",
-    "SkillFailed",
-    "SkillParams",
-    "SkillRun",
-    "UndeclaredFailure",
-    "come_to_rest",
-    "param",
-]

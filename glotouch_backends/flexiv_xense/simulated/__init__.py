@@ -8,13 +8,3 @@ from glotouch_backends.flexiv_xense.simulated.vendor import (
     SimulatedVendor,
     open_vendor,
 )
-
-__all__ = [
-    "GRIPPER_ADDRESS",
-    "PAD_SNS",
-    "ROBOT_SN",
-    "RemoteVendor",
-    "SimulatedVendor",
-    "open_remote_vendor",
-    "open_vendor",
-]

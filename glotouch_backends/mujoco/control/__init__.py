@@ -4,18 +4,3 @@ from glotouch_backends.mujoco.control.jaws import JawReports, JawServo
 from glotouch_backends.mujoco.control.requests import PAYLOAD_S, PendingPayload, PendingTare
 from glotouch_backends.mujoco.control.safety import CHUNK, HardLimitGuard, check_sane, silence_mujoco
 from glotouch_backends.mujoco.control.servo import BRAKE_REACH_M, Servo, hermite
-
-__all__ = [
-    "BRAKE_REACH_M",
-    "CHUNK",
-    "PAYLOAD_S",
-    "HardLimitGuard",
-    "JawReports",
-    "JawServo",
-    "PendingPayload",
-    "PendingTare",
-    "Servo",
-    "check_sane",
-    "hermite",
-    "silence_mujoco",
-]

@@ -2,5 +2,3 @@
 
 from glotouch_backends.mujoco.hulls.decompose import load_hulls
 from glotouch_backends.mujoco.hulls.feet import FOOT_PROTRUSION_M, FOOT_RADIUS_M
-
-__all__ = ["FOOT_PROTRUSION_M", "FOOT_RADIUS_M", "load_hulls"]

@@ -4,16 +4,3 @@ from glotouch_backends.mujoco.model.arm import DAMPING_PER_STIFFNESS_S, JOINT_DA
 from glotouch_backends.mujoco.model.compile import STEP_S, STEPS, Handles, SensorMap, compile_world
 from glotouch_backends.mujoco.model.gripper import JAW_STIFFNESS_N_M
 from glotouch_backends.mujoco.model.probe import handle_mesh
-
-__all__ = [
-    "DAMPING_PER_STIFFNESS_S",
-    "JAW_STIFFNESS_N_M",
-    "JOINT_DAMPING",
-    "STEPS",
-    "STEP_S",
-    "STIFFNESS_NM_RAD",
-    "Handles",
-    "SensorMap",
-    "compile_world",
-    "handle_mesh",
-]

@@ -2,5 +2,3 @@
 
 from glotouch_backends.mujoco.sensing.tactile import Tactile, body_pose
 from glotouch_backends.mujoco.sensing.wrench import GRAVITY_M_S2, WristSensor, up_in
-
-__all__ = ["GRAVITY_M_S2", "Tactile", "WristSensor", "body_pose", "up_in"]

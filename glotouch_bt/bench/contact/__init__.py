@@ -2,5 +2,3 @@
 
 from glotouch_bt.bench.contact.bench import METRICS, ContactCampaign, run_campaign
 from glotouch_bt.bench.contact.square import TOOLS
-
-__all__ = ["METRICS", "TOOLS", "ContactCampaign", "run_campaign"]

@@ -2,5 +2,3 @@
 
 from glotouch_bt.bench.match.bench import MatchCampaign, run_campaign
 from glotouch_bt.bench.match.methods import chosen
-
-__all__ = ["MatchCampaign", "chosen", "run_campaign"]

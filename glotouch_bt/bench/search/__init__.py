@@ -3,5 +3,3 @@
 from glotouch_bt.bench.search.bench import SearchCampaign, run_campaign
 from glotouch_bt.bench.search.plots import COLOURS
 from glotouch_bt.bench.search.summary import quantiles
-
-__all__ = ["COLOURS", "SearchCampaign", "quantiles", "run_campaign"]

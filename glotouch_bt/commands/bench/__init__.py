@@ -17,8 +17,6 @@ from glotouch_bt.commands.bench.retrieve import retrieve
 from glotouch_bt.commands.bench.search import search
 from glotouch_bt.commands.bench.speed import speed
 
-__all__ = ["bench"]
-
 bench = typer.Typer(
     name="bench",
     help="Run experiments: many trials, confidence intervals, summary.json.",

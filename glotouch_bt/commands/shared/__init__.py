@@ -25,32 +25,3 @@ from glotouch_bt.commands.shared.options import (
     read_settings,
 )
 from glotouch_bt.commands.shared.output import print_json
-
-__all__ = [
-    "Backend",
-    "BackendSettings",
-    "BenchFolder",
-    "Conditions",
-    "FewObjects",
-    "FirstSeed",
-    "Json",
-    "KeepTrials",
-    "MissionName",
-    "MissionSettings",
-    "Objects",
-    "Operator",
-    "RunFolderArgument",
-    "Settings",
-    "SummaryJson",
-    "Trials",
-    "Workers",
-    "bench_folder",
-    "check_names",
-    "check_parameters",
-    "guarded",
-    "operated",
-    "print_json",
-    "read_settings",
-    "set_debug",
-    "showing_tracebacks",
-]

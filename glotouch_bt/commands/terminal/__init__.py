@@ -14,20 +14,3 @@ from glotouch_bt.commands.terminal.console import RunProgress, print_skill, prin
 from glotouch_bt.commands.terminal.fault_tables import print_exhaustive, print_faults
 from glotouch_bt.commands.terminal.findings import print_findings, texts_of
 from glotouch_bt.commands.terminal.run_end import print_end
-
-__all__ = [
-    "RunProgress",
-    "print_contact",
-    "print_end",
-    "print_exhaustive",
-    "print_faults",
-    "print_findings",
-    "print_match",
-    "print_retrieve",
-    "print_search",
-    "print_skill",
-    "print_skills",
-    "print_speed",
-    "print_table",
-    "texts_of",
-]

@@ -3,14 +3,3 @@
 from glotouch_bt.faults.effects.base import Actions, Effect, EffectContext, FaultParams, samples_altered
 from glotouch_bt.faults.effects.catalogue import CATALOGUE, FaultKind
 from glotouch_bt.faults.effects.model import WrongScaleStlParams
-
-__all__ = [
-    "CATALOGUE",
-    "Actions",
-    "Effect",
-    "EffectContext",
-    "FaultKind",
-    "FaultParams",
-    "WrongScaleStlParams",
-    "samples_altered",
-]

@@ -1,5 +1,3 @@
 """The load-time check: from a read tree to findings, each with the shortest run that shows it. Knows no py_trees."""
 
 from glotouch_bt.mission.check.rules import check_flow
-
-__all__ = ["check_flow"]

@@ -4,16 +4,3 @@ from glotouch_bt.mission.checkpoint.codec import decode, encode
 from glotouch_bt.mission.checkpoint.store import CHECKPOINT_FILE, CheckpointFile, CheckpointRow
 from glotouch_bt.mission.checkpoint.world_check import WorldChanged
 from glotouch_bt.mission.checkpoint.writer import CheckpointHooks, CheckpointWriter, ResumePoint, RunState
-
-__all__ = [
-    "CHECKPOINT_FILE",
-    "CheckpointFile",
-    "CheckpointHooks",
-    "CheckpointRow",
-    "CheckpointWriter",
-    "ResumePoint",
-    "RunState",
-    "WorldChanged",
-    "decode",
-    "encode",
-]

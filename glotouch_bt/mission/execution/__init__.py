@@ -3,13 +3,3 @@
 from glotouch_bt.mission.execution.control import Control, TimedPauses
 from glotouch_bt.mission.execution.runner import Outcome, default_arm, run_mission
 from glotouch_bt.mission.execution.watchdog import Stuck, deferred_interrupt
-
-__all__ = [
-    "Control",
-    "Outcome",
-    "Stuck",
-    "TimedPauses",
-    "default_arm",
-    "deferred_interrupt",
-    "run_mission",
-]

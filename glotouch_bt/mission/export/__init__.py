@@ -4,5 +4,3 @@ from glotouch_bt.mission.export.btcpp import as_btcpp
 from glotouch_bt.mission.export.catalogue import describe_mission, describe_nodes, describe_skill
 from glotouch_bt.mission.export.drawing import as_svg, as_text
 from glotouch_bt.mission.export.schema import mission_schema
-
-__all__ = ["as_btcpp", "as_svg", "as_text", "describe_mission", "describe_nodes", "describe_skill", "mission_schema"]

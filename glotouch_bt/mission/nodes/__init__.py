@@ -16,7 +16,6 @@ from glotouch_bt.mission.nodes.base import (
     NoSettings,
     Position,
     Requirement,
-    RunCount,
     Stack,
     ValueKind,
     Values,
@@ -52,32 +51,3 @@ register(FailKind())
 register(ConditionKind())
 register(SubtreeKind())
 register(SkillKind(), named=False)
-
-__all__ = [
-    "ANYTHING",
-    "EMPTY",
-    "NODES",
-    "UNSET",
-    "BuildContext",
-    "ConditionSettings",
-    "ExitStates",
-    "ForEachSettings",
-    "MissionDecorator",
-    "NoSettings",
-    "NodeKind",
-    "ParallelSettings",
-    "Position",
-    "RepeatSettings",
-    "Requirement",
-    "RetrySettings",
-    "RunCount",
-    "Stack",
-    "SubtreeSettings",
-    "TimeoutSettings",
-    "ValueKind",
-    "Values",
-    "btcpp_value",
-    "holds",
-    "kind_of",
-    "register",
-]

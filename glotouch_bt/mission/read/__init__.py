@@ -24,32 +24,3 @@ from glotouch_bt.mission.read.scope import Reading, Scope
 from glotouch_bt.mission.read.subtrees import entries_of
 from glotouch_bt.mission.read.worlds import WorldFile, load_conditions, load_world, read_world
 from glotouch_bt.mission.read.yaml_source import parse_yaml, read_yaml
-
-__all__ = [
-    "RESUME_CHECK_GROUP",
-    "Declaration",
-    "Parameter",
-    "Reading",
-    "Scope",
-    "SkillRegistry",
-    "Value",
-    "WorldFile",
-    "check_used",
-    "entries_of",
-    "find_shipped",
-    "from_command_line",
-    "load_conditions",
-    "load_world",
-    "parse_tree",
-    "parse_yaml",
-    "read_parameters",
-    "read_world",
-    "read_yaml",
-    "resolved",
-    "shipped",
-    "shipped_root",
-    "shown",
-    "substitute",
-    "unit_of",
-    "validate",
-]

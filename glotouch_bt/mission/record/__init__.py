@@ -8,23 +8,3 @@ from glotouch_bt.mission.record.recorded_requests import REQUEST_DONE, RecordedR
 from glotouch_bt.mission.record.recorder import RESULT_ATTACHMENT, RUN_ATTACHMENT, Recorder
 from glotouch_bt.mission.record.rounding import STAMP_S, Rounding, to_step
 from glotouch_bt.mission.record.run_summary import NullRecord, Record, RunSummary
-
-__all__ = [
-    "EVENT_PREFIX",
-    "REQUEST_DONE",
-    "RESULT_ATTACHMENT",
-    "RUN_ATTACHMENT",
-    "STAMP_S",
-    "Json",
-    "NullRecord",
-    "Record",
-    "RecordedRequests",
-    "Recorder",
-    "Rounding",
-    "RunSummary",
-    "join",
-    "read_chunks",
-    "to_json",
-    "to_step",
-    "unpack",
-]

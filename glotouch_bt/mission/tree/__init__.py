@@ -2,5 +2,3 @@
 
 from glotouch_bt.mission.tree.build import BuiltTree, build_tree
 from glotouch_bt.mission.tree.failure_chain import NodeFailure, ReasonBook, sensed
-
-__all__ = ["BuiltTree", "NodeFailure", "ReasonBook", "build_tree", "sensed"]

@@ -30,5 +30,3 @@ SECTIONS: tuple[tuple[str, Callable[[RunRecord], str]], ...] = (
     ("About this run", about_section),
 )
 """Title and function of each section, in the order of the page."""
-
-__all__ = ["SECTIONS", "verdict"]

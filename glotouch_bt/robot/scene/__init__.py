@@ -5,19 +5,3 @@ from glotouch_bt.robot.scene.meshes import Mesh, is_sound_stl, load_folder, load
 from glotouch_bt.robot.scene.placement import Placement, draw_layout
 from glotouch_bt.robot.scene.streams import stream
 from glotouch_bt.robot.scene.world import Container, Holder, ObjectSet, Probe, World
-
-__all__ = [
-    "Conditions",
-    "Container",
-    "Holder",
-    "Mesh",
-    "ObjectSet",
-    "Placement",
-    "Probe",
-    "World",
-    "draw_layout",
-    "is_sound_stl",
-    "load_folder",
-    "load_mesh",
-    "stream",
-]

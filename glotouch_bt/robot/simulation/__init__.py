@@ -2,5 +2,3 @@
 
 from glotouch_bt.robot.simulation.disturber import Disturber, PathBlocked
 from glotouch_bt.robot.simulation.referee import BareSteps, Referee, TrueObject
-
-__all__ = ["BareSteps", "Disturber", "PathBlocked", "Referee", "TrueObject"]

@@ -2,5 +2,3 @@
 
 from glotouch_bt.robot.supervision.limits import GuardFinding, SupervisionLimits
 from glotouch_bt.robot.supervision.supervisor import Supervisor
-
-__all__ = ["GuardFinding", "SupervisionLimits", "Supervisor"]

@@ -4,14 +4,3 @@ from glotouch_bt.validation.faults.campaign import FaultCampaign, few_objects, r
 from glotouch_bt.validation.faults.cases import chosen_cases, chosen_skills
 from glotouch_bt.validation.faults.exhaustive import Exhaustive, run_exhaustive
 from glotouch_bt.validation.faults.trial import VERDICTS
-
-__all__ = [
-    "VERDICTS",
-    "Exhaustive",
-    "FaultCampaign",
-    "chosen_cases",
-    "chosen_skills",
-    "few_objects",
-    "run_campaign",
-    "run_exhaustive",
-]

@@ -6,5 +6,3 @@ reads one, checks it and runs what passes with scripted leaves, `watch` detects 
 
 from glotouch_bt.validation.fuzz.campaign import FuzzCampaign, run_campaign
 from glotouch_bt.validation.fuzz.trial import BAD
-
-__all__ = ["BAD", "FuzzCampaign", "run_campaign"]

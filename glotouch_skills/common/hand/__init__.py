@@ -15,29 +15,3 @@ from glotouch_skills.common.hand.line_guard import (
 from glotouch_skills.common.hand.retract import CAUGHT_N, RISE_M_S, rise_clear
 from glotouch_skills.common.hand.wait_for import REQUEST_FAILED, finish
 from glotouch_skills.common.hand.weighing import GRAVITY_M_S2, STAND_S, weigh, weigh_N
-
-__all__ = [
-    "CAUGHT_N",
-    "CLEARANCE_M",
-    "DOWN_B",
-    "GRAVITY_M_S2",
-    "REQUEST_FAILED",
-    "RISE_M_S",
-    "STAND_S",
-    "UP_B",
-    "Pressed",
-    "StraightGuard",
-    "Strayed",
-    "close_compliantly",
-    "describe_stop",
-    "finish",
-    "glide",
-    "keeping_clear_of",
-    "may_touch",
-    "release",
-    "require_clear",
-    "rise_clear",
-    "straight_guard",
-    "weigh",
-    "weigh_N",
-]

@@ -13,24 +13,3 @@ from glotouch_skills.common.planning.squeeze_motion import (
 from glotouch_skills.common.planning.squeeze_plan import Stance, plan_stances
 from glotouch_skills.common.planning.target import TOO_LOW, load_target, load_target_model
 from glotouch_skills.common.planning.touch_options import Option, Standing, best_rates, options
-
-__all__ = [
-    "MIN_GAP_M",
-    "SHIFTS_M",
-    "TOO_LOW",
-    "ClosureParams",
-    "GraspPlan",
-    "Option",
-    "Squeezing",
-    "Stance",
-    "Standing",
-    "best_rates",
-    "disturbance",
-    "layer_heights",
-    "load_target",
-    "load_target_model",
-    "options",
-    "pads_height_m",
-    "plan_grasp",
-    "plan_stances",
-]

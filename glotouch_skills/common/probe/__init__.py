@@ -5,19 +5,3 @@ from glotouch_skills.common.probe.free_corner import corner_place, corner_walls,
 from glotouch_skills.common.probe.plan_driver import HELD_TOLERANCE_M, Explorer, ExploringSpeeds
 from glotouch_skills.common.probe.return_probe import RETURN_PROBE_FAILURES, nothing_in_hand, return_probe
 from glotouch_skills.common.probe.tracing_params import TracingParams
-
-__all__ = [
-    "FEEL_FLOOR_FAILURES",
-    "FLOOR_SEARCH_M",
-    "HELD_TOLERANCE_M",
-    "RETURN_PROBE_FAILURES",
-    "Explorer",
-    "ExploringSpeeds",
-    "TracingParams",
-    "corner_place",
-    "corner_walls",
-    "feel_floor",
-    "nothing_in_hand",
-    "quiet_corner",
-    "return_probe",
-]

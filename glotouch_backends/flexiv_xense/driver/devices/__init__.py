@@ -1,5 +1,3 @@
 """Adapters of the vendors' interfaces: the only files of the driver that call an SDK."""
 
 from .connect import Connected, connect_devices
-
-__all__ = ["Connected", "connect_devices"]

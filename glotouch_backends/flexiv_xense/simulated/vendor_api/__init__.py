@@ -10,14 +10,3 @@ from glotouch_backends.flexiv_xense.simulated.vendor_api.flexiv_types import (
 )
 from glotouch_backends.flexiv_xense.simulated.vendor_api.xensegripper import GripperLink
 from glotouch_backends.flexiv_xense.simulated.vendor_api.xensesdk import PadLink
-
-__all__ = [
-    "EPOCH_S",
-    "GripperLink",
-    "Mode",
-    "OperationalStatus",
-    "PadLink",
-    "RobotEvent",
-    "RobotEvent_Level",
-    "ToolParams",
-]

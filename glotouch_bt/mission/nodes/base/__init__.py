@@ -14,13 +14,7 @@ from glotouch_bt.mission.nodes.base.analysis import (
     Values,
     VariableTable,
 )
-from glotouch_bt.mission.nodes.base.behaviours import (
-    BuildContext,
-    CountedLoop,
-    Keys,
-    MissionDecorator,
-    OutcomeDecorator,
-)
+from glotouch_bt.mission.nodes.base.behaviours import BuildContext, CountedLoop, Keys, MissionDecorator
 from glotouch_bt.mission.nodes.base.comparison import ConditionSettings, holds, in_code, in_words
 from glotouch_bt.mission.nodes.base.composite import CompositeKind
 from glotouch_bt.mission.nodes.base.kind import (
@@ -40,45 +34,3 @@ from glotouch_bt.mission.nodes.base.kind import (
 from glotouch_bt.mission.nodes.base.loop import LoopKind, Pass
 from glotouch_bt.mission.nodes.base.requirements import comparison_requirement, port_requirement
 from glotouch_bt.mission.nodes.base.run_count import RunCount
-
-__all__ = [
-    "ANYTHING",
-    "EMPTY",
-    "NODES",
-    "UNSET",
-    "BtcppForm",
-    "BuildContext",
-    "CompositeKind",
-    "ConditionSettings",
-    "CountedLoop",
-    "DataFlowAnalysis",
-    "ExitStates",
-    "Keys",
-    "LoopKind",
-    "MissionDecorator",
-    "NoSettings",
-    "NodeKind",
-    "NodeReader",
-    "OutcomeDecorator",
-    "Pass",
-    "PathSearch",
-    "Position",
-    "Requirement",
-    "RunCount",
-    "Stack",
-    "ValueKind",
-    "Values",
-    "VariableTable",
-    "btcpp_key",
-    "btcpp_name",
-    "btcpp_value",
-    "comparison_requirement",
-    "holds",
-    "in_code",
-    "in_words",
-    "kind_of",
-    "port_requirement",
-    "register",
-    "set_values",
-    "wire_setting",
-]

@@ -7,5 +7,3 @@ from glotouch_bt.perception.recognition.likelihood.belief import (
     infer_belief,
     ranked,
 )
-
-__all__ = ["Belief", "closure_options", "expected_gain", "infer_belief", "ranked"]

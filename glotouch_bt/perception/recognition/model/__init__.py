@@ -21,27 +21,3 @@ from glotouch_bt.perception.recognition.model.pads import (
 from glotouch_bt.perception.recognition.model.parts import VERSION, from_parts, to_parts
 from glotouch_bt.perception.recognition.model.raster import hand_axes, mirrored
 from glotouch_bt.perception.recognition.model.target import STRIDE, TargetModel
-
-__all__ = [
-    "FINE",
-    "POOLED",
-    "SENSING_M",
-    "STRIDE",
-    "TIP_RADIUS_M",
-    "VERSION",
-    "Array32",
-    "PadSpec",
-    "Patch",
-    "TargetModel",
-    "first_hit",
-    "from_parts",
-    "gel_shift",
-    "hand_axes",
-    "image_feature",
-    "minimum_rectangle",
-    "mirrored",
-    "patch_of",
-    "pool",
-    "to_parts",
-    "traced_tips",
-]

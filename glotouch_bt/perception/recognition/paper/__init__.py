@@ -5,5 +5,3 @@ ranking = paper_matcher(PaperParams())(model, touchsets)
 
 from glotouch_bt.perception.recognition.paper.matcher import paper_match, paper_matcher, paper_rank
 from glotouch_bt.perception.recognition.paper.params import TERMS, PaperParams
-
-__all__ = ["TERMS", "PaperParams", "paper_match", "paper_matcher", "paper_rank"]

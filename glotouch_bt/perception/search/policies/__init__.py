@@ -4,14 +4,3 @@ from glotouch_bt.perception.search.policies.expectation import ExpectationParams
 from glotouch_bt.perception.search.policies.frontier import PAPER_PASSES, NearestFrontier
 from glotouch_bt.perception.search.policies.policy import SearchPolicy, Stretch
 from glotouch_bt.perception.search.policies.registry import POLICIES, search_policy
-
-__all__ = [
-    "PAPER_PASSES",
-    "POLICIES",
-    "ExpectationParams",
-    "ExpectedFind",
-    "NearestFrontier",
-    "SearchPolicy",
-    "Stretch",
-    "search_policy",
-]

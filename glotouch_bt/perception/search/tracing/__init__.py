@@ -3,5 +3,3 @@
 from glotouch_bt.perception.search.tracing.trace import trace, trace_more
 from glotouch_bt.perception.search.tracing.trace_params import TraceParams
 from glotouch_bt.perception.search.tracing.trace_state import OutlineTrace
-
-__all__ = ["OutlineTrace", "TraceParams", "trace", "trace_more"]

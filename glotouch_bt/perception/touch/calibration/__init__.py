@@ -2,13 +2,3 @@
 
 from glotouch_bt.perception.touch.calibration.jaw_zero import MEASURED_SD_M, JawZero, measured_zero
 from glotouch_bt.perception.touch.calibration.tip_offset import TipCalibration, WallTouch, solve_tip, wrench_delay
-
-__all__ = [
-    "MEASURED_SD_M",
-    "JawZero",
-    "TipCalibration",
-    "WallTouch",
-    "measured_zero",
-    "solve_tip",
-    "wrench_delay",
-]

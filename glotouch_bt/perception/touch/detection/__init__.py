@@ -16,24 +16,3 @@ from glotouch_bt.perception.touch.detection.localisation import (
     section_point,
 )
 from glotouch_bt.perception.touch.detection.settling import settled
-
-__all__ = [
-    "Baseline",
-    "ContactGuard",
-    "Disc",
-    "GuardParams",
-    "HardStop",
-    "HardTrip",
-    "LowPass",
-    "MeasuredInertia",
-    "Onset",
-    "Payload",
-    "Polygon",
-    "Section",
-    "TipFusion",
-    "contact_direction",
-    "contact_point",
-    "fit_baseline",
-    "section_point",
-    "settled",
-]

@@ -1,32 +1,10 @@
 """Planar outlines of objects estimated from contacts: posterior over shape families, envelopes, polygon geometry."""
 
 from glotouch_bt.perception.touch.outline.belief import current_tips, infer_outline
-from glotouch_bt.perception.touch.outline.contours import (
-    contour_quality,
-    fit_contour,
-    fit_kind,
-    signed_distance,
-)
+from glotouch_bt.perception.touch.outline.contours import contour_quality, fit_contour, fit_kind, signed_distance
 from glotouch_bt.perception.touch.outline.envelope import envelope
 from glotouch_bt.perception.touch.outline.mixture import OutlineBelief
 from glotouch_bt.perception.touch.outline.moved import infer_outline_from_contacts, split_at_motion
 from glotouch_bt.perception.touch.outline.polygons import convex_hull, polygon_distance
 from glotouch_bt.perception.touch.outline.primitives import wrapped
 from glotouch_bt.perception.touch.outline.pushing import estimate_push
-
-__all__ = [
-    "OutlineBelief",
-    "contour_quality",
-    "convex_hull",
-    "current_tips",
-    "envelope",
-    "estimate_push",
-    "fit_contour",
-    "fit_kind",
-    "infer_outline",
-    "infer_outline_from_contacts",
-    "polygon_distance",
-    "signed_distance",
-    "split_at_motion",
-    "wrapped",
-]

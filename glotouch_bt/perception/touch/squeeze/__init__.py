@@ -14,17 +14,3 @@ from glotouch_bt.perception.touch.squeeze.plateau import (
     make_layer,
     temporal_median,
 )
-
-__all__ = [
-    "ObjectMotion",
-    "PatchStats",
-    "Plateau",
-    "PlateauParams",
-    "estimate_object_motion",
-    "evidence_weight",
-    "find_plateau",
-    "make_layer",
-    "patch_statistics",
-    "relative_nonplanarity",
-    "temporal_median",
-]
