@@ -20,7 +20,7 @@ class MatchParams(SkillParams):
     matcher: Literal["likelihood", "paper"] = param("Method of comparing candidates", default="likelihood")
 
 
-class Match(Skill):
+class MatchTarget(Skill):
     """Rank all TouchSets against the target's STL and plan the grasp of the best candidate.
 
     SUCCESS: the best candidate is the target with enough certainty and evidence; `plan` is its grasp.

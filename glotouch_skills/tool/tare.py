@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from glotouch_bt.robot import Tare as TareRequest
+from glotouch_bt.robot import Tare
 from glotouch_bt.skill import MOTION_REFUSED, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import REQUEST_FAILED, RISE_M_S, finish, rise_clear
 
@@ -16,7 +16,7 @@ class TareParams(SkillParams):
     speed_m_s: float = param("Speed of rising to free air", unit="m/s", default=RISE_M_S, gt=0.0, le=0.15)
 
 
-class Tare(Skill):
+class TareWrist(Skill):
     """Rise to free air if necessary, stand still, and tare the wrist sensor with the payload that the controller knows.
 
     SUCCESS: the sensor reads zero.
@@ -35,5 +35,5 @@ class Tare(Skill):
         arm = self.context.arm
         yield from rise_clear(arm, self.params.speed_m_s)
         yield from arm.hold(self.params.settle_s)
-        yield from finish(self.context.requests.start(TareRequest()), "tare")
+        yield from finish(self.context.requests.start(Tare()), "tare")
         self.event("tare")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from py_trees.common import Status
 
-from glotouch_skills.tool.tare import Tare
+from glotouch_skills.tool.tare import TareWrist
 from glotouch_skills.tool.wrist_check import WristCheck
 
 
