@@ -44,7 +44,7 @@ def make(bench, folder):
     def make_one(target, touchsets):
         b = bench()
         b.context.world = replace(b.world, objects=replace(b.world.objects, folder=folder))
-        return b, b.make(Match, inputs={} if touchsets is None else {"touchsets": touchsets}, target=target)
+        return b, b.make(MatchTarget, inputs={} if touchsets is None else {"touchsets": touchsets}, target=target)
 
     return make_one
 

@@ -61,7 +61,7 @@ def test_wrist_check__off_zero__by_torque_alone(bench) -> None:
 
 def test_a_tare_makes_it_read_nothing_again(make) -> None:
     b = make(4.0)
-    tare, check = b.make(Tare), b.make(WristCheck)
+    tare, check = b.make(TareWrist), b.make(WristCheck)
     b.run(tare)
     assert tare.status is Status.SUCCESS, tare.feedback_message
     b.run(check)
@@ -75,7 +75,7 @@ def test_wrist_check__request_failed(make, monkeypatch) -> None:
         done, error = True, "no answer"
 
     monkeypatch.setattr(b.robot, "start", lambda request: Broken())
-    skill = b.make(Tare)
+    skill = b.make(TareWrist)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "request_failed")
 
@@ -88,5 +88,5 @@ def test_high_already_nothing_moves(bench) -> None:
 
 
 def test_broken_off_anywhere(make, preempt_all_along) -> None:
-    preempt_all_along(lambda: ((b := make()), b.make(Tare)), 6)
+    preempt_all_along(lambda: ((b := make()), b.make(TareWrist)), 6)
     preempt_all_along(lambda: ((b := make()), b.make(WristCheck)), 6)
