@@ -79,7 +79,7 @@ def test_files_stay_short() -> None:
         ("sleeping, but for the driver's one clock", r"\btime\.sleep\((?!left\))", PACKAGES),
         ("uninitialised memory", r"\bnp\.empty(_like)?\(", PACKAGES),
         ("global random numbers", r"\bnp\.random\.(seed|rand|randn|normal|uniform)\b|^import random$", PACKAGES),
-        ("a backend's name", r"(?i)mujoco|flexiv|xense|rizon", ("glotouch_skills",)),
+        ("a backend's name", r"(?i)mujoco|flexiv|xense|\brizon", ("glotouch_skills",)),
     ],
 )
 def test_banned(what: str, pattern: str, folders: tuple[str, ...]) -> None:

@@ -27,9 +27,8 @@ def resume(
 
     After a crash, a kill, Ctrl-C or a safety stop. Finished skills do not run again.
     """
-    from glotouch_bt.commands.shared import Operator, operated
     from glotouch_bt.commands.terminal import RunProgress, print_end
-    from glotouch_bt.runs import ResumableRun
+    from glotouch_bt.runs import Operator, ResumableRun, operated
     from glotouch_bt.runs import resume as resume_run
 
     if list_:

@@ -36,9 +36,8 @@ def run(
 
     `p` or SIGUSR1 pauses and continues it, SIGTERM ends it safely.
     """
-    from glotouch_bt.commands.shared import Operator, operated
     from glotouch_bt.commands.terminal import RunProgress, print_end
-    from glotouch_bt.runs import RunRequest, launch
+    from glotouch_bt.runs import Operator, RunRequest, launch, operated
 
     request = RunRequest(
         mission,

@@ -2,6 +2,7 @@
 
 from glotouch_bt.runs.folder import RunFolder
 from glotouch_bt.runs.launch import RunRequest, RunResult, launch
+from glotouch_bt.runs.operator import Operator, operated
 from glotouch_bt.runs.result import installed_versions
 from glotouch_bt.runs.resume import resume
 from glotouch_bt.runs.resume_point import EARLIER, ResumableRun, copy_run, find_resumable

@@ -1,7 +1,6 @@
-"""Shared by several commands: options, error messages and exit codes, JSON output, the operator's signals and keys."""
+"""Shared by several commands: options, error messages and exit codes, JSON output."""
 
 from glotouch_bt.commands.shared.errors import guarded, set_debug, showing_tracebacks
-from glotouch_bt.commands.shared.operator import Operator, operated
 from glotouch_bt.commands.shared.options import (
     Backend,
     BackendSettings,

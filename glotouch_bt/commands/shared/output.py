@@ -76,4 +76,4 @@ def tolerant_streams() -> Iterator[TolerantStream]:
 
 def print_json(data: object) -> None:
     """Print JSON on stdout."""
-    sys.stdout.write(json.dumps(data, indent=2, default=str) + "\n")
+    sys.stdout.write(json.dumps(data, indent=2, allow_nan=False, default=str) + "\n")

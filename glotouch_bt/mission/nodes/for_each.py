@@ -36,8 +36,7 @@ from glotouch_bt.mission.nodes.base import (
 from glotouch_bt.mission.spec import Map, NodeSpec, Scalar, Settings
 from glotouch_bt.skill import param
 
-Pairs = Mapping[str, tuple[str, str]]
-"""Source key and target key of each port that gathers."""
+Pairs = Mapping[str, tuple[str, str]]  # (source key, target key) of each port that gathers
 
 
 class ForEachSettings(Settings):
@@ -47,9 +46,7 @@ class ForEachSettings(Settings):
     item: str = Field(description="key each item is written to")
     collect: dict[str, str] = Field(default_factory=dict, description="child's key: key of the tuple it is gathered in")
     on_failure: Literal["continue", "stop"] = Field(default="stop", description="what a failing item does")
-    order_by: str | None = param(
-        "field of the items: those with the least of it first", default=None, formerly="least_first"
-    )
+    order_by: str | None = param("field by which items are sorted, ascending", default=None, formerly="least_first")
 
 
 class ForEach(MissionDecorator):

@@ -14,7 +14,7 @@ import pytest
 from glotouch_bt.bench.search.bench import SearchCampaign, run_campaign
 from glotouch_bt.bench.search.scoring import Found, TrueLayout, discovered_at, score
 from glotouch_bt.bench.search.summary import correlation, quantiles, summarise
-from glotouch_bt.bench.search.trial import Way, _result_of, recorded_folders
+from glotouch_bt.bench.search.trial import TipPath, _result_of, recorded_folders
 from glotouch_bt.report.run_record import RecordedEvent, RunRecord, Tick
 from glotouch_bt.robot import BadInput
 from glotouch_bt.runs.launch import RunRequest
@@ -133,7 +133,7 @@ def test_travel_of_a_record_counts_from_the_first_sweep_to_the_last_trace():
         events=[RecordedEvent(0.0, "tool", {"held": True})],
         ticks=[Tick(1.0, "a/guarded_sweep", "INVALID", "RUNNING"), Tick(3.0, "a/orbit_probe", "RUNNING", "SUCCESS")],
     )
-    way = Way.of(record)
+    way = TipPath.of(record)
     assert way.before_m == pytest.approx(0.1, abs=0.004)
     assert way.total_m == pytest.approx(0.2, abs=0.006)
     assert way.travel_m(2.0) == pytest.approx(0.1, abs=0.004)
@@ -142,7 +142,7 @@ def test_travel_of_a_record_counts_from_the_first_sweep_to_the_last_trace():
 
 
 def test_a_record_without_exploration_has_no_travel():
-    way = Way.of(RunRecord(Path("x")))
+    way = TipPath.of(RunRecord(Path("x")))
     assert (way.total_m, way.before_m, way.travel_m(5.0)) == (0.0, 0.0, 0.0)
 
 

@@ -28,15 +28,12 @@ from glotouch_bt.mission.nodes.timeout import ClockTimeout
 from glotouch_bt.mission.read.parse import parse_tree
 from glotouch_bt.mission.read.scope import Scope
 from glotouch_bt.mission.read.yaml_source import parse_yaml
-from glotouch_bt.mission.spec.findings import Findings
-from glotouch_bt.mission.spec.node import NodeSpec, number_names
+from glotouch_bt.mission.spec import Findings, NodeSpec, number_names
 from glotouch_bt.mission.tree.build import build_tree
 from glotouch_bt.skill import UNCHANGED, Context, In, Out, Skill, SkillFailed, SkillRun
 
 pytestmark = pytest.mark.usefixtures("quorum")
-MAX_RUNS = 600
-MAX_STEPS = 16
-ITEMS = 2
+MAX_RUNS, MAX_STEPS, ITEMS = 600, 16, 2
 
 
 class Oracle:

@@ -16,13 +16,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from glotouch_bt.commands.shared.operator import operated
 from glotouch_bt.mission.execution.control import Control, Preempted, TimedPauses
 from glotouch_bt.mission.execution.runner import Outcome, run_mission
 from glotouch_bt.mission.record.run_summary import NullRecord
 from glotouch_bt.motion import Arm
 from glotouch_bt.robot import Command, Observation, Robot, World
 from glotouch_bt.robot.fake import FakeRobot
+from glotouch_bt.runs.operator import operated
 from glotouch_bt.skill import Skill, SkillFailed, SkillRun
 from glotouch_bt.validation.pause import EveryNthTick
 
@@ -175,8 +175,8 @@ def test_keys_pause_in_the_foreground_and_the_shell_has_its_own_in_the_backgroun
 
 OPERATED = """
 import os, signal, sys, termios, time
-from glotouch_bt.commands.shared.operator import operated
-from glotouch_bt.mission.control import Control
+from glotouch_bt.runs.operator import operated
+from glotouch_bt.mission.execution import Control
 
 def say(word):
     sys.stdout.write(word)
