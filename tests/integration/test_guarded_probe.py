@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from glotouch_bt.bench.detection.simulated import Rig
+from glotouch_bt.bench.detection.simulated import SimulatedProbe
 from glotouch_bt.perception.touch import GuardParams
 from glotouch_bt.robot import Pose
 from glotouch_bt.skill.probing.guarded_probe import Prober
@@ -14,7 +14,7 @@ from glotouch_bt.skill.probing.guarded_probe import Prober
 
 def test_the_inertia_taken_out_leaves_less_than_half_of_the_threshold() -> None:
     """Free moves without noise, any direction counting, thresholds at 0.06 N: no contact."""
-    rig = Rig("ideal", 5)
+    rig = SimulatedProbe("ideal", 5)
     with rig.robot:
         tool = dataclasses.replace(rig.tool, latency_s=0.0)
         rig.prober = Prober(rig.context, tool, GuardParams(directional_N=0.06, total_N=0.06))
@@ -28,7 +28,7 @@ def test_the_inertia_taken_out_leaves_less_than_half_of_the_threshold() -> None:
 
 def test_how_far_a_free_object_was_pushed() -> None:
     """Against the true displacement of the object's middle, over six touches: nearer than the ball's bare way."""
-    rig = Rig("nominal", 6)
+    rig = SimulatedProbe("nominal", 6)
     with rig.robot:
         K_from_B = rig.world.container.pose_B_K.inverse()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from glotouch_bt.bench.detection.simulated import Rig
+from glotouch_bt.bench.detection.simulated import SimulatedProbe
 from glotouch_bt.perception.touch.calibration.jaw_zero import measured_zero
 from glotouch_bt.robot.scene.streams import stream
 
@@ -12,7 +12,7 @@ from glotouch_bt.robot.scene.streams import stream
 @pytest.mark.parametrize(("conditions", "seed", "limit_m"), [("nominal", 7, 0.4e-3), ("harsh", 8, 1.0e-3)])
 def test_the_handle_tells_the_zero(conditions: str, seed: int, limit_m: float) -> None:
     """Within 0.1 mm, four times the reports' noise over 0.2 s; unmeasured it is off by up to `limit_m`."""
-    rig = Rig(conditions, seed)
+    rig = SimulatedProbe(conditions, seed)
     with rig.robot:
         arm = rig.context.arm
         seen = rig.go(arm.hold(0.2, tactile=True))

@@ -105,7 +105,7 @@ class Squeezes(Told):
         yield from arm.transit(Pose.pointing_down((x, y, z + 0.1), yaw), arm.pose_B_P.position_m[2], 0.2, check=False)
         yield from arm.line(Pose.pointing_down((x, y, z), yaw), 0.05, check=False)
         self.say("closing")
-        yield from close_compliantly(arm, 0.03, 10.0, seen_by=self.seen)
+        yield from close_compliantly(arm, 0.03, 10.0, on_observation=self.seen)
         self.say("closed")
         yield from arm.hold(0.3)
         yield from arm.jaws(OPEN_M)
