@@ -1,4 +1,4 @@
-"""What the commands print: progress, findings, tables, the end of a run. Import it when something is printed.
+"""Terminal output of the commands: progress, findings, tables, the end of a run. Import it when something is printed.
 
 Nothing here computes; the module of a table takes the summary that an experiment wrote.
 """

@@ -47,7 +47,7 @@ class EffectContext:
 
 @dataclass
 class Actions:
-    """What an effect did besides altering commands and observations.
+    """Record of an effect beyond altered commands and observations.
 
     Attributes:
         count: Number of acts.

@@ -27,7 +27,7 @@ MAX_STEPS = 120_000
 
 @dataclass(frozen=True)
 class Goal:
-    """What to reach.
+    """Goal of a path search.
 
     Attributes:
         node: The node that looks, or None: the end of the mission, in success.

@@ -1,4 +1,4 @@
-"""What node kinds are made of: base classes, the registry, and the protocols of the checker and the reader."""
+"""Base of the node kinds: base classes, the registry, and the protocols of the checker and the reader."""
 
 from glotouch_bt.mission.nodes.base.analysis import (
     ANYTHING,

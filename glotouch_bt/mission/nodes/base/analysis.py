@@ -1,4 +1,4 @@
-"""What a node kind sees of the checker, and what it answers. The checker's own classes fulfil these protocols."""
+"""Protocols between a node kind and the checker. The checker's own classes fulfil these protocols."""
 
 from __future__ import annotations
 
