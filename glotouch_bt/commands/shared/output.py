@@ -7,12 +7,13 @@ full disk) is reported when the command has ended.
 from __future__ import annotations
 
 import errno
-import json
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TextIO
+
+from glotouch_bt.json_text import json_text
 
 GONE = (errno.EPIPE, errno.EIO)
 """Errors of a pipe without a reader, and of a terminal that was hung up."""
@@ -76,4 +77,4 @@ def tolerant_streams() -> Iterator[TolerantStream]:
 
 def print_json(data: object) -> None:
     """Print JSON on stdout."""
-    sys.stdout.write(json.dumps(data, indent=2, allow_nan=False, default=str) + "\n")
+    sys.stdout.write(json_text(data, default=str))

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import sys
 import traceback
 from typing import TYPE_CHECKING
 
-from glotouch_bt.commands.shared import showing_tracebacks
+from glotouch_bt.commands.shared import print_json, showing_tracebacks
 from glotouch_bt.commands.terminal.console import print_error, print_result
 
 if TYPE_CHECKING:
@@ -25,7 +23,7 @@ def print_end(done: RunResult, json_: bool) -> int:
         The exit code.
     """
     if json_:
-        sys.stdout.write(json.dumps({**done.result, "folder": str(done.folder)}, indent=2, allow_nan=False) + "\n")
+        print_json({**done.result, "folder": str(done.folder)})
     else:
         print_result(done)
     for refused in done.unwritten:

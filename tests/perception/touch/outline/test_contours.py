@@ -1,5 +1,4 @@
 import itertools
-import types
 
 import numpy as np
 import pytest
@@ -181,8 +180,3 @@ def test_quality_falls_with_uneven_coverage():
 def test_invalid_contacts_are_refused(bad):
     with pytest.raises(ParamError, match="tip_K_m"):
         fit_contour(bad, R)
-
-
-def test_every_exported_name_exists():
-    assert isinstance(touch, types.ModuleType)
-    assert all(hasattr(touch, name) for name in touch.__all__)
