@@ -32,6 +32,7 @@ from glotouch_bt.robot.fake import FakeRobot
 from glotouch_bt.robot.geometry import (
     Array,
     Pose,
+    cross,
     cross_matrix,
     frozen_array,
     matrix_to_quat,
@@ -87,6 +88,7 @@ __all__ = [
     "UnknownName",
     "World",
     "backend_entry_points",
+    "cross",
     "cross_matrix",
     "frozen_array",
     "load_backend",

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from glotouch_bt.robot.command import Command, GripperTarget, Request, SetPayload, Tare
 from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription
 from glotouch_bt.robot.errors import BadInput, ParamError, SafetyStop
-from glotouch_bt.robot.geometry import Array, Pose, cross_matrix, frozen_array
+from glotouch_bt.robot.geometry import Array, Pose, cross, cross_matrix, frozen_array
 from glotouch_bt.robot.interface import Backend, Robot
 from glotouch_bt.robot.limits import Limits
 from glotouch_bt.robot.observation import GripperState, Observation, TactileFrame
@@ -302,7 +302,7 @@ class FakeRobot(Robot):
         balls = position + _turned(quat, np.broadcast_to(self._tip_P, position.shape))
         force_B = sum((wall.force_B_N(balls, self._tip_radius) for wall in self.walls), np.zeros_like(position))
         out[:, :3] = _turned(quat * [1.0, -1.0, -1.0, -1.0], force_B) @ E_P.rotation.T
-        out[:, 3:] = np.cross(E_P.apply(self._tip_P), out[:, :3])
+        out[:, 3:] = cross(E_P.apply(self._tip_P), out[:, :3])
         return out
 
     def _take_tare(self) -> None:

@@ -29,6 +29,7 @@ from glotouch_bt.robot import (
     Probe,
     Robot,
     World,
+    cross_matrix,
 )
 from glotouch_bt.robot.fake import FakeRobot, forward
 from glotouch_bt.skill import Context, Skill
@@ -94,6 +95,8 @@ class BenchRobot(FakeRobot):
         self.moment_S_Nm = np.asarray(moment_S_Nm)
         self.speed_rad_s = np.zeros(7)
         self.velocity_B: Array | None = None
+        self.hand = Payload.hand(RIZON4_XENSE.gripper, world.probe)
+        self.lever_S = cross_matrix(RIZON4_XENSE.gripper.pose_E_P.apply((0.0, 0.0, tip_P_m)))
         super().__init__(RIZON4_XENSE, wrench=self._all_felt, grip_width_m=grip_width_m)
 
     def cycle(self, command: Command) -> Observation:
@@ -111,24 +114,23 @@ class BenchRobot(FakeRobot):
         return super().cycle(command)
 
     def _all_felt(self, stamp: Array, position: Array, quat: Array) -> Array:
-        pose, K = Pose(position[-1], quat[-1]), self.world.container.pose_B_K
-        tip_P = np.array([0.0, 0.0, self.tip_P_m])
-        ball = K.inverse().apply(position + pose.rotation @ tip_P)
-        force_B = sum((t(ball, 0.006) for t in self.things), np.zeros_like(ball)) @ K.rotation.T
-        contact = force_B @ pose.rotation
-        lever = self.description.gripper.pose_E_P.apply(tip_P)
-        down_S = pose.rotation.T @ np.array([0.0, 0.0, -1.0])
-        weight = np.array([self.weight_N(p, self._aperture) for p in position])[:, None] * down_S
-        force = np.hstack([contact + weight, np.cross(lever, contact) + self.moment_S_Nm])
-        return force + self._inertial(position, pose, float(stamp[-1] - stamp[0]))
+        pose, wrench = Pose(position[-1], quat[-1]), np.zeros((len(stamp), 6))
+        if self.things:
+            K = self.world.container.pose_B_K
+            ball = K.inverse().apply(position + pose.rotation @ np.array([0.0, 0.0, self.tip_P_m]))
+            contact = sum(t(ball, 0.006) for t in self.things) @ K.rotation.T @ pose.rotation
+            wrench[:, :3], wrench[:, 3:] = contact, contact @ self.lever_S.T
+        down_S = -pose.rotation[2]
+        wrench[:, :3] += np.array([self.weight_N(p, self._aperture) for p in position])[:, None] * down_S
+        wrench[:, 3:] += self.moment_S_Nm
+        return wrench + self._inertial(position, pose, float(stamp[-1] - stamp[0]))
 
     def _inertial(self, position: Array, pose: Pose, span_s: float) -> Array:
         """(6,) what the hand with the probe feels of the change of velocity since the last period."""
         velocity = (position[-1] - position[0]) / span_s
         change = velocity - (velocity if self.velocity_B is None else self.velocity_B)
         self.velocity_B = velocity
-        hand = Payload.hand(self.description.gripper, self.world.probe)
-        return np.asarray(hand.wrench_S(pose.rotation.T @ change / self.period_s))
+        return np.asarray(self.hand.wrench_S(pose.rotation.T @ change / self.period_s))
 
 
 class Bench:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from glotouch_bt.robot import Array, Gripper, Observation, ParamError, Pose, Probe, frozen_array, quat_to_matrix
+from glotouch_bt.robot import Array, Gripper, Observation, ParamError, Pose, Probe, cross, frozen_array, quat_to_matrix
 
 NEAREST = 9
 """Number of samples per acceleration: 4 ms to either side at 1 kHz, a usual wrist latency. Position noise of 1 um gives
@@ -62,7 +62,7 @@ class Payload:
     def wrench_S(self, acceleration_S_m_s2: Array) -> Array:
         """Return the inertial wrench (..., 6) N and Nm in S at S for accelerations (..., 3) of a translation."""
         force = -self.mass_kg * np.asarray(acceleration_S_m_s2, dtype=np.float64)
-        return np.concatenate([force, np.cross(self.com_S_m, force)], axis=-1)
+        return np.concatenate([force, cross(self.com_S_m, force)], axis=-1)
 
 
 class MeasuredInertia:
