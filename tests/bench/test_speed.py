@@ -21,7 +21,7 @@ from glotouch_bt.bench.speed import CycleTimes, SpeedStudy, SpeedTrial, TimedRec
 from glotouch_bt.robot import Backend, BadInput, Command, Observation, Robot
 from glotouch_bt.robot.simulation.referee import BareSteps, Referee
 
-HOUSE = Path(__file__).parents[1] / "support" / "fake_cli.py"
+FAKE_CLI = Path(__file__).parents[1] / "support" / "fake_cli.py"
 MISSION = (
     "mission: nap\nworld: container_five\ntree:\n  - wait: {name: first, seconds: 0.2}\n  - wait: {name: second}\n"
 )
@@ -46,7 +46,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 @pytest.fixture
 def house(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    spec = importlib.util.spec_from_file_location("fake_cli", HOUSE)
+    spec = importlib.util.spec_from_file_location("fake_cli", FAKE_CLI)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)

@@ -22,7 +22,7 @@ from glotouch_bt import cli
 from glotouch_bt.mission.checkpoint.store import CHECKPOINT_FILE
 from glotouch_bt.report import read_run
 
-HOUSE = Path(__file__).parents[2] / "support" / "fake_cli.py"
+FAKE_CLI = Path(__file__).parents[2] / "support" / "fake_cli.py"
 HEAD = "mission: m\nworld: container_five\nparameters:\n  end: {type: str, default: ok}\n"
 TREE = """tree:
   sequence:
@@ -40,7 +40,7 @@ DIFFERS = ("wall_time_s", "wall_open_s", "resumed")
 
 def glotouch(*words: object) -> Any:
     """In this process: starting one takes longer than the mission."""
-    spec = importlib.util.spec_from_file_location("fake_cli", HOUSE)
+    spec = importlib.util.spec_from_file_location("fake_cli", FAKE_CLI)
     assert spec is not None
     assert spec.loader is not None
     with pytest.MonkeyPatch.context() as patch:
@@ -54,7 +54,8 @@ def glotouch(*words: object) -> Any:
 
 def started(*words: object) -> subprocess.Popen[bytes]:
     """A process of its own, to be killed."""
-    return subprocess.Popen([sys.executable, HOUSE, *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    command = [sys.executable, FAKE_CLI, *map(str, words)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
 
 @pytest.fixture(scope="module")

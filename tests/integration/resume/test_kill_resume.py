@@ -8,7 +8,7 @@ from pathlib import Path
 
 from glotouch_bt.validation.kill_resume import KillStudy, run_study, summarise
 
-HOUSE = Path(__file__).parents[1] / "support" / "fake_cli.py"
+FAKE_CLI = Path(__file__).parents[2] / "support" / "fake_cli.py"
 MISSION = """mission: m
 world: container_five
 tree:
@@ -21,7 +21,7 @@ tree:
 
 def test_a_killed_run_is_compared_with_its_twin(tmp_path: Path) -> None:
     (tmp_path / "m.yaml").write_text(MISSION)
-    study = KillStudy(str(tmp_path / "m.yaml"), [3], 1, tmp_path / "out", words=(sys.executable, str(HOUSE)))
+    study = KillStudy(str(tmp_path / "m.yaml"), [3], 1, tmp_path / "out", words=(sys.executable, str(FAKE_CLI)))
     rows: list[dict[str, object]] = []
     summary = run_study(study, lambda row, done, total: rows.append(row))
     (row,) = rows
