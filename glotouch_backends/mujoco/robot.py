@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import mujoco
 import numpy as np
 
@@ -166,14 +164,10 @@ class MujocoRobot(Robot):
     def start(self, request: Request) -> Ticket:
         """See `Robot`."""
         if isinstance(request, Tare):
-            if not (math.isfinite(request.duration_s) and request.duration_s > 0):
-                raise ParamError("tare.duration_s", request.duration_s, "finite and positive")
             if self._tare is not None:
                 self._tare.ticket.error, self._tare.ticket.done = "replaced by a newer tare", True
             self._tare = PendingTare(request, max(1, round(request.duration_s / self.period_s)))
             return self._tare.ticket
-        if not (math.isfinite(request.mass_kg) and request.mass_kg >= 0):
-            raise ParamError("payload.mass_kg", request.mass_kg, "finite and not negative")
         if self._payload is not None:
             self._payload.ticket.error, self._payload.ticket.done = "replaced by a newer payload", True
         self._payload = PendingPayload(request, max(1, round(PAYLOAD_S / self.period_s)))

@@ -8,5 +8,3 @@ class TestMine(RobotConformance):
 
 from glotouch_bt.conformance.rig import Rig, Wall
 from glotouch_bt.conformance.suite import RobotConformance
-
-__all__ = ["Rig", "RobotConformance", "Wall"]

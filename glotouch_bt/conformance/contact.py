@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
@@ -19,21 +17,6 @@ APPROACH_GAP_M = 0.008
 """Gap to the wall at which the guarded move starts."""
 OVERTRAVEL_M = 0.05
 """Distance beyond the wall that is commanded."""
-
-
-@dataclass(frozen=True)
-class GuardedContact:
-    """End of a guarded move.
-
-    Attributes:
-        sensed: Block in which the guard tripped.
-        gap_m: Gap to the nominal wall in that block.
-        before_N: Largest force along the normal before it.
-    """
-
-    sensed: Observation
-    gap_m: float
-    before_N: float
 
 
 class ContactTests(Conformance):
@@ -60,8 +43,8 @@ class ContactTests(Conformance):
         turns = [(Pose(p, q) @ E_P.inverse()).rotation for p, q in zip(o.position_B_P, o.quat_B_P, strict=True)]
         return np.array([(r @ w[:3]) @ wall.normal_B for r, w in zip(turns, o.wrench_S, strict=True)])
 
-    def _until_touch(self, rig: Rig, wall: Wall) -> GuardedContact:
-        """Approach until the guard trips; the arm is still moving then."""
+    def _until_touch(self, rig: Rig, wall: Wall) -> tuple[float, float]:
+        """Approach until the guard trips in motion; return the gap there, m, and the largest force before, N."""
         before: list[float] = []
 
         def trips(o: Observation) -> bool:
@@ -74,22 +57,22 @@ class ContactTests(Conformance):
         here = rig.kinematics.fk(rig.q)
         goal = Pose(here.position_m - wall.normal_B * (APPROACH_GAP_M + OVERTRAVEL_M), here.quat)
         rig.go(goal, SPEED_M_S, until=trips)
-        return GuardedContact(rig.last, wall.gap_m(rig.last.pose_B_P), max(before[:-3], default=0.0))
+        return wall.gap_m(rig.last.pose_B_P), max(before[:-3], default=0.0)
 
     def test_a_guarded_move_stops_at_a_wall(self) -> None:
         """No force before the wall, a force out of the wall at it, in time; then the arm stands near it."""
         wall = self._wall()
         with self.own() as rig:
             self._approach(rig, wall)
-            touch = self._until_touch(rig, wall)
-            assert touch.before_N < TOUCH_FORCE_N, "something was felt before the wall"
-            assert abs(touch.gap_m) < wall.tolerance_m + 0.002, f"felt {touch.gap_m * 1e3:.1f} mm before the wall"
-            felt = self._felt_B(touch.sensed, wall, rig)
+            gap_m, before_N = self._until_touch(rig, wall)
+            assert before_N < TOUCH_FORCE_N, "something was felt before the wall"
+            assert abs(gap_m) < wall.tolerance_m + 0.002, f"felt {gap_m * 1e3:.1f} mm before the wall"
+            felt = self._felt_B(rig.last, wall, rig)
             assert felt.max() > 0.8 * TOUCH_FORCE_N, "the hand must feel the wall pushing it back"
             assert felt.max() > -felt.min()
             seen = rig.hold(0.3)
             deepest = min(wall.gap_m(Pose(p, q)) for o in seen for p, q in zip(o.position_B_P, o.quat_B_P, strict=True))
-            assert deepest > touch.gap_m - 0.002, "it pressed on"
+            assert deepest > gap_m - 0.002, "it pressed on"
             force = np.linalg.norm(stack(seen, "wrench_S")[:, :3], axis=1)
             assert force.max() < rig.robot.limits.hard_force_N
             still = stack(seen[-10:], "position_B_P")

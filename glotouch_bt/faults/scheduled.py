@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from glotouch_bt.faults.effects import Effect
 from glotouch_bt.faults.plan import FaultSpec
 from glotouch_bt.faults.proof import Proof
@@ -21,7 +23,7 @@ class ScheduledFault:
         spent: It will not start again.
     """
 
-    def __init__(self, spec: FaultSpec, effect: Effect) -> None:
+    def __init__(self, spec: FaultSpec, effect: Effect[Any]) -> None:
         self.spec, self.effect = spec, effect
         self.proof = Proof(spec, effect.actions)
         self.active = False

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
+from glotouch_bt.robot.errors import ParamError
 from glotouch_bt.robot.geometry import Array, Pose, frozen_array
 
 
@@ -66,6 +68,10 @@ class Tare:
 
     duration_s: float = 0.2
 
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.duration_s) and self.duration_s > 0):
+            raise ParamError("tare.duration_s", self.duration_s, "finite and positive")
+
 
 @dataclass(frozen=True)
 class SetPayload:
@@ -80,6 +86,8 @@ class SetPayload:
     com_P_m: Array
 
     def __post_init__(self) -> None:
+        if not (math.isfinite(self.mass_kg) and self.mass_kg >= 0):
+            raise ParamError("payload.mass_kg", self.mass_kg, "finite and not negative")
         object.__setattr__(self, "com_P_m", frozen_array("com_P_m", self.com_P_m, (3,)))
 
 

@@ -13,7 +13,7 @@ from math import acos, atan2, hypot, pi
 import numpy as np
 import numpy.typing as npt
 
-from glotouch_bt.robot.command import Command, GripperTarget, Request, SetPayload, Tare
+from glotouch_bt.robot.command import Command, GripperTarget, PendingTicket, Request, SetPayload
 from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription
 from glotouch_bt.robot.errors import BadInput, ParamError, SafetyStop
 from glotouch_bt.robot.geometry import Array, Pose, cross, cross_matrix, frozen_array
@@ -137,19 +137,6 @@ class SpringWall:
         return np.asarray(self.stiffness_N_m * depth[:, None] * self.normal_B, dtype=np.float64)
 
 
-@dataclass
-class FakeTicket:
-    """A request that ends after a number of cycles."""
-
-    cycles_left: int
-    error: str | None = None
-
-    @property
-    def done(self) -> bool:
-        """True once its cycles have passed."""
-        return self.cycles_left <= 0
-
-
 class FakeRobot(Robot):
     """A robot that follows every setpoint exactly.
 
@@ -201,7 +188,7 @@ class FakeRobot(Robot):
         self._aperture = description.gripper.stroke_m
         self._target = GripperTarget(self._aperture, description.gripper.speed_m_s, 10.0)
         self._bias = np.zeros(6)
-        self._tare: tuple[FakeTicket, list[Array]] | None = None
+        self._tare: tuple[PendingTicket, int, list[Array]] | None = None
         self._stop: SafetyStop | None = None
         self._lower = np.array([j.lower_rad for j in description.joints])
         self._upper = np.array([j.upper_rad for j in description.joints])
@@ -232,14 +219,12 @@ class FakeRobot(Robot):
         self._enforce()
         return self._newest
 
-    def start(self, request: Request) -> FakeTicket:
+    def start(self, request: Request) -> PendingTicket:
         """Start a tare, which takes its duration, or a payload, which takes no time."""
         if isinstance(request, SetPayload):
-            ticket = FakeTicket(0)
-        else:
-            assert isinstance(request, Tare)
-            ticket = FakeTicket(max(1, round(request.duration_s / self.period_s)))
-            self._tare = (ticket, [])
+            return PendingTicket(done=True)
+        ticket = PendingTicket()
+        self._tare = (ticket, round(request.duration_s / self.period_s), [])
         return ticket
 
     def hold(self) -> None:
@@ -308,10 +293,10 @@ class FakeRobot(Robot):
     def _take_tare(self) -> None:
         if self._tare is None:
             return
-        ticket, blocks = self._tare
+        ticket, periods, blocks = self._tare
         blocks.append(self._raw)
-        ticket.cycles_left -= 1
-        if ticket.done:
+        if len(blocks) >= periods:
+            ticket.done = True
             self._bias = np.concatenate(blocks).mean(axis=0)
             self._tare = None
 

@@ -12,6 +12,9 @@ from dataclasses import dataclass
 
 from glotouch_bt.robot.geometry import Array, Pose
 
+SAMPLED = ("stamp_s", "q", "dq", "position_B_P", "quat_B_P", "wrench_S")
+"""Fields of an `Observation` with one row a sample."""
+
 
 @dataclass(frozen=True, slots=True)
 class GripperState:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -19,13 +18,10 @@ class FollowingErrorParams(FaultParams):
     rise_s: float = param("Time in which the deviation grows to that", unit="s", default=0.5, gt=0.0, le=60.0)
 
 
-class FollowingError(Effect):
+class FollowingError(Effect[FollowingErrorParams]):
     """One joint deviates from its setpoint; the device measures its true position."""
 
-    Params = FollowingErrorParams
-    params: FollowingErrorParams
-
-    def __init__(self, params: Any, context: EffectContext) -> None:
+    def __init__(self, params: FollowingErrorParams, context: EffectContext) -> None:
         super().__init__(params, context)
         if params.joint >= context.description.dof:
             raise BadInput(f"joint {params.joint}: this arm has joints 0 to {context.description.dof - 1}")
@@ -53,11 +49,8 @@ class JointLimitParams(FaultParams):
     margin_rad: float = param("Largest joint motion since its start", unit="rad", default=0.05, gt=0.0, le=3.0)
 
 
-class JointLimit(Effect):
+class JointLimit(Effect[JointLimitParams]):
     """The device refuses setpoints outside a range narrower than in its description."""
-
-    Params = JointLimitParams
-    params: JointLimitParams
 
     def begin(self) -> None:
         """See `Effect`."""
@@ -83,11 +76,8 @@ class LostCycleParams(FaultParams):
     lost: float = param("Share of the commands that are lost", default=0.2, gt=0.0, le=1.0)
 
 
-class LostCycle(Effect):
-    """Commands get lost on the way: the device condition_holds for that period."""
-
-    Params = LostCycleParams
-    params: LostCycleParams
+class LostCycle(Effect[LostCycleParams]):
+    """Commands get lost on the way: the device holds for that period."""
 
     def command(self, command: Command) -> Command:
         """See `Effect`."""
@@ -104,11 +94,9 @@ class SlowCycleParams(FaultParams):
     share: float = param("Share of the cycles that are slow", default=0.1, gt=0.0, le=1.0)
 
 
-class SlowCycle(Effect):
-    """Cycles overrun: the device condition_holds on its own for some periods, whose samples nobody gets."""
+class SlowCycle(Effect[SlowCycleParams]):
+    """Cycles overrun: the device holds on its own for some periods, whose samples nobody gets."""
 
-    Params = SlowCycleParams
-    params: SlowCycleParams
     drives = True
 
     def drive(self, cycle: Cycle, command: Command) -> Observation:
@@ -121,7 +109,7 @@ class SlowCycle(Effect):
         return observation
 
 
-class StaleData(Effect):
+class StaleData(Effect[FaultParams]):
     """The block before the fault is delivered repeatedly with its old stamps; the device continues."""
 
     def begin(self) -> None:
@@ -139,11 +127,9 @@ class RobotFaultParams(FaultParams):
     message: str = param("Message of the controller", default="servo fault (injected)")
 
 
-class RobotFault(Effect):
+class RobotFault(Effect[RobotFaultParams]):
     """The robot's controller stops by itself: every robot call fails."""
 
-    Params = RobotFaultParams
-    params: RobotFaultParams
     drives = True
 
     def drive(self, cycle: Cycle, command: Command) -> Observation:
@@ -157,7 +143,7 @@ class RobotFault(Effect):
         raise BackendError(f"robot fault stop: {self.params.message}")
 
 
-class IkFailure(Effect):
+class IkFailure(Effect[FaultParams]):
     """The arm's own planner finds no solution: the device refuses a motion."""
 
     drives = True

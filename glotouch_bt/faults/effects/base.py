@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import ClassVar, Generic, TypeVar, get_args
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from glotouch_bt.robot import Array, BadInput, Command, Observation, Request, RobotDescription, Ticket
+from glotouch_bt.robot import SAMPLED, Array, BadInput, Command, Observation, Request, RobotDescription, Ticket
 from glotouch_bt.robot.simulation import Disturber
 from glotouch_bt.skill import param
 
-__all__ = ["Effect", "EffectContext", "FaultParams", "param"]
+__all__ = ["Effect", "EffectContext", "FaultParams", "P", "param"]
 
 Cycle = Callable[[Command], Observation]
 
@@ -22,6 +22,9 @@ class FaultParams(BaseModel):
     """Base of every fault's parameters. YAML keys are the field names; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+P = TypeVar("P", bound=FaultParams)
 
 
 @dataclass
@@ -60,8 +63,10 @@ class Actions:
     notes: list[str] = field(default_factory=list)
 
 
-class Effect:
-    """The effect of one fault. Every method has a default that changes nothing.
+class Effect(Generic[P]):
+    """The effect of one fault: `Effect[FaultParams]` or, with parameters of its own, `Effect[ItsParams]`.
+
+    Every method has a default that changes nothing.
 
     Args:
         params: Parameters of the plan.
@@ -72,7 +77,12 @@ class Effect:
     drives: ClassVar[bool] = False
     """True for effects that override `drive`."""
 
-    def __init__(self, params: Any, context: EffectContext) -> None:
+    def __init_subclass__(cls) -> None:
+        for base in cls.__dict__.get("__orig_bases__", ()):
+            if isinstance(own := get_args(base)[0], type):
+                cls.Params = own
+
+    def __init__(self, params: P, context: EffectContext) -> None:
         self.params, self.context, self.actions = params, context, Actions()
 
     def prepare(self) -> None:
@@ -121,17 +131,7 @@ def samples_altered(before: Observation, after: Observation) -> int:
     """Return the number of differing samples: rows, the gripper state, the pair of depth maps."""
     if before is after:
         return 0
-    rows = max(
-        rows_altered(b, a)
-        for b, a in (
-            (before.stamp_s, after.stamp_s),
-            (before.q, after.q),
-            (before.dq, after.dq),
-            (before.position_B_P, after.position_B_P),
-            (before.quat_B_P, after.quat_B_P),
-            (before.wrench_S, after.wrench_S),
-        )
-    )
+    rows = max(rows_altered(getattr(before, name), getattr(after, name)) for name in SAMPLED)
     jaws = int(before.gripper != after.gripper)
     one, two = before.tactile, after.tactile
     if one is two:

@@ -43,7 +43,7 @@ class FaultKind:
     name: str
     channel: str
     summary: str
-    effect: type[Effect]
+    effect: type[Effect[Any]]
     seen_by: str
     recoverable: bool
 
@@ -90,7 +90,7 @@ class FaultKind:
 
 def _kinds() -> Mapping[str, FaultKind]:
     watch, guard, tree = "supervision", "the guarded move or the hard limit", "the skill that meets it"
-    rows: tuple[tuple[str, str, str, type[Effect], str, bool], ...] = (
+    rows: tuple[tuple[str, str, str, type[Effect[Any]], str, bool], ...] = (
         ("wrench_off", "wrench", "every component reads zero", wrench.WrenchOff, watch, False),
         ("wrench_stuck", "wrench", "the last sample is repeated", wrench.WrenchStuck, watch, False),
         ("wrench_garbage", "wrench", "samples are NaN, infinite or huge", wrench.WrenchGarbage, watch, False),

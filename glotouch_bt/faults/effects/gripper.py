@@ -8,7 +8,7 @@ from glotouch_bt.faults.effects.base import Effect, FaultParams, param
 from glotouch_bt.robot import Command, GripperTarget, Observation
 
 
-class GripStall(Effect):
+class GripStall(Effect[FaultParams]):
     """The jaws do not move: targets are accepted and not executed."""
 
     def begin(self) -> None:
@@ -38,11 +38,8 @@ class GripShortParams(FaultParams):
     min_m: float = param("Smallest aperture they reach", unit="m", default=0.0, ge=0.0, le=0.08, formerly="least_m")
 
 
-class GripShort(Effect):
+class GripShort(Effect[GripShortParams]):
     """The jaws do not close completely."""
-
-    Params = GripShortParams
-    params: GripShortParams
 
     def command(self, command: Command) -> Command:
         """See `Effect`."""
@@ -60,11 +57,8 @@ class GripSlipParams(FaultParams):
     factor: float = param("Share of the commanded force that the jaws apply", default=0.1, gt=0.0, lt=1.0)
 
 
-class GripSlip(Effect):
+class GripSlip(Effect[GripSlipParams]):
     """The jaws apply a fraction of the commanded force and report the commanded force."""
-
-    Params = GripSlipParams
-    params: GripSlipParams
 
     def begin(self) -> None:
         """See `Effect`."""
@@ -92,11 +86,8 @@ class GripMisreportParams(FaultParams):
     aperture_m: float = param("Added to the reported aperture", unit="m", default=0.004, ge=-0.08, le=0.08)
 
 
-class GripMisreport(Effect):
+class GripMisreport(Effect[GripMisreportParams]):
     """The reported aperture has a constant error."""
-
-    Params = GripMisreportParams
-    params: GripMisreportParams
 
     def sense(self, observation: Observation) -> Observation:
         """See `Effect`."""
@@ -112,11 +103,8 @@ class GripDropParams(FaultParams):
     masked: bool = param("Report the state before the fault", default=False)
 
 
-class GripDrop(Effect):
+class GripDrop(Effect[GripDropParams]):
     """The jaws open briefly and close again, so that the probe or object they hold falls."""
-
-    Params = GripDropParams
-    params: GripDropParams
 
     def begin(self) -> None:
         """See `Effect`."""

@@ -11,11 +11,8 @@ class WrongScaleStlParams(FaultParams):
     factor: float = param("Size of the model relative to the object", default=1.15, ge=0.2, le=5.0)
 
 
-class WrongScaleStl(Effect):
+class WrongScaleStl(Effect[WrongScaleStlParams]):
     """The target's STL has the wrong scale; the real object does not change."""
-
-    Params = WrongScaleStlParams
-    params: WrongScaleStlParams
 
     def prepare(self) -> None:
         """See `Effect`. `models.wrong_models` replaced the model when the mission was loaded."""

@@ -10,7 +10,7 @@ from glotouch_bt.faults.effects.base import Cycle, Effect, FaultParams, param
 from glotouch_bt.robot import BadInput, Command, Observation
 
 
-class DriverException(Effect):
+class DriverException(Effect[FaultParams]):
     """The driver raises an undocumented error."""
 
     drives = True
@@ -32,11 +32,9 @@ class HangParams(FaultParams):
     wall_s: float = param("Wall time for which one cycle blocks", unit="s", default=2.0, gt=0.0, le=600.0)
 
 
-class Hang(Effect):
+class Hang(Effect[HangParams]):
     """One cycle blocks for a while."""
 
-    Params = HangParams
-    params: HangParams
     drives = True
 
     def begin(self) -> None:
@@ -52,7 +50,7 @@ class Hang(Effect):
         return cycle(command)
 
 
-class Kill(Effect):
+class Kill(Effect[FaultParams]):
     """The process is killed (SIGKILL), as in a power failure; only if it runs nothing but this mission."""
 
     drives = True

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from glotouch_bt.faults.effects.base import Effect, FaultParams, param
+from glotouch_bt.faults.effects.base import Effect, FaultParams, P, param
 from glotouch_bt.robot import Observation, TactileFrame
 
 
-class TouchEffect(Effect):
+class TouchEffect(Effect[P]):
     """Base of effects that replace or drop a pair of depth maps."""
 
     def sense(self, observation: Observation) -> Observation:
@@ -31,11 +31,8 @@ class TouchDeadParams(FaultParams):
     share: float = param("Share of the taxels that deliver nothing", default=0.3, gt=0.0, le=1.0)
 
 
-class TouchDead(TouchEffect):
+class TouchDead(TouchEffect[TouchDeadParams]):
     """A fixed set of taxels delivers NaN."""
-
-    Params = TouchDeadParams
-    params: TouchDeadParams
 
     def begin(self) -> None:
         """See `Effect`."""
@@ -50,7 +47,7 @@ class TouchDead(TouchEffect):
         )
 
 
-class TouchFrozen(TouchEffect):
+class TouchFrozen(TouchEffect[FaultParams]):
     """The first pair of maps is repeated with new stamps."""
 
     def begin(self) -> None:
@@ -71,18 +68,15 @@ class TouchDroppedParams(FaultParams):
     share: float = param("Share of the frames that are lost", default=1.0, gt=0.0, le=1.0)
 
 
-class TouchDropped(TouchEffect):
+class TouchDropped(TouchEffect[TouchDroppedParams]):
     """Frames are lost."""
-
-    Params = TouchDroppedParams
-    params: TouchDroppedParams
 
     def alter(self, frame: TactileFrame) -> TactileFrame | None:
         """See `TouchEffect`."""
         return None if self.context.rng.random() < self.params.share else frame
 
 
-class TouchSwapped(TouchEffect):
+class TouchSwapped(TouchEffect[FaultParams]):
     """The maps of the left and the right pad are exchanged."""
 
     def alter(self, frame: TactileFrame) -> TactileFrame:
@@ -97,11 +91,8 @@ class GelOffsetParams(FaultParams):
     right_m: float = param("Added to the right map", unit="m", default=0.0003, ge=-0.002, le=0.002)
 
 
-class GelOffset(TouchEffect):
+class GelOffset(TouchEffect[GelOffsetParams]):
     """Untouched gel reads a depth: it is swollen, or its reference image is old."""
-
-    Params = GelOffsetParams
-    params: GelOffsetParams
 
     def alter(self, frame: TactileFrame) -> TactileFrame:
         """See `TouchEffect`."""

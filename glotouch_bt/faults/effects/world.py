@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
-from glotouch_bt.faults.effects.base import Effect, EffectContext, FaultParams, param, require_disturber
+from glotouch_bt.faults.effects.base import Effect, EffectContext, FaultParams, P, param, require_disturber
 from glotouch_bt.robot import Array, Command, Observation
 from glotouch_bt.robot.simulation import PathBlocked
 
@@ -31,10 +31,10 @@ class ObjectParams(FaultParams):
     which: Which = param("Object: nearest to or farthest from the pads, or any", default="nearest")
 
 
-class WorldEffect(Effect):
+class WorldEffect(Effect[P]):
     """Actions once: when it begins, or as soon after that as there is room."""
 
-    def __init__(self, params: Any, context: EffectContext) -> None:
+    def __init__(self, params: P, context: EffectContext) -> None:
         super().__init__(params, context)
         self.disturber = require_disturber(context)
         self._obstacle = ""
@@ -116,11 +116,8 @@ class ObjectShovedParams(ObjectParams):
     speed_m_s: float = param("Speed after the knock", unit="m/s", default=0.5, gt=0.0, le=3.0)
 
 
-class ObjectShoved(WorldEffect):
+class ObjectShoved(WorldEffect[ObjectShovedParams]):
     """An object is knocked and slides in a random direction away from the robot, about 20 mm at 0.5 m/s."""
-
-    Params = ObjectShovedParams
-    params: ObjectShovedParams
 
     def draw(self) -> None:
         """See `WorldEffect`."""
@@ -145,11 +142,8 @@ class ObjectShoved(WorldEffect):
         return observation
 
 
-class ObjectToppled(WorldEffect):
+class ObjectToppled(WorldEffect[ObjectParams]):
     """An object is laid on its side where there is room."""
-
-    Params = ObjectParams
-    params: ObjectParams
 
     def draw(self) -> None:
         """See `WorldEffect`."""
@@ -162,11 +156,8 @@ class ObjectToppled(WorldEffect):
         self.note(self._index, before, "toppled")
 
 
-class ObjectRemoved(WorldEffect):
+class ObjectRemoved(WorldEffect[ObjectParams]):
     """An object is removed."""
-
-    Params = ObjectParams
-    params: ObjectParams
 
     def draw(self) -> None:
         """See `WorldEffect`."""
@@ -179,11 +170,8 @@ class ObjectRemoved(WorldEffect):
         self.note(self._index, before, "taken away")
 
 
-class ObjectAdded(WorldEffect):
+class ObjectAdded(WorldEffect[ObjectParams]):
     """An object missing at first is put at its place of the layout."""
-
-    Params = ObjectParams
-    params: ObjectParams
 
     def prepare(self) -> None:
         """See `Effect`."""
@@ -204,11 +192,8 @@ class ContainerOffsetParams(FaultParams):
     yaw_rad: float = param("Rotation about its middle", unit="rad", default=0.0, ge=-0.5, le=0.5)
 
 
-class ContainerOffset(WorldEffect):
+class ContainerOffset(WorldEffect[ContainerOffsetParams]):
     """The container is moved with its content."""
-
-    Params = ContainerOffsetParams
-    params: ContainerOffsetParams
 
     def act(self) -> None:
         """See `WorldEffect`."""

@@ -6,17 +6,17 @@ They alter what is reported. A device that watches its own sensor internally is 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
-from glotouch_bt.faults.effects.base import Effect, EffectContext, FaultParams, param
+from glotouch_bt.faults.effects.base import Effect, EffectContext, FaultParams, P, param
 from glotouch_bt.robot import Array, Observation, Request, Tare, Ticket
 
 Triple = tuple[float, float, float]
 
 
-class WrenchEffect(Effect):
+class WrenchEffect(Effect[P]):
     """Base of effects that alter the block of wrenches."""
 
     def sense(self, observation: Observation) -> Observation:
@@ -29,7 +29,7 @@ class WrenchEffect(Effect):
         raise NotImplementedError
 
 
-class WrenchOff(WrenchEffect):
+class WrenchOff(WrenchEffect[FaultParams]):
     """The connection is dead: every component reads exactly zero."""
 
     def alter(self, wrench_S: Array, stamp_s: Array) -> Array:
@@ -37,7 +37,7 @@ class WrenchOff(WrenchEffect):
         return np.zeros_like(wrench_S)
 
 
-class WrenchStuck(WrenchEffect):
+class WrenchStuck(WrenchEffect[FaultParams]):
     """The last sample before the fault is repeated."""
 
     def begin(self) -> None:
@@ -56,11 +56,9 @@ class WrenchGarbageParams(FaultParams):
     share: float = param("Share of the samples that are garbage", default=1.0, gt=0.0, le=1.0)
 
 
-class WrenchGarbage(WrenchEffect):
+class WrenchGarbage(WrenchEffect[WrenchGarbageParams]):
     """Samples are invalid numbers."""
 
-    Params = WrenchGarbageParams
-    params: WrenchGarbageParams
     _VALUES: ClassVar[dict[str, float]] = {"nan": float("nan"), "inf": float("inf"), "huge": 1e9}
 
     def alter(self, wrench_S: Array, stamp_s: Array) -> Array:
@@ -73,7 +71,7 @@ class WrenchGarbage(WrenchEffect):
         return out
 
 
-class WrenchOffsetEffect(WrenchEffect):
+class WrenchOffsetEffect(WrenchEffect[P]):
     """Base of effects that add a wrench inside the sensor; a tare during the fault removes it."""
 
     def begin(self) -> None:
@@ -104,11 +102,8 @@ class WrenchBiasParams(FaultParams):
     torque_Nm: Triple = param("Added torque (x, y, z) in S", unit="Nm", default=(0.0, 0.0, 0.0))
 
 
-class WrenchBias(WrenchOffsetEffect):
+class WrenchBias(WrenchOffsetEffect[WrenchBiasParams]):
     """A constant is added, until the next tare."""
-
-    Params = WrenchBiasParams
-    params: WrenchBiasParams
 
     def added(self, since_s: Array) -> Array:
         """See `WrenchOffsetEffect`."""
@@ -121,11 +116,8 @@ class WrenchDriftParams(FaultParams):
     rate_N_s: Triple = param("Force per second (x, y, z) in S", unit="N/s", default=(0.2, 0.0, 0.2))
 
 
-class WrenchDrift(WrenchOffsetEffect):
+class WrenchDrift(WrenchOffsetEffect[WrenchDriftParams]):
     """A ramp is added that starts at zero; a tare restarts it."""
-
-    Params = WrenchDriftParams
-    params: WrenchDriftParams
 
     def added(self, since_s: Array) -> Array:
         """See `WrenchOffsetEffect`."""
@@ -138,11 +130,8 @@ class WrenchScaleParams(FaultParams):
     factor: float = param("Every component is multiplied by this", default=0.3, ge=-10.0, le=10.0)
 
 
-class WrenchScale(WrenchEffect):
+class WrenchScale(WrenchEffect[WrenchScaleParams]):
     """Every component is multiplied by a wrong gain."""
-
-    Params = WrenchScaleParams
-    params: WrenchScaleParams
 
     def alter(self, wrench_S: Array, stamp_s: Array) -> Array:
         """See `WrenchEffect`."""
@@ -156,11 +145,8 @@ class WrenchNoiseParams(FaultParams):
     torque_sd_Nm: float = param("Standard deviation of each torque", unit="Nm", default=0.05, ge=0.0, le=100.0)
 
 
-class WrenchNoise(WrenchEffect):
+class WrenchNoise(WrenchEffect[WrenchNoiseParams]):
     """White noise is added."""
-
-    Params = WrenchNoiseParams
-    params: WrenchNoiseParams
 
     def alter(self, wrench_S: Array, stamp_s: Array) -> Array:
         """See `WrenchEffect`."""
@@ -176,11 +162,8 @@ class WrenchDelayParams(FaultParams):
     delay_s: float = param("Delay of each sample", unit="s", default=0.05, gt=0.0, le=5.0)
 
 
-class WrenchDelay(WrenchEffect):
+class WrenchDelay(WrenchEffect[WrenchDelayParams]):
     """Samples are delayed; until the delay line is full, the last sample before the fault is repeated."""
-
-    Params = WrenchDelayParams
-    params: WrenchDelayParams
 
     def begin(self) -> None:
         """See `Effect`."""
@@ -202,11 +185,8 @@ class WrenchIntermittentParams(FaultParams):
     reads: Literal["held", "zero"] = param("Content of a lost block: the last sample, or zeros", default="held")
 
 
-class WrenchIntermittent(WrenchEffect):
+class WrenchIntermittent(WrenchEffect[WrenchIntermittentParams]):
     """A loose contact: whole blocks are lost."""
-
-    Params = WrenchIntermittentParams
-    params: WrenchIntermittentParams
 
     def begin(self) -> None:
         """See `Effect`."""
@@ -227,13 +207,10 @@ class WrenchSaturationParams(FaultParams):
     torque_Nm: float = param("Largest reported torque component", unit="Nm", default=0.1, gt=0.0, le=1000.0)
 
 
-class WrenchSaturation(WrenchEffect):
+class WrenchSaturation(WrenchEffect[WrenchSaturationParams]):
     """Components are clipped."""
 
-    Params = WrenchSaturationParams
-    params: WrenchSaturationParams
-
-    def __init__(self, params: Any, context: EffectContext) -> None:
+    def __init__(self, params: WrenchSaturationParams, context: EffectContext) -> None:
         super().__init__(params, context)
         self._max = np.array([params.force_N] * 3 + [params.torque_Nm] * 3)
 
@@ -242,7 +219,7 @@ class WrenchSaturation(WrenchEffect):
         return np.clip(wrench_S, -self._max, self._max)
 
 
-class WrenchSignFlip(WrenchEffect):
+class WrenchSignFlip(WrenchEffect[FaultParams]):
     """Every component has the wrong sign."""
 
     def alter(self, wrench_S: Array, stamp_s: Array) -> Array:
@@ -256,13 +233,10 @@ class WrenchFrameFlipParams(FaultParams):
     yaw_rad: float = param("Rotation of the axes about z_S", unit="rad", default=float(np.pi / 2), ge=-7.0, le=7.0)
 
 
-class WrenchFrameFlip(WrenchEffect):
+class WrenchFrameFlip(WrenchEffect[WrenchFrameFlipParams]):
     """The sensor is configured with a wrong mounting: its axes are rotated about z_S."""
 
-    Params = WrenchFrameFlipParams
-    params: WrenchFrameFlipParams
-
-    def __init__(self, params: Any, context: EffectContext) -> None:
+    def __init__(self, params: WrenchFrameFlipParams, context: EffectContext) -> None:
         super().__init__(params, context)
         c, s = np.cos(params.yaw_rad), np.sin(params.yaw_rad)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -288,7 +262,7 @@ class _DelayedTicket:
         return self._polls_left < 0
 
 
-class StaleTare(Effect):
+class StaleTare(Effect[FaultParams]):
     """Tares are acknowledged and not executed."""
 
     def request(self, request: Request) -> Ticket | None:

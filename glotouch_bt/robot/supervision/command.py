@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from glotouch_bt.robot.command import Command, GripperTarget, JointSetpoint
-from glotouch_bt.robot.description import RobotDescription
-from glotouch_bt.robot.limits import Limits
+from glotouch_bt.robot.interface import Robot
 from glotouch_bt.robot.observation import Observation
 from glotouch_bt.robot.supervision.limits import GuardFinding, SupervisionLimits
 
@@ -22,29 +21,22 @@ class CommandGuard:
     """Check every command before it is sent.
 
     Args:
-        description, limits, period_s: Those of the robot.
+        robot: The guarded robot.
         rules: Limits of the guards.
         first: The newest block.
     """
 
-    def __init__(
-        self,
-        description: RobotDescription,
-        limits: Limits,
-        period_s: float,
-        rules: SupervisionLimits,
-        first: Observation,
-    ) -> None:
-        self._joints, self._hand, self._period_s = description.joints, description.gripper, period_s
+    def __init__(self, robot: Robot, rules: SupervisionLimits, first: Observation) -> None:
+        self._joints, self._hand = robot.description.joints, robot.description.gripper
+        self._period_s, self._speed_m_s = robot.period_s, robot.limits.tcp_speed_m_s
         self._start_rad = rules.start_rad
         # lower, upper, largest speed, largest step in a period
         self._ranges = [
-            (j.lower_rad - ROUNDING, j.upper_rad + ROUNDING, fastest, fastest * period_s)
-            for j in description.joints
+            (j.lower_rad - ROUNDING, j.upper_rad + ROUNDING, fastest, fastest * robot.period_s)
+            for j in self._joints
             for fastest in (rules.command_slack * j.velocity_rad_s,)
         ]
-        self._max_step_2 = (rules.command_slack * limits.tcp_speed_m_s * period_s) ** 2
-        self._speed_m_s = limits.tcp_speed_m_s
+        self._max_step_2 = (rules.command_slack * self._speed_m_s * robot.period_s) ** 2
         self.reset(first)
 
     def reset(self, newest: Observation) -> None:

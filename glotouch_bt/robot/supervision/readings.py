@@ -6,14 +6,14 @@ import math
 from collections import deque
 from dataclasses import replace
 from operator import lt
+from typing import Any
 
 import numpy as np
 
 from glotouch_bt.robot.command import Command
-from glotouch_bt.robot.description import RobotDescription
 from glotouch_bt.robot.geometry import Array
-from glotouch_bt.robot.limits import Limits
-from glotouch_bt.robot.observation import Observation
+from glotouch_bt.robot.interface import Robot
+from glotouch_bt.robot.observation import SAMPLED, Observation
 from glotouch_bt.robot.supervision.limits import GuardFinding, SupervisionLimits, TransientCounter
 from glotouch_bt.robot.supervision.signals import TactileSignalGuard, WrenchSignalGuard
 
@@ -32,28 +32,22 @@ class ReadingsGuard:
     """Check every block of readings.
 
     Args:
-        description, limits, period_s: Those of the robot.
+        robot: The guarded robot.
         rules: Limits of the guards.
         first: The newest block. The first block of several samples gives the number of samples a period.
     """
 
-    def __init__(
-        self,
-        description: RobotDescription,
-        limits: Limits,
-        period_s: float,
-        rules: SupervisionLimits,
-        first: Observation,
-    ) -> None:
+    def __init__(self, robot: Robot, rules: SupervisionLimits, first: Observation) -> None:
+        limits, period_s = robot.limits, robot.period_s
         self._rules, self._limits, self._period_s = rules, limits, period_s
-        self._joints = description.joints
+        self._joints = robot.description.joints
         self._transients = TransientCounter(rules)
         self._samples = self._count(first)
         self._last_s = float(first.stamp_s[-1])
         self._late_s = (1.0 + LATE_PERIODS) * period_s
         slack = rules.joint_slack_rad
-        self._ranges = [(j.lower_rad - slack, j.upper_rad + slack) for j in description.joints]
-        self._max_speeds = rules.speed_slack * np.array([j.velocity_rad_s for j in description.joints])
+        self._ranges = [(j.lower_rad - slack, j.upper_rad + slack) for j in self._joints]
+        self._max_speeds = rules.speed_slack * np.array([j.velocity_rad_s for j in self._joints])
         # The fast test compares sums of squares over a block: below the limit no sample can exceed it or be NaN.
         self._per_limit = np.array([1.0 / limits.hard_force_N] * 3 + [1.0 / limits.hard_torque_Nm] * 3)
         self._max_speed_2, self._max_reach_2 = float(self._max_speeds.min()) ** 2, rules.reach_m**2
@@ -300,15 +294,8 @@ class ReadingsGuard:
 
 def _select(o: Observation, good: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Observation:
     """Return the block with the chosen samples only."""
-    return replace(
-        o,
-        stamp_s=o.stamp_s[good],
-        q=o.q[good],
-        dq=o.dq[good],
-        position_B_P=o.position_B_P[good],
-        quat_B_P=o.quat_B_P[good],
-        wrench_S=o.wrench_S[good],
-    )
+    chosen: dict[str, Any] = {name: getattr(o, name)[good] for name in SAMPLED}
+    return replace(o, **chosen)
 
 
 def _within_limits(wrench: Array) -> bool:

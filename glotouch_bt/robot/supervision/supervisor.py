@@ -44,8 +44,8 @@ class Supervisor(Robot):
         self.counts: dict[str, int] = {}
         self._lock = threading.RLock()
         self._newest = first = robot.observe()
-        self._commands = CommandGuard(self.description, self.limits, self.period_s, self.guard_limits, first)
-        self._sensed = ReadingsGuard(self.description, self.limits, self.period_s, self.guard_limits, first)
+        self._commands = CommandGuard(robot, self.guard_limits, first)
+        self._sensed = ReadingsGuard(robot, self.guard_limits, first)
         self._error: BackendError | None = None
 
     @property
