@@ -5,23 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 from glotouch_backends.flexiv_xense.client.link import OPEN_S, DriverLink
 from glotouch_backends.flexiv_xense.client.options import ClientOptions, read_options
 from glotouch_backends.flexiv_xense.client.process import DriverProcess
 from glotouch_backends.flexiv_xense.client.referee import RemoteReferee
 from glotouch_backends.flexiv_xense.client.robot import FlexivXenseRobot
-from glotouch_backends.flexiv_xense.driver import (
-    PROTOCOL,
-    ArmLimits,
-    Block,
-    Devices,
-    DeviceSettings,
-    HandLimits,
-    Open,
-    Opened,
-    ToolData,
-)
+from glotouch_backends.flexiv_xense.driver import messages
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import Backend, Conditions, Limits, Pose, Robot, RobotDescription, World
 from glotouch_bt.robot.simulation import Referee
@@ -33,16 +24,16 @@ def _pose(pose: Pose) -> tuple[float, ...]:
     return (*pose.position_m.tolist(), *pose.quat.tolist())
 
 
-def _tool(description: RobotDescription) -> ToolData:
+def _tool(description: RobotDescription) -> messages.ToolData:
     """Return the bare hand: gripper body and both fingers."""
     g = description.gripper
     mass, com = g.mass_and_com_E()
-    return ToolData(mass_kg=mass, com_E_m=tuple(com.tolist()), pose_E_P=_pose(g.pose_E_P))
+    return messages.ToolData(mass_kg=mass, com_E_m=tuple(com.tolist()), pose_E_P=_pose(g.pose_E_P))
 
 
-def _arm_limits(description: RobotDescription, limits: Limits) -> ArmLimits:
+def _arm_limits(description: RobotDescription, limits: Limits) -> messages.ArmLimits:
     joints = description.joints
-    return ArmLimits(
+    return messages.ArmLimits(
         q_min=tuple(j.lower_rad for j in joints),
         q_max=tuple(j.upper_rad for j in joints),
         dq_max=tuple(j.velocity_rad_s for j in joints),
@@ -55,7 +46,7 @@ def _arm_limits(description: RobotDescription, limits: Limits) -> ArmLimits:
     )
 
 
-def _within(description: RobotDescription, opened: Opened) -> RobotDescription:
+def _within(description: RobotDescription, opened: messages.Opened) -> RobotDescription:
     """Return the description with the device's joint ranges where those are narrower."""
     joints = tuple(
         replace(j, lower_rad=max(j.lower_rad, low), upper_rad=min(j.upper_rad, high))
@@ -96,7 +87,7 @@ class FlexivXenseBackend(Backend):
         conditions: Conditions,
         seed: int,
         options: ClientOptions,
-        settings: DeviceSettings,
+        settings: messages.DeviceSettings,
         *,
         move: bool = True,
         on_progress: Callable[[str], None] | None = None,
@@ -117,10 +108,11 @@ class FlexivXenseBackend(Backend):
                 paced=not options.lockstep,
                 keys=Path(options.keys) if options.keys else None,
             )
-            request = self._request(options, settings, process, link.number(), move)
-            opened = link.ask(request, Opened, limit_s=OPEN_S, on_progress=on_progress or (lambda _: None))
+            world_at = "" if process is None else process.world
+            request = self._request(options, settings, world_at, link.number(), move)
+            opened = link.ask(request, messages.Opened, limit_s=OPEN_S, on_progress=on_progress or (lambda _: None))
             link.beat()
-            first = link.wait(0, Block, limit_s=10.0)
+            first = link.wait(0, messages.Block, limit_s=10.0)
         except BaseException:
             if link is not None:
                 link.close()
@@ -133,18 +125,18 @@ class FlexivXenseBackend(Backend):
         return robot
 
     def _request(
-        self, options: ClientOptions, settings: DeviceSettings, process: DriverProcess | None, number: int, move: bool
-    ) -> Open:
+        self, options: ClientOptions, settings: messages.DeviceSettings, world: str, number: int, move: bool
+    ) -> messages.Open:
         hand = self._description.gripper
         simulated = options.devices == "simulated"
         kind = "real" if not simulated else "simulated" if options.lockstep else "cell"
-        return Open(
+        return messages.Open(
             number=number,
-            protocol=PROTOCOL,
-            devices=Devices(kind=kind, settings=settings, world="" if process is None else process.world),
+            protocol=messages.PROTOCOL,
+            devices=messages.Devices(kind=kind, settings=settings, world=world),
             tool=_tool(self._description),
             arm=_arm_limits(self._description, self._limits),
-            hand=HandLimits(
+            hand=messages.HandLimits(
                 stroke_m=hand.stroke_m,
                 speed_m_s=hand.speed_m_s,
                 force_N=hand.force_N,
@@ -160,5 +152,5 @@ class FlexivXenseBackend(Backend):
     def referee(self, robot: Robot) -> Referee | None:
         """See `Backend`; None for real devices."""
         if isinstance(robot, FlexivXenseRobot) and robot.info["devices"] != "real":
-            return RemoteReferee(robot.link)
+            return cast("Referee", RemoteReferee(robot.link))
         return None

@@ -13,17 +13,7 @@ import msgspec
 import zmq
 import zmq.auth
 
-from glotouch_backends.flexiv_xense.driver import (
-    HEARTBEAT_SUFFIX,
-    Answer,
-    Beat,
-    Failed,
-    OpenProgress,
-    Refused,
-    Request,
-    decode_answer,
-    encode,
-)
+from glotouch_backends.flexiv_xense.driver import HEARTBEAT_SUFFIX, messages
 from glotouch_bt.robot import BackendError, ParamError, StaleReading
 
 A = TypeVar("A")
@@ -45,7 +35,7 @@ class DeviceError(BackendError):
     """A device failed; the message ends with the arm's last event."""
 
 
-def failure(answer: Failed) -> BackendError:
+def failure(answer: messages.Failed) -> BackendError:
     """Return our error for the driver's, with the arm's event log in its notes."""
     if answer.kind == "stale":
         error: BackendError = StaleReading(answer.message, answer.age_s, answer.limit_s)
@@ -108,21 +98,21 @@ class DriverLink:
         self._heart.start()
 
     def _beat_on(self) -> None:
-        body = encode(Beat())
+        body = messages.encode(messages.Beat())
         socket = self._connect(self._name + HEARTBEAT_SUFFIX)  # a zmq socket belongs to one thread
         while not self._stop.wait(BEAT_S):
             _send(socket, body)
         socket.close()
 
-    def post(self, request: Request) -> None:
+    def post(self, request: messages.Request) -> None:
         """Send a request without waiting for its answer."""
         if self._closed:
             raise BackendError("the link to the driver is closed")
-        _send(self._socket, encode(request))
+        _send(self._socket, messages.encode(request))
 
     def ask(
         self,
-        request: Request,
+        request: messages.Request,
         answer: type[A],
         *,
         limit_s: float = LOCKSTEP_S,
@@ -161,22 +151,22 @@ class DriverLink:
                     raise BackendError(f"nothing heard from the driver for {now - heard:.2f} s (limit {quiet_s:g} s)")
                 continue
             heard = now
-            if isinstance(answer, OpenProgress) and on_progress is not None:
+            if isinstance(answer, messages.OpenProgress) and on_progress is not None:
                 on_progress(answer.text)
-            if isinstance(answer, Failed) and answer.number in (0, number):
+            if isinstance(answer, messages.Failed) and answer.number in (0, number):
                 raise failure(answer)
-            if isinstance(answer, Refused) and answer.number in (0, number):
+            if isinstance(answer, messages.Refused) and answer.number in (0, number):
                 raise ParamError(answer.name, answer.value, answer.rule)
             if isinstance(answer, kind) and getattr(answer, "number", number) == number:
                 return answer
             if now - began > limit_s:
                 raise BackendError(f"the driver did not answer within {limit_s:g} s")
 
-    def _receive(self, timeout_s: float) -> Answer | None:
+    def _receive(self, timeout_s: float) -> messages.Answer | None:
         if not self._socket.poll(round(timeout_s * 1e3)):
             return None
         try:
-            answer: Answer = decode_answer(self._socket.recv(zmq.NOBLOCK))
+            answer: messages.Answer = messages.decode_answer(self._socket.recv(zmq.NOBLOCK))
         except msgspec.MsgspecError as e:
             raise BackendError(f"the driver's answer cannot be read: {e}") from e
         return answer

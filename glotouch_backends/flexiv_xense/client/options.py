@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Literal
 
-from glotouch_backends.flexiv_xense.driver import DeviceSettings
+from glotouch_backends.flexiv_xense.driver import messages
 from glotouch_backends.options import WorldOptions, convert_options
 from glotouch_bt.robot import BadInput
 
@@ -49,19 +49,19 @@ class ClientOptions(WorldOptions):
         return WorldOptions(**{f.name: getattr(self, f.name) for f in fields(WorldOptions)})
 
 
-def read_options(given: Mapping[str, object]) -> tuple[ClientOptions, DeviceSettings]:
+def read_options(given: Mapping[str, object]) -> tuple[ClientOptions, messages.DeviceSettings]:
     """Check and convert the options of one session.
 
     Raises:
         BadInput: An unknown option, an invalid value, or real devices without their addresses.
     """
-    values = convert_options("flexiv_xense", given, ClientOptions, DeviceSettings)
+    values = convert_options("flexiv_xense", given, ClientOptions, messages.DeviceSettings)
     simulated = values.get("devices") == "simulated"
     if simulated:
         values = SIMULATED | values
     own = {f.name for f in fields(ClientOptions)}
     options = ClientOptions(**{name: value for name, value in values.items() if name in own})
-    settings = DeviceSettings(**{name: value for name, value in values.items() if name not in own})
+    settings = messages.DeviceSettings(**{name: value for name, value in values.items() if name not in own})
     if not simulated:
         _check_real(options, settings, given)
     elif options.driver:
@@ -69,7 +69,7 @@ def read_options(given: Mapping[str, object]) -> tuple[ClientOptions, DeviceSett
     return options, settings
 
 
-def _check_real(options: ClientOptions, settings: DeviceSettings, given: Mapping[str, object]) -> None:
+def _check_real(options: ClientOptions, settings: messages.DeviceSettings, given: Mapping[str, object]) -> None:
     for name in SIMULATED_ONLY:
         if name in given:
             raise BadInput(f"option {name}: only simulated devices have it")

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import pickle
-from typing import cast
+from collections.abc import Callable
+from typing import Any
 
 from glotouch_backends.flexiv_xense.client.link import DriverLink
-from glotouch_backends.flexiv_xense.driver import RefereeAnswer, RefereeRequest
-from glotouch_bt.robot import Array, Pose
-from glotouch_bt.robot.simulation import BareSteps, TrueObject
+from glotouch_backends.flexiv_xense.driver import messages
 
 
 class RemoteReferee:
-    """See `robot.simulation.Referee`.
+    """A `robot.simulation.Referee` whose every method asks the world's own referee.
 
     Args:
         link: Connection to a driver with simulated devices.
@@ -21,36 +20,13 @@ class RemoteReferee:
     def __init__(self, link: DriverLink) -> None:
         self._link = link
 
-    def _ask(self, method: str, *arguments: object) -> object:
-        # Pickle is safe here: our own child process wrote the answer, over a socket only we can open.
-        question = pickle.dumps((method, arguments))
-        answer = self._link.ask(RefereeRequest(number=self._link.number(), question=question), RefereeAnswer)
-        return cast("object", pickle.loads(answer.answer))
+    def __getattr__(self, method: str) -> Callable[..., Any]:
+        if method.startswith("_"):
+            raise AttributeError(method)
 
-    def objects(self) -> list[TrueObject]:
-        """See `Referee`."""
-        return cast("list[TrueObject]", self._ask("objects"))
+        def ask(*arguments: object) -> Any:
+            question = messages.RefereeRequest(number=self._link.number(), question=pickle.dumps((method, arguments)))
+            # Pickle is safe here: our own child process wrote the answer, over a socket only we can open.
+            return pickle.loads(self._link.ask(question, messages.RefereeAnswer).answer)
 
-    def pose_B_K(self) -> Pose:
-        """See `Referee`."""
-        return cast("Pose", self._ask("pose_B_K"))
-
-    def tip_B_m(self) -> Array:
-        """See `Referee`."""
-        return cast("Array", self._ask("tip_B_m"))
-
-    def push_tip(self, force_B_N: Array) -> None:
-        """See `Referee`."""
-        self._ask("push_tip", force_B_N)
-
-    def probe_in_holder(self) -> bool:
-        """See `Referee`."""
-        return bool(self._ask("probe_in_holder"))
-
-    def peak_force_N(self) -> float:
-        """See `Referee`."""
-        return float(cast("float", self._ask("peak_force_N")))
-
-    def replay_bare_steps(self) -> BareSteps | None:
-        """Return None: this backend records no steps."""
-        return None
+        return ask

@@ -11,19 +11,7 @@ import numpy as np
 from glotouch_backends.flexiv_xense.client.chain import Chain
 from glotouch_backends.flexiv_xense.client.link import DriverLink
 from glotouch_backends.flexiv_xense.client.process import DriverProcess
-from glotouch_backends.flexiv_xense.driver import (
-    COLUMNS,
-    Accepted,
-    Block,
-    Cycle,
-    HoldRequest,
-    JawTarget,
-    Maps,
-    PayloadRequest,
-    Quit,
-    Setpoint,
-    TareRequest,
-)
+from glotouch_backends.flexiv_xense.driver import messages
 from glotouch_bt.robot import (
     Array,
     BackendError,
@@ -71,7 +59,7 @@ class FlexivXenseRobot(Robot):
         link: DriverLink,
         process: DriverProcess | None,
         info: dict[str, str],
-        first: Block,
+        first: messages.Block,
     ) -> None:
         self.description, self.limits, self.period_s = description, limits, period_s
         self.link, self.process, self.info = link, process, info
@@ -95,10 +83,12 @@ class FlexivXenseRobot(Robot):
             raise self._failed
         setpoint = None if command.motion is None else self._setpoint(command.motion)
         g = command.gripper
-        jaws = None if g is None else JawTarget(float(g.aperture_m), float(g.speed_m_s), float(g.force_N))
+        jaws = None if g is None else messages.JawTarget(float(g.aperture_m), float(g.speed_m_s), float(g.force_N))
         number, began = self.link.number(), time.monotonic()
         try:
-            block = self.link.ask(Cycle(number=number, setpoint=setpoint, jaws=jaws, tactile=command.tactile), Block)
+            block = self.link.ask(
+                messages.Cycle(number=number, setpoint=setpoint, jaws=jaws, tactile=command.tactile), messages.Block
+            )
         except BackendError as e:
             self._failed = e
             self._end_tickets(str(e))
@@ -112,19 +102,15 @@ class FlexivXenseRobot(Robot):
     def start(self, request: Request) -> Ticket:
         """See `Robot`."""
         number, ticket = self.link.number(), PendingTicket()
-        message: TareRequest | PayloadRequest
+        message: messages.TareRequest | messages.PayloadRequest
         if isinstance(request, Tare):
-            if not (math.isfinite(request.duration_s) and request.duration_s > 0):
-                raise ParamError("tare.duration_s", request.duration_s, "finite and positive")
-            message = TareRequest(number=number, ticket=number, duration_s=request.duration_s)
+            message = messages.TareRequest(number=number, ticket=number, duration_s=request.duration_s)
         else:
-            if not (math.isfinite(request.mass_kg) and request.mass_kg >= 0):
-                raise ParamError("payload.mass_kg", request.mass_kg, "finite and not negative")
             com = tuple(request.com_P_m.tolist())
-            message = PayloadRequest(number=number, ticket=number, mass_kg=float(request.mass_kg), com_P_m=com)
+            message = messages.PayloadRequest(number=number, ticket=number, mass_kg=float(request.mass_kg), com_P_m=com)
         self._tickets[number] = ticket
         self.link.slow_request = True
-        self.link.ask(message, Accepted)
+        self.link.ask(message, messages.Accepted)
         return ticket
 
     def hold(self) -> None:
@@ -132,7 +118,7 @@ class FlexivXenseRobot(Robot):
         if self._closed or self._failed is not None:
             return  # the driver holds by itself on a fault and without messages
         try:
-            self.link.ask(HoldRequest(number=self.link.number()), Accepted, limit_s=QUIT_S)
+            self.link.ask(messages.HoldRequest(number=self.link.number()), messages.Accepted, limit_s=QUIT_S)
         except GlotouchError as e:
             self._failed = e if isinstance(e, BackendError) else self._failed
 
@@ -142,12 +128,12 @@ class FlexivXenseRobot(Robot):
             return
         self._closed = True
         with suppress(GlotouchError):  # the driver may have ended already
-            self.link.post(Quit(number=self.link.number()))
+            self.link.post(messages.Quit(number=self.link.number()))
         if self.process is not None:
             self.process.end()
         self.link.close()
 
-    def _setpoint(self, motion: JointSetpoint) -> Setpoint:
+    def _setpoint(self, motion: JointSetpoint) -> messages.Setpoint:
         """Return the message of a setpoint: its pose, and the twist of its joint velocities.
 
         Raises:
@@ -169,21 +155,21 @@ class FlexivXenseRobot(Robot):
             raise ParamError(
                 "setpoint.pose_B_P", f"{away * 1e3:.2f} mm from where its joints put P", "the pose its joints realise"
             )
-        return Setpoint(
+        return messages.Setpoint(
             tuple(q.tolist()),
             tuple(dq.tolist()),
             (*asked.position_m.tolist(), *asked.quat.tolist()),
             tuple(twist.tolist()),
         )
 
-    def _take(self, block: Block) -> Observation:
+    def _take(self, block: messages.Block) -> Observation:
         for done in block.done:
             ticket = self._tickets.pop(done.ticket, None)
             if ticket is not None:
                 ticket.error, ticket.done = done.error or None, True
         self.link.slow_request = bool(self._tickets)
         self.late_periods += block.late
-        rows = np.frombuffer(block.samples, dtype="<f8").reshape(-1, COLUMNS)
+        rows = np.frombuffer(block.samples, dtype="<f8").reshape(-1, messages.COLUMNS)
         j = block.jaws
         return Observation(
             stamp_s=np.frombuffer(block.stamps, dtype="<f8"),
@@ -202,7 +188,7 @@ class FlexivXenseRobot(Robot):
         self._tickets.clear()
 
 
-def _frame(maps: Maps) -> TactileFrame:
+def _frame(maps: messages.Maps) -> TactileFrame:
     shape = (maps.rows, maps.columns)
     left, right = (_map(b, shape) for b in (maps.left, maps.right))
     return TactileFrame(maps.stamp_s, left, right)

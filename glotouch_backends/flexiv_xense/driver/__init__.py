@@ -4,37 +4,8 @@ It needs only Python 3.10, numpy, pyzmq, msgspec and the SDKs, is installed as `
 else of this project. Its client imports `messages` from here.
 """
 
+from . import messages
 from .clock import Clock, SteppedClock, WallClock
+from .devices import Vendor
 from .endpoint import HEARTBEAT_SUFFIX
-from .messages import (
-    COLUMNS,
-    PROTOCOL,
-    Accepted,
-    Answer,
-    ArmLimits,
-    Beat,
-    Block,
-    Cycle,
-    Devices,
-    DeviceSettings,
-    Failed,
-    HandLimits,
-    HoldRequest,
-    JawTarget,
-    Maps,
-    Open,
-    Opened,
-    OpenProgress,
-    PayloadRequest,
-    Quit,
-    RefereeAnswer,
-    RefereeRequest,
-    Refused,
-    Request,
-    Setpoint,
-    TareRequest,
-    ToolData,
-    decode_answer,
-    encode,
-)
 from .priority import DEVICES_PRIORITY, request_realtime

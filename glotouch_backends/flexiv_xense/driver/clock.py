@@ -9,28 +9,28 @@ from __future__ import annotations
 import heapq
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Protocol
 
 
-class Clock(Protocol):
+class Clock(ABC):
     """Seconds since the devices were opened."""
 
+    @abstractmethod
     def now_s(self) -> float:
         """Return the present time."""
-        ...
 
+    @abstractmethod
     def sleep_until(self, stamp_s: float) -> None:
         """Block until `now_s` has reached `stamp_s`."""
-        ...
 
     def spawn(self, work: Callable[[], None]) -> None:
         """Run `work`, which must not raise, concurrently with the caller."""
-        ...
+        threading.Thread(target=work, daemon=True).start()
 
 
-class WallClock:
+class WallClock(Clock):
     """Monotonic clock of this machine.
 
     Args:
@@ -50,12 +50,8 @@ class WallClock:
         if left > 0.0:
             time.sleep(left)
 
-    def spawn(self, work: Callable[[], None]) -> None:
-        """See `Clock`: a daemon thread."""
-        threading.Thread(target=work, daemon=True).start()
 
-
-class SteppedClock:
+class SteppedClock(Clock):
     """Clock of a simulated world: time passes only while a thread sleeps on it.
 
     Without a conductor, every sleeping thread advances the world. With a conductor (the driver's loop), only its sleeps

@@ -14,21 +14,9 @@ import time
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
 
+from . import messages
 from .endpoint import DriverSocket
 from .faults import CommandRefused, DeviceFault
-from .messages import (
-    Accepted,
-    Beat,
-    Cycle,
-    HoldRequest,
-    PayloadRequest,
-    Quit,
-    RefereeAnswer,
-    RefereeRequest,
-    Refused,
-    Request,
-    TareRequest,
-)
 from .session import DriverSession
 
 SAMPLE_S = 0.001
@@ -56,7 +44,7 @@ class _DriverLoop:
         self._session, self._socket, self._log, self._stopping = session, socket, log, stopping
 
     def _refuse(self, number: int, error: CommandRefused) -> None:
-        self._socket.send(Refused(number=number, name=error.name, value=repr(error.value), rule=error.rule))
+        self._socket.send(messages.Refused(number=number, name=error.name, value=repr(error.value), rule=error.rule))
 
     def _fail(self, number: int, error: DeviceFault) -> None:
         session = self._session
@@ -67,27 +55,27 @@ class _DriverLoop:
                 session.hold()
         self._socket.send(error.answer(number))
 
-    def _answer(self, request: Request) -> bool:
+    def _answer(self, request: messages.Request) -> bool:
         """Answer a request other than a cycle; return False to end the loop."""
         session = self._session
-        if isinstance(request, (TareRequest, PayloadRequest)):
+        if isinstance(request, (messages.TareRequest, messages.PayloadRequest)):
             session.start(request)
-            self._socket.send(Accepted(number=request.number))
-        elif isinstance(request, HoldRequest):
+            self._socket.send(messages.Accepted(number=request.number))
+        elif isinstance(request, messages.HoldRequest):
             try:
                 session.hold()
             except DeviceFault as e:
                 self._fail(request.number, e)
             else:
-                self._socket.send(Accepted(number=request.number))
-        elif isinstance(request, RefereeRequest):
+                self._socket.send(messages.Accepted(number=request.number))
+        elif isinstance(request, messages.RefereeRequest):
             ask = getattr(session.devices.vendor, "referee", None)
             if ask is None:
                 fault = DeviceFault("vendor", "there is no referee: the devices are real")
                 self._socket.send(fault.answer(request.number))
             else:
-                self._socket.send(RefereeAnswer(number=request.number, answer=ask(request.question)))
-        elif isinstance(request, Quit):
+                self._socket.send(messages.RefereeAnswer(number=request.number, answer=ask(request.question)))
+        elif isinstance(request, messages.Quit):
             self._log("quit", peak_force_N=session.peak_force_N)
             return False
         return True
@@ -114,7 +102,7 @@ class Lockstep(_DriverLoop):
                         return
                     continue
                 heard = now
-                if not isinstance(request, Cycle):
+                if not isinstance(request, messages.Cycle):
                     if not self._answer(request):
                         return
                     continue
@@ -167,7 +155,7 @@ class Paced(_DriverLoop):
         session, socket, clock = self._session, self._socket, self._session.clock
         steps = round(period_s / SAMPLE_S)
         socket.send(session.block(0, tactile=False))
-        waiting: Cycle | None = None
+        waiting: messages.Cycle | None = None
         gc.collect()
         gc.freeze()  # a full garbage collection takes longer than a sample may be late
         begin = due = clock.now_s()
@@ -185,7 +173,7 @@ class Paced(_DriverLoop):
                 while True:
                     while (request := socket.receive(0.0)) is not None:
                         heard = clock.now_s()
-                        if isinstance(request, Cycle):
+                        if isinstance(request, messages.Cycle):
                             waiting, commanded = request, heard
                             session.command(request)
                         elif not self._answer(request):
@@ -213,7 +201,7 @@ class Paced(_DriverLoop):
                 waiting = None
             if now - beaten > BEAT_S:
                 beaten = now
-                socket.send(Beat())
+                socket.send(messages.Beat())
             if now - heard > CLIENT_LOST_S:
                 self._log("client lost", silent_s=now - heard, speed_m_s=session.speed_m_s)
                 return

@@ -126,13 +126,18 @@ class JawTarget(msgspec.Struct, frozen=True, array_like=True):
     force_N: float
 
 
+class _Numbered(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+    """A request with its number, or the answer to the request of that number."""
+
+    number: int
+
+
 # -- requests ----------------------------------------------------------------------------------------------------------
 
 
-class Open(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+class Open(_Numbered, kw_only=True):
     """Connect to the devices and make them ready; the first request."""
 
-    number: int
     protocol: int
     devices: Devices
     tool: ToolData
@@ -144,49 +149,41 @@ class Open(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     move: bool = True  # False: observe only; nothing is enabled, switched or commanded
 
 
-class Cycle(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+class Cycle(_Numbered, kw_only=True):
     """Run one control period."""
 
-    number: int
     setpoint: Setpoint | None = None
     jaws: JawTarget | None = None
     tactile: bool = False
 
 
-class TareRequest(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+class TareRequest(_Numbered, kw_only=True):
     """Zero the wrist sensor. The answer is `Accepted`; a later block reports the end."""
 
-    number: int
     ticket: int
     duration_s: float
 
 
-class PayloadRequest(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+class PayloadRequest(_Numbered, kw_only=True):
     """Set the payload, with its centre of mass (3,) in P. Answered like a tare."""
 
-    number: int
     ticket: int
     mass_kg: float
     com_P_m: Numbers
 
 
-class HoldRequest(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+class HoldRequest(_Numbered):
     """Stop the arm."""
 
-    number: int
 
-
-class RefereeRequest(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+class RefereeRequest(_Numbered, kw_only=True):
     """Simulated devices only: a question to the world's referee, which alone can decode it."""
 
-    number: int
     question: bytes
 
 
-class Quit(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+class Quit(_Numbered):
     """Stop the arm, release the devices, end the process."""
-
-    number: int
 
 
 class Beat(msgspec.Struct, frozen=True, tag=True):
@@ -231,10 +228,9 @@ class Done(msgspec.Struct, frozen=True, array_like=True):
     error: str = ""
 
 
-class Opened(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+class Opened(_Numbered, kw_only=True):
     """The devices are ready. `info` is for display; q_min and q_max are the device's own limits."""
 
-    number: int
     info: dict[str, str]
     q_min: Numbers
     q_max: Numbers
@@ -246,7 +242,7 @@ class OpenProgress(msgspec.Struct, frozen=True, tag=True):
     text: str
 
 
-class Block(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+class Block(_Numbered, kw_only=True):
     """Readings since the last block.
 
     Attributes:
@@ -258,7 +254,6 @@ class Block(msgspec.Struct, frozen=True, kw_only=True, tag=True):
             measuring latencies on one machine.
     """
 
-    number: int
     stamps: bytes
     samples: bytes
     jaws: JawState
@@ -270,25 +265,21 @@ class Block(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     read_s: float = 0.0
 
 
-class Accepted(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+class Accepted(_Numbered):
     """The request was started or done."""
 
-    number: int
 
-
-class Refused(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+class Refused(_Numbered, kw_only=True):
     """The command is invalid; nothing was sent to the device, and the arm holds."""
 
-    number: int
     name: str
     value: str
     rule: str
 
 
-class Failed(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+class Failed(_Numbered, kw_only=True):
     """A device failed. `kind`: connect, fault, state, link, stale, vendor, world."""
 
-    number: int
     kind: str
     message: str
     cause: str = ""
@@ -297,10 +288,9 @@ class Failed(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     limit_s: float = 0.0
 
 
-class RefereeAnswer(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+class RefereeAnswer(_Numbered, kw_only=True):
     """Answer of the referee."""
 
-    number: int
     answer: bytes
 
 

@@ -9,24 +9,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from . import messages
 from .checks import SetpointCheck, rest_pose
 from .clock_offset import StampConverter
 from .devices import Connected
 from .faults import CommandRefused, DeviceFault
 from .frames import payload_on_tool, wrench_map
-from .messages import (
-    COLUMNS,
-    Block,
-    Cycle,
-    Done,
-    JawState,
-    JawTarget,
-    Maps,
-    Open,
-    PayloadRequest,
-    Setpoint,
-    TareRequest,
-)
 
 MIN_SAMPLES_OVER = 5
 """Consecutive samples beyond the hard limit that stop the arm (5 ms); a single one may be noise. Source: ours."""
@@ -34,7 +22,7 @@ MAX_BUFFERED_SAMPLES = 60_000
 """Samples buffered while the client requests none (60 s)."""
 SPEED_SAMPLES = 20
 """Samples over which the speed of P is measured."""
-NO_JAWS = JawState(0.0, math.nan, 0.0, False)
+NO_JAWS = messages.JawState(0.0, math.nan, 0.0, False)
 
 
 class DriverSession:
@@ -51,7 +39,7 @@ class DriverSession:
         recent_peak_N: The same since it was last set to zero.
     """
 
-    def __init__(self, devices: Connected, request: Open) -> None:
+    def __init__(self, devices: Connected, request: messages.Open) -> None:
         self.devices, self.clock = devices, devices.clock
         self._arm, self._tool, self._limits = devices.arm, request.tool, request.arm
         self._check = SetpointCheck(request.arm, request.period_s)
@@ -64,10 +52,10 @@ class DriverSession:
         self._fresh_s = self._zero_s
         self._over = 0
         self._newest: list[float] | None = None
-        self._last: Setpoint | None = None  # the last one sent, while the arm follows setpoints
+        self._last: messages.Setpoint | None = None  # the last one sent, while the arm follows setpoints
         self._rest: tuple[float, ...] | None = None  # pose of rest, once told to hold
-        self._queue: deque[TareRequest | PayloadRequest] = deque()
-        self._done: list[Done] = []
+        self._queue: deque[messages.TareRequest | messages.PayloadRequest] = deque()
+        self._done: list[messages.Done] = []
         self._busy = False
         self._jaws = NO_JAWS
         self._moves = request.move
@@ -93,7 +81,7 @@ class DriverSession:
 
     # -- commands ----------------------------------------------------------------------------------------------------
 
-    def command(self, cycle: Cycle) -> None:
+    def command(self, cycle: messages.Cycle) -> None:
         """Send one period's command; send nothing once the hard limit has tripped.
 
         Raises:
@@ -120,7 +108,7 @@ class DriverSession:
             self.hold()
         self._sent_s = time.monotonic()
 
-    def _check_command(self, cycle: Cycle) -> None:
+    def _check_command(self, cycle: messages.Cycle) -> None:
         if not self._moves and (cycle.setpoint is not None or cycle.jaws is not None):
             raise CommandRefused("command", "a motion", "none in a read-only session")
         if cycle.jaws is not None:
@@ -130,7 +118,7 @@ class DriverSession:
                 raise CommandRefused("command.motion", "a setpoint", "none while a tare or payload is pending")
             self._check.check(cycle.setpoint)
 
-    def _check_jaws(self, jaws: JawTarget) -> None:
+    def _check_jaws(self, jaws: messages.JawTarget) -> None:
         if self.devices.gripper is None:
             raise CommandRefused("command.gripper", jaws, "none: no gripper is connected")
         self.devices.gripper.check(jaws)
@@ -147,7 +135,7 @@ class DriverSession:
             self._rest = rest_pose(self._last, self._limits.stop_acceleration_m_s2)
         self._arm.hold_at(self._rest)
 
-    def start(self, request: TareRequest | PayloadRequest) -> None:
+    def start(self, request: messages.TareRequest | messages.PayloadRequest) -> None:
         """Queue a slow request; it starts at once if none is pending."""
         self._queue.append(request)
         if not self._busy:
@@ -159,7 +147,7 @@ class DriverSession:
         while self._queue:
             request = self._queue.popleft()
             try:
-                if isinstance(request, TareRequest):
+                if isinstance(request, messages.TareRequest):
                     self._arm.zero(request.duration_s)
                 else:
                     self._arm.idle()
@@ -167,13 +155,13 @@ class DriverSession:
                 self._arm.enter_motion()
             except DeviceFault as e:
                 self.failed = self.failed or e
-                self._done.append(Done(request.ticket, e.message))
+                self._done.append(messages.Done(request.ticket, e.message))
             else:
-                self._done.append(Done(request.ticket))
+                self._done.append(messages.Done(request.ticket))
         self._reset_to_measured()
         self._busy = False
 
-    def _hand_with_payload(self, request: PayloadRequest) -> tuple[float, list[float]]:
+    def _hand_with_payload(self, request: messages.PayloadRequest) -> tuple[float, list[float]]:
         t = self._tool
         return payload_on_tool(t.mass_kg, t.com_E_m, request.mass_kg, request.com_P_m, t.pose_E_P)
 
@@ -243,24 +231,24 @@ class DriverSession:
             self._arm.check()
         if self.devices.gripper is not None:
             state = self.devices.gripper.poll()
-            self._jaws = JawState(state.stamp_s - self._zero_s, state.aperture_m, state.force_N, state.moving)
+            self._jaws = messages.JawState(state.stamp_s - self._zero_s, state.aperture_m, state.force_N, state.moving)
 
-    def block(self, number: int, *, tactile: bool, late: int = 0) -> Block:
+    def block(self, number: int, *, tactile: bool, late: int = 0) -> messages.Block:
         """Return everything sensed since the last block.
 
         Raises:
             DeviceFault: The pads failed.
         """
-        maps: Maps | None = None
+        maps: messages.Maps | None = None
         if tactile and self.devices.pads is not None:
             m = self.devices.pads.take()
             if m is not None:
-                maps = Maps(m.stamp_s - self._zero_s, m.rows, m.columns, m.left, m.right)
+                maps = messages.Maps(m.stamp_s - self._zero_s, m.rows, m.columns, m.left, m.right)
         n = len(self._rows)
         stamps = np.array([self._stamps.popleft() for _ in range(n)])
-        rows = np.array([self._rows.popleft() for _ in range(n)]).reshape(n, COLUMNS)
+        rows = np.array([self._rows.popleft() for _ in range(n)]).reshape(n, messages.COLUMNS)
         done, self._done = tuple(self._done), []
-        return Block(
+        return messages.Block(
             number=number,
             stamps=stamps.astype("<f8").tobytes(),
             samples=rows.astype("<f8").tobytes(),

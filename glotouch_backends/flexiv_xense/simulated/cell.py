@@ -24,7 +24,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from glotouch_backends.flexiv_xense.driver import DEVICES_PRIORITY, request_realtime
+from glotouch_backends.flexiv_xense.driver import DEVICES_PRIORITY, Clock, request_realtime
 from glotouch_backends.flexiv_xense.simulated.vendor import SimulatedVendor, assemble
 from glotouch_backends.flexiv_xense.simulated.wire import NEW, REFEREE, Reference
 from glotouch_backends.flexiv_xense.simulated.world import SimulatedWorld
@@ -38,11 +38,9 @@ STILL_M_S = 1e-3
 """The tool stands still below this speed. Source: ours."""
 STILL_STEPS = 20
 """Steps below that speed that count as standstill. Source: ours."""
-PROXIED = ("Robot", "Tool", "XenseTCPGripper", "XenseSerialGripper", "Sensor")
-"""Classes whose objects stay in the cell; a client gets a `Reference`."""
 
 
-class CellClock:
+class CellClock(Clock):
     """World time; sleeping on it releases the world's lock."""
 
     def __init__(self, world: SimulatedWorld, turn: threading.Condition) -> None:
@@ -56,10 +54,6 @@ class CellClock:
         """See `driver.clock.Clock`."""
         with self._turn:
             self._turn.wait_for(lambda: self._world.now_s >= stamp_s - 1e-9)
-
-    def spawn(self, work: Callable[[], None]) -> None:
-        """See `driver.clock.Clock`."""
-        threading.Thread(target=work, daemon=True).start()
 
 
 class StandstillMonitor:
@@ -130,7 +124,6 @@ class Cell:
             "XenseTCPGripper": inner.XenseTCPGripper,
             "XenseSerialGripper": inner.XenseSerialGripper,
             "Sensor": v.xensesdk.Sensor.create,
-            "scanSerialNumber": v.xensesdk.Sensor.scanSerialNumber,
         }
 
     def write(self, event: str, **values: object) -> None:
@@ -217,8 +210,6 @@ class Cell:
             name, args, kwargs = arguments
             args = [self._made[a.key][1] if isinstance(a, Reference) else a for a in args]
             made = self._makers[name](*args, **kwargs)
-            if name not in PROXIED:
-                return made
             key = len(self._made) + 1
             while key in self._made:
                 key += 1

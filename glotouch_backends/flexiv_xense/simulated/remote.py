@@ -10,8 +10,8 @@ from multiprocessing.connection import Client, Connection
 from types import SimpleNamespace
 from typing import Any
 
-from glotouch_backends.flexiv_xense.driver import Clock, WallClock
-from glotouch_backends.flexiv_xense.simulated.vendor_api import flexivrdk, xensegripper, xensesdk
+from glotouch_backends.flexiv_xense.driver import Vendor, WallClock
+from glotouch_backends.flexiv_xense.simulated.vendor_api import flexivrdk, xensesdk
 from glotouch_backends.flexiv_xense.simulated.wire import CALL, NEW, REFEREE, Reference
 
 CONNECT_S = 120.0
@@ -95,13 +95,9 @@ def _maker(link: CellLink, name: str) -> Any:
 
 
 @dataclass(frozen=True)
-class RemoteVendor:
-    """See `driver.devices.vendor.Vendor`."""
+class RemoteVendor(Vendor):
+    """The vendors' modules over a cell."""
 
-    flexivrdk: Any
-    xensesdk: Any
-    xensegripper: Any
-    clock: Clock
     link: CellLink
 
     def referee(self, question: bytes) -> bytes:
@@ -128,10 +124,9 @@ def open_remote_vendor(address: str) -> RemoteVendor:
     def create(mac_addr: str | None = None, **kwargs: Any) -> Any:
         return tcp(mac_addr) if mac_addr is not None else serial(**kwargs)
 
-    gripper = SimpleNamespace(create=create, ControlMode=xensegripper.XenseGripper.ControlMode)
+    gripper = SimpleNamespace(create=create)
     sensor = SimpleNamespace(
         create=_maker(link, "Sensor"),
-        scanSerialNumber=lambda: link.ask(NEW, "scanSerialNumber", [], {}),
         OutputType=xensesdk.Sensor.OutputType,
     )
     inner = SimpleNamespace(XenseGripper=gripper, XenseTCPGripper=tcp, XenseSerialGripper=serial)

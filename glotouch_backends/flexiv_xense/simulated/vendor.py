@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
-from glotouch_backends.flexiv_xense.driver import Clock, SteppedClock
+from glotouch_backends.flexiv_xense.driver import Clock, SteppedClock, Vendor
 from glotouch_backends.flexiv_xense.simulated.control_box import ControlBox
 from glotouch_backends.flexiv_xense.simulated.disturbances import DisturbingReferee
 from glotouch_backends.flexiv_xense.simulated.vendor_api import GripperLink, PadLink, flexivrdk, xensegripper, xensesdk
@@ -19,19 +19,9 @@ PAD_SNS = ("OG000001", "OG000002")  # left, right
 
 
 @dataclass(frozen=True)
-class SimulatedVendor:
-    """See `driver.devices.vendor.Vendor`; with the world behind it.
+class SimulatedVendor(Vendor):
+    """The vendors' modules with the simulated devices behind them. Sleeping on the clock advances the world."""
 
-    Attributes:
-        flexivrdk, xensesdk, xensegripper: Namespaces with the vendors' names.
-        clock: Sleeping on it advances the world.
-        world, box, gripper, pads: The simulated devices.
-    """
-
-    flexivrdk: Any
-    xensesdk: Any
-    xensegripper: Any
-    clock: Clock
     world: SimulatedWorld
     box: ControlBox
     gripper: GripperLink

@@ -77,7 +77,6 @@ def test_aperture_noise_has_the_spread_of_the_conditions() -> None:
 
 def test_pads_are_found_and_opened_by_serial_number(bench: SimulatedVendor) -> None:
     sensor = bench.xensesdk.Sensor
-    assert set(sensor.scanSerialNumber()) == set(PAD_SNS)
     for wrong in ("OG999999", 77, None):
         with pytest.raises(ValueError, match="no sensor"):
             sensor.create(wrong)

@@ -6,7 +6,7 @@ import importlib
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 from ..clock import Clock, WallClock
 from ..faults import DeviceFault
@@ -14,32 +14,10 @@ from ..faults import DeviceFault
 SIMULATED = "glotouch_backends.flexiv_xense.simulated"
 
 
-class Vendor(Protocol):
-    """The vendors' modules, and the clock of their devices."""
-
-    @property
-    def flexivrdk(self) -> Any:
-        """Interface of the arm."""
-        ...
-
-    @property
-    def xensesdk(self) -> Any:
-        """Interface of the pads."""
-        ...
-
-    @property
-    def xensegripper(self) -> Any:
-        """Interface of the gripper."""
-        ...
-
-    @property
-    def clock(self) -> Clock:
-        """Clock of the devices."""
-        ...
-
-
 @dataclass(frozen=True)
-class _Installed:
+class Vendor:
+    """The vendors' modules: interfaces of the arm, the pads and the gripper; and the clock of their devices."""
+
     flexivrdk: Any
     xensesdk: Any
     xensegripper: Any
@@ -69,7 +47,7 @@ def load_vendor(kind: str, world: str = "", *, gripper: bool = True, pads: bool 
         DeviceFault: A package is not installed, or the world cannot be built.
     """
     if kind == "real":
-        return _Installed(
+        return Vendor(
             _module("flexivrdk", True),
             _module("xensesdk", pads),
             _module("xensegripper", gripper),

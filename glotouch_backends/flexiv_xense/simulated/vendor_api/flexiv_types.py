@@ -89,15 +89,9 @@ class RobotInfo:
     software_ver: str = ""
     model_name: str = ""
     license_type: str = ""
-    DoF: int = 0
-    DoF_m: int = 0
-    DoF_e: int = 0
     K_x_nom: list[float] = field(default_factory=lambda: [0.0] * 6)
-    K_q_nom: list[float] = field(default_factory=list)
     q_min: list[float] = field(default_factory=list)
     q_max: list[float] = field(default_factory=list)
-    dq_max: list[float] = field(default_factory=list)
-    tau_max: list[float] = field(default_factory=list)
     has_FT_sensor: bool = False
 
 

@@ -117,15 +117,9 @@ class Robot:
             software_ver="v3.11.1",
             model_name="Rizon4",
             license_type="Simulated",
-            DoF=d.dof,
-            DoF_m=d.dof,
-            DoF_e=0,
             K_x_nom=NOMINAL_STIFFNESS.tolist(),
-            K_q_nom=[3000.0, 3000.0, 800.0, 800.0, 200.0, 200.0, 200.0],
             q_min=[j.lower_rad for j in d.joints],
             q_max=[j.upper_rad for j in d.joints],
-            dq_max=[j.velocity_rad_s for j in d.joints],
-            tau_max=[j.torque_Nm for j in d.joints],
             has_FT_sensor=True,
         )
 

@@ -7,7 +7,6 @@ an unreachable TCP gripper raises a bare Exception.
 
 from __future__ import annotations
 
-from enum import Enum
 from typing import Any, ClassVar
 
 from glotouch_backends.flexiv_xense.driver import Clock
@@ -38,13 +37,6 @@ class GripperLink:
 
 class XenseGripper:
     """Common part of both grippers."""
-
-    class ControlMode(Enum):
-        """Modes of the TCP gripper."""
-
-        POSITION = 0
-        SAFE = 1
-        SPEED = 2
 
     _links: ClassVar[dict[str, GripperLink]] = {}
     _tcp: ClassVar[type[Any]]

@@ -114,11 +114,6 @@ class Sensor:
                 return sensor
         raise ValueError(f"no sensor {cam_id!r}")
 
-    @classmethod
-    def scanSerialNumber(cls) -> dict[str, int]:
-        """Return the camera numbers of the connected sensors by serial number."""
-        return {serial: link.camera for serial, link in cls._links.items()}
-
     def calibrateSensor(self) -> None:
         """Set the present depth as zero: nothing may touch the pad."""
         if self._link is not None:
