@@ -13,69 +13,30 @@ import numpy as np
 
 from glotouch_bt.robot import Box, Capsule, Gripper, Joint, Link, Pose, RobotDescription
 
+Vec3 = tuple[float, float, float]
+Inertia = tuple[float, float, float, float, float, float]
 Y, Z = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 # Inertia (ixx, iyy, izz, ixy, ixz, iyz) about the centre of mass: vendor numbers, coarse on purpose ("blurred" in the
 # vendor's words); a test checks that each is positive definite and obeys the triangle inequality.
 # Capsules: from one joint's origin to the next, with the housing's radius rounded up. Source: ours.
-_BASE = Link(
-    name="base",
-    mass_kg=3.8,
-    com_m=(0.0, 0.0, 0.09),
-    inertia_kgm2=(0.02, 0.02, 0.01, 0.0, 0.0, 0.0),
-    capsules=(Capsule(start_m=(0.0, 0.0, 0.05), end_m=(0.0, 0.0, 0.14), radius_m=0.075),),
+# Base and links: (mass kg, centre of mass m, inertia kg m2, start m, end m and radius m of the capsule)
+_BODIES = (
+    (3.8, (0.0, 0.0, 0.09), (0.02, 0.02, 0.01, 0.0, 0.0, 0.0), (0.0, 0.0, 0.05), (0.0, 0.0, 0.14), 0.075),
+    (3.6, (0.0, 0.0, 0.15), (0.03, 0.03, 0.01, 0.0, 0.0, 0.0), (0.0, 0.0, 0.04), (0.0, 0.01, 0.21), 0.065),
+    (2.7, (0.0, 0.04, 0.1), (0.02, 0.02, 0.004, 0.0, 0.0, -0.0003), (0.0, 0.03, 0.0), (0.0, 0.035, 0.205), 0.062),
+    (2.4, (-0.01, 0.0, 0.14), (0.01, 0.01, 0.004, 0.0, -0.001, -0.0007), (0.0, 0.0, 0.03), (-0.02, -0.01, 0.19), 0.058),
+    (2.4, (-0.01, 0.03, 0.1), (0.02, 0.02, 3e-3, 0.0, -2e-3, -1e-3), (0.0, 0.025, 0.0), (-0.02, 0.025, 0.195), 0.055),
+    (2.3, (0.0, 0.0, 0.14), (0.01, 0.01, 0.004, 0.0, 0.0, 0.001), (0.0, 0.0, 0.03), (0.0, 0.01, 0.19), 0.053),
+    (2.2, (0.02, 0.06, 0.07), (0.01, 0.01, 0.004, 0.0, -0.001, 0.002), (0.0, 0.04, 0.0), (0.0, 0.073, 0.11), 0.052),
+    (0.8, (0.0, 0.0, 0.03), (0.001, 0.001, 0.001, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.035), 0.045),
 )
-_LINKS = (
-    Link(
-        name="link1",
-        mass_kg=3.6,
-        com_m=(0.0, 0.0, 0.15),
-        inertia_kgm2=(0.03, 0.03, 0.01, 0.0, 0.0, 0.0),
-        capsules=(Capsule(start_m=(0.0, 0.0, 0.04), end_m=(0.0, 0.01, 0.21), radius_m=0.065),),
-    ),
-    Link(
-        name="link2",
-        mass_kg=2.7,
-        com_m=(0.0, 0.04, 0.1),
-        inertia_kgm2=(0.02, 0.02, 0.004, 0.0, 0.0, -0.0003),
-        capsules=(Capsule(start_m=(0.0, 0.03, 0.0), end_m=(0.0, 0.035, 0.205), radius_m=0.062),),
-    ),
-    Link(
-        name="link3",
-        mass_kg=2.4,
-        com_m=(-0.01, 0.0, 0.14),
-        inertia_kgm2=(0.01, 0.01, 0.004, 0.0, -0.001, -0.0007),
-        capsules=(Capsule(start_m=(0.0, 0.0, 0.03), end_m=(-0.02, -0.01, 0.19), radius_m=0.058),),
-    ),
-    Link(
-        name="link4",
-        mass_kg=2.4,
-        com_m=(-0.01, 0.03, 0.1),
-        inertia_kgm2=(0.02, 0.02, 0.003, 0.0, -0.002, -0.001),
-        capsules=(Capsule(start_m=(0.0, 0.025, 0.0), end_m=(-0.02, 0.025, 0.195), radius_m=0.055),),
-    ),
-    Link(
-        name="link5",
-        mass_kg=2.3,
-        com_m=(0.0, 0.0, 0.14),
-        inertia_kgm2=(0.01, 0.01, 0.004, 0.0, 0.0, 0.001),
-        capsules=(Capsule(start_m=(0.0, 0.0, 0.03), end_m=(0.0, 0.01, 0.19), radius_m=0.053),),
-    ),
-    Link(
-        name="link6",
-        mass_kg=2.2,
-        com_m=(0.02, 0.06, 0.07),
-        inertia_kgm2=(0.01, 0.01, 0.004, 0.0, -0.001, 0.002),
-        capsules=(Capsule(start_m=(0.0, 0.04, 0.0), end_m=(0.0, 0.073, 0.11), radius_m=0.052),),
-    ),
-    Link(
-        name="link7",
-        mass_kg=0.8,
-        com_m=(0.0, 0.0, 0.03),
-        inertia_kgm2=(0.001, 0.001, 0.001, 0.0, 0.0, 0.0),
-        capsules=(Capsule(start_m=(0.0, 0.0, 0.0), end_m=(0.0, 0.0, 0.035), radius_m=0.045),),
-    ),
-)
+
+
+def _link(name: str, mass_kg: float, com_m: Vec3, inertia: Inertia, start: Vec3, end: Vec3, radius_m: float) -> Link:
+    capsule = Capsule(start_m=start, end_m=end, radius_m=radius_m)
+    return Link(name=name, mass_kg=mass_kg, com_m=com_m, inertia_kgm2=inertia, capsules=(capsule,))
+
 
 # (origin m, rpy rad, axis, lower rad, upper rad, velocity rad/s, torque Nm, armature kg m2)
 _TABLE = (
@@ -108,7 +69,7 @@ XENSE_GRIPPER = Gripper(
 
 RIZON4_XENSE = RobotDescription(
     name="Flexiv Rizon 4 with Xense gripper",
-    base=_BASE,
+    base=_link("base", *_BODIES[0]),
     joints=tuple(
         Joint(
             name=f"joint{i}",
@@ -120,10 +81,10 @@ RIZON4_XENSE = RobotDescription(
             velocity_rad_s=velocity,
             torque_Nm=torque,
             armature_kgm2=armature,
-            link=link,
+            link=_link(f"link{i}", *body),
         )
-        for i, ((origin, rpy, axis, lower, upper, velocity, torque, armature), link) in enumerate(
-            zip(_TABLE, _LINKS, strict=True), start=1
+        for i, ((origin, rpy, axis, lower, upper, velocity, torque, armature), body) in enumerate(
+            zip(_TABLE, _BODIES[1:], strict=True), start=1
         )
     ),
     # Vendor RDK v1.5 URDF and flexiv_ros2: flange 0.081 m beyond joint 7, turned by -pi about its axis.

@@ -236,35 +236,23 @@ class Arm(Mover):
         Returns:
             The last reported state with aperture and force averaged over the rest window.
         """
-        with self.pause_signal.finishing():
-            return (yield from self._jaws(aperture_m, speed_m_s, force_N, timeout_s, tactile, on_observation))
-
-    # -- inside ------------------------------------------------------------------------------------------------------
-
-    def _jaws(
-        self,
-        aperture_m: float,
-        speed_m_s: float,
-        force_N: float,
-        timeout_s: float,
-        tactile: bool,
-        on_observation: Callable[[Observation], None] | None,
-    ) -> Motion[GripperState]:
         hand = self.description.gripper
-        target = GripperTarget(
+        gripper: GripperTarget | None = GripperTarget(
             min(max(aperture_m, 0.0), hand.stroke_m), min(speed_m_s, hand.speed_m_s), min(force_N, hand.force_N)
         )
         watch = JawRestDetector(self.period_s)
-        gripper: GripperTarget | None = target
-        for _ in range(max(1, int(np.ceil(timeout_s / self.period_s - 1e-9)))):
-            observation = yield Command(gripper=gripper, tactile=tactile)
-            gripper = None
-            self._see(observation)
-            if on_observation is not None:
-                on_observation(observation)
-            if watch.still(observation.now_s, observation.gripper):
-                break
+        with self.pause_signal.finishing():
+            for _ in range(max(1, int(np.ceil(timeout_s / self.period_s - 1e-9)))):
+                observation = yield Command(gripper=gripper, tactile=tactile)
+                gripper = None
+                self._see(observation)
+                if on_observation is not None:
+                    on_observation(observation)
+                if watch.still(observation.now_s, observation.gripper):
+                    break
         return watch.state()
+
+    # -- inside ------------------------------------------------------------------------------------------------------
 
     def _within_limits(self, speed: float, acceleration: float, jerk: float, what: str) -> None:
         limits = self.limits

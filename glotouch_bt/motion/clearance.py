@@ -267,18 +267,6 @@ class Scene:
             return ClearanceViolation(n, parts[i].name, obstacles[k].name, float(distance), margin)
         return None
 
-    def distance_m(self, part: str, obstacle: str, q: Array, aperture_m: float) -> float:
-        """Return the signed distance of a part from an obstacle at `q` (dof,) rad; negative is penetration."""
-        parts = {p.name: p for p in (*self._arm_parts, *self._tool_parts)}
-        if part not in parts:
-            raise UnknownName("part", part, parts)
-        if obstacle not in self._obstacles:
-            raise UnknownName("obstacle", obstacle, self._obstacles)
-        rotations, centres = self._placed([parts[part]], np.asarray(q, dtype=np.float64)[None], aperture_m)
-        body = parts[part].body
-        body.setTransform(fcl.Transform(rotations[0, 0], centres[0, 0]))
-        return float(fcl.distance(body, self._obstacles[obstacle].body, self._request, fcl.DistanceResult()))
-
     def _placed(self, parts: list[MovingPart], q: Array, aperture_m: float) -> tuple[Array, Array]:
         links = [self._kinematics.link_placements(row) for row in q]
         index = [p.link for p in parts]

@@ -111,7 +111,6 @@ class Kinematics:
         self.velocity: Array = np.array([j.velocity_rad_s for j in description.joints])
         self.home: Array = np.array(description.home_q)
         self._ridge = 1e-9 * np.eye(6)
-        self._error = 0.0
 
     def fk(self, q: Array) -> Pose:
         """Return the pose of P in B at joint positions `q` (dof,), rad."""
@@ -140,17 +139,12 @@ class Kinematics:
         frames = list(self._data.oMi)[1:]
         return np.array([m.rotation for m in frames]), np.array([m.translation for m in frames])
 
-    def step(self, pose_B_P: Pose, q: Array) -> Array:
-        """Take one Newton step from `q` (dof,) towards a near pose: minimum joint change, joint limits ignored.
-
-        Convergence is quadratic: an error of 1 mm becomes about a micrometre.
-        """
-        return q + self._newton(pose_B_P.position_m, pose_B_P.rotation, q, None)[:, 0]
-
     def path_step(
         self, position_m: Array, rotation: Array, q: Array, twist_B: Array, posture_gain: float = 0.0
     ) -> tuple[Array, Array, float]:
-        """Compute correction and tangent for path following from one Jacobian at `q`.
+        """Compute correction and tangent for path following from one Jacobian at `q`; joint limits are ignored.
+
+        The correction is one Newton step, which converges quadratically: 1 mm becomes about a micrometre.
 
         Args:
             position_m, rotation: The target of P, (3,) m and (3, 3).
@@ -162,29 +156,22 @@ class Kinematics:
             Newton correction (dof,) rad; dq/ds (dof,) rad/m of twist and posture pull; distance of P from the target
             (largest component in m and rad).
         """
-        both = self._newton(position_m, rotation, q, twist_B, posture_gain)
-        return both[:, 0], both[:, 1], self._error
-
-    def _newton(
-        self, position_m: Array, rotation: Array, q: Array, twist_B: Array | None, posture_gain: float = 0.0
-    ) -> Array:
         model, data = self.model, self._data
         pin.computeJointJacobians(model, data, q)
         frame = pin.updateFramePlacement(model, data, self._frame)
         j = pin.getFrameJacobian(model, data, self._frame, pin.LOCAL_WORLD_ALIGNED)
-        error = np.zeros((6, 1 if twist_B is None else 2 if posture_gain == 0.0 else 3), order="F")
-        error[:3, 0] = position_m - frame.translation
-        error[3:, 0] = pin.log3(rotation @ frame.rotation.T)
-        if twist_B is not None:
-            error[:, 1] = twist_B
-            self._error = float(np.abs(error[:, 0]).max())
-            if posture_gain != 0.0:
-                pull = posture_gain * (self.home - q)
-                error[:, 2] = j @ pull
-        x = j.T @ scipy.linalg.lapack.dgesv(j @ j.T + self._ridge, error, overwrite_a=1, overwrite_b=1)[2]
-        if twist_B is not None and posture_gain != 0.0:
+        right = np.zeros((6, 2 if posture_gain == 0.0 else 3), order="F")
+        right[:3, 0] = position_m - frame.translation
+        right[3:, 0] = pin.log3(rotation @ frame.rotation.T)
+        right[:, 1] = twist_B
+        error = float(np.abs(right[:, 0]).max())
+        if posture_gain != 0.0:
+            pull = posture_gain * (self.home - q)
+            right[:, 2] = j @ pull
+        x = j.T @ scipy.linalg.lapack.dgesv(j @ j.T + self._ridge, right, overwrite_a=1, overwrite_b=1)[2]
+        if posture_gain != 0.0:
             x[:, 1] += pull - x[:, 2]
-        return np.asarray(x, dtype=np.float64)
+        return x[:, 0], x[:, 1], error
 
     def ik(
         self,

@@ -42,6 +42,16 @@ class Piece(Path, Protocol):
     """A path with a continuous tangent."""
 
     @property
+    def pieces(self) -> tuple[Piece, ...]:
+        """Itself, or nothing when it has no length."""
+        return (self,) if self.length_m > 1e-9 else ()
+
+    def pose(self, s: float) -> Pose:
+        """Return the pose of P in B at `s` metres from the start, clamped to the ends."""
+        position, quat = self.sample(np.array([s]))
+        return Pose(position[0], quat[0])
+
+    @property
     def curvature_1_m(self) -> float:
         """Curvature, 1/m: the centripetal acceleration at speed v is v^2 times this."""
         ...
@@ -86,7 +96,7 @@ def quats_to_matrices(quat: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Line:
+class Line(Piece):
     """Straight line between two poses with a constant rotation rate about one axis.
 
     Attributes:
@@ -110,18 +120,9 @@ class Line:
         return max(float(np.linalg.norm(self._shift)), TURN_LEVER_M * float(np.linalg.norm(self._rotation)))
 
     @property
-    def pieces(self) -> tuple[Piece, ...]:
-        """Itself, or nothing when it has no length."""
-        return (self,) if self.length_m > 1e-9 else ()
-
-    @property
     def curvature_1_m(self) -> float:
         """Curvature of a straight line: 0."""
         return 0.0
-
-    def pose(self, s: float) -> Pose:
-        """Pose of P in B at `s` metres."""
-        return _pose_of(self, s)
 
     def sample(self, s: Array) -> tuple[Array, Array]:
         """Positions (n, 3) and quaternions (n, 4) in B at `s` (n,) m."""
@@ -135,7 +136,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Arc:
+class Arc(Piece):
     """Circular arc about an axis.
 
     Attributes:
@@ -182,20 +183,11 @@ class Arc:
         return abs(self.angle) * lever
 
     @property
-    def pieces(self) -> tuple[Piece, ...]:
-        """Itself, or nothing when it has no length."""
-        return (self,) if self.length_m > 1e-9 else ()
-
-    @property
     def curvature_1_m(self) -> float:
         """Curvature with respect to `length_m`: the centripetal acceleration at speed v is v^2 times this."""
         if self.length_m <= 1e-9:
             return 0.0
         return self.radius_m * (self.angle / self.length_m) ** 2
-
-    def pose(self, s: float) -> Pose:
-        """Pose of P in B at `s` metres."""
-        return _pose_of(self, s)
 
     def sample(self, s: Array) -> tuple[Array, Array]:
         """Positions (n, 3) and quaternions (n, 4) in B at `s` (n,) m."""
@@ -249,8 +241,3 @@ class Polyline:
                 return piece.pose(s)
             s -= piece.length_m
         return self.poses[-1]
-
-
-def _pose_of(piece: Piece, s: float) -> Pose:
-    position, quat = piece.sample(np.array([s]))
-    return Pose(position[0], quat[0])

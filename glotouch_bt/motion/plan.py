@@ -14,7 +14,7 @@ import scipy
 
 from glotouch_bt.motion.kinematics import Kinematics, known_pose
 from glotouch_bt.motion.paths import Piece, quats_to_matrices
-from glotouch_bt.motion.timing import ProfileLimits, Progress, between, brake, rest_to_rest, stop
+from glotouch_bt.motion.timing import ProfileLimits, Progress, between, brake, rest_to_rest
 from glotouch_bt.robot import Array, JointSetpoint, MotionRefused
 
 KNOT_SPACING_M = 0.005
@@ -58,14 +58,7 @@ class MotionPlan:
 
     def halt(self, k: int, acceleration: float, jerk: float, period_s: float) -> MotionPlan | None:
         """Plan the fastest stop on the path after period `k` under limits (m/s2, m/s3); None if already at rest."""
-        p = self.progress
-        if p.v[k] == 0.0 and p.a[k] == 0.0:
-            return None
-        return self._timed(stop(p.s[k], p.v[k], p.a[k], acceleration, jerk, period_s))
-
-    def brake(self, k: int, period_s: float) -> MotionPlan | None:
-        """Plan a stop on the path after period `k` under the plan's own limits; None if already at rest."""
-        progress = brake(self.progress, k, self.limits, period_s)
+        progress = brake(self.progress, k, acceleration, jerk, period_s)
         return None if progress is None else self._timed(progress)
 
     def between(self, s0: float, s1: float, period_s: float, max_m_s: float = np.inf) -> MotionPlan:

@@ -59,11 +59,6 @@ def _solve(dof: int, target: ruckig.InputParameter) -> ruckig.Trajectory:
     raise BackendError(f"ruckig found no profile for {target}") from failure
 
 
-def _periods(duration_s: float, period_s: float) -> int:
-    # The tolerance keeps rounding from adding a period to a whole number of periods.
-    return max(1, int(np.ceil(duration_s / period_s - 1e-9)))
-
-
 def rest_to_rest(length_m: float, speed: float, acceleration: float, jerk: float, period_s: float) -> Progress:
     """Return the fastest profile over `length_m` from rest to rest under limits (m/s, m/s2, m/s3).
 
@@ -97,19 +92,20 @@ def between(s0: float, s1: float, limits: ProfileLimits, period_s: float) -> Pro
     return Progress(s, sign * way.v, sign * way.a)
 
 
-def brake(progress: Progress, k: int, limits: ProfileLimits, period_s: float) -> Progress | None:
-    """Return the stop after period `k` of a profile under its own limits; None if it is at rest there.
+def brake(progress: Progress, k: int, acceleration: float, jerk: float, period_s: float) -> Progress | None:
+    """Return the fastest stop after period `k` of a profile; None if it is at rest there.
 
-    It ends before the profile does, because the profile itself comes to rest under these limits.
+    Under the profile's own limits it ends before the profile does, which itself comes to rest under them.
     """
     s, v, a = (float(x[k]) for x in (progress.s, progress.v, progress.a))
     if v == 0.0 and a == 0.0:
         return None
-    return stop(s, v, a, limits.acceleration, limits.jerk, period_s)
+    return stop(s, v, a, acceleration, jerk, period_s)
 
 
 def _sample(trajectory: ruckig.Trajectory, period_s: float, end: float) -> Progress:
-    n = _periods(trajectory.duration, period_s)
+    # The tolerance keeps rounding from adding a period to a whole number of periods.
+    n = max(1, int(np.ceil(trajectory.duration / period_s - 1e-9)))
     rows = np.array([trajectory.at_time(k * period_s) for k in range(1, n)]).reshape(-1, 3)
     rows = np.vstack([rows, [end, 0.0, 0.0]])
     return Progress(rows[:, 0].copy(), rows[:, 1].copy(), rows[:, 2].copy())

@@ -135,7 +135,6 @@ class Mover:
         self._aperture_m = min(max(observation.gripper.aperture_m, 0.0), self.description.gripper.stroke_m)
 
     def _travel(self, plans: Sequence[MotionPlan], guard: Guard | None, tactile: bool) -> Motion[MoveResult]:
-        limits = self.limits
         trip = _GuardState(guard)
         done_m, travelled = 0.0, 0.0
         if guard is not None and self.pause_signal.stops:  # keep the fresh baseline of the guard up to date
@@ -148,17 +147,13 @@ class Mover:
                 k = yield from self._play(now, trip, tactile, pausable=True)
                 travelled = float(now.progress.s[k])
                 if trip.tripped():
-                    halt = now.halt(k, limits.stop_acceleration_m_s2, limits.stop_jerk_m_s3, self.period_s)
-                    if halt is not None:
-                        yield from self._play(halt, trip, tactile)
-                        travelled = float(halt.progress.s[-1])
-                    self._last_contact = (plan, travelled)
+                    travelled = yield from self._halt(now, k, trip, tactile)
                 elif k < len(now) - 1 and self.pause_signal.stops:
                     travelled = yield from self._pause(now, k, trip, tactile)
-                    if trip.tripped():
-                        self._last_contact = (plan, travelled)
-                    elif travelled < plan.piece.length_m - 1e-9:
+                    if not trip.tripped() and travelled < plan.piece.length_m - 1e-9:
                         running = plan.between(travelled, plan.piece.length_m, self.period_s)
+                if trip.tripped():
+                    self._last_contact = (plan, travelled)
             done_m += travelled
             if trip.tripped():
                 break
@@ -193,7 +188,7 @@ class Mover:
         """
         with self.pause_signal.handling():
             at_m = float(plan.progress.s[k])
-            slower = plan.brake(k, self.period_s)
+            slower = plan.halt(k, plan.limits.acceleration, plan.limits.jerk, self.period_s)
             legs: list[MotionPlan] = []
             if slower is not None:
                 at_m = min(float(slower.progress.s[-1]), plan.piece.length_m)
@@ -257,7 +252,7 @@ class Mover:
     def _pause_joints(self, profile: JointProfile, k: int) -> Motion[JointProfile | None]:
         """Brake a joint move after period `k`, wait for the end of the pause, and return the remaining move."""
         at = float(profile.share.s[k])
-        slower = brake(profile.share, k, profile.limits, self.period_s)
+        slower = brake(profile.share, k, profile.limits.acceleration, profile.limits.jerk, self.period_s)
         with self.pause_signal.handling():
             if slower is not None:
                 yield from self._play_joints(JointProfile.along(profile.start, profile.way, slower, profile.limits))
