@@ -16,7 +16,7 @@ from glotouch_backends.mujoco.control import (
     Servo,
     check_sane,
 )
-from glotouch_backends.mujoco.model import STEP_S, STEPS, Handles, handle_mesh
+from glotouch_backends.mujoco.model import STEP_S, STEPS, Handles
 from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, Tactile, WristSensor, up_in
 from glotouch_backends.mujoco.simulation import ControlTrace, SnapshotStore
 from glotouch_backends.mujoco.truth import Truth
@@ -69,18 +69,7 @@ class MujocoRobot(Robot):
         self._jaws = JawServo(model, handles, description.gripper, aperture)
         self._wrist = WristSensor(description, conditions, seed)
         self._guard = HardLimitGuard(limits)
-        self._tactile = Tactile(
-            model,
-            data,
-            handles,
-            description.gripper,
-            [
-                (handles.probe_body, handle_mesh(world.probe)),
-                *((b, o.mesh) for b, o in zip(handles.object_bodies, truth.objects, strict=True)),
-            ],
-            conditions,
-            seed,
-        )
+        self._tactile = Tactile(model, data, handles, description.gripper, world, truth, conditions, seed)
         self._ctrl = np.zeros((STEPS, model.nu))
         self._arm_ctrl, self._jaw_ctrl = self._ctrl[:, handles.arm_ctrl], self._ctrl[:, handles.jaw_ctrl]
         self._samples = np.zeros((STEPS, model.nsensordata))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glotouch_bt.motion import Kinematics, Line, MotionPlan, plan_piece
+from glotouch_bt.motion import Kinematics, Line, plan_piece
 from glotouch_bt.robot import HOLD, Array, Command, JointSetpoint, Observation, Pose, Request, Robot
 
 MAX_REQUEST_S = 10.0
@@ -74,24 +74,6 @@ class Rig:
         command = Command(tactile=tactile)
         return [self.cycle(command) for _ in range(max(1, round(duration_s / self.period_s)))]
 
-    def plan(self, goal_B_P: Pose, speed_m_s: float) -> MotionPlan | None:
-        """Plan a straight line from the last setpoint to a pose; None if it is there."""
-        limits = self.robot.limits
-        piece = Line(self.kinematics.fk(self.q), goal_B_P)
-        if piece.length_m < 1e-5:
-            return None
-        return plan_piece(
-            self.kinematics,
-            piece,
-            self.q,
-            speed_m_s=speed_m_s,
-            acceleration_m_s2=limits.tcp_acceleration_m_s2,
-            jerk_m_s3=limits.tcp_jerk_m_s3,
-            period_s=self.period_s,
-            posture_gain=0.0,
-            what="conformance",
-        )
-
     def send(self, setpoint: JointSetpoint) -> Observation:
         """Send one setpoint."""
         observation = self.cycle(Command(motion=setpoint))
@@ -102,11 +84,23 @@ class Rig:
         self, goal_B_P: Pose, speed_m_s: float = 0.1, until: Callable[[Observation], bool] | None = None
     ) -> list[tuple[JointSetpoint, Observation]]:
         """Move P straight to a pose in B; stop sending at full speed when `until` returns True."""
-        plan = self.plan(goal_B_P, speed_m_s)
-        track = []
-        for k in range(0 if plan is None else len(plan)):
-            assert plan is not None
-            setpoint = plan.setpoint(k)
+        limits = self.robot.limits
+        track: list[tuple[JointSetpoint, Observation]] = []
+        piece = Line(self.kinematics.fk(self.q), goal_B_P)
+        if piece.length_m < 1e-5:
+            return track
+        plan = plan_piece(
+            self.kinematics,
+            piece,
+            self.q,
+            speed_m_s=speed_m_s,
+            acceleration_m_s2=limits.tcp_acceleration_m_s2,
+            jerk_m_s3=limits.tcp_jerk_m_s3,
+            period_s=self.period_s,
+            posture_gain=0.0,
+            what="conformance",
+        )
+        for setpoint in map(plan.setpoint, range(len(plan))):
             track.append((setpoint, self.send(setpoint)))
             if until is not None and until(self.last):
                 break

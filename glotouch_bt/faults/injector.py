@@ -129,11 +129,6 @@ class FaultInjector(Robot):
         """The device's; see `Robot`."""
         return self._robot.paced
 
-    @property
-    def inner(self) -> Robot:
-        """The device."""
-        return self._robot
-
     def snapshot(self) -> Snapshot | None:
         """Return the device's snapshot; the state of the faults is not saved."""
         return self._robot.snapshot()

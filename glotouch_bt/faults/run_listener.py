@@ -17,11 +17,10 @@ class ListeningRecord:
     Args:
         record: Receives everything.
         injector: The fault injector.
-        reactions: Kinds of events that count as reactions, besides a skill's failure.
     """
 
-    def __init__(self, record: Record, injector: FaultInjector, reactions: tuple[str, ...] = ("guard",)) -> None:
-        self._record, self._injector, self._reactions = record, injector, reactions
+    def __init__(self, record: Record, injector: FaultInjector) -> None:
+        self._record, self._injector = record, injector
 
     def block(self, observation: Observation, command: Command) -> None:
         """Forward, after the fault events of this period."""
@@ -44,7 +43,7 @@ class ListeningRecord:
         """Forward; inform the injector who reacts."""
         if kind == FAILURE_EVENT:
             self._injector.add_sighting(stamp_s, str(data["node"]), str(data["code"]), str(data["message"]))
-        elif kind in self._reactions:
+        elif kind == "guard":
             # A guard stamps its finding with the last trusted sample; the reaction happens now.
             known_s = max(stamp_s, self._injector.now_s)
             words = str(data.get("what", data.get("text", "")))
@@ -57,8 +56,5 @@ class ListeningRecord:
 
 
 def injector_in(robot: Robot) -> FaultInjector | None:
-    """Return the fault injector in a chain of wrappers, or None."""
-    layer: object = robot
-    while layer is not None and not isinstance(layer, FaultInjector):
-        layer = getattr(layer, "inner", None)
-    return layer
+    """Return the robot if it is a fault injector, else None."""
+    return robot if isinstance(robot, FaultInjector) else None

@@ -106,10 +106,11 @@ class Arm(Mover):
         Raises:
             MotionRefused: Before the first command: a limit or the clearance would be violated.
         """
-        plan = plan_joints(self.kinematics, self._q, np.asarray(q, dtype=np.float64), speed, self.limits, self.period_s)
+        goal = np.asarray(q, dtype=np.float64)
+        running: JointProfile | None
+        running, checks_q = plan_joints(self.kinematics, self._q, goal, speed, self.limits, self.period_s)
         if check:
-            self._clear(plan.checks_q, "joint move")
-        running: JointProfile | None = plan.profile
+            self._clear(checks_q, "joint move")
         while running is not None:
             k = yield from self._play_joints(running, pausable=True)
             if k is None:

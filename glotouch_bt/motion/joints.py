@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from glotouch_bt.motion.kinematics import Kinematics
@@ -18,22 +16,9 @@ _SPEED_SAMPLES = 40
 """Number of postures at which the tool speed is checked."""
 
 
-@dataclass(frozen=True)
-class JointPlan:
-    """A joint move and the postures at which to check clearance.
-
-    Attributes:
-        profile: Setpoints, one per control period.
-        checks_q: (k, dof) rad, evenly spaced from start to end, at most 2 degrees apart.
-    """
-
-    profile: JointProfile
-    checks_q: Array
-
-
 def plan_joints(
     kinematics: Kinematics, start: Array, end: Array, speed: float, limits: Limits, period_s: float
-) -> JointPlan:
+) -> tuple[JointProfile, Array]:
     """Plan from rest to rest on a straight line in joint space.
 
     Args:
@@ -42,6 +27,9 @@ def plan_joints(
         speed: 0..1, fraction of the joint speed limits; lowered so that P stays within the tool speed limit.
         limits: Source of the tool speed limit.
         period_s: Control period.
+
+    Returns:
+        The profile, and the postures (k, dof) at which to check clearance: from start to end, at most 2 degrees apart.
 
     Raises:
         MotionRefused: The end is outside a joint's range, or speed outside 0..1.
@@ -60,7 +48,7 @@ def plan_joints(
     checks = np.linspace(start, end, max(2, int(np.ceil(largest / np.radians(2.0))) + 1))
     if largest < 1e-9:
         there = Progress(np.ones(1), np.zeros(1), np.zeros(1))
-        return JointPlan(JointProfile.along(start, end - start, there, ProfileLimits(1.0, 1.0, 1.0)), checks)
+        return JointProfile.along(start, end - start, there, ProfileLimits(1.0, 1.0, 1.0)), checks
     velocity = speed * kinematics.velocity
     profile = _profile(start, end, velocity, 1.0, period_s)
     picks = np.unique(np.linspace(0, len(profile.q) - 1, _SPEED_SAMPLES).astype(int))
@@ -68,7 +56,7 @@ def plan_joints(
     if fastest > limits.tcp_speed_m_s:
         # Time scaling: stretching time by 1/r scales speed by r, acceleration by r^2 and jerk by r^3 on the same path.
         profile = _profile(start, end, velocity, 0.98 * limits.tcp_speed_m_s / fastest, period_s)
-    return JointPlan(profile, checks)
+    return profile, checks
 
 
 def _profile(start: Array, end: Array, velocity: Array, slower: float, period_s: float) -> JointProfile:

@@ -179,7 +179,6 @@ class Kinematics:
         q_seed: npt.ArrayLike,
         *,
         posture_weight: float = 0.5,
-        posture_q: npt.ArrayLike | None = None,
         what: str = "reaching a pose",
     ) -> Array:
         """Solve inverse kinematics by damped least squares with joint limits and a null-space posture task.
@@ -190,8 +189,7 @@ class Kinematics:
         Args:
             pose_B_P: Target pose of P in B.
             q_seed: (dof,) rad, start of the iteration; the solution is on its branch.
-            posture_weight: 0..1, fraction of the distance to `posture_q` travelled in the null space per iteration.
-            posture_q: (dof,) rad, preferred posture; home if omitted.
+            posture_weight: 0..1, fraction of the distance to home travelled in the null space per iteration.
             what: Name of the motion for the error message.
 
         Returns:
@@ -200,7 +198,6 @@ class Kinematics:
         Raises:
             MotionRefused: No solution within the joint limits; gives the remaining distance and the blocking joint.
         """
-        posture = self.home if posture_q is None else self._checked(np.asarray(posture_q, dtype=np.float64))
         seed = self._checked(np.asarray(q_seed, dtype=np.float64))
         turned = self.home.copy()
         home_P = self.place(self.home)[0]
@@ -209,7 +206,7 @@ class Kinematics:
         best = ""
         least = np.inf
         for start in (seed, self.home, turned):
-            q, error, blocked = self._solve(pose_B_P, np.clip(start, self.lower, self.upper), posture_weight, posture)
+            q, error, blocked = self._solve(pose_B_P, np.clip(start, self.lower, self.upper), posture_weight)
             if error == 0.0:
                 return q
             if error < least:
@@ -220,7 +217,7 @@ class Kinematics:
                 best += f" with {blocked}" if blocked else " (out of reach or too near a singularity)"
         raise MotionRefused(what, best)
 
-    def _solve(self, pose: Pose, q: Array, weight: float, posture: Array) -> tuple[Array, float, str]:
+    def _solve(self, pose: Pose, q: Array, weight: float) -> tuple[Array, float, str]:
         target = pose.rotation
         dof = len(q)
         blocked = ""
@@ -236,7 +233,7 @@ class Kinematics:
             reached = near_P < _POSITION_TOLERANCE_M and near_R < _ROTATION_TOLERANCE_RAD
             damping = 1e-9 + 0.01 * min(norm * norm, 1.0)
             free = np.ones(dof, dtype=bool)
-            pull = weight * (posture - q)
+            pull = weight * (self.home - q)
             for _ in range(dof):
                 jf = j[:, free]
                 solved = np.linalg.solve(jf @ jf.T + damping * np.eye(6), np.stack([error, jf @ pull[free]], axis=1))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import cast
@@ -90,12 +90,9 @@ class FlexivXenseBackend(Backend):
         settings: messages.DeviceSettings,
         *,
         move: bool = True,
-        on_progress: Callable[[str], None] | None = None,
     ) -> FlexivXenseRobot:
-        """Open a robot with converted options; report progress, and enable nothing if `move` is False."""
-        process: DriverProcess | None = None
-        if not options.driver:
-            process = DriverProcess(options)
+        """Open a robot with converted options; enable nothing if `move` is False."""
+        process = None if options.driver else DriverProcess(options)
         link: DriverLink | None = None
         try:
             if process is not None:
@@ -110,7 +107,7 @@ class FlexivXenseBackend(Backend):
             )
             world_at = "" if process is None else process.world
             request = self._request(options, settings, world_at, link.number(), move)
-            opened = link.ask(request, messages.Opened, limit_s=OPEN_S, on_progress=on_progress or (lambda _: None))
+            opened = link.ask(request, messages.Opened, limit_s=OPEN_S, on_progress=lambda _: None)
             link.beat()
             first = link.wait(0, messages.Block, limit_s=10.0)
         except BaseException:

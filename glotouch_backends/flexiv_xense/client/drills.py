@@ -117,29 +117,27 @@ def run_drill(victim: str, moment_s: float, mission: str, seed: int, folder: Pat
     killed_s = time.monotonic()
     os.kill(opened["pid"] if victim == "driver" else executive.pid, signal.SIGKILL)
     if victim == "driver":
-        drill = _after_driver(moment_s, cell_log)
+        speed, standstill, peak = _after_driver(cell_log)
         code: int | None = executive.wait(EXIT_S)
     else:
-        drill = _after_executive(moment_s, driver_log, killed_s)
+        speed, standstill, peak = _after_executive(driver_log, killed_s)
         executive.wait()
         code = None
         _await(lambda: _event(driver_log, "released"), AFTER_S)
     _end(others)
-    return Drill(**{**asdict(drill), "exit_code": code})
+    return Drill(victim, moment_s, speed, standstill, peak, code)
 
 
-def _after_driver(moment_s: float, cell_log: Path) -> Drill:
-    """Read the cell's log; the cell sees the link end at the moment of the kill."""
+def _after_driver(cell_log: Path) -> tuple[float, float | None, float | None]:
+    """Return speed, time to standstill and peak force by the cell, which sees the link end at the moment of the kill."""
     still = _await(lambda: _event(cell_log, "standstill"), AFTER_S)
     lost = _event(cell_log, "client lost")
     speed = float("nan") if lost is None else lost["speed_m_s"]
-    if still is None:
-        return Drill("driver", moment_s, speed, None, None, None)
-    return Drill("driver", moment_s, speed, still["after_s"], still["peak_force_N"], None)
+    return (speed, None, None) if still is None else (speed, still["after_s"], still["peak_force_N"])
 
 
-def _after_executive(moment_s: float, driver_log: Path, killed_s: float) -> Drill:
-    """Read the driver's log, which has this machine's monotonic clock. An earlier hold counts from the kill."""
+def _after_executive(driver_log: Path, killed_s: float) -> tuple[float, float | None, float | None]:
+    """Return the same by the driver's log, on this machine's monotonic clock. An earlier hold counts from the kill."""
 
     def later(e: Mapping[str, Any]) -> bool:
         return bool(e["monotonic_s"] >= killed_s)
@@ -147,11 +145,9 @@ def _after_executive(moment_s: float, driver_log: Path, killed_s: float) -> Dril
     _await(lambda: _event(driver_log, "client lost", later), AFTER_S)
     still, silent = _event(driver_log, "standstill", later), _event(driver_log, "no command", later)
     if still is None and silent is None:  # the arm stood already, held before the kill
-        return Drill("executive", moment_s, 0.0, 0.0, 0.0, None)
+        return 0.0, 0.0, 0.0
     speed = 0.0 if silent is None else silent["speed_m_s"]
-    if still is None:
-        return Drill("executive", moment_s, speed, None, None, None)
-    return Drill("executive", moment_s, speed, still["monotonic_s"] - killed_s, still["peak_force_N"], None)
+    return (speed, None, None) if still is None else (speed, still["monotonic_s"] - killed_s, still["peak_force_N"])
 
 
 def main(argv: list[str] | None = None) -> int:

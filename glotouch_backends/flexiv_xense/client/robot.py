@@ -13,7 +13,6 @@ from glotouch_backends.flexiv_xense.client.link import DriverLink
 from glotouch_backends.flexiv_xense.client.process import DriverProcess
 from glotouch_backends.flexiv_xense.driver import messages
 from glotouch_bt.robot import (
-    Array,
     BackendError,
     Command,
     GlotouchError,
@@ -190,9 +189,5 @@ class FlexivXenseRobot(Robot):
 
 def _frame(maps: messages.Maps) -> TactileFrame:
     shape = (maps.rows, maps.columns)
-    left, right = (_map(b, shape) for b in (maps.left, maps.right))
+    left, right = (np.frombuffer(body, dtype="<f8").reshape(shape) for body in (maps.left, maps.right))
     return TactileFrame(maps.stamp_s, left, right)
-
-
-def _map(body: bytes, shape: tuple[int, int]) -> Array:
-    return np.frombuffer(body, dtype="<f8").reshape(shape)

@@ -62,11 +62,10 @@ class SteppedClock(Clock):
 
     Args:
         advance: Advances the world to a time.
-        now_s: Present time of the world.
     """
 
-    def __init__(self, advance: Callable[[float], None], now_s: float = 0.0) -> None:
-        self._advance, self._now = advance, now_s
+    def __init__(self, advance: Callable[[float], None]) -> None:
+        self._advance, self._now = advance, 0.0
         self._turn = threading.Condition()
         self._conductor: int | None = None
         self._running: int | None = None  # the worker that runs now

@@ -112,16 +112,13 @@ class DriverSession:
         if not self._moves and (cycle.setpoint is not None or cycle.jaws is not None):
             raise CommandRefused("command", "a motion", "none in a read-only session")
         if cycle.jaws is not None:
-            self._check_jaws(cycle.jaws)
+            if self.devices.gripper is None:
+                raise CommandRefused("command.gripper", cycle.jaws, "none: no gripper is connected")
+            self.devices.gripper.check(cycle.jaws)
         if cycle.setpoint is not None:
             if self._busy:
                 raise CommandRefused("command.motion", "a setpoint", "none while a tare or payload is pending")
             self._check.check(cycle.setpoint)
-
-    def _check_jaws(self, jaws: messages.JawTarget) -> None:
-        if self.devices.gripper is None:
-            raise CommandRefused("command.gripper", jaws, "none: no gripper is connected")
-        self.devices.gripper.check(jaws)
 
     def hold(self) -> None:
         """Brake to rest along the path of the last setpoint and stay; later calls repeat the pose of rest.
@@ -151,7 +148,8 @@ class DriverSession:
                     self._arm.zero(request.duration_s)
                 else:
                     self._arm.idle()
-                    self._arm.load(*self._hand_with_payload(request))
+                    com_P, t = request.com_P_m, self._tool
+                    self._arm.load(*payload_on_tool(t.mass_kg, t.com_E_m, request.mass_kg, com_P, t.pose_E_P))
                 self._arm.enter_motion()
             except DeviceFault as e:
                 self.failed = self.failed or e
@@ -160,10 +158,6 @@ class DriverSession:
                 self._done.append(messages.Done(request.ticket))
         self._reset_to_measured()
         self._busy = False
-
-    def _hand_with_payload(self, request: messages.PayloadRequest) -> tuple[float, list[float]]:
-        t = self._tool
-        return payload_on_tool(t.mass_kg, t.com_E_m, request.mass_kg, request.com_P_m, t.pose_E_P)
 
     def _reset_to_measured(self) -> None:
         """Continue from the measured pose: the arm's own controller has moved it, not a setpoint of ours."""

@@ -107,24 +107,20 @@ class Cell:
         self.world, self._log = world, log
         self.turn = threading.Condition(threading.RLock())
         self.vendor: SimulatedVendor = assemble(world, CellClock(world, self.turn))
-        self._makers = self._find_makers()
+        sdk, grippers = self.vendor.flexivrdk, self.vendor.xensegripper.xense_gripper
+        self._makers: dict[str, Any] = {
+            "Robot": sdk.Robot,
+            "Tool": sdk.Tool,
+            "XenseTCPGripper": grippers.XenseTCPGripper,
+            "XenseSerialGripper": grippers.XenseSerialGripper,
+            "Sensor": self.vendor.xensesdk.Sensor.create,
+        }
         self._made: dict[int, tuple[int, Any]] = {}
         self._links: dict[int, int] = {}  # client: open connections
         self._monitor = StandstillMonitor(world, self.write)
         self._parent = os.getppid()
         self._last_client_s = time.monotonic()
         self.ended = False
-
-    def _find_makers(self) -> dict[str, Any]:
-        v = self.vendor
-        inner = v.xensegripper.xense_gripper
-        return {
-            "Robot": v.flexivrdk.Robot,
-            "Tool": v.flexivrdk.Tool,
-            "XenseTCPGripper": inner.XenseTCPGripper,
-            "XenseSerialGripper": inner.XenseSerialGripper,
-            "Sensor": v.xensesdk.Sensor.create,
-        }
 
     def write(self, event: str, **values: object) -> None:
         """Write one line of the log."""

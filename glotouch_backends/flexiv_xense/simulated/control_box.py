@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from datetime import UTC, datetime
 
 import numpy as np
@@ -135,11 +134,6 @@ class ControlBox:
         self.clock.sleep_until(self.clock.now_s() + seconds)
         self.need_link()
 
-    def wait_until(self, reached: Callable[[], bool]) -> None:
-        """Block the caller until `reached`."""
-        while not reached():
-            self.wait(POLL_S)
-
     def need_link(self) -> None:
         """Raise RuntimeError if the link is lost."""
         if not self.linked:
@@ -162,7 +156,8 @@ class ControlBox:
         """Brake if the arm moves, and wait for standstill."""
         if not self.arm.trajectory.at_rest:
             self.arm.brake()
-        self.wait_until(lambda: self.arm.stopped)
+        while not self.arm.stopped:
+            self.wait(POLL_S)
 
     def switch(self, mode: Mode) -> None:
         """Stop and change the mode."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from glotouch_backends.mujoco import Truth
 from glotouch_backends.mujoco.control import JawReports, JawServo
-from glotouch_backends.mujoco.model import STEP_S, STEPS, Handles, handle_mesh
+from glotouch_backends.mujoco.model import STEP_S, STEPS, Handles
 from glotouch_backends.mujoco.sensing import Tactile
 from glotouch_bt.robot import Array, Conditions, GripperState, GripperTarget, RobotDescription, TactileFrame, World
 
@@ -56,9 +56,7 @@ class SimulatedHand:
         self._aperture = aperture = float(data.qpos[handles.jaw_qpos].sum())
         self._jaws = JawServo(model, handles, self.gripper, aperture)
         self._rows = np.zeros((STEPS, 2))
-        surfaces = [(b, o.mesh) for b, o in zip(handles.object_bodies, truth.objects, strict=True)]
-        surfaces.insert(0, (handles.probe_body, handle_mesh(world.probe)))
-        self._tactile = Tactile(model, data, handles, self.gripper, surfaces, conditions, seed)
+        self._tactile = Tactile(model, data, handles, self.gripper, world, truth, conditions, seed)
         self._reports = JawReports(conditions, seed, PERIOD_S, GripperState(0.0, aperture, 0.0, False))
         late = round(conditions.gripper_latency_s / PERIOD_S)
         self._speeds: deque[float] = deque([0.0] * (late + 1), maxlen=late + 1)

@@ -57,10 +57,6 @@ class Trajectory:
     """
 
     def __init__(self, q: Array) -> None:
-        self.reset(q)
-
-    def reset(self, q: Array) -> None:
-        """Set the commanded state to `q` at rest."""
         self.q, self.dq, self.ddq = q.copy(), np.zeros_like(q), np.zeros_like(q)
         self._rows: list[tuple[Array, Array, Array]] = []
         self._next = 0

@@ -11,11 +11,12 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from glotouch_backends.mujoco.model import Handles
+from glotouch_backends.mujoco.model import Handles, handle_mesh
 from glotouch_backends.mujoco.sensing.gel import GelSensor, PairPress
 from glotouch_backends.mujoco.sensing.rays import SurfaceRays
-from glotouch_bt.robot import Conditions, Gripper, Pose, TactileFrame
-from glotouch_bt.robot.scene import Mesh, stream
+from glotouch_backends.mujoco.truth import Truth
+from glotouch_bt.robot import Conditions, Gripper, Pose, TactileFrame, World
+from glotouch_bt.robot.scene import stream
 
 MAX_SAME_TRAVEL_M = 1e-5
 """Do not solve the gel again while the jaws have moved less than this. Source: ours."""
@@ -75,7 +76,8 @@ class Tactile:
         data: mujoco.MjData,
         handles: Handles,
         gripper: Gripper,
-        surfaces: Sequence[tuple[int, Mesh]],
+        world: World,
+        truth: Truth,
         conditions: Conditions,
         seed: int,
     ) -> None:
@@ -83,7 +85,8 @@ class Tactile:
         self._pads = PadContacts(model, data, handles)
         self._site = handles.pads_site
         self._gel = GelSensor(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
-        self._meshes = dict(surfaces)
+        self._meshes = dict(zip(handles.object_bodies, (o.mesh for o in truth.objects), strict=True))
+        self._meshes[handles.probe_body] = handle_mesh(world.probe)
         self._rays: dict[int, SurfaceRays] = {}
         self._c = conditions
         self._rng = stream(seed, "tactile")

@@ -49,7 +49,7 @@ def open_robot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Open
         robot: FlexivXenseRobot | None = None
         ends.append(end)
         opened = link.ask(
-            backend._request(options_, settings, None, link.number(), True), Opened, on_progress=lambda _: None
+            backend._request(options_, settings, "", link.number(), True), Opened, on_progress=lambda _: None
         )
         link.beat()
         first = link.wait(0, Block)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..clock import Clock
 from ..faults import DeviceFault, vendor_call
@@ -39,15 +39,14 @@ DEVICE_WRENCH_SHARE = 1.2
 """The device's contact limit over the driver's: the driver stops the arm, the device bounds the peak. Source: ours."""
 
 
-class ArmState:
+class ArmState(NamedTuple):
     """A reading: the device's stamp, q, dq (7,), TCP pose (7,) in B, wrench (6,) on the TCP in P."""
 
-    __slots__ = ("dq", "pose", "q", "stamp", "wrench")
-
-    def __init__(
-        self, stamp: object, q: Sequence[float], dq: Sequence[float], pose: Sequence[float], wrench: Sequence[float]
-    ) -> None:
-        self.stamp, self.q, self.dq, self.pose, self.wrench = stamp, q, dq, pose, wrench
+    stamp: object
+    q: Sequence[float]
+    dq: Sequence[float]
+    pose: Sequence[float]
+    wrench: Sequence[float]
 
 
 class DriverArm(ABC):

@@ -56,7 +56,7 @@ class TactileSensors:
 
     def __init__(self, sdk: Any, sensors: tuple[Any, Any], clock: Clock, limits: HandLimits, mirror: str) -> None:
         self._sensors, self._clock = sensors, clock
-        self._shape, self._max_depth_m = limits.pad_shape, limits.pad_depth_m
+        self._shape = limits.pad_shape
         self._types = sdk.Sensor.OutputType.Depth, sdk.Sensor.OutputType.TimeStamp
         self._mirrored = mirror == "left", mirror == "right"
         self._lateness = [math.inf, math.inf]

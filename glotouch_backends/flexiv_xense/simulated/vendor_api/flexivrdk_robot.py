@@ -227,19 +227,11 @@ class Robot:
         if not box.arm.go_to_pose(goal, twist, (linear_vel, angular_vel, linear_acc, angular_acc)):
             box.fail(200002, "the commanded pose is out of reach")
             return
-        self._faults_on(box.arm.trajectory.goal_q, twist)
-
-    def _faults_on(self, q: np.typing.NDArray[np.float64], dq: np.typing.NDArray[np.float64]) -> bool:
-        """Fault the robot if a setpoint is not finite or far out of range; return True if so."""
-        box = self._box
-        joints = box.arm.description.joints
-        if not bool(np.isfinite(q).all() and np.isfinite(dq).all()):
+        q, joints = box.arm.trajectory.goal_q, box.arm.description.joints
+        if not bool(np.isfinite(q).all()):
             box.fail(200001, "the commanded joint position is not a number", critical=True)
         elif any(not j.lower_rad - FAULT_RAD <= v <= j.upper_rad + FAULT_RAD for j, v in zip(joints, q, strict=True)):
             box.fail(200003, "the commanded joint position is beyond a joint's range")
-        else:
-            return False
-        return True
 
     # --- settings: these block --------------------------------------------------------------------------------------
 
