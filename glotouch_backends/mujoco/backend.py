@@ -15,15 +15,7 @@ from glotouch_backends.mujoco.simulation import MujocoDisturber, MujocoReferee
 from glotouch_backends.mujoco.truth import Truth, draw_truth
 from glotouch_backends.options import WorldOptions, convert_options
 from glotouch_backends.rizon4 import RIZON4_XENSE
-from glotouch_bt.robot import (
-    Backend,
-    BackendError,
-    Conditions,
-    Limits,
-    Robot,
-    RobotDescription,
-    World,
-)
+from glotouch_bt.robot import Backend, BackendError, Conditions, Limits, Robot, RobotDescription, World
 from glotouch_bt.robot.simulation import Disturber, Referee
 
 SETTLE_S = 0.6

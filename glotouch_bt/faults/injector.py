@@ -48,7 +48,6 @@ class FaultInjector(Robot):
         self.pending_events: list[tuple[float, dict[str, object]]] = []
         self.outcome = ""
         self.held = False
-        draws = seed if plan.seed is None else plan.seed
         self._scene = partial(
             EffectContext,
             period_s=robot.period_s,
@@ -57,7 +56,7 @@ class FaultInjector(Robot):
             sensed=first,
             may_kill=may_kill,
         )
-        self._draws = draws
+        self._draws = seed if plan.seed is None else plan.seed
         self._faults: list[ScheduledFault] = []
         self._waiting: list[ScheduledFault] = []
         self._active: list[ScheduledFault] = []

@@ -174,12 +174,7 @@ class Kinematics:
         return x[:, 0], x[:, 1], error
 
     def ik(
-        self,
-        pose_B_P: Pose,
-        q_seed: npt.ArrayLike,
-        *,
-        posture_weight: float = 0.5,
-        what: str = "reaching a pose",
+        self, pose_B_P: Pose, q_seed: npt.ArrayLike, *, posture_weight: float = 0.5, what: str = "reaching a pose"
     ) -> Array:
         """Solve inverse kinematics by damped least squares with joint limits and a null-space posture task.
 

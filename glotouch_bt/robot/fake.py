@@ -16,7 +16,7 @@ import numpy.typing as npt
 from glotouch_bt.robot.command import Command, GripperTarget, PendingTicket, Request, SetPayload
 from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription
 from glotouch_bt.robot.errors import BadInput, ParamError, SafetyStop
-from glotouch_bt.robot.geometry import Array, Pose, cross, cross_matrix, frozen_array
+from glotouch_bt.robot.geometry import Array, Pose, cross, cross_matrix, frozen_array, rpy_to_matrix
 from glotouch_bt.robot.interface import Backend, Robot
 from glotouch_bt.robot.limits import Limits
 from glotouch_bt.robot.observation import GripperState, Observation, TactileFrame
@@ -91,9 +91,8 @@ def forward(description: RobotDescription, q: npt.ArrayLike) -> Pose:
     """Return the pose of P in B at `q` (dof,) rad by chaining the description's frames."""
     pose = Pose(np.zeros(3))
     for joint, angle in zip(description.joints, np.asarray(q, dtype=np.float64), strict=True):
-        roll, pitch, yaw = joint.origin_rpy_rad
-        fixed = _about((0.0, 0.0, 1.0), yaw) @ _about((0.0, 1.0, 0.0), pitch) @ _about((1.0, 0.0, 0.0), roll)
-        pose = pose @ Pose.from_matrix(joint.origin_m, fixed @ _about(joint.axis, float(angle)))
+        turn = rpy_to_matrix(joint.origin_rpy_rad) @ _about(joint.axis, float(angle))
+        pose = pose @ Pose.from_matrix(joint.origin_m, turn)
     return pose @ description.pose_last_E @ description.gripper.pose_E_P
 
 

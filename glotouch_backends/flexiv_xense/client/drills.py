@@ -129,7 +129,7 @@ def run_drill(victim: str, moment_s: float, mission: str, seed: int, folder: Pat
 
 
 def _after_driver(cell_log: Path) -> tuple[float, float | None, float | None]:
-    """Return speed, time to standstill and peak force by the cell, which sees the link end at the moment of the kill."""
+    """Return speed, time to standstill and peak force by the cell, whose link ends at the moment of the kill."""
     still = _await(lambda: _event(cell_log, "standstill"), AFTER_S)
     lost = _event(cell_log, "client lost")
     speed = float("nan") if lost is None else lost["speed_m_s"]

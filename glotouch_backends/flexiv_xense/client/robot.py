@@ -90,7 +90,9 @@ class FlexivXenseRobot(Robot):
             )
         except BackendError as e:
             self._failed = e
-            self._end_tickets(str(e))
+            for ticket in self._tickets.values():
+                ticket.error, ticket.done = str(e), True
+            self._tickets.clear()
             raise
         self.latency_s = (block.sent_s - began) + (time.monotonic() - block.read_s)
         self._observation = self._take(block)
@@ -180,11 +182,6 @@ class FlexivXenseRobot(Robot):
             gripper=GripperState(j.stamp_s, j.aperture_m, j.force_N, j.moving),
             tactile=None if block.maps is None else _frame(block.maps),
         )
-
-    def _end_tickets(self, why: str) -> None:
-        for ticket in self._tickets.values():
-            ticket.error, ticket.done = why, True
-        self._tickets.clear()
 
 
 def _frame(maps: messages.Maps) -> TactileFrame:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import select
 from pathlib import Path
-from types import TracebackType
 
 import msgspec
 import zmq
@@ -104,7 +103,5 @@ class DriverSocket:
     def __enter__(self) -> DriverSocket:
         return self
 
-    def __exit__(
-        self, exc_type: type[BaseException] | None, exc: BaseException | None, tb: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()

@@ -135,7 +135,7 @@ class _Numbered(msgspec.Struct, frozen=True, kw_only=True, tag=True):
 # -- requests ----------------------------------------------------------------------------------------------------------
 
 
-class Open(_Numbered, kw_only=True):
+class Open(_Numbered, frozen=True, kw_only=True):
     """Connect to the devices and make them ready; the first request."""
 
     protocol: int
@@ -149,7 +149,7 @@ class Open(_Numbered, kw_only=True):
     move: bool = True  # False: observe only; nothing is enabled, switched or commanded
 
 
-class Cycle(_Numbered, kw_only=True):
+class Cycle(_Numbered, frozen=True, kw_only=True):
     """Run one control period."""
 
     setpoint: Setpoint | None = None
@@ -157,14 +157,14 @@ class Cycle(_Numbered, kw_only=True):
     tactile: bool = False
 
 
-class TareRequest(_Numbered, kw_only=True):
+class TareRequest(_Numbered, frozen=True, kw_only=True):
     """Zero the wrist sensor. The answer is `Accepted`; a later block reports the end."""
 
     ticket: int
     duration_s: float
 
 
-class PayloadRequest(_Numbered, kw_only=True):
+class PayloadRequest(_Numbered, frozen=True, kw_only=True):
     """Set the payload, with its centre of mass (3,) in P. Answered like a tare."""
 
     ticket: int
@@ -172,17 +172,17 @@ class PayloadRequest(_Numbered, kw_only=True):
     com_P_m: Numbers
 
 
-class HoldRequest(_Numbered):
+class HoldRequest(_Numbered, frozen=True):
     """Stop the arm."""
 
 
-class RefereeRequest(_Numbered, kw_only=True):
+class RefereeRequest(_Numbered, frozen=True, kw_only=True):
     """Simulated devices only: a question to the world's referee, which alone can decode it."""
 
     question: bytes
 
 
-class Quit(_Numbered):
+class Quit(_Numbered, frozen=True):
     """Stop the arm, release the devices, end the process."""
 
 
@@ -228,7 +228,7 @@ class Done(msgspec.Struct, frozen=True, array_like=True):
     error: str = ""
 
 
-class Opened(_Numbered, kw_only=True):
+class Opened(_Numbered, frozen=True, kw_only=True):
     """The devices are ready. `info` is for display; q_min and q_max are the device's own limits."""
 
     info: dict[str, str]
@@ -242,7 +242,7 @@ class OpenProgress(msgspec.Struct, frozen=True, tag=True):
     text: str
 
 
-class Block(_Numbered, kw_only=True):
+class Block(_Numbered, frozen=True, kw_only=True):
     """Readings since the last block.
 
     Attributes:
@@ -265,11 +265,11 @@ class Block(_Numbered, kw_only=True):
     read_s: float = 0.0
 
 
-class Accepted(_Numbered):
+class Accepted(_Numbered, frozen=True):
     """The request was started or done."""
 
 
-class Refused(_Numbered, kw_only=True):
+class Refused(_Numbered, frozen=True, kw_only=True):
     """The command is invalid; nothing was sent to the device, and the arm holds."""
 
     name: str
@@ -277,7 +277,7 @@ class Refused(_Numbered, kw_only=True):
     rule: str
 
 
-class Failed(_Numbered, kw_only=True):
+class Failed(_Numbered, frozen=True, kw_only=True):
     """A device failed. `kind`: connect, fault, state, link, stale, vendor, world."""
 
     kind: str
@@ -288,7 +288,7 @@ class Failed(_Numbered, kw_only=True):
     limit_s: float = 0.0
 
 
-class RefereeAnswer(_Numbered, kw_only=True):
+class RefereeAnswer(_Numbered, frozen=True, kw_only=True):
     """Answer of the referee."""
 
     answer: bytes

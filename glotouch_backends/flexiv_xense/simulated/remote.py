@@ -125,10 +125,7 @@ def open_remote_vendor(address: str) -> RemoteVendor:
         return tcp(mac_addr) if mac_addr is not None else serial(**kwargs)
 
     gripper = SimpleNamespace(create=create)
-    sensor = SimpleNamespace(
-        create=_maker(link, "Sensor"),
-        OutputType=xensesdk.Sensor.OutputType,
-    )
+    sensor = SimpleNamespace(create=_maker(link, "Sensor"), OutputType=xensesdk.Sensor.OutputType)
     inner = SimpleNamespace(XenseGripper=gripper, XenseTCPGripper=tcp, XenseSerialGripper=serial)
     return RemoteVendor(
         SimpleNamespace(**arm),

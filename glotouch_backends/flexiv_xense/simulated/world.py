@@ -78,7 +78,7 @@ class SimulatedWorld:
             raise BackendError(f"MuJoCo failed at t={self.now_s:.3f} s: {e}") from e
 
     def _step(self) -> None:
-        """Step one millisecond."""
+        """Step one millisecond, and do at its end what the MuJoCo backend does once a control period."""
         i = self.steps % STEPS
         if i == 0:
             self.arm.carry()
@@ -93,13 +93,9 @@ class SimulatedWorld:
         self._external[i] = self._external_now
         self.arm.sense(self.steps, row)
         if i == STEPS - 1:
-            self._after_period()
-
-    def _after_period(self) -> None:
-        """Update what the MuJoCo backend updates once a control period."""
-        check_sane(self.data.warning.number, self._samples, self.data.time)
-        self._note_peak()
-        self.hand.end(self.now_s, self._samples[-1])
+            check_sane(self.data.warning.number, self._samples, self.data.time)
+            self._note_peak()
+            self.hand.end(self.now_s, self._samples[-1])
 
     def contact_force_N(self) -> float:
         """Return the true contact force of the last step on the hand, and on the probe while it is held."""

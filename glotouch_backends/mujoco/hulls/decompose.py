@@ -158,7 +158,8 @@ def decompose(mesh: Mesh, progress: Progress | None = None) -> Parts:
         (COARSE, "collision shape is coarse (16 parts): fine cutting failed"),
     ):
         try:
-            hulls = _trim(_run_coacd(mesh, attempt, say))
+            trimmed = (trimmed_hull(p, MAX_VERTICES, TOLERANCE_M) for p in _run_coacd(mesh, attempt, say))
+            hulls = tuple(h for h in trimmed if h is not None)
             _check(mesh, hulls)
         except _CutFailed as e:
             say(f"{mesh.name}: cutting failed ({e}); trying coarser parameters")
@@ -172,11 +173,6 @@ def decompose(mesh: Mesh, progress: Progress | None = None) -> Parts:
 
 class _CutFailed(Exception):
     """One attempt gave no usable parts."""
-
-
-def _trim(parts: Sequence[Array]) -> tuple[Array, ...]:
-    trimmed = (trimmed_hull(p, MAX_VERTICES, TOLERANCE_M) for p in parts)
-    return tuple(h for h in trimmed if h is not None)
 
 
 def _check(mesh: Mesh, hulls: Sequence[Array]) -> None:

@@ -42,10 +42,7 @@ def _box(body: mujoco.MjsBody, box: Box, colour: tuple[float, ...], name: str = 
 def finger_boxes(gripper: Gripper, side: float) -> tuple[Box, Box]:
     """Return finger and pad of the left (+1) or right (-1) side, in P with the jaws closed."""
     (x, y, z), (hx, hy, hz) = gripper.finger.centre_m, gripper.finger.half_m
-    back = Box(
-        centre_m=(x, side * (y + 0.5 * PAD_PROUD_M), z),
-        half_m=(hx, hy - 0.5 * PAD_PROUD_M, hz),
-    )
+    back = Box(centre_m=(x, side * (y + 0.5 * PAD_PROUD_M), z), half_m=(hx, hy - 0.5 * PAD_PROUD_M, hz))
     width, length = gripper.pad_window_m
     pad = Box(centre_m=(0.0, side * PAD_PROUD_M, 0.0), half_m=(0.5 * width, PAD_PROUD_M, 0.5 * length))
     return back, pad

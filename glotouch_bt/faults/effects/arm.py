@@ -82,9 +82,8 @@ class LostCycle(Effect[LostCycleParams]):
     def command(self, command: Command) -> Command:
         """See `Effect`."""
         asks = command.motion is not None or command.gripper is not None
-        return (
-            replace(HOLD, tactile=command.tactile) if asks and self.context.rng.random() < self.params.lost else command
-        )
+        lost = asks and self.context.rng.random() < self.params.lost
+        return replace(HOLD, tactile=command.tactile) if lost else command
 
 
 class SlowCycleParams(FaultParams):

@@ -17,13 +17,10 @@ class GripStall(Effect[FaultParams]):
 
     def command(self, command: Command) -> Command:
         """See `Effect`."""
-        if command.gripper is not None:
-            hold, self._hold = self._hold or self._standing(), None
-            return replace(command, gripper=hold)
-        if self._hold is not None and self.context.sensed.gripper.moving:
-            hold, self._hold = self._hold, None
-            return replace(command, gripper=hold)
-        return command
+        if command.gripper is None and (self._hold is None or not self.context.sensed.gripper.moving):
+            return command
+        hold, self._hold = self._hold or self._standing(), None
+        return replace(command, gripper=hold)
 
     def _standing(self) -> GripperTarget:
         hand, now = self.context.description.gripper, self.context.sensed.gripper
@@ -133,9 +130,4 @@ class GripDrop(Effect[GripDropParams]):
         """See `Effect`."""
         if not self.params.masked:
             return observation
-        state = observation.gripper
-        before = self._before
-        return replace(
-            observation,
-            gripper=replace(state, aperture_m=before.aperture_m, force_N=before.force_N, moving=before.moving),
-        )
+        return replace(observation, gripper=replace(self._before, stamp_s=observation.gripper.stamp_s))

@@ -5,7 +5,7 @@ As in the vendor's library, a list taken from an object is a copy.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import Enum
@@ -150,6 +150,11 @@ class ArmReading:
     load: Load
     pose_E_P: Pose
 
+    def stamp(self) -> tuple[int, int]:
+        """Return the seconds since the epoch, and the nanoseconds since the last full second."""
+        seconds, rest = divmod(self.sample.step, round(1.0 / STEP_S))
+        return EPOCH_S + seconds, rest * round(STEP_S * 1e9)
+
     def flange(self) -> Pose:
         """Return the pose of the flange in B."""
         row = self.sample.row
@@ -176,10 +181,28 @@ def _same(a: Pose, b: Pose) -> bool:
     return bool((a.position_m == b.position_m).all() and (a.quat == b.quat).all())
 
 
+def _read(empty: Callable[[], object], of: Callable[[ArmReading], object]) -> property:
+    """Return a property of a state: computed from its reading, or `empty` if it has none."""
+
+    def _get(self: RobotStates) -> object:
+        return empty() if self._reading is None else of(self._reading)
+
+    return property(_get)
+
+
 class RobotStates:
-    """State of the arm at one millisecond; only values that the simulation has."""
+    """State of the arm at one millisecond; only values that the simulation has. Wrenches in N and Nm, poses in m."""
 
     __slots__ = ("_reading",)
+    timestamp = _read(lambda: (0, 0), lambda r: r.stamp())
+    q = _read(list, lambda r: _list(r.sample.row[r.sensors.q]))
+    dq = _read(list, lambda r: _list(r.sample.row[r.sensors.dq]))
+    flange_pose = _read(lambda: [0.0] * 7, lambda r: seven(r.flange()))
+    tcp_pose = _read(lambda: [0.0] * 7, lambda r: r.tool())
+    ext_wrench_in_tcp = _read(lambda: [0.0] * 6, lambda r: r.in_tool(r.sample.filtered_S))
+    ext_wrench_in_tcp_raw = _read(lambda: [0.0] * 6, lambda r: r.in_tool(r.sample.wrench_S))
+    ext_wrench_in_world = _read(lambda: [0.0] * 6, lambda r: r.in_world(r.sample.filtered_S))
+    ext_wrench_in_world_raw = _read(lambda: [0.0] * 6, lambda r: r.in_world(r.sample.wrench_S))
 
     def __init__(self) -> None:
         self._reading: ArmReading | None = None
@@ -189,60 +212,6 @@ class RobotStates:
         states = cls()
         states._reading = reading
         return states
-
-    @property
-    def timestamp(self) -> tuple[int, int]:
-        """Seconds since the epoch, and nanoseconds since the last full second."""
-        if self._reading is None:
-            return (0, 0)
-        seconds, rest = divmod(self._reading.sample.step, round(1.0 / STEP_S))
-        return EPOCH_S + seconds, rest * round(STEP_S * 1e9)
-
-    @property
-    def q(self) -> list[float]:
-        """Joint positions, link side, rad."""
-        r = self._reading
-        return [] if r is None else _list(r.sample.row[r.sensors.q])
-
-    @property
-    def dq(self) -> list[float]:
-        """Joint velocities, link side, rad/s."""
-        r = self._reading
-        return [] if r is None else _list(r.sample.row[r.sensors.dq])
-
-    @property
-    def flange_pose(self) -> list[float]:
-        """The flange in the world, m and w x y z."""
-        return [0.0] * 7 if self._reading is None else seven(self._reading.flange())
-
-    @property
-    def tcp_pose(self) -> list[float]:
-        """The tool centre point in the world."""
-        return [0.0] * 7 if self._reading is None else self._reading.tool()
-
-    @property
-    def ext_wrench_in_tcp(self) -> list[float]:
-        """Wrench on the tool at its centre point, in its axes, N and Nm; filtered."""
-        r = self._reading
-        return [0.0] * 6 if r is None else r.in_tool(r.sample.filtered_S)
-
-    @property
-    def ext_wrench_in_tcp_raw(self) -> list[float]:
-        """The same, not filtered."""
-        r = self._reading
-        return [0.0] * 6 if r is None else r.in_tool(r.sample.wrench_S)
-
-    @property
-    def ext_wrench_in_world(self) -> list[float]:
-        """Wrench on the tool at its centre point, in the world's axes; filtered."""
-        r = self._reading
-        return [0.0] * 6 if r is None else r.in_world(r.sample.filtered_S)
-
-    @property
-    def ext_wrench_in_world_raw(self) -> list[float]:
-        """The same, not filtered."""
-        r = self._reading
-        return [0.0] * 6 if r is None else r.in_world(r.sample.wrench_S)
 
 
 def _list(a: Array) -> list[float]:
