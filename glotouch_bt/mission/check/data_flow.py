@@ -13,8 +13,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from glotouch_bt.mission.check.requirements import Requirements, verdicts
-from glotouch_bt.mission.check.state_variables import StateVariables
-from glotouch_bt.mission.nodes import ANYTHING, EMPTY, ConditionSettings, ExitStates, Requirement, kind_of
+from glotouch_bt.mission.nodes import (
+    ANYTHING,
+    EMPTY,
+    ConditionSettings,
+    ExitStates,
+    Requirement,
+    StateVariables,
+    kind_of,
+)
 from glotouch_bt.mission.spec import NodeSpec
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from glotouch_bt.mission.check.state_variables import StateVariables
-from glotouch_bt.mission.nodes import UNSET, ConditionSettings, Requirement, holds, kind_of
+from glotouch_bt.mission.nodes import UNSET, ConditionSettings, Requirement, StateVariables, holds, kind_of
 from glotouch_bt.mission.spec import UNITS, NodeSpec
 
 Requirements = Mapping[int, tuple[Requirement, ...]]

@@ -13,8 +13,8 @@ from glotouch_bt.mission.check.counterexample import Goal, StepBudget, shortest_
 from glotouch_bt.mission.check.data_flow import DataFlow
 from glotouch_bt.mission.check.lint import check_lint
 from glotouch_bt.mission.check.requirements import all_requirements, same_quantity
-from glotouch_bt.mission.check.state_variables import StateVariables
-from glotouch_bt.mission.nodes import ANYTHING, EMPTY, UNSET, Requirement, ValueKind, kind_of
+from glotouch_bt.mission.check.variables_of import variables_of
+from glotouch_bt.mission.nodes import ANYTHING, EMPTY, UNSET, Requirement, StateVariables, ValueKind, kind_of
 from glotouch_bt.mission.spec import Findings, NodeSpec, Place
 
 MAX_PATHS = 40
@@ -35,7 +35,7 @@ def check_flow(
         timeout_s: Longest duration of the mission.
     """
     with _deep_recursion():
-        variables = StateVariables(tree)
+        variables = variables_of(tree)
         requirements = all_requirements(tree, variables)
         exact = DataFlow(tree, variables, requirements)
         blocked = any(exact.entered.get(id(n), EMPTY) == EMPTY for n in tree.walk())
@@ -46,7 +46,7 @@ def check_flow(
 
 @contextmanager
 def _deep_recursion() -> Iterator[None]:
-    """Raise the recursion limit; see `state_sets`."""
+    """Raise the recursion limit; see `nodes.base.state_sets`."""
     before = sys.getrecursionlimit()
     sys.setrecursionlimit(max(before, MAX_RECURSION))
     try:

@@ -1,4 +1,4 @@
-"""Node kinds, one file each: settings, reading, building, transitions for the checker, drawing, BehaviorTree.CPP form.
+"""Node kinds, one file each or each family: settings, reading, building, transitions for the checker, drawing, BT.CPP.
 
 To add one: write its class in a new file here, and register it below.
 """
@@ -17,6 +17,7 @@ from glotouch_bt.mission.nodes.base import (
     Position,
     Requirement,
     Stack,
+    StateVariables,
     ValueKind,
     Values,
     btcpp_value,
@@ -25,29 +26,18 @@ from glotouch_bt.mission.nodes.base import (
     register,
 )
 from glotouch_bt.mission.nodes.condition import ConditionKind
-from glotouch_bt.mission.nodes.fail import FailKind
 from glotouch_bt.mission.nodes.for_each import ForEachKind, ForEachSettings
-from glotouch_bt.mission.nodes.invert import InvertKind
+from glotouch_bt.mission.nodes.ordered import SelectorKind, SequenceKind
+from glotouch_bt.mission.nodes.outcomes import FailKind, InvertKind, SucceedKind
 from glotouch_bt.mission.nodes.parallel import ParallelKind, ParallelSettings
 from glotouch_bt.mission.nodes.repeat import RepeatKind, RepeatSettings
 from glotouch_bt.mission.nodes.retry import RetryKind, RetrySettings
-from glotouch_bt.mission.nodes.selector import SelectorKind
-from glotouch_bt.mission.nodes.sequence import SequenceKind
 from glotouch_bt.mission.nodes.skill import SkillKind
 from glotouch_bt.mission.nodes.subtree import SubtreeKind, SubtreeSettings
-from glotouch_bt.mission.nodes.succeed import SucceedKind
 from glotouch_bt.mission.nodes.timeout import TimeoutKind, TimeoutSettings
 
-register(SequenceKind())
-register(SelectorKind())
-register(ParallelKind())
-register(RetryKind())
-register(TimeoutKind())
-register(RepeatKind())
-register(ForEachKind())
-register(InvertKind())
-register(SucceedKind())
-register(FailKind())
-register(ConditionKind())
-register(SubtreeKind())
+for _kind in (SequenceKind, SelectorKind, ParallelKind, RetryKind, TimeoutKind, RepeatKind, ForEachKind, InvertKind):
+    register(_kind())
+for _kind in (SucceedKind, FailKind, ConditionKind, SubtreeKind):
+    register(_kind())
 register(SkillKind(), named=False)

@@ -22,8 +22,8 @@ from glotouch_bt.mission.nodes.base import (
     Position,
     Requirement,
     Stack,
+    StateVariables,
     Values,
-    VariableTable,
     btcpp_name,
     comparison_requirement,
     holds,
@@ -86,7 +86,7 @@ class ConditionKind(NodeKind):
         settings = node.settings
         return ("port", settings) if isinstance(settings, ConditionSettings) and "port" in node.reads else None
 
-    def requirements(self, node: NodeSpec, variables: VariableTable) -> Iterator[Requirement]:
+    def requirements(self, node: NodeSpec, variables: StateVariables) -> Iterator[Requirement]:
         """Yield that of the port."""
         if found := self.comparison(node):
             yield comparison_requirement(node, variables, *found)

@@ -26,9 +26,9 @@ from glotouch_bt.mission.nodes.base import (
     Requirement,
     RunCount,
     Stack,
+    StateVariables,
     ValueKind,
     Values,
-    VariableTable,
     btcpp_key,
     port_requirement,
     wire_setting,
@@ -183,7 +183,7 @@ class ForEachKind(NodeKind):
         """Return those of `collect`."""
         return {p: (node.reads[p].key, w.key) for p, w in node.writes.items() if p in node.reads}
 
-    def requirements(self, node: NodeSpec, variables: VariableTable) -> Iterator[Requirement]:
+    def requirements(self, node: NodeSpec, variables: StateVariables) -> Iterator[Requirement]:
         """Yield those of the items and of every gathered key."""
         for port in node.reads:
             yield port_requirement(node, port, variables, "not always", tuple if port == "items" else object)
@@ -206,7 +206,7 @@ class ForEachKind(NodeKind):
             found += [(target, ValueKind.tuple_of([k])) for k in held(source)]
         return found
 
-    def effects(self, node: NodeSpec, variables: VariableTable) -> Iterator[tuple[int, set[int]]]:
+    def effects(self, node: NodeSpec, variables: StateVariables) -> Iterator[tuple[int, set[int]]]:
         """Yield what it writes, and that it unsets what it gathers before every item."""
         yield from super().effects(node, variables)
         for source, _ in self.gathers(node).values():
@@ -360,7 +360,7 @@ class ForEachKind(NodeKind):
         return BtcppForm(self.btcpp, {**attributes, "on_failure": node.settings.on_failure}, custom=True)
 
 
-def _empty_tuples(variables: VariableTable, pairs: Pairs) -> Iterator[tuple[int, int]]:
+def _empty_tuples(variables: StateVariables, pairs: Pairs) -> Iterator[tuple[int, int]]:
     """Yield (variable, value) of each key that gathers, when the loop begins."""
     for source, target in pairs.values():
         kind = ValueKind.tuple_of(variables.written_kinds(source)[1:])

@@ -26,8 +26,8 @@ from glotouch_bt.mission.nodes.base import (
     Requirement,
     RunCount,
     Stack,
+    StateVariables,
     Values,
-    VariableTable,
     btcpp_name,
     comparison_requirement,
     holds,
@@ -130,7 +130,7 @@ class RepeatKind(LoopKind):
         condition = node.settings.condition if isinstance(node.settings, RepeatSettings) else None
         return ("until", condition) if condition is not None and "until" in node.reads else None
 
-    def requirements(self, node: NodeSpec, variables: VariableTable) -> Iterator[Requirement]:
+    def requirements(self, node: NodeSpec, variables: StateVariables) -> Iterator[Requirement]:
         """Yield that of `until`."""
         if found := self.comparison(node):
             yield comparison_requirement(node, variables, *found)

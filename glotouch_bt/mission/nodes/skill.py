@@ -19,9 +19,9 @@ from glotouch_bt.mission.nodes.base import (
     Requirement,
     RunCount,
     Stack,
+    StateVariables,
     ValueKind,
     Values,
-    VariableTable,
     btcpp_key,
     btcpp_value,
     port_requirement,
@@ -55,7 +55,7 @@ class SkillKind(NodeKind):
         """Return what it writes with each result, each kind once."""
         return list(dict.fromkeys(written_kind(node, port, result) for result in RESULTS))
 
-    def effects(self, node: NodeSpec, variables: VariableTable) -> Iterator[tuple[int, set[int]]]:
+    def effects(self, node: NodeSpec, variables: StateVariables) -> Iterator[tuple[int, set[int]]]:
         """Yield what it writes, and the states in which it leaves resources."""
         skill = _skill_of(node)
         for port, wire in node.writes.items():
@@ -65,7 +65,7 @@ class SkillKind(NodeKind):
             after = {*skill.FAILURE_STATES.get(resource, ()), skill.POSTCONDITIONS.get(resource, UNCHANGED)}
             yield variables.resources[resource], {variables.state(resource, s) for s in after - {UNCHANGED}}
 
-    def requirements(self, node: NodeSpec, variables: VariableTable) -> Iterator[Requirement]:
+    def requirements(self, node: NodeSpec, variables: StateVariables) -> Iterator[Requirement]:
         """Yield those of its inputs, then its preconditions."""
         skill = _skill_of(node)
         for port, wire in node.reads.items():

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from glotouch_bt.mission.nodes.base import BtcppForm, NodeKind, NodeReader
-from glotouch_bt.mission.spec import Node, NodeSpec, Place, Settings
+from glotouch_bt.mission.nodes.base import BtcppForm, NodeKind
+from glotouch_bt.mission.spec import NodeSpec, Settings
 
 
 class SubtreeSettings(Settings):
@@ -26,10 +26,6 @@ class SubtreeKind(NodeKind):
     Settings = SubtreeSettings
     children = "none"
     btcpp, sign, fill = "SubTree", "▤", "#eeeeee"
-
-    def read(self, reader: NodeReader, place: Place, body: Node) -> NodeSpec:
-        """Read the other file."""
-        return reader.subtree(place, body)
 
     def btcpp_form(self, node: NodeSpec) -> BtcppForm | None:
         """Let its tree stand in its place."""

@@ -12,7 +12,7 @@ from typing import Any, TypeVar, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from glotouch_bt.mission.spec import Findings, Map, Node, Place, Scalar, Seq, convert, split_quantity, units_for
+from glotouch_bt.mission.spec import Findings, Map, Node, Place, Scalar, Seq, convert, split_quantity, units_for, walk
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -236,7 +236,8 @@ def _report(
         names = _keys(model, loc[:-1])
         findings.unknown(at, "unknown_parameter", f"key of {name} in {what}:", str(loc[-1]), names)
         return
-    dotted = ".".join(str(s) for s in loc if not isinstance(s, str) or s in _written(given) or rest == ())
+    written = {str(k.value) for n in walk(given) if isinstance(n, Map) for k, _ in n.entries}
+    dotted = ".".join(str(s) for s in loc if not isinstance(s, str) or s in written or rest == ())
     shown = f" = {node.value!r}" if isinstance(node, Scalar) else ""
     source = f" (from {node.origin})" if isinstance(node, Scalar) and node.origin else ""
     words = _WORDS.get(error["type"])
@@ -266,30 +267,13 @@ def _keys(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
     return list(model.model_fields)
 
 
-def _written(given: Map) -> set[str]:
-    names: set[str] = set()
-    stack: list[Node] = [given]
-    while stack:
-        node = stack.pop()
-        if isinstance(node, Map):
-            names.update(node.keys())
-            stack.extend(v for _, v in node.entries)
-        elif isinstance(node, Seq):
-            stack.extend(node.items)
-    return names
-
-
 def _valid(field: FieldInfo | None, unit: str) -> str:
     """Return the field's type, range and unit in words."""
     kind = _kind_in_words(field.annotation) if field is not None else ""
     if field is None or not kind:
         return ""
-    rules = [
-        f"{symbol} {getattr(m, attribute)}"
-        for m in field.metadata
-        for attribute, symbol in (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
-        if getattr(m, attribute, None) is not None
-    ]
+    limits = ((symbol, getattr(m, word, None)) for m in field.metadata for word, symbol, _ in _RULES)
+    rules = [f"{symbol} {limit}" for symbol, limit in limits if limit is not None]
     return f"{kind}{unit}" + (f", {', '.join(rules)}" if rules else "")
 
 

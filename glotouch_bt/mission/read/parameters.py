@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from os.path import isdir, isfile
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -27,12 +27,21 @@ from glotouch_bt.mission.spec import (
     measured,
     plain,
     units_for,
+    walk,
 )
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene import is_sound_stl, load_mesh
 
 Value = bool | int | float | str
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_KINDS: dict[str, tuple[Any, str]] = {
+    "int": (int, "a whole number"),
+    "float": (int | float, "a number"),
+    "str": (str, "text"),
+    "bool": (bool, "true or false"),
+    "stl": (str, "text"),
+}
+"""Type of each kind of parameter, and its name in messages."""
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
 
@@ -209,18 +218,9 @@ def _from_text(given: str | Value, kind: str) -> Value:
 
 def _fault(value: Value, declared: Declaration) -> str:
     """Return why a value does not fit its declaration, or empty."""
-    kinds: dict[str, tuple[type, ...]] = {
-        "int": (int,),
-        "float": (int, float),
-        "str": (str,),
-        "bool": (bool,),
-        "stl": (str,),
-    }
-    fits = isinstance(value, kinds[declared.type]) and isinstance(value, bool) == (declared.type == "bool")
-    if not fits:
-        return "must be " + {"int": "a whole number", "float": "a number", "bool": "true or false"}.get(
-            declared.type, "text"
-        )
+    kind, words = _KINDS[declared.type]
+    if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
+        return f"must be {words}"
     if isinstance(value, (int, float)) and declared.type in ("int", "float"):
         if value != value or value in (float("inf"), float("-inf")):
             return "must be finite"
@@ -286,18 +286,9 @@ def check_used(section: Node | None, tree: Node, findings: Findings) -> None:
     """Report declared parameters that a tree does not use."""
     if not isinstance(section, Map):
         return
-    used: set[str] = set()
-    stack = [tree]
-    while stack:
-        node = stack.pop()
-        if isinstance(node, Seq):
-            stack.extend(node.items)
-        elif isinstance(node, Map):
-            stack.extend(v for _, v in node.entries)
-        elif isinstance(node.value, str) and node.value.startswith("$"):
-            used.add(node.value[1:])
+    used = {node.value for node in walk(tree) if isinstance(node, Scalar)}
     for key, _ in section.entries:
-        if key.value not in used:
+        if f"${key.value}" not in used:
             findings.add(key.place, "unused_parameter", f"no node uses the parameter {key.value!r}")
 
 
@@ -309,16 +300,3 @@ def resolved(node: Node | None, parameters: Mapping[str, Parameter]) -> dict[str
     for name, parameter in parameters.items():
         section[name]["default"] = parameter.value
     return dict(section)
-
-
-__all__ = [
-    "Declaration",
-    "Parameter",
-    "Value",
-    "check_used",
-    "from_command_line",
-    "read_parameters",
-    "resolved",
-    "stl_usable",
-    "substitute",
-]

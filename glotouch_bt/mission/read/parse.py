@@ -12,11 +12,10 @@ from glotouch_bt.mission.read.literals import is_literal, read_literal
 from glotouch_bt.mission.read.parameters import stl_usable, substitute
 from glotouch_bt.mission.read.scope import Scope
 from glotouch_bt.mission.read.subtrees import entries_of, find_subtree, handed_on, open_subtree
-from glotouch_bt.mission.spec import Findings, Map, Node, NodeSpec, Place, Scalar, Seq, Wire
+from glotouch_bt.mission.spec import Map, Node, NodeSpec, Place, Scalar, Seq, Wire
 from glotouch_bt.robot import BadInput
 from glotouch_bt.skill import Skill
 
-KEY = re.compile(r"[a-z][a-z0-9_]*")
 MAX_NODES = 3000
 """Largest number of nodes of a mission, subtrees included."""
 MAX_DEPTH = 100
@@ -68,13 +67,13 @@ def _lost(node: Node) -> NodeSpec:
 
 def _named(name: str, place: Place, body: Node, scope: Scope) -> NodeSpec:
     if name in NODES:
-        return NODES[name].read(_Reader(scope), place, body)
+        return _node_named(name, place, body, scope)
     known = name
     if name not in scope.skills:
         also = {kind.btcpp: name for name, kind in NODES.items() if kind.btcpp}
         known = scope.findings.unknown(place, "unknown_skill", "skill or node", name, [*NODES, *scope.skills], also)
         if known in NODES and _holds_children(body) == (NODES[known].children != "none"):
-            return NODES[known].read(_Reader(scope), place, body)
+            return _node_named(known, place, body, scope)
         if known not in scope.skills or _holds_children(body):
             return NodeSpec("unknown", name, place, _children_of_unknown(body, scope))
     try:
@@ -123,24 +122,8 @@ def _title(taken: Mapping[str, tuple[Place, Node]], default: str, scope: Scope) 
     return default
 
 
-class _Reader:
-    """The part of this module that node kinds use."""
-
-    def __init__(self, scope: Scope) -> None:
-        self._scope = scope
-
-    @property
-    def findings(self) -> Findings:
-        return self._scope.findings
-
-    def node(self, kind: NodeKind, place: Place, body: Node) -> NodeSpec:
-        return _node_of_kind(kind, place, body, self._scope)
-
-    def subtree(self, place: Place, body: Node) -> NodeSpec:
-        return _subtree(place, body, self._scope)
-
-    def wire(self, port: str, key: str, place: Place) -> Wire | None:
-        return _keyed(port, key, place, self._scope)
+def _node_named(name: str, place: Place, body: Node, scope: Scope) -> NodeSpec:
+    return _subtree(place, body, scope) if name == "subtree" else _node_of_kind(NODES[name], place, body, scope)
 
 
 def _node_of_kind(kind: NodeKind, place: Place, body: Node, scope: Scope) -> NodeSpec:
@@ -163,7 +146,7 @@ def _node_of_kind(kind: NodeKind, place: Place, body: Node, scope: Scope) -> Nod
         children = (_lost(body),)
     spec = NodeSpec(kind.name, "", place, children, settings)
     spec.name = _title(taken, kind.default_name(spec), scope)
-    kind.wire(spec, rest, unit, _Reader(scope))
+    kind.wire(spec, rest, unit, scope)
     return spec
 
 
@@ -185,13 +168,6 @@ def _children(kind: NodeKind, below: Node | None, place: Place, scope: Scope) ->
     return children
 
 
-def _keyed(port: str, key: str, place: Place, scope: Scope) -> Wire | None:
-    if not KEY.fullmatch(key):
-        scope.findings.add(place, "wrong_key", f"{key!r} is not a port key", valid="small letters, digits and _")
-        return None
-    return Wire(port, scope.key(key), place)
-
-
 def _skill(name: str, skill: type[Skill], place: Place, body: Node, scope: Scope) -> NodeSpec:
     taken, rest = _take(_settings_map(name, place, body, scope), "name", "in", "out")
     ports = {p: "out" for p in skill.OUTPUT_PORTS} | {p: "in" for p in skill.INPUT_PORTS} | {"in": "", "out": ""}
@@ -205,26 +181,15 @@ def _skill(name: str, skill: type[Skill], place: Place, body: Node, scope: Scope
     writes = {p: Wire(p, scope.key(keys[p]), place) for p in skill.OUTPUT_PORTS}
     constants: dict[str, object] = {}
     if "in" in taken:
-        given, constants = _literals(skill, taken["in"][1], place, reads, scope)
+        given, constants = _literals(skill, taken["in"][1], reads, scope)
         _rewire(name, "in", given, reads, skill, scope)
     if "out" in taken:
         _rewire(name, "out", taken["out"][1], writes, skill, scope)
-    return NodeSpec(
-        "skill",
-        _title(taken, name, scope),
-        place,
-        skill=name,
-        skill_type=skill,
-        params=params,
-        reads=reads,
-        writes=writes,
-        constants=constants,
-    )
+    title = _title(taken, name, scope)
+    return NodeSpec("skill", title, place, (), None, name, skill, params, reads, writes, constants)
 
 
-def _literals(
-    skill: type[Skill], given: Node, place: Place, wires: dict[str, Wire], scope: Scope
-) -> tuple[Node, dict[str, object]]:
+def _literals(skill: type[Skill], given: Node, wires: dict[str, Wire], scope: Scope) -> tuple[Node, dict[str, object]]:
     """Read constants of input ports; return (entries left to wire, values). Missions cannot name their keys."""
     constants: dict[str, object] = {}
     if not isinstance(given, Map):
@@ -260,7 +225,7 @@ def _rewire(name: str, direction: str, given: Node, wires: dict[str, Wire], skil
                 scope.findings.unknown(key.place, "unknown_port", f"{word} port of skill {name!r}:", port, wires)
         elif not isinstance(value, Scalar) or not isinstance(value.value, str):
             scope.findings.add(value.place, "wrong_key", f"{direction}.{port}: must be the name of a key")
-        elif not value.poisoned and (wire := _keyed(port, value.value, value.place, scope)):
+        elif not value.poisoned and (wire := scope.wire(port, value.value, value.place)):
             wires[port] = wire
 
 
@@ -284,7 +249,7 @@ def _subtree(place: Place, body: Node, scope: Scope) -> NodeSpec:
         return NodeSpec("unknown", title, place)
     ports: dict[str, str] = {}
     for key, value in entries_of(rest.get("ports")):
-        if isinstance(value, Scalar) and (wire := _keyed(str(key.value), str(value.value), value.place, scope)):
+        if isinstance(value, Scalar) and (wire := scope.wire(str(key.value), str(value.value), value.place)):
             ports[str(key.value)] = wire.key
     # py_trees splits keys at dots, so that none may stand in a key.
     scope.reading.subtrees += 1

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from glotouch_bt.mission.spec import Findings, Node, Place
+from glotouch_bt.mission.spec import Findings, Node, Place, Wire
 from glotouch_bt.skill import Skill
+
+KEY = re.compile(r"[a-z][a-z0-9_]*")
 
 
 @dataclass
@@ -69,3 +72,10 @@ class Scope:
     def key(self, name: str) -> str:
         """Return the absolute key of a name that is used in this tree."""
         return self.ports.get(name, self.prefix + name)
+
+    def wire(self, port: str, key: str, place: Place) -> Wire | None:
+        """Return a port wired to a key of this tree; None (and a finding) if that is not a key."""
+        if not KEY.fullmatch(key):
+            self.findings.add(place, "wrong_key", f"{key!r} is not a port key", valid="small letters, digits and _")
+            return None
+        return Wire(port, self.key(key), place)

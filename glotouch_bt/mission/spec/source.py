@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,6 +63,10 @@ class Map:
         """Return the position of a key (of the mapping if it has no such key)."""
         return next((k.place for k, _ in self.entries if k.value == key), self.place)
 
+    def values(self) -> list[Node]:
+        """Return all values, in order."""
+        return [v for _, v in self.entries]
+
     def __contains__(self, key: str) -> bool:
         return self.get(key) is not None
 
@@ -72,6 +76,15 @@ class Map:
 
 
 Node = Scalar | Seq | Map
+
+
+def walk(node: Node) -> Iterator[Node]:
+    """Yield a node and everything inside it, without recursion."""
+    stack = [node]
+    while stack:
+        node = stack.pop()
+        yield node
+        stack.extend(node.items if isinstance(node, Seq) else node.values() if isinstance(node, Map) else ())
 
 
 def plain(node: Node, renamed: Mapping[Place, str] | None = None) -> Any:

@@ -21,9 +21,9 @@ from py_trees.common import Status
 from glotouch_bt.mission.check.counterexample import Goal, shortest_path
 from glotouch_bt.mission.check.data_flow import DataFlow
 from glotouch_bt.mission.check.requirements import all_requirements
-from glotouch_bt.mission.check.state_sets import EMPTY, START, StateSets
-from glotouch_bt.mission.check.state_variables import StateVariables
+from glotouch_bt.mission.check.variables_of import variables_of
 from glotouch_bt.mission.nodes import ConditionSettings, condition, repeat
+from glotouch_bt.mission.nodes.base import EMPTY, START, StateSets
 from glotouch_bt.mission.nodes.timeout import ClockTimeout
 from glotouch_bt.mission.read.parse import parse_tree
 from glotouch_bt.mission.read.scope import Scope
@@ -290,7 +290,7 @@ def by_ticking(spec: NodeSpec) -> tuple[dict[tuple[str, str, str], int], set[tup
 
 
 def by_sets(spec: NodeSpec) -> tuple[DataFlow, set[tuple[str, str, str]], set[tuple[Status, str, bool, bool]]]:
-    variables = StateVariables(spec)
+    variables = variables_of(spec)
     flow = DataFlow(spec, variables, all_requirements(spec, variables))
     wrong: set[tuple[str, str, str]] = set()
     for requirement, looked in flow.looked.items():

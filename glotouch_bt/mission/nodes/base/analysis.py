@@ -1,4 +1,4 @@
-"""Protocols between a node kind and the checker. The checker's own classes fulfil these protocols."""
+"""Values and protocols between a node kind and the checker. The checker's own classes fulfil the protocols."""
 
 from __future__ import annotations
 
@@ -7,45 +7,14 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
 from glotouch_bt.mission.nodes.base.comparison import ConditionSettings
+from glotouch_bt.mission.nodes.base.state_sets import EMPTY, StateSets
+from glotouch_bt.mission.nodes.base.state_variables import StateVariables
 from glotouch_bt.mission.spec import NodeSpec, Place
-
-EMPTY = 0
-"""The empty set of states."""
-UNSET, ANYTHING = 0, 1
-"""Values of every key's variable: not written, and written with a value of an unknown kind."""
 
 Values = tuple[int, ...]
 """The values of the variables that a path search follows."""
 Stack = tuple[tuple[int, Any], ...]
 """The nodes that are running, outermost first: (node number, what the node remembers)."""
-
-
-@dataclass(frozen=True)
-class ValueKind:
-    """What is known of a value.
-
-    Attributes:
-        data_type: Its type; `object` when not known.
-        element: Type of a tuple's items; `object` when not known.
-        unit: Unit its port's name carries, or empty.
-        value: The value itself, where the writer's outcome fixes it; None: any.
-    """
-
-    data_type: type = object
-    element: type = object
-    unit: str = ""
-    value: bool | int | float | str | None = None
-
-    @property
-    def item(self) -> ValueKind:
-        """The kind of a tuple's items."""
-        return ValueKind(self.element)
-
-    @staticmethod
-    def tuple_of(kinds: Iterable[ValueKind]) -> ValueKind:
-        """Return the kind of a tuple of values of these kinds."""
-        types = {k.data_type for k in kinds}
-        return ValueKind(tuple, types.pop() if len(types) == 1 else object)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,48 +57,6 @@ class Requirement:
         return self.unset == "never" or self.of_resource
 
 
-class SetAlgebra(Protocol):
-    """Sets of states, each known by a number; equal sets have equal numbers."""
-
-    def union(self, *sets: int) -> int:
-        """Return the union."""
-
-    def meet(self, a: int, b: int) -> int:
-        """Return the intersection."""
-
-    def where(self, given: int, variable: int, values: Iterable[int]) -> int:
-        """Return the states in which a variable has one of some values."""
-
-    def assign(self, given: int, variable: int, value: int) -> int:
-        """Return all states, with a variable set to a value."""
-
-    def allow(self, given: int, variable: int, values: Iterable[int]) -> int:
-        """Return all states as they are, and with a variable set to any of some values."""
-
-
-class VariableTable(Protocol):
-    """The variables of a tree: one for each key, one for each resource, one that marks unknown nodes."""
-
-    keys: dict[str, int]
-    resources: dict[str, int]
-    lost: int
-
-    def kind(self, key: str, value: int) -> ValueKind:
-        """Return what a value of a key's variable stands for."""
-
-    def value(self, key: str, kind: ValueKind) -> int:
-        """Return the value of a key's variable that stands for a kind."""
-
-    def written(self, key: str) -> range:
-        """Return all values of a key's variable but UNSET."""
-
-    def written_kinds(self, key: str) -> list[ValueKind]:
-        """Return what these values stand for, ANYTHING first."""
-
-    def state(self, resource: str, name: str) -> int:
-        """Return the value of a resource's variable that stands for a state."""
-
-
 @dataclass(frozen=True)
 class ExitStates:
     """Sets of states after a node.
@@ -143,7 +70,7 @@ class ExitStates:
     failure: int = EMPTY
     running: int = EMPTY
 
-    def joined(self, other: ExitStates, sets: SetAlgebra) -> ExitStates:
+    def joined(self, other: ExitStates, sets: StateSets) -> ExitStates:
         """Return the union with another one."""
         return ExitStates(
             sets.union(self.success, other.success),
@@ -156,11 +83,11 @@ class DataFlowAnalysis(Protocol):
     """The data-flow analysis of one tree, as a node kind uses it to compute its exit states."""
 
     @property
-    def sets(self) -> SetAlgebra:
+    def sets(self) -> StateSets:
         """The algebra of sets of states."""
 
     @property
-    def variables(self) -> VariableTable:
+    def variables(self) -> StateVariables:
         """The variables of the tree."""
 
     @property
@@ -218,7 +145,7 @@ class PathSearch(Protocol):
     """The search for the shortest run to a mistake, as a node kind uses it to yield the next positions."""
 
     @property
-    def variables(self) -> VariableTable:
+    def variables(self) -> StateVariables:
         """The variables of the tree."""
 
     def enter(self, node: NodeSpec, stack: Stack, values: Values) -> Iterator[Position]:

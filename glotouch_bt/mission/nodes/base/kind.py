@@ -11,20 +11,19 @@ from py_trees.behaviour import Behaviour
 from pydantic import BaseModel
 
 from glotouch_bt.mission.nodes.base.analysis import (
-    EMPTY,
     DataFlowAnalysis,
     ExitStates,
     PathSearch,
     Position,
     Requirement,
     Stack,
-    ValueKind,
     Values,
-    VariableTable,
 )
 from glotouch_bt.mission.nodes.base.behaviours import BuildContext, OutcomeDecorator
 from glotouch_bt.mission.nodes.base.comparison import ConditionSettings
 from glotouch_bt.mission.nodes.base.run_count import RunCount
+from glotouch_bt.mission.nodes.base.state_sets import EMPTY
+from glotouch_bt.mission.nodes.base.state_variables import StateVariables, ValueKind
 from glotouch_bt.mission.spec import Findings, Map, Node, NodeSpec, Place, Scalar, Settings, Wire
 
 
@@ -53,12 +52,6 @@ class NodeReader(Protocol):
     @property
     def findings(self) -> Findings:
         """Where faults go."""
-
-    def node(self, kind: NodeKind, place: Place, body: Node) -> NodeSpec:
-        """Read a node: its name, settings and children."""
-
-    def subtree(self, place: Place, body: Node) -> NodeSpec:
-        """Read another file's tree."""
 
     def wire(self, port: str, key: str, place: Place) -> Wire | None:
         """Return a port wired to a key; None (and a finding) if that is not a key."""
@@ -108,10 +101,6 @@ class NodeKind:
 
     # -- reading -----------------------------------------------------------------------------------------------------
 
-    def read(self, reader: NodeReader, place: Place, body: Node) -> NodeSpec:
-        """Read a node of this kind."""
-        return reader.node(self, place, body)
-
     def convert_units(self, given: Map, findings: Findings) -> tuple[Map, str]:
         """Return the settings with comparisons in SI units, and the unit of what is compared."""
         return given, ""
@@ -136,7 +125,7 @@ class NodeKind:
 
     # -- what it reads and writes ------------------------------------------------------------------------------------
 
-    def requirements(self, node: NodeSpec, variables: VariableTable) -> Iterator[Requirement]:
+    def requirements(self, node: NodeSpec, variables: StateVariables) -> Iterator[Requirement]:
         """Yield every read of a key or resource: keys in the order of its ports, then resources."""
         yield from ()
 
@@ -152,7 +141,7 @@ class NodeKind:
         """Return the kinds that the node writes because of what other keys may hold, each with its key."""
         return []
 
-    def effects(self, node: NodeSpec, variables: VariableTable) -> Iterator[tuple[int, set[int]]]:
+    def effects(self, node: NodeSpec, variables: StateVariables) -> Iterator[tuple[int, set[int]]]:
         """Yield each variable that the node itself may change, and to which values."""
         for wire in node.writes.values():
             yield variables.keys[wire.key], set(variables.written(wire.key))

@@ -6,17 +6,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from glotouch_bt.mission.nodes.base.analysis import (
-    EMPTY,
-    DataFlowAnalysis,
-    ExitStates,
-    PathSearch,
-    Position,
-    Stack,
-    Values,
-)
+from glotouch_bt.mission.nodes.base.analysis import DataFlowAnalysis, ExitStates, PathSearch, Position, Stack, Values
 from glotouch_bt.mission.nodes.base.kind import NodeKind
 from glotouch_bt.mission.nodes.base.run_count import RunCount
+from glotouch_bt.mission.nodes.base.state_sets import EMPTY
 from glotouch_bt.mission.spec import NodeSpec
 
 MAX_PASSES_FOLLOWED = 3

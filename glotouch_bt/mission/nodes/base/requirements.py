@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from glotouch_bt.mission.nodes.base.analysis import UNSET, Requirement, ValueKind, VariableTable
+from glotouch_bt.mission.nodes.base.analysis import Requirement
 from glotouch_bt.mission.nodes.base.comparison import ConditionSettings, compared_type
+from glotouch_bt.mission.nodes.base.state_variables import UNSET, StateVariables, ValueKind
 from glotouch_bt.mission.spec import NodeSpec
 
 
 def port_requirement(
     node: NodeSpec,
     port: str,
-    variables: VariableTable,
+    variables: StateVariables,
     unset: Literal["never", "not always", "allowed"],
     wanted: Any,
     unit: str = "",
@@ -27,7 +28,7 @@ def port_requirement(
 
 
 def comparison_requirement(
-    node: NodeSpec, variables: VariableTable, port: str, settings: ConditionSettings
+    node: NodeSpec, variables: StateVariables, port: str, settings: ConditionSettings
 ) -> Requirement:
     """Return the requirement of a port that is compared; unwritten, every comparison but `is_set` fails."""
     unset: Literal["not always", "allowed"] = "not always" if settings.is_set is None else "allowed"

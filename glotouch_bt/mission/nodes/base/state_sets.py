@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from glotouch_bt.mission.nodes import EMPTY
-
+EMPTY = 0
+"""The empty set of states."""
 START = 1
 """The set of the one state in which all variables are 0."""
 
