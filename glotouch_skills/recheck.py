@@ -9,19 +9,10 @@ import numpy as np
 from glotouch_bt.motion import Motion, finger_outline_half_m
 from glotouch_bt.perception.touch import Candidate, GuardParams, signed_distance
 from glotouch_bt.perception.touch.detection import Polygon
-from glotouch_bt.robot import Array, MotionRefused, SetPayload, Tare
-from glotouch_bt.skill import (
-    MOTION_REFUSED,
-    Failure,
-    In,
-    Skill,
-    SkillParams,
-    SkillRun,
-    come_to_rest,
-    param,
-)
+from glotouch_bt.robot import Array, MotionRefused
+from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Skill, SkillParams, SkillRun, come_to_rest, param
 from glotouch_bt.skill.probing import HeldTool, Prober
-from glotouch_skills.common.hand import REQUEST_FAILED, finish, rise_clear
+from glotouch_skills.common.hand import REQUEST_FAILED, rise_clear, set_payload_and_tare
 from glotouch_skills.common.probe import FEEL_FLOOR_FAILURES, HELD_TOLERANCE_M, feel_floor
 
 MIN_GRIP_N = 1.0
@@ -130,12 +121,10 @@ class Recheck(Skill):
 
     def _ready(self, *, held: bool) -> SkillRun:
         """Rise, set the payload and tare: a restarted controller knows neither payload nor tare."""
-        arm, probe = self.context.arm, self.context.world.probe
-        yield from rise_clear(arm, self.params.speed_m_s)
+        probe = self.context.world.probe
+        yield from rise_clear(self.context.arm, self.params.speed_m_s)
         mass, below = (probe.mass_kg, probe.com_below_grasp_m) if held else (0.0, 0.0)
-        yield from finish(self.context.requests.start(SetPayload(mass, np.array([0.0, 0.0, below]))), "payload")
-        yield from arm.hold(0.2)
-        yield from finish(self.context.requests.start(Tare()), "tare")
+        yield from set_payload_and_tare(self.context, mass, below)
 
     def _floor(self, tool: HeldTool) -> Motion[float]:
         p = self.params

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from glotouch_bt.report.run_record import RunRecord
-from glotouch_bt.robot import Array
+from glotouch_bt.robot import Array, Pose
 
 
 @dataclass(frozen=True)
@@ -39,58 +38,14 @@ class TrueOutline:
 
 
 def true_outlines(record: RunRecord) -> list[TrueOutline]:
-    """Return the objects of truth.json.
-
-    It is a list of {name, outline_B_m: {start, end}}; `outline_B_m` as a bare list is the start, and
-    {start: [...], end: [...]} with a list of objects each is accepted, too. Unreadable entries are left out.
-    """
-    pose = record.pose_B_K
-    if pose is None:
+    """Return the objects of truth.json: {start: [...], end: [...]} of {name, outline_B_m}; empty without one."""
+    pose, truth = record.pose_B_K, record.truth
+    if pose is None or not isinstance(truth, dict):
         return []
-    K_B = pose.inverse()
-    truth = record.truth
-    if isinstance(truth, dict) and isinstance(truth.get("objects"), list | dict):
-        truth = truth["objects"]
-    ends: dict[str, Any] = {}
-    if isinstance(truth, dict):
-        late = truth.get("end")
-        ends = {str(o.get("name")): o for o in late if isinstance(o, dict)} if isinstance(late, list) else {}
-        truth = truth.get("start")
-    out: list[TrueOutline] = []
-    for item in truth if isinstance(truth, list) else []:
-        if not isinstance(item, dict):
-            continue
-        name = str(item.get("name", "object"))
-        start = _polygon(item, "start")
-        end = _polygon(ends[name], "end") if name in ends else _polygon(item, "end", bare=False)
-        if start is not None:
-            in_K = [
-                None if p is None else K_B.apply(np.column_stack([p, np.full(len(p), pose.position_m[2])]))[:, :2]
-                for p in (start, end)
-            ]
-            assert in_K[0] is not None
-            out.append(TrueOutline(name, in_K[0], in_K[1]))
-    return out
+    start, end = ({str(o["name"]): _in_K(o["outline_B_m"], pose) for o in truth.get(w) or ()} for w in ("start", "end"))
+    return [TrueOutline(name, outline, end.get(name)) for name, outline in start.items()]
 
 
-def _polygon(item: dict[str, Any], when: str, bare: bool = True) -> Array | None:
-    """Return the outline (n, 2) in B of one object, from any of the accepted forms."""
-    both = item.get("outline_B_m")
-    nested = item.get(when)
-    candidates = [
-        both.get(when) if isinstance(both, dict) else None,
-        item.get(f"outline_{when}_B_m"),
-        item.get(f"outline_B_m_{when}"),
-        nested.get("outline_B_m") if isinstance(nested, dict) else None,
-        both if bare and isinstance(both, list) else None,
-    ]
-    for value in candidates:
-        if value is None:
-            continue
-        try:
-            p = np.asarray(value, dtype=np.float64)
-        except (TypeError, ValueError):
-            continue
-        if p.ndim == 2 and len(p) >= 3 and p.shape[1] >= 2 and np.isfinite(p).all():
-            return p[:, :2]
-    return None
+def _in_K(outline_B_m: object, pose_B_K: Pose) -> Array:
+    p = np.asarray(outline_B_m, dtype=np.float64)[:, :2]
+    return pose_B_K.inverse().apply(np.column_stack([p, np.full(len(p), pose_B_K.position_m[2])]))[:, :2]

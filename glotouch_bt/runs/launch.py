@@ -102,16 +102,7 @@ def launch(
                 on_start(mission, folder.path)
             resume_point = None if resumable is None else resumable.resume_point(same_world=world is not None)
             run = _Run(
-                request=request,
-                mission=mission,
-                conditions=conditions,
-                robot=robot,
-                referee=referee,
-                folder=folder,
-                objects_at_start=objects_at_start,
-                began=began,
-                resumable=resumable,
-                resume_point=resume_point,
+                request, mission, conditions, robot, referee, folder, objects_at_start, began, resumable, resume_point
             )
             return _run(run, on_progress, control)
 

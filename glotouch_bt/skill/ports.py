@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Generic, TypeVar, cast, overload
+from typing import TYPE_CHECKING, Generic, Self, TypeVar, cast, overload
 
 if TYPE_CHECKING:
     from glotouch_bt.skill.skill import Skill
@@ -22,6 +22,16 @@ class Port(Generic[T]):
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
+
+    @overload
+    def __get__(self, obj: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, obj: Skill, owner: type) -> T: ...
+    def __get__(self, obj: Skill | None, owner: type) -> Self | T:
+        return self if obj is None else cast(T, self._value(obj))
+
+    def _value(self, skill: Skill) -> object:
+        return skill.get_last_output(self.name)
 
     @property
     def key(self) -> str:
@@ -44,16 +54,9 @@ class In(Port[T]):
         super().__init__(data_type, description, key=key, element=element)
         self.required = required
 
-    @overload
-    def __get__(self, obj: None, owner: type) -> In[T]: ...
-    @overload
-    def __get__(self, obj: Skill, owner: type) -> T: ...
-    def __get__(self, obj: Skill | None, owner: type) -> In[T] | T:
-        if obj is None:
-            return self
-        if not self.required and not obj.blackboard_client.exists(self.name):
-            return cast(T, None)
-        return cast(T, obj.get_input(self.name))
+    def _value(self, skill: Skill) -> object:
+        missing = not self.required and not skill.blackboard_client.exists(self.name)
+        return None if missing else skill.get_input(self.name)
 
 
 class Out(Port[T]):
@@ -75,15 +78,6 @@ class Out(Port[T]):
     ) -> None:
         super().__init__(data_type, description, key=key, element=element)
         self.always, self.on_success, self.on_failure = always, on_success, on_failure
-
-    @overload
-    def __get__(self, obj: None, owner: type) -> Out[T]: ...
-    @overload
-    def __get__(self, obj: Skill, owner: type) -> T: ...
-    def __get__(self, obj: Skill | None, owner: type) -> Out[T] | T:
-        if obj is None:
-            return self
-        return cast(T, obj.get_last_output(self.name))
 
     def __set__(self, obj: Skill, value: T) -> None:
         obj.write_port(self.name, value)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
 from glotouch_bt.motion import Motion
-from glotouch_bt.perception.search import BallMove, BallOutcome, Top, TopPlan, TopRule, rounds, top_plan
+from glotouch_bt.perception.search import BallMove, BallOutcome, TopPlan, TopRule, rounds, top_plan
 from glotouch_bt.perception.touch import Candidate, GuardParams
 from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool, Prober
+from glotouch_skills.common.probe import drive
 
 RIM_PLACES = 4
 """Number of places on the rim of a hollow object to touch, evenly spaced."""
@@ -68,7 +70,8 @@ class TouchTop(Skill):
         candidate, tool = self.candidate, self.tool
         touched_m = float(np.median([c.tip_K_m[2] for c in candidate.contacts])) - tool.floor_z_K_m
         self.measured = replace(candidate, height_m=max(candidate.height_m, touched_m))
-        top = yield from self._drive(Prober(self.context, tool, GuardParams()), self._plan(candidate, touched_m))
+        prober = Prober(self.context, tool, GuardParams())
+        top = yield from drive(self._plan(candidate, touched_m), partial(self._make, prober))
         if top.ball_K_m is None:
             raise self.NO_TOP(
                 f"nothing higher than {touched_m * 1e3:.0f} mm was met where candidate {candidate.index} was traced",
@@ -99,16 +102,6 @@ class TouchTop(Skill):
         inwards = candidate.contour.centre_K_m - rim
         far = np.maximum(np.linalg.norm(inwards, axis=1, keepdims=True), 1e-9)
         return np.asarray(rim + RIM_INSET_M * inwards / far)
-
-    def _drive(self, prober: Prober, plan: TopPlan) -> Motion[Top]:
-        """Execute the plan and return its result."""
-        move = next(plan)
-        while True:
-            met = yield from self._make(prober, move)
-            try:
-                move = plan.send(met)
-            except StopIteration as end:
-                return end.value  # type: ignore[no-any-return]
 
     def _make(self, prober: Prober, move: BallMove) -> Motion[BallOutcome]:
         p = self.params

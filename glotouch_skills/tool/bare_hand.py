@@ -8,10 +8,10 @@ import numpy as np
 
 from glotouch_bt.motion import finger_outline_half_m, yaw_near_home
 from glotouch_bt.perception.touch.detection import Polygon
-from glotouch_bt.robot import Pose, SetPayload, Tare
+from glotouch_bt.robot import Pose
 from glotouch_bt.skill import MOTION_REFUSED, Failure, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
-from glotouch_skills.common.hand import REQUEST_FAILED, finish
+from glotouch_skills.common.hand import REQUEST_FAILED, set_payload_and_tare
 from glotouch_skills.common.probe import corner_place
 
 TRAVEL_M_S = 0.1
@@ -58,9 +58,7 @@ class BareHand(Skill):
         container = self.context.world.container.pose_B_K
         over = container.apply(np.array([*corner_place(self.context.world, self.params.corner_gap_m), 0.0]))
         yield from arm.line(Pose.pointing_down((*over[:2], here.position_m[2]), yaw), TRAVEL_M_S)
-        yield from finish(self.context.requests.start(SetPayload(0.0, np.zeros(3))), "payload")
-        yield from arm.hold(0.2)
-        yield from finish(self.context.requests.start(Tare()), "tare")
+        yield from set_payload_and_tare(self.context)
         gripper = arm.description.gripper
         half = finger_outline_half_m(gripper, state.aperture_m)
         self.tool = HeldTool(

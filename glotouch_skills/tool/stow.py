@@ -7,8 +7,8 @@ from typing import ClassVar
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Probe
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import GRAVITY_M_S2, RISE_M_S, rise_clear, weigh_N
-from glotouch_skills.common.probe import HELD_TOLERANCE_M, RETURN_PROBE_FAILURES, nothing_in_hand, return_probe
+from glotouch_skills.common.hand import GRAVITY_M_S2, RISE_M_S, rise_clear, set_payload_and_tare, weigh_N
+from glotouch_skills.common.probe import HELD_TOLERANCE_M, RETURN_PROBE_FAILURES, return_probe
 
 MIN_HELD_M = 0.003
 """The jaws hold something if the aperture is larger than this ..."""
@@ -74,7 +74,7 @@ class Stow(Skill):
                 force_N=pressed,
             )
         arm.scene.hold_tool(False)
-        yield from nothing_in_hand(self.context)
+        yield from set_payload_and_tare(self.context)
 
     def _weighs(self, probe: Probe) -> Motion[bool]:
         """Return True if the wrist, tared with the probe in the hand, does not miss its weight."""

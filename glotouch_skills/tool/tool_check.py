@@ -7,17 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.skill import (
-    MOTION_REFUSED,
-    UNCHANGED,
-    Failure,
-    In,
-    Out,
-    Skill,
-    SkillParams,
-    SkillRun,
-    param,
-)
+from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
 from glotouch_skills.common.hand import GRAVITY_M_S2, rise_clear, weigh
 from glotouch_skills.common.probe import FEEL_FLOOR_FAILURES, HELD_TOLERANCE_M, feel_floor

@@ -276,14 +276,15 @@ def ranking(made: Made) -> dict[str, object]:
     }
 
 
-def truth() -> list[dict[str, object]]:
-    out = []
+def truth() -> dict[str, list[dict[str, object]]]:
+    ends: dict[str, list[dict[str, object]]] = {"start": [], "end": []}
     for i, spec in enumerate(OBJECTS):
         start = contour_of(spec).outline_K_m(24)
         end = start + (np.array([0.009, -0.004]) if i == 1 else 0.0)
-        in_B = [POSE_B_K.apply(np.column_stack([p, 0 * p[:, 0]]))[:, :2].tolist() for p in (start, end)]
-        out.append({"name": spec[0], "outline_B_m": {"start": in_B[0], "end": in_B[1]}, "pose": None})
-    return out
+        for when, p in (("start", start), ("end", end)):
+            in_B = POSE_B_K.apply(np.column_stack([p, 0 * p[:, 0]]))[:, :2].tolist()
+            ends[when].append({"name": spec[0], "outline_B_m": in_B, "pose": None})
+    return ends
 
 
 @pytest.fixture(scope="session")

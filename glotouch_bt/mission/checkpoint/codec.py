@@ -30,6 +30,7 @@ _MIN_INT, _MAX_INT = -(2**63), 2**64 - 1
 _TUPLE, _LIST, _MAP, _SET, _FROZENSET, _DEQUE = "t", "l", "m", "s", "f", "q"
 _ARRAY, _NUMBER, _BIG, _GENERATOR = "a", "n", "i", "g"
 _ENUM, _DATA, _AGAIN = "e", "d", "r"
+_SEQUENCES = {tuple: _TUPLE, list: _LIST, deque: _DEQUE}
 _DTYPES = "biufc"
 
 
@@ -136,13 +137,9 @@ class Encoder:
     def _compound(self, value: Any, kind: type, where: str, depth: int) -> Any:
         if kind is np.ndarray:
             return _array(value, where)
-        if kind is tuple:
-            return [_TUPLE, *(self._plain(v, f"{where}[{i}]", depth) for i, v in enumerate(value))]
-        if kind is list:
-            return [_LIST, *(self._plain(v, f"{where}[{i}]", depth) for i, v in enumerate(value))]
-        if kind is deque:
-            items = [self._plain(v, f"{where}[{i}]", depth) for i, v in enumerate(value)]
-            return [_DEQUE, value.maxlen, *items]
+        if kind in _SEQUENCES:
+            head = [_DEQUE, value.maxlen] if kind is deque else [_SEQUENCES[kind]]
+            return [*head, *(self._plain(v, f"{where}[{i}]", depth) for i, v in enumerate(value))]
         if kind in (set, frozenset):
             ordered = sorted(value, key=repr)  # so that equal sets give equal bytes
             mark = _SET if kind is set else _FROZENSET
@@ -208,12 +205,12 @@ class _Decoder:
     def __init__(self) -> None:
         self._made: list[Any] = []
         self._read: dict[str, Callable[[list[Any]], Any]] = {
-            _TUPLE: self._tuple,
-            _LIST: self._list,
-            _MAP: self._map,
-            _SET: self._set,
-            _FROZENSET: self._frozenset,
-            _DEQUE: self._deque,
+            _TUPLE: lambda rest: tuple(self.value(v) for v in rest),
+            _LIST: lambda rest: [self.value(v) for v in rest],
+            _MAP: lambda rest: {self.value(k): self.value(v) for k, v in rest},
+            _SET: lambda rest: {self.value(v) for v in rest},
+            _FROZENSET: lambda rest: frozenset(self.value(v) for v in rest),
+            _DEQUE: lambda rest: deque([self.value(v) for v in rest[1:]], maxlen=rest[0]),
             _ARRAY: self._array,
             _GENERATOR: self._generator,
             _DATA: self._data,
@@ -241,24 +238,6 @@ class _Decoder:
         made = self._read[mark](rest)
         self._made[number] = made
         return made
-
-    def _tuple(self, rest: list[Any]) -> Any:
-        return tuple(self.value(v) for v in rest)
-
-    def _list(self, rest: list[Any]) -> Any:
-        return [self.value(v) for v in rest]
-
-    def _map(self, rest: list[Any]) -> Any:
-        return {self.value(k): self.value(v) for k, v in rest}
-
-    def _set(self, rest: list[Any]) -> Any:
-        return {self.value(v) for v in rest}
-
-    def _frozenset(self, rest: list[Any]) -> Any:
-        return frozenset(self.value(v) for v in rest)
-
-    def _deque(self, rest: list[Any]) -> Any:
-        return deque([self.value(v) for v in rest[1:]], maxlen=rest[0])
 
     def _array(self, rest: list[Any]) -> Any:
         name, shape, order, writeable, data = rest

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.blackboard import Blackboard
@@ -18,22 +18,10 @@ from glotouch_bt.mission.checkpoint.codec import NotEncodable, encode, encode_pa
 from glotouch_bt.mission.checkpoint.store import CheckpointFile, CheckpointRow
 from glotouch_bt.mission.checkpoint.tree_state import RestoredTree, start_at, tree_state
 from glotouch_bt.mission.checkpoint.world_check import world_check
-from glotouch_bt.mission.record import RecordedRequests, RunSummary
+from glotouch_bt.mission.record import RecordedRequests, Recorder, RunSummary
 from glotouch_bt.mission.tree import BuiltTree, ReasonBook
 from glotouch_bt.robot import BadInput, Robot
 from glotouch_bt.skill import Context, Skill
-
-
-class FlushableRecord(Protocol):
-    """The part of a record that a checkpoint needs."""
-
-    def flush(self) -> int:
-        """Write everything pending; return the length of the file in bytes."""
-        ...
-
-    def state(self) -> dict[str, Any]:
-        """Return what a record that continues from here needs."""
-        ...
 
 
 @dataclass
@@ -96,7 +84,7 @@ class CheckpointWriter:
         lacking: Values that the last checkpoint could not hold, with the reason.
     """
 
-    def __init__(self, file: CheckpointFile, record: FlushableRecord | None = None, number: int = 0) -> None:
+    def __init__(self, file: CheckpointFile, record: Recorder | None = None, number: int = 0) -> None:
         self._file, self._record, self._number = file, record, number
         self._started: dict[str, None] = {}
         self.lacking: dict[str, str] = {}

@@ -1,9 +1,11 @@
-"""Wait for a slow request without blocking a tick."""
+"""Wait for slow requests (payload, tare) without blocking a tick."""
 
 from __future__ import annotations
 
-from glotouch_bt.robot import HOLD, Ticket
-from glotouch_bt.skill import Failure, SkillRun
+import numpy as np
+
+from glotouch_bt.robot import HOLD, SetPayload, Tare, Ticket
+from glotouch_bt.skill import Context, Failure, SkillRun
 
 TIMEOUT_PERIODS = 500
 """Longest wait for a request, in control periods."""
@@ -26,3 +28,15 @@ def finish(ticket: Ticket, what: str) -> SkillRun:
         yield HOLD
     if not ticket.done or ticket.error:
         raise REQUEST_FAILED(f"{what} did not finish: {ticket.error or 'timed out'}", limit_periods=TIMEOUT_PERIODS)
+
+
+def set_payload_and_tare(context: Context, mass_kg: float = 0.0, com_below_P_m: float = 0.0) -> SkillRun:
+    """Set the payload (default: the empty hand), stand still for 0.2 s, and tare.
+
+    Raises:
+        SkillFailed: `request_failed`.
+    """
+    payload = SetPayload(mass_kg, np.array([0.0, 0.0, com_below_P_m]))
+    yield from finish(context.requests.start(payload), "payload")
+    yield from context.arm.hold(0.2)
+    yield from finish(context.requests.start(Tare()), "tare")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.skill import Context, Failure
 from glotouch_bt.skill.probing import HeldTool, Prober
 from glotouch_skills.common.hand import GRAVITY_M_S2, rise_clear, weigh_N
+
+_Move, _Outcome = TypeVar("_Move"), TypeVar("_Outcome")
 
 AT_HEIGHT_M = 0.004
 """The ball is at sensing height within this tolerance."""
@@ -45,6 +47,17 @@ class ExploringSpeeds:
     lower_m_s: float = 0.02
     height_m: float = 0.018
     headroom_m: float = 0.13
+
+
+def drive(plan: Generator[_Move, _Outcome, T], make: Callable[[_Move], Motion[_Outcome]]) -> Motion[T]:
+    """Execute a plan: make each of its moves and send it the outcome; return the plan's result."""
+    try:
+        move = next(plan)
+        while True:
+            move = plan.send((yield from make(move)))
+    except StopIteration as end:
+        result: T = end.value
+        return result
 
 
 class Explorer:
@@ -85,13 +98,7 @@ class Explorer:
         Raises:
             SkillFailed: `tool_lost`, `hard_contact`.
         """
-        try:
-            move = next(plan)
-            while True:
-                move = plan.send((yield from self._make(move)))
-        except StopIteration as end:
-            result: T = end.value
-            return result
+        return (yield from drive(plan, self._make))
 
     def _make(self, move: Move) -> Motion[MoveOutcome]:
         self._require_tool()

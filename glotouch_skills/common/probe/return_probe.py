@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from glotouch_bt.motion import Motion, MoveResult
-from glotouch_bt.robot import MotionRefused, Observation, Pose, SetPayload, Tare
+from glotouch_bt.robot import MotionRefused, Observation, Pose
 from glotouch_bt.skill import Context, Failure, SkillRun
 from glotouch_skills.common.hand import (
     CAUGHT_N,
@@ -18,7 +18,7 @@ from glotouch_skills.common.hand import (
     StraightGuard,
     Strayed,
     describe_stop,
-    finish,
+    set_payload_and_tare,
     straight_guard,
 )
 from glotouch_skills.common.probe.plan_driver import HELD_TOLERANCE_M
@@ -119,7 +119,7 @@ def return_probe(
     yield from arm.jaws(min(aperture_m + 0.03, arm.description.gripper.stroke_m), speed_m_s=0.08)
     arm.scene.hold_tool(False)
     yield from arm.shift(np.array([0.0, 0.0, RISE_M]), 0.08, check=False)
-    yield from nothing_in_hand(context)
+    yield from set_payload_and_tare(context)
 
 
 def _lower(context: Context, goal: Pose, speed_m_s: float, aperture_m: float, max_N: float) -> Motion[MoveResult]:
@@ -148,14 +148,3 @@ def _rise(context: Context, speed_m_s: float) -> SkillRun:
     """Move straight up, off the obstacle."""
     guard = yield from straight_guard(context.arm, UP_B, CAUGHT_N)
     yield from context.arm.shift(RISE_M * UP_B, speed_m_s, check=False, guard=guard)
-
-
-def nothing_in_hand(context: Context) -> SkillRun:
-    """Set the payload to an empty hand, and tare.
-
-    Raises:
-        SkillFailed: `request_failed`.
-    """
-    yield from finish(context.requests.start(SetPayload(0.0, np.zeros(3))), "payload")
-    yield from context.arm.hold(0.2)
-    yield from finish(context.requests.start(Tare()), "tare")

@@ -11,7 +11,6 @@ import math
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
 from glotouch_bt.perception.recognition.evidence import LayerEvidence
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
@@ -20,7 +19,6 @@ from glotouch_bt.perception.recognition.synthetic import touch_windows
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import Array
 
-Floats = npt.NDArray[np.floating]
 SURFACES = 1500
 """Number of random surfaces. Two seeds agree in log density within 0.1."""
 WIDTH_SCALE_M = 2.5e-3
@@ -75,13 +73,8 @@ def image_kernel(squared: Array32, p: LikelihoodParams) -> Array32:
     return np.asarray(near ** np.float32(-p.image_order))
 
 
-def log_kernel(squared: Floats, p: LikelihoodParams) -> Array32:
-    """Return the log of `image_kernel`."""
-    return np.asarray(np.log(image_kernel(squared.astype(np.float32), p) + np.float32(1e-12)))
-
-
 def log_generic_images(layers: tuple[LayerEvidence, ...], pad: PadSpec, p: LikelihoodParams) -> Array:
-    """Return the background log density (n, 2), in units of `log_kernel`, of (left, right) images; 0 without image.
+    """Return the background log density (n, 2) of (left, right) images, in units of log `image_kernel`; 0 without image.
 
     A mixture of the surface library and of neighbouring images: below on the same pad, at the same height in the
     previous sequence, on the other pad. So repeated images of one wall are not independent evidence.

@@ -25,7 +25,7 @@ from glotouch_bt.perception.recognition.likelihood.pair import Pair, TouchSetRea
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.perception.recognition.likelihood.scalars import yaw_prior
 from glotouch_bt.perception.recognition.likelihood.volumes import T_PEAK, width_kernel
-from glotouch_bt.perception.recognition.model import POOLED, Array32, TargetModel, hand_axes
+from glotouch_bt.perception.recognition.model import POOLED, Array32, TargetModel, hand_axes, span
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.perception.touch.calibration import MEASURED_SD_M
 from glotouch_bt.robot import Array
@@ -68,7 +68,7 @@ class Prediction:
 def predict(model: TargetModel, reading: TouchSetReading, pair: Pair, p: LikelihoodParams) -> Prediction:
     """Return the most probable poses of a candidate."""
     candidate = reading.touchset.candidate
-    z0 = np.linspace(-p.z0_limit_m, p.z0_limit_m, p.z0_steps) if p.z0_steps > 1 else np.zeros(1)
+    z0 = span(p.z0_limit_m, p.z0_steps)
     if pair.log_pose is None:
         log_pose = yaw_prior(model, candidate, pair.first_rad, p)[:, None]
         z0 = np.zeros(1)

@@ -92,15 +92,8 @@ class LikelihoodParams:
             if f.name.endswith("_steps") and v % 2 == 0:
                 raise ParamError(f"likelihood.{f.name}", v, "odd, so that the grid contains zero")
         for name in (
-            "width_outlier",
-            "slip",
-            "image_outlier",
-            "image_alike",
-            "height_lower",
-            "contour_outlier",
-            "prior_absent",
-            "twin",
-            "twin_width",
-        ):
+            "width_outlier", "slip", "image_outlier", "image_alike", "height_lower", "contour_outlier", "prior_absent",
+            "twin", "twin_width",
+        ):  # fmt: skip
             if not 0 < getattr(self, name) < 1:
                 raise ParamError(f"likelihood.{name}", getattr(self, name), "between 0 and 1")

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from glotouch_bt.perception.recognition.evidence import LayerEvidence
 from glotouch_bt.perception.recognition.likelihood.background import image_kernel
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
-from glotouch_bt.perception.recognition.model import POOLED, Array32, TargetModel
+from glotouch_bt.perception.recognition.model import POOLED, Array32, TargetModel, span
 from glotouch_bt.robot import Array
 
 Index = npt.NDArray[np.int64]
@@ -36,10 +36,6 @@ class Grid:
     @classmethod
     def of(cls, p: LikelihoodParams, zero_sd_m: float) -> Grid:
         """Build the grid; `zero_sd_m` is the standard deviation of the aperture bias."""
-
-        def span(limit: float, n: int) -> Array:
-            return np.linspace(-limit, limit, n) if n > 1 else np.zeros(1)
-
         return cls(
             span(p.bias_span * zero_sd_m, p.bias_steps),
             span(p.shift_limit_m, p.shift_steps),

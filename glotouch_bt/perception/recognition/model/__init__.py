@@ -19,5 +19,5 @@ from glotouch_bt.perception.recognition.model.pads import (
     pool,
 )
 from glotouch_bt.perception.recognition.model.parts import VERSION, from_parts, to_parts
-from glotouch_bt.perception.recognition.model.raster import hand_axes, mirrored
+from glotouch_bt.perception.recognition.model.raster import hand_axes, mirrored, span
 from glotouch_bt.perception.recognition.model.target import STRIDE, TargetModel

@@ -120,13 +120,11 @@ class Patch:
         valid: Large and deep enough for a contact.
         rho: Relative nonplanarity, eq. (relative_nonplanarity); NaN if not valid.
         top_m: Maximum indentation after a 3 x 3 median.
-        area_m2: Area of the patch.
     """
 
     valid: bool
     rho: float
     top_m: float
-    area_m2: float
 
 
 def patch_of(depth_m: Array, pad: PadSpec, threshold_m: float = 6e-5, smallest_m2: float = 6e-6) -> Patch:
@@ -135,7 +133,7 @@ def patch_of(depth_m: Array, pad: PadSpec, threshold_m: float = 6e-5, smallest_m
     Eq. (relative_nonplanarity): RMS of the residual to the least-squares plane over the 90th percentile of the depth.
     """
     rows, cols = depth_m.shape
-    none = Patch(False, float("nan"), 0.0, 0.0)
+    none = Patch(False, float("nan"), 0.0)
     good = np.isfinite(depth_m)
     if good.mean() < 0.5:
         return none
@@ -147,15 +145,14 @@ def patch_of(depth_m: Array, pad: PadSpec, threshold_m: float = 6e-5, smallest_m
         return none
     counts = np.bincount(labels.ravel())[1:]
     best = int(np.argmax(counts)) + 1
-    area = float(counts[best - 1] * cell)
-    if area < smallest_m2:
+    if float(counts[best - 1] * cell) < smallest_m2:
         return none
     r, c = np.nonzero((labels == best) & good)
     d = depth_m[r, c]
     top = float(smooth[labels == best].max())
     if len(d) < 4:
-        return Patch(True, float("nan"), top, area)
+        return Patch(True, float("nan"), top)
     a = np.stack([r, c, np.ones(len(r))], axis=1).astype(np.float64)
     residual = d - a @ np.linalg.lstsq(a, d, rcond=None)[0]
     q90 = float(np.quantile(d, 0.9))
-    return Patch(True, float(np.sqrt(np.mean(residual**2)) / max(q90, 1e-5)), top, area)
+    return Patch(True, float(np.sqrt(np.mean(residual**2)) / max(q90, 1e-5)), top)

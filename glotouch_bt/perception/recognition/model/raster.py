@@ -62,6 +62,11 @@ def window_max(reach: Array32) -> Array32:
     )
 
 
+def span(limit: float, n: int) -> Array:
+    """Return n evenly spaced values over +-limit; zero for n = 1."""
+    return np.linspace(-limit, limit, n) if n > 1 else np.zeros(1)
+
+
 def mirrored(table: Array32) -> Array32:
     """Return the table of the RIGHT pad: yaw + 180 deg, l reversed. Needs an even number of yaws."""
     return np.roll(table, -(table.shape[0] // 2), axis=0)[:, ::-1]

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -93,18 +94,6 @@ def paper_rank(
     return replace(ranking, matches=matches, p_absent=0.0)
 
 
-@dataclass(frozen=True)
-class PaperMatcher:
-    """Matcher that calls `paper_rank` with fixed parameters and gates."""
-
-    params: PaperParams
-    gates: Gates
-
-    def __call__(self, model: TargetModel, touchsets: Sequence[TouchSet]) -> Ranking:
-        """See `paper_rank`."""
-        return paper_rank(model, touchsets, self.params, self.gates)
-
-
-def paper_matcher(params: PaperParams | None = None, gates: Gates = PAPER_GATES) -> PaperMatcher:
+def paper_matcher(params: PaperParams | None = None, gates: Gates = PAPER_GATES) -> partial[Ranking]:
     """Return a Matcher with these parameters."""
-    return PaperMatcher(params or PaperParams(), gates)
+    return partial(paper_rank, params=params, gates=gates)

@@ -13,7 +13,7 @@ from glotouch_bt.perception.recognition.paper.params import PaperParams
 from glotouch_bt.perception.touch import Layer, TouchSequence, TouchSet
 from glotouch_bt.robot import Array
 
-NO_CONTACT = Patch(False, float("nan"), 0.0, 0.0)
+NO_CONTACT = Patch(False, float("nan"), 0.0)
 
 
 @dataclass(frozen=True)

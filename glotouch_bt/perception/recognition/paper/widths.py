@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from glotouch_bt.perception.recognition.model import FINE, STRIDE, Array32, PadSpec, TargetModel, mirrored
+from glotouch_bt.perception.recognition.model import FINE, STRIDE, Array32, PadSpec, TargetModel, mirrored, span
 from glotouch_bt.perception.recognition.paper.params import PaperParams
 from glotouch_bt.robot import Array
 
@@ -108,11 +108,6 @@ class Hypotheses:
         d, z = (np.square(v / max(float(np.abs(v).max()), 1e-9)) for v in (self.shift_m, self.z0_m))
         one = (d[:, None] + z[None, :]).reshape(-1).astype(np.float32)
         return np.tile(one, len(self.scale) * self.yaws)
-
-
-def span(limit: float, n: int) -> Array:
-    """Return n evenly spaced values over +-limit; zero for n = 1."""
-    return np.linspace(-limit, limit, n) if n > 1 else np.zeros(1)
 
 
 def predicted_widths(tables: tuple[WidthTable, ...], along_m: float, height_m: Array, grid: Hypotheses) -> Array32:

@@ -31,18 +31,14 @@ class PatchStats:
         mask: (rows, cols) taxels of the valid patches, bool.
         patches: Number of valid patches.
         area_fraction: Taxels of valid patches over all working taxels.
-        valid_fraction: Taxels of valid patches over all taxels above the threshold; 0 without contact.
         rho: Relative nonplanarity RMS(D - plane) / q90(D) of the largest patch; NaN if not valid.
-        depth_q90_m: 90th percentile of the indentation over the valid patches; 0 without contact.
     """
 
     valid: bool
     mask: np.typing.NDArray[np.bool_]
     patches: int
     area_fraction: float
-    valid_fraction: float
     rho: float
-    depth_q90_m: float
 
 
 def patch_statistics(depth_m: Array, *, threshold_m: float = THRESHOLD_M, min_taxels: int = MIN_TAXELS) -> PatchStats:
@@ -58,16 +54,14 @@ def patch_statistics(depth_m: Array, *, threshold_m: float = THRESHOLD_M, min_ta
     large = sizes >= min_taxels
     mask = touched & large[labels]
     if not mask.any():
-        return PatchStats(False, mask, 0, 0.0, 0.0, float("nan"), 0.0)
+        return PatchStats(False, mask, 0, 0.0, float("nan"))
     largest = touched & (labels == int(np.argmax(sizes)))
     return PatchStats(
         valid=True,
         mask=mask,
         patches=int(np.count_nonzero(large)),
         area_fraction=float(mask.sum() / max(int(alive.sum()), 1)),
-        valid_fraction=float(mask.sum() / touched.sum()),
         rho=relative_nonplanarity(depth, largest),
-        depth_q90_m=float(np.quantile(depth[mask], 0.9)),
     )
 
 
