@@ -292,6 +292,3 @@ def _document(
     if reading.used:
         document["subtrees"] = {n: plain(t, reading.renamed) for n, t in sorted(reading.used.items())}
     return document
-
-
-__all__ = ["MAX_DURATION_S", "Mission", "load_mission", "split_settings"]

@@ -8,5 +8,3 @@ if TYPE_CHECKING:
     from glotouch_bt.perception.model_cache import target_model
 
 __getattr__ = lazy_door(__name__, target_model="model_cache")
-
-__all__ = ["target_model"]

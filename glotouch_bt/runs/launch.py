@@ -31,8 +31,6 @@ from glotouch_bt.runs.resume_point import ResumableRun, describe_checkpointed_ru
 
 MAX_SEED = 2**32 - 1
 
-__all__ = ["MAX_SEED", "RunRequest", "RunResult", "launch"]
-
 
 def launch(
     request: RunRequest,

@@ -82,7 +82,8 @@ def score(request: RunRequest, mission: Mission, outcome: Outcome, referee: Refe
         "probe_path_m": round(found.probe_path_m, 6),
         "peak_force_N": round(float(peak), 6),
         "sensed_peak_force_N": round(found.peak_force_N, 6),
-        "parameters": {k: _portable(k, v, mission) for k, v in mission.parameters.items()},
+        # without paths of this machine
+        "parameters": {k: _stem(str(v)) if k in mission.stl_parameters else v for k, v in mission.parameters.items()},
         "versions": installed_versions(),
     }
 
@@ -97,11 +98,6 @@ def _target(mission: Mission) -> str | None:
 
 def _stem(given: str) -> str:
     return Path(given).stem if given.lower().endswith(".stl") else given
-
-
-def _portable(name: str, value: object, mission: Mission) -> object:
-    """Return a parameter without paths of this machine."""
-    return _stem(str(value)) if name in mission.stl_parameters else value
 
 
 def truth(objects: list[TrueObject]) -> list[Any]:

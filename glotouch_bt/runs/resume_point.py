@@ -160,7 +160,8 @@ def _find_resumable(folder: Path, file: CheckpointFile, start: str | None, versi
     if different:
         notes.append(f"the run was made with {', '.join(different)}")
     mission = _mission(folder, run)
-    if asdict(load_conditions(run["request"]["conditions"])) != _as_loaded(run["conditions"]):
+    conditions = {k: tuple(v) if isinstance(v, list) else v for k, v in run["conditions"].items()}
+    if asdict(load_conditions(run["request"]["conditions"])) != conditions:
         raise BadInput(f"{folder}: the conditions {run['request']['conditions']!r} have changed since this run began")
     path = "" if start is None else _node(mission, start)
     row = _row_before(rows, path)
@@ -170,10 +171,6 @@ def _find_resumable(folder: Path, file: CheckpointFile, start: str | None, versi
     return ResumableRun(
         folder, file, row or rows[-1], mission, path, leads, run["request"], tuple(run["resumed"]), notes
     )
-
-
-def _as_loaded(data: Mapping[str, Any]) -> dict[str, Any]:
-    return {k: tuple(v) if isinstance(v, list) else v for k, v in data.items()}
 
 
 def _mission(folder: Path, run: Mapping[str, Any]) -> Mission:

@@ -27,7 +27,6 @@ class Journal(Protocol):
 
     def event(self, kind: str, stamp_s: float, data: Mapping[str, object]) -> None:
         """Record one event: `kind` (contact, candidate, touchset, ranking, ...) with JSON-able data or arrays."""
-        ...
 
 
 class RobotRequests(Protocol):
@@ -35,7 +34,6 @@ class RobotRequests(Protocol):
 
     def start(self, request: Request) -> Ticket:
         """Start a slow request; keep yielding and poll the ticket."""
-        ...
 
 
 @dataclass

@@ -23,10 +23,6 @@ from glotouch_skills.common.planning import (
 )
 
 
-class SqueezeParams(ClosureParams):
-    """Parameters of `squeeze`."""
-
-
 class Squeeze(Skill):
     """Squeeze one candidate with limited force at several heights.
 
@@ -36,8 +32,8 @@ class Squeeze(Skill):
     SUCCESS: there is at least one stable layer; `touchset` has all layers.
     """
 
-    Params = SqueezeParams
-    params: SqueezeParams
+    Params = ClosureParams
+    params: ClosureParams
 
     PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
     POSTCONDITIONS: ClassVar = {"hand": "empty"}

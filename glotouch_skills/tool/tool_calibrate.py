@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import ClassVar
 
 import numpy as np
@@ -150,7 +151,7 @@ class ToolCalibrate(Skill):
         """Turn about the vertical through the ball, via the grasp's yaw to keep the last joint off its stops."""
         for yaw in (tool.yaw_B_rad, yaw_B_rad):
             goal = tool.pose_B_P(self.context.world, place, yaw)
-            if abs(_wrapped(self.context.arm.pose_B_P.yaw_rad - yaw)) > 1e-3:
+            if abs(math.remainder(self.context.arm.pose_B_P.yaw_rad - yaw, 2 * math.pi)) > 1e-3:
                 yield from self.context.arm.line(goal, self.params.travel_speed_m_s)
 
     def _touch_walls(self, tool: HeldTool, place: Array) -> Motion[list[WallTouch]]:
@@ -203,7 +204,3 @@ class ToolCalibrate(Skill):
             residuals_m=found.residuals_m,
         )
         return measured
-
-
-def _wrapped(angle_rad: float) -> float:
-    return float((angle_rad + np.pi) % (2 * np.pi) - np.pi)

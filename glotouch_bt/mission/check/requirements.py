@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from glotouch_bt.mission.nodes import UNSET, ConditionSettings, Requirement, StateVariables, holds, kind_of
-from glotouch_bt.mission.spec import UNITS, NodeSpec
+from glotouch_bt.mission.spec import NodeSpec
 
 Requirements = Mapping[int, tuple[Requirement, ...]]
 """Those of each node, by node id."""
@@ -31,8 +31,3 @@ def verdicts(
         if free or not held:
             failing.add(value)
     return holding, failing
-
-
-def same_quantity(unit: str, other: str) -> bool:
-    """Return True if two units measure the same quantity, so that only the factor is wrong."""
-    return unit in UNITS and other in UNITS and UNITS[unit][0] == UNITS[other][0]

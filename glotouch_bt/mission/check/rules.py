@@ -12,10 +12,10 @@ from typing import Any, get_type_hints
 from glotouch_bt.mission.check.counterexample import Goal, StepBudget, shortest_path
 from glotouch_bt.mission.check.data_flow import DataFlow
 from glotouch_bt.mission.check.lint import check_lint
-from glotouch_bt.mission.check.requirements import all_requirements, same_quantity
+from glotouch_bt.mission.check.requirements import all_requirements
 from glotouch_bt.mission.check.variables_of import variables_of
 from glotouch_bt.mission.nodes import ANYTHING, EMPTY, UNSET, Requirement, StateVariables, ValueKind, kind_of
-from glotouch_bt.mission.spec import Findings, NodeSpec, Place
+from glotouch_bt.mission.spec import Findings, NodeSpec, Place, base_of
 
 MAX_PATHS = 40
 """Number of findings that are reported with a path; later ones come without."""
@@ -161,7 +161,7 @@ class _Rules:
         path = self._path(flow, requirement, values)
         if kind.unit and requirement.unit and kind.unit != requirement.unit:
             what = f"{_reader(requirement)} in {requirement.unit}, but {by} writes it in {kind.unit}"
-            if not same_quantity(kind.unit, requirement.unit):
+            if base_of(kind.unit) != base_of(requirement.unit):
                 what += ": another quantity"
             self._findings.add(requirement.place, "port_unit", what, path=path, node=requirement.node.name)
             return

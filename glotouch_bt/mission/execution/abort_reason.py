@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from glotouch_bt.mission.checkpoint import WorldChanged
 from glotouch_bt.mission.execution.control import Preempted
 from glotouch_bt.mission.execution.watchdog import SkillHung
@@ -23,7 +25,7 @@ def abort_failure(error: BaseException, node: str) -> NodeFailure:
     elif isinstance(error, GuardTripped):
         code, text = f"guard_{error.guard}", str(error)
     elif isinstance(error, BackendError):
-        code, text = _snake(type(error).__name__), str(error)
+        code, text = re.sub("(?<!^)(?=[A-Z])", "_", type(error).__name__).lower(), str(error)
     else:
         code, text = "fault", f"{type(error).__name__}: {error}"
     return NodeFailure(node, text, Reason(code, text, _evidence(error), node=node))
@@ -35,7 +37,3 @@ def _evidence(error: BaseException) -> dict[str, float | int | str]:
         return {}
     names = ("guard", "quantity", "value", "limit", "stamp_s", "age_s", "max_age_s")
     return {name: value for name in names if isinstance(value := getattr(error, name, None), (float, int, str))}
-
-
-def _snake(name: str) -> str:
-    return "".join(f"_{c.lower()}" if c.isupper() and i else c.lower() for i, c in enumerate(name))

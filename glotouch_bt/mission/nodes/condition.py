@@ -20,12 +20,9 @@ from glotouch_bt.mission.nodes.base import (
     NodeReader,
     PathSearch,
     Position,
-    Requirement,
     Stack,
-    StateVariables,
     Values,
     btcpp_name,
-    comparison_requirement,
     holds,
     in_code,
     in_words,
@@ -85,11 +82,6 @@ class ConditionKind(NodeKind):
         """Return its settings."""
         settings = node.settings
         return ("port", settings) if isinstance(settings, ConditionSettings) and "port" in node.reads else None
-
-    def requirements(self, node: NodeSpec, variables: StateVariables) -> Iterator[Requirement]:
-        """Yield that of the port."""
-        if found := self.comparison(node):
-            yield comparison_requirement(node, variables, *found)
 
     def exits(self, flow: DataFlowAnalysis, node: NodeSpec, entry: int) -> ExitStates:
         """Split the states by the result of the comparison."""

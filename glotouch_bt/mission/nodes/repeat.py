@@ -23,13 +23,10 @@ from glotouch_bt.mission.nodes.base import (
     Pass,
     PathSearch,
     Position,
-    Requirement,
     RunCount,
     Stack,
-    StateVariables,
     Values,
     btcpp_name,
-    comparison_requirement,
     holds,
     in_code,
     in_words,
@@ -129,11 +126,6 @@ class RepeatKind(LoopKind):
         """Return that of `until`."""
         condition = node.settings.condition if isinstance(node.settings, RepeatSettings) else None
         return ("until", condition) if condition is not None and "until" in node.reads else None
-
-    def requirements(self, node: NodeSpec, variables: StateVariables) -> Iterator[Requirement]:
-        """Yield that of `until`."""
-        if found := self.comparison(node):
-            yield comparison_requirement(node, variables, *found)
 
     def max_passes(self, node: NodeSpec) -> int:
         """Return its `times`, or the limit of `until`."""

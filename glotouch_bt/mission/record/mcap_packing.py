@@ -78,14 +78,8 @@ def pack(start_ns: int, columns: Sequence[Column], values: Sequence[npt.ArrayLik
         blocks.append(planes.transpose(1, 2, 0).tobytes())
     layout = " ".join(map(str, columns)).encode()
     data = b"".join(blocks)
-    return b"".join(
-        (
-            _tag(1, 0) + _varint(start_ns & (2**64 - 1)),
-            _tag(2, 0) + _varint(rows),
-            _field(3, layout),
-            _field(4, data),
-        )
-    )
+    head = _tag(1, 0) + _varint(start_ns & (2**64 - 1)) + _tag(2, 0) + _varint(rows)
+    return b"".join((head, _field(3, layout), _field(4, data)))
 
 
 def unpack(message: bytes) -> tuple[int, dict[str, Array]]:
@@ -166,22 +160,13 @@ def _field(number: int, data: bytes) -> bytes:
 def _packed_descriptor() -> bytes:
     """Return the schema as a serialised FileDescriptorSet, as MCAP requires (field numbers of descriptor.proto)."""
     package, name = PACKED_NAME.split(".")
-    int64, uint32, string, raw = 3, 13, 9, 12
+    optional, int64, uint32, string, raw = 1, 3, 13, 9, 12
     fields = b""
     for number, (field, kind) in enumerate(
         (("start_ns", int64), ("rows", uint32), ("layout", string), ("data", raw)), start=1
     ):
-        optional = 1
-        fields += _field(
-            2,
-            _field(1, field.encode())
-            + _tag(3, 0)
-            + _varint(number)
-            + _tag(4, 0)
-            + _varint(optional)
-            + _tag(5, 0)
-            + _varint(kind),
-        )
+        numbers = ((3, number), (4, optional), (5, kind))
+        fields += _field(2, _field(1, field.encode()) + b"".join(_tag(n, 0) + _varint(v) for n, v in numbers))
     message = _field(1, name.encode()) + fields
     file = (
         _field(1, b"glotouch/packed.proto") + _field(2, package.encode()) + _field(4, message) + _field(12, b"proto3")

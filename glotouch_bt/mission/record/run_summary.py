@@ -16,19 +16,15 @@ class Record(Protocol):
 
     def block(self, observation: Observation, command: Command) -> None:
         """Record one control cycle."""
-        ...
 
     def tick(self, stamp_s: float, changes: Sequence[tuple[str, object, object]]) -> None:
         """Record nodes whose status changed: (path, old, new)."""
-        ...
 
     def event(self, kind: str, stamp_s: float, data: Mapping[str, object]) -> None:
         """Record an event of a skill."""
-        ...
 
     def port(self, stamp_s: float, key: str, value: object) -> None:
         """Record a blackboard write."""
-        ...
 
 
 class NullRecord:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Literal
 
 
@@ -28,12 +29,7 @@ class FindingKind:
     brief: bool = False
 
 
-_Error = FindingKind
-
-
-def _Warning(code: str, meaning: str, why: str = "", advice: str = "", *, brief: bool = False) -> FindingKind:
-    return FindingKind(code, meaning, why, advice, "warning", brief)
-
+_Error, _Warning = FindingKind, partial(FindingKind, severity="warning")
 
 _KINDS = (
     # the file and its keys

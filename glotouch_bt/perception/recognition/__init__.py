@@ -20,19 +20,3 @@ __getattr__ = lazy_door(
     **dict.fromkeys(("MATCHERS", "Matcher"), "matchers"),
     **dict.fromkeys(("PadSpec", "TargetModel"), "model"),
 )
-
-__all__ = [
-    "MATCHERS",
-    "Belief",
-    "Closure",
-    "Fit",
-    "Gates",
-    "Match",
-    "Matcher",
-    "PadSpec",
-    "Ranking",
-    "TargetModel",
-    "expected_gain",
-    "infer_belief",
-    "rank",
-]

@@ -22,11 +22,8 @@ class Matcher(Protocol):
         Raises:
             ParamError: No TouchSet at all, or two of the same candidate.
         """
-        ...
 
 
-def _likelihood(model: TargetModel, touchsets: Sequence[TouchSet]) -> Ranking:
-    return ranked(infer_belief(model, touchsets))
-
-
-MATCHERS: Mapping[str, Matcher] = MappingProxyType({"likelihood": _likelihood, "paper": paper_matcher()})
+MATCHERS: Mapping[str, Matcher] = MappingProxyType(
+    {"likelihood": lambda model, touchsets: ranked(infer_belief(model, touchsets)), "paper": paper_matcher()}
+)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 from glotouch_bt.mission.record import to_json
@@ -11,20 +12,14 @@ from glotouch_bt.runs.replay.run import Replay
 
 def as_dict(replay: Replay) -> dict[str, Any]:
     """Return the JSON data of `--json`."""
-    divergence = replay.divergence
     return {
         "same": replay.same,
         "status": {"then": replay.statuses[0], "now": replay.statuses[1]},
-        "parted": None
-        if divergence is None
-        else {"cycle": divergence.cycle, "stamp_s": divergence.stamp_s, "what": divergence.what},
+        "parted": None if replay.divergence is None else asdict(replay.divergence),
         "record_ended": replay.ended,
         "compared": dict(replay.compared),
         "largest_difference": {k: {"value": v, "where": where} for k, (v, where) in replay.largest.items() if where},
-        "differences": [
-            {"stamp_s": d.stamp_s, "kind": d.kind, "where": d.where, "then": d.then, "now": d.now}
-            for d in replay.differences
-        ],
+        "differences": [asdict(d) for d in replay.differences],
         "reasons": replay.outcome.reasons,
     }
 

@@ -54,14 +54,9 @@ class ClosureParams(SkillParams):
     )
 
 
-def body_bottom_m(gripper: Gripper) -> float:
-    """Return how far the gripper's body reaches below the flange."""
-    return max(b.centre_m[2] + b.half_m[2] for b in gripper.body)
-
-
 def lowest_pads_m(height_m: float, gripper: Gripper) -> float:
     """Return the least height of the pads' mid-point: fingertips clear of the floor, body clear of the object's top."""
-    body_above_P = gripper.pose_E_P.position_m[2] - body_bottom_m(gripper)
+    body_above_P = gripper.pose_E_P.position_m[2] - max(b.centre_m[2] + b.half_m[2] for b in gripper.body)
     return float(max(gripper.fingertip_below_P_m, height_m - body_above_P) + HAND_CLEARANCE_M)
 
 

@@ -26,7 +26,7 @@ from glotouch_bt.mission.nodes.base.kind import (
     wire_setting,
 )
 from glotouch_bt.mission.nodes.base.loop import LoopKind, Pass
-from glotouch_bt.mission.nodes.base.requirements import comparison_requirement, port_requirement
+from glotouch_bt.mission.nodes.base.requirements import port_requirement
 from glotouch_bt.mission.nodes.base.run_count import RunCount
 from glotouch_bt.mission.nodes.base.state_sets import EMPTY, START, StateSets
 from glotouch_bt.mission.nodes.base.state_variables import ANYTHING, UNSET, StateVariables, ValueKind

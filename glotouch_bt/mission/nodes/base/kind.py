@@ -21,6 +21,7 @@ from glotouch_bt.mission.nodes.base.analysis import (
 )
 from glotouch_bt.mission.nodes.base.behaviours import BuildContext, OutcomeDecorator
 from glotouch_bt.mission.nodes.base.comparison import ConditionSettings
+from glotouch_bt.mission.nodes.base.requirements import comparison_requirement
 from glotouch_bt.mission.nodes.base.run_count import RunCount
 from glotouch_bt.mission.nodes.base.state_sets import EMPTY
 from glotouch_bt.mission.nodes.base.state_variables import StateVariables, ValueKind
@@ -127,7 +128,8 @@ class NodeKind:
 
     def requirements(self, node: NodeSpec, variables: StateVariables) -> Iterator[Requirement]:
         """Yield every read of a key or resource: keys in the order of its ports, then resources."""
-        yield from ()
+        if found := self.comparison(node):
+            yield comparison_requirement(node, variables, *found)
 
     def comparison(self, node: NodeSpec) -> tuple[str, ConditionSettings] | None:
         """Return the port that the node compares with a constant, and the comparison; None if it does not."""

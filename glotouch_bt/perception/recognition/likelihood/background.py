@@ -74,7 +74,7 @@ def image_kernel(squared: Array32, p: LikelihoodParams) -> Array32:
 
 
 def log_generic_images(layers: tuple[LayerEvidence, ...], pad: PadSpec, p: LikelihoodParams) -> Array:
-    """Return the background log density (n, 2) of (left, right) images, in units of log `image_kernel`; 0 without image.
+    """Return the background log density (n, 2) of (left, right) images, in units of log `image_kernel`; 0 without one.
 
     A mixture of the surface library and of neighbouring images: below on the same pad, at the same height in the
     previous sequence, on the other pad. So repeated images of one wall are not independent evidence.

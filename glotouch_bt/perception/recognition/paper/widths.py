@@ -53,7 +53,7 @@ def width_tables(model: TargetModel, scales: tuple[float, ...]) -> tuple[WidthTa
 
 
 def _table(model: TargetModel, scale: float) -> WidthTable:
-    rows, cols = (_odd(n / scale) for n in FINE)
+    rows, cols = (2 * int(np.floor(0.5 * (n / scale))) + 1 for n in FINE)  # odd
     edge_z, edge_l = (n // 2 for n in FINE)
     reach = scipy.ndimage.maximum_filter1d(model.fine_m, cols, axis=1, mode="constant", cval=-np.inf)
     reach = scipy.ndimage.maximum_filter1d(reach, rows, axis=2, mode="constant", cval=-np.inf)
@@ -67,10 +67,6 @@ def _table(model: TargetModel, scale: float) -> WidthTable:
     for a in (width, supported, middle):
         a.setflags(write=False)
     return WidthTable(scale, model.l_m * scale, model.z_m * scale, width, supported, middle)
-
-
-def _odd(x: float) -> int:
-    return 2 * int(np.floor(0.5 * x)) + 1
 
 
 @dataclass(frozen=True)

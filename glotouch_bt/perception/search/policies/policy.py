@@ -27,4 +27,3 @@ class SearchPolicy(Protocol):
 
     def next_stretch(self, belief: SearchMap, tip_K_m: Array) -> Stretch | None:
         """Return the next path from tip_K_m (2,); None if nothing unexplored is reachable."""
-        ...

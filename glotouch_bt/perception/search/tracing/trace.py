@@ -144,11 +144,11 @@ def _until_known(
             missed += 1
             s.blocked.append(bearing)
         elif not (elsewhere is not None and elsewhere(found)) and (beside or s.belongs(outline, found, p)):
-            if s.is_new(found, p):
-                missed = 0
-            else:
+            if s.near(found, p.same_m):
                 missed += 1
                 s.blocked.append(bearing)
+            else:
+                missed = 0
             s.add(found, outline, p)
             yield from _retreat(s, p)
             if s.begin_anew(p):

@@ -213,10 +213,6 @@ class TraceState:
             self.odd = len(self.raw)
         self.raw.append(contact)
 
-    def is_new(self, contact: Contact, p: TraceParams) -> bool:
-        """Return True if no earlier contact is at the same position."""
-        return not self.near(contact, p.same_m)
-
     def bearing(self, outline: OutlineBelief) -> float:
         """Return the bearing of the ball from the outline's centre, rad."""
         off = self.tip - outline.centre_K_m

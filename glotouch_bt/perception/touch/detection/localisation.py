@@ -15,7 +15,6 @@ class Section(Protocol):
 
     def support_m(self, direction: Array) -> float:
         """Return the support function: max d.p over the section's points p, for d (2,) in the section's axes."""
-        ...
 
 
 @dataclass(frozen=True)

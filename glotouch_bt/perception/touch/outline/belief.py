@@ -23,8 +23,6 @@ from glotouch_bt.perception.touch.outline.primitives import (
 )
 from glotouch_bt.robot import Array, ParamError
 
-__all__ = ["OutlineBelief", "current_tips", "infer_outline"]
-
 AMPLITUDES: tuple[float, ...] = (0.3, 1.0, 2.0)
 """Deviation scales of a circle, relative to the spread over random objects; a rectangle uses the first two."""
 SCATTER_SCALES = ((1.0, 0.3), (2.2, 0.03))

@@ -13,31 +13,17 @@ from glotouch_bt.perception.touch.squeeze.object_motion import ObjectMotion
 from glotouch_bt.perception.touch.values import Layer
 from glotouch_bt.robot import Array, Observation, ParamError, TactileFrame
 
-
-@dataclass(frozen=True, kw_only=True)
-class PlateauParams:
-    """Conditions of a stable plateau.
-
-    Attributes:
-        duration_s: Minimum duration. Source: six periods of a 60 Hz tactile sensor.
-        tolerance_m: Maximum aperture drift: difference between the means of the halves, beyond what the scatter
-            explains. Source: aperture noise of the harsh conditions with a margin.
-        force_fraction: Minimum fraction of the commanded jaw force; an empty closure does not reach it.
-        arm_m: Maximum motion of the pads' mid-point. Source: half a pad pixel.
-        empty_m: Apertures below this mean empty jaws. Source: aperture bias of the harsh conditions.
-    """
-
-    duration_s: float = 0.1
-    tolerance_m: float = 0.00025
-    force_fraction: float = 0.7
-    arm_m: float = 0.0005
-    empty_m: float = 0.003
-
-    def __post_init__(self) -> None:
-        for name in ("duration_s", "tolerance_m", "force_fraction", "arm_m", "empty_m"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise ParamError(name, value, "finite and positive")
+DURATION_S = 0.1
+"""Minimum duration of a plateau. Source: six periods of a 60 Hz tactile sensor."""
+TOLERANCE_M = 0.00025
+"""Maximum aperture drift: difference between the means of the halves, beyond what the scatter explains. Source:
+aperture noise of the harsh conditions with a margin."""
+FORCE_FRACTION = 0.7
+"""Minimum fraction of the commanded jaw force; an empty closure does not reach it."""
+ARM_M = 0.0005
+"""Maximum motion of the pads' mid-point. Source: half a pad pixel."""
+EMPTY_M = 0.003
+"""Apertures below this mean empty jaws. Source: aperture bias of the harsh conditions."""
 
 
 @dataclass(frozen=True)
@@ -59,17 +45,16 @@ class Plateau:
     why_not: str
 
 
-def find_plateau(blocks: Sequence[Observation], force_N: float, params: PlateauParams | None = None) -> Plateau:
-    """Evaluate the last `duration_s` of a closure commanded with jaw force `force_N`.
+def find_plateau(blocks: Sequence[Observation], force_N: float) -> Plateau:
+    """Evaluate the last `DURATION_S` of a closure commanded with jaw force `force_N`.
 
     Raises:
         ParamError: No blocks.
     """
-    p = params or PlateauParams()
     if not blocks:
         raise ParamError("blocks", 0, "at least one observation")
     end = blocks[-1].now_s
-    window = [b for b in blocks if b.now_s > end - p.duration_s + 1e-9]
+    window = [b for b in blocks if b.now_s > end - DURATION_S + 1e-9]
     aperture = np.array([b.gripper.aperture_m for b in window])
     force = np.array([b.gripper.force_N for b in window])
     start = float(window[0].stamp_s[0])
@@ -83,15 +68,15 @@ def find_plateau(blocks: Sequence[Observation], force_N: float, params: PlateauP
     felt = float(np.median(force))
     opening = float(np.median(aperture))
     first = float(blocks[0].stamp_s[0])
-    if end - first < 0.8 * p.duration_s:
+    if end - first < 0.8 * DURATION_S:
         why = f"watched for {end - first:.3f} s only"
-    elif drift > p.tolerance_m + scatter:
+    elif drift > TOLERANCE_M + scatter:
         why = f"aperture still drifts by {1e3 * drift:.2f} mm"
-    elif felt < p.force_fraction * force_N:
+    elif felt < FORCE_FRACTION * force_N:
         why = f"jaw force {felt:.1f} N of {force_N:.1f} N"
-    elif opening < p.empty_m:
+    elif opening < EMPTY_M:
         why = f"jaws met at {1e3 * opening:.1f} mm"
-    elif moved > p.arm_m:
+    elif moved > ARM_M:
         why = f"the arm moved {1e3 * moved:.2f} mm"
     else:
         why = ""
@@ -125,7 +110,6 @@ def make_layer(
     yaw_rad: float,
     force_N: float,
     pad_shape: tuple[int, int],
-    params: PlateauParams | None = None,
     object_motion: ObjectMotion | None = None,
 ) -> Layer:
     """Build a `Layer` from one closure: aperture and force on the plateau, median maps of the frames TAKEN during it.
@@ -137,13 +121,12 @@ def make_layer(
         yaw_rad: Direction of x_P in K.
         force_N: Commanded jaw force.
         pad_shape: (rows, cols) of the maps.
-        params: Plateau conditions.
         object_motion: Motion of the object during the closure, if estimated.
 
     Raises:
         ParamError: No blocks, or maps of another shape.
     """
-    plateau = find_plateau(blocks, force_N, params)
+    plateau = find_plateau(blocks, force_N)
     frames = [b.tactile for b in blocks if b.tactile is not None]
     # Frames arrive late: select by their stamp; use the newest if none was taken on the plateau.
     on_plateau = [f for f in frames if f.stamp_s >= plateau.start_s] or frames[-1:]
