@@ -17,8 +17,7 @@ from typing import Any
 from glotouch_bt.faults import FaultInjector, FaultPlan, ListeningRecord, injector_in, read_plan, wrong_models
 from glotouch_bt.lazy import load_all
 from glotouch_bt.mission import Mission, load_mission, split_settings
-from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE
-from glotouch_bt.mission.checkpoint import CheckpointFile, CheckpointWriter, ResumePoint
+from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile, CheckpointWriter, ResumePoint
 from glotouch_bt.mission.execution import Control, Outcome, Stuck, deferred_interrupt, run_mission
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import Record, Recorder, RunSummary
@@ -143,9 +142,7 @@ def _record(run: _Run) -> tuple[Recorder, CheckpointFile, CheckpointWriter]:
     resumable, folder = run.resumable, run.folder
     if resumable is None:
         recorder = Recorder(folder.path / "run.mcap", setup)
-        described = describe_checkpointed_run(
-            run.request.as_json(), run.mission, run.conditions, installed_versions()
-        )
+        described = describe_checkpointed_run(run.request.as_json(), run.mission, run.conditions, installed_versions())
         file = CheckpointFile.create(folder.path / CHECKPOINT_FILE, described)
         return recorder, file, CheckpointWriter(file, recorder)
     part = folder.path / ".run.mcap.part"

@@ -10,7 +10,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from glotouch_bt.version import __version__
 from glotouch_bt.mission import Mission
 from glotouch_bt.mission.execution import Outcome
 from glotouch_bt.mission.read import shown
@@ -18,6 +17,7 @@ from glotouch_bt.mission.record import to_json
 from glotouch_bt.robot import Conditions, Robot
 from glotouch_bt.robot.simulation import Referee, TrueObject
 from glotouch_bt.runs.request import RunRequest
+from glotouch_bt.version import __version__
 
 RECORDED_PACKAGES = ("mujoco", "numpy", "pin", "py_trees", "ruckig", "scipy", "trimesh")
 

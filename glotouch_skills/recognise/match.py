@@ -32,9 +32,7 @@ class MatchTarget(Skill):
     USES: ClassVar = frozenset({"arm"})  # it holds the arm while it computes
 
     NOT_RECOGNISED = Failure(
-        "not_recognised",
-        "no candidate is surely the target; `ranking` is written",
-        advice="touch more",
+        "not_recognised", "no candidate is surely the target; `ranking` is written", advice="touch more"
     )
     TOO_WIDE = Failure(
         "too_wide",

@@ -12,18 +12,7 @@ from glotouch_bt.perception import recognition
 from glotouch_bt.perception.touch import Candidate, Layer, TouchSequence, TouchSet
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import HOLD, Array, MotionRefused
-from glotouch_bt.skill import (
-    MOTION_REFUSED,
-    UNCHANGED,
-    Context,
-    Failure,
-    In,
-    Out,
-    Skill,
-    SkillParams,
-    SkillRun,
-    param,
-)
+from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Context, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import CLEARANCE_M, keeping_clear_of, require_clear
 from glotouch_skills.common.planning import (
     TOO_LOW,

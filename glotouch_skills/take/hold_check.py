@@ -40,14 +40,10 @@ class HoldCheck(Skill):
     USES: ClassVar = frozenset({"arm"})
 
     LOST = Failure(
-        "lost",
-        "the object is not in the hand any more",
-        advice="grasp nearer to the centre of mass, or harder",
+        "lost", "the object is not in the hand any more", advice="grasp nearer to the centre of mass, or harder"
     )
     SLIPPED = Failure(
-        "slipped",
-        "the object hangs in the jaws by another place than it was taken",
-        advice="grasp it elsewhere",
+        "slipped", "the object hangs in the jaws by another place than it was taken", advice="grasp it elsewhere"
     )
 
     grip_m = In(float, "aperture when the jaws had closed, m")

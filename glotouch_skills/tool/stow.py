@@ -59,11 +59,7 @@ class Stow(Skill):
         handle_wide = abs(apart - probe.handle_m[1]) <= HELD_TOLERANCE_M
         if arm.scene.holding_tool and (handle_wide or (yield from self._weighs(probe))):
             yield from return_probe(
-                self.context,
-                arm.pose_B_P.yaw_rad,
-                apart,
-                speed_m_s=p.speed_m_s,
-                insert_speed_m_s=p.insert_speed_m_s,
+                self.context, arm.pose_B_P.yaw_rad, apart, speed_m_s=p.speed_m_s, insert_speed_m_s=p.insert_speed_m_s
             )
             self.event("tool", held=False)
             return

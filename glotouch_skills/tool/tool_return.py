@@ -43,10 +43,6 @@ class ToolReturn(Skill):
         """See the class."""
         tool, p = self.tool, self.params
         yield from return_probe(
-            self.context,
-            tool.yaw_B_rad,
-            tool.aperture_m,
-            speed_m_s=p.speed_m_s,
-            insert_speed_m_s=p.insert_speed_m_s,
+            self.context, tool.yaw_B_rad, tool.aperture_m, speed_m_s=p.speed_m_s, insert_speed_m_s=p.insert_speed_m_s
         )
         self.event("tool", held=False)

@@ -73,14 +73,7 @@ class Prober:
 
     FAILURES: ClassVar = (HARD_CONTACT,)
 
-    def __init__(
-        self,
-        context: Context,
-        tool: HeldTool,
-        guard: GuardParams,
-        *,
-        carried: Payload | None = None,
-    ) -> None:
+    def __init__(self, context: Context, tool: HeldTool, guard: GuardParams, *, carried: Payload | None = None) -> None:
         self._context, self._tool = context, tool
         self._guard = replace(guard, latency_s=tool.latency_s)
         self._world = context.world
@@ -133,11 +126,7 @@ class Prober:
         step_B = self._world.container.pose_B_K.rotation @ step
         guard = yield from self._guard_for(step_B / length, any_direction)
         result = yield from self._context.arm.shift(
-            step_B,
-            speed_m_s,
-            acceleration_m_s2=GUARDED_ACCELERATION_M_S2,
-            jerk_m_s3=GUARDED_JERK_M_S3,
-            guard=guard,
+            step_B, speed_m_s, acceleration_m_s2=GUARDED_ACCELERATION_M_S2, jerk_m_s3=GUARDED_JERK_M_S3, guard=guard
         )
         return self._outcome(result, step / length)
 

@@ -60,10 +60,6 @@ def glide(context: Context, pose_B_P: Pose, speed_m_s: float) -> Motion[bool]:
         replace(GuardParams(), directional_N=BUMP_N, total_N=BUMP_N, cutoff_Hz=BUMP_CUTOFF_HZ),
     )
     result = yield from arm.line(
-        pose_B_P,
-        speed_m_s,
-        acceleration_m_s2=GLIDE_ACCELERATION_M_S2,
-        jerk_m_s3=GLIDE_JERK_M_S3,
-        guard=guard,
+        pose_B_P, speed_m_s, acceleration_m_s2=GLIDE_ACCELERATION_M_S2, jerk_m_s3=GLIDE_JERK_M_S3, guard=guard
     )
     return result.stop is None

@@ -10,11 +10,7 @@ from glotouch_bt.robot import Observation
 
 
 def settled(
-    observations: Sequence[Observation],
-    *,
-    speed_m_s: float = 0.002,
-    force_N: float = 0.1,
-    torque_Nm: float = 0.02,
+    observations: Sequence[Observation], *, speed_m_s: float = 0.002, force_N: float = 0.1, torque_Nm: float = 0.02
 ) -> bool:
     """Return True if wrench and position are stable over all given blocks (paper III-A); False for fewer than two.
 
