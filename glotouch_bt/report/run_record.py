@@ -130,21 +130,19 @@ class RunRecord:
     @property
     def pose_B_K(self) -> Pose | None:
         """The nominal container frame, if the description has it."""
-        for value in (self.run.get("pose_B_K"), self.of_run("container", "pose_B_K"), self.of_run("world", "pose_B_K")):
-            if isinstance(value, dict):
-                try:
-                    return Pose(np.array(value["position_m"], float), np.array(value["quat"], float))
-                except (KeyError, ValueError, TypeError, GlotouchError):
-                    return None
-        return None
+        value = self.of_run("container", "pose_B_K")
+        try:
+            return Pose(np.array(value["position_m"], float), np.array(value["quat"], float))
+        except (KeyError, ValueError, TypeError, GlotouchError):
+            return None
 
     @property
     def interior_m(self) -> tuple[float, float, float] | None:
         """The container's interior, if the description has it."""
-        for value in (self.of_run("container", "interior_m"), self.run.get("interior_m")):
-            if isinstance(value, list) and len(value) == 3:
-                return float(value[0]), float(value[1]), float(value[2])
-        return None
+        value = self.of_run("container", "interior_m")
+        return (
+            (float(value[0]), float(value[1]), float(value[2])) if isinstance(value, list) and len(value) == 3 else None
+        )
 
 
 def read_run(path: str | Path) -> RunRecord:

@@ -11,11 +11,9 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 
 from glotouch_bt.mission.nodes import NODES, ConditionSettings
-from glotouch_bt.mission.read import read_yaml, shown, unit_of
+from glotouch_bt.mission.read import limits_of, read_yaml, shown, unit_of
 from glotouch_bt.mission.spec import plain
 from glotouch_bt.skill import Skill
-
-_LIMITS = (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
 
 
 def describe_skill(name: str, skill: type[Skill]) -> dict[str, Any]:
@@ -72,7 +70,7 @@ def _fields(model: type[BaseModel]) -> list[dict[str, Any]]:
     """Return the fields of a model: name, type, unit, required, default, range, description."""
     found: list[dict[str, Any]] = []
     for name, field in model.model_fields.items():
-        limits = [f"{sign} {getattr(m, word):g}" for m in field.metadata for word, sign in _LIMITS if hasattr(m, word)]
+        limits = [f"{sign} {limit:g}" for sign, limit, _ in limits_of(field)]
         found.append(
             {
                 "name": name,

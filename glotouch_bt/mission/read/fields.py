@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import operator
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType, UnionType
 from typing import Any, TypeVar, Union, get_args, get_origin
@@ -61,6 +61,12 @@ def unit_of(field: FieldInfo) -> str:
 def named_by(field: FieldInfo) -> str:
     """Return the kind of thing that a text parameter names (`stl`), or empty."""
     return _extra(field, "names")
+
+
+def limits_of(field: FieldInfo) -> list[tuple[str, float, Callable[[float, float], bool]]]:
+    """Return (symbol, limit, comparison) of each limit of a number."""
+    found = ((symbol, getattr(m, word, None), holds) for m in field.metadata for word, symbol, holds in _RULES)
+    return [(symbol, limit, holds) for symbol, limit, holds in found if isinstance(limit, (int, float))]
 
 
 def _extra(field: FieldInfo, word: str) -> str:
@@ -141,13 +147,11 @@ def _check_span(node: Scalar, name: str, field: FieldInfo, findings: Findings) -
     unit = unit_of(field)
     for end in node.span or ():
         value = convert(end, node.unit, unit) if node.unit else end
-        for rule in field.metadata:
-            for word, symbol, holds in _RULES:
-                limit = getattr(rule, word, None)
-                if isinstance(limit, (int, float)) and not holds(value, limit):
-                    shown = f"{end:g} {node.unit}".strip()
-                    what = f"{node.origin} may be set to {shown}, but {name} must be {symbol} {limit:g} {unit}".rstrip()
-                    findings.add(node.place, "range_too_wide", what)
+        for symbol, limit, holds in limits_of(field):
+            if not holds(value, limit):
+                shown = f"{end:g} {node.unit}".strip()
+                what = f"{node.origin} may be set to {shown}, but {name} must be {symbol} {limit:g} {unit}".rstrip()
+                findings.add(node.place, "range_too_wide", what)
 
 
 def _of_the_right_branch(errors: Sequence[Any], given: Map) -> list[Any]:
@@ -272,8 +276,7 @@ def _valid(field: FieldInfo | None, unit: str) -> str:
     kind = _kind_in_words(field.annotation) if field is not None else ""
     if field is None or not kind:
         return ""
-    limits = ((symbol, getattr(m, word, None)) for m in field.metadata for word, symbol, _ in _RULES)
-    rules = [f"{symbol} {limit}" for symbol, limit in limits if limit is not None]
+    rules = [f"{symbol} {limit}" for symbol, limit, _ in limits_of(field)]
     return f"{kind}{unit}" + (f", {', '.join(rules)}" if rules else "")
 
 

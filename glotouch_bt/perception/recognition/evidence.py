@@ -88,21 +88,10 @@ def read_evidence(touchset: TouchSet, pad: PadSpec) -> Evidence:
             np.asarray(image_feature(pool(d)), dtype=np.float64) if s > 0 else None
             for d, s in zip((layer.left_m, layer.right_m), sunk, strict=True)
         )
-        x, _ = hand_axes(np.asarray(layer.yaw_rad))
-        layers.append(
-            LayerEvidence(
-                k,
-                h,
-                layer.aperture_m + sum(sunk),
-                1.0 if felt == 2 else ONE_SIDED,
-                felt < 2,
-                float(layer.yaw_rad),
-                float(x @ (np.asarray(layer.position_K_m) - centre)),
-                layer.height_m,
-                (left, right),
-                sunk,
-            )
-        )
+        yaw, z, width = float(layer.yaw_rad), layer.height_m, layer.aperture_m + sum(sunk)
+        along = float(hand_axes(np.asarray(layer.yaw_rad))[0] @ (np.asarray(layer.position_K_m) - centre))
+        weight = 1.0 if felt == 2 else ONE_SIDED
+        layers.append(LayerEvidence(k, h, width, weight, felt < 2, yaw, along, z, (left, right), sunk))
     both = sum(e.weight for e in layers if not e.upper_only)
     one = min(sum(e.weight for e in layers if e.upper_only), 1.0)
     return Evidence(tuple(layers), np.array([s.yaw_rad for s in touchset.sequences]), both + one)

@@ -157,13 +157,6 @@ class SearchMap:
             return np.full(len(points), np.inf)
         return np.asarray(self._tree.query(points)[0], dtype=np.float64)
 
-    def covered_fraction(self, coverage_radius_m: float) -> float:
-        """Return the fraction of the permitted region that is near the path or inside an envelope, on a 5 mm grid."""
-        axes = [np.linspace(-h, h, max(int(2 * h / GRID_STEP_M) + 1, 2)) for h in self.half_extent_m]
-        grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-        covered = (self.path_distance(grid) <= coverage_radius_m) | self.inside_exclusion(grid)
-        return float(np.mean(covered))
-
     @property
     def complete(self) -> bool:
         """True if all expected objects are traced."""

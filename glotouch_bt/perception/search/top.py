@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 import scipy
 
-from glotouch_bt.robot import Array, ParamError
+from glotouch_bt.robot import Array
 
 BallMoveKind = Literal["over", "lift", "back", "down", "pass", "feel"]
 """Kind of motion; the driver chooses speeds and guards.
@@ -95,11 +95,6 @@ class TopRule:
     near_m: float = 0.004
     climbs: int = 3
     max_touches: int = 20
-
-    def __post_init__(self) -> None:
-        for name in ("clearance_m", "reach_m", "onward_m", "back_m", "lift_m"):
-            if not getattr(self, name) > 0.0:
-                raise ParamError(name, getattr(self, name), "positive")
 
 
 def rounds(points_K_m: Array, centre_K_m: Array, rule: TopRule) -> Array:

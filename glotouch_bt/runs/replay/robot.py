@@ -76,8 +76,7 @@ class ReplayedRobot(Robot):
         self._ends = np.cumsum(cycles["samples"]).astype(np.int64)
         frames = tactile["arrived_s"] if len(tactile) else np.zeros(0)
         self._frame_of = np.searchsorted(cycles["stamp_s"], frames - 0.5 * period_s)
-        wrench = np.concatenate([samples["force_S_N"], samples["torque_S_Nm"]], axis=1)
-        self._wrench = np.ascontiguousarray(wrench)
+        self._wrench = np.ascontiguousarray(np.concatenate([samples["force_S_N"], samples["torque_S_Nm"]], axis=1))
         self._at = 0
         self._requests = 0
         self._observation = self._block(0)
@@ -122,7 +121,7 @@ class ReplayedRobot(Robot):
 
     def _block(self, i: int) -> Observation:
         rows = slice(int(self._ends[i - 1]) if i else 0, int(self._ends[i]))
-        s, c = self._samples, self._cycles
+        s, c = {name: column[rows] for name, column in self._samples.items()}, self._cycles
         gripper = GripperState(
             float(c["gripper_stamp_s"][i]),
             float(c["gripper_aperture_m"][i]),
@@ -134,15 +133,9 @@ class ReplayedRobot(Robot):
         if at < len(self._frame_of) and self._frame_of[at] == i:
             t = self._tactile
             frame = TactileFrame(float(t["stamp_s"][at]), t["left_m"][at], t["right_m"][at])
+        wrench_S = self._wrench[rows]
         return Observation(
-            s["stamp_s"][rows],
-            s["q"][rows],
-            s["dq"][rows],
-            s["position_B_P"][rows],
-            s["quat_B_P"][rows],
-            self._wrench[rows],
-            gripper,
-            frame,
+            s["stamp_s"], s["q"], s["dq"], s["position_B_P"], s["quat_B_P"], wrench_S, gripper, frame
         )
 
     def _difference(self, command: Command, i: int) -> str:

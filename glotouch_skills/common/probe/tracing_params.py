@@ -28,13 +28,8 @@ class TracingParams(SkillParams):
 
     def rule(self) -> TraceParams:
         """Return them as the trace plan takes them."""
-        return TraceParams(
-            clearance_m=self.clearance_m,
-            centre_sd_m=self.centre_sd_m,
-            radial_sd_m=self.radial_sd_m,
-            min_contacts=self.min_contacts,
-            max_contacts=self.max_contacts,
-        )
+        shared = {"clearance_m", "centre_sd_m", "radial_sd_m", "min_contacts", "max_contacts"}
+        return TraceParams(**self.model_dump(include=shared))
 
     def speeds(self) -> ExploringSpeeds:
         """Return them as the plan driver takes them."""

@@ -4,6 +4,7 @@ import pytest
 from glotouch_bt.perception.search import SearchMap
 from glotouch_bt.perception.touch import Contact, Contour
 from glotouch_bt.robot import ParamError
+from tests.support.coverage import covered_fraction
 
 DISC = Contour("round", np.array([0.05, 0.0]), (0.06, 0.06), 0.0, 0.0, np.zeros(0))
 
@@ -52,10 +53,10 @@ def test_exclusion_is_the_inflated_outline():
 def test_covered_fraction_of_one_stripe():
     """A stripe of half width r along the whole length covers r / half of the region."""
     belief = blank().with_path([[-0.188, 0.0], [0.188, 0.0]])
-    assert belief.covered_fraction(0.046) == pytest.approx(0.046 / 0.138, abs=0.03)
-    assert blank().covered_fraction(0.05) == 0.0
+    assert covered_fraction(belief, 0.046) == pytest.approx(0.046 / 0.138, abs=0.03)
+    assert covered_fraction(blank(), 0.05) == 0.0
     everything = Contour("box", np.zeros(2), (0.5, 0.5), 0.0, 0.0, np.zeros(0))
-    assert blank().with_exclusion(everything, 0.0).covered_fraction(0.01) == 1.0
+    assert covered_fraction(blank().with_exclusion(everything, 0.0), 0.01) == 1.0
 
 
 def test_bad_values_are_refused():

@@ -12,6 +12,7 @@ from glotouch_bt.perception.search import SearchMap
 from glotouch_bt.perception.touch import Contact, GuardParams
 from glotouch_bt.skill.probing.guarded_probe import Prober
 from glotouch_skills.explore.guarded_sweep import GuardedSweep
+from tests.support.coverage import covered_fraction
 
 POST, RADIUS, TOP = (0.03, -0.04), 0.03, 0.06
 BALL = 0.006
@@ -87,7 +88,7 @@ def test_guarded_sweep__search_exhausted(make, policy: str) -> None:
     assert skill.exhausted is True
     assert not b.of_kind("contact")
     assert skill.reason.evidence["found"] == 0
-    assert skill.map.covered_fraction(0.02) > 0.95 > belief.covered_fraction(0.02)
+    assert covered_fraction(skill.map, 0.02) > 0.95 > covered_fraction(belief, 0.02)
 
 
 def test_what_was_touched_by_the_way_is_looked_at_first(make) -> None:

@@ -8,6 +8,7 @@ from py_trees.common import Status
 from glotouch_bt.perception.search import SearchMap
 from glotouch_bt.perception.touch.outline import envelope
 from glotouch_skills.explore.search_anew import SearchAnew
+from tests.support.coverage import covered_fraction
 
 
 def test_objects_are_kept_and_ways_forgotten(bench, found) -> None:
@@ -21,7 +22,7 @@ def test_objects_are_kept_and_ways_forgotten(bench, found) -> None:
     after = skill.map
     assert (after.expected, after.found, after.exclusions) == (3, 1, before.exclusions)
     assert (len(after.path_K_m), len(after.dropped)) == (0, 0)
-    assert after.covered_fraction(0.03) < 0.5 * before.covered_fraction(0.03)
+    assert covered_fraction(after, 0.03) < 0.5 * covered_fraction(before, 0.03)
 
 
 def test_search_anew__nothing_searched(bench) -> None:

@@ -13,7 +13,7 @@ from py_trees.common import Status
 from scipy.spatial import ConvexHull
 
 from glotouch_bt.perception.search.top import BallMove, BallOutcome, Top, TopRule, rounds, top_plan
-from glotouch_bt.robot import MotionRefused, ParamError
+from glotouch_bt.robot import MotionRefused
 from glotouch_skills.explore.touch_top import TouchTop
 
 BALL, CEILING, LOWEST = 0.006, 0.136, 0.024
@@ -156,11 +156,6 @@ def test_the_passes_stay_inside_and_leave_nothing_out_of_reach(n: int, seed: int
     anywhere = rng.dirichlet(np.full(n, 0.3), 500) @ points  # within the outline's hull
     away = np.linalg.norm(anywhere[:, None] - dense, axis=2).min(axis=1)
     assert away.max() <= rule.reach_m + rule.inset_m + 0.005
-
-
-def test_a_rule_of_no_sense() -> None:
-    with pytest.raises(ParamError):
-        TopRule(reach_m=0.0)
 
 
 # -- the skill ----------------------------------------------------------------------------------------------------

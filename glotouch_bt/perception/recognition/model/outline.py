@@ -115,16 +115,9 @@ def _summary(fits: list[Contour]) -> KindFit:
         mean = np.mean(np.exp(2j * np.array([f.yaw_rad for f in fits])))
         yaw = 0.5 * float(np.angle(mean))
         yaw_sd = 0.5 * math.sqrt(-2 * math.log(min(max(float(abs(mean)), 1e-6), 1 - 1e-9)))
-    spread = size.std(axis=0)
-    long, short = np.median(size, axis=0)
-    return KindFit(
-        np.median(centre, axis=0),
-        float(np.sqrt(centre.var(axis=0).mean())),
-        (float(long), float(short)),
-        (float(spread[0]), float(spread[1])),
-        yaw,
-        yaw_sd,
-    )
+    (long, short), (long_sd, short_sd) = np.median(size, axis=0).tolist(), size.std(axis=0).tolist()
+    centre_sd = float(np.sqrt(centre.var(axis=0).mean()))
+    return KindFit(np.median(centre, axis=0), centre_sd, (long, short), (long_sd, short_sd), yaw, yaw_sd)
 
 
 def traced_tips(solid: trimesh.Trimesh, aim_m: Array, contacts: int, start_rad: float) -> Array:

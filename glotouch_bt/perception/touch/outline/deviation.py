@@ -175,16 +175,10 @@ def infer_posteriors(
         posterior = replace(posterior, mean=_limit(shape, params, posterior.mean, start, sd, noise, touches))
     residuals = g.distance_m[:, :k] - r + (rows[:, :k] @ posterior.mean[..., None])[..., 0]
     own = posterior.mean.shape[1] - (2 if touches.outliers else 0)
+    mean, covariance = posterior.mean[:, :own], posterior.covariance[:, :own, :own]
     return [
         Hypothesis(
-            shape,
-            params[i],
-            float(amplitude[i, 0]),
-            posterior.mean[i, :own],
-            posterior.covariance[i, :own, :own],
-            float(evidence[i]),
-            residuals[i],
-            r,
+            shape, params[i], float(amplitude[i, 0]), mean[i], covariance[i], float(evidence[i]), residuals[i], r
         )
         for i in range(s)
     ]

@@ -92,16 +92,9 @@ class OutlineBelief:
             return Contour("round", p[:2], size, 0.0, rms, best.residuals_m, family, best.covariance[:n, :n])
         order = [0, 1, 2, 3, 4] if p[3] >= p[4] else [0, 1, 2, 4, 3]
         yaw = float(p[2]) + (0.0 if p[3] >= p[4] else 0.5 * math.pi)
-        return Contour(
-            "box",
-            p[:2],
-            (float(2 * p[order[3]]), float(2 * p[order[4]])),
-            (yaw + 0.5 * math.pi) % math.pi - 0.5 * math.pi,
-            rms,
-            best.residuals_m,
-            family,
-            best.covariance[np.ix_(order, order)],
-        )
+        yaw = (yaw + 0.5 * math.pi) % math.pi - 0.5 * math.pi
+        size, covariance = (float(2 * p[order[3]]), float(2 * p[order[4]])), best.covariance[np.ix_(order, order)]
+        return Contour("box", p[:2], size, yaw, rms, best.residuals_m, family, covariance)
 
     @cached_property
     def centre_sd_m(self) -> Array:

@@ -9,6 +9,7 @@ from glotouch_bt.perception.search import NearestFrontier, Routes, SearchMap, se
 from glotouch_bt.perception.search.policies.frontier import PAPER_PASSES
 from glotouch_bt.perception.touch import Contour
 from glotouch_bt.robot import ParamError
+from tests.support.coverage import covered_fraction
 
 HALF = np.array([0.188, 0.138])
 CORNER = np.array([-0.18, -0.13])
@@ -44,7 +45,7 @@ def test_empty_container_is_exhausted(planar):
     trial = planar.run(policy, [(ghost, None)], CORNER, limit_m=30.0)
     assert trial.exhausted
     assert len(policy.frontiers(trial.belief)) == 0
-    assert trial.belief.covered_fraction(1.3 * 0.024) > 0.99
+    assert covered_fraction(trial.belief, 1.3 * 0.024) > 0.99
 
 
 def test_full_map_is_exhausted_at_once():
