@@ -36,8 +36,9 @@ from glotouch_bt.mission.nodes.skill import SkillKind
 from glotouch_bt.mission.nodes.subtree import SubtreeKind, SubtreeSettings
 from glotouch_bt.mission.nodes.timeout import TimeoutKind, TimeoutSettings
 
-for _kind in (SequenceKind, SelectorKind, ParallelKind, RetryKind, TimeoutKind, RepeatKind, ForEachKind, InvertKind):
-    register(_kind())
-for _kind in (SucceedKind, FailKind, ConditionKind, SubtreeKind):
-    register(_kind())
+_kind: NodeKind
+for _kind in (SequenceKind(), SelectorKind(), ParallelKind(), RetryKind(), TimeoutKind(), RepeatKind(), ForEachKind()):
+    register(_kind)
+for _kind in (InvertKind(), SucceedKind(), FailKind(), ConditionKind(), SubtreeKind()):
+    register(_kind)
 register(SkillKind(), named=False)

@@ -18,7 +18,8 @@ from glotouch_bt.skill import Context, Failure
 from glotouch_bt.skill.probing import HeldTool, Prober
 from glotouch_skills.common.hand import GRAVITY_M_S2, rise_clear, weigh_N
 
-_Move, _Outcome = TypeVar("_Move"), TypeVar("_Outcome")
+_Move = TypeVar("_Move")
+_Outcome = TypeVar("_Outcome")
 
 AT_HEIGHT_M = 0.004
 """The ball is at sensing height within this tolerance."""
