@@ -18,7 +18,7 @@ from glotouch_bt.faults import FaultInjector, FaultPlan, ListeningRecord, inject
 from glotouch_bt.lazy import load_all
 from glotouch_bt.mission import Mission, load_mission, split_settings
 from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile, CheckpointWriter, ResumePoint
-from glotouch_bt.mission.execution import Control, Outcome, Stuck, deferred_interrupt, run_mission
+from glotouch_bt.mission.execution import Control, Outcome, SkillHung, deferred_interrupt, run_mission
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import Record, Recorder, RunSummary
 from glotouch_bt.robot import Backend, BadInput, Conditions, GlotouchError, Robot, load_backend
@@ -165,7 +165,7 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
     injector = injector_in(robot)
     record: Record = recorder if injector is None else ListeningRecord(recorder, injector)
 
-    def exit_stuck(stuck: Stuck, outcome: Outcome) -> None:
+    def exit_stuck(stuck: SkillHung, outcome: Outcome) -> None:
         """Write what is known and end the process, because the main thread hangs in a skill."""
         try:
             record.event("stuck", outcome.end_s, {"node": stuck.node, "stack": stuck.stack})

@@ -16,6 +16,7 @@ from glotouch_bt.mission.check.requirements import Requirements, verdicts
 from glotouch_bt.mission.nodes import (
     ANYTHING,
     EMPTY,
+    START,
     ConditionSettings,
     ExitStates,
     Requirement,
@@ -52,7 +53,7 @@ class DataFlow:
         self.exits: dict[int, ExitStates] = {}
         self.looked: dict[Requirement, int] = {}
         self._known: dict[tuple[int, int], ExitStates] = {}
-        self.end = self.run(tree, variables.start)
+        self.end = self.run(tree, START)
 
     def run(self, node: NodeSpec, entry: int) -> ExitStates:
         """Return the exit states of a node that is entered in `entry`."""

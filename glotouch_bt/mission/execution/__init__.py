@@ -2,4 +2,4 @@
 
 from glotouch_bt.mission.execution.control import Control, TimedPauses
 from glotouch_bt.mission.execution.runner import Outcome, default_arm, run_mission
-from glotouch_bt.mission.execution.watchdog import Stuck, deferred_interrupt
+from glotouch_bt.mission.execution.watchdog import SkillHung, deferred_interrupt

@@ -14,7 +14,7 @@ from glotouch_bt.mission.execution.abort_reason import abort_failure
 from glotouch_bt.mission.execution.control import Control, Preempted
 from glotouch_bt.mission.execution.pause_gate import PauseGate
 from glotouch_bt.mission.execution.safe_stop import stop_safely
-from glotouch_bt.mission.execution.watchdog import STUCK_S, SkillHung, Stuck, Watchdog, deferred_interrupt
+from glotouch_bt.mission.execution.watchdog import STUCK_S, SkillHung, Watchdog, deferred_interrupt
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.record import Record, RecordedRequests, Rounding, RunSummary
 from glotouch_bt.mission.tree import NodeFailure, ReasonBook, build_tree, sensed
@@ -86,7 +86,7 @@ def run_mission(
     control: Control | None = None,
     supervision: SupervisionLimits | None = None,
     stuck_s: float = STUCK_S,
-    on_unresponsive: Callable[[Stuck, Outcome], None] | None = None,
+    on_unresponsive: Callable[[SkillHung, Outcome], None] | None = None,
     checkpoints: CheckpointWriter | None = None,
     resume_point: ResumePoint | None = None,
 ) -> Outcome:
@@ -142,10 +142,10 @@ def run_mission(
     loop = _TickLoop(state, supervisor, rounding, outcome, control or Control(), hooks, on_progress)
     loop.begin()
 
-    def unresponsive(stuck: Stuck) -> None:
+    def unresponsive(stuck: SkillHung) -> None:
         if on_unresponsive is not None:
             outcome.end_s, outcome.paused_s = context.observation.now_s, context.paused_s
-            outcome.abort(stuck.error(), stuck.node)
+            outcome.abort(stuck, stuck.node)
             on_unresponsive(stuck, outcome)
 
     watchdog = loop.watchdog = Watchdog(supervisor, lambda: summary.node or mission.name, stuck_s, unresponsive)
@@ -269,7 +269,7 @@ class _TickLoop:
     def abort(self, error: BaseException) -> None:
         """Set the outcome to aborted by an error raised inside the loop."""
         stuck = None if self.watchdog is None else self.watchdog.stuck
-        cause = error if stuck is None else stuck.error()
+        cause = stuck or error
         if isinstance(cause, GuardTripped):
             self._supervisor.trip_by(cause)
         self._outcome.abort(cause, cause.node if isinstance(cause, SkillHung) else self.node_of(error))

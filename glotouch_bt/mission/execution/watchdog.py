@@ -10,7 +10,6 @@ import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from types import TracebackType
 from typing import Self
 
@@ -45,19 +44,6 @@ class TickInterrupted(BaseException):
     """Raised inside the stuck thread. Not an `Exception`, so that no skill catches it by accident."""
 
 
-@dataclass
-class Stuck:
-    """A stuck tick: the running node, the wall time waited, and the stack of the thread."""
-
-    node: str
-    seconds: float
-    stack: str
-
-    def error(self) -> SkillHung:
-        """Return it as an error."""
-        return SkillHung(self.node, self.seconds, self.stack)
-
-
 class Watchdog:
     """Watch the thread that creates it. Use as a context manager around the tick loop; call `beat` once a cycle.
 
@@ -70,7 +56,7 @@ class Watchdog:
         grace_s: See `GRACE_S`.
 
     Attributes:
-        stuck: The stuck tick, once seen.
+        stuck: The stuck tick as an error, once seen.
     """
 
     def __init__(
@@ -78,7 +64,7 @@ class Watchdog:
         robot: Robot,
         node: Callable[[], str],
         stuck_s: float,
-        on_unresponsive: Callable[[Stuck], None] | None = None,
+        on_unresponsive: Callable[[SkillHung], None] | None = None,
         *,
         grace_s: float = GRACE_S,
     ) -> None:
@@ -89,7 +75,7 @@ class Watchdog:
         self._beat_s = time.monotonic()
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="watchdog", daemon=True)
-        self.stuck: Stuck | None = None
+        self.stuck: SkillHung | None = None
 
     @property
     def interrupting(self) -> bool:
@@ -122,7 +108,7 @@ class Watchdog:
             if silent_s <= self._stuck_s:
                 continue
             if self.stuck is None:
-                self.stuck = Stuck(self._node(), silent_s, self._stack())
+                self.stuck = SkillHung(self._node(), silent_s, self._stack())
             if time.monotonic() - interrupted_s > 0.5 * self._stuck_s:
                 interrupted_s = time.monotonic()
                 self._interrupt()

@@ -7,6 +7,7 @@ from glotouch_bt.mission.nodes.base import (
     ANYTHING,
     EMPTY,
     NODES,
+    START,
     UNSET,
     BuildContext,
     ConditionSettings,

@@ -57,19 +57,32 @@ def _share(match: dict[str, Any]) -> float | None:
 
 def _share_bars(shares: list[tuple[str, float]]) -> str:
     """Return one bar per hypothesis, from 0 to 1."""
+    return _chart([(name, [(name, share)], share) for name, share in shares], 1.0, "probability", "probabilities")
+
+
+def _chart(rows: list[tuple[str, list[tuple[str, float]], float]], high: float, axis: str, title: str) -> str:
+    """Return a bar chart of (name, parts of the bar, total); without parts there are no data."""
     width, left, right, row, top = 1060.0, 110.0, 980.0, 30.0, 14.0
-    bottom = top + row * len(shares)
-    x = AxisScale(0.0, 1.0, left, right)
-    out = [x_axis(x, top - 6, bottom, "probability", about=8)]
-    for i, (name, share) in enumerate(shares):
+    bottom = top + row * len(rows)
+    x = AxisScale(0.0, high, left, right)
+    out = [x_axis(x, top - 6, bottom, axis, about=8)]
+    for i, (name, parts, total) in enumerate(rows):
         y = top + row * i
         out.append(label(left - 12, y + 16, name, "ink e" + (" b" if i == 0 else "")))
-        out.append(
-            f'<rect x="{left:.1f}" y="{y + 3:.1f}" width="{x.at(share) - left:.1f}" height="18" fill="var(--t0)" '
-            f'stroke="var(--card)"><title>{name}: {share:.4f}</title></rect>'
-        )
-        out.append(label(x.at(share) + 8, y + 16, number(share, 3), "ink b"))
-    return f'<div style="margin-top:18px">{picture(width, bottom + 38, "".join(out), "probabilities")}</div>'
+        if not parts:
+            out.append(label(left + 6, y + 16, "no data"))
+            continue
+        at = left
+        for k, (part, value) in enumerate(parts):
+            w = x.at(value) - left
+            if w > 0.05:
+                out.append(
+                    f'<rect x="{at:.1f}" y="{y + 3:.1f}" width="{w:.1f}" height="18" fill="var(--t{k % COLOURS})" '
+                    f'stroke="var(--card)"><title>{part}: {value:.4f}</title></rect>'
+                )
+            at += max(w, 0.0)
+        out.append(label(x.at(total) + 8, y + 16, number(total, 3), "ink b"))
+    return f'<div style="margin-top:18px">{picture(width, bottom + 38, "".join(out), title)}</div>'
 
 
 def _verdict(ranking: dict[str, Any], details: str = "") -> str:
@@ -112,33 +125,15 @@ def _bars(matches: list[dict[str, Any]], names: list[str]) -> str:
     finite = [m for m in matches if math.isfinite(_loss(m))]
     if not finite:
         return ""
-    width, left, right, row, top = 1060.0, 110.0, 980.0, 30.0, 14.0
-    bottom = top + row * len(matches)
-    x = AxisScale(0.0, max(max(_loss(m) for m in finite), 1e-9) * 1.02, left, right)
-    out = [x_axis(x, top - 6, bottom, "loss", about=8)]
-    split = all(_adds_up(m) for m in finite)
-    for i, m in enumerate(matches):
-        y = top + row * i
-        out.append(
-            label(left - 12, y + 16, f"candidate {esc(m.get('index', '?'))}", "ink e" + (" b" if i == 0 else ""))
-        )
-        if not math.isfinite(_loss(m)):
-            out.append(label(left + 6, y + 16, "no data"))
-            continue
-        at = left
-        parts = [(n, float(m["terms"].get(n) or 0.0)) for n in names] if split and names else [("loss", _loss(m))]
-        for k, (name, value) in enumerate(parts):
-            w = x.at(value) - left
-            if w > 0.05:
-                out.append(
-                    f'<rect x="{at:.1f}" y="{y + 3:.1f}" width="{w:.1f}" height="18" fill="var(--t{k % COLOURS})" '
-                    f'stroke="var(--card)"><title>{esc(name)}: {value:.4f}</title></rect>'
-                )
-            at += max(w, 0.0)
-        out.append(label(x.at(_loss(m)) + 8, y + 16, number(_loss(m), 3), "ink b"))
-    keys = [(f"k-t{k % COLOURS}", esc(n)) for k, n in enumerate(names)] if split and names else []
-    chart = picture(width, bottom + 38, "".join(out), "loss of every candidate")
-    return f'<div style="margin-top:18px">{chart}</div>' + (legend(keys) if keys else "")
+    split = bool(names) and all(_adds_up(m) for m in finite)
+    rows: list[tuple[str, list[tuple[str, float]], float]] = []
+    for m in matches:
+        terms = m.get("terms") or {}
+        parts = [(esc(n), float(terms.get(n) or 0.0)) for n in names] if split else [("loss", _loss(m))]
+        rows.append((f"candidate {esc(m.get('index', '?'))}", parts if math.isfinite(_loss(m)) else [], _loss(m)))
+    high = max(max(_loss(m) for m in finite), 1e-9) * 1.02
+    keys = [(f"k-t{k % COLOURS}", esc(n)) for k, n in enumerate(names)] if split else []
+    return _chart(rows, high, "loss", "loss of every candidate") + (legend(keys) if keys else "")
 
 
 def _adds_up(match: dict[str, Any]) -> bool:

@@ -14,7 +14,7 @@ import pytest
 from py_trees.common import Status
 
 from glotouch_bt.mission.execution.runner import Outcome, run_mission
-from glotouch_bt.mission.execution.watchdog import SkillHung, Stuck, Watchdog
+from glotouch_bt.mission.execution.watchdog import SkillHung, Watchdog
 from glotouch_bt.robot import HOLD, BackendError, GlotouchError, MotionRefused, ParamError, StaleReading
 from glotouch_bt.skill import Out, Skill, SkillFailed, SkillRun
 from tests.mission.execution.test_pause import Events
@@ -168,9 +168,9 @@ def test_an_arm_with_a_clock_of_its_own_is_held_while_a_skill_blocks(go: Any, ro
 
 def test_what_cannot_be_broken_off_is_handed_to_the_last_resort(robot: Any) -> None:
     lost = threading.Event()
-    seen: list[Stuck] = []
+    seen: list[SkillHung] = []
 
-    def on_unresponsive(stuck: Stuck) -> None:
+    def on_unresponsive(stuck: SkillHung) -> None:
         seen.append(stuck)
         lost.set()
 

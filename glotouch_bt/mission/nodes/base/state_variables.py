@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from glotouch_bt.mission.nodes.base.state_sets import START, StateSets
+from glotouch_bt.mission.nodes.base.state_sets import StateSets
 
 UNSET, ANYTHING = 0, 1
 """Values of every key's variable: not written, and written with a value of an unknown kind."""
@@ -52,7 +52,6 @@ class StateVariables:
 
     Attributes:
         sets: The algebra.
-        start: The set of the one state in which a mission begins: no key written.
         keys: Variable of each key.
         resources: Variable of each resource.
         lost: Variable that is 1 once an unknown node may have run.
@@ -67,7 +66,6 @@ class StateVariables:
         self.lost = len(self.keys) + len(self.resources)
         sizes = [*(len(k) for k in self._kinds.values()), *(len(s) for s in self._states.values()), 2]
         self.sets = StateSets(sizes)
-        self.start = START
 
     def kind(self, key: str, value: int) -> ValueKind:
         """Return what a value of a key's variable stands for."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from glotouch_bt.perception.recognition.decision import Closure, Ranking
-from glotouch_bt.perception.recognition.likelihood.gain import Prediction, expected_gains, predict
+from glotouch_bt.perception.recognition.likelihood.gain import expected_gains, predict
 from glotouch_bt.perception.recognition.likelihood.pair import Pair, TouchSetReading, compare, read_touchset
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.perception.recognition.likelihood.posterior import decide
@@ -51,10 +51,6 @@ class Belief:
             readings = tuple(read_touchset(t, self.model.pad, self.params) for t in self.touchsets)
             object.__setattr__(self, "readings", readings)
             object.__setattr__(self, "pairs", tuple(compare(self.model, r, self.params) for r in readings))
-
-    def predictions(self) -> dict[int, Prediction]:
-        """Return the predictions by candidate index."""
-        return {x.index: predict(self.model, r, x, self.params) for r, x in zip(self.readings, self.pairs, strict=True)}
 
 
 def infer_belief(
@@ -106,7 +102,9 @@ def expected_gain(belief: Belief, closures: Sequence[Closure]) -> Array:
         if c.candidate not in known:
             raise ParamError("closure.candidate", c.candidate, f"one of {sorted(known)}")
     shares = {m.index: m.probability for m in belief.ranking.matches}
-    return expected_gains(belief.model, belief.predictions(), shares, belief.ranking.p_absent, closures, belief.params)
+    model, p = belief.model, belief.params
+    predictions = {x.index: predict(model, r, x, p) for r, x in zip(belief.readings, belief.pairs, strict=True)}
+    return expected_gains(model, predictions, shares, belief.ranking.p_absent, closures, p)
 
 
 def ranked(belief: Belief) -> Ranking:
