@@ -75,7 +75,7 @@ def _chart(rows: list[tuple[str, list[tuple[str, float]], float]], high: float, 
         at = left
         for k, (part, value) in enumerate(parts):
             w = x.at(value) - left
-            if w > 0.05:
+            if w > 0.05 or len(parts) == 1:
                 out.append(
                     f'<rect x="{at:.1f}" y="{y + 3:.1f}" width="{w:.1f}" height="18" fill="var(--t{k % COLOURS})" '
                     f'stroke="var(--card)"><title>{part}: {value:.4f}</title></rect>'
