@@ -56,12 +56,8 @@ def resume(
         if on_found is not None:
             on_found(resumable)
         request = RunRequest(
-            mission=asked["mission"],
-            backend=asked["backend"],
-            seed=asked["seed"],
-            settings=asked["settings"],
+            **{name: asked[name] for name in ("mission", "backend", "seed", "settings", "conditions")},
             objects=None if asked["objects"] is None else Path(asked["objects"]),
-            conditions=asked["conditions"],
             out=folder,
             report=report,
         )

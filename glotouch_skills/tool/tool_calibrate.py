@@ -125,21 +125,18 @@ class ToolCalibrate(Skill):
 
     def _rise(self, tool: HeldTool, place: Array) -> Motion[tuple[float, float]]:
         """Rise to the touching height; return the sensor's latency and its standard deviation, s. A pause waits."""
-        with self.context.arm.pause_signal.finishing():
-            return (yield from self._measured_rise(tool, place))
-
-    def _measured_rise(self, tool: HeldTool, place: Array) -> Motion[tuple[float, float]]:
         arm = self.context.arm
         blocks: list[Observation] = []
-        blocks += yield from arm.hold(0.1)
-        yield from arm.line(
-            tool.pose_B_P(self.context.world, place),
-            self.params.travel_speed_m_s,
-            acceleration_m_s2=RISE_ACCELERATION_M_S2,
-            jerk_m_s3=RISE_JERK_M_S3,
-            guard=blocks.append,
-        )
-        blocks += yield from arm.hold(0.15)
+        with arm.pause_signal.finishing():
+            blocks += yield from arm.hold(0.1)
+            yield from arm.line(
+                tool.pose_B_P(self.context.world, place),
+                self.params.travel_speed_m_s,
+                acceleration_m_s2=RISE_ACCELERATION_M_S2,
+                jerk_m_s3=RISE_JERK_M_S3,
+                guard=blocks.append,
+            )
+            blocks += yield from arm.hold(0.15)
         up_S = arm.description.gripper.pose_E_P.rotation @ arm.pose_B_P.rotation[2]
         stamps = np.concatenate([b.stamp_s for b in blocks])
         even = np.arange(stamps[0], stamps[-1], 1.0 / RATE_HZ)

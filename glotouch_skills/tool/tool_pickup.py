@@ -132,7 +132,12 @@ class ToolPickup(Skill):
             yaw_B_rad=yaw,
         )
         if p.floor_touch:
-            tool = yield from self._feel_floor(tool)
+            floor_z = yield from feel_floor(self.context, tool, p.corner_gap_m, p.speed_m_s)
+            if floor_z is None:
+                raise self.NO_FLOOR(
+                    f"the ball met no floor {FLOOR_SEARCH_M * 1e3:.0f} mm below where the registration puts it"
+                )
+            tool = dataclasses.replace(tool, floor_z_K_m=floor_z)
         self.event(
             "tool", held=True, grasp_to_tip_m=probe.grasp_to_tip_m, floor_z_K_m=tool.floor_z_K_m, weight_N=weight_N,
             jaw_zero=self.jaw_zero,
@@ -191,12 +196,3 @@ class ToolPickup(Skill):
         moved = yield from arm.shift(up * UP_B, speed_m_s, check=False, guard=guard)
         if (why := describe_stop(moved)) is not None:
             raise self.HARD_CONTACT(f"the probe does not come out of its holder: {why}", travelled_m=moved.travelled_m)
-
-    def _feel_floor(self, tool: HeldTool) -> Motion[HeldTool]:
-        """Measure the floor's height in the corner nearest to the holder."""
-        floor_z = yield from feel_floor(self.context, tool, self.params.corner_gap_m, self.params.speed_m_s)
-        if floor_z is None:
-            raise self.NO_FLOOR(
-                f"the ball met no floor {FLOOR_SEARCH_M * 1e3:.0f} mm below where the registration puts it"
-            )
-        return dataclasses.replace(tool, floor_z_K_m=floor_z)

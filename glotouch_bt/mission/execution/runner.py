@@ -127,17 +127,9 @@ def run_mission(
     context.requests = requests = RecordedRequests(supervisor, summary, lambda: context.observation.now_s)
     tree = build_tree(mission.spec, context, mission.name)
     outcome = Outcome("aborted", summary, start_s=observation.now_s)
-    state = RunState(
-        tree=tree,
-        context=context,
-        robot=robot,
-        summary=summary,
-        book=ReasonBook(),
-        requests=requests,
-        status={node.id: Status.INVALID for node in tree.root.iterate()},
-        guards=supervisor.counts,
-        start_s=outcome.start_s,
-    )
+    status = {node.id: Status.INVALID for node in tree.root.iterate()}
+    state = RunState(tree, context, robot, summary, ReasonBook(), requests, status, {}, supervisor.counts)
+    state.start_s = outcome.start_s
     hooks = CheckpointHooks(checkpoints, resume_point)
     loop = _TickLoop(state, supervisor, rounding, outcome, control or Control(), hooks, on_progress)
     loop.begin()

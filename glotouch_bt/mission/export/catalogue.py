@@ -36,16 +36,8 @@ def describe_skill(name: str, skill: type[Skill]) -> dict[str, Any]:
 
 def describe_nodes() -> list[dict[str, Any]]:
     """Return every node kind as JSON data: name, description, children (none, one, many), BT.CPP name, settings."""
-    return [
-        {
-            "name": kind.name,
-            "description": kind.description,
-            "children": kind.children,
-            "btcpp": kind.btcpp,
-            "settings": _fields(kind.Settings),
-        }
-        for kind in NODES.values()
-    ]
+    words = ("name", "description", "children", "btcpp")
+    return [{w: getattr(kind, w) for w in words} | {"settings": _fields(kind.Settings)} for kind in NODES.values()]
 
 
 def describe_mission(file: Path) -> dict[str, Any]:

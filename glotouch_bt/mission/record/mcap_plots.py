@@ -17,6 +17,7 @@ from glotouch_bt.robot import Array
 Stamps = npt.NDArray[np.int64]
 _NOT_FINITE = re.compile(r"-?\b(?:nan|inf)\b")
 _TIME = '{"sec":%d,"nsec":%d}'
+_PLACE, _TURN = '{"x":%.6f,"y":%.6f,"z":%.6f}', '{"x":%.7f,"y":%.7f,"z":%.7f,"w":%.7f}'
 
 
 def _rows(template: str, stamps_ns: Stamps, *columns: npt.ArrayLike) -> list[bytes]:
@@ -40,24 +41,15 @@ def wrench(stamps_ns: Stamps, wrench_S: Array) -> list[bytes]:
 
 def pose(stamps_ns: Stamps, position_B_P: Array, quat_B_P: Array) -> list[bytes]:
     """Return foxglove.PoseInFrame of P in B: (n, 3) m and (n, 4) w x y z."""
-    return _rows(
-        f'{{"timestamp":{_TIME},"frame_id":"B","pose":{{"position":{{"x":%.6f,"y":%.6f,"z":%.6f}},'
-        '"orientation":{"x":%.7f,"y":%.7f,"z":%.7f,"w":%.7f}}}',
-        stamps_ns,
-        position_B_P,
-        quat_B_P[:, [1, 2, 3, 0]],
-    )
+    template = f'{{"timestamp":{_TIME},"frame_id":"B","pose":{{"position":{_PLACE},"orientation":{_TURN}}}}}'
+    return _rows(template, stamps_ns, position_B_P, quat_B_P[:, [1, 2, 3, 0]])
 
 
 def transforms(stamps_ns: Stamps, position_B_P: Array, quat_B_P: Array) -> list[bytes]:
     """Return foxglove.FrameTransforms of P in B: (n, 3) m and (n, 4) w x y z."""
-    return _rows(
-        f'{{"transforms":[{{"timestamp":{_TIME},"parent_frame_id":"B","child_frame_id":"P",'
-        '"translation":{"x":%.6f,"y":%.6f,"z":%.6f},"rotation":{"x":%.7f,"y":%.7f,"z":%.7f,"w":%.7f}}]}',
-        stamps_ns,
-        position_B_P,
-        quat_B_P[:, [1, 2, 3, 0]],
-    )
+    head = f'{{"transforms":[{{"timestamp":{_TIME},"parent_frame_id":"B","child_frame_id":"P",'
+    template = f'{head}"translation":{_PLACE},"rotation":{_TURN}}}]}}'
+    return _rows(template, stamps_ns, position_B_P, quat_B_P[:, [1, 2, 3, 0]])
 
 
 def joints(stamps_ns: Stamps, q: Array, dq: Array) -> list[bytes]:

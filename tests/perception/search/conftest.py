@@ -59,11 +59,11 @@ def run(policy, layout, start, *, limit_m=8.0, wall_gap=0.012, orbit=True):
     known, touched_at = set(), []
     travel = sweep = 0.0
     while travel < limit_m and len(known) < len(objects):
-        way = policy.next_path(belief, tip)
-        if way is None:
+        stretch = policy.next_stretch(belief, tip)
+        if stretch is None:
             return Trial(touched_at, travel, sweep, True, belief)
         hit = None
-        for goal in way:
+        for goal in stretch.waypoints_K_m:
             n = max(int(np.linalg.norm(goal - tip) / 0.001), 1)
             line = tip + (goal - tip) * np.linspace(0, 1, n + 1)[1:, None]
             gaps = np.array([signed_distance(o, line) for o in objects]) - TIP

@@ -72,19 +72,14 @@ class NearestFrontier:
         return unexplored(belief, samples[inner], factor * self.coverage_radius_m)
 
     def next_stretch(self, belief: SearchMap, tip_K_m: Array) -> Stretch | None:
-        """See `SearchPolicy`."""
-        way = self.next_path(belief, tip_K_m)
-        return None if way is None else Stretch(way)
-
-    def next_path(self, belief: SearchMap, tip_K_m: Array) -> Array | None:
-        """Return waypoints (k, 2) in K to the nearest unexplored sample; None if none is reachable."""
+        """See `SearchPolicy`: the way to the nearest unexplored sample."""
         tip = np.asarray(tip_K_m, dtype=np.float64)[:2]
         routes = Routes(belief, tip)
         for step in range(len(self._passes)):
             goals = self.frontiers(belief, step)
             way = first_reachable(routes, goals, routes.lengths(goals) + self._turn_m * turning(belief, tip, goals))
             if way is not None:
-                return way
+                return Stretch(way)
         return None
 
 
