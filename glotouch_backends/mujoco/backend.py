@@ -9,10 +9,10 @@ import mujoco
 import numpy as np
 
 from glotouch_backends.mujoco.control import check_sane, silence_mujoco
-from glotouch_backends.mujoco.model import Handles, compile_world
+from glotouch_backends.mujoco.model import BuiltWorld, Handles, compile_world
 from glotouch_backends.mujoco.robot import MujocoRobot
 from glotouch_backends.mujoco.simulation import MujocoDisturber, MujocoReferee
-from glotouch_backends.mujoco.truth import Truth, draw_truth
+from glotouch_backends.mujoco.truth import draw_truth
 from glotouch_backends.options import WorldOptions, convert_options
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import Backend, BackendError, Conditions, Limits, Robot, RobotDescription, World
@@ -52,7 +52,7 @@ def _settle(model: mujoco.MjModel, data: mujoco.MjData, handles: Handles, descri
 
 def build_world(
     description: RobotDescription, world: World, conditions: Conditions, seed: int, options: WorldOptions
-) -> tuple[Truth, mujoco.MjModel, mujoco.MjData, Handles]:
+) -> BuiltWorld:
     """Draw, compile and settle the world of a trial.
 
     Raises:
@@ -67,7 +67,7 @@ def build_world(
         _settle(model, data, handles, description)
     except mujoco.FatalError as e:
         raise BackendError(f"MuJoCo failed while the world {world.name!r} settled: {e}") from e
-    return truth, model, data, handles
+    return BuiltWorld(description, world, conditions, seed, truth, model, data, handles)
 
 
 class MujocoBackend(Backend):
@@ -88,7 +88,7 @@ class MujocoBackend(Backend):
         """See `Backend`; options in `MujocoOptions`."""
         chosen = MujocoOptions(**convert_options(self.name, options, MujocoOptions))
         built = build_world(self._description, world, conditions, seed, chosen)
-        return MujocoRobot(self._description, self._limits, world, *built, conditions, seed, chosen.trace)
+        return MujocoRobot(built, self._limits, chosen.trace)
 
     def referee(self, robot: Robot) -> Referee | None:
         """See `Backend`."""

@@ -16,26 +16,22 @@ from glotouch_backends.mujoco.control import (
     Servo,
     check_sane,
 )
-from glotouch_backends.mujoco.model import STEP_S, STEPS, Handles
+from glotouch_backends.mujoco.model import STEP_S, STEPS, BuiltWorld
 from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, Tactile, WristSensor, up_in
 from glotouch_backends.mujoco.simulation import ControlTrace, SnapshotStore
-from glotouch_backends.mujoco.truth import Truth
 from glotouch_bt.robot import (
     Array,
     BackendError,
     Command,
-    Conditions,
     GripperState,
     Limits,
     Observation,
     ParamError,
     Request,
     Robot,
-    RobotDescription,
     Snapshot,
     Tare,
     Ticket,
-    World,
 )
 
 MAX_HELD_DISTANCE_M = 0.02
@@ -45,21 +41,11 @@ MAX_HELD_DISTANCE_M = 0.02
 class MujocoRobot(Robot):
     """See `Robot`. Created by `MujocoBackend.open`; only the referee may read its truth."""
 
-    def __init__(
-        self,
-        description: RobotDescription,
-        limits: Limits,
-        world: World,
-        truth: Truth,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-        handles: Handles,
-        conditions: Conditions,
-        seed: int,
-        traced: bool = False,
-    ) -> None:
+    def __init__(self, built: BuiltWorld, limits: Limits, traced: bool = False) -> None:
+        description, conditions, seed = built.description, built.conditions, built.seed
+        model, data, handles = built.model, built.data, built.handles
         self.description, self.limits, self.period_s = description, limits, STEPS * STEP_S
-        self.world, self.truth = world, truth
+        self.world, self.truth = built.world, built.truth
         self.model, self.data, self.handles = model, data, handles
         s = handles.sensors
         self._s = s
@@ -69,7 +55,7 @@ class MujocoRobot(Robot):
         self._jaws = JawServo(model, handles, description.gripper, aperture)
         self._wrist = WristSensor(description, conditions, seed)
         self._guard = HardLimitGuard(limits)
-        self._tactile = Tactile(model, data, handles, description.gripper, world, truth, conditions, seed)
+        self._tactile = Tactile(built)
         self._ctrl = np.zeros((STEPS, model.nu))
         self._arm_ctrl, self._jaw_ctrl = self._ctrl[:, handles.arm_ctrl], self._ctrl[:, handles.jaw_ctrl]
         self._samples = np.zeros((STEPS, model.nsensordata))

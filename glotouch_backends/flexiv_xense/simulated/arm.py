@@ -17,9 +17,9 @@ import numpy as np
 from glotouch_backends.flexiv_xense.simulated.kinematics import ControllerKinematics, inverse, rotation_between
 from glotouch_backends.flexiv_xense.simulated.trajectory import Trajectory, cubic_extremes, shortest
 from glotouch_backends.mujoco.control import BRAKE_REACH_M
-from glotouch_backends.mujoco.model import DAMPING_PER_STIFFNESS_S, JOINT_DAMPING, STEP_S, STIFFNESS_NM_RAD, Handles
+from glotouch_backends.mujoco.model import DAMPING_PER_STIFFNESS_S, JOINT_DAMPING, STEP_S, STIFFNESS_NM_RAD, BuiltWorld
 from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, WristSensor, up_in
-from glotouch_bt.robot import Array, Conditions, Pose, RobotDescription, cross_matrix, quat_to_matrix
+from glotouch_bt.robot import Array, Pose, cross_matrix, quat_to_matrix
 from glotouch_bt.robot.scene import stream
 
 STOP_RAD_S2 = 2.0 / BRAKE_REACH_M
@@ -92,19 +92,11 @@ class SimulatedArm:
     """Trajectory, servo, wrench and tare of the simulated arm. The world steps it.
 
     Args:
-        description, conditions, seed: As for a backend.
-        model, data, handles: The world.
+        built: The world.
     """
 
-    def __init__(
-        self,
-        description: RobotDescription,
-        conditions: Conditions,
-        seed: int,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-        handles: Handles,
-    ) -> None:
+    def __init__(self, built: BuiltWorld) -> None:
+        model, data, handles, description = built.model, built.data, built.handles, built.description
         self.description = description
         self._model, self._data, self._h, self.sensors = model, data, handles, handles.sensors
         self.trajectory = Trajectory(np.array(data.qpos[handles.arm_qpos]))
@@ -114,8 +106,8 @@ class SimulatedArm:
         self._vector, self._product = np.zeros(model.nv), np.zeros(model.nv)
         self._jacobian = np.zeros((6, model.nv))
         self._hand = description.gripper.mass_and_com_E()
-        self._wrist = WristSensor(description, conditions, seed, steps=1)
-        self._offset_S = OFFSET_SD * stream(seed, "unzeroed").standard_normal(6)
+        self._wrist = WristSensor(description, built.conditions, built.seed, steps=1)
+        self._offset_S = OFFSET_SD * stream(built.seed, "unzeroed").standard_normal(6)
         self._bias = np.zeros(6)
         self._taring: list[Array] | None = None
         self.load = FLANGE

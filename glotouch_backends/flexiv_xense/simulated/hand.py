@@ -6,14 +6,12 @@ import math
 from collections import deque
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 
-from glotouch_backends.mujoco import Truth
 from glotouch_backends.mujoco.control import JawReports, JawServo
-from glotouch_backends.mujoco.model import STEP_S, STEPS, Handles
+from glotouch_backends.mujoco.model import STEP_S, STEPS, BuiltWorld
 from glotouch_backends.mujoco.sensing import Tactile
-from glotouch_bt.robot import Array, Conditions, GripperState, GripperTarget, RobotDescription, TactileFrame, World
+from glotouch_bt.robot import Array, GripperState, GripperTarget, TactileFrame
 
 PERIOD_S = STEPS * STEP_S
 WANTED_S = 0.1
@@ -32,32 +30,22 @@ class SimulatedHand:
     """Jaws and pads. The world steps them once a period.
 
     Args:
-        description, conditions, seed, world, truth: As for the MuJoCo backend.
-        model, data, handles: The world.
+        built: The world.
 
     Attributes:
         status: Last report of the jaws.
         frame: Last pair of depth maps that arrived, or None.
     """
 
-    def __init__(
-        self,
-        description: RobotDescription,
-        conditions: Conditions,
-        seed: int,
-        world: World,
-        truth: Truth,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-        handles: Handles,
-    ) -> None:
+    def __init__(self, built: BuiltWorld) -> None:
+        handles, conditions = built.handles, built.conditions
         self._s = handles.sensors
-        self.gripper = description.gripper
-        self._aperture = aperture = float(data.qpos[handles.jaw_qpos].sum())
-        self._jaws = JawServo(model, handles, self.gripper, aperture)
+        self.gripper = built.description.gripper
+        self._aperture = aperture = float(built.data.qpos[handles.jaw_qpos].sum())
+        self._jaws = JawServo(built.model, handles, self.gripper, aperture)
         self._rows = np.zeros((STEPS, 2))
-        self._tactile = Tactile(model, data, handles, self.gripper, world, truth, conditions, seed)
-        self._reports = JawReports(conditions, seed, PERIOD_S, GripperState(0.0, aperture, 0.0, False))
+        self._tactile = Tactile(built)
+        self._reports = JawReports(conditions, built.seed, PERIOD_S, GripperState(0.0, aperture, 0.0, False))
         late = round(conditions.gripper_latency_s / PERIOD_S)
         self._speeds: deque[float] = deque([0.0] * (late + 1), maxlen=late + 1)
         self._now_s = 0.0

@@ -39,11 +39,12 @@ class SimulatedWorld:
         description: RobotDescription = RIZON4_XENSE,
     ) -> None:
         self.world, self.description = world, description
-        self.truth, self.model, self.data, self.handles = build_world(description, world, conditions, seed, options)
+        built = build_world(description, world, conditions, seed, options)
+        self.truth, self.model, self.data, self.handles = built.truth, built.model, built.data, built.handles
         self.trace: ControlTrace | None = None
         self.peak_force_N = 0.0
-        self.arm = SimulatedArm(description, conditions, seed, self.model, self.data, self.handles)
-        self.hand = SimulatedHand(description, conditions, seed, world, self.truth, self.model, self.data, self.handles)
+        self.arm = SimulatedArm(built)
+        self.hand = SimulatedHand(built)
         self.steps = 0
         h = self.handles
         self._ctrl = np.array(self.data.ctrl)

@@ -15,7 +15,7 @@ from glotouch_backends.mujoco.model.gripper import add_gripper
 from glotouch_backends.mujoco.model.objects import add_object
 from glotouch_backends.mujoco.model.probe import add_probe
 from glotouch_backends.mujoco.truth import Truth
-from glotouch_bt.robot import BackendError, RobotDescription, World
+from glotouch_bt.robot import BackendError, Conditions, RobotDescription, World
 
 STEP_S = 0.001
 """Solver step."""
@@ -72,6 +72,20 @@ class Handles:
     holder_body: int
     pad_geoms: tuple[int, int]
     sensors: SensorMap
+
+
+@dataclass(frozen=True)
+class BuiltWorld:
+    """The simulated world of one trial, and what it was built from."""
+
+    description: RobotDescription
+    world: World
+    conditions: Conditions
+    seed: int
+    truth: Truth
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    handles: Handles
 
 
 def _add_sensors(spec: mujoco.MjSpec, description: RobotDescription) -> None:

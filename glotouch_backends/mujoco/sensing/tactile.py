@@ -11,11 +11,10 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from glotouch_backends.mujoco.model import Handles, handle_mesh
+from glotouch_backends.mujoco.model import BuiltWorld, Handles, handle_mesh
 from glotouch_backends.mujoco.sensing.gel import GelSensor, PairPress
 from glotouch_backends.mujoco.sensing.rays import SurfaceRays
-from glotouch_backends.mujoco.truth import Truth
-from glotouch_bt.robot import Conditions, Gripper, Pose, TactileFrame, World
+from glotouch_bt.robot import Pose, TactileFrame
 from glotouch_bt.robot.scene import stream
 
 MAX_SAME_TRAVEL_M = 1e-5
@@ -70,27 +69,18 @@ class Tactile:
             of the reported aperture.
     """
 
-    def __init__(
-        self,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-        handles: Handles,
-        gripper: Gripper,
-        world: World,
-        truth: Truth,
-        conditions: Conditions,
-        seed: int,
-    ) -> None:
-        self._data = data
-        self._pads = PadContacts(model, data, handles)
+    def __init__(self, built: BuiltWorld) -> None:
+        handles, gripper, conditions = built.handles, built.description.gripper, built.conditions
+        self._data = built.data
+        self._pads = PadContacts(built.model, built.data, handles)
         self._site = handles.pads_site
         self._gel = GelSensor(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
-        self._meshes = dict(zip(handles.object_bodies, (o.mesh for o in truth.objects), strict=True))
-        self._meshes[handles.probe_body] = handle_mesh(world.probe)
+        self._meshes = dict(zip(handles.object_bodies, (o.mesh for o in built.truth.objects), strict=True))
+        self._meshes[handles.probe_body] = handle_mesh(built.world.probe)
         self._rays: dict[int, SurfaceRays] = {}
         self._c = conditions
-        self._rng = stream(seed, "tactile")
-        fixed = stream(seed, "gel")
+        self._rng = stream(built.seed, "tactile")
+        fixed = stream(built.seed, "gel")
         shape = (2, *gripper.pad_shape)
         self._offset = fixed.uniform(*conditions.tactile_offset_m, shape)
         self._dead = fixed.random(shape) < conditions.tactile_dead_fraction

@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from glotouch_backends.flexiv_xense.client.backend import FlexivXenseBackend, _arm_limits, _tool
+from glotouch_backends.flexiv_xense.client.backend import FlexivXenseBackend
+from glotouch_backends.flexiv_xense.client.options import read_options
 from glotouch_backends.flexiv_xense.driver.devices.arm_20 import Arm20
 from glotouch_backends.flexiv_xense.driver.messages import Setpoint
 from tests.backends.flexiv_xense.scripted import Mode, ScriptedVendor
@@ -53,11 +54,8 @@ def arm() -> Arm20:
     rdk = SimpleNamespace(
         JointGroup=JointGroup, Mode=Mode, NrtCartesianCmd=Command, PrimitiveArgs=lambda name, values: (name, values)
     )
-    b = FlexivXenseBackend()
-    return Arm20(
-        rdk, Robot20(vendor, old), vendor.clock, _tool(b._description), _arm_limits(b._description, b._limits),
-        b._description.home_q, raw=True, feed_forward=True,
-    )  # fmt: skip
+    request = FlexivXenseBackend()._request(*read_options({"devices": "simulated"}), "", 1, True)
+    return Arm20(rdk, Robot20(vendor, old), vendor.clock, request)
 
 
 def test_states_are_the_arms_group_and_raw(arm: Arm20) -> None:

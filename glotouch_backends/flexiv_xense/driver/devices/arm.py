@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from ..clock import Clock
 from ..faults import DeviceFault, vendor_call
-from ..messages import ArmEvent, ArmLimits, Numbers, Setpoint, ToolData
+from ..messages import ArmEvent, Numbers, Open, Setpoint
 
 TOOL_NAME = "glotouch"
 """Name of our tool in the arm's memory."""
@@ -56,30 +56,16 @@ class DriverArm(ABC):
         rdk: The vendor's module.
         robot: Its `Robot`, connected.
         clock: Time.
-        tool: The bare hand.
-        limits: Basis of the device's own limits.
-        posture: (7,) reference of the null space.
-        raw: Use the unfiltered wrench.
-        feed_forward: Send velocities.
+        request: The client's request: tool, limits, posture (7,) of the null space, and settings.
     """
 
     api = ""
 
-    def __init__(
-        self,
-        rdk: Any,
-        robot: Any,
-        clock: Clock,
-        tool: ToolData,
-        limits: ArmLimits,
-        posture: Numbers,
-        *,
-        raw: bool,
-        feed_forward: bool,
-    ) -> None:
+    def __init__(self, rdk: Any, robot: Any, clock: Clock, request: Open) -> None:
         self.rdk, self.robot, self.clock = rdk, robot, clock
-        self._tool, self._limits, self._posture = tool, limits, list(posture)
-        self._raw, self._feed_forward = raw, feed_forward
+        self._tool, self._limits, self._posture = request.tool, request.arm, list(request.posture)
+        settings = request.devices.settings
+        self._raw, self._feed_forward = settings.wrench == "raw", settings.feed_forward
         self._tools: Any = None
         with vendor_call("reading the arm's data", "connect"):
             self.info = robot.info()

@@ -69,16 +69,7 @@ def connect_devices(request: Open, progress: Callable[[str], None]) -> Connected
     progress(f"connecting to the arm {s.robot}")
     with vendor_call(f"connecting to the arm {s.robot!r}", "connect"):
         robot = rdk.Robot(s.robot, list(s.network), False)
-    arm = adapter(
-        rdk,
-        robot,
-        clock,
-        request.tool,
-        request.arm,
-        request.posture,
-        raw=s.wrench == "raw",
-        feed_forward=s.feed_forward,
-    )
+    arm = adapter(rdk, robot, clock, request)
     connected = Connected(clock, arm, None, None, vendor)
     try:
         if gripper:
