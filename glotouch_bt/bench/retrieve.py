@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor, as_completed
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from glotouch_bt.bench.statistics import bootstrap_mean, wilson
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene import load_folder
-from glotouch_bt.runs import RunRequest, launch
+from glotouch_bt.runs import Campaign, OnRow, RunRequest, crashed, gather, launch, silent, write_summary, write_table
 
 COLUMNS = (
     "target", "seed", "exit_code", "status", "retrieved", "correct", "cause", "candidates", "contacts", "probe_path_m",
@@ -22,47 +21,20 @@ COLUMNS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class RetrieveCampaign:
-    """Settings of the campaign.
+@dataclass(frozen=True, kw_only=True)
+class RetrieveCampaign(Campaign):
+    """Settings of the campaign; its mission takes a parameter `target`.
 
     Attributes:
-        mission: Path or shipped name; it must take a parameter `target`.
         targets: Names of objects in the folder; every target is tried on every seed.
-        seeds: Seeds of the trials.
-        conditions: Path or shipped name.
-        objects: Folder of STL files instead of the world's.
-        backend: Registered name.
-        out: Folder of the campaign; it receives a run folder for each trial.
-        settings: Further `--set` values, for every trial.
-        resume: Skip trials whose result is in `out` already.
     """
 
-    mission: str
     targets: tuple[str, ...]
-    seeds: tuple[int, ...]
-    conditions: str
-    objects: Path | None
-    backend: str
-    out: Path
-    settings: Mapping[str, str] = field(default_factory=dict)
-    resume: bool = False
 
     def requests(self) -> list[tuple[str, RunRequest]]:
         """Return (target, request) of every trial, seeds outermost: an interrupted campaign covers all targets."""
         return [
-            (
-                target,
-                RunRequest(
-                    mission=self.mission,
-                    backend=self.backend,
-                    seed=seed,
-                    settings={**self.settings, "target": target},
-                    objects=self.objects,
-                    conditions=self.conditions,
-                    out=self.out / f"{target}-s{seed}",
-                ),
-            )
+            (target, self.request(seed, f"{target}-s{seed}", settings={**self.settings, "target": target}))
             for seed in self.seeds
             for target in self.targets
         ]
@@ -87,7 +59,7 @@ def run_trial(target: str, request: RunRequest, resume: bool = False) -> dict[st
     except BadInput:
         raise
     except Exception as e:
-        return row | {"status": "traceback", "exit_code": -1, "cause": f"traceback {type(e).__name__}: {e}"}
+        return row | crashed(e)
     return row | _columns(done.result) | {"exit_code": done.exit_code}
 
 
@@ -111,38 +83,14 @@ def cause(result: Mapping[str, Any]) -> str:
     return f"{root['node'].rsplit('/', 1)[-1]}: {root['code'] or 'failed'}"
 
 
-def run_campaign(
-    campaign: RetrieveCampaign, executor: Executor, on_row: Callable[[dict[str, Any], int, int], None] | None = None
-) -> dict[str, Any]:
-    """Run every trial on the executor, write trials.csv and summary.json, and return the summary.
-
-    Args:
-        campaign: Settings.
-        executor: Any `concurrent.futures` executor (processes here, a cluster elsewhere).
-        on_row: Called with (row, done, total) after each trial.
-    """
-    requests = campaign.requests()
-    campaign.out.mkdir(parents=True, exist_ok=True)
-    futures = [executor.submit(run_trial, target, request, campaign.resume) for target, request in requests]
-    rows: list[dict[str, Any]] = []
-    for future in as_completed(futures):
-        rows.append(future.result())
-        if on_row is not None:
-            on_row(rows[-1], len(rows), len(futures))
+def run_campaign(campaign: RetrieveCampaign, executor: Executor, on_row: OnRow = silent) -> dict[str, Any]:
+    """Run every trial on the executor, write trials.csv and summary.json, and return the summary."""
+    rows = gather([executor.submit(run_trial, *trial, campaign.resume) for trial in campaign.requests()], on_row)
     rows.sort(key=lambda r: (r["target"], r["seed"]))
-    with (campaign.out / "trials.csv").open("w", newline="") as f:
-        table = csv.DictWriter(f, COLUMNS, extrasaction="ignore")
-        table.writeheader()
-        table.writerows(rows)
-    summary = summarise(rows) | {
-        "conditions": campaign.conditions,
-        "seeds": list(campaign.seeds),
-        "targets": list(campaign.targets),
-        "mission": campaign.mission,
-        "backend": campaign.backend,
-        "settings": dict(campaign.settings),
-    }
-    (campaign.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    write_table(campaign.out, "trials.csv", COLUMNS, rows)
+    more = {"targets": list(campaign.targets), "backend": campaign.backend, "settings": dict(campaign.settings)}
+    summary = summarise(rows) | campaign.described() | more
+    write_summary(campaign.out, summary)
     return summary
 
 

@@ -9,10 +9,8 @@ factors by processor time (`time.process_time`) are given too: where they differ
 
 from __future__ import annotations
 
-import csv
-import json
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,7 +22,7 @@ from glotouch_bt.mission.execution import run_mission
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import Record, Recorder
 from glotouch_bt.robot import BadInput, Command, Observation, Request, Robot, Ticket, load_backend
-from glotouch_bt.runs import RunFolder
+from glotouch_bt.runs import Campaign, OnRow, RunFolder, silent, write_summary, write_table
 
 COLUMNS = (
     "seed", "status", "sim_s", "wall_s", "bare_s", "steps", "same_end_state", "realtime_factor", "bare_factor",
@@ -34,29 +32,6 @@ TARGET_REALTIME = 15.0
 """Required ratio of simulated time to wall time. Source: the project's speed requirement."""
 TARGET_OVER_PHYSICS = 2.0
 """Largest ratio of wall time to bare step time. Source: the project's speed requirement."""
-
-
-@dataclass(frozen=True)
-class SpeedStudy:
-    """Settings of the study.
-
-    Attributes:
-        mission: Path or shipped name.
-        settings: Mission parameters.
-        seeds: One mission each.
-        conditions: Path or shipped name.
-        objects: Folder of STL files instead of the world's.
-        backend: Registered name; it must know the option `trace` and have a referee.
-        out: Folder of the study; it receives a folder for each mission.
-    """
-
-    mission: str
-    settings: Mapping[str, str]
-    seeds: tuple[int, ...]
-    conditions: str
-    objects: Path | None
-    backend: str
-    out: Path
 
 
 @dataclass
@@ -184,7 +159,7 @@ class SpeedTrial:
     times: CycleTimes
 
 
-def run_trial(study: SpeedStudy, seed: int) -> SpeedTrial:
+def run_trial(study: Campaign, seed: int) -> SpeedTrial:
     """Run one mission and replay its steps.
 
     Raises:
@@ -224,7 +199,7 @@ def run_trial(study: SpeedStudy, seed: int) -> SpeedTrial:
     return SpeedTrial(row, times)
 
 
-def _description(study: SpeedStudy, seed: int, container: object) -> dict[str, object]:
+def _description(study: Campaign, seed: int, container: object) -> dict[str, object]:
     return {
         "mission": study.mission,
         "backend": study.backend,
@@ -244,31 +219,19 @@ def _report_s(folder: Path) -> float:
     return time.perf_counter() - began
 
 
-def run_study(study: SpeedStudy, on_row: Callable[[Mapping[str, Any], int, int], None] | None = None) -> dict[str, Any]:
-    """Run every seed in turn, write trials.csv and summary.json, and return the summary.
+def run_study(study: Campaign, on_row: OnRow = silent) -> dict[str, Any]:
+    """Run one mission a seed in turn, write trials.csv and summary.json, and return the summary.
 
-    Args:
-        study: Settings.
-        on_row: Called with (row, done, total) after each mission.
+    The backend must know the option `trace` and have a referee.
     """
-    study.out.mkdir(parents=True, exist_ok=True)
     trials = []
     for seed in study.seeds:
         trials.append(run_trial(study, seed))
-        if on_row is not None:
-            on_row(trials[-1].row, len(trials), len(study.seeds))
-    with (study.out / "trials.csv").open("w", newline="") as f:
-        table = csv.DictWriter(f, COLUMNS)
-        table.writeheader()
-        table.writerows({k: round(v, 6) if isinstance(v, float) else v for k, v in t.row.items()} for t in trials)
-    summary = summarise(trials) | {
-        "conditions": study.conditions,
-        "seeds": list(study.seeds),
-        "mission": study.mission,
-        "settings": dict(study.settings),
-        "backend": study.backend,
-    }
-    (study.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+        on_row(trials[-1].row, len(trials), len(study.seeds))
+    rows = ({k: round(v, 6) if isinstance(v, float) else v for k, v in t.row.items()} for t in trials)
+    write_table(study.out, "trials.csv", COLUMNS, rows)
+    summary = summarise(trials) | study.described() | {"settings": dict(study.settings), "backend": study.backend}
+    write_summary(study.out, summary)
     return summary
 
 

@@ -7,30 +7,21 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.shared import (
-    Backend,
-    Conditions,
-    Json,
-    MissionName,
-    Objects,
-    Settings,
-    guarded,
-    read_settings,
-)
+from glotouch_bt.commands import shared
 
 
-@guarded
+@shared.guarded
 def run(
-    mission: MissionName,
-    backend: Backend = "mujoco",
+    mission: shared.MissionName,
+    backend: shared.Backend = "mujoco",
     seed: Annotated[int, typer.Option(help="source of every random draw")] = 0,
-    set_: Settings = None,
-    objects: Objects = None,
-    conditions: Conditions = "nominal",
+    set_: shared.Settings = None,
+    objects: shared.Objects = None,
+    conditions: shared.Conditions = "nominal",
     faults: Annotated[str | None, typer.Option(metavar="FILE", help="a fault plan (see: glotouch faults)")] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="the run's folder (default: runs/...)")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the run that --out holds")] = False,
-    json_: Json = False,
+    json_: shared.Json = False,
 ) -> int:
     """Run a mission; write its record, result and report.
 
@@ -43,7 +34,7 @@ def run(
         mission,
         backend,
         seed,
-        read_settings(set_),
+        shared.read_settings(set_),
         objects,
         conditions,
         out,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -15,6 +14,7 @@ from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.motion import Kinematics
 from glotouch_bt.robot import Array, Command, JointSetpoint, load_backend
+from glotouch_bt.runs import write_summary
 
 SWAY_RAD = 0.004
 """Amplitude of the first joint's sway while measuring, so that every setpoint is new."""
@@ -103,6 +103,5 @@ def run_study(study: LinkStudy, on_progress: Callable[[float], None] | None = No
         "late_periods": late,
         "samples_per_cycle": {"min": min(blocks), "median": float(np.median(blocks)), "max": max(blocks)},
     }
-    study.out.mkdir(parents=True, exist_ok=True)
-    (study.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    write_summary(study.out, summary)
     return summary

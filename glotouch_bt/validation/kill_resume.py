@@ -7,14 +7,13 @@ are processes of their own, started with the normal command line.
 from __future__ import annotations
 
 import contextlib
-import csv
 import json
 import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile
 from glotouch_bt.report import RunRecord, read_run
 from glotouch_bt.robot import BackendError, BadInput, GlotouchError
 from glotouch_bt.robot.scene import stream
+from glotouch_bt.runs import Campaign, OnRow, silent, write_summary, write_table
 
 POLL_S = 0.002
 ONLY_HERE = ("wall_time_s", "wall_open_s", "resumed", "versions")
@@ -34,36 +34,23 @@ COLUMNS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class KillStudy:
-    """Settings of the study.
+@dataclass(frozen=True, kw_only=True)
+class KillStudy(Campaign):
+    """Settings of the study, with one twin a seed.
 
     Attributes:
-        mission: Path or shipped name.
-        seeds: One twin each.
         kills: Number of kills a seed.
-        out: Folder of the study.
-        settings: `--set` words.
-        conditions: Path or shipped name.
-        objects: Folder of STL files instead of the world's.
-        resume: Keep existing twins and trials in `out`.
         words: First words of the command line.
     """
 
-    mission: str
-    seeds: Sequence[int]
     kills: int
-    out: Path
-    settings: Mapping[str, str] = field(default_factory=dict)
-    conditions: str = "nominal"
-    objects: Path | None = None
-    resume: bool = False
     words: tuple[str, ...] = (sys.executable, "-m", "glotouch_bt.cli")
 
     def run_words(self, seed: int, folder: Path) -> list[str]:
         """Return the command that runs one mission."""
         sets = [w for k, v in self.settings.items() for w in ("--set", f"{k}={v}")]
-        head = [*self.words, "run", self.mission, "--seed", str(seed), "--conditions", self.conditions]
+        head = [*self.words, "run", self.mission, "--backend", self.backend, "--seed", str(seed)]
+        head += ["--conditions", self.conditions]
         box = [] if self.objects is None else ["--objects", str(self.objects)]
         return [*head, *sets, *box, "--out", str(folder), "--json"]
 
@@ -84,7 +71,7 @@ class Twin:
     ended_s: float
 
 
-def run_study(study: KillStudy, on_row: Callable[[dict[str, Any], int, int], None] | None = None) -> dict[str, Any]:
+def run_study(study: KillStudy, on_row: OnRow = silent) -> dict[str, Any]:
     """Run every twin and every kill, write trials.csv and summary.json after each, and return the summary.
 
     Raises:
@@ -104,24 +91,14 @@ def run_study(study: KillStudy, on_row: Callable[[dict[str, Any], int, int], Non
                 done.write_text(json.dumps(_trial(study, seed, number, float(share), twin)))
             rows.append(json.loads(done.read_text()))
             _write(study, rows)
-            if on_row is not None:
-                on_row(rows[-1], len(rows), total)
+            on_row(rows[-1], len(rows), total)
     return _write(study, rows)
 
 
 def _write(study: KillStudy, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    with (study.out / "trials.csv").open("w", newline="") as f:
-        table = csv.DictWriter(f, COLUMNS, extrasaction="ignore")
-        table.writeheader()
-        table.writerows(rows)
-    summary = summarise(rows) | {
-        "mission": study.mission,
-        "settings": dict(study.settings),
-        "conditions": study.conditions,
-        "seeds": list(study.seeds),
-        "kills": study.kills,
-    }
-    (study.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    write_table(study.out, "trials.csv", COLUMNS, rows)
+    summary = summarise(rows) | study.described() | {"settings": dict(study.settings), "kills": study.kills}
+    write_summary(study.out, summary)
     return summary
 
 

@@ -6,9 +6,7 @@ like its twin and keep the hard limit. The sensor noise differs, because time pa
 
 from __future__ import annotations
 
-import csv
 import json
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +15,7 @@ from glotouch_bt.bench import wilson
 from glotouch_bt.mission.execution import Control
 from glotouch_bt.report import read_run
 from glotouch_bt.robot import Limits
-from glotouch_bt.runs import RunRequest, launch
+from glotouch_bt.runs import Campaign, OnRow, launch, silent, write_summary, write_table
 
 COLUMNS = (
     "seed", "target", "status", "retrieved", "twin_status", "twin_retrieved", "same", "pauses", "on_the_way",
@@ -56,43 +54,21 @@ class EveryNthTick(Control):
         return False
 
 
-@dataclass(frozen=True)
-class PauseStudy:
-    """Settings of the study.
+@dataclass(frozen=True, kw_only=True)
+class PauseStudy(Campaign):
+    """Settings: a paused mission and its twin for each seed; `every` and `pause_s` as in `EveryNthTick`."""
 
-    Attributes:
-        mission: Path or shipped name.
-        settings: Its parameters.
-        seeds: A paused mission and its twin for each.
-        every, pause_s: See `EveryNthTick`.
-        conditions, backend: As in `RunRequest`.
-        objects: Folder of STL files instead of the world's.
-        out: Folder of the study.
-    """
-
-    mission: str
-    settings: Mapping[str, str]
-    seeds: tuple[int, ...]
     every: int
     pause_s: float
-    conditions: str
-    backend: str
-    objects: Path | None
-    out: Path
 
 
-def run_pauses(study: PauseStudy, on_row: Callable[[dict[str, Any], int, int], None] | None = None) -> dict[str, Any]:
+def run_pauses(study: PauseStudy, on_row: OnRow = silent) -> dict[str, Any]:
     """Run every seed twice, write trials.csv and summary.json, and return the summary."""
-    study.out.mkdir(parents=True, exist_ok=True)
-    rows = []
+    rows: list[dict[str, Any]] = []
     for seed in study.seeds:
         rows.append(_pair(study, seed))
-        if on_row is not None:
-            on_row(rows[-1], len(rows), len(study.seeds))
-    with (study.out / "trials.csv").open("w", newline="") as f:
-        table = csv.DictWriter(f, COLUMNS)
-        table.writeheader()
-        table.writerows(rows)
+        on_row(rows[-1], len(rows), len(study.seeds))
+    write_table(study.out, "trials.csv", COLUMNS, rows)
     limit = Limits().hard_force_N
     summary = {
         "same": wilson(sum(bool(r["same"]) for r in rows), len(rows)),
@@ -101,26 +77,18 @@ def run_pauses(study: PauseStudy, on_row: Callable[[dict[str, Any], int, int], N
         "largest_peak_force_N": max(r["peak_force_N"] for r in rows),
         "longest_to_rest_s": max(r["longest_to_rest_s"] for r in rows),
         "trials": rows,
-        "mission": study.mission,
         "every": study.every,
         "pause_s": study.pause_s,
-        "conditions": study.conditions,
-        "seeds": list(study.seeds),
+        **study.described(),
     }
-    (study.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    write_summary(study.out, summary)
     return summary
 
 
 def _pair(study: PauseStudy, seed: int) -> dict[str, Any]:
-    def request(name: str) -> RunRequest:
-        out = study.out / f"{name}-s{seed}"
-        return RunRequest(
-            study.mission, study.backend, seed, study.settings, study.objects, study.conditions, out, report=False
-        )
-
-    twin = launch(request("twin")).result
+    twin = launch(study.request(seed, f"twin-s{seed}", report=False)).result
     control = EveryNthTick(study.every, study.pause_s)
-    done = launch(request("paused"), control=control)
+    done = launch(study.request(seed, f"paused-s{seed}", report=False), control=control)
     result = done.result
     places, longest_s = _rests(done.folder)
     return {

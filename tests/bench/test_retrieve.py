@@ -28,7 +28,9 @@ def _result(request: RunRequest) -> dict[str, Any]:
 
 @pytest.fixture
 def campaign(tmp_path: Path) -> retrieve.RetrieveCampaign:
-    return retrieve.RetrieveCampaign("retrieve", ("a", "b"), (0, 1, 2, 3, 4), "nominal", None, "fake", tmp_path / "out")
+    return retrieve.RetrieveCampaign(
+        mission="retrieve", targets=("a", "b"), seeds=range(5), backend="fake", out=tmp_path / "out"
+    )
 
 
 def test_every_trial_is_counted_and_named(campaign: retrieve.RetrieveCampaign, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,9 +17,10 @@ import numpy as np
 import pytest
 
 from glotouch_bt.bench import speed
-from glotouch_bt.bench.speed import CycleTimes, SpeedStudy, SpeedTrial, TimedRecord, TimedRobot
+from glotouch_bt.bench.speed import CycleTimes, SpeedTrial, TimedRecord, TimedRobot
 from glotouch_bt.robot import Backend, BadInput, Command, Observation, Robot
 from glotouch_bt.robot.simulation.referee import BareSteps, Referee
+from glotouch_bt.runs import Campaign
 
 FAKE_CLI = Path(__file__).parents[1] / "support" / "fake_cli.py"
 MISSION = (
@@ -80,14 +81,14 @@ def furnish(house: ModuleType, clock: Clock, patch: pytest.MonkeyPatch, bare: Ba
     patch.setattr(speed, "load_backend", lambda name: Traced())
 
 
-def study(tmp_path: Path, **other: Any) -> SpeedStudy:
+def study(tmp_path: Path, **other: Any) -> Campaign:
     path = tmp_path / "nap.yaml"
     path.write_text(MISSION)
     given: dict[str, Any] = {
         "mission": str(path), "settings": {}, "seeds": (3, 4), "conditions": "nominal", "objects": None,
         "backend": "null", "out": tmp_path / "out",
     }  # fmt: skip
-    return SpeedStudy(**{**given, **other})
+    return Campaign(**{**given, **other})
 
 
 def test_a_study_of_known_durations(

@@ -11,7 +11,7 @@ from glotouch_bt.bench import contact
 
 def test_one_seed_for_real(tmp_path: Path) -> None:
     """The bolted square by the probe is far better than the targets; the whole folder is written."""
-    campaign = contact.ContactCampaign((1,), "nominal", 3, "mujoco", tmp_path)
+    campaign = contact.ContactCampaign(seeds=(1,), per_side=3, out=tmp_path)
     with ThreadPoolExecutor(1) as pool:
         summary = contact.run_campaign(campaign, pool)
     assert summary["probe"]["traced"]["rate"] == 1.0, summary["not_traced"]

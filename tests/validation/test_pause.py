@@ -15,7 +15,9 @@ from glotouch_bt.validation.pause import EveryNthTick, PauseStudy, run_pauses
 
 def test_a_paused_mission_beside_its_twin(tmp_path: Path) -> None:
     told = []
-    study = PauseStudy("pick_at", {}, (0, 1), 20, 0.2, "ideal", "fake", None, tmp_path)
+    study = PauseStudy(
+        mission="pick_at", seeds=(0, 1), every=20, pause_s=0.2, conditions="ideal", backend="fake", out=tmp_path
+    )
     summary = run_pauses(study, lambda row, done, total: told.append((row["seed"], done, total)))
     assert told == [(0, 1, 2), (1, 2, 2)]
     assert summary["same"]["rate"] == 1.0

@@ -7,12 +7,9 @@ square bolted to the floor, the second has it free.
 
 from __future__ import annotations
 
-import csv
-import json
-from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, as_completed
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +20,7 @@ from glotouch_bt.bench.retrieve import cause
 from glotouch_bt.bench.statistics import bootstrap_mean, wilson
 from glotouch_bt.report import RunRecord, read_run
 from glotouch_bt.robot import Array, BadInput, Pose
-from glotouch_bt.runs import RunRequest, launch
+from glotouch_bt.runs import Campaign, OnRow, RunRequest, crashed, gather, launch, silent, write_summary, write_table
 
 METRICS = ("centre_error_mm", "contact_std_mm", "contact_rms_mm", "max_contact_mm", "side_error_mm")
 PAPER = {
@@ -37,43 +34,27 @@ COLUMNS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class ContactCampaign:
-    """Settings of the campaign.
+@dataclass(frozen=True, kw_only=True)
+class ContactCampaign(Campaign):
+    """Settings of the campaign; the tool's name completes the mission's, and the backend knows the option `fixed`.
 
     Attributes:
-        seeds: Seeds of the trials; each draws the square's pose and every disturbance.
-        conditions: Path or shipped name.
         per_side: Contacts made for each side of the square.
-        backend: Registered name; it must know the option `fixed`.
-        out: Folder of the campaign; it receives a run folder for each trial.
     """
 
-    seeds: tuple[int, ...]
-    conditions: str
+    mission: str = "contact"
     per_side: int
-    backend: str
-    out: Path
 
     def requests(self) -> list[tuple[Tool, bool, RunRequest]]:
         """(tool, square bolted down, request) of every trial, seeds outermost."""
         return [
-            (
-                tool,
-                fixed,
-                RunRequest(
-                    mission=f"contact_{tool}",
-                    backend=self.backend,
-                    seed=seed,
-                    settings={"contacts": str(4 * self.per_side), "fixed": str(fixed).lower()},
-                    conditions=self.conditions,
-                    out=self.out / f"{tool}-{'fixed' if fixed else 'free'}-s{seed}",
-                ),
-            )
-            for seed in self.seeds
-            for fixed in (True, False)
-            for tool in TOOLS
+            (t, fixed, self._trial(seed, t, fixed)) for seed in self.seeds for fixed in (True, False) for t in TOOLS
         ]
+
+    def _trial(self, seed: int, tool: Tool, fixed: bool) -> RunRequest:
+        settings = {"contacts": str(4 * self.per_side), "fixed": str(fixed).lower()}
+        name = f"{tool}-{'fixed' if fixed else 'free'}-s{seed}"
+        return replace(self.request(seed, name, settings=settings), mission=f"{self.mission}_{tool}")
 
 
 def run_trial(tool: Tool, fixed: bool, request: RunRequest) -> dict[str, Any]:
@@ -85,7 +66,7 @@ def run_trial(tool: Tool, fixed: bool, request: RunRequest) -> dict[str, Any]:
     except BadInput:
         raise
     except Exception as e:
-        return row | _fault(e)
+        return row | crashed(e)
     row |= {k: done.result.get(k) for k in COLUMNS if k in done.result}
     row |= {"exit_code": done.exit_code, "cause": ""}
     if done.exit_code != 0:
@@ -94,11 +75,7 @@ def run_trial(tool: Tool, fixed: bool, request: RunRequest) -> dict[str, Any]:
         record = read_run(done.folder)
         return row | score(record, traced_square(record, tool, fixed))
     except Exception as e:
-        return row | _fault(e)
-
-
-def _fault(e: Exception) -> dict[str, Any]:
-    return {"status": "traceback", "exit_code": -1, "cause": f"traceback {type(e).__name__}: {e}"}
+        return row | crashed(e)
 
 
 def score(record: RunRecord, traced: TracedSquare) -> dict[str, Any]:
@@ -135,37 +112,14 @@ def true_tip_P_m(record: RunRecord) -> Array:
     return hand.inverse().apply(np.array(record.truth["tip_B_m"], dtype=np.float64))
 
 
-def run_campaign(
-    campaign: ContactCampaign, executor: Executor, on_row: Callable[[dict[str, Any], int, int], None] | None = None
-) -> dict[str, Any]:
-    """Run every trial on the executor, write trials.csv, summary.json and two plots and return the summary.
-
-    Args:
-        campaign: Settings.
-        executor: Any `concurrent.futures` executor.
-        on_row: Called with (row, done, total) after each trial.
-    """
-    requests = campaign.requests()
-    campaign.out.mkdir(parents=True, exist_ok=True)
-    futures = [executor.submit(run_trial, *request) for request in requests]
-    rows: list[dict[str, Any]] = []
-    for future in as_completed(futures):
-        rows.append(future.result())
-        if on_row is not None:
-            on_row(rows[-1], len(rows), len(futures))
+def run_campaign(campaign: ContactCampaign, executor: Executor, on_row: OnRow = silent) -> dict[str, Any]:
+    """Run every trial on the executor, write trials.csv, summary.json and two plots and return the summary."""
+    rows = gather([executor.submit(run_trial, *trial) for trial in campaign.requests()], on_row)
     rows.sort(key=lambda r: (r["square"], r["tool"], r["seed"]))
-    with (campaign.out / "trials.csv").open("w", newline="") as f:
-        table = csv.DictWriter(f, COLUMNS, extrasaction="ignore")
-        table.writeheader()
-        table.writerows(rows)
-    summary = summarise(rows) | {
-        "paper": PAPER,
-        "conditions": campaign.conditions,
-        "seeds": list(campaign.seeds),
-        "contacts_per_side": campaign.per_side,
-        "backend": campaign.backend,
-    }
-    (campaign.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    write_table(campaign.out, "trials.csv", COLUMNS, rows)
+    more = {"paper": PAPER, "contacts_per_side": campaign.per_side, "backend": campaign.backend}
+    summary = summarise(rows) | campaign.described() | more
+    write_summary(campaign.out, summary)
     plot_errors(rows, PAPER, campaign.out / "errors.png")
     plot_traces(rows, campaign.out)
     return summary

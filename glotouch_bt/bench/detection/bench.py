@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -19,6 +17,7 @@ from glotouch_bt.bench.statistics import wilson
 from glotouch_bt.mission.read import load_conditions, load_world
 from glotouch_bt.perception.touch import GuardParams, Payload
 from glotouch_bt.robot import RobotDescription
+from glotouch_bt.runs import write_summary, write_table
 from glotouch_bt.skill.probing import GUARDED_ACCELERATION_M_S2, GUARDED_JERK_M_S3
 
 PUSH_N = 0.6
@@ -54,18 +53,14 @@ class DetectionStudy:
 
 def run_study(study: DetectionStudy, on_line: Callable[[str], None] = lambda _: None) -> dict[str, Any]:
     """Run everything, write the folder and return the summary: `synthetic` and `simulated` results by condition."""
-    study.out.mkdir(parents=True, exist_ok=True)
     rows: list[dict[str, Any]] = []
     summary: dict[str, Any] = {"guard": asdict(GuardParams()), "seeds": list(study.seeds), "conditions": {}}
     for name in study.conditions:
         simulated, description = _simulated(study, name, rows, on_line)
         synthetic = _synthetic(study, name, description, rows, on_line)
         summary["conditions"][name] = {"simulated": simulated, "synthetic": synthetic}
-    with (study.out / "trials.csv").open("w", newline="") as f:
-        table = csv.DictWriter(f, COLUMNS, restval="")
-        table.writeheader()
-        table.writerows(rows)
-    (study.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    write_table(study.out, "trials.csv", COLUMNS, rows)
+    write_summary(study.out, summary)
     plot_curves(summary, study.out / "detection.png")
     return summary
 

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import csv
-import json
-import math
 import shutil
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor, as_completed
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,42 +17,31 @@ from glotouch_bt.bench.match.plots import plot_all
 from glotouch_bt.bench.match.summary import summarise
 from glotouch_bt.bench.match.timing import time_matching
 from glotouch_bt.bench.match.trials import PAIR_COLUMNS, TRIAL_COLUMNS, decide, models_of
+from glotouch_bt.json_text import finite
 from glotouch_bt.mission import load_mission
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene import load_folder, stream
-from glotouch_bt.runs import RunRequest
+from glotouch_bt.runs import Campaign, OnRow, RunRequest, gather, silent, write_summary, write_table
 
 IN_THE_BOX = 5
 """Objects in a layout. From a larger folder, each seed draws this many."""
 LAYOUT_COLUMNS = ("seed", "conditions", "ended", "objects", "touched", "nameless", "closures", "stable", "sim_s")
-OnRow = Callable[[Mapping[str, Any], int, int], None]
 
 
-@dataclass(frozen=True)
-class MatchCampaign:
-    """Settings of the campaign.
+@dataclass(frozen=True, kw_only=True)
+class MatchCampaign(Campaign):
+    """Settings of the campaign: one layout a seed, on which the mission squeezes every candidate.
 
     Attributes:
-        seeds: One layout each; with `dataset`, their number is the number of layouts to read.
-        conditions: Path or shipped name.
-        objects: Folder of STL files instead of the world's.
-        strangers: Folder of STL files that are never in the box, used as absent targets; or None.
-        dataset: Folder of recorded TouchSets to use instead of acquiring; it defines `seeds` and `conditions`.
         methods: Names of the matchers to compare.
-        backend: Registered name of a simulation.
-        out: Folder of the campaign.
-        mission: Path or shipped name of a mission that squeezes every candidate.
+        strangers: Folder of STL files that are never in the box, used as absent targets; or None.
+        dataset: Folder of recorded TouchSets to use instead; it defines seeds (except their number) and conditions.
     """
 
-    seeds: tuple[int, ...]
-    conditions: str
-    objects: Path | None
-    strangers: Path | None
-    dataset: Path | None
-    methods: tuple[str, ...]
-    backend: str
-    out: Path
     mission: str = "touch_all"
+    methods: tuple[str, ...]
+    strangers: Path | None = None
+    dataset: Path | None = None
 
     @property
     def folder(self) -> Path:
@@ -78,14 +64,11 @@ class MatchCampaign:
         if self.dataset is not None:
             layout_files(self.dataset)
 
-    def request(self, seed: int) -> RunRequest:
+    def layout_request(self, seed: int) -> RunRequest:
         """Return the mission request for a layout; create its folder of objects if it is a drawn subset."""
         box = objects_of(self.folder, seed, self.out / "objects") if self.objects else None
         count = len(list((box or self.folder).glob("*.[sS][tT][lL]")))
-        return RunRequest(
-            mission=self.mission, backend=self.backend, seed=seed, settings={"expected_objects": str(count)},
-            objects=box, conditions=self.conditions, out=self.out / "runs" / f"s{seed:04d}",
-        )  # fmt: skip
+        return self.request(seed, f"runs/s{seed:04d}", settings={"expected_objects": str(count)}, objects=box)
 
 
 def objects_of(folder: Path, seed: int, copies: Path) -> Path:
@@ -107,7 +90,9 @@ def layout_task(campaign: MatchCampaign, seed: int, file: Path | None) -> dict[s
         BadInput: The recording or an STL cannot be used.
     """
     try:
-        layout = read_layout(file) if file else acquire_layout(campaign.request(seed), campaign.out / "touchsets")
+        layout = (
+            read_layout(file) if file else acquire_layout(campaign.layout_request(seed), campaign.out / "touchsets")
+        )
     except BadInput:
         raise
     except Exception as e:
@@ -133,38 +118,25 @@ def timing_task(files: Sequence[Path], folder: Path, names: Sequence[str]) -> di
     return time_matching([read_layout(f) for f in files], folder, names)
 
 
-def run_campaign(campaign: MatchCampaign, executor: Executor, on_row: OnRow | None = None) -> dict[str, Any]:
+def run_campaign(campaign: MatchCampaign, executor: Executor, on_row: OnRow = silent) -> dict[str, Any]:
     """Decide on every layout, write CSVs, plots and summary.json, and return the summary.
 
-    Args:
-        campaign: Settings.
-        executor: Any `concurrent.futures` executor.
-        on_row: Called with (row, done, total) after each layout; the row has the number of correct decisions.
+    The rows that `on_row` receives have the number of correct decisions.
 
     Raises:
         BadInput: A setting cannot be used.
     """
     campaign.check()
-    campaign.out.mkdir(parents=True, exist_ok=True)
     files = layout_files(campaign.dataset)[: len(campaign.seeds)] if campaign.dataset else []
     todo: list[tuple[int, Path | None]] = [(-1, f) for f in files] or [(seed, None) for seed in campaign.seeds]
     futures = [executor.submit(layout_task, campaign, seed, file) for seed, file in todo]
-    done: list[dict[str, Any]] = []
-    try:
-        for future in as_completed(futures):
-            done.append(future.result())
-            if on_row is not None:
-                on_row(_progress(done[-1]), len(done), len(futures))
-    except BaseException:
-        for future in futures:
-            future.cancel()
-        raise
+    done = gather(futures, lambda found, n, total: on_row(_progress(found), n, total))
     done.sort(key=lambda d: d["layout"]["seed"])
     rows = {part: [r for d in done for r in d[part]] for part in ("trials", "pairs", "closures")}
     layouts = [d["layout"] for d in done]
     recorded = files or sorted((campaign.out / "touchsets").glob("s[0-9]*.json"))
     timed = executor.submit(timing_task, recorded[:3], campaign.folder, campaign.methods).result() if recorded else {}
-    figures: dict[str, Any] = _finite(
+    figures: dict[str, Any] = finite(
         summarise(rows["trials"], rows["pairs"], rows["closures"], campaign.methods)
         | {
             "timing": timed,
@@ -181,11 +153,11 @@ def run_campaign(campaign: MatchCampaign, executor: Executor, on_row: OnRow | No
             "backend": campaign.backend,
         }
     )
-    _write(campaign.out / "layouts.csv", LAYOUT_COLUMNS, layouts)
-    _write(campaign.out / "trials.csv", TRIAL_COLUMNS, rows["trials"])
-    _write(campaign.out / "pairs.csv", PAIR_COLUMNS, rows["pairs"])
-    _write(campaign.out / "closures.csv", CLOSURE_COLUMNS, rows["closures"])
-    (campaign.out / "summary.json").write_text(json.dumps(figures, indent=2, allow_nan=False) + "\n")
+    write_table(campaign.out, "layouts.csv", LAYOUT_COLUMNS, layouts)
+    write_table(campaign.out, "trials.csv", TRIAL_COLUMNS, rows["trials"])
+    write_table(campaign.out, "pairs.csv", PAIR_COLUMNS, rows["pairs"])
+    write_table(campaign.out, "closures.csv", CLOSURE_COLUMNS, rows["closures"])
+    write_summary(campaign.out, figures)
     plot_all(campaign.out, figures, rows["trials"], rows["closures"])
     return figures
 
@@ -195,19 +167,3 @@ def _progress(done: Mapping[str, Any]) -> dict[str, Any]:
     names = dict.fromkeys(t["method"] for t in present)
     right = {n: sum(bool(t["right"]) for t in present if t["method"] == n) for n in names}
     return dict(done["layout"]) | {"right": right}
-
-
-def _finite(value: Any) -> Any:
-    """Replace non-finite numbers by None, for JSON."""
-    if isinstance(value, Mapping):
-        return {k: _finite(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _write(path: Path, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:
-    with path.open("w", newline="") as f:
-        table = csv.DictWriter(f, columns, extrasaction="ignore")
-        table.writeheader()
-        table.writerows(rows)

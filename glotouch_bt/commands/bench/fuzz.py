@@ -9,30 +9,27 @@ from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.commands.bench.shared import print_summary, worker_pool
-from glotouch_bt.commands.shared import BenchFolder, FirstSeed, SummaryJson, Workers, bench_folder, guarded
+from glotouch_bt.commands import shared
 
 
-@guarded
+@shared.guarded
 def fuzz(
     trials: Annotated[int, typer.Option(min=1, help="number of documents")] = 20_000,
-    seed: FirstSeed = 0,
-    workers: Workers = 2,
-    out: BenchFolder = None,
-    json_: SummaryJson = False,
+    seed: shared.FirstSeed = 0,
+    workers: shared.Workers = 2,
+    out: shared.BenchFolder = None,
+    json_: shared.SummaryJson = False,
 ) -> int:
     """Random and corrupt missions and fault plans: the checker must not crash, hang, run code or accept a mistake."""
     from glotouch_bt.validation.fuzz import BAD, FuzzCampaign, run_campaign
 
-    campaign = FuzzCampaign(trials, seed, bench_folder(out, "fuzz"))
+    campaign = FuzzCampaign(trials, seed, shared.bench_folder(out, "fuzz"))
 
-    def show(done: int, total: int, counts: Mapping[str, int]) -> None:
-        bad = sum(counts.get(name, 0) for name in BAD)
-        sys.stderr.write(f"[{done}/{total}] {bad} bad\n")
+    def told(counts: Mapping[str, int]) -> str:
+        return f"{sum(counts.get(name, 0) for name in BAD)} bad"
 
-    with worker_pool(workers) as pool:
-        summary = run_campaign(campaign, pool, show)
-    print_summary(summary, campaign.out, _print_fuzz, json_)
+    summary = shared.run_in_pool(run_campaign, campaign, workers, told)
+    shared.print_summary(summary, campaign.out, _print_fuzz, json_)
     return 1 if summary["failures"] else 0
 
 

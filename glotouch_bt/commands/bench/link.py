@@ -7,32 +7,23 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.shared import (
-    Backend,
-    BackendSettings,
-    BenchFolder,
-    SummaryJson,
-    bench_folder,
-    guarded,
-    print_json,
-    read_settings,
-)
+from glotouch_bt.commands import shared
 
 
-@guarded
+@shared.guarded
 def link(
-    backend: Backend = "flexiv_xense",
+    backend: shared.Backend = "flexiv_xense",
     duration: Annotated[float, typer.Option(min=0.1, help="seconds of robot time")] = 60.0,
-    set_: BackendSettings = None,
-    out: BenchFolder = None,
-    json_: SummaryJson = False,
+    set_: shared.BackendSettings = None,
+    out: shared.BenchFolder = None,
+    json_: shared.SummaryJson = False,
 ) -> None:
     """Duration of one control cycle, from the setpoint sent to the state received: p50, p99, p99.9."""
     from glotouch_bt.commissioning import LinkStudy, run_study
 
-    summary = run_study(LinkStudy(backend, bench_folder(out, "link"), read_settings(set_), duration))
+    summary = run_study(LinkStudy(backend, shared.bench_folder(out, "link"), shared.read_settings(set_), duration))
     if json_:
-        print_json(summary)
+        shared.print_json(summary)
         return
     for name in ("cycle_ms", "latency_ms"):
         if summary[name] is not None:

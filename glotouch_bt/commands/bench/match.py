@@ -2,34 +2,20 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.commands.bench.shared import print_summary, worker_pool
-from glotouch_bt.commands.shared import (
-    Backend,
-    BenchFolder,
-    Conditions,
-    FirstSeed,
-    Objects,
-    SummaryJson,
-    Workers,
-    bench_folder,
-    check_names,
-    guarded,
-)
+from glotouch_bt.commands import shared
 
 
-@guarded
+@shared.guarded
 def match(
     phases: Annotated[int, typer.Option(min=1, help="number of layouts; each gives one decision per object")] = 24,
-    seed: FirstSeed = 400,
-    conditions: Conditions = "nominal",
-    objects: Objects = None,
+    seed: shared.FirstSeed = 400,
+    conditions: shared.Conditions = "nominal",
+    objects: shared.Objects = None,
     strangers: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="folder of STL files of objects that are not in the box, as targets"),
@@ -39,16 +25,16 @@ def match(
         typer.Option(metavar="DIR", help="recorded TouchSets to use instead of new ones (with their own conditions)"),
     ] = None,
     method: Annotated[list[str] | None, typer.Option(help="only these matchers (default: all)")] = None,
-    backend: Backend = "mujoco",
-    workers: Workers = 2,
-    out: BenchFolder = None,
-    json_: SummaryJson = False,
+    backend: shared.Backend = "mujoco",
+    workers: shared.Workers = 2,
+    out: shared.BenchFolder = None,
+    json_: shared.SummaryJson = False,
 ) -> None:
     """Recognition: which touched object is the target, by matcher and ablation of the paper."""
     from glotouch_bt.bench.match import MatchCampaign, chosen, run_campaign
     from glotouch_bt.commands.terminal import print_match
 
-    check_names(conditions, backend)
+    shared.check_names(conditions, backend)
     campaign = MatchCampaign(
         seeds=tuple(range(seed, seed + phases)),
         conditions=conditions,
@@ -57,16 +43,13 @@ def match(
         dataset=dataset,
         methods=chosen(method or ()),
         backend=backend,
-        out=bench_folder(out, "match"),
+        out=shared.bench_folder(out, "match"),
     )
 
-    def show(row: Mapping[str, Any], done: int, total: int) -> None:
-        right = ", ".join(f"{name} {n}" for name, n in row["right"].items())
-        sys.stderr.write(
-            f"[{done}/{total}] seed {row['seed']}: {row['ended']}, {row['touched']} of {row['objects']} touched; "
-            f"right: {right or 'none'}\n"
-        )
+    def told(row: dict[str, Any]) -> str:
+        right = ", ".join(f"{name} {n}" for name, n in row["right"].items()) or "none"
+        touched = f"{row['touched']} of {row['objects']} touched"
+        return f"seed {row['seed']}: {row['ended']}, {touched}; right: {right}"
 
-    with worker_pool(workers) as pool:
-        summary = run_campaign(campaign, pool, show)
-    print_summary(summary, campaign.out, print_match, json_)
+    summary = shared.run_in_pool(run_campaign, campaign, workers, told)
+    shared.print_summary(summary, campaign.out, print_match, json_)

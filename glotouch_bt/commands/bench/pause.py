@@ -7,50 +7,43 @@ from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.commands.shared import (
-    Backend,
-    BenchFolder,
-    Conditions,
-    FirstSeed,
-    MissionSettings,
-    Objects,
-    SummaryJson,
-    Trials,
-    bench_folder,
-    check_names,
-    guarded,
-    print_json,
-    read_settings,
-)
+from glotouch_bt.commands import shared
 
 
-@guarded
+@shared.guarded
 def pause(
     mission: Annotated[str, typer.Option(help="path of a mission file, or the name of a shipped mission")] = "retrieve",
-    set_: MissionSettings = None,
-    trials: Trials = 3,
-    seed: FirstSeed = 0,
+    set_: shared.MissionSettings = None,
+    trials: shared.Trials = 3,
+    seed: shared.FirstSeed = 0,
     every: Annotated[int, typer.Option(min=1, help="ticks of the tree between two pauses")] = 50,
     pause_s: Annotated[
         float, typer.Option("--pause", min=0.01, help="requested duration of each pause, s of robot time")
     ] = 1.0,
-    conditions: Conditions = "nominal",
-    backend: Backend = "mujoco",
-    objects: Objects = None,
-    out: BenchFolder = None,
-    json_: SummaryJson = False,
+    conditions: shared.Conditions = "nominal",
+    backend: shared.Backend = "mujoco",
+    objects: shared.Objects = None,
+    out: shared.BenchFolder = None,
+    json_: shared.SummaryJson = False,
 ) -> None:
     """Pauses: missions paused at every N-th tick, compared with undisturbed runs of the same seed."""
     from glotouch_bt.commands.terminal import print_table
     from glotouch_bt.mission import load_mission
     from glotouch_bt.validation import PauseStudy, run_pauses
 
-    check_names(conditions, backend)
-    settings = read_settings(set_)
+    shared.check_names(conditions, backend)
+    settings = shared.read_settings(set_)
     load_mission(mission, settings, objects=objects)
-    seeds = tuple(range(seed, seed + trials))
     study = PauseStudy(
-        mission, settings, seeds, every, pause_s, conditions, backend, objects, bench_folder(out, "pause")
+        mission=mission,
+        settings=settings,
+        seeds=tuple(range(seed, seed + trials)),
+        every=every,
+        pause_s=pause_s,
+        conditions=conditions,
+        backend=backend,
+        objects=objects,
+        out=shared.bench_folder(out, "pause"),
     )
 
     def show(row: dict[str, Any], done: int, total: int) -> None:
@@ -63,7 +56,7 @@ def pause(
 
     summary = run_pauses(study, show)
     if json_:
-        print_json(summary)
+        shared.print_json(summary)
         return
     rows = [
         (

@@ -2,44 +2,27 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.commands.bench.shared import print_summary, worker_pool
-from glotouch_bt.commands.shared import (
-    Backend,
-    BenchFolder,
-    Conditions,
-    FirstSeed,
-    KeepTrials,
-    Objects,
-    Settings,
-    SummaryJson,
-    Trials,
-    Workers,
-    bench_folder,
-    check_parameters,
-    guarded,
-    read_settings,
-)
+from glotouch_bt.commands import shared
 
 
-@guarded
+@shared.guarded
 def retrieve(
     mission: Annotated[str, typer.Option(help="mission with the parameter target")] = "retrieve",
     target: Annotated[list[str] | None, typer.Option(help="only these targets (default: every object)")] = None,
-    trials: Trials = 10,
-    seed: FirstSeed = 0,
-    conditions: Conditions = "nominal",
-    objects: Objects = None,
-    backend: Backend = "mujoco",
-    set_: Settings = None,
-    resume: KeepTrials = False,
-    workers: Workers = 2,
-    out: BenchFolder = None,
-    json_: SummaryJson = False,
+    trials: shared.Trials = 10,
+    seed: shared.FirstSeed = 0,
+    conditions: shared.Conditions = "nominal",
+    objects: shared.Objects = None,
+    backend: shared.Backend = "mujoco",
+    set_: shared.Settings = None,
+    resume: shared.KeepTrials = False,
+    workers: shared.Workers = 2,
+    out: shared.BenchFolder = None,
+    json_: shared.SummaryJson = False,
 ) -> None:
     """Retrieval: the whole mission for every target and seed."""
     from glotouch_bt.bench import RetrieveCampaign, run_campaign, targets_of
@@ -48,12 +31,12 @@ def retrieve(
     from glotouch_bt.robot import BadInput
 
     names = tuple(target) if target else targets_of(objects) if objects else ()
-    settings = read_settings(set_)
+    settings = shared.read_settings(set_)
     if "target" in settings:
         raise BadInput("--set target: use --target to choose the targets of a campaign")
     # The default target may be missing from other objects: load the mission with a target that exists.
     loaded = load_mission(mission, settings | ({"target": names[0]} if names else {}), objects=objects)
-    check_parameters(loaded, ("target",))
+    shared.check_parameters(loaded, ("target",))
     campaign = RetrieveCampaign(
         mission=mission,
         targets=names or targets_of(loaded.world.objects.folder),
@@ -61,15 +44,13 @@ def retrieve(
         conditions=conditions,
         objects=objects,
         backend=backend,
-        out=bench_folder(out, "retrieve"),
+        out=shared.bench_folder(out, "retrieve"),
         settings=settings,
         resume=resume,
     )
 
-    def show(row: dict[str, Any], done: int, total: int) -> None:
-        verdict = row["cause"] or "retrieved"
-        sys.stderr.write(f"[{done}/{total}] {row['target']} seed {row['seed']}: {verdict}\n")
+    def told(row: dict[str, Any]) -> str:
+        return f"{row['target']} seed {row['seed']}: {row['cause'] or 'retrieved'}"
 
-    with worker_pool(workers) as pool:
-        summary = run_campaign(campaign, pool, show)
-    print_summary(summary, campaign.out, print_retrieve, json_)
+    summary = shared.run_in_pool(run_campaign, campaign, workers, told)
+    shared.print_summary(summary, campaign.out, print_retrieve, json_)

@@ -2,48 +2,33 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.commands.bench.shared import print_summary, worker_pool
-from glotouch_bt.commands.shared import (
-    Backend,
-    BenchFolder,
-    Conditions,
-    FirstSeed,
-    KeepTrials,
-    Objects,
-    SummaryJson,
-    Workers,
-    bench_folder,
-    check_names,
-    guarded,
-)
+from glotouch_bt.commands import shared
 
 
-@guarded
+@shared.guarded
 def search(
     policies: Annotated[str, typer.Option(help="search policies, comma-separated; the report is on the first")] = (
         "expected_find,nearest_frontier,random_descent"
     ),
     trials: Annotated[int, typer.Option(min=0, help="missions per policy, each with its own layout")] = 100,
     planar: Annotated[int, typer.Option(min=0, help="layouts explored in the planar model only")] = 0,
-    seed: FirstSeed = 0,
-    conditions: Conditions = "nominal",
-    objects: Objects = None,
-    backend: Backend = "mujoco",
-    workers: Workers = 2,
-    out: BenchFolder = None,
-    resume: KeepTrials = False,
+    seed: shared.FirstSeed = 0,
+    conditions: shared.Conditions = "nominal",
+    objects: shared.Objects = None,
+    backend: shared.Backend = "mujoco",
+    workers: shared.Workers = 2,
+    out: shared.BenchFolder = None,
+    resume: shared.KeepTrials = False,
     recorded: Annotated[
         list[Path] | None,
         typer.Option(metavar="DIR", help="also score the runs recorded below this folder, without running them again"),
     ] = None,
-    json_: SummaryJson = False,
+    json_: shared.SummaryJson = False,
 ) -> None:
     """Search: travel until every object is found, for each policy.
 
@@ -52,7 +37,7 @@ def search(
     from glotouch_bt.bench.search import SearchCampaign, run_campaign
     from glotouch_bt.commands.terminal import print_search
 
-    check_names(conditions, backend)
+    shared.check_names(conditions, backend)
     campaign = SearchCampaign(
         policies=tuple(p.strip() for p in policies.split(",") if p.strip()),
         seeds=tuple(range(seed, seed + trials)),
@@ -60,17 +45,14 @@ def search(
         conditions=conditions,
         objects=objects,
         backend=backend,
-        out=bench_folder(out, "search"),
+        out=shared.bench_folder(out, "search"),
         resume=resume,
         recorded=tuple(recorded or ()),
     )
 
-    def show(row: Mapping[str, Any], done: int, total: int) -> None:
-        sys.stderr.write(
-            f"[{done}/{total}] {row['simulator']} {row['policy']} seed {row['seed']}: "
-            f"{len(row['discovered_m'])} found, {row['travel_m']:.2f} m, {row['ended']}\n"
-        )
+    def told(row: dict[str, Any]) -> str:
+        found = f"{len(row['discovered_m'])} found, {row['travel_m']:.2f} m, {row['ended']}"
+        return f"{row['simulator']} {row['policy']} seed {row['seed']}: {found}"
 
-    with worker_pool(workers) as pool:
-        summary = run_campaign(campaign, pool, show)
-    print_summary(summary, campaign.out, print_search, json_)
+    summary = shared.run_in_pool(run_campaign, campaign, workers, told)
+    shared.print_summary(summary, campaign.out, print_search, json_)

@@ -2,59 +2,43 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Mapping
 from typing import Annotated, Any
 
 import typer
 
-from glotouch_bt.commands.bench.shared import print_summary
-from glotouch_bt.commands.shared import (
-    Backend,
-    BenchFolder,
-    Conditions,
-    FirstSeed,
-    MissionSettings,
-    Objects,
-    SummaryJson,
-    Trials,
-    bench_folder,
-    guarded,
-    read_settings,
-)
+from glotouch_bt.commands import shared
 
 
-@guarded
+@shared.guarded
 def speed(
     mission: Annotated[str, typer.Option(help="the mission to time")] = "retrieve",
-    set_: MissionSettings = None,
-    trials: Trials = 10,
-    seed: FirstSeed = 0,
-    conditions: Conditions = "nominal",
-    objects: Objects = None,
-    backend: Backend = "mujoco",
-    out: BenchFolder = None,
-    json_: SummaryJson = False,
+    set_: shared.MissionSettings = None,
+    trials: shared.Trials = 10,
+    seed: shared.FirstSeed = 0,
+    conditions: shared.Conditions = "nominal",
+    objects: shared.Objects = None,
+    backend: shared.Backend = "mujoco",
+    out: shared.BenchFolder = None,
+    json_: shared.SummaryJson = False,
 ) -> None:
     """Speed: wall time of a mission against simulated time, and against the bare solver steps."""
-    from glotouch_bt.bench import SpeedStudy, run_study
+    from glotouch_bt.bench import run_study
     from glotouch_bt.commands.terminal import print_speed
+    from glotouch_bt.runs import Campaign
 
-    study = SpeedStudy(
+    study = Campaign(
         mission=mission,
-        settings=read_settings(set_),
+        settings=shared.read_settings(set_),
         seeds=tuple(range(seed, seed + trials)),
         conditions=conditions,
         objects=objects,
         backend=backend,
-        out=bench_folder(out, "speed"),
+        out=shared.bench_folder(out, "speed"),
     )
 
-    def show(row: Mapping[str, Any], done: int, total: int) -> None:
-        sys.stderr.write(
-            f"[{done}/{total}] seed {row['seed']}: {row['status']}, {row['sim_s']:.0f} s in {row['wall_s']:.1f} s "
-            f"({row['realtime_factor']:.1f}x), {row['over_physics']:.2f}x the bare steps\n"
-        )
+    def told(row: dict[str, Any]) -> str:
+        speed = f"{row['sim_s']:.0f} s in {row['wall_s']:.1f} s ({row['realtime_factor']:.1f}x)"
+        return f"seed {row['seed']}: {row['status']}, {speed}, {row['over_physics']:.2f}x the bare steps"
 
-    summary = run_study(study, show)
-    print_summary(summary, study.out, print_speed, json_)
+    summary = run_study(study, shared.progress(told))
+    shared.print_summary(summary, study.out, print_speed, json_)

@@ -1,6 +1,7 @@
-"""Shared by several commands: options, error messages and exit codes, JSON output."""
+"""Shared by several commands: options, error messages and exit codes, JSON output, parts of experiments."""
 
 from glotouch_bt.commands.shared.errors import guarded, set_debug, showing_tracebacks
+from glotouch_bt.commands.shared.experiments import print_summary, progress, put_few_in_box, run_in_pool
 from glotouch_bt.commands.shared.options import (
     Backend,
     BackendSettings,

@@ -8,7 +8,6 @@ run before it is simulated only once.
 from __future__ import annotations
 
 import gc
-import json
 import os
 import signal
 from collections.abc import Callable, Mapping
@@ -23,6 +22,7 @@ from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import NullRecord
 from glotouch_bt.mission.spec import Place
 from glotouch_bt.robot import Backend, BadInput, Command, Observation, Request, Robot, Ticket, load_backend
+from glotouch_bt.runs import write_summary
 
 KINDS = ("robot_fault", "exception")
 HUNG_S = 30
@@ -172,8 +172,7 @@ def run_exhaustive(study: Exhaustive, on_progress: Callable[[int, str], None] | 
         "kinds": list(KINDS),
         "bad": bad,
     }
-    study.out.mkdir(parents=True, exist_ok=True)
-    (study.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    write_summary(study.out, summary)
     return summary
 
 

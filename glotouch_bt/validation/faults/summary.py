@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from glotouch_bt.bench import bootstrap_mean, wilson
 from glotouch_bt.faults import CATALOGUE
+from glotouch_bt.robot import Limits
 from glotouch_bt.validation.faults.trial import VERDICTS
 
 Row = Mapping[str, Any]
@@ -35,15 +35,15 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
         "twins_succeeded": sum(r["verdict"] == "recovered" for r in twins),
         "altered_nothing": [f"{r['class']} in {r['skill']}, seed {r['seed']}" for r in faulted if not r["effective"]],
         "verdicts": {v: counts.get(v, 0) for v in VERDICTS},
-        "hard_limit_broken": _over(tried),
+        "hard_limit_broken": sum(float(r.get("peak_force_N") or 0.0) > Limits().hard_force_N for r in tried),
         "tracebacks": sum(r["status"] == "traceback" for r in tried),
         "hangs": sum(r["status"] == "hang" for r in tried),
-        "wrong_object": _rate(len(wrong_object), len(tried)),
-        "named": _rate(sum(bool(r.get("named")) for r in ended), len(ended)),
-        "recovered": _rate(sum(r["verdict"] == "recovered" for r in can), len(can)),
+        "wrong_object": wilson(len(wrong_object), len(tried)),
+        "named": wilson(sum(bool(r.get("named")) for r in ended), len(ended)),
+        "recovered": wilson(sum(r["verdict"] == "recovered" for r in can), len(can)),
         "largest_peak_force_N": max(peaks, default=0.0),
-        "latency_s": _mean(latencies),
-        "wall_s": _mean([float(r["wall_s"]) for r in rows]),
+        "latency_s": bootstrap_mean(latencies),
+        "wall_s": bootstrap_mean([float(r["wall_s"]) for r in rows]),
         "by_class": {
             name: {v: sum(r["class"] == name and r["verdict"] == v for r in tried) for v in VERDICTS}
             | {"named": sum(r["class"] == name and bool(r.get("named")) for r in ended)}
@@ -55,28 +55,9 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def _over(rows: Sequence[Row]) -> int:
-    from glotouch_bt.robot import Limits
-
-    return sum(float(r.get("peak_force_N") or 0.0) > Limits().hard_force_N for r in rows)
-
-
 def _who(row: Row) -> str:
     by = str(row.get("seen_by") or "nobody").rsplit("/", 1)[-1]
     return f"{by}: {row['seen_code']}" if row.get("seen_code") else by
-
-
-def _rate(successes: int, n: int) -> dict[str, Any]:
-    return _as_json(wilson(successes, n))
-
-
-def _mean(values: Sequence[float]) -> dict[str, Any]:
-    return _as_json(bootstrap_mean(values))
-
-
-def _as_json(found: Mapping[str, Any]) -> dict[str, Any]:
-    """Replace non-finite numbers by None."""
-    return {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in found.items()}
 
 
 def matrix(rows: Sequence[Row], classes: Sequence[str], skills: Sequence[str]) -> dict[str, dict[str, list[int]]]:

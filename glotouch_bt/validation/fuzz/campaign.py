@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
-from collections.abc import Callable, Mapping
-from concurrent.futures import Executor, Future, as_completed
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from glotouch_bt.bench import wilson
+from glotouch_bt.runs import OnRow, gather, silent, write_summary
 from glotouch_bt.validation.fuzz.trial import BAD, MAX_DURATION_S, Result, run_trials
 
 CHUNK = 50
@@ -31,35 +30,25 @@ class FuzzCampaign:
     out: Path
 
 
-OnChunk = Callable[[int, int, Mapping[str, int]], None]
+def run_campaign(campaign: FuzzCampaign, executor: Executor, on_counts: OnRow = silent) -> dict[str, Any]:
+    """Run every trial in processes, write summary.json and failures/, and return the summary.
 
-
-def run_campaign(campaign: FuzzCampaign, executor: Executor, on_chunk: OnChunk | None = None) -> dict[str, Any]:
-    """Run every trial, write summary.json and failures/, and return the summary.
-
-    Args:
-        campaign: Settings.
-        executor: Any `concurrent.futures` executor of processes.
-        on_chunk: Called with (trials done, total, counts so far).
+    `on_counts` is called with (counts so far, trials done, total) after each chunk.
     """
     campaign.out.mkdir(parents=True, exist_ok=True)
     counts: Counter[tuple[str, str]] = Counter()
     bad: list[Result] = []
     chunks = [range(k, min(k + CHUNK, campaign.trials)) for k in range(0, campaign.trials, CHUNK)]
-    futures: list[Future[list[Result]]] = [executor.submit(run_trials, campaign.seed, tuple(c)) for c in chunks]
-    try:
-        for future in as_completed(futures):
-            for result in future.result():
-                counts[result.kind, result.came] += 1
-                if result.came in BAD:
-                    bad.append(result)
-                    _keep(campaign.out, result)
-            if on_chunk is not None:
-                on_chunk(counts.total(), campaign.trials, _by_class(counts))
-    except BaseException:
-        for future in futures:
-            future.cancel()
-        raise
+
+    def count(results: list[Result], *_: int) -> None:
+        for result in results:
+            counts[result.kind, result.came] += 1
+            if result.came in BAD:
+                bad.append(result)
+                _keep(campaign.out, result)
+        on_counts(_by_class(counts), counts.total(), campaign.trials)
+
+    gather([executor.submit(run_trials, campaign.seed, tuple(c)) for c in chunks], count)
     summary = {
         "trials": campaign.trials,
         "seed": campaign.seed,
@@ -68,7 +57,7 @@ def run_campaign(campaign: FuzzCampaign, executor: Executor, on_chunk: OnChunk |
         "bad": wilson(len(bad), campaign.trials),
         "failures": [{"trial": r.number, "kind": r.kind, "came": r.came, "detail": r.detail} for r in bad],
     }
-    (campaign.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    write_summary(campaign.out, summary)
     return summary
 
 

@@ -79,7 +79,7 @@ def test_a_recorded_dataset(quick, monkeypatch, tmp_path):
 
 def test_layouts_that_cannot_be_acquired_are_rows(quick, monkeypatch, tmp_path):
     monkeypatch.setattr(MatchCampaign, "check", lambda self: None)
-    monkeypatch.setattr(MatchCampaign, "request", lambda self, seed: seed)
+    monkeypatch.setattr(MatchCampaign, "layout_request", lambda self, seed: seed)
 
     def acquire(seed, dataset):
         if seed == 4:
@@ -99,7 +99,7 @@ def test_layouts_that_cannot_be_acquired_are_rows(quick, monkeypatch, tmp_path):
 def test_nothing_acquired_at_all(quick, monkeypatch, tmp_path):
     monkeypatch.setattr(MatchCampaign, "check", lambda self: None)
     monkeypatch.setattr(bench, "acquire_layout", lambda *_: a_layout(names=()))
-    monkeypatch.setattr(MatchCampaign, "request", lambda self, seed: seed)
+    monkeypatch.setattr(MatchCampaign, "layout_request", lambda self, seed: seed)
     with ThreadPoolExecutor(1) as pool:
         summary = run_campaign(campaign(tmp_path), pool)
     assert summary["methods"]["likelihood"]["row_top1"]["rate"] is None
@@ -118,7 +118,7 @@ def test_five_of_a_large_folder(tmp_path):
 
 
 def test_the_mission_of_a_layout(tmp_path):
-    request = campaign(tmp_path, seeds=(5,)).request(5)
+    request = campaign(tmp_path, seeds=(5,)).layout_request(5)
     assert (request.mission, request.seed, request.settings) == ("touch_all", 5, {"expected_objects": "5"})
     assert request.out == tmp_path / "o" / "runs" / "s0005"
 

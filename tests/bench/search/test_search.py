@@ -148,14 +148,14 @@ def test_a_record_without_exploration_has_no_travel():
 
 def test_unknown_policies_are_named():
     with pytest.raises(BadInput, match="no_such"):
-        SearchCampaign(("no_such",), (1,), (), "nominal", None, "mujoco", Path("x"))
+        SearchCampaign(policies=("no_such",), seeds=(1,), out=Path("x"))
     with pytest.raises(BadInput, match="nothing to try"):
-        SearchCampaign(("random_descent",), (), (), "nominal", None, "mujoco", Path("x"))
+        SearchCampaign(policies=("random_descent",), seeds=(), out=Path("x"))
 
 
 def test_a_campaign_in_the_plane_writes_all_there_is(tmp_path):
     campaign = SearchCampaign(
-        ("nearest_frontier",), (), (3, 4), "nominal", None, "mujoco", tmp_path / "out", planar_budget_m=1.0
+        policies=("nearest_frontier",), seeds=(), planar_seeds=(3, 4), out=tmp_path / "out", planar_budget_m=1.0
     )
     seen = []
     with ThreadPoolExecutor(1) as pool:

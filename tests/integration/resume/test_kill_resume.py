@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from glotouch_bt.validation.kill_resume import KillStudy, run_study, summarise
@@ -21,7 +22,9 @@ tree:
 
 def test_a_killed_run_is_compared_with_its_twin(tmp_path: Path) -> None:
     (tmp_path / "m.yaml").write_text(MISSION)
-    study = KillStudy(str(tmp_path / "m.yaml"), [3], 1, tmp_path / "out", words=(sys.executable, str(FAKE_CLI)))
+    study = KillStudy(
+        mission=str(tmp_path / "m.yaml"), seeds=[3], kills=1, out=tmp_path / "out", words=(sys.executable, str(FAKE_CLI))
+    )
     rows: list[dict[str, object]] = []
     summary = run_study(study, lambda row, done, total: rows.append(row))
     (row,) = rows
@@ -34,7 +37,7 @@ def test_a_killed_run_is_compared_with_its_twin(tmp_path: Path) -> None:
     assert summary["same_record"]["rate"] == 1.0
     assert summary["outside"] == 0
     assert json.loads((tmp_path / "out" / "summary.json").read_text()) == json.loads(json.dumps(summary))
-    again = run_study(KillStudy(study.mission, [3], 1, study.out, resume=True, words=("false",)))
+    again = run_study(replace(study, resume=True, words=("false",)))
     assert again["same_record"] == summary["same_record"], "nothing was run again"
 
 
