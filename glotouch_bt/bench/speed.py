@@ -12,7 +12,6 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.execution import run_mission
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import Record, Recorder
+from glotouch_bt.report import write_report
 from glotouch_bt.robot import BadInput, Command, Observation, Request, Robot, Ticket, load_backend
 from glotouch_bt.runs import Campaign, OnRow, RunFolder, silent, write_summary, write_table
 
@@ -170,6 +170,10 @@ def run_trial(study: Campaign, seed: int) -> SpeedTrial:
     mission = load_mission(study.mission, study.settings, objects=study.objects)
     conditions = load_conditions(study.conditions)
     backend = load_backend(study.backend)
+    described: dict[str, object] = {
+        "mission": study.mission, "backend": study.backend, "seed": seed, "conditions": study.conditions,
+        "container": mission.world.container, "parameters": dict(study.settings),
+    }  # fmt: skip
     times = CycleTimes()
     with backend.open(mission.world, conditions, seed, {"trace": True}) as robot:
         referee = backend.referee(robot)
@@ -177,13 +181,15 @@ def run_trial(study: Campaign, seed: int) -> SpeedTrial:
             raise BadInput(f"backend {study.backend!r} cannot repeat its steps; bench speed needs a simulation")
         timed = TimedRobot(robot, times)
         began, cpu = time.perf_counter(), time.process_time()
-        with Recorder(folder.path / "run.mcap", _description(study, seed, mission.world.container)) as recorder:
+        with Recorder(folder.path / "run.mcap", described) as recorder:
             outcome = run_mission(mission, timed, TimedRecord(recorder, timed))
             timed.account(time.perf_counter())
             ticked = time.perf_counter()
         ended, cpu_s = time.perf_counter(), time.process_time() - cpu
         folder.write_json("result.json", {"mission": mission.name, "seed": seed, "status": outcome.status})
-        report_s = _report_s(folder.path)
+        reporting = time.perf_counter()
+        write_report(folder.path)
+        report_s = time.perf_counter() - reporting
         bare = referee.replay_bare_steps()
     if bare is None:
         raise BadInput(f"backend {study.backend!r} kept no trace of its steps")
@@ -197,26 +203,6 @@ def run_trial(study: Campaign, seed: int) -> SpeedTrial:
         "record_s": sum(times.record) + ended - ticked, "open_s": began - opening, "report_s": report_s,
     }  # fmt: skip
     return SpeedTrial(row, times)
-
-
-def _description(study: Campaign, seed: int, container: object) -> dict[str, object]:
-    return {
-        "mission": study.mission,
-        "backend": study.backend,
-        "seed": seed,
-        "conditions": study.conditions,
-        "container": container,
-        "parameters": dict(study.settings),
-    }
-
-
-def _report_s(folder: Path) -> float:
-    """Return the wall time of writing the run's report."""
-    from glotouch_bt.report import write_report
-
-    began = time.perf_counter()
-    write_report(folder)
-    return time.perf_counter() - began
 
 
 def run_study(study: Campaign, on_row: OnRow = silent) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import asdict
 from typing import Annotated
 
 import typer
@@ -52,5 +53,5 @@ def doctor(
         if not json_:
             show(finding)
     if json_:
-        print_json([f.as_dict() for f in findings])
+        print_json([asdict(f) for f in findings])
     return 0 if all(f.good is not False for f in findings) else 1

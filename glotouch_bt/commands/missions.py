@@ -18,7 +18,7 @@ def missions(
 
     The list also names the shipped worlds, conditions and fault plans.
     """
-    from glotouch_bt.commands.terminal import print_table
+    from glotouch_bt.commands.terminal import print_settings, print_table
     from glotouch_bt.mission.export import describe_mission
     from glotouch_bt.mission.read import shipped
     from glotouch_bt.robot import UnknownName
@@ -38,7 +38,4 @@ def missions(
         return
     (d,) = described
     sys.stdout.write(f"{d['name']}: {d['description']}\n{d['file']}\nworld {d['world']}\n")
-    head = ("name", "type", "unit", "default", "range", "description")
-    values = [["" if p[key] is None else str(p[key]) for key in head] for p in d["parameters"]]
-    if values:
-        print_table("parameters", head, values)
+    print_settings("parameters", d["parameters"])

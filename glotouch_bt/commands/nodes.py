@@ -15,7 +15,7 @@ def nodes(
     name: Annotated[str | None, typer.Argument(metavar="NAME", help="one node")] = None, json_: Json = False
 ) -> None:
     """List the nodes of the mission language, or describe one."""
-    from glotouch_bt.commands.terminal import print_table
+    from glotouch_bt.commands.terminal import print_settings, print_table
     from glotouch_bt.mission.export import describe_nodes
     from glotouch_bt.robot import UnknownName
 
@@ -34,7 +34,4 @@ def nodes(
         return
     d = known[name]
     sys.stdout.write(f"{name}: {d['description']}\nchildren: {d['children']}\n")
-    head = ("name", "type", "unit", "default", "range", "description")
-    values = [["" if s[key] is None else str(s[key]) for key in head] for s in d["settings"]]
-    if values:
-        print_table("settings", head, values)
+    print_settings("settings", d["settings"])

@@ -7,13 +7,13 @@ no files.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
 from glotouch_bt.commissioning.registration import Registration, touch_walls
-from glotouch_bt.motion import Arm, Motion
+from glotouch_bt.motion import Arm, Motion, drive
 from glotouch_bt.robot import (
     HOLD,
     Array,
@@ -86,20 +86,11 @@ class DoctorFinding:
     text: str
     values: Mapping[str, Any] = field(default_factory=dict)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON data."""
-        return asdict(self)
 
-
-def drive(robot: Robot, motion: Motion[T]) -> T:
+def run_and_hold(robot: Robot, motion: Motion[T]) -> T:
     """Run a motion to its end and hold the arm; return the motion's result."""
-    command = next(motion)
     try:
-        while True:
-            command = motion.send(robot.cycle(command))
-    except StopIteration as e:
-        result: T = e.value
-        return result
+        return drive(motion, robot.cycle)
     finally:
         robot.hold()
 
@@ -138,7 +129,7 @@ def run_doctor(
         if looking is None:
             yield from facts(robot)
             yield from rates(robot)
-        drive(robot, _tared(robot))
+        run_and_hold(robot, _tared(robot))
         yield from wrist(robot, "tared")
         yield from place(robot, world)
         if ask(f"Move the jaws by {JAW_STEP_M * 1e3:.0f} mm and then over their stroke, {JAW_N:g} N? Hands off."):
@@ -309,7 +300,7 @@ def walls(robot: Robot, world: World) -> Iterator[DoctorFinding]:
     arm.sync(robot.observe())
     _jaws_to(robot, 0.0)
     try:
-        found = drive(robot, touch_walls(arm, world, robot.observe))
+        found = run_and_hold(robot, touch_walls(arm, world, robot.observe))
     except MotionRefused as e:
         yield DoctorFinding("walls", "touch", False, str(e))
         return

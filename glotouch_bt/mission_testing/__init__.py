@@ -5,8 +5,9 @@ Names are imported on first use, because pytest loads the plugin in every sessio
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
+
+from glotouch_bt.lazy import lazy_door
 
 if TYPE_CHECKING:
     from glotouch_bt.mission_testing.call import Call
@@ -16,38 +17,18 @@ if TYPE_CHECKING:
     from glotouch_bt.mission_testing.scripted import RunsAway, ScriptedRun, run_scripted
     from glotouch_bt.mission_testing.standins import stand_in
 
-_HOME = {
-    "Call": "call",
-    "ScriptError": "casting",
-    "RunsAway": "scripted",
-    "ScriptMaker": "random_script",
-    "ScriptedRun": "scripted",
-    "fails": "outcomes",
-    "hangs": "outcomes",
-    "ok": "outcomes",
-    "raises": "outcomes",
-    "real": "outcomes",
-    "run_scripted": "scripted",
-    "stand_in": "standins",
-}
-
-__all__ = [
-    "Call",
-    "RunsAway",
-    "ScriptError",
-    "ScriptMaker",
-    "ScriptedRun",
-    "fails",
-    "hangs",
-    "ok",
-    "raises",
-    "real",
-    "run_scripted",
-    "stand_in",
-]
-
-
-def __getattr__(name: str) -> object:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+__getattr__ = lazy_door(
+    __name__,
+    Call="call",
+    ScriptError="casting",
+    fails="outcomes",
+    hangs="outcomes",
+    ok="outcomes",
+    raises="outcomes",
+    real="outcomes",
+    ScriptMaker="random_script",
+    RunsAway="scripted",
+    ScriptedRun="scripted",
+    run_scripted="scripted",
+    stand_in="standins",
+)

@@ -23,14 +23,9 @@ class ScriptError(BadInput):
     """A script names something that the mission or its skills do not have. The mistake is in the test."""
 
 
-def paths_of(root: NodeSpec, title: str) -> dict[str, NodeSpec]:
-    """Return every node by its path, as the runner names it."""
-    return root.paths(title)
-
-
 def leaves_of(root: NodeSpec, title: str) -> dict[str, NodeSpec]:
     """Return the skill leaves by path."""
-    return {p: n for p, n in paths_of(root, title).items() if n.skill_type is not None}
+    return {p: n for p, n in root.paths(title).items() if n.skill_type is not None}
 
 
 def fitting(pattern: str, leaves: Mapping[str, NodeSpec]) -> dict[str, NodeSpec]:

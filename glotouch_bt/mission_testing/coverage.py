@@ -9,7 +9,6 @@ from glotouch_bt.mission import Mission
 from glotouch_bt.mission.nodes import kind_of
 from glotouch_bt.mission.read import shown
 from glotouch_bt.mission.spec import NodeSpec
-from glotouch_bt.mission_testing.casting import paths_of
 from glotouch_bt.mission_testing.scripted import ScriptedRun
 
 SUCCESS, FAILURE, PREEMPTED = "SUCCESS", "FAILURE", "PREEMPTED"
@@ -106,7 +105,7 @@ def _cells(leaf: Leaf) -> str:
 
 def expected_endings(root: NodeSpec, title: str) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Yield (path, expected endings) of every leaf."""
-    paths = paths_of(root, title)
+    paths = root.paths(title)
     for path, node in paths.items():
         if node.skill_type is None:
             continue

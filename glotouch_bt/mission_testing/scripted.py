@@ -181,7 +181,7 @@ def run_scripted(
     Raises:
         ScriptError: The script does not fit the mission.
     """
-    paths = casting.paths_of(mission.spec, mission.name)
+    paths = mission.spec.paths(mission.name)
     parts = casting.cast(mission.spec, mission.name, script or {})
     stage = Stage({paths[path].name: part for path, part in parts.items() if part is not None})
     end_s = mission.timeout_s if timeout_s is None else timeout_s
@@ -205,8 +205,7 @@ def run_scripted(
         injector.conclude(outcome.status, "", "; ".join(outcome.reasons), outcome.end_s)
     if isinstance(outcome.error, ScriptError | KeyboardInterrupt):
         raise outcome.error
-    leaves = {p: n for p, n in paths.items() if n.skill_type is not None}
-    return ScriptedRun(mission.name, leaves, heard, stage, outcome)
+    return ScriptedRun(mission.name, casting.leaves_of(mission.spec, mission.name), heard, stage, outcome)
 
 
 def _robot(tree: NodeSpec, end_s: float, stage: Stage, still: bool) -> FakeRobot:

@@ -10,4 +10,4 @@ from glotouch_bt.motion.pause_signal import PauseSignal, Style
 from glotouch_bt.motion.plan import MotionPlan, plan_piece
 from glotouch_bt.motion.shapes import finger_outline_half_m
 from glotouch_bt.motion.timing import rest_to_rest
-from glotouch_bt.motion.travel import Motion, MoveResult
+from glotouch_bt.motion.travel import Motion, MoveResult, drive

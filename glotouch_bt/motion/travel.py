@@ -19,8 +19,21 @@ from glotouch_bt.motion.timing import JointProfile, between, brake
 from glotouch_bt.robot import Array, Command, JointSetpoint, Limits, Observation, Pose, RobotDescription
 
 T = TypeVar("T")
+Asked = TypeVar("Asked")
+Answer = TypeVar("Answer")
 Motion = Generator[Command, Observation, T]
 Guard = Callable[[Observation], object | None]
+
+
+def drive(plan: Generator[Asked, Answer, T], answer: Callable[[Asked], Answer]) -> T:
+    """Run a generator to its end, a motion or a search plan: send the answer to each value; return its result."""
+    try:
+        asked = next(plan)
+        while True:
+            asked = plan.send(answer(asked))
+    except StopIteration as end:
+        result: T = end.value
+        return result
 
 
 @dataclass(frozen=True)

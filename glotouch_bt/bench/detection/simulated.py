@@ -13,9 +13,9 @@ from py_trees.common import Status
 
 from glotouch_bt.bench.detection.signals import wrong
 from glotouch_bt.mission.read import SkillRegistry, load_conditions, load_world
-from glotouch_bt.motion import Arm, Motion
+from glotouch_bt.motion import Arm, Motion, drive
 from glotouch_bt.perception.touch import GuardParams, Payload
-from glotouch_bt.robot import HOLD, Array, BadInput, MotionRefused, Observation, Robot, load_backend
+from glotouch_bt.robot import HOLD, Array, BadInput, Command, MotionRefused, Observation, Robot, load_backend
 from glotouch_bt.robot.simulation import Referee
 from glotouch_bt.skill import Context
 from glotouch_bt.skill.probing import HeldTool, Probed, Prober
@@ -35,15 +35,11 @@ class PushTrial:
     """Result of one push on the ball.
 
     Attributes:
-        force_N: Magnitude.
-        kind: Motion of the ball, `across` or `down`.
         found: The prober reported a contact during the push.
         early: The prober reported a contact before the push.
         late_s: Delay from the start of the push to the dated onset; NaN if not found.
     """
 
-    force_N: float
-    kind: str
     found: bool
     early: bool
     late_s: float
@@ -103,15 +99,14 @@ class SimulatedProbe:
 
     def go(self, motion: Motion[Any], before: Callable[[Observation], None] | None = None) -> Any:
         """Run a motion to its end; call `before` with the newest observation before each period."""
-        try:
-            command = next(motion)
-            while True:
-                if before is not None:
-                    before(self.context.observation)
-                self.context.observation = self.robot.cycle(command)
-                command = motion.send(self.context.observation)
-        except StopIteration as end:
-            return end.value
+
+        def cycle(command: Command) -> Observation:
+            if before is not None:
+                before(self.context.observation)
+            self.context.observation = self.robot.cycle(command)
+            return self.context.observation
+
+        return drive(motion, cycle)
 
     def place(self, low_m: float = LOW_M) -> Array:
         """Draw a position (3,) of the ball in the empty half of the container, in K."""
@@ -188,4 +183,4 @@ def push_once(rig: SimulatedProbe, force_N: float, kind: str, grows_s: float) ->
         contact = probed.contact
         early = contact is not None and contact.stamp_s < begins - 0.02
         late = float("nan") if contact is None else contact.stamp_s - begins
-        return PushTrial(force_N, kind, contact is not None and not early, early, late)
+        return PushTrial(contact is not None and not early, early, late)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -138,16 +138,3 @@ def _touched(file: Path, entry: Mapping[str, Any]) -> Touched:
         raise BadInput(f"{file}: candidate {entry['index']} must have an object and its (x, y, yaw), or neither")
     known: Planar | None = None if pose is None else (float(pose[0]), float(pose[1]), float(pose[2]))
     return Touched(touchset, name, known, None if tilt is None else float(tilt))
-
-
-def read_dataset(folder: Path, first: int | None = None) -> list[Layout]:
-    """Read the layouts of a dataset, by seed; at most `first` of them.
-
-    Raises:
-        BadInput: As `layout_files` and `read_layout`, or two layouts have the same seed.
-    """
-    layouts = [read_layout(f) for f in layout_files(folder)[:first]]
-    seeds: Sequence[int] = [x.seed for x in layouts]
-    if len(set(seeds)) < len(seeds):
-        raise BadInput(f"{folder}: two layouts have the same seed")
-    return layouts

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from glotouch_bt.bench.search import COLOURS
@@ -44,7 +43,6 @@ def plot_all(folder: Path, summary: Mapping[str, Any], trials: Sequence[Row], cl
 
 def _figure(width: float, height: float, panels: int = 1) -> tuple[Figure, list[Axes]]:
     figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
     return figure, list(np.atleast_1d(figure.subplots(1, panels)))
 
 

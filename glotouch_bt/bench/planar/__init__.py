@@ -3,4 +3,4 @@
 from glotouch_bt.bench.planar.explore import BUDGET_M, Traced, explore, refine_all
 from glotouch_bt.bench.planar.layout import planar_world
 from glotouch_bt.bench.planar.section import FeltSection, felt_section
-from glotouch_bt.bench.planar.world import WALL, ContactModel, PlanarWorld
+from glotouch_bt.bench.planar.world import ContactModel, PlanarWorld

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
+from itertools import count
 from typing import Any
 
-from glotouch_bt.bench.planar.drive import drive
 from glotouch_bt.bench.planar.world import PlanarWorld
 from glotouch_bt.mission.read import SkillRegistry
+from glotouch_bt.motion import drive
 from glotouch_bt.perception.search import (
     Move,
     MoveOutcome,
@@ -49,14 +51,12 @@ class Explored:
         ended: "complete", "exhausted" or "budget".
         belief: The map at the end.
         contacts: Number of contacts of the candidates.
-        untraced: Number of first contacts that gave no candidate.
     """
 
     found: tuple[Traced, ...]
     travel_m: float
     ended: str
     belief: SearchMap
-    untraced: int
 
     @property
     def contacts(self) -> int:
@@ -68,18 +68,16 @@ class _OutOfBudget(Exception):
     """The travel budget is spent."""
 
 
-class _Budget:
-    """Wrapper of a world that stops when the travel budget is spent."""
+def _limited(world: PlanarWorld, budget_m: float) -> Callable[[Move], MoveOutcome]:
+    """Return the world's `execute`, which raises once the travel budget is spent."""
+    moves = count()
 
-    def __init__(self, world: PlanarWorld, budget_m: float) -> None:
-        self._world, self._budget_m, self._moves = world, budget_m, 0
-
-    def execute(self, move: Move) -> MoveOutcome:
-        """Execute a move if the budget allows."""
-        self._moves += 1
-        if self._world.travel_m >= self._budget_m or self._moves > MAX_MOVES:
+    def execute(move: Move) -> MoveOutcome:
+        if world.travel_m >= budget_m or next(moves) >= MAX_MOVES:
             raise _OutOfBudget
-        return self._world.execute(move)
+        return world.execute(move)
+
+    return execute
 
 
 @cache
@@ -88,13 +86,7 @@ def _defaults(skill: str) -> Any:
     return SkillRegistry()[skill].Params()
 
 
-def explore(
-    world: PlanarWorld,
-    policy: SearchPolicy,
-    expected: int,
-    *,
-    budget_m: float = BUDGET_M,
-) -> Explored:
+def explore(world: PlanarWorld, policy: SearchPolicy, expected: int, *, budget_m: float = BUDGET_M) -> Explored:
     """Run the mission's exploration on geometry alone.
 
     Args:
@@ -107,10 +99,10 @@ def explore(
     belief = SearchMap.blank(world.half_m + world.tip_radius_m - sweep.wall_gap_m, expected)
     found: dict[int, Traced] = {}
     candidates: tuple[Candidate, ...] = ()
-    limited, untraced, ended = _Budget(world, budget_m), 0, "complete"
+    execute, ended = _limited(world, budget_m), "complete"
     try:
         while not belief.complete:
-            sought = drive(seek(belief, policy, world.tip_K_m, lowered=world.lowered), limited)
+            sought = drive(seek(belief, policy, world.tip_K_m, lowered=world.lowered), execute)
             belief = sought.belief
             if sought.contact is None:
                 ended = "exhausted"
@@ -130,16 +122,14 @@ def explore(
                 elsewhere=elsewhere,
                 joined=joined,
             )
-            traced = drive(plan, limited)
+            traced = drive(plan, execute)
             admitted = admit(belief, candidates, first, traced, orbit.height_m, orbit.exclusion_m, part_of=old)
             belief, candidates = admitted.belief, admitted.candidates
-            if admitted.index is None:
-                untraced += 1
-                continue
-            found[admitted.index] = Traced(world.travel_m, candidates[admitted.index])
+            if admitted.index is not None:
+                found[admitted.index] = Traced(world.travel_m, candidates[admitted.index])
     except _OutOfBudget:
         ended = "budget"
-    return Explored(tuple(found[i] for i in sorted(found)), world.travel_m, ended, belief, untraced)
+    return Explored(tuple(found[i] for i in sorted(found)), world.travel_m, ended, belief)
 
 
 def refine_all(world: PlanarWorld, explored: Explored, *, budget_m: float = BUDGET_M) -> tuple[Traced, ...]:
@@ -153,12 +143,12 @@ def refine_all(world: PlanarWorld, explored: Explored, *, budget_m: float = BUDG
         budget_m: Travel at which it stops, the exploration included.
     """
     tracing, half = _defaults("refine_outline").rule(), explored.belief.half_extent_m
-    out, limited = list(explored.found), _Budget(world, budget_m)
+    out, execute = list(explored.found), _limited(world, budget_m)
     for i, traced in sorted(enumerate(explored.found), key=lambda item: item[1].candidate.quality):
         known = traced.candidate.contacts
         more = trace_more(known, world.tip_K_m, world.tip_radius_m, tracing, half_extent_m=half)
         try:
-            better = refined(traced.candidate, drive(more, limited))
+            better = refined(traced.candidate, drive(more, execute))
         except _OutOfBudget:
             break
         if better is not None and not elsewhere_m(traced.candidate, better):

@@ -12,7 +12,7 @@ SAMPLE_M^2 / (8 s), a few hundredths of a millimetre. It is converted to polygon
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -22,6 +22,7 @@ from contourpy import contour_generator
 from scipy.ndimage import label
 from scipy.spatial import ConvexHull, cKDTree
 
+from glotouch_bt.perception.touch import area_and_centroid, minimum_rectangle
 from glotouch_bt.robot import Array, Probe
 from glotouch_bt.robot.scene import Mesh
 
@@ -76,7 +77,7 @@ class SignedGrid:
         x, y = (self.origin_m[i] + GRID_M * np.arange(self.values_m.shape[i]) for i in (0, 1))
         lines = contour_generator(x, y, self.values_m.T).lines(value_m)
         found = [np.asarray(line, dtype=np.float64) for line in lines if len(line) > 3]
-        return sorted(found, key=lambda p: -abs(area(p)))
+        return sorted(found, key=lambda p: -abs(area_and_centroid(p)[0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +90,6 @@ class FeltSection:
         above: The same for a ball lowered from above.
         outline_m: (n, 2) closed polygon of the largest part: the forbidden set shrunk by the ball's radius.
         centre_m: (2,) centre of area of the convex hull of all outlines: the object's centre.
-        hull_m: (k, 2) that hull, counter-clockwise.
-        hull_area_m2: Its area.
         box_size_m, box_yaw_rad: Long and short side of its minimum-area rectangle, and direction of the long side.
         top_m: Highest vertex above the floor.
         pressed_m: (2,) centre of mass seen from above; a push rotates the object about it.
@@ -103,8 +102,6 @@ class FeltSection:
     above: SignedGrid
     outline_m: Array
     centre_m: Array
-    hull_m: Array
-    hull_area_m2: float
     box_size_m: tuple[float, float]
     box_yaw_rad: float
     top_m: float
@@ -145,13 +142,7 @@ class _Keyed:
     """A mesh that compares by its digest, for the cache."""
 
     digest: str
-    mesh: Mesh
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Keyed) and other.digest == self.digest
-
-    def __hash__(self) -> int:
-        return hash(self.digest)
+    mesh: Mesh = field(compare=False)
 
 
 @lru_cache(maxsize=64)
@@ -181,17 +172,14 @@ def _section(key: _Keyed, probe: Probe, height_m: float) -> FeltSection:
     )
     shrunk = side.level(-r)
     corners = np.concatenate(shrunk)
-    hull = ConvexHull(corners)
-    polygon = corners[hull.vertices]
-    size, yaw = min_rectangle(polygon)
+    polygon = corners[ConvexHull(corners).vertices]
+    _, size, yaw = minimum_rectangle(polygon)
     return FeltSection(
         name=mesh.name,
         side=side,
         above=above,
         outline_m=shrunk[0],
-        centre_m=centre_of_area(polygon),
-        hull_m=polygon,
-        hull_area_m2=float(hull.volume),  # in the plane, scipy's volume is the area
+        centre_m=area_and_centroid(polygon)[1],
         box_size_m=size,
         box_yaw_rad=yaw,
         top_m=float(mesh.vertices_m[:, 2].max()),
@@ -297,33 +285,3 @@ def _to_polygons(polygons: list[Array], nodes: Array) -> Array:
             t = np.clip((to * edge).sum(axis=1) / np.maximum((edge**2).sum(axis=1), 1e-18), 0.0, 1.0)
             best = np.minimum(best, np.linalg.norm(to - t[:, None] * edge, axis=1))
     return best
-
-
-def area(polygon: Array) -> float:
-    """Return the signed area of a polygon (n, 2), counter-clockwise positive (shoelace formula)."""
-    x, y = polygon.T
-    return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
-
-
-def centre_of_area(polygon: Array) -> Array:
-    """Return the centroid (2,) of the area of a polygon (n, 2)."""
-    x, y = polygon.T
-    cross = x * np.roll(y, -1) - np.roll(x, -1) * y
-    both = polygon + np.roll(polygon, -1, axis=0)
-    return np.asarray((both * cross[:, None]).sum(axis=0) / (3.0 * cross.sum()))
-
-
-def min_rectangle(hull: Array) -> tuple[tuple[float, float], float]:
-    """Return (long, short) side of the minimum-area rectangle of a convex polygon, and the long side's direction, rad.
-
-    One side lies along an edge of the polygon (Freeman and Shapira, CACM 18, 1975).
-    """
-    edges = np.roll(hull, -1, axis=0) - hull
-    best = (np.inf, (0.0, 0.0), 0.0)
-    for yaw in np.unique(np.round(np.arctan2(edges[:, 1], edges[:, 0]) % (0.5 * np.pi), 9)):
-        c, s = np.cos(yaw), np.sin(yaw)
-        size = np.ptp(hull @ np.array([[c, -s], [s, c]]), axis=0)
-        if size[0] * size[1] < best[0]:
-            long = int(np.argmax(size))
-            best = (float(size[0] * size[1]), (float(size[long]), float(size[1 - long])), float(yaw + long * np.pi / 2))
-    return best[1], float((best[2] + 0.5 * np.pi) % np.pi - 0.5 * np.pi)

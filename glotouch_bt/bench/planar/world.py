@@ -51,15 +51,6 @@ class ContactModel:
     touch_force_N: float = 1.0
 
 
-@dataclass(frozen=True)
-class Logged:
-    """One log entry: planar travel, what happened, and the object index (`WALL`, or -2 for none)."""
-
-    travel_m: float
-    what: str
-    object: int = -2
-
-
 class PlanarWorld:
     """One layout and the ball in it.
 
@@ -93,16 +84,10 @@ class PlanarWorld:
         self.tip_K_m: Array = np.zeros(2) if start_K_m is None else np.array(start_K_m, dtype=np.float64)
         self.lowered = False
         self.travel_m = 0.0
-        self.log: list[Logged] = []
 
-    def centres_K_m(self, poses: Array | None = None) -> Array:
-        """Return the true centres (k, 2) of the sections at the current or given poses."""
-        where = self.poses if poses is None else poses
-        return np.array([self.to_K(i, s.centre_m[None], where)[0] for i, s in enumerate(self.sections)]).reshape(-1, 2)
-
-    def to_K(self, i: int, points_m: Array, poses: Array | None = None) -> Array:
+    def to_K(self, i: int, points_m: Array) -> Array:
         """Transform points (n, 2) from object i's mesh frame to K."""
-        x, y, yaw = (self.poses if poses is None else poses)[i]
+        x, y, yaw = self.poses[i]
         c, s = np.cos(yaw), np.sin(yaw)
         return np.asarray(points_m @ np.array([[c, s], [-s, c]]) + (x, y))
 
@@ -110,10 +95,6 @@ class PlanarWorld:
         """Return signed distances (n,) of ball centres (n, 2) from touching object i."""
         section = self.sections[i]
         return (section.above if above else section.side)(self._to_object(i, points_K_m))
-
-    def note(self, what: str, index: int = -2) -> None:
-        """Add a log entry at the current travel."""
-        self.log.append(Logged(self.travel_m, what, index))
 
     def execute(self, move: Move) -> MoveOutcome:
         """Execute one move; the planar path length adds to the travel."""
@@ -129,7 +110,6 @@ class PlanarWorld:
         return self._guarded(move.kind, goal)
 
     def _refuse(self, why: str) -> MoveOutcome:
-        self.note(f"refused: {why}")
         return MoveOutcome(self.tip_K_m, np.zeros((0, 2)), refused=why)
 
     def _go(self, goal: Array, contact: Contact | None) -> MoveOutcome:
@@ -149,7 +129,6 @@ class PlanarWorld:
         gaps = [float(self.clearance(goal[None], i, above=True)[0]) for i in range(len(self.sections))]
         if gaps and min(gaps) <= 0.0:
             i = int(np.argmin(gaps))
-            self.note("landed", i)
             height = self.sections[i].landing_height_m(self._to_object(i, goal[None])[0])
             down = np.array([0.0, 0.0, -1.0])
             tip = np.array([*goal, height])
@@ -174,7 +153,6 @@ class PlanarWorld:
         over = 0.0 if i == WALL else max(over, 0.0)
         if i != WALL:
             self._push(i, onset, reaction, normal, over * u)
-        self.note("touched", i)
         contact = self._contact(onset, u, reaction, over * u)
         return self._go(onset + over * u, contact)
 
@@ -257,7 +235,6 @@ class PlanarWorld:
             gap = float(self.clearance(self.tip_K_m[None], i)[0])
             if gap < 0.0:
                 self.poses[i, :2] += gap * self._normal(i, self.tip_K_m)
-                self.note("pushed aside", i)
 
     def _contact(self, onset: Array, u: Array, reaction: Array, way: Array) -> Contact:
         """As the wrist would report it."""

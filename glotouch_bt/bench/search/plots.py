@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from glotouch_bt.bench.planar import FeltSection
@@ -26,7 +25,6 @@ MAX_TRAVEL_M = 6.0
 def plot_discovered(path: Path, rows: Sequence[Mapping[str, Any]], policies: Sequence[str], objects: int) -> None:
     """Draw mean discovered objects against travel, 95 % bands: MuJoCo solid, planar dashed, paper dots."""
     figure = Figure(figsize=(7.5, 4.6), layout="constrained")
-    FigureCanvasAgg(figure)
     axes = figure.subplots()
     at = np.linspace(0.0, MAX_TRAVEL_M, 121)
     for name, colour in zip(policies, COLOURS * (1 + len(policies) // len(COLOURS)), strict=False):
@@ -62,7 +60,6 @@ def plot_layout(path: Path, run: Path, sections: Mapping[str, FeltSection]) -> N
         return
     layout = true_layout(record.truth, pose_B_K, dict(sections))
     figure = Figure(figsize=(5.2, 6.4), layout="constrained")
-    FigureCanvasAgg(figure)
     axes = figure.subplots()
     half = 500.0 * np.array(interior[:2])
     axes.plot(half[0] * np.array([-1, 1, 1, -1, -1]), half[1] * np.array([-1, -1, 1, 1, -1]), color="#14181f", lw=1.5)

@@ -34,19 +34,16 @@ def summarise(rows: Sequence[Row], policies: Sequence[str], objects: int) -> dic
     """
     real = [r for r in rows if r["simulator"] != "planar"]
     plane = [r for r in rows if r["simulator"] == "planar"]
-    out: dict[str, Any] = {"policies": {}, "paper": PAPER, "candidates": {}}
-    for name in policies:
-        mine = [r for r in real if r["policy"] == name]
-        if mine:
-            out["policies"][name] = discovery(mine, objects) | {"candidates": candidate_errors(mine)}
+
+    def by_policy(rows: Sequence[Row]) -> dict[str, Any]:
+        groups = {name: [r for r in rows if r["policy"] == name] for name in policies}
+        return {n: discovery(g, objects) | {"candidates": candidate_errors(g)} for n, g in groups.items() if g}
+
+    out: dict[str, Any] = {"policies": by_policy(real), "paper": PAPER, "candidates": {}}
     if out["policies"]:
         out["candidates"] = next(iter(out["policies"].values()))["candidates"]
     if plane:
-        out["planar"] = {
-            name: discovery(mine, objects) | {"candidates": candidate_errors(mine)}
-            for name in policies
-            if (mine := [r for r in plane if r["policy"] == name])
-        }
+        out["planar"] = by_policy(plane)
     if real and plane:
         out["validation"] = {
             name: validation(

@@ -161,7 +161,7 @@ def score_run(record: RunRecord, sections: dict[str, FeltSection]) -> dict[str, 
     row = score(found, layout, measured)
     row["contacts"] = sum(len(c["contacts"]) for _, c in last.values())
     row["contact_gap_mm"] = _gaps(record, layout)
-    return row | {"travel_m": way.total_m, "before_m": way.before_m, "start_K_m": way.start_K_m}
+    return row | {"travel_m": way.total_m, "before_m": way.before_m}
 
 
 def _found(travel_m: float, candidate: Any, height_m: float | None) -> Found:
@@ -208,14 +208,12 @@ class TipPath:
     Attributes:
         stamp_s, length_m: (n,) travel since the probe was picked up, at each control cycle.
         begin_s, end_s: Start and end of the exploration.
-        start_K_m: Position of the tip at its start.
     """
 
     stamp_s: Array
     length_m: Array
     begin_s: float
     end_s: float
-    start_K_m: list[float]
 
     @classmethod
     def of(cls, record: RunRecord) -> TipPath:
@@ -225,15 +223,12 @@ class TipPath:
         held = [e.stamp_s for e in record.of_kind("tool") if e.data.get("held")]
         pose_B_K = record.pose_B_K
         if not ticks or not held or pose_B_K is None or "position_B_P" not in record.samples:
-            return cls(np.zeros(1), np.zeros(1), np.inf, np.inf, [])
+            return cls(np.zeros(1), np.zeros(1), np.inf, np.inf)
         stamps = record.samples["stamp_s"]
         use = np.nonzero((stamps >= held[0]) & (stamps <= max(t.stamp_s for t in (*ticks[-1:], *later[-1:]))))[0][::10]
         # the hand keeps pointing down with one yaw, so the tip moves in the plane as the pads' mid-point does
         p = pose_B_K.inverse().apply(record.samples["position_B_P"][use])[:, :2]
-        length = _travelled(p)
-        begin = ticks[0].stamp_s
-        at = p[int(np.searchsorted(stamps[use], begin).clip(max=len(p) - 1))]
-        return cls(stamps[use], length, begin, ticks[-1].stamp_s, at.tolist())
+        return cls(stamps[use], _travelled(p), ticks[0].stamp_s, ticks[-1].stamp_s)
 
     def travel_m(self, stamp_s: float) -> float:
         """Return the travel from the start of the exploration to a time, refining included."""

@@ -10,6 +10,10 @@ from rich.console import Console
 from glotouch_bt.commands.terminal.console import print_table
 
 
+def _mean(m: dict[str, Any] | None) -> str:
+    return f"{m['mean']:.2f} [{m['lo']:.2f}, {m['hi']:.2f}]" if m else "-"
+
+
 def print_retrieve(summary: dict[str, Any], folder: Path) -> None:
     """Print a retrieval campaign: rates with Wilson 95 % intervals, causes of failure."""
 
@@ -90,15 +94,12 @@ def print_speed(summary: dict[str, Any], folder: Path) -> None:
 def print_search(summary: dict[str, Any], folder: Path) -> None:
     """Print a search campaign: objects found at each budget, the paper's figures, errors of the candidates."""
 
-    def mean(m: dict[str, Any]) -> str:
-        return f"{m['mean']:.2f} [{m['lo']:.2f}, {m['hi']:.2f}]"
-
     def rate(r: dict[str, Any]) -> str:
         return f"{100 * r['rate']:.0f} % [{100 * r['lo']:.0f}, {100 * r['hi']:.0f}]"
 
     def row(name: str, f: dict[str, Any]) -> tuple[str, ...]:
         n = f["mean_discovered"]["1"]["n"]
-        means = [mean(f["mean_discovered"][d]) for d in ("1", "3", "5")]
+        means = [_mean(f["mean_discovered"][d]) for d in ("1", "3", "5")]
         return (name, str(n), *means, rate(f["complete"]["3"]), rate(f["complete"]["5"]))
 
     rows = [row(name, f) for name, f in summary["policies"].items()]
@@ -127,10 +128,6 @@ def print_contact(summary: dict[str, Any], folder: Path) -> None:
     """Print a contact campaign: errors of probe and bare gripper, the paper's figures, squares not traced."""
     from glotouch_bt.bench.contact import METRICS, TOOLS
 
-    def mean(of: dict[str, Any], metric: str) -> str:
-        m = of.get(metric)
-        return f"{m['mean']:.2f} [{m['lo']:.2f}, {m['hi']:.2f}]" if m else "-"
-
     def traced(r: dict[str, Any]) -> str:
         return f"{r['rate'] * r['n']:.0f}/{r['n']}" if r["n"] else "0/0"
 
@@ -141,7 +138,7 @@ def print_contact(summary: dict[str, Any], folder: Path) -> None:
         columns.append((summary[tool], summary["paper"][tool], summary["free"][tool]))
     rows = [
         (metric, *(c for fixed, paper, free in columns
-                   for c in (mean(fixed, metric), f"{paper[metric]:.2f}", mean(free, metric))))
+                   for c in (_mean(fixed.get(metric)), f"{paper[metric]:.2f}", _mean(free.get(metric)))))
         for metric in METRICS
     ]  # fmt: skip
     rows.append(

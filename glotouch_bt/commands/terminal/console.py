@@ -134,6 +134,13 @@ def print_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) 
     console.print(table)
 
 
+def print_settings(title: str, described: Sequence[Mapping[str, Any]]) -> None:
+    """Print the table of described parameters or settings; nothing if there are none."""
+    head = ("name", "type", "unit", "default", "range", "description")
+    if described:
+        print_table(title, head, [["" if d[key] is None else str(d[key]) for key in head] for d in described])
+
+
 def print_skills(described: Sequence[dict[str, Any]]) -> None:
     """Print one line for each skill."""
     rows = [

@@ -17,6 +17,7 @@ from glotouch_bt.perception.touch.detection import (
     settled,
 )
 from glotouch_bt.perception.touch.outline import (
+    area_and_centroid,
     contour_quality,
     current_tips,
     estimate_push,
@@ -24,6 +25,7 @@ from glotouch_bt.perception.touch.outline import (
     fit_kind,
     infer_outline,
     infer_outline_from_contacts,
+    minimum_rectangle,
     signed_distance,
     split_at_motion,
 )

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
@@ -21,7 +20,6 @@ def plot_matrix(path: Path, rows: Sequence[Mapping[str, Any]], classes: Sequence
     """Draw each cell as a bar of its trials; grey: the class cannot affect that skill."""
     counts = matrix(rows, classes, skills)
     figure = Figure(figsize=(1.9 + 1.05 * len(skills), 1.6 + 0.27 * len(classes)), layout="constrained")
-    FigureCanvasAgg(figure)
     axes = figure.subplots()
     for y, name in enumerate(classes):
         for x, skill in enumerate(skills):

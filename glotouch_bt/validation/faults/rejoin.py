@@ -27,15 +27,15 @@ class TwinWatch(CheckpointFile):
     """Checkpoints of a trial that stops once it equals its twin.
 
     Args:
-        path: The trial's file.
+        folder: The trial's folder.
         twin: The twin's.
         plan: The trial's plan with one fault that occurs once.
         begins_s: Robot clock when the fault begins.
     """
 
-    def __init__(self, path: Path, twin: Path, plan: FaultPlan, begins_s: float) -> None:
-        super().__init__(path)
-        self._twin = CheckpointFile(twin)
+    def __init__(self, folder: Path, twin: Path, plan: FaultPlan, begins_s: float) -> None:
+        super().__init__(folder / CHECKPOINT_FILE)
+        self._twin = CheckpointFile(twin / CHECKPOINT_FILE)
         self._stamps = {(r.number, r.stamp_s) for r in self._twin.rows()}
         (spec,) = plan.faults
         duration = spec.duration
@@ -77,8 +77,3 @@ class TwinWatch(CheckpointFile):
 
 def _known(state: dict[str, Any]) -> bytes:
     return encode({k: v for k, v in sorted(state.items()) if k in KNOWN or k.startswith(("port ", "recorded"))})
-
-
-def watched(folder: Path, twin: Path, plan: FaultPlan, begins_s: float) -> TwinWatch:
-    """Return the watched checkpoints of a trial in `folder`."""
-    return TwinWatch(folder / CHECKPOINT_FILE, twin / CHECKPOINT_FILE, plan, begins_s)

@@ -12,7 +12,7 @@ from pathlib import Path
 from glotouch_bt.faults import FaultPlan
 from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile, CheckpointRow
 from glotouch_bt.runs import ResumableRun, copy_run, find_resumable, installed_versions
-from glotouch_bt.validation.faults.rejoin import watched
+from glotouch_bt.validation.faults.rejoin import TwinWatch
 
 
 def _first(rows: list[CheckpointRow], node: str) -> tuple[str, CheckpointRow, int] | None:
@@ -52,4 +52,4 @@ def start_from(twin: Path, out: Path, plan: FaultPlan, warm_up_s: float) -> Resu
     copy_run(twin, out)
     resumable = find_resumable(out, path, installed_versions())
     resumable.file.close()
-    return replace(resumable, file=watched(out, twin, plan, begins_s), row=soon[-1], start="")
+    return replace(resumable, file=TwinWatch(out, twin, plan, begins_s), row=soon[-1], start="")

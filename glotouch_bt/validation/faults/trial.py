@@ -16,6 +16,7 @@ from glotouch_bt.faults import CATALOGUE, FaultPlan
 from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE
 from glotouch_bt.report import read_run
 from glotouch_bt.robot import BadInput
+from glotouch_bt.robot.scene import stream
 from glotouch_bt.runs import EARLIER, RunRequest, launch
 from glotouch_bt.validation.faults.cases import chosen_cases
 from glotouch_bt.validation.faults.rejoin import Rejoined
@@ -209,6 +210,4 @@ def _row(result: Mapping[str, Any], hard_force_N: float) -> dict[str, Any]:
 
 def drawn_after_s(seed: int, fault: str, skill: str, lasts_s: float) -> float:
     """Draw when the fault begins: within the first 80 % of the skill's run, rounded to the period."""
-    from glotouch_bt.robot.scene import stream
-
     return round(float(stream(seed, f"moment {fault} {skill}").uniform(0.0, 0.8 * max(lasts_s, 0.0))), 2)

@@ -68,16 +68,8 @@ def _delete(place: Place, places: list[Place], rng: Rng) -> None:
 def _rename(place: Place, places: list[Place], rng: Rng) -> None:
     holder, key = place
     if isinstance(holder, dict) and key != "":
-        names = [str(k) for h, k in places if isinstance(h, dict)] + [
-            "tree",
-            "do",
-            "in",
-            "out",
-            "subtree",
-            "",
-            "<<",
-            "é",
-        ]
+        names = [str(k) for h, k in places if isinstance(h, dict)]
+        names += ["tree", "do", "in", "out", "subtree", "", "<<", "é"]
         text = str(key)
         typo = text[: int(rng.integers(len(text) + 1))] + text[int(rng.integers(len(text) + 1)) :]
         holder[pick(rng, (pick(rng, names), typo, None, 7, True))] = holder.pop(key)
@@ -113,17 +105,8 @@ def _widen(place: Place, places: list[Place], rng: Rng) -> None:
 
 
 def _subtree(place: Place, places: list[Place], rng: Rng) -> None:
-    files = (
-        "m.yaml",
-        "subtrees/take_probe.yaml",
-        "missing.yaml",
-        "..",
-        "/dev/zero",
-        "/etc/passwd",
-        "",
-        "self.yaml",
-        "pipe",
-    )
+    files = ("m.yaml", "subtrees/take_probe.yaml", "missing.yaml", "..", "/dev/zero", "/etc/passwd", "", "self.yaml",
+             "pipe")  # fmt: skip
     place[0][place[1]] = {"subtree": {"file": pick(rng, files), "ports": pick(rng, ({}, {"tool": "tool"}, {"x": "Y"}))}}
 
 
@@ -164,8 +147,12 @@ def _flip(text: bytes, rng: Rng) -> bytes:
 
 def _insert(text: bytes, rng: Rng) -> bytes:
     at = int(rng.integers(len(text) + 1))
+    return text[:at] + _odd_text(rng) + text[at:]
+
+
+def _odd_text(rng: Rng) -> bytes:
     word = pick(rng, ODD_TEXTS).replace("{canary}", CANARY).replace("{{", "{").replace("}}", "}")
-    return text[:at] + word.encode("utf-8", "surrogatepass") + text[at:]
+    return word.encode("utf-8", "surrogatepass")
 
 
 def _after_colon(text: bytes, rng: Rng) -> bytes:
@@ -175,8 +162,7 @@ def _after_colon(text: bytes, rng: Rng) -> bytes:
         return _insert(text, rng)
     at = pick(rng, places) + 2
     end = text.find(b"\n", at)
-    word = pick(rng, ODD_TEXTS).replace("{canary}", CANARY).replace("{{", "{").replace("}}", "}")
-    return text[:at] + word.encode("utf-8", "surrogatepass") + text[end if end >= 0 else len(text) :]
+    return text[:at] + _odd_text(rng) + text[end if end >= 0 else len(text) :]
 
 
 def _cut(text: bytes, rng: Rng) -> bytes:

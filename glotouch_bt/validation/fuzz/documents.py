@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Literal, TypeVar, get_args, get_origin
@@ -11,7 +12,7 @@ import numpy as np
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from glotouch_bt.faults import CATALOGUE
+from glotouch_bt.faults import CATALOGUE, Repeat, When
 from glotouch_bt.mission.read import SkillRegistry, read_yaml, shipped, shipped_root
 from glotouch_bt.mission.spec import plain
 from glotouch_bt.skill import Skill
@@ -58,7 +59,7 @@ def shipped_plans() -> tuple[Document, ...]:
 def grow_mission(rng: np.random.Generator) -> Document:
     """Return a random or shipped mission."""
     if rng.random() < 0.15:
-        return dict(_copied(pick(rng, shipped_documents())))
+        return deepcopy(pick(rng, shipped_documents()))
     worlds = [f"worlds/{p.name}" for p in sorted((shipped_root() / "worlds").glob("*.yaml"))]
     grown = Grown({})
     document: Document = {"mission": pick(rng, ("m", "fuzz_1", "Ünïcode", "a-b")), "world": pick(rng, worlds)}
@@ -75,7 +76,7 @@ def grow_mission(rng: np.random.Generator) -> Document:
 def grow_plan(rng: np.random.Generator) -> Document:
     """Return a random or shipped fault plan."""
     if shipped_plans() and rng.random() < 0.1:
-        return dict(_copied(pick(rng, shipped_plans())))
+        return deepcopy(pick(rng, shipped_plans()))
     faults = [_fault(rng) for _ in range(int(rng.integers(1, 6)))]
     document: Document = {"faults": "fuzz", "plan": faults}
     if rng.random() < 0.5:
@@ -86,12 +87,6 @@ def grow_plan(rng: np.random.Generator) -> Document:
 def pick(rng: np.random.Generator, options: Sequence[T]) -> T:
     """Pick one of the options."""
     return options[int(rng.integers(len(options)))]
-
-
-def _copied(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {k: _copied(v) for k, v in value.items()}
-    return [_copied(v) for v in value] if isinstance(value, list) else value
 
 
 def _many(rng: np.random.Generator, grown: Grown, depth: int, parameter: bool) -> list[Any]:
@@ -209,8 +204,6 @@ def _range(field: Any) -> tuple[float, float]:
 
 
 def _fault(rng: np.random.Generator) -> Document:
-    from glotouch_bt.faults import Repeat, When
-
     kind = pick(rng, list(CATALOGUE.values()))
     made: Document = {"fault": kind.name}
     given = _values(kind.effect.Params, rng, lambda: rng.random() < 0.4)

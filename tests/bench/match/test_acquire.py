@@ -12,7 +12,7 @@ import pytest
 
 from glotouch_bt.bench.match import acquire
 from glotouch_bt.bench.match.acquire import acquire_layout, from_json, layout_of
-from glotouch_bt.bench.match.dataset import Layout, read_dataset, read_layout, write_layout
+from glotouch_bt.bench.match.dataset import Layout, layout_files, read_layout, write_layout
 from glotouch_bt.mission.record.mcap_json import to_json
 from glotouch_bt.perception.touch import Contour, TouchSet
 from glotouch_bt.report.run_record import RecordedEvent, RunRecord
@@ -86,10 +86,9 @@ def test_a_layout_comes_back(tmp_path):
     layouts = [a_layout(seed=4, names=("small", None)), a_layout(seed=11)]
     for x in reversed(layouts):
         write_layout(tmp_path / "set", x)
-    back = read_dataset(tmp_path / "set")
+    back = [read_layout(f) for f in layout_files(tmp_path / "set")]
     assert [x.seed for x in back] == [4, 11]
     assert all(same(a, b) for a, b in zip(back, layouts, strict=True))
-    assert len(read_dataset(tmp_path / "set", 1)) == 1
 
 
 @pytest.mark.parametrize(
@@ -122,7 +121,7 @@ def test_files_of_another_candidate_or_none_are_refused(tmp_path):
     with pytest.raises(BadInput, match="not a layout's truth"):
         read_layout(file)
     with pytest.raises(BadInput, match="not a folder of recorded TouchSets"):
-        read_dataset(tmp_path / "gone")
+        layout_files(tmp_path / "gone")
 
 
 def test_acquiring_runs_the_mission_and_writes_the_layout(tmp_path, monkeypatch):
@@ -131,4 +130,4 @@ def test_acquiring_runs_the_mission_and_writes_the_layout(tmp_path, monkeypatch)
     monkeypatch.setattr(acquire, "read_run", lambda folder: a_record([touchset(0, 0.05)], start, start))
     layout = acquire_layout("a request", tmp_path)
     assert isinstance(layout, Layout)
-    assert same(read_dataset(tmp_path)[0], layout)
+    assert same(read_layout(layout_files(tmp_path)[0]), layout)

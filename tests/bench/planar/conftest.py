@@ -37,6 +37,11 @@ def mushroom(stem: float, cap: float) -> Mesh:
     return as_mesh(trimesh.creation.revolve(profile, sections=256), "mushroom")
 
 
+def centres_of(world: PlanarWorld) -> Array:
+    """True centres (k, 2) of the sections in K."""
+    return np.array([world.to_K(i, s.centre_m[None])[0] for i, s in enumerate(world.sections)]).reshape(-1, 2)
+
+
 WorldOf = Callable[..., PlanarWorld]
 
 

@@ -11,7 +11,7 @@ from glotouch_bt.mission.load import load_mission
 from glotouch_bt.perception.search import search_policy
 from glotouch_bt.robot.scene.meshes import load_folder
 from glotouch_bt.robot.scene.placement import draw_layout
-from tests.bench.planar.conftest import WorldOf, cylinder
+from tests.bench.planar.conftest import WorldOf, centres_of, cylinder
 
 
 @pytest.mark.parametrize("policy", ["nearest_frontier", "expected_find"])
@@ -22,13 +22,13 @@ def test_two_cylinders_are_found_where_they_are(world_of: WorldOf, policy: str) 
     explored = explore(world, search_policy(policy), 2)
     assert explored.ended == "complete"
     found = np.array([t.candidate.contour.centre_K_m for t in explored.found])
-    gap = np.linalg.norm(found[:, None] - world.centres_K_m()[None], axis=2)
+    gap = np.linalg.norm(found[:, None] - centres_of(world)[None], axis=2)
     assert gap.min(axis=0).max() < 0.003
     assert explored.travel_m == world.travel_m
     refined = refine_all(world, explored)
     assert explored.travel_m < refined[-1].travel_m <= world.travel_m
     measured = np.array([t.candidate.contour.centre_K_m for t in refined])
-    assert np.linalg.norm(measured[:, None] - world.centres_K_m()[None], axis=2).min(axis=0).max() < 0.002
+    assert np.linalg.norm(measured[:, None] - centres_of(world)[None], axis=2).min(axis=0).max() < 0.002
     assert [t.travel_m for t in explored.found] == sorted(t.travel_m for t in explored.found)
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from glotouch_bt.bench.planar import felt_section
-from glotouch_bt.bench.planar.section import centre_of_area, min_rectangle
+from glotouch_bt.perception.touch import area_and_centroid, minimum_rectangle
 from glotouch_bt.robot.scene.meshes import load_folder
 from tests.bench.planar.conftest import TIP, box, cylinder, mushroom
 
@@ -30,7 +30,6 @@ def test_cylinder(off: float) -> None:
     section = felt_section(cylinder(0.025))
     assert section.side(polar(0.025 + TIP + off)) == pytest.approx(np.full(90, off), abs=EXACT_M)
     assert section.centre_m == pytest.approx([0, 0], abs=EXACT_M)
-    assert section.hull_area_m2 == pytest.approx(np.pi * 0.025**2, rel=0.005)
     assert section.top_m == pytest.approx(0.06)
 
 
@@ -90,15 +89,15 @@ def test_centroid_and_rectangle_of_random_hulls(seed: int) -> None:
     triangles = [(first, hull[i], hull[i + 1]) for i in range(1, len(hull) - 1)]
     areas = [0.5 * abs((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0]) for a, b, c in triangles]
     exact = sum(w * (a + b + c) / 3 for w, (a, b, c) in zip(areas, triangles, strict=True)) / sum(areas)
-    assert centre_of_area(hull) == pytest.approx(exact, abs=1e-9)
-    size, _ = min_rectangle(hull)
+    assert area_and_centroid(hull)[1] == pytest.approx(exact, abs=1e-9)
+    _, size, _ = minimum_rectangle(hull)
     brute = min(
         np.prod(np.ptp(hull @ np.array([[np.cos(t), -np.sin(t)], [np.sin(t), np.cos(t)]]), axis=0))
         for t in np.linspace(0, np.pi / 2, 400)
     )
     assert size[0] * size[1] <= brute + 1e-9
     turned = hull @ np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
-    size_turned, yaw_turned = min_rectangle(turned)
+    _, size_turned, yaw_turned = minimum_rectangle(turned)
     assert np.prod(size_turned) == pytest.approx(np.prod(size))
     c, s = np.cos(yaw_turned), np.sin(yaw_turned)  # two rectangles may be the least one: any may be given
     assert np.prod(np.ptp(turned @ np.array([[c, -s], [s, c]]), axis=0)) == pytest.approx(np.prod(size))

@@ -9,14 +9,14 @@ import pytest
 import trimesh
 
 from glotouch_bt.bench.planar import ContactModel, PlanarWorld
-from glotouch_bt.bench.planar.drive import drive
+from glotouch_bt.motion import drive
 from glotouch_bt.perception.search import Move, MoveOutcome, OutlineTrace, TraceParams, trace, trace_more
 from glotouch_bt.perception.search.tracing.trace_state import TraceState
 from glotouch_bt.perception.touch import Contact
 from glotouch_bt.robot.scene.meshes import Mesh
 from glotouch_skills.explore.orbit_probe import OrbitProbeParams
 from glotouch_skills.explore.refine_outline import RefineOutlineParams
-from tests.bench.planar.conftest import TIP, WorldOf, as_mesh, box, cylinder
+from tests.bench.planar.conftest import TIP, WorldOf, as_mesh, box, centres_of, cylinder
 
 CENTRE = np.array([0.02, -0.03])
 INNER = np.array([0.138, 0.188])
@@ -25,7 +25,7 @@ INNER = np.array([0.138, 0.188])
 def touched_from(world: PlanarWorld, angle: float) -> Contact:
     """The first contact: straight towards the first object from a direction."""
     out = np.array([np.cos(angle), np.sin(angle)])
-    centre = world.centres_K_m()[0]
+    centre = centres_of(world)[0]
     world.lowered, world.tip_K_m = True, centre + 0.085 * out
     felt = world.execute(Move("sweep", centre))
     assert felt.contact is not None
@@ -33,7 +33,7 @@ def touched_from(world: PlanarWorld, angle: float) -> Contact:
 
 
 def traced(world: PlanarWorld, first: Contact, params: TraceParams | None = None) -> OutlineTrace:
-    return drive(trace(first, world.tip_K_m, TIP, params, half_extent_m=INNER), world)
+    return drive(trace(first, world.tip_K_m, TIP, params, half_extent_m=INNER), world.execute)
 
 
 @pytest.mark.parametrize("radius", [0.02, 0.03, 0.04])
@@ -44,19 +44,19 @@ def test_a_disc_is_where_it_is_and_as_large(world_of: WorldOf, radius: float, an
     assert result.contour is not None
     assert result.contour.family == "circle"
     # in the world's own words: contacts are exact, the object stands where it is now
-    np.testing.assert_allclose(result.contour.centre_K_m, world.centres_K_m()[0], atol=3e-4)
+    np.testing.assert_allclose(result.contour.centre_K_m, centres_of(world)[0], atol=3e-4)
     assert result.contour.size_m[0] == pytest.approx(2 * radius, abs=6e-4)
     assert TraceParams().min_contacts <= len(result.contacts) <= TraceParams().max_contacts
     assert result.outliers == ()
     assert result.ended
-    assert np.linalg.norm(result.displaced_K_m - (world.centres_K_m()[0] - CENTRE)) < 5e-4
+    assert np.linalg.norm(result.displaced_K_m - (centres_of(world)[0] - CENTRE)) < 5e-4
 
 
 def test_a_box_is_traced_within_its_bounds(world_of: WorldOf) -> None:
     world = world_of([box(0.09, 0.05)], [(*CENTRE, 0.4)])
     result = traced(world, touched_from(world, 1.2))
     assert result.contour is not None
-    np.testing.assert_allclose(result.contour.centre_K_m, world.centres_K_m()[0], atol=2e-3)
+    np.testing.assert_allclose(result.contour.centre_K_m, centres_of(world)[0], atol=2e-3)
     np.testing.assert_allclose(sorted(result.contour.size_m), [0.05, 0.09], atol=5e-3)
     assert len(result.contacts) <= TraceParams().max_contacts
 
@@ -88,10 +88,10 @@ def test_what_was_touched_at_a_limbs_end_is_beside_it(
     tip = np.array([*CENTRE, 0.018])
     first = Contact(0.0, tip, -out, out, (tip - TIP * out)[:2], 1.0)
     world.lowered, world.tip_K_m = True, tip[:2] + 0.004 * out[:2]
-    result = drive(trace(first, world.tip_K_m, TIP, OrbitProbeParams().rule(), half_extent_m=INNER), world)
+    result = drive(trace(first, world.tip_K_m, TIP, OrbitProbeParams().rule(), half_extent_m=INNER), world.execute)
     assert len(result.contacts) >= TraceParams().min_contacts
     assert result.outline is not None
-    assert np.linalg.norm(result.outline.centre_K_m - world.centres_K_m()[0]) < 0.02
+    assert np.linalg.norm(result.outline.centre_K_m - centres_of(world)[0]) < 0.02
 
 
 def test_what_turns_out_to_be_known_is_not_traced_to_the_end(world_of: WorldOf) -> None:
@@ -104,7 +104,7 @@ def test_what_turns_out_to_be_known_is_not_traced_to_the_end(world_of: WorldOf) 
 
     params = TraceParams(centre_sd_m=1e-9, radial_sd_m=1e-9)
     plan = trace(first, world.tip_K_m, TIP, params, half_extent_m=INNER, joined=joined)
-    result = drive(plan, world)
+    result = drive(plan, world.execute)
     assert (result.ended, len(result.contacts)) == ("it is an object that is known", 5)
     assert min(asked) == params.min_contacts
 
@@ -135,11 +135,11 @@ def test_a_contact_that_faces_the_middle_is_with_something_else(world_of: WorldO
 
     world, intruded = world_of([cylinder(0.03)], [(*CENTRE, 0)]), Intruded()
     first = touched_from(world, np.pi)
-    result = drive(trace(first, world.tip_K_m, TIP, half_extent_m=INNER), intruded)
+    result = drive(trace(first, world.tip_K_m, TIP, half_extent_m=INNER), intruded.execute)
     assert intruded.met is not None
     assert [s is intruded.met for s in result.outliers] == [True]
     assert result.contour is not None
-    np.testing.assert_allclose(result.contour.centre_K_m, world.centres_K_m()[0], atol=5e-4)
+    np.testing.assert_allclose(result.contour.centre_K_m, centres_of(world)[0], atol=5e-4)
 
 
 def test_what_moved_unfelt_is_traced_anew(world_of: WorldOf) -> None:
@@ -154,9 +154,9 @@ def test_what_moved_unfelt_is_traced_anew(world_of: WorldOf) -> None:
             first = touched_from(world, 0.7 + k)
             before = traced(world, first, TraceParams(centre_sd_m=5e-3, radial_sd_m=0.02, min_contacts=5))
             world.poses[0, :2] += shift
-            result = drive(trace_more(before.contacts, world.tip_K_m, TIP, half_extent_m=INNER), world)
+            result = drive(trace_more(before.contacts, world.tip_K_m, TIP, half_extent_m=INNER), world.execute)
             assert result.contour is not None
-            off = float(np.linalg.norm(result.contour.centre_K_m - world.centres_K_m()[0]))
+            off = float(np.linalg.norm(result.contour.centre_K_m - centres_of(world)[0]))
             if shift == (0.0, 0.0):
                 assert result.moves == 0
                 assert off < 1e-3
@@ -186,7 +186,7 @@ def refine(world: PlanarWorld, before: OutlineTrace, moves: list[tuple[Move, Mov
             return felt
 
     rule = RefineOutlineParams().rule()
-    return drive(trace_more(before.contacts, world.tip_K_m, TIP, rule, half_extent_m=INNER), Watched())
+    return drive(trace_more(before.contacts, world.tip_K_m, TIP, rule, half_extent_m=INNER), Watched().execute)
 
 
 def test_refining_finds_every_limb(world_of: WorldOf) -> None:

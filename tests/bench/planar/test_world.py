@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glotouch_bt.bench.planar import WALL, ContactModel, PlanarWorld, felt_section
+from glotouch_bt.bench.planar import ContactModel, PlanarWorld, felt_section
 from glotouch_bt.perception.search.moves import Move
 from tests.bench.planar.conftest import HALF, IDEAL, TIP, WorldOf, box, cylinder
 
@@ -97,7 +97,6 @@ def test_walls(world_of: WorldOf) -> None:
     assert felt.contact is not None
     assert felt.tip_K_m[0] == pytest.approx(HALF[0] - TIP)
     assert felt.contact.reaction_K[0] < -0.9
-    assert world.log[-1].object == WALL
     assert world.execute(go("hop", 0.149, 0)).refused
 
 

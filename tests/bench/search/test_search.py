@@ -138,7 +138,6 @@ def test_travel_of_a_record_counts_from_the_first_sweep_to_the_last_trace():
     assert way.total_m == pytest.approx(0.2, abs=0.006)
     assert way.travel_m(2.0) == pytest.approx(0.1, abs=0.004)
     assert way.travel_m(99.0) == way.total_m
-    assert way.start_K_m == pytest.approx([0.1, 0.0], abs=0.002)
 
 
 def test_a_record_without_exploration_has_no_travel():

@@ -5,6 +5,11 @@ from glotouch_bt.perception.touch.outline.contours import contour_quality, fit_c
 from glotouch_bt.perception.touch.outline.envelope import envelope
 from glotouch_bt.perception.touch.outline.mixture import OutlineBelief
 from glotouch_bt.perception.touch.outline.moved import infer_outline_from_contacts, split_at_motion
-from glotouch_bt.perception.touch.outline.polygons import convex_hull, polygon_distance
+from glotouch_bt.perception.touch.outline.polygons import (
+    area_and_centroid,
+    convex_hull,
+    minimum_rectangle,
+    polygon_distance,
+)
 from glotouch_bt.perception.touch.outline.primitives import wrapped
 from glotouch_bt.perception.touch.outline.pushing import estimate_push
