@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from glotouch_bt.bench.contact.plots import plot_errors, plot_traces
-from glotouch_bt.bench.contact.square import TOOLS, Tool, TracedSquare, polygon_distance, traced_square, true_square
+from glotouch_bt.bench.contact.square import TOOLS, Tool, TracedSquare, traced_square, true_square
 from glotouch_bt.bench.retrieve import cause
 from glotouch_bt.bench.statistics import bootstrap_mean, wilson
+from glotouch_bt.perception.touch import polygon_distance
 from glotouch_bt.report import RunRecord, read_run
 from glotouch_bt.robot import Array, BadInput, Pose
 from glotouch_bt.runs import Campaign, OnRow, RunRequest, crashed, gather, launch, silent, write_summary, write_table
@@ -81,8 +82,8 @@ def run_trial(tool: Tool, fixed: bool, request: RunRequest) -> dict[str, Any]:
 def score(record: RunRecord, traced: TracedSquare) -> dict[str, Any]:
     """Return the paper's five errors and ours, in mm and degrees."""
     before, true = true_square(record, "start"), true_square(record)
-    contact = polygon_distance(traced.points_B_m, true.corners_B_m)
-    ball = polygon_distance(traced.tips_B_m, true.corners_B_m) - traced.tip_radius_m
+    contact = polygon_distance(true.corners_B_m, traced.points_B_m)
+    ball = polygon_distance(true.corners_B_m, traced.tips_B_m) - traced.tip_radius_m
     calibration = record.of_kind("calibration")
     row: dict[str, Any] = {
         "contacts": len(contact),

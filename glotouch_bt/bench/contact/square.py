@@ -1,4 +1,4 @@
-"""The calibration square: its true outline, the fit to a run's contacts, and point-to-outline distances."""
+"""The calibration square: its true outline, and the fit to a run's contacts."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from glotouch_bt.mission.read import load_world
-from glotouch_bt.perception.touch import Contour, fit_kind
+from glotouch_bt.perception.touch import fit_kind
 from glotouch_bt.report import RunRecord
 from glotouch_bt.robot import Array, BadInput, Pose
 from glotouch_bt.robot.scene import load_folder
@@ -72,11 +72,6 @@ def rectangle(centre_m: Array, sides_m: Array, yaw_rad: float) -> Array:
     return np.asarray(local @ np.array([[c, s], [-s, c]]) + centre_m)
 
 
-def fit_square(places_m: Array, radius_m: float) -> Contour:
-    """Fit a rectangle to ball centres (k, 2) with the ball's radius, or to contact points with radius 0."""
-    return fit_kind(places_m, radius_m, "box")
-
-
 def traced_square(record: RunRecord, tool: Tool, fixed: bool) -> TracedSquare:
     """Return the contacts of the traced candidate and the square fitted to them.
 
@@ -97,7 +92,7 @@ def traced_square(record: RunRecord, tool: Tool, fixed: bool) -> TracedSquare:
     tips = np.array([c["tip_K_m"][:2] for c in contacts], dtype=np.float64)
     points = np.array([c["point_K_m"] for c in contacts], dtype=np.float64)
     radius = float(record.of_run("probe", "tip_radius_m")) if tool == "probe" else 0.0
-    fit = fit_square(tips if radius else points, radius)
+    fit = fit_kind(tips if radius else points, radius, "box")
     return TracedSquare(
         _planar(pose_B_K, points),
         _planar(pose_B_K, tips),
@@ -115,17 +110,6 @@ def true_square(record: RunRecord, when: Literal["start", "end"] = "end") -> Tru
     world = load_world(WORLD)
     (block,) = load_folder(world.objects.folder, world.objects.names)
     return TrueSquare(pose, block.extents_m[:2])
-
-
-def polygon_distance(points_m: Array, polygon_m: Array) -> Array:
-    """Return signed distances (n,) of points (n, 2) from a counter-clockwise convex polygon (m, 2); negative inside."""
-    start = np.asarray(polygon_m, dtype=np.float64)
-    edge = np.roll(start, -1, axis=0) - start
-    offset = np.asarray(points_m, dtype=np.float64)[:, None] - start
-    share = np.clip((offset * edge).sum(-1) / (edge * edge).sum(-1), 0.0, 1.0)
-    nearest = np.linalg.norm(offset - share[..., None] * edge, axis=-1).min(axis=1)
-    outside = (edge[:, 0] * offset[..., 1] - edge[:, 1] * offset[..., 0]).min(axis=1) < 0.0
-    return np.asarray(np.where(outside, nearest, -nearest))
 
 
 def _planar(pose_B_K: Pose, points_K_m: Array) -> Array:

@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from glotouch_bt.bench.detection.curve import Pace, Push, false_alarms, found_share, per_hour
+from glotouch_bt.bench.detection.curve import Push, false_alarms, found_share, per_hour
 from glotouch_bt.bench.detection.plot import plot_curves
 from glotouch_bt.bench.detection.signals import Hand, MoveKind
 from glotouch_bt.bench.detection.simulated import WORLD, FreeMotion, SimulatedProbe, free_motion, push_once
@@ -18,7 +18,6 @@ from glotouch_bt.mission.read import load_conditions, load_world
 from glotouch_bt.perception.touch import GuardParams, Payload
 from glotouch_bt.robot import RobotDescription
 from glotouch_bt.runs import write_summary, write_table
-from glotouch_bt.skill.probing import GUARDED_ACCELERATION_M_S2, GUARDED_JERK_M_S3
 
 PUSH_N = 0.6
 FORCES_N = (0.10, 0.12, 0.14, 0.16, 0.18, 0.20, 0.25, 0.30, 0.40, 0.60)
@@ -114,17 +113,16 @@ def _synthetic(
     conditions, probe, gripper = load_conditions(name), load_world(WORLD).probe, description.gripper
     tip_P = np.array([0.0, 0.0, probe.grasp_to_tip_m])
     hand = Hand(Payload.hand(gripper, probe), tip_P, gripper.pose_E_P)
-    pace, guard = Pace(GUARDED_ACCELERATION_M_S2, GUARDED_JERK_M_S3), GuardParams()
     result: dict[str, Any] = {}
     for key, compensate, hours in (("false_alarms", True, study.hours), ("uncompensated", False, 0.1 * study.hours)):
-        result[key] = false_alarms(hand, conditions, guard, pace, study.seeds, hours=hours, compensate=compensate)
+        result[key] = false_alarms(hand, conditions, study.seeds, hours=hours, compensate=compensate)
         for kind, r in result[key].items():
             rows.append(_row(key, name, kind=kind, count=r["count"], hours=r["hours"]))
             on_line(f"{name} {key} {kind}: {r['count']} in {r['hours']:.2f} h")
     result["found"] = {}
     for kind in get_args(MoveKind):
         for push in get_args(Push):
-            shares = [found_share(hand, conditions, guard, pace, kind, push, f, study.seeds) for f in FORCES_N]
+            shares = [found_share(hand, conditions, kind, push, f, study.seeds) for f in FORCES_N]
             for force, share in zip(FORCES_N, shares, strict=True):
                 n = share["n"]
                 rows.append(

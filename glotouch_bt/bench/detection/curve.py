@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Literal, TypedDict, get_args
 
 import numpy as np
@@ -11,7 +11,6 @@ from scipy.stats import chi2
 
 from glotouch_bt.bench.detection.signals import RATE_HZ, FreeMove, Hand, MoveKind, Wrist
 from glotouch_bt.bench.statistics import Rate, wilson
-from glotouch_bt.perception.touch import GuardParams
 from glotouch_bt.robot import Array, Conditions
 
 Push = Literal["step", "slow"]
@@ -43,15 +42,7 @@ def per_hour(count: int, hours: float) -> PerHour:
     return {"rate": count / hours, "lo": lo / hours, "hi": hi / hours, "count": count, "hours": hours}
 
 
-@dataclass(frozen=True)
-class Pace:
-    """Acceleration and jerk of a guarded move."""
-
-    acceleration_m_s2: float
-    jerk_m_s3: float
-
-
-def draw_move(kind: MoveKind, pace: Pace, rng: np.random.Generator) -> FreeMove:
+def draw_move(kind: MoveKind, rng: np.random.Generator) -> FreeMove:
     """Draw a move like those of exploration: sweeps of 50-350 mm at 40-50 mm/s, steps of 10-30 mm, 20-110 mm down."""
     bearing = rng.uniform(0.0, 2 * np.pi)
     across = np.array([np.cos(bearing), np.sin(bearing), 0.0])
@@ -61,25 +52,11 @@ def draw_move(kind: MoveKind, pace: Pace, rng: np.random.Generator) -> FreeMove:
         "down": (0.02, 0.11, 0.015, 0.04),
     }[kind]
     direction = np.array([0.0, 0.0, -1.0]) if kind == "down" else across
-    return FreeMove(
-        kind,
-        rng.uniform(low, high),
-        rng.uniform(slowest, fastest),
-        pace.acceleration_m_s2,
-        pace.jerk_m_s3,
-        direction,
-    )
+    return FreeMove(kind, rng.uniform(low, high), rng.uniform(slowest, fastest), direction)
 
 
 def false_alarms(
-    hand: Hand,
-    conditions: Conditions,
-    params: GuardParams,
-    pace: Pace,
-    seeds: Sequence[int],
-    *,
-    hours: float,
-    compensate: bool = True,
+    hand: Hand, conditions: Conditions, seeds: Sequence[int], *, hours: float, compensate: bool = True
 ) -> dict[MoveKind, PerHour]:
     """Return contacts reported per hour of guarded free motion, by kind of move; `hours` for each kind."""
     found: dict[MoveKind, PerHour] = {}
@@ -87,10 +64,10 @@ def false_alarms(
         count, heard_s = 0, 0.0
         for seed in seeds:
             rng = np.random.default_rng([seed, get_args(MoveKind).index(kind)])
-            wrist = Wrist(hand, conditions, params, rng, compensate)
+            wrist = Wrist(hand, conditions, rng, compensate)
             share_s = 0.0
             while share_s < 3600.0 * hours / len(seeds):
-                onset, listened_s = wrist.listen(draw_move(kind, pace, rng))
+                onset, listened_s = wrist.listen(draw_move(kind, rng))
                 count += onset is not None
                 share_s += listened_s
             heard_s += share_s
@@ -107,22 +84,14 @@ def force_of(push: Push, force_N: float, against_B: Array) -> Array:
 
 
 def found_share(
-    hand: Hand,
-    conditions: Conditions,
-    params: GuardParams,
-    pace: Pace,
-    kind: MoveKind,
-    push: Push,
-    force_N: float,
-    seeds: Sequence[int],
+    hand: Hand, conditions: Conditions, kind: MoveKind, push: Push, force_N: float, seeds: Sequence[int]
 ) -> Rate:
     """Return the share of pushes of `force_N` detected while they last, one push a seed. An earlier alarm is a miss."""
     hits = 0
     for seed in seeds:
         rng = np.random.default_rng([seed, 7])
-        drawn = draw_move(kind, pace, rng)
-        long = FreeMove(kind, 0.09, 0.04, drawn.acceleration_m_s2, drawn.jerk_m_s3, drawn.direction_B)
+        long = replace(draw_move(kind, rng), length_m=0.09, speed_m_s=0.04)
         force = force_of(push, force_N, -long.direction_B)
-        onset, _ = Wrist(hand, conditions, params, rng).listen(long, force)
+        onset, _ = Wrist(hand, conditions, rng).listen(long, force)
         hits += onset is not None and PUSH_AFTER_S <= onset.detected_s <= len(force) / RATE_HZ
     return wilson(hits, len(seeds))

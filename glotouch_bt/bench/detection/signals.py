@@ -15,6 +15,7 @@ import numpy as np
 from glotouch_bt.motion import rest_to_rest
 from glotouch_bt.perception.touch import ContactGuard, GuardParams, MeasuredInertia, Onset, Payload, fit_baseline
 from glotouch_bt.robot import Array, Conditions, GripperState, Observation, Pose
+from glotouch_bt.skill.probing import GUARDED_ACCELERATION_M_S2, GUARDED_JERK_M_S3
 
 RATE_HZ, PERIOD_S = 1000.0, 0.01
 REST = 120
@@ -52,15 +53,13 @@ class FreeMove:
 
     Attributes:
         kind: Kind of move, which selects the guard.
-        length_m, speed_m_s, acceleration_m_s2, jerk_m_s3: Motion profile.
+        length_m, speed_m_s: Length and speed; acceleration and jerk are those of guarded moves.
         direction_B: (3,) unit.
     """
 
     kind: MoveKind
     length_m: float
     speed_m_s: float
-    acceleration_m_s2: float
-    jerk_m_s3: float
     direction_B: Array
 
 
@@ -76,15 +75,12 @@ class Wrist:
     Args:
         hand: As configured.
         conditions: Disturbances.
-        params: Parameters of the guard, with the configured latency.
         compensate: Subtract the inertial wrench of the measured motion, as the prober does.
         rng: Random stream of this trial.
     """
 
-    def __init__(
-        self, hand: Hand, conditions: Conditions, params: GuardParams, rng: np.random.Generator, compensate: bool = True
-    ) -> None:
-        self._hand, self._c, self._params, self._rng, self._compensate = hand, conditions, params, rng, compensate
+    def __init__(self, hand: Hand, conditions: Conditions, rng: np.random.Generator, compensate: bool = True) -> None:
+        self._hand, self._c, self._rng, self._compensate = hand, conditions, rng, compensate
         self._true = wrong(hand.carried, conditions, rng)
         self._sd = np.array([conditions.force_noise_sd_N] * 3 + [conditions.torque_noise_sd_Nm] * 3)
         self._drift_sd = conditions.force_drift_N_per_sqrt_min * np.sqrt(1.0 / RATE_HZ / 60.0)
@@ -96,7 +92,8 @@ class Wrist:
             move: The move.
             touch_B_N: (k, 3) force on the ball in B from the first sample of the move, or None; truncated to the move.
         """
-        profile = rest_to_rest(move.length_m, move.speed_m_s, move.acceleration_m_s2, move.jerk_m_s3, PERIOD_S)
+        limits = GUARDED_ACCELERATION_M_S2, GUARDED_JERK_M_S3
+        profile = rest_to_rest(move.length_m, move.speed_m_s, *limits, PERIOD_S)
         n = round(len(profile.a) * PERIOD_S * RATE_HZ)
         ends = np.arange(len(profile.a) + 1) * PERIOD_S * RATE_HZ - 1
         along = np.interp(np.arange(n), ends, np.concatenate([[0.0], profile.a]))
@@ -110,16 +107,10 @@ class Wrist:
             clean[:, 3:] += np.cross(self._hand.tip_S_m, force_S)
         wrench = self._sensed(np.vstack([np.zeros((REST, 6)), clean]))
         baseline = fit_baseline(wrench[:REST])
-        hand = self._hand
-        inertia = MeasuredInertia(hand.carried, hand.pose_E_P, self._params.latency_s) if self._compensate else None
-        guard = ContactGuard(
-            baseline,
-            None if move.kind == "step" else move.direction_B,
-            hand.tip_P_m,
-            hand.pose_E_P,
-            self._params,
-            inertia,
-        )
+        hand, params = self._hand, GuardParams()
+        inertia = MeasuredInertia(hand.carried, hand.pose_E_P, params.latency_s) if self._compensate else None
+        direction_B = None if move.kind == "step" else move.direction_B
+        guard = ContactGuard(baseline, direction_B, hand.tip_P_m, hand.pose_E_P, params, inertia)
         return guard(_block(wrench[REST:], move, along)), n / RATE_HZ
 
     def _sensed(self, true: Array) -> Array:

@@ -26,6 +26,7 @@ from glotouch_bt.perception.touch.outline import (
     infer_outline,
     infer_outline_from_contacts,
     minimum_rectangle,
+    polygon_distance,
     signed_distance,
     split_at_motion,
 )

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glotouch_bt.bench.contact import bench as contact
-from glotouch_bt.bench.contact.square import TrueSquare, fit_square, polygon_distance, rectangle
+from glotouch_bt.bench.contact.square import TrueSquare, rectangle
+from glotouch_bt.perception.touch import fit_kind, polygon_distance
 from glotouch_bt.robot import Pose
 
 SIDES = np.array([0.06, 0.06])
@@ -27,12 +28,12 @@ def test_distance_from_a_face_is_how_far_off_it_is(yaw, x, y, u, off, side) -> N
     out = np.array([(b - a)[1], -(b - a)[0]]) / 0.06
     inside = -min(0.03 - abs(u), -off) if off < 0 else off
     point = 0.5 * (a + b) + u * (b - a) / 0.06 + off * out
-    assert polygon_distance(point[None], corners)[0] == pytest.approx(inside, abs=1e-12)
+    assert polygon_distance(corners, point[None])[0] == pytest.approx(inside, abs=1e-12)
 
 
 def test_distance_from_a_corner_is_round() -> None:
     corners = rectangle(np.zeros(2), SIDES, 0.0)
-    np.testing.assert_allclose(polygon_distance(np.array([[0.033, 0.034]]), corners), [0.005], atol=1e-12)
+    np.testing.assert_allclose(polygon_distance(corners, np.array([[0.033, 0.034]])), [0.005], atol=1e-12)
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.006])
@@ -42,7 +43,7 @@ def test_a_square_is_fitted_to_what_touched_it(radius: float) -> None:
     faces = [np.column_stack([u, np.full(4, 0.03 + radius)]) @ np.array([[c, s], [-s, c]]) for c, s in
              ((1, 0), (0, 1), (-1, 0), (0, -1))]  # fmt: skip
     turn = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
-    fit = fit_square(np.concatenate(faces) @ turn + (0.02, -0.03), radius)
+    fit = fit_kind(np.concatenate(faces) @ turn + (0.02, -0.03), radius, "box")
     np.testing.assert_allclose(fit.centre_K_m, [0.02, -0.03], atol=2e-5)
     np.testing.assert_allclose(fit.size_m, SIDES, atol=1e-4)
 

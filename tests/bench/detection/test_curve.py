@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from glotouch_backends.rizon4 import RIZON4_XENSE
-from glotouch_bt.bench.detection.curve import Pace, false_alarms, force_of, found_share, per_hour
+from glotouch_bt.bench.detection.curve import false_alarms, force_of, found_share, per_hour
 from glotouch_bt.bench.detection.signals import FreeMove, Hand, Wrist
 from glotouch_bt.mission.read.worlds import load_conditions
-from glotouch_bt.perception.touch import GuardParams, Payload
+from glotouch_bt.perception.touch import Payload
 from glotouch_bt.robot import Conditions, Probe
 
 PROBE = Probe()
@@ -16,7 +16,7 @@ HAND = Hand(
     np.array([0.0, 0.0, PROBE.grasp_to_tip_m]),
     RIZON4_XENSE.gripper.pose_E_P,
 )
-PACE, SEEDS = Pace(0.5, 20.0), range(20)
+SEEDS = range(20)
 
 
 def test_poisson_interval_against_the_tables():
@@ -30,9 +30,9 @@ def test_poisson_interval_against_the_tables():
 def test_free_motion_is_silent_because_the_inertia_is_taken_out(condition):
     """Five minutes of each kind of move; downwards it would trip on every stop without."""
     conditions = load_conditions(condition)
-    quiet = false_alarms(HAND, conditions, GuardParams(), PACE, SEEDS, hours=0.08)
+    quiet = false_alarms(HAND, conditions, SEEDS, hours=0.08)
     assert [r["count"] for r in quiet.values()] == [0, 0, 0]
-    loud = false_alarms(HAND, conditions, GuardParams(), PACE, range(2), hours=0.01, compensate=False)
+    loud = false_alarms(HAND, conditions, range(2), hours=0.01, compensate=False)
     assert loud["down"]["rate"] > 300
 
 
@@ -41,17 +41,16 @@ def test_free_motion_is_silent_because_the_inertia_is_taken_out(condition):
 def test_what_force_is_found(kind, push):
     """Below the threshold never, above it always; along the probe under harsh noise from 0.4 N."""
     nominal, harsh = load_conditions("nominal"), load_conditions("harsh")
-    args = (GuardParams(), PACE, kind, push)
-    assert found_share(HAND, nominal, *args, 0.08, SEEDS)["rate"] == 0.0
-    assert found_share(HAND, nominal, *args, 0.2, SEEDS)["rate"] == 1.0
-    assert found_share(HAND, harsh, *args, 0.4 if kind == "down" else 0.2, SEEDS)["rate"] == 1.0
-    assert found_share(HAND, harsh, *args, 0.6, SEEDS)["rate"] == 1.0
+    assert found_share(HAND, nominal, kind, push, 0.08, SEEDS)["rate"] == 0.0
+    assert found_share(HAND, nominal, kind, push, 0.2, SEEDS)["rate"] == 1.0
+    assert found_share(HAND, harsh, kind, push, 0.4 if kind == "down" else 0.2, SEEDS)["rate"] == 1.0
+    assert found_share(HAND, harsh, kind, push, 0.6, SEEDS)["rate"] == 1.0
 
 
 def test_a_push_is_dated_where_it_began():
     """Without noise: a sudden push half a second into the move, to two samples."""
-    move = FreeMove("sweep", 0.09, 0.04, 0.5, 20.0, np.array([0.0, 1.0, 0.0]))
-    wrist = Wrist(HAND, Conditions(wrench_latency_s=0.003), GuardParams(), np.random.default_rng(0))
+    move = FreeMove("sweep", 0.09, 0.04, np.array([0.0, 1.0, 0.0]))
+    wrist = Wrist(HAND, Conditions(wrench_latency_s=0.003), np.random.default_rng(0))
     onset, listened_s = wrist.listen(move, force_of("step", 0.6, -move.direction_B))
     assert listened_s == pytest.approx(0.09 / 0.04, abs=0.15)
     assert onset is not None
