@@ -105,10 +105,10 @@ def run_campaign(campaign: SearchCampaign, executor: Executor, on_row: OnRow = s
 def _run(campaign: SearchCampaign, executor: Executor, on_row: OnRow) -> list[dict[str, Any]]:
     """Run missions first, seeds outermost: an interrupted campaign has all policies on the same layouts."""
     runs = [f for top in campaign.recorded for f in recorded_folders(top, Path(campaign.conditions).stem)]
-    plane = tuple(dict.fromkeys(campaign.seeds + campaign.planar_seeds))
+    plane = tuple(dict.fromkeys((*campaign.seeds, *campaign.planar_seeds)))
     budget = campaign.planar_budget_m
     futures: list[Future[Any]] = [
-        executor.submit(mission_trial, campaign.request(policy, seed), policy, campaign.resume)
+        executor.submit(mission_trial, campaign.trial(policy, seed), policy, campaign.resume)
         for seed in campaign.seeds
         for policy in campaign.policies
     ]
