@@ -36,7 +36,7 @@ COLUMNS = (
 
 @dataclass(frozen=True, kw_only=True)
 class KillStudy(Campaign):
-    """Settings of the study, with one twin a seed.
+    """Settings of the study, with one twin a seed. Missions run on the default backend.
 
     Attributes:
         kills: Number of kills a seed.
@@ -49,8 +49,7 @@ class KillStudy(Campaign):
     def run_words(self, seed: int, folder: Path) -> list[str]:
         """Return the command that runs one mission."""
         sets = [w for k, v in self.settings.items() for w in ("--set", f"{k}={v}")]
-        head = [*self.words, "run", self.mission, "--backend", self.backend, "--seed", str(seed)]
-        head += ["--conditions", self.conditions]
+        head = [*self.words, "run", self.mission, "--seed", str(seed), "--conditions", self.conditions]
         box = [] if self.objects is None else ["--objects", str(self.objects)]
         return [*head, *sets, *box, "--out", str(folder), "--json"]
 
