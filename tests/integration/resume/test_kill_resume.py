@@ -23,7 +23,11 @@ tree:
 def test_a_killed_run_is_compared_with_its_twin(tmp_path: Path) -> None:
     (tmp_path / "m.yaml").write_text(MISSION)
     study = KillStudy(
-        mission=str(tmp_path / "m.yaml"), seeds=[3], kills=1, out=tmp_path / "out", words=(sys.executable, str(FAKE_CLI))
+        mission=str(tmp_path / "m.yaml"),
+        seeds=[3],
+        kills=1,
+        out=tmp_path / "out",
+        words=(sys.executable, str(FAKE_CLI)),
     )
     rows: list[dict[str, object]] = []
     summary = run_study(study, lambda row, done, total: rows.append(row))
