@@ -128,7 +128,7 @@ def test_travel_of_a_record_counts_from_the_first_sweep_to_the_last_trace():
     )
     record = RunRecord(
         Path("x"),
-        run={"pose_B_K": {"position_m": [0.6, 0.0, -0.2], "quat": [1.0, 0.0, 0.0, 0.0]}},
+        run={"container": {"pose_B_K": {"position_m": [0.6, 0.0, -0.2], "quat": [1.0, 0.0, 0.0, 0.0]}}},
         samples={"stamp_s": t, "position_B_P": position + np.array([0.6, 0.0, 0.0])},
         events=[RecordedEvent(0.0, "tool", {"held": True})],
         ticks=[Tick(1.0, "a/guarded_sweep", "INVALID", "RUNNING"), Tick(3.0, "a/orbit_probe", "RUNNING", "SUCCESS")],
@@ -150,6 +150,13 @@ def test_unknown_policies_are_named():
         SearchCampaign(policies=("no_such",), seeds=(1,), out=Path("x"))
     with pytest.raises(BadInput, match="nothing to try"):
         SearchCampaign(policies=("random_descent",), seeds=(), out=Path("x"))
+
+
+def test_the_request_of_a_trial(tmp_path):
+    campaign = SearchCampaign(policies=("random_descent",), seeds=(7,), out=tmp_path)
+    request = campaign.trial("random_descent", 7)
+    assert (request.mission, request.seed, request.out) == ("survey", 7, tmp_path / "random_descent-s7")
+    assert request.settings == {"policy": "random_descent", "expected_objects": "5"}
 
 
 def test_a_campaign_in_the_plane_writes_all_there_is(tmp_path):
