@@ -28,7 +28,7 @@ def true_object(name, x, y, yaw, tilt=0.0):
 
 
 def a_record(touchsets, start, end, status="success", chain=()):
-    record = RunRecord(Path("run.mcap"), run={"seed": 7, "pose_B_K": to_json(POSE_B_K)})
+    record = RunRecord(Path("run.mcap"), run={"seed": 7, "container": {"pose_B_K": to_json(POSE_B_K)}})
     record.result = {"conditions": "harsh", "status": status, "reason_chain": list(chain), "sim_time_s": 500.0}
     record.truth = {"start": start, "end": end}
     record.events = [RecordedEvent(float(k), "touchset", {"touchset": to_json(t)}) for k, t in enumerate(touchsets)]
