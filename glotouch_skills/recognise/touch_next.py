@@ -118,7 +118,8 @@ class TouchNext(Skill):
         self.touchsets, self.decided = touchsets, False
         yield HOLD  # the computation takes longer than a control period; on hardware the arm holds meanwhile
         belief = recognition.infer_belief(self._target_model(), touchsets)
-        self._hopeless = frozenset(t.candidate.index for t in touchsets if _in_vain(t) >= MAX_VAIN_CLOSURES)
+        vain = (t for t in touchsets if not any(layer.stable for layer in t.layers))
+        self._hopeless = frozenset(t.candidate.index for t in vain if len(t.layers) >= MAX_VAIN_CLOSURES)
         why = self._enough(belief)
         chosen = None if why else self._choose(belief, down)
         if chosen is None:
@@ -305,11 +306,6 @@ def _short_of_evidence(belief: Belief) -> set[int]:
     """Return the likeliest candidate if both pads did not touch it as often as a decision requires."""
     best = max(belief.ranking.matches, key=lambda m: m.probability)
     return {best.index} if best.evidence < belief.params.evidence else set()
-
-
-def _in_vain(touchset: TouchSet) -> int:
-    """Return the number of closures if none had a plateau, else 0."""
-    return 0 if any(layer.stable for layer in touchset.layers) else len(touchset.layers)
 
 
 def _key(option: Option) -> tuple[int, int, int, int]:

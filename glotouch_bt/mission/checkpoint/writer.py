@@ -135,7 +135,7 @@ class CheckpointWriter:
             "preempted": run.context.preempted,
             "paused_s": run.context.paused_s,
             "summary": run.summary.state(),
-            "reasons": {paths[i]: failure for i, failure in run.book.noted().items()},
+            "reasons": {paths[i]: failure for i, failure in run.book.last.items()},
             "status": {paths[i]: status.value for i, status in run.status.items()},
             "ticks": run.ticks,
             "guards": dict(run.guards),
@@ -233,7 +233,7 @@ def restore(run: RunState, point: ResumePoint) -> RestoredTree | None:
     if unknown:
         raise BadInput(f"checkpoint {point.number} is of another tree (its node {unknown[0]} is not in this one)")
     run.guards.update(state["guards"])
-    run.book.take_up({ids[p]: failure for p, failure in state["reasons"].items()})
+    run.book.last.update({ids[p]: failure for p, failure in state["reasons"].items()})
     run.summary.restore(state["summary"])
     restored: RestoredTree | None = None
     if point.start:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from glotouch_bt.mission.execution.control import Control
-from glotouch_bt.motion import Motion, PauseSignal, Style
+from glotouch_bt.motion import Motion, PauseSignal
 from glotouch_bt.robot import HOLD, Command, Observation
 from glotouch_bt.skill import Context
 
@@ -57,10 +57,6 @@ class PauseGate:
         if self._standing and not self._paced:
             self._control.rest(now_s - self._updated_s)
         self._updated_s = now_s
-
-    def on_skill_started(self, style: Style) -> None:
-        """Adopt the pause style of the skill that has just started."""
-        self.pause_signal.style = style
 
     def send(self, command: Command, ticks: int) -> None:
         """Send a skill's command, after a pause if one is due now."""

@@ -357,7 +357,7 @@ class _TickLoop:
             if new is Status.RUNNING and not node.children:
                 self._summary.node = self._tree.paths[node.id]
                 if isinstance(node, Skill):
-                    self._gate.on_skill_started(node.PAUSE)
+                    self._gate.pause_signal.style = node.PAUSE
         if changes:
             self._summary.tick(now_s, changes)
             self._hooks.on_nodes_started([path for path, _, new in changes if new is Status.RUNNING])

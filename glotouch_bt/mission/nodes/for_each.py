@@ -323,7 +323,7 @@ class ForEachKind(NodeKind):
     def max_runs(self, node: NodeSpec) -> RunCount:
         """Return the child's number, times n."""
         below = super().max_runs(node)
-        return below if node.settings is None else below.per_item()
+        return below if node.settings is None else RunCount((0, *below.terms))
 
     def ordered_by(self, node: NodeSpec) -> tuple[str, str] | None:
         """Return the items' key and `order_by`."""

@@ -72,27 +72,22 @@ class ReasonBook:
     """The last failure of each node. A node's children must be noted before the node itself (tick order).
 
     Composites forget the status of a child when they move on, so each failure must be noted when it happens.
+
+    Attributes:
+        last: The last failure of each node that has failed, by node id.
     """
 
     def __init__(self) -> None:
-        self._last: dict[object, NodeFailure] = {}
-
-    def noted(self) -> dict[object, NodeFailure]:
-        """Return the last failure of each node that has failed, by node id."""
-        return dict(self._last)
-
-    def take_up(self, noted: Mapping[object, NodeFailure]) -> None:
-        """Start with the failures that another book has noted."""
-        self._last = dict(noted)
+        self.last: dict[object, NodeFailure] = {}
 
     def note(self, node: Behaviour, sensed: Mapping[str, float] | None = None) -> None:
         """Note why a node has just failed, and what the robot sensed then."""
         failure = self._explain(node)
-        self._last[node.id] = replace(failure, sensed=sensed) if sensed and failure.skill else failure
+        self.last[node.id] = replace(failure, sensed=sensed) if sensed and failure.skill else failure
 
     def of(self, node: Behaviour) -> NodeFailure:
         """Return the last failure of a node."""
-        return self._last.get(node.id) or self._explain(node)
+        return self.last.get(node.id) or self._explain(node)
 
     def _explain(self, node: Behaviour) -> NodeFailure:
         if isinstance(node, Skill):
@@ -109,7 +104,7 @@ class ReasonBook:
     def _causes(self, node: Behaviour) -> tuple[NodeFailure, ...]:
         """Return what failed below a node: of a selector every branch, of others the last failure."""
         if isinstance(node, Selector):
-            return tuple(self._last[c.id] for c in node.children if c.id in self._last)
+            return tuple(self.last[c.id] for c in node.children if c.id in self.last)
         failed = [c for c in node.children if c.status is Status.FAILURE]
         return tuple(self.of(c) for c in (failed[:1] if isinstance(node, Sequence) else failed))
 

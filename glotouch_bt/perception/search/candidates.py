@@ -127,10 +127,6 @@ def _with(candidate: Candidate, contacts: tuple[Contact, ...], outline: OutlineB
     return replace(candidate, contour=outline.contour, contacts=contacts, quality=quality(outline))
 
 
-def _touched_all_round(c: Candidate) -> bool:
-    return contour_quality(np.array([k.tip_K_m[:2] for k in c.contacts]), c.contour) >= WELL_TRACED_QUALITY
-
-
 def part_of(known: tuple[Candidate, ...], first: Contact, radius_m: float) -> Candidate | None:
     """Return the candidate of a new contact: by distance, or if one object explains both better than two; else None."""
     for old in sorted(known, key=lambda c: float(signed_distance(envelope(c), first.point_K_m[None])[0])):
@@ -158,7 +154,9 @@ def joins(known: tuple[Candidate, ...], contacts: tuple[Contact, ...], radius_m:
 def of_another(known: tuple[Candidate, ...], contact: Contact) -> bool:
     """Return True if a contact made during a trace belongs to another, well-traced candidate."""
     return any(
-        float(signed_distance(envelope(c), contact.point_K_m[None])[0]) < ON_M and _touched_all_round(c) for c in known
+        float(signed_distance(envelope(c), contact.point_K_m[None])[0]) < ON_M
+        and contour_quality(np.array([k.tip_K_m[:2] for k in c.contacts]), c.contour) >= WELL_TRACED_QUALITY
+        for c in known
     )
 
 

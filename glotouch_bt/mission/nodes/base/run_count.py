@@ -24,10 +24,6 @@ class RunCount:
         """Return `factor` times this number."""
         return RunCount(tuple(factor * t for t in self.terms))
 
-    def per_item(self) -> RunCount:
-        """Return n times this number."""
-        return RunCount((0, *self.terms))
-
     @property
     def fixed(self) -> int:
         """The largest coefficient."""
