@@ -4,6 +4,18 @@
 their names; see `observation` for the frames.
 """
 
+from glotouch_bt.errors import (
+    BackendError,
+    BadInput,
+    GlotouchError,
+    GuardTripped,
+    MissionFailed,
+    MotionRefused,
+    ParamError,
+    SafetyStop,
+    StaleReading,
+    UnknownName,
+)
 from glotouch_bt.robot.command import (
     HOLD,
     Command,
@@ -16,18 +28,6 @@ from glotouch_bt.robot.command import (
     Ticket,
 )
 from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription
-from glotouch_bt.robot.errors import (
-    BackendError,
-    BadInput,
-    GlotouchError,
-    GuardTripped,
-    MissionFailed,
-    MotionRefused,
-    ParamError,
-    SafetyStop,
-    StaleReading,
-    UnknownName,
-)
 from glotouch_bt.robot.fake import FakeRobot
 from glotouch_bt.robot.geometry import (
     Array,

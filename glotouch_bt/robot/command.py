@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from glotouch_bt.robot.errors import ParamError
+from glotouch_bt.errors import ParamError
 from glotouch_bt.robot.geometry import Array, Pose, frozen_array
 
 

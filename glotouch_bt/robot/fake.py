@@ -13,9 +13,9 @@ from math import acos, atan2, hypot, pi
 import numpy as np
 import numpy.typing as npt
 
+from glotouch_bt.errors import BadInput, ParamError, SafetyStop
 from glotouch_bt.robot.command import Command, GripperTarget, PendingTicket, Request, SetPayload
 from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription
-from glotouch_bt.robot.errors import BadInput, ParamError, SafetyStop
 from glotouch_bt.robot.geometry import Array, Pose, cross, cross_matrix, frozen_array, rpy_to_matrix
 from glotouch_bt.robot.interface import Backend, Robot
 from glotouch_bt.robot.limits import Limits

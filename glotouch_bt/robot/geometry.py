@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from glotouch_bt.robot.errors import ParamError
+from glotouch_bt.errors import ParamError
 
 Array = npt.NDArray[np.float64]
 _YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])

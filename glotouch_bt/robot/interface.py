@@ -6,9 +6,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Self
 
+from glotouch_bt.errors import BackendError
 from glotouch_bt.robot.command import Command, Request, Ticket
 from glotouch_bt.robot.description import RobotDescription
-from glotouch_bt.robot.errors import BackendError
 from glotouch_bt.robot.limits import Limits
 from glotouch_bt.robot.observation import Observation
 from glotouch_bt.robot.scene import Conditions, World

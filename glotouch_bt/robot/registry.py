@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.metadata import EntryPoint, entry_points
 
-from glotouch_bt.robot.errors import BackendError, UnknownName
+from glotouch_bt.errors import BackendError, UnknownName
 from glotouch_bt.robot.interface import Backend
 
 GROUP = "glotouch_bt.backends"

@@ -8,7 +8,6 @@ from __future__ import annotations
 import codecs
 import math
 import re
-import stat
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ import yaml
 
 from glotouch_bt.mission.spec import Map, Node, Place, Scalar, Seq
 from glotouch_bt.robot import BadInput
+from glotouch_bt.untrusted import read_file
 
 MAX_BYTES = 1_000_000
 """Largest size of a YAML file (bytes)."""
@@ -39,17 +39,7 @@ def read_yaml(path: Path, shown: str | None = None) -> Node:
         BadInput: The file is not readable, over a limit, not YAML, or has anchors, aliases, tags or a duplicate key.
     """
     shown = shown or str(path)
-    try:
-        if path.is_dir():
-            raise BadInput(f"{shown}: is a folder, not a YAML file")
-        found = path.stat()
-        if not stat.S_ISREG(found.st_mode):  # a device or a pipe may have no end, or never begin
-            raise BadInput(f"{shown}: is a device or a pipe, not a YAML file")
-        if found.st_size > MAX_BYTES:
-            raise BadInput(f"{shown}: is larger than {MAX_BYTES} bytes")
-        data = path.read_bytes()
-    except (OSError, ValueError) as e:
-        raise BadInput(f"{shown}: cannot be read ({getattr(e, 'strerror', None) or e})") from e
+    data = read_file(path, MAX_BYTES, what="a YAML file", links=True, shown=shown)
     return parse_yaml(data, shown)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
-from glotouch_bt.robot.errors import ParamError
+from glotouch_bt.errors import ParamError
 
 Range = tuple[float, float]
 

@@ -6,6 +6,7 @@ An object is a single watertight solid in metres, upright: its z axis is up and 
 from __future__ import annotations
 
 import hashlib
+import io
 from dataclasses import dataclass
 from os.path import isdir, isfile
 from pathlib import Path
@@ -15,15 +16,18 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from glotouch_bt.errors import BadInput
 from glotouch_bt.lazy import lazy_module
-from glotouch_bt.robot.errors import BadInput
 from glotouch_bt.robot.geometry import Array
+from glotouch_bt.untrusted import read_file
 
 if TYPE_CHECKING:
     import trimesh
 else:
     trimesh = lazy_module("trimesh")
 
+MAX_STL_BYTES = 64_000_000
+"""Largest size of an STL file; a binary one then has 1.3 million triangles."""
 MIN_SIZE_M = 0.005
 """Least size of an object along any axis of its file."""
 MAX_SIZE_M = 0.30
@@ -72,7 +76,7 @@ def is_sound_stl(path: Path) -> bool:
 
     False leaves the verdict to `load_mesh`. This takes milliseconds and only numpy.
     """
-    data = path.read_bytes()
+    data = read_file(path, MAX_STL_BYTES, what="an STL file", links=True)
     count = int.from_bytes(data[80:84], "little")
     if count < 4 or len(data) != 84 + _FACET.itemsize * count:
         return False
@@ -118,8 +122,9 @@ def load_mesh(path: Path) -> Mesh:
     """
     if not isfile(path):
         raise BadInput(f"{path}: no such STL file")
+    data = io.BytesIO(read_file(path, MAX_STL_BYTES, what="an STL file", links=True))
     try:
-        mesh = trimesh.load_mesh(path, file_type="stl", process=True)
+        mesh = trimesh.load_mesh(data, file_type="stl", process=True)
     except Exception as e:  # trimesh raises many kinds on a broken file
         raise BadInput(f"{path}: not a readable STL ({e})") from e
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) < 4:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from glotouch_bt.robot.errors import BadInput
+from glotouch_bt.errors import BadInput
 from glotouch_bt.robot.geometry import Array
 from glotouch_bt.robot.scene.meshes import Mesh
 from glotouch_bt.robot.scene.streams import stream

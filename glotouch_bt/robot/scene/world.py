@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from glotouch_bt.robot.errors import ParamError
+from glotouch_bt.errors import ParamError
 from glotouch_bt.robot.geometry import Pose
 
 MAX_SIDE_M = 3.0

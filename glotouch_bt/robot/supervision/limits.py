@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
-from glotouch_bt.robot.errors import ParamError
+from glotouch_bt.errors import ParamError
 
 GUARDS = {
     "not_finite": "a reading is not finite (single samples are dropped)",

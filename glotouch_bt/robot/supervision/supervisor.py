@@ -12,8 +12,8 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
+from glotouch_bt.errors import BackendError, GuardTripped, SafetyStop, StaleReading
 from glotouch_bt.robot.command import HOLD, Command, Request, Ticket
-from glotouch_bt.robot.errors import BackendError, GuardTripped, SafetyStop, StaleReading
 from glotouch_bt.robot.interface import Robot, Snapshot
 from glotouch_bt.robot.observation import Observation
 from glotouch_bt.robot.supervision.command import CommandGuard

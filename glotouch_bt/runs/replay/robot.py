@@ -134,9 +134,7 @@ class ReplayedRobot(Robot):
             t = self._tactile
             frame = TactileFrame(float(t["stamp_s"][at]), t["left_m"][at], t["right_m"][at])
         wrench_S = self._wrench[rows]
-        return Observation(
-            s["stamp_s"], s["q"], s["dq"], s["position_B_P"], s["quat_B_P"], wrench_S, gripper, frame
-        )
+        return Observation(s["stamp_s"], s["q"], s["dq"], s["position_B_P"], s["quat_B_P"], wrench_S, gripper, frame)
 
     def _difference(self, command: Command, i: int) -> str:
         """Return how a command differs from the recorded one of cycle i, in words; empty if it does not."""

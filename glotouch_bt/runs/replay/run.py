@@ -149,7 +149,7 @@ def replayed_robot(record: RunRecord) -> ReplayedRobot:
     robot = record.of_run("robot")
     if not isinstance(robot, dict) or not len(record.cycles) or not len(record.samples):
         raise BadInput(
-            f"{record.path}: it has no robot description or no observations, because it is cut off or of an older version"
+            f"{record.path}: it has no robot description or no observations: it is cut off or of an older version"
         )
     try:
         description = msgspec.convert(robot["description"], RobotDescription, dec_hook=_array, strict=False)

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from glotouch_backends.mujoco.sensing.gel import BOTTOM_M, GelSensor, pad_pose_P
 from glotouch_backends.mujoco.sensing.rays import SurfaceRays
-from glotouch_bt.robot.errors import ParamError
+from glotouch_bt.errors import ParamError
 from glotouch_bt.robot.geometry import Array, Pose
 from glotouch_bt.robot.scene.meshes import Mesh
 

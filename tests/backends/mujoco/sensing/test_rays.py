@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from glotouch_backends.mujoco.sensing.rays import SurfaceRays
-from glotouch_bt.robot.errors import ParamError
+from glotouch_bt.errors import ParamError
 from glotouch_bt.robot.scene.meshes import Mesh
 
 

@@ -1,0 +1,70 @@
+"""Parse JSON and unpack Zstandard frames within bounds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import zstandard
+
+from glotouch_bt.errors import BadInput
+from glotouch_bt.untrusted.files import read_file
+
+MAX_JSON_BYTES = 32_000_000
+"""Largest JSON text. Source: 20 times the largest result of ours; as Python data it takes at most 0.8 GB."""
+MAX_DIGITS = 20
+"""Most characters of a whole number; 2^64 has 20 digits."""
+
+
+def parse_json(data: bytes | str, shown: str, max_bytes: int = MAX_JSON_BYTES) -> Any:
+    """Parse JSON text; NaN, infinities and whole numbers beyond 64 bit are not JSON here.
+
+    Args:
+        data: The text.
+        shown: Its place, for messages.
+        max_bytes: Largest size.
+
+    Raises:
+        BadInput: It is too large, nested too deep or not JSON.
+    """
+    if len(data) > max_bytes:
+        raise BadInput(f"{shown}: is larger than {max_bytes} bytes")
+    try:
+        return json.loads(data, parse_constant=_no_number, parse_int=_whole)
+    except RecursionError as e:
+        raise BadInput(f"{shown}: is nested too deep") from e
+    except ValueError as e:  # also UnicodeDecodeError
+        raise BadInput(f"{shown}: is not JSON ({e})") from e
+
+
+def read_json(path: Path, max_bytes: int = MAX_JSON_BYTES) -> Any:
+    """Read a JSON file, never through a link; errors as for `read_file` and `parse_json`."""
+    return parse_json(read_file(path, max_bytes, what="a JSON file"), str(path), max_bytes)
+
+
+def unpack_zstd(data: bytes, max_bytes: int, shown: str) -> bytes:
+    """Unpack one Zstandard frame that states its size, as our writers do.
+
+    Raises:
+        BadInput: It is damaged, or unpacks to more than `max_bytes`, or to an unknown size.
+    """
+    try:
+        size = zstandard.frame_content_size(data)
+        if size < 0:
+            raise BadInput(f"{shown}: does not state its unpacked size")
+        if size > max_bytes:
+            raise BadInput(f"{shown}: unpacks to {size} bytes; at most {max_bytes} are allowed")
+        return bytes(zstandard.ZstdDecompressor().decompress(data))
+    except (zstandard.ZstdError, ValueError, MemoryError) as e:
+        raise BadInput(f"{shown}: is damaged ({e})") from e
+
+
+def _no_number(word: str) -> float:
+    raise ValueError(f"{word} is not a number of JSON")
+
+
+def _whole(digits: str) -> int:
+    if len(digits) > MAX_DIGITS:
+        raise ValueError(f"a whole number of {len(digits)} characters")
+    return int(digits)
