@@ -14,8 +14,7 @@ import numpy as np
 
 from glotouch_bt.perception.recognition.evidence import LayerEvidence
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
-from glotouch_bt.perception.recognition.model import FINE, Array32, PadSpec, image_feature
-from glotouch_bt.perception.recognition.synthetic import touch_windows
+from glotouch_bt.perception.recognition.model import FINE, Array32, PadSpec, image_feature, touch_windows
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import Array
 

@@ -14,7 +14,7 @@ import numpy as np
 from glotouch_bt.perception.recognition.model.outline import Outline, minimum_rectangle, traced_outline
 from glotouch_bt.perception.recognition.model.pads import FINE, Array32, PadSpec, image_feature
 from glotouch_bt.perception.recognition.model.raster import mirrored, side_images, window_max
-from glotouch_bt.perception.recognition.synthetic import pooled_images, simulated_statistics
+from glotouch_bt.perception.recognition.model.simulated_touches import pooled_images, simulated_statistics
 from glotouch_bt.robot import Array
 from glotouch_bt.robot.scene import Mesh
 

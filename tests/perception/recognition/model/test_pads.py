@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from glotouch_bt.perception.recognition.model.pads import PadSpec, gel_shift, image_feature, patch_of, pool
-from glotouch_bt.perception.recognition.synthetic.touches import pooled_images
+from glotouch_bt.perception.recognition.model.simulated_touches import pooled_images
 from glotouch_bt.robot import ParamError
 
 PAD = PadSpec()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from glotouch_bt.perception.recognition.model import FINE, POOLED, Array32, PadSpec, gel_shift, patch_of
+from glotouch_bt.perception.recognition.model.pads import FINE, POOLED, Array32, PadSpec, gel_shift, patch_of
 
 LEVELS = 24
 """Number of levels of the height histogram in the gel's force balance."""
