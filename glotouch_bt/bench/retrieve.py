@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from glotouch_bt.bench.statistics import bootstrap_mean, wilson
-from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene import load_folder
-from glotouch_bt.runs import Campaign, OnRow, RunRequest, crashed, gather, launch, silent, write_summary, write_table
+from glotouch_bt.runs import (
+    Campaign,
+    OnRow,
+    Row,
+    RunRequest,
+    Trial,
+    TrialMemory,
+    crashed,
+    launch_trial,
+    run_trials,
+    silent,
+    write_summary,
+    write_table,
+)
 
 COLUMNS = (
     "target", "seed", "exit_code", "status", "retrieved", "correct", "cause", "candidates", "contacts", "probe_path_m",
@@ -31,13 +43,14 @@ class RetrieveCampaign(Campaign):
 
     targets: tuple[str, ...]
 
-    def requests(self) -> list[tuple[str, RunRequest]]:
-        """Return (target, request) of every trial, seeds outermost: an interrupted campaign covers all targets."""
-        return [
-            (target, self.request(seed, f"{target}-s{seed}", settings={**self.settings, "target": target}))
-            for seed in self.seeds
-            for target in self.targets
-        ]
+    def trials(self) -> list[Trial]:
+        """Return every trial, seeds outermost: an interrupted campaign covers all targets."""
+        return [self._trial(target, seed) for seed in self.seeds for target in self.targets]
+
+    def _trial(self, target: str, seed: int) -> Trial:
+        request = self.request(seed, f"{target}-s{seed}", settings={**self.settings, "target": target})
+        head = {"target": target, "seed": seed, "folder": f"{target}-s{seed}"}
+        return Trial(partial(run_trial, head, request), partial(_failed, head), TrialMemory(request))
 
 
 def targets_of(folder: Path) -> tuple[str, ...]:
@@ -49,25 +62,15 @@ def targets_of(folder: Path) -> tuple[str, ...]:
     return tuple(m.name for m in load_folder(folder))
 
 
-def run_trial(target: str, request: RunRequest, resume: bool = False) -> dict[str, Any]:
-    """Run one trial in this process and return its row. A failure becomes a row, never an exception."""
-    row: dict[str, Any] = {"target": target, "seed": request.seed, "folder": request.out and request.out.name}
-    if resume and request.out is not None and (request.out / "result.json").is_file():
-        return row | _columns(json.loads((request.out / "result.json").read_text()))
-    try:
-        done = launch(request)
-    except BadInput:
-        raise
-    except Exception as e:
-        return row | crashed(e)
-    return row | _columns(done.result) | {"exit_code": done.exit_code}
+def run_trial(head: Row, request: RunRequest) -> Row:
+    """Run one trial in this process and return its row, which begins with the columns `head`."""
+    done = launch_trial(request)
+    found = {"candidates": len(done.result["candidates"]), "cause": cause(done.result), "exit_code": done.exit_code}
+    return head | {k: done.result[k] for k in COLUMNS if k in done.result} | found
 
 
-def _columns(result: Mapping[str, Any]) -> dict[str, Any]:
-    """Convert a result to columns of a row."""
-    code = {"success": 0, "failure": 1}.get(str(result["status"]), 3)
-    found = {"candidates": len(result["candidates"]), "cause": cause(result), "exit_code": code}
-    return {k: result[k] for k in COLUMNS if k in result} | found
+def _failed(head: Row, error: Exception) -> Row:
+    return head | crashed(error)
 
 
 def cause(result: Mapping[str, Any]) -> str:
@@ -85,7 +88,7 @@ def cause(result: Mapping[str, Any]) -> str:
 
 def run_campaign(campaign: RetrieveCampaign, executor: Executor, on_row: OnRow = silent) -> dict[str, Any]:
     """Run every trial on the executor, write trials.csv and summary.json, and return the summary."""
-    rows = gather([executor.submit(run_trial, *trial, campaign.resume) for trial in campaign.requests()], on_row)
+    rows = run_trials(executor, campaign.trials(), campaign.resume, on_row)
     rows.sort(key=lambda r: (r["target"], r["seed"]))
     write_table(campaign.out, "trials.csv", COLUMNS, rows)
     more = {"targets": list(campaign.targets), "backend": campaign.backend, "settings": dict(campaign.settings)}
@@ -111,6 +114,7 @@ def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "wrong_object": wilson(wrong, n),
         "safety_stops": wilson(sum(r.get("exit_code") == 3 for r in rows), n),
         "tracebacks": wilson(sum(r.get("status") == "traceback" for r in rows), n),
+        "lost": sum(r.get("status") == "lost" for r in rows),
         "by_target": {t: wilson(sum(map(succeeded, group)), len(group)) for t, group in by_target.items()},
         "causes": dict(causes.most_common()),
         "wall_s": bootstrap_mean([r["wall_time_s"] for r in rows if r.get("wall_time_s") is not None]),

@@ -183,6 +183,8 @@ def run_trial(study: Campaign, seed: int) -> SpeedTrial:
         began, cpu = time.perf_counter(), time.process_time()
         with Recorder(folder.path / "run.mcap", described) as recorder:
             outcome = run_mission(mission, timed, TimedRecord(recorder, timed))
+            if isinstance(outcome.error, KeyboardInterrupt):
+                raise outcome.error
             timed.account(time.perf_counter())
             ticked = time.perf_counter()
         ended, cpu_s = time.perf_counter(), time.process_time() - cpu

@@ -1,20 +1,25 @@
-"""Campaigns of many runs: their settings, the results of worker processes, and the files they write."""
+"""Campaigns of many runs: their settings, their trials in worker processes, and the files they write."""
 
 from __future__ import annotations
 
 import csv
 import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import Future, as_completed
+from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 from glotouch_bt.json_text import json_text
+from glotouch_bt.robot import BadInput
 from glotouch_bt.runs.folder import RunFolder
-from glotouch_bt.runs.request import RunRequest
+from glotouch_bt.runs.launch import launch
+from glotouch_bt.runs.request import RunRequest, RunResult
+from glotouch_bt.runs.trial_memory import TrialMemory
+from glotouch_bt.runs.workers import WorkerLost
 
 T = TypeVar("T")
+Row = dict[str, Any]
 OnRow = Callable[[Any, int, int], object]
 """Called with (row, trials done, trials in all) after each trial."""
 
@@ -49,7 +54,7 @@ class Campaign:
 
     def request(self, seed: int, name: str, **changes: Any) -> RunRequest:
         """Return the request of a trial in the folder `name`; `changes` are further fields of the request."""
-        given = {"settings": self.settings, "objects": self.objects, "out": self.out / name}
+        given = {"settings": self.settings, "objects": self.objects, "out": self.out / name, "overwrite": True}
         return RunRequest(self.mission, self.backend, seed, conditions=self.conditions, **given | changes)
 
     def described(self) -> dict[str, Any]:
@@ -57,18 +62,74 @@ class Campaign:
         return {"mission": self.mission, "conditions": self.conditions, "seeds": list(self.seeds)}
 
 
-def gather(futures: Sequence[Future[T]], on_result: OnRow = silent) -> list[T]:
-    """Return the results of all futures in the order of completion; cancel the rest if one raises.
+@dataclass(frozen=True)
+class Task(Generic[T]):
+    """Work for a worker process whose failure is a result, not an exception.
+
+    Attributes:
+        run: Does the work; it can be pickled.
+        failed: Returns the result that stands for an error of `run` or for a lost process (`WorkerLost`).
+    """
+
+    run: Callable[[], T]
+    failed: Callable[[Exception], T]
+
+    def __call__(self) -> T:
+        """Do the work in this process.
+
+        Raises:
+            BadInput: The request itself is wrong, so that no trial can be run.
+            KeyboardInterrupt: The work was interrupted.
+        """
+        try:
+            return self.run()
+        except BadInput:
+            raise
+        except Exception as e:
+            return self.failed(e)
+
+
+@dataclass(frozen=True)
+class Trial(Task[Row]):
+    """A run of a campaign and its row, which the run's folder remembers together with the request.
+
+    Attributes:
+        memory: The trial's folder and request.
+    """
+
+    memory: TrialMemory
+
+    def __call__(self) -> Row:
+        """See `Task`. Failures are not remembered: a resumed campaign tries them again."""
+        self.memory.forget()
+        try:
+            row = self.run()
+        except BadInput:
+            raise
+        except Exception as e:
+            return self.failed(e)
+        self.memory.write(row)
+        return row
+
+
+def gather(executor: Executor, tasks: Sequence[Task[T]], on_result: OnRow = silent) -> list[T]:
+    """Run tasks on any executor; return their results in the order of completion. If one raises, cancel the rest.
 
     Args:
-        futures: Submitted to any `concurrent.futures` executor.
-        on_result: Called with (result, results so far, futures) after each.
+        executor: A `WorkerPool` in commands.
+        tasks: The tasks.
+        on_result: Called with (result, results so far, tasks) after each.
     """
+    futures = {executor.submit(task): task for task in tasks}
     results: list[T] = []
     try:
         for future in as_completed(futures):
-            results.append(future.result())
-            on_result(results[-1], len(results), len(futures))
+            try:
+                result = future.result()
+            except WorkerLost as e:
+                result = futures[future].failed(e)
+            results.append(result)
+            on_result(result, len(results), len(futures))
     except BaseException:
         for future in futures:
             future.cancel()
@@ -76,8 +137,37 @@ def gather(futures: Sequence[Future[T]], on_result: OnRow = silent) -> list[T]:
     return results
 
 
+def run_trials(executor: Executor, trials: Sequence[Trial], resume: bool, on_row: OnRow = silent) -> list[Row]:
+    """Run trials; return their rows. With `resume`, finished trials with the same request are not run again.
+
+    Raises:
+        BadInput: A finished trial was made with another request; nothing was run.
+    """
+    kept = [t.memory.read() if resume else None for t in trials]
+    rows = [row for row in kept if row is not None]
+    for n, row in enumerate(rows):
+        on_row(row, n + 1, len(trials))
+    left = [trial for trial, row in zip(trials, kept, strict=True) if row is None]
+    return rows + gather(executor, left, lambda row, n, _: on_row(row, len(rows) + n, len(trials)))
+
+
+def launch_trial(request: RunRequest, **given: Any) -> RunResult:
+    """Launch a run of a campaign; arguments as for `launch`.
+
+    Raises:
+        KeyboardInterrupt: The run was interrupted: it is no trial.
+        BadInput, BackendError: As `launch`.
+    """
+    done = launch(request, **given)
+    if isinstance(done.outcome.error, KeyboardInterrupt):
+        raise done.outcome.error
+    return done
+
+
 def crashed(error: Exception) -> dict[str, Any]:
-    """Return the columns of a trial that raised."""
+    """Return the columns of a trial that raised or whose process was lost."""
+    if isinstance(error, WorkerLost):
+        return {"status": "lost", "exit_code": -1, "cause": f"lost: {error}"}
     return {"status": "traceback", "exit_code": -1, "cause": f"traceback {type(error).__name__}: {error}"}
 
 

@@ -22,7 +22,7 @@ from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile
 from glotouch_bt.report import RunRecord, read_run
 from glotouch_bt.robot import BackendError, BadInput, GlotouchError
 from glotouch_bt.robot.scene import stream
-from glotouch_bt.runs import Campaign, OnRow, silent, write_summary, write_table
+from glotouch_bt.runs import Campaign, OnRow, TrialMemory, silent, write_summary, write_table
 
 POLL_S = 0.002
 ONLY_HERE = ("wall_time_s", "wall_open_s", "resumed", "versions")
@@ -51,7 +51,11 @@ class KillStudy(Campaign):
         sets = [w for k, v in self.settings.items() for w in ("--set", f"{k}={v}")]
         head = [*self.words, "run", self.mission, "--seed", str(seed), "--conditions", self.conditions]
         box = [] if self.objects is None else ["--objects", str(self.objects)]
-        return [*head, *sets, *box, "--out", str(folder), "--json"]
+        return [*head, *sets, *box, "--out", str(folder), "--overwrite", "--json"]
+
+    def memory(self, seed: int, name: str) -> TrialMemory:
+        """Return the memory of a run in the folder `name`."""
+        return TrialMemory(self.request(seed, name))
 
 
 @dataclass(frozen=True)
@@ -85,10 +89,13 @@ def run_study(study: KillStudy, on_row: OnRow = silent) -> dict[str, Any]:
     for seed in study.seeds:
         twin = _twin(study, seed)
         for number, share in enumerate(stream(seed, "kill").random(study.kills)):
-            done = study.out / f"killed-s{seed}-{number}.json"
-            if not (study.resume and done.is_file()):
-                done.write_text(json.dumps(_trial(study, seed, number, float(share), twin)))
-            rows.append(json.loads(done.read_text()))
+            memory = study.memory(seed, f"killed-s{seed}-{number}")
+            row = memory.read() if study.resume else None
+            if row is None:
+                memory.forget()
+                row = _trial(study, seed, number, float(share), twin)
+                memory.write(row)
+            rows.append(row)
             _write(study, rows)
             on_row(rows[-1], len(rows), total)
     return _write(study, rows)
@@ -122,10 +129,11 @@ def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def _twin(study: KillStudy, seed: int) -> Twin:
-    folder, done = study.out / f"twin-s{seed}", study.out / f"twin-s{seed}.json"
-    if study.resume and done.is_file():
-        began_s, ended_s = json.loads(done.read_text())
-        return Twin(folder, json.loads((folder / "result.json").read_text()), began_s, ended_s)
+    folder, memory = study.out / f"twin-s{seed}", study.memory(seed, f"twin-s{seed}")
+    kept = memory.read() if study.resume else None
+    if kept is not None:
+        return Twin(folder, json.loads((folder / "result.json").read_text()), kept["began_s"], kept["ended_s"])
+    memory.forget()
     began_s = ended_s = 0.0
     with _start(study.run_words(seed, folder)) as process:
         while process.poll() is None:
@@ -139,7 +147,7 @@ def _twin(study: KillStudy, seed: int) -> Twin:
         said = b"" if process.stderr is None else process.stderr.read()
     if process.returncode not in (0, 1, 3):
         raise BadInput(said.decode().strip().removeprefix("glotouch: ") or "the twin did not run")
-    done.write_text(json.dumps([began_s, ended_s]))
+    memory.write({"began_s": began_s, "ended_s": ended_s})
     return Twin(folder, json.loads((folder / "result.json").read_text()), began_s, ended_s)
 
 

@@ -15,7 +15,7 @@ from glotouch_bt.bench import wilson
 from glotouch_bt.mission.execution import Control
 from glotouch_bt.report import read_run
 from glotouch_bt.robot import Limits
-from glotouch_bt.runs import Campaign, OnRow, launch, silent, write_summary, write_table
+from glotouch_bt.runs import Campaign, OnRow, launch_trial, silent, write_summary, write_table
 
 COLUMNS = (
     "seed", "target", "status", "retrieved", "twin_status", "twin_retrieved", "same", "pauses", "on_the_way",
@@ -86,9 +86,9 @@ def run_pauses(study: PauseStudy, on_row: OnRow = silent) -> dict[str, Any]:
 
 
 def _pair(study: PauseStudy, seed: int) -> dict[str, Any]:
-    twin = launch(study.request(seed, f"twin-s{seed}", report=False)).result
+    twin = launch_trial(study.request(seed, f"twin-s{seed}", report=False)).result
     control = EveryNthTick(study.every, study.pause_s)
-    done = launch(study.request(seed, f"paused-s{seed}", report=False), control=control)
+    done = launch_trial(study.request(seed, f"paused-s{seed}", report=False), control=control)
     result = done.result
     places, longest_s = _rests(done.folder)
     return {

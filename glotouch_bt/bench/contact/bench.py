@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,21 @@ from glotouch_bt.bench.retrieve import cause
 from glotouch_bt.bench.statistics import bootstrap_mean, wilson
 from glotouch_bt.perception.touch import polygon_distance
 from glotouch_bt.report import RunRecord, read_run
-from glotouch_bt.robot import Array, BadInput, Pose
-from glotouch_bt.runs import Campaign, OnRow, RunRequest, crashed, gather, launch, silent, write_summary, write_table
+from glotouch_bt.robot import Array, Pose
+from glotouch_bt.runs import (
+    Campaign,
+    OnRow,
+    Row,
+    RunRequest,
+    Trial,
+    TrialMemory,
+    crashed,
+    launch_trial,
+    run_trials,
+    silent,
+    write_summary,
+    write_table,
+)
 
 METRICS = ("centre_error_mm", "contact_std_mm", "contact_rms_mm", "max_contact_mm", "side_error_mm")
 PAPER = {
@@ -46,37 +60,32 @@ class ContactCampaign(Campaign):
     mission: str = "contact"
     per_side: int
 
-    def requests(self) -> list[tuple[Tool, bool, RunRequest]]:
-        """(tool, square bolted down, request) of every trial, seeds outermost."""
-        return [
-            (t, fixed, self._trial(seed, t, fixed)) for seed in self.seeds for fixed in (True, False) for t in TOOLS
-        ]
+    def trials(self) -> list[Trial]:
+        """Return every trial, seeds outermost, with the square bolted down and free."""
+        return [self._trial(seed, t, fixed) for seed in self.seeds for fixed in (True, False) for t in TOOLS]
 
-    def _trial(self, seed: int, tool: Tool, fixed: bool) -> RunRequest:
+    def _trial(self, seed: int, tool: Tool, fixed: bool) -> Trial:
         settings = {"contacts": str(4 * self.per_side), "fixed": str(fixed).lower()}
-        name = f"{tool}-{'fixed' if fixed else 'free'}-s{seed}"
-        return replace(self.request(seed, name, settings=settings), mission=f"{self.mission}_{tool}")
+        square = "fixed" if fixed else "free"
+        name = f"{tool}-{square}-s{seed}"
+        request = replace(self.request(seed, name, settings=settings), mission=f"{self.mission}_{tool}")
+        head = {"tool": tool, "square": square, "seed": seed, "folder": name}
+        return Trial(partial(run_trial, head, request), partial(_failed, head), TrialMemory(request))
 
 
-def run_trial(tool: Tool, fixed: bool, request: RunRequest) -> dict[str, Any]:
-    """Run one trial in this process and return its row. A failure becomes a row, never an exception."""
-    row: dict[str, Any] = {"tool": tool, "square": "fixed" if fixed else "free", "seed": request.seed}
-    row["folder"] = request.out and request.out.name
-    try:
-        done = launch(request)
-    except BadInput:
-        raise
-    except Exception as e:
-        return row | crashed(e)
-    row |= {k: done.result.get(k) for k in COLUMNS if k in done.result}
+def run_trial(head: Row, request: RunRequest) -> Row:
+    """Run one trial in this process and return its row, which begins with the columns `head`."""
+    done = launch_trial(request)
+    row = head | {k: done.result.get(k) for k in COLUMNS if k in done.result}
     row |= {"exit_code": done.exit_code, "cause": ""}
     if done.exit_code != 0:
         return row | {"cause": cause(done.result)}
-    try:
-        record = read_run(done.folder)
-        return row | score(record, traced_square(record, tool, fixed))
-    except Exception as e:
-        return row | crashed(e)
+    record = read_run(done.folder)
+    return row | score(record, traced_square(record, head["tool"], head["square"] == "fixed"))
+
+
+def _failed(head: Row, error: Exception) -> Row:
+    return head | crashed(error)
 
 
 def score(record: RunRecord, traced: TracedSquare) -> dict[str, Any]:
@@ -115,7 +124,7 @@ def true_tip_P_m(record: RunRecord) -> Array:
 
 def run_campaign(campaign: ContactCampaign, executor: Executor, on_row: OnRow = silent) -> dict[str, Any]:
     """Run every trial on the executor, write trials.csv, summary.json and two plots and return the summary."""
-    rows = gather([executor.submit(run_trial, *trial) for trial in campaign.requests()], on_row)
+    rows = run_trials(executor, campaign.trials(), campaign.resume, on_row)
     rows.sort(key=lambda r: (r["square"], r["tool"], r["seed"]))
     write_table(campaign.out, "trials.csv", COLUMNS, rows)
     more = {"paper": PAPER, "contacts_per_side": campaign.per_side, "backend": campaign.backend}

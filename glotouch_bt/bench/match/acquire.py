@@ -15,7 +15,7 @@ from glotouch_bt.bench.match.dataset import Layout, Planar, Touched, write_layou
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.report import RunRecord, read_run
 from glotouch_bt.robot import Array, BadInput, Pose
-from glotouch_bt.runs import RunRequest, launch
+from glotouch_bt.runs import RunRequest, launch_trial
 
 NEAREST_M = 0.025
 """A candidate whose contour centre is farther than this from every object's centre belongs to no object."""
@@ -38,7 +38,7 @@ def acquire_layout(request: RunRequest, dataset: Path) -> Layout:
         BadInput: The request is wrong, or the backend has no referee.
         BackendError: The backend did not open.
     """
-    done = launch(request)
+    done = launch_trial(request)
     layout = layout_of(read_run(done.folder))
     write_layout(dataset, layout)
     return layout

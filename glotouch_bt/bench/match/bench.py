@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,8 @@ from glotouch_bt.bench.match.timing import time_matching
 from glotouch_bt.bench.match.trials import PAIR_COLUMNS, TRIAL_COLUMNS, decide, models_of
 from glotouch_bt.json_text import finite
 from glotouch_bt.mission import load_mission
-from glotouch_bt.robot import BadInput
-from glotouch_bt.robot.scene import load_folder, stream
-from glotouch_bt.runs import Campaign, OnRow, RunRequest, gather, silent, write_summary, write_table
+from glotouch_bt.robot.scene import load_folder, stl_files, stream
+from glotouch_bt.runs import Campaign, OnRow, RunRequest, Task, crashed, gather, silent, write_summary, write_table
 
 IN_THE_BOX = 5
 """Objects in a layout. From a larger folder, each seed draws this many."""
@@ -67,13 +67,13 @@ class MatchCampaign(Campaign):
     def layout_request(self, seed: int) -> RunRequest:
         """Return the mission request for a layout; create its folder of objects if it is a drawn subset."""
         box = objects_of(self.folder, seed, self.out / "objects") if self.objects else None
-        count = len(list((box or self.folder).glob("*.[sS][tT][lL]")))
+        count = len(stl_files(box or self.folder))
         return self.request(seed, f"runs/s{seed:04d}", settings={"expected_objects": str(count)}, objects=box)
 
 
 def objects_of(folder: Path, seed: int, copies: Path) -> Path:
     """Return the folder, or one below `copies` with `IN_THE_BOX` of its STLs drawn by the seed."""
-    files = sorted(p for p in folder.iterdir() if p.suffix.lower() == ".stl")
+    files = list(stl_files(folder).values())
     if len(files) <= IN_THE_BOX:
         return folder
     mine = copies / f"s{seed:04d}"
@@ -84,19 +84,21 @@ def objects_of(folder: Path, seed: int, copies: Path) -> Path:
 
 
 def layout_task(campaign: MatchCampaign, seed: int, file: Path | None) -> dict[str, Any]:
-    """Acquire or read one layout and decide on it. A failed acquisition is a row; bad input raises.
+    """Acquire or read one layout and decide on it.
 
     Raises:
         BadInput: The recording or an STL cannot be used.
     """
-    try:
-        layout = (
-            read_layout(file) if file else acquire_layout(campaign.layout_request(seed), campaign.out / "touchsets")
-        )
-    except BadInput:
-        raise
-    except Exception as e:
-        layout = Layout(seed, Path(campaign.conditions).stem, (), (), f"traceback {type(e).__name__}: {e}")
+    touchsets = campaign.out / "touchsets"
+    return _decided(campaign, read_layout(file) if file else acquire_layout(campaign.layout_request(seed), touchsets))
+
+
+def failed_task(campaign: MatchCampaign, seed: int, error: Exception) -> dict[str, Any]:
+    """Return the result of a layout that raised or whose process was lost: nothing was touched."""
+    return _decided(campaign, Layout(seed, Path(campaign.conditions).stem, (), (), crashed(error)["cause"]))
+
+
+def _decided(campaign: MatchCampaign, layout: Layout) -> dict[str, Any]:
     decided = decide(layout, campaign.folder, campaign.strangers, campaign.methods)
     closures: list[dict[str, Any]] = []
     if DEFAULT in campaign.methods and layout.touched:
@@ -118,6 +120,10 @@ def timing_task(files: Sequence[Path], folder: Path, names: Sequence[str]) -> di
     return time_matching([read_layout(f) for f in files], folder, names)
 
 
+def _untimed(error: Exception) -> dict[str, Any]:
+    return {}
+
+
 def run_campaign(campaign: MatchCampaign, executor: Executor, on_row: OnRow = silent) -> dict[str, Any]:
     """Decide on every layout, write CSVs, plots and summary.json, and return the summary.
 
@@ -129,13 +135,14 @@ def run_campaign(campaign: MatchCampaign, executor: Executor, on_row: OnRow = si
     campaign.check()
     files = layout_files(campaign.dataset)[: len(campaign.seeds)] if campaign.dataset else []
     todo: list[tuple[int, Path | None]] = [(-1, f) for f in files] or [(seed, None) for seed in campaign.seeds]
-    futures = [executor.submit(layout_task, campaign, seed, file) for seed, file in todo]
-    done = gather(futures, lambda found, n, total: on_row(_progress(found), n, total))
+    tasks = [Task(partial(layout_task, campaign, s, f), partial(failed_task, campaign, s)) for s, f in todo]
+    done = gather(executor, tasks, lambda found, n, total: on_row(_progress(found), n, total))
     done.sort(key=lambda d: d["layout"]["seed"])
     rows = {part: [r for d in done for r in d[part]] for part in ("trials", "pairs", "closures")}
     layouts = [d["layout"] for d in done]
     recorded = files or sorted((campaign.out / "touchsets").glob("s[0-9]*.json"))
-    timed = executor.submit(timing_task, recorded[:3], campaign.folder, campaign.methods).result() if recorded else {}
+    timing = Task(partial(timing_task, recorded[:3], campaign.folder, campaign.methods), _untimed)
+    timed = gather(executor, [timing])[0] if recorded else {}
     figures: dict[str, Any] = finite(
         summarise(rows["trials"], rows["pairs"], rows["closures"], campaign.methods)
         | {

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from glotouch_bt.bench.search.plots import plot_discovered, plot_layout
 from glotouch_bt.bench.search.scoring import discovered_at
 from glotouch_bt.bench.search.summary import COMPLETE_AT_M, MEAN_AT_M, summarise
 from glotouch_bt.bench.search.trial import (
+    failed_trial,
     mission_trial,
     planar_trials,
     recorded_folders,
@@ -23,7 +25,19 @@ from glotouch_bt.bench.search.trial import (
 from glotouch_bt.json_text import finite
 from glotouch_bt.perception.search import POLICIES
 from glotouch_bt.robot import BadInput
-from glotouch_bt.runs import Campaign, OnRow, RunRequest, gather, silent, write_summary, write_table
+from glotouch_bt.runs import (
+    Campaign,
+    OnRow,
+    Row,
+    Task,
+    Trial,
+    TrialMemory,
+    gather,
+    run_trials,
+    silent,
+    write_summary,
+    write_table,
+)
 
 CHUNK = 25
 """Number of planar layouts in one task."""
@@ -62,10 +76,12 @@ class SearchCampaign(Campaign):
         if not self.seeds and not self.planar_seeds and not self.recorded:
             raise BadInput("nothing to try: give --trials, --planar or --recorded")
 
-    def trial(self, policy: str, seed: int) -> RunRequest:
-        """Return the mission request of a trial."""
+    def trial(self, policy: str, seed: int) -> Trial:
+        """Return the mission trial of a policy."""
         settings = {"policy": policy, "expected_objects": str(self.object_count)}
-        return self.request(seed, f"{policy}-s{seed}", settings=settings)
+        request = self.request(seed, f"{policy}-s{seed}", settings=settings)
+        head = {"simulator": self.backend, "policy": policy, "seed": seed}
+        return Trial(partial(mission_trial, head, request), partial(failed_trial, head), TrialMemory(request))
 
     @property
     def object_count(self) -> int:
@@ -106,31 +122,33 @@ def _run(campaign: SearchCampaign, executor: Executor, on_row: OnRow) -> list[di
     """Run missions first, seeds outermost: an interrupted campaign has all policies on the same layouts."""
     runs = [f for top in campaign.recorded for f in recorded_folders(top, Path(campaign.conditions).stem)]
     plane = tuple(dict.fromkeys((*campaign.seeds, *campaign.planar_seeds)))
-    budget = campaign.planar_budget_m
-    futures: list[Future[Any]] = [
-        executor.submit(mission_trial, campaign.trial(policy, seed), policy, campaign.resume)
-        for seed in campaign.seeds
-        for policy in campaign.policies
-    ]
-    futures += [
-        executor.submit(recorded_trial, folder, campaign.mission, campaign.objects, campaign.policies[0])
-        for folder in runs
-    ]
-    futures += [
-        executor.submit(planar_trials, campaign.mission, campaign.objects, policy, plane[k : k + CHUNK], budget)
-        for k in range(0, len(plane), CHUNK)
-        for policy in campaign.policies
-    ]
+    mission, objects, budget = campaign.mission, campaign.objects, campaign.planar_budget_m
+    trials = [campaign.trial(policy, seed) for seed in campaign.seeds for policy in campaign.policies]
+    others: list[Task[list[Row]]] = []
+    for folder in runs:
+        head = {"simulator": "recorded", "policy": campaign.policies[0], "seed": -1, "folder": str(folder)}
+        run = partial(recorded_trial, folder, mission, objects, campaign.policies[0])
+        others.append(Task(run, partial(_all_failed, [head])))
+    for k in range(0, len(plane), CHUNK):
+        for policy in campaign.policies:
+            seeds = plane[k : k + CHUNK]
+            heads = [{"simulator": "planar", "policy": policy, "seed": seed} for seed in seeds]
+            run = partial(planar_trials, mission, objects, policy, seeds, budget)
+            others.append(Task(run, partial(_all_failed, heads)))
     total = len(campaign.policies) * (len(campaign.seeds) + len(plane)) + len(runs)
-    rows: list[dict[str, Any]] = []
+    rows = run_trials(executor, trials, campaign.resume, lambda row, n, _: on_row(row, n, total))
 
-    def add(result: Any, *_: int) -> None:
-        for row in result if isinstance(result, list) else [result]:
+    def add(found: list[Row], *_: int) -> None:
+        for row in found:
             rows.append(row)
             on_row(row, len(rows), total)
 
-    gather(futures, add)
+    gather(executor, others, add)
     return rows
+
+
+def _all_failed(heads: Sequence[Row], error: Exception) -> list[Row]:
+    return [failed_trial(head, error) for head in heads]
 
 
 def _write_csv(campaign: SearchCampaign, rows: Sequence[Mapping[str, Any]], objects: int) -> None:

@@ -23,7 +23,7 @@ from glotouch_bt.perception.search import search_policy
 from glotouch_bt.report import RunRecord, read_run
 from glotouch_bt.robot import Array, BadInput, Pose, World
 from glotouch_bt.robot.scene import Mesh, load_folder
-from glotouch_bt.runs import RunRequest, launch
+from glotouch_bt.runs import Row, RunRequest, crashed, launch_trial
 
 SWEEP_NODE, TRACE_NODE, REFINE_NODE, PICKUP_NODE = "guarded_sweep", "orbit_probe", "refine_outline", "tool_pickup"
 TOP_NODE = "touch_top"
@@ -35,30 +35,20 @@ EMPTY_ROW: dict[str, Any] = {
 }  # fmt: skip
 
 
-def mission_trial(request: RunRequest, policy: str, resume: bool = False) -> dict[str, Any]:
-    """Run the mission and score its record. A failed run is a row with what it discovered.
-
-    Args:
-        request: The mission to run, and its folder.
-        policy: Name of the policy, for the row.
-        resume: Score an existing record of the same mission, seed and conditions instead.
+def mission_trial(head: Row, request: RunRequest) -> Row:
+    """Run the mission and score its record; `head` are the first columns of the row.
 
     Raises:
         BadInput: The request itself is wrong.
     """
-    row = EMPTY_ROW | {"simulator": request.backend, "policy": policy, "seed": request.seed}
-    try:
-        done = _result_of(request) if resume else None
-        folder = request.out
-        if done is None or folder is None:
-            run = launch(request)
-            done, folder = run.result, run.folder
-        sections = sections_of(request.mission, request.objects)
-        return row | {"ended": _ended(done)} | score_run(read_run(folder), sections)
-    except BadInput:
-        raise
-    except Exception as e:
-        return row | {"ended": f"traceback {type(e).__name__}: {e}"}
+    done = launch_trial(request)
+    sections = sections_of(request.mission, request.objects)
+    return EMPTY_ROW | head | {"ended": _ended(done.result)} | score_run(read_run(done.folder), sections)
+
+
+def failed_trial(head: Row, error: Exception) -> Row:
+    """Return the row of a trial that raised or whose process was lost: it discovered nothing."""
+    return EMPTY_ROW | head | {"ended": crashed(error)["cause"]}
 
 
 def recorded_folders(top: Path, conditions: str) -> list[Path]:
@@ -81,8 +71,8 @@ def recorded_folders(top: Path, conditions: str) -> list[Path]:
     return out
 
 
-def recorded_trial(folder: Path, mission: str, objects: Path | None, policy: str) -> dict[str, Any]:
-    """Return the row of a recorded run of any mission that explores.
+def recorded_trial(folder: Path, mission: str, objects: Path | None, policy: str) -> list[Row]:
+    """Return the row of a recorded run of any mission that explores, in a list.
 
     Args:
         folder: Folder of the run.
@@ -93,18 +83,7 @@ def recorded_trial(folder: Path, mission: str, objects: Path | None, policy: str
     policy = str((record.run.get("parameters") or {}).get("policy", policy))
     row = EMPTY_ROW | {"simulator": record.run["backend"], "policy": policy, "seed": int(record.run["seed"])}
     row["folder"] = str(folder)
-    return row | {"ended": _ended(record.result)} | score_run(record, sections_of(mission, objects))
-
-
-def _result_of(request: RunRequest) -> Mapping[str, Any] | None:
-    """Return the result of a finished run of this request, or None."""
-    try:
-        result: Mapping[str, Any] = json.loads(((request.out or Path()) / "result.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    asked = {"mission": request.mission, "backend": request.backend, "seed": request.seed}
-    asked["conditions"] = request.conditions
-    return result if all(result.get(k) == v for k, v in asked.items()) else None
+    return [row | {"ended": _ended(record.result)} | score_run(record, sections_of(mission, objects))]
 
 
 def _ended(result: Any) -> str:
@@ -261,7 +240,7 @@ def _travelled(places: Array) -> Array:
 
 def planar_trials(
     mission: str, objects: Path | None, policy: str, seeds: Sequence[int], budget_m: float
-) -> list[dict[str, Any]]:
+) -> list[Row]:
     """Run the same explorations in the planar simulator, one row a seed."""
     world, meshes = scene(mission, objects)
     rows = []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from concurrent.futures import BrokenExecutor
 from typing import Annotated, Any
 
 import typer
@@ -42,7 +41,6 @@ def faults(
     """Fault injection: each fault in each skill, compared with the unfaulted run of the same seed."""
     from glotouch_bt.commands.terminal import print_exhaustive, print_faults
     from glotouch_bt.mission import load_mission
-    from glotouch_bt.robot import GlotouchError
     from glotouch_bt.validation.faults import (
         Exhaustive,
         FaultCampaign,
@@ -83,8 +81,5 @@ def faults(
         ending = f"{row['verdict']} {row.get('cause') or ''}" if row["effective"] else "altered nothing"
         return f"seed {row['seed']} {what}: {ending} ({row['wall_s']:.0f} s)"
 
-    try:
-        summary = shared.run_in_pool(run_campaign, campaign, workers, told)
-    except BrokenExecutor as e:
-        raise GlotouchError(f"a trial ended its worker process; continue with --resume --out {folder}") from e
+    summary = shared.run_in_pool(run_campaign, campaign, workers, told)
     shared.print_summary(summary, campaign.out, print_faults, json_)

@@ -25,11 +25,10 @@ def progress(told: Callable[[Any], str]) -> Show:
 def run_in_pool(
     run: Callable[[T, Executor, Show], dict[str, Any]], campaign: T, workers: int, told: Callable[[Any], str]
 ) -> dict[str, Any]:
-    """Run a campaign in fresh processes (spawned: MuJoCo and threads do not survive a fork); return its summary."""
-    import concurrent.futures
-    from multiprocessing import get_context
+    """Run a campaign in worker processes; return its summary."""
+    from glotouch_bt.runs import WorkerPool
 
-    with concurrent.futures.ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with WorkerPool(workers) as pool:
         return run(campaign, pool, progress(told))
 
 

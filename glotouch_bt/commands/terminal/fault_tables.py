@@ -28,7 +28,7 @@ def print_faults(summary: Mapping[str, Any], out: Path) -> None:
     lines = (
         ("trials", f"{summary['trials']}, and {summary['twins_succeeded']} of {summary['twins']} twins succeeded"),
         ("hard limit broken", f"{summary['hard_limit_broken']} (largest peak {summary['largest_peak_force_N']:.1f} N)"),
-        ("tracebacks, hangs", f"{summary['tracebacks']}, {summary['hangs']}"),
+        ("tracebacks, hangs, lost", f"{summary['tracebacks']}, {summary['hangs']}, {summary['lost']}"),
         ("wrong object lifted", _rate(summary["wrong_object"])),
         ("cause named", _rate(summary["named"])),
         ("recoverable recovered", _rate(summary["recovered"])),

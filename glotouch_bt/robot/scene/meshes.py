@@ -216,15 +216,32 @@ def _require_one_body(path: Path, mesh: trimesh.Trimesh) -> None:
         raise BadInput(f"{path}: holds {count} separate bodies; one object per file")
 
 
+def stl_files(folder: Path) -> dict[str, Path]:
+    """Return the STL files of a folder by the name of their object, sorted.
+
+    Raises:
+        BadInput: There is no such folder, two files have the same name of an object, or a name has control characters.
+    """
+    if not isdir(folder):
+        raise BadInput(f"{folder}: no such folder of STL files")
+    files: dict[str, Path] = {}
+    for path in sorted(folder.iterdir()):
+        if path.suffix.lower() != ".stl":
+            continue
+        if path.stem in files:
+            both = f"{files[path.stem].name} and {path.name}"
+            raise BadInput(f"{folder}: {both} are two files for one object; rename one of them")
+        files[path.stem] = path
+    return files
+
+
 def load_folder(folder: Path, names: tuple[str, ...] = ()) -> list[Mesh]:
     """Load every STL of a folder, sorted by name, or the named files in order.
 
     Raises:
         BadInput: The folder is missing or empty, a name is not in it, or a file is unusable.
     """
-    if not isdir(folder):
-        raise BadInput(f"{folder}: no such folder of STL files")
-    files = {p.stem: p for p in sorted(folder.iterdir()) if p.suffix.lower() == ".stl"}
+    files = stl_files(folder)
     if not files:
         raise BadInput(f"{folder}: holds no .stl file")
     missing = [n for n in names if n not in files]

@@ -8,20 +8,30 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Mapping
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from glotouch_bt.faults import FaultPlan
 from glotouch_bt.json_text import finite
 from glotouch_bt.robot import BadInput, Limits, ObjectSet
-from glotouch_bt.robot.scene import load_folder
-from glotouch_bt.runs import Campaign, OnRow, gather, silent, write_summary, write_table
+from glotouch_bt.robot.scene import load_folder, stl_files
+from glotouch_bt.runs import (
+    Campaign,
+    OnRow,
+    Trial,
+    TrialMemory,
+    run_trials,
+    silent,
+    write_summary,
+    write_table,
+)
 from glotouch_bt.validation.faults.cases import Case
 from glotouch_bt.validation.faults.plots import plot_matrix
 from glotouch_bt.validation.faults.summary import summarise
-from glotouch_bt.validation.faults.trial import drawn_after_s, run_trial
+from glotouch_bt.validation.faults.trial import drawn_after_s, failed_trial, run_trial
 
 COLUMNS = (
     "class", "skill", "seed", "verdict", "effective", "after_s", "status", "cause", "named", "seen_by", "seen_code",
@@ -68,16 +78,18 @@ def run_campaign(campaign: FaultCampaign, executor: Executor, on_row: OnRow = si
     cells = [(c, s) for c in campaign.cases for s in campaign.skills if s in c.skills]
     total = len(campaign.seeds) * (1 + len(cells))
 
-    def submit(seed: int, name: str, plan: FaultPlan, labels: Mapping[str, Any]) -> Future[dict[str, Any]]:
+    def trial(seed: int, name: str, plan: FaultPlan, labels: Mapping[str, Any]) -> Trial:
         request = campaign.request(seed, name, faults=plan, report=False)
         twin = campaign.out / f"twin-s{seed}" if plan.faults else None
-        return executor.submit(run_trial, request, labels, hard_force_N, campaign.resume, campaign.keep, twin)
+        labels = {**labels, "folder": name}
+        run = partial(run_trial, request, labels, hard_force_N, campaign.keep, twin)
+        return Trial(run, partial(failed_trial, labels), TrialMemory(request))
 
     nothing = FaultPlan("none", ())
-    futures = [submit(s, f"twin-s{s}", nothing, {"class": "none", "skill": "", "seed": s}) for s in campaign.seeds]
-    rows = gather(futures, lambda row, n, _: on_row(row, n, total))
+    trials = [trial(s, f"twin-s{s}", nothing, {"class": "none", "skill": "", "seed": s}) for s in campaign.seeds]
+    rows = run_trials(executor, trials, campaign.resume, lambda row, n, _: on_row(row, n, total))
     twins = {row["seed"]: row for row in rows}
-    futures, not_reached = [], 0
+    trials, not_reached = [], 0
     for seed in campaign.seeds:
         lasted = twins[seed].get("durations_s", {})
         for case, skill in cells:
@@ -87,8 +99,8 @@ def run_campaign(campaign: FaultCampaign, executor: Executor, on_row: OnRow = si
             after_s = drawn_after_s(seed, case.fault, skill, lasted[skill])
             labels = {"class": case.fault, "skill": skill, "seed": seed, "after_s": after_s}
             labels["twin_ok"] = twins[seed]["verdict"] == "recovered"
-            futures.append(submit(seed, f"{case.fault}-{skill}-s{seed}", case.plan(skill, after_s), labels))
-    rows += gather(futures, lambda row, n, _: on_row(row, len(twins) + n, total))
+            trials.append(trial(seed, f"{case.fault}-{skill}-s{seed}", case.plan(skill, after_s), labels))
+    rows += run_trials(executor, trials, campaign.resume, lambda row, n, _: on_row(row, len(twins) + n, total))
     rows.sort(key=lambda r: (str(r["class"]), str(r["skill"]), r["seed"]))
     return _written(campaign, rows, not_reached)
 

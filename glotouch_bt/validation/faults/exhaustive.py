@@ -193,6 +193,8 @@ def _run(
         try:
             with injector:
                 outcome = run_mission(mission, injector, ListeningRecord(NullRecord(), injector))
+            if isinstance(outcome.error, KeyboardInterrupt) and injector.failing is None:
+                raise outcome.error
         except Exception as e:
             if injector.failing is None:
                 raise

@@ -38,6 +38,7 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
         "hard_limit_broken": sum(float(r.get("peak_force_N") or 0.0) > Limits().hard_force_N for r in tried),
         "tracebacks": sum(r["status"] == "traceback" for r in tried),
         "hangs": sum(r["status"] == "hang" for r in tried),
+        "lost": sum(r["status"] == "lost" for r in tried),
         "wrong_object": wilson(len(wrong_object), len(tried)),
         "named": wilson(sum(bool(r.get("named")) for r in ended), len(ended)),
         "recovered": wilson(sum(r["verdict"] == "recovered" for r in can), len(can)),

@@ -15,17 +15,14 @@ from typing import Any
 from glotouch_bt.faults import CATALOGUE, FaultPlan
 from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE
 from glotouch_bt.report import read_run
-from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene import stream
-from glotouch_bt.runs import EARLIER, RunRequest, launch
+from glotouch_bt.runs import EARLIER, Row, RunRequest, crashed, launch_trial
 from glotouch_bt.validation.faults.cases import chosen_cases
 from glotouch_bt.validation.faults.rejoin import Rejoined
 from glotouch_bt.validation.faults.start import start_from
 
 HUNG_S = 900.0
 """Wall time after which a trial counts as hanging, s."""
-ROW, STARTED = "row.json", "started"
-MAX_STARTS = 2
 VERDICTS = ("recovered", "safely ended", "wrong", "unsafe")
 
 
@@ -82,53 +79,39 @@ def durations(folder: Path) -> dict[str, float]:
 
 
 def run_trial(
-    request: RunRequest,
-    labels: Mapping[str, Any],
-    hard_force_N: float,
-    resume: bool = False,
-    keep: bool = False,
-    twin: Path | None = None,
-) -> dict[str, Any]:
-    """Run one trial and return its row. A failure becomes a row, never an exception.
+    request: RunRequest, labels: Mapping[str, Any], hard_force_N: float, keep: bool = False, twin: Path | None = None
+) -> Row:
+    """Run one trial and return its row.
 
     Args:
         request: Run request with its folder.
-        labels: First columns of the row: class, skill, seed, after_s.
+        labels: First columns of the row: class, skill, seed, after_s, folder.
         hard_force_N: Hard limit of the true peak force.
-        resume: Use an existing row.
         keep: Keep the record of a harmless trial.
         twin: Folder of the unfaulted run of this seed, to start from.
     """
     assert request.out is not None
-    kept = request.out / ROW
-    if resume and kept.is_file():
-        row: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8"))
-        return row
-    starts = _count_start(request.out.with_name(f".{request.out.name}.{STARTED}"))
     began = time.perf_counter()
-    row = dict(labels) | {"folder": request.out.name}
     try:
-        if starts > MAX_STARTS:
-            raise Hung(f"took its process down {MAX_STARTS} times")
         with hang_guard():
             result = _launched(request, twin)
-    except BadInput:
-        raise
-    except (Exception, Hung) as e:
-        status = "hang" if isinstance(e, Hung) else "traceback"
-        row |= {"status": status, "verdict": "unsafe", "cause": f"{type(e).__name__}: {e}", "effective": True}
+    except Hung as e:
+        row = failed_trial(labels, e)
     else:
-        row |= _row(result, hard_force_N)
+        row = dict(labels) | _row(result, hard_force_N)
         if labels["class"] == "none":
             row["durations_s"] = durations(request.out)
     row["wall_s"] = round(time.perf_counter() - began, 2)
     request.out.mkdir(parents=True, exist_ok=True)
     if labels["class"] != "none":
         _tidy(request.out, everything=not keep and row.get("verdict") in ("recovered", "safely ended"))
-    part = request.out / (ROW + ".part")
-    part.write_text(json.dumps(row) + "\n", encoding="utf-8")
-    part.replace(kept)
     return row
+
+
+def failed_trial(labels: Mapping[str, Any], error: Exception | Hung) -> Row:
+    """Return the row of a trial that hung, raised, or whose process was lost."""
+    found = {"status": "hang", "cause": "hang"} if isinstance(error, Hung) else crashed(error)
+    return dict(labels) | found | {"verdict": "unsafe", "effective": True, "wall_s": 0.0}
 
 
 def _launched(request: RunRequest, twin: Path | None) -> Mapping[str, Any]:
@@ -141,7 +124,7 @@ def _launched(request: RunRequest, twin: Path | None) -> Mapping[str, Any]:
             (case,) = chosen_cases([spec.kind.name])
             resumable = start_from(twin, request.out, plan, case.warm_up_s)
     try:
-        done = launch(request, resumable=resumable)
+        done = launch_trial(request, resumable=resumable)
     finally:
         if resumable is not None:
             resumable.file.close()
@@ -167,15 +150,7 @@ def _tidy(folder: Path, everything: bool) -> None:
             (folder / name).unlink(missing_ok=True)
 
 
-def _count_start(marker: Path) -> int:
-    """Count the starts of this trial, this one included: a lost mission ends its own process."""
-    marker.parent.mkdir(parents=True, exist_ok=True)
-    starts = 1 + (int(marker.read_text(encoding="utf-8")) if marker.is_file() else 0)
-    marker.write_text(str(starts), encoding="utf-8")
-    return starts
-
-
-def _row(result: Mapping[str, Any], hard_force_N: float) -> dict[str, Any]:
+def _row(result: Mapping[str, Any], hard_force_N: float) -> Row:
     chain, reports = result["reason_chain"], result["faults"]
     root = chain[-1] if chain else {"node": "", "code": ""}
     row = {
