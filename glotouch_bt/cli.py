@@ -6,6 +6,7 @@ Exit codes: 0 done; 1 the mission failed; 2 bad input; 3 a safety stop or backen
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from typing import Annotated, Any
 
@@ -67,7 +68,10 @@ def main() -> None:
     if "--debug" in sys.argv[1:]:
         set_debug()
         sys.argv = [a for a in sys.argv if a != "--debug"]
-    app()
+    try:
+        app()
+    finally:  # the command is over: one more Ctrl-C must not end the interpreter's own clean-up
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 if __name__ == "__main__":

@@ -100,14 +100,9 @@ class Trial(Task[Row]):
     memory: TrialMemory
 
     def __call__(self) -> Row:
-        """See `Task`. Failures are not remembered: a resumed campaign tries them again."""
+        """See `Task`. A trial that was interrupted or whose process was lost is not remembered."""
         self.memory.forget()
-        try:
-            row = self.run()
-        except BadInput:
-            raise
-        except Exception as e:
-            return self.failed(e)
+        row = super().__call__()
         self.memory.write(row)
         return row
 

@@ -1,4 +1,4 @@
-"""Worker processes of a campaign: one lost process is one lost task, Ctrl-C ends them all, and none outlives its parent."""
+"""Worker processes of a campaign: a lost process is one lost task, Ctrl-C ends them all, none outlives its parent."""
 
 from __future__ import annotations
 

@@ -3,41 +3,72 @@
 from __future__ import annotations
 
 import json
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from glotouch_bt.json_text import finite, json_text
-from glotouch_bt.runs import Campaign, gather, write_summary, write_table
+from glotouch_bt.robot import BadInput
+from glotouch_bt.runs import Campaign, Task, WorkerLost, gather, write_summary, write_table
 
 NAN, INF = float("nan"), float("inf")
 
 
+def task(run: Callable[[], Any]) -> Task[Any]:
+    return Task(run, lambda error: f"failed: {error}")
+
+
+def raises(error: BaseException) -> Callable[[], Any]:
+    def run() -> Any:
+        raise error
+
+    return run
+
+
 def test_results_are_gathered_and_counted() -> None:
     told: list[tuple[int, int]] = []
+    tasks = [task(partial(pow, 3, 2)), task(raises(KeyError("a bug"))), task(raises(ValueError("another")))]
     with ThreadPoolExecutor(1) as pool:
-        found = gather([pool.submit(pow, n, 2) for n in range(3)], lambda _, done, total: told.append((done, total)))
-    assert sorted(found) == [0, 1, 4]
+        found = gather(pool, tasks, lambda _, done, total: told.append((done, total)))
+    assert sorted(found, key=str) == [9, "failed: 'a bug'", "failed: another"]
     assert told == [(1, 3), (2, 3), (3, 3)]
 
 
+class Lost(Executor):
+    """Gives futures that the test ends."""
+
+    def __init__(self, *made: Future[Any]) -> None:
+        self.made = list(made)
+
+    def submit(self, *_: Any) -> Future[Any]:
+        return self.made.pop(0)
+
+
 @pytest.mark.parametrize("who", ["trial", "caller"])
-def test_an_error_cancels_what_has_not_begun(who: str) -> None:
+def test_bad_input_or_an_interrupt_cancels_what_has_not_begun(who: str) -> None:
     first: Future[int] = Future()
     waiting: Future[int] = Future()
     if who == "trial":
-        first.set_exception(KeyError("a bug"))
+        first.set_exception(BadInput("no such mission"))
     else:
         first.set_result(1)
 
     def refuse(*_: Any) -> None:
-        raise KeyError("a bug")
+        raise KeyboardInterrupt
 
-    with pytest.raises(KeyError):
-        gather([first, waiting], refuse)
+    with pytest.raises(BadInput if who == "trial" else KeyboardInterrupt):
+        gather(Lost(first, waiting), [task(int)] * 2, refuse)
     assert waiting.cancelled()
+
+
+def test_a_lost_process_is_the_failure_of_its_task() -> None:
+    lost: Future[int] = Future()
+    lost.set_exception(WorkerLost(-9))
+    assert gather(Lost(lost), [task(int)]) == ["failed: its process was killed (SIGKILL)"]
 
 
 def test_a_trial_takes_the_settings_of_its_campaign(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ def _result(request: RunRequest) -> dict[str, Any]:
 @pytest.fixture
 def campaign(tmp_path: Path) -> retrieve.RetrieveCampaign:
     return retrieve.RetrieveCampaign(
-        mission="retrieve", targets=("a", "b"), seeds=range(5), backend="fake", out=tmp_path / "out"
+        mission="retrieve", targets=("apple", "train"), seeds=range(5), backend="fake", out=tmp_path / "out"
     )
 
 
@@ -40,13 +40,13 @@ def test_every_trial_is_counted_and_named(campaign: retrieve.RetrieveCampaign, m
         code = {2: 1, 3: 3}.get(request.seed, 0)
         return SimpleNamespace(result=_result(request), exit_code=code)
 
-    monkeypatch.setattr(retrieve, "launch", launch)
+    monkeypatch.setattr(retrieve, "launch_trial", launch)
     shown: list[int] = []
     with ThreadPoolExecutor(2) as pool:
         summary = retrieve.run_campaign(campaign, pool, lambda row, done, total: shown.append(done))
     assert shown == list(range(1, 11))
     assert (summary["success"]["rate"], summary["success"]["n"]) == (0.2, 10)
-    assert summary["by_target"]["a"]["rate"] == 0.2
+    assert summary["by_target"]["apple"]["rate"] == 0.2
     assert summary["wrong_object"]["rate"] == 0.2
     assert summary["safety_stops"]["rate"] == 0.2
     assert summary["tracebacks"]["rate"] == 0.2
@@ -77,7 +77,7 @@ def test_a_resumed_campaign_keeps_what_was_run_and_passes_settings_on(
         (request.out / "result.json").write_text(json.dumps(_result(request)))
         return SimpleNamespace(result=_result(request), exit_code={2: 1, 3: 3}.get(request.seed, 0))
 
-    monkeypatch.setattr(retrieve, "launch", launch)
+    monkeypatch.setattr(retrieve, "launch_trial", launch)
     first = replace(campaign, seeds=(0, 1), settings={"devices": "simulated"})
     with ThreadPoolExecutor(1) as pool:
         retrieve.run_campaign(first, pool)

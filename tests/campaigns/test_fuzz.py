@@ -3,40 +3,47 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from glotouch_bt.runs import WorkerLost
 from glotouch_bt.validation.fuzz import campaign as campaign_module
+from glotouch_bt.validation.fuzz import missions as missions_module
 from glotouch_bt.validation.fuzz import trial as trial_module
-from glotouch_bt.validation.fuzz.campaign import FuzzCampaign, run_campaign
+from glotouch_bt.validation.fuzz.campaign import KINDS, FuzzCampaign, run_campaign
 from glotouch_bt.validation.fuzz.corrupt import ODD_VALUES
-from glotouch_bt.validation.fuzz.trial import BAD, Result, document_of, run_trials
+from glotouch_bt.validation.fuzz.kind import BAD, FuzzKind
+from glotouch_bt.validation.fuzz.missions import document_of
+from glotouch_bt.validation.fuzz.trial import Result, run_trials, stream_of
 
 SEED = 7
+MISSIONS = KINDS["missions"]
+
+
+def drawn(seed: int, n: int) -> tuple[str, bytes]:
+    return document_of(stream_of(seed, n))
 
 
 def test_a_trial_is_the_same_whenever_it_is_made() -> None:
     for n in range(60):
-        kind, text, _ = document_of(SEED, n)
-        again = document_of(SEED, n)
-        assert (kind, text) == again[:2]
+        assert drawn(SEED, n) == drawn(SEED, n)
 
 
 def test_a_document_does_not_depend_on_those_before_it() -> None:
     before = deepcopy(ODD_VALUES)
-    first = [document_of(1, n)[1] for n in range(1500)]
+    first = [drawn(1, n)[1] for n in range(1500)]
     assert repr(before) == repr(ODD_VALUES)
-    assert first == [document_of(1, n)[1] for n in range(1500)]
+    assert first == [drawn(1, n)[1] for n in range(1500)]
 
 
 def test_documents_are_of_both_kinds_and_in_all_states() -> None:
-    documents = [document_of(SEED, n)[:2] for n in range(300)]
+    documents = [drawn(SEED, n) for n in range(300)]
     assert {kind for kind, _ in documents} == {"mission", "fault plan"}
     texts = [text for _, text in documents]
     assert any(b"!!python" in t for t in texts), "tags"
@@ -45,10 +52,11 @@ def test_documents_are_of_both_kinds_and_in_all_states() -> None:
     assert sum(b"tool_pickup" in t for t in texts) > 20, "and things that make sense"
 
 
-def test_nothing_bad_comes_of_some_of_them() -> None:
-    results = run_trials(SEED, range(60))
+@pytest.mark.parametrize(("kind", "some"), [("missions", {"refused with places"}), ("meshes", {"accepted"})])
+def test_nothing_bad_comes_of_some_of_them(kind: str, some: set[str]) -> None:
+    results = run_trials(KINDS[kind], SEED, range(60))
     assert [(r.number, r.came, r.detail) for r in results if r.came in BAD] == []
-    assert {"refused with places", "refused unread"} < {r.came for r in results}
+    assert {"refused unread", *some} <= {r.came for r in results}
 
 
 @pytest.fixture
@@ -59,7 +67,7 @@ def broken_check(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
 
 
 def missions(n: int) -> list[int]:
-    return [i for i in range(60) if document_of(SEED, i)[0] == "mission"][:n]
+    return [i for i in range(60) if drawn(SEED, i)[0] == "mission"][:n]
 
 
 def bug(path: object, settings: object) -> None:
@@ -89,20 +97,42 @@ def runs_text(path: Path, settings: object) -> None:
      (runs_text, "code run")],
 )  # fmt: skip
 def test_what_must_not_happen_is_noticed(broken_check: pytest.MonkeyPatch, what: object, came: str) -> None:
-    broken_check.setattr(trial_module, "load_mission", what)
-    (result,) = run_trials(SEED, missions(1))
+    broken_check.setattr(missions_module, "load_mission", what)
+    (result,) = run_trials(MISSIONS, SEED, missions(1))
     assert result.came == came
-    assert result.text, "with what it came of"
+
+
+def test_a_kind_that_writes_does_so_below_its_folder_only(tmp_path: Path) -> None:
+    class Writes(FuzzKind):
+        name, description, writes = "writes", "", True
+
+        def make(self, rng: object, folder: Path) -> str:
+            return "file"
+
+        def attempt(self, sort: str, folder: Path, rng: object) -> tuple[Any, str]:
+            (folder / "inside").write_text("x")
+            (folder / "inside").rename(folder / "renamed")
+            (tmp_path / "outside").write_text("x")
+            return "accepted", ""
+
+    (result,) = run_trials(Writes(), SEED, [0])
+    assert result.came == "code run"
+    assert result.detail.splitlines() == [f"open {str(tmp_path / 'outside')!r} w"]
 
 
 def test_a_campaign_counts_and_keeps_what_broke(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def made(seed: int, numbers: tuple[int, ...]) -> list[Result]:
-        return [Result(n, "mission", "traceback" if n == 3 else "ran to success", "why", b"\xff") for n in numbers]
+    """A process that dies costs no result: its trials are run one by one."""
+
+    def made(kind: FuzzKind, seed: int, numbers: tuple[int, ...]) -> list[Result]:
+        if 70 in numbers:
+            raise WorkerLost(-9)
+        return [Result(n, "mission", "traceback" if n == 3 else "ran to success", "why") for n in numbers]
 
     monkeypatch.setattr(campaign_module, "run_trials", made)
     with ThreadPoolExecutor(1) as pool:
         summary = run_campaign(FuzzCampaign(120, SEED, tmp_path / "out"), pool)
-    assert summary["counts"] == {"mission": {"ran to success": 119, "traceback": 1}}
-    assert json.loads((tmp_path / "out/summary.json").read_text())["failures"][0]["trial"] == 3
-    assert (tmp_path / "out/failures/traceback-3.yaml").read_bytes() == b"\xff"
-    assert os.listdir(tmp_path / "out/failures") != []
+    assert summary["counts"] == {"mission": {"ran to success": 118, "traceback": 1}, "unknown": {"process died": 1}}
+    found = json.loads((tmp_path / "out/summary.json").read_text())["failures"]
+    assert [(f["trial"], f["detail"]) for f in found] == [(3, "why"), (70, "its process was killed (SIGKILL)")]
+    assert (tmp_path / "out/failures/traceback-3/m.yaml").read_bytes() == drawn(SEED, 3)[1]
+    assert (tmp_path / "out/failures/process_died-70/m.yaml").read_bytes() == drawn(SEED, 70)[1]

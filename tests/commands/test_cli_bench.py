@@ -40,7 +40,7 @@ class NoPool:
 def command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[CliRunner]:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setattr("concurrent.futures.ProcessPoolExecutor", NoPool)
+    monkeypatch.setattr("glotouch_bt.runs.WorkerPool", NoPool)
     yield CliRunner()
     cli._debug = False
 

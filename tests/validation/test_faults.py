@@ -17,6 +17,7 @@ from glotouch_bt.faults.effects.catalogue import CATALOGUE
 from glotouch_bt.mission.checkpoint.store import CheckpointRow
 from glotouch_bt.robot import BadInput, UnknownName
 from glotouch_bt.robot.fake import FakeRobot
+from glotouch_bt.runs import WorkerLost
 from glotouch_bt.runs.launch import RunRequest
 from glotouch_bt.validation.faults import exhaustive as faults_exhaustive
 from glotouch_bt.validation.faults import start as faults_start
@@ -151,13 +152,19 @@ def test_a_campaign_counts_every_trial(tmp_path: Path, monkeypatch: pytest.Monke
     assert again == summary
 
 
-def test_a_trial_that_ends_its_process_twice_counts_as_hanging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(faults_trial, "_launched", made_up)
+def test_a_trial_that_hangs_or_loses_its_process_is_unsafe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def hangs(*_: object) -> Any:
+        raise faults_trial.Hung
+
+    monkeypatch.setattr(faults_trial, "_launched", hangs)
     request = RunRequest("m", out=tmp_path / "t", faults=Case("wrench_off").plan("lift", 0.0))
-    (tmp_path / f".t.{faults_trial.STARTED}").write_text("2")
     labels = {"class": "wrench_off", "skill": "lift", "seed": 1}
-    row = faults_trial.run_trial(request, labels, 30.0, True, False)
+    row = faults_trial.run_trial(request, labels, 30.0)
     assert (row["status"], row["verdict"]) == ("hang", "unsafe")
+    lost = faults_trial.failed_trial(labels, WorkerLost(-9))
+    assert (lost["status"], lost["verdict"], lost["cause"]) == (
+        "lost", "unsafe", "lost: its process was killed (SIGKILL)"
+    )  # fmt: skip
 
 
 def short_mission(folder: Path) -> str:

@@ -8,7 +8,7 @@ returning the probe) discovers nothing and is not counted.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -238,9 +238,7 @@ def _travelled(places: Array) -> Array:
     return out
 
 
-def planar_trials(
-    mission: str, objects: Path | None, policy: str, seeds: Sequence[int], budget_m: float
-) -> list[Row]:
+def planar_trials(mission: str, objects: Path | None, policy: str, seeds: Sequence[int], budget_m: float) -> list[Row]:
     """Run the same explorations in the planar simulator, one row a seed."""
     world, meshes = scene(mission, objects)
     rows = []

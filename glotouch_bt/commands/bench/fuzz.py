@@ -1,4 +1,4 @@
-"""`glotouch bench fuzz`: random and corrupt documents for the checker."""
+"""`glotouch bench fuzz`: random and corrupt inputs."""
 
 from __future__ import annotations
 
@@ -14,16 +14,20 @@ from glotouch_bt.commands import shared
 
 @shared.guarded
 def fuzz(
-    trials: Annotated[int, typer.Option(min=1, help="number of documents")] = 20_000,
+    kind: Annotated[str, typer.Option(help="what is fuzzed: missions (with fault plans) or meshes")] = "missions",
+    trials: Annotated[int, typer.Option(min=1, help="number of inputs")] = 20_000,
     seed: shared.FirstSeed = 0,
     workers: shared.Workers = 2,
     out: shared.BenchFolder = None,
     json_: shared.SummaryJson = False,
 ) -> int:
-    """Random and corrupt missions and fault plans: the checker must not crash, hang, run code or accept a mistake."""
-    from glotouch_bt.validation.fuzz import BAD, FuzzCampaign, run_campaign
+    """Random and corrupt inputs: nothing may crash, hang, run code or accept a mistake."""
+    from glotouch_bt.robot import UnknownName
+    from glotouch_bt.validation.fuzz import BAD, KINDS, FuzzCampaign, run_campaign
 
-    campaign = FuzzCampaign(trials, seed, shared.bench_folder(out, "fuzz"))
+    if kind not in KINDS:
+        raise UnknownName("kind of input", kind, KINDS)
+    campaign = FuzzCampaign(trials, seed, shared.bench_folder(out, "fuzz"), kind)
 
     def told(counts: Mapping[str, int]) -> str:
         return f"{sum(counts.get(name, 0) for name in BAD)} bad"
@@ -36,10 +40,10 @@ def fuzz(
 def _print_fuzz(summary: Mapping[str, Any], out: Path) -> None:
     from glotouch_bt.commands.terminal import print_table
 
-    kinds = list(summary["counts"])
+    sorts = list(summary["counts"])
     classes = sorted({c for found in summary["counts"].values() for c in found})
-    rows = [(c, *(str(summary["counts"][k].get(c, 0)) for k in kinds)) for c in classes]
-    print_table(f"{summary['trials']} documents, seed {summary['seed']}", ("outcome", *kinds), rows)
+    rows = [(c, *(str(summary["counts"][k].get(c, 0)) for k in sorts)) for c in classes]
+    print_table(f"{summary['trials']} {summary['kind']}, seed {summary['seed']}", ("outcome", *sorts), rows)
     bad = summary["bad"]
     sys.stdout.write(f"bad: {len(summary['failures'])} ({100 * bad['lo']:.3f} .. {100 * bad['hi']:.3f} %)\n")
     sys.stdout.write(f"{out / 'summary.json'}\n")

@@ -59,13 +59,18 @@ def few_objects(objects: ObjectSet, count: int, folder: Path) -> tuple[Path, tup
     """Copy the first `count` objects of a world to a folder; return it and their names.
 
     Raises:
-        BadInput: The world's objects cannot be read, or the folder not be written.
+        BadInput: The world's objects cannot be read, or the folder holds other ones or cannot be written.
     """
     names = tuple(m.name for m in load_folder(objects.folder, objects.names))[:count]
+    files = stl_files(objects.folder)
+    there = stl_files(folder) if folder.is_dir() else {}
+    other = [n for n, path in there.items() if n not in names or path.read_bytes() != files[n].read_bytes()]
+    if other:
+        raise BadInput(f"{folder}: holds other objects ({', '.join(other)}); give the same options, or another --out")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name in names:
-            shutil.copyfile(objects.folder / f"{name}.stl", folder / f"{name}.stl")
+            shutil.copyfile(files[name], folder / f"{name}.stl")
     except OSError as e:
         raise BadInput(f"{folder}: the objects cannot be copied there ({e.strerror})") from e
     return folder, names

@@ -1,8 +1,8 @@
-"""`bench fuzz`: random and corrupted missions and fault plans; reading one must never crash, hang or run code.
+"""`bench fuzz`: random and corrupted inputs of several kinds; using one must never crash, hang or run code.
 
-`documents` generates missions and plans that are nearly right, `corrupt` changes them (as data and as bytes), `trial`
-reads one, checks it and runs what passes with scripted leaves, `watch` detects forbidden actions, `campaign` counts.
+A kind (`kind`) makes an input and tries it; `campaign` registers the kinds. `missions` are grown by `documents` and
+changed by `corrupt`, as data and as bytes. `trial` runs one trial while `watch` detects forbidden actions.
 """
 
-from glotouch_bt.validation.fuzz.campaign import FuzzCampaign, run_campaign
-from glotouch_bt.validation.fuzz.trial import BAD
+from glotouch_bt.validation.fuzz.campaign import KINDS, FuzzCampaign, run_campaign
+from glotouch_bt.validation.fuzz.kind import BAD

@@ -69,6 +69,6 @@ def test_a_trial_that_failed_counts() -> None:
 
 def test_every_mode_is_tried_on_every_seed(tmp_path: Path) -> None:
     campaign = contact.ContactCampaign(seeds=(3, 4), per_side=5, out=tmp_path)
-    asked = [(tool, fixed, r.seed, r.settings["contacts"]) for tool, fixed, r in campaign.requests()]
+    asked = [(r.out, r.mission, r.seed, r.settings["contacts"]) for r in (t.memory.request for t in campaign.trials())]
     assert len(asked) == len(set(asked)) == 8
     assert {a[3] for a in asked} == {"20"}

@@ -126,7 +126,7 @@ def test_files_of_another_candidate_or_none_are_refused(tmp_path):
 
 def test_acquiring_runs_the_mission_and_writes_the_layout(tmp_path, monkeypatch):
     start = [true_object("a", 0.0, 0.0, 0.0)]
-    monkeypatch.setattr(acquire, "launch", lambda request: SimpleNamespace(folder=request))
+    monkeypatch.setattr(acquire, "launch_trial", lambda request: SimpleNamespace(folder=request))
     monkeypatch.setattr(acquire, "read_run", lambda folder: a_record([touchset(0, 0.05)], start, start))
     layout = acquire_layout("a request", tmp_path)
     assert isinstance(layout, Layout)

@@ -145,7 +145,7 @@ BAD = [
 def command(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setattr("concurrent.futures.ProcessPoolExecutor", Threads)
+    monkeypatch.setattr("glotouch_bt.runs.WorkerPool", Threads)
     yield CliRunner()
     cli._debug = False
 

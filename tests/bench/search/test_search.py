@@ -14,10 +14,9 @@ import pytest
 from glotouch_bt.bench.search.bench import SearchCampaign, run_campaign
 from glotouch_bt.bench.search.scoring import Found, TrueLayout, discovered_at, score
 from glotouch_bt.bench.search.summary import correlation, quantiles, summarise
-from glotouch_bt.bench.search.trial import TipPath, _result_of, recorded_folders
+from glotouch_bt.bench.search.trial import TipPath, recorded_folders
 from glotouch_bt.report.run_record import RecordedEvent, RunRecord, Tick
 from glotouch_bt.robot import BadInput
-from glotouch_bt.runs.launch import RunRequest
 
 
 def thing(name="thing", size=(0.08, 0.04), centre=(0.01, 0.0), yaw=0.0, top=0.07):
@@ -154,7 +153,7 @@ def test_unknown_policies_are_named():
 
 def test_the_request_of_a_trial(tmp_path):
     campaign = SearchCampaign(policies=("random_descent",), seeds=(7,), out=tmp_path)
-    request = campaign.trial("random_descent", 7)
+    request = campaign.trial("random_descent", 7).memory.request
     assert (request.mission, request.seed, request.out) == ("survey", 7, tmp_path / "random_descent-s7")
     assert request.settings == {"policy": "random_descent", "expected_objects": "5"}
 
@@ -198,14 +197,3 @@ def test_recorded_runs_are_those_that_ended_under_the_conditions_with_their_trut
     assert recorded_folders(tmp_path, "harsh") == [tmp_path / "c"]
     with pytest.raises(BadInput, match="no recorded run"):
         recorded_folders(tmp_path, "ideal")
-
-
-def test_a_run_is_resumed_only_if_it_is_the_one_that_was_asked_for(tmp_path):
-    asked = RunRequest(mission="survey", backend="mujoco", seed=3, conditions="nominal", out=tmp_path)
-    assert _result_of(asked) is None
-    result = {"mission": "survey", "backend": "mujoco", "seed": 3, "conditions": "nominal", "status": "success"}
-    (tmp_path / "result.json").write_text(json.dumps(result))
-    assert _result_of(asked) == result
-    for key, other in (("mission", "retrieve"), ("seed", 4), ("conditions", "harsh")):
-        (tmp_path / "result.json").write_text(json.dumps(result | {key: other}))
-        assert _result_of(asked) is None

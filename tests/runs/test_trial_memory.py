@@ -1,0 +1,123 @@
+"""A finished trial of a campaign is reused for the same request only; an interrupted one is none."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from glotouch_bt.faults import read_plan
+from glotouch_bt.mission.read import shipped_root
+from glotouch_bt.robot import BadInput
+from glotouch_bt.robot.scene import stl_files
+from glotouch_bt.runs import RunRequest, Trial, TrialMemory, run_trials, trials
+
+MISSION = "mission: m\nworld: container_five\ntimeout_s: 60\ntree: [tool_pickup, tool_return]\n"
+
+
+@pytest.fixture
+def request_(tmp_path: Path) -> RunRequest:
+    objects = tmp_path / "objects"
+    objects.mkdir()
+    for name, file in list(stl_files(shipped_root() / "objects").items())[:2]:
+        shutil.copyfile(file, objects / f"{name}.stl")
+    (tmp_path / "m.yaml").write_text(MISSION)
+    (tmp_path / "c.yaml").write_text("name: c\nforce_noise_sd_N: 0.1\n")
+    conditions = str(tmp_path / "c.yaml")
+    return RunRequest(str(tmp_path / "m.yaml"), "fake", 3, {}, objects, conditions, tmp_path / "out")
+
+
+def trial(request: RunRequest, run: Callable[[], dict[str, Any]] = lambda: {"n": 1}) -> Trial:
+    return Trial(run, lambda error: {"failed": str(error)}, TrialMemory(request))
+
+
+def rows(trial: Trial, resume: bool = True) -> list[dict[str, Any]]:
+    with ThreadPoolExecutor(1) as pool:
+        return run_trials(pool, [trial], resume)
+
+
+def forget_contents() -> None:
+    from glotouch_bt.runs import trial_memory
+
+    trial_memory._content.cache_clear()
+
+
+def test_a_finished_trial_is_kept(request_: RunRequest) -> None:
+    assert rows(trial(request_)) == [{"n": 1}]
+    assert rows(trial(request_, lambda: {"n": 2})) == [{"n": 1}]
+    assert rows(trial(request_, lambda: {"n": 2}), resume=False) == [{"n": 2}]
+
+
+def change_objects(request: RunRequest) -> RunRequest:
+    assert request.objects is not None
+    first = next(iter(request.objects.iterdir()))
+    first.write_bytes(first.read_bytes() + b" ")
+    return request
+
+
+def change_mission(request: RunRequest) -> RunRequest:
+    Path(request.mission).write_text(MISSION.replace("60", "61"))
+    return request
+
+
+def change_conditions(request: RunRequest) -> RunRequest:
+    Path(request.conditions).write_text("name: c\nforce_noise_sd_N: 0.2\n")
+    return request
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda r: replace(r, conditions="harsh"), "conditions "),
+        (lambda r: replace(r, backend="mujoco"), 'backend "fake", now "mujoco"'),
+        (lambda r: replace(r, seed=4), "seed 3, now 4"),
+        (lambda r: replace(r, settings={"devices": "x"}), 'settings: devices none, now "x"'),
+        (lambda r: replace(r, faults=read_plan("weak_grip")), "faults none, now "),
+        (change_objects, "content of object "),
+        (change_mission, "content of mission "),
+        (change_conditions, "content of conditions "),
+    ],
+)
+def test_another_request_is_refused_with_the_difference(
+    change: Callable[[RunRequest], RunRequest], said: str, request_: RunRequest
+) -> None:
+    rows(trial(request_))
+    changed = change(request_)
+    forget_contents()
+    with pytest.raises(BadInput, match="holds a trial that was made otherwise") as refused:
+        rows(trial(changed))
+    assert said in str(refused.value)
+    assert rows(trial(changed), resume=False) == [{"n": 1}], "without --resume it is run again"
+
+
+def test_an_interrupted_trial_is_none(request_: RunRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that Ctrl-C ended has a result; it is run again, and no result of before counts."""
+    rows(trial(request_))
+    ended = SimpleNamespace(outcome=SimpleNamespace(error=KeyboardInterrupt()), result={"status": "aborted"})
+    monkeypatch.setattr(trials, "launch", lambda request: ended)
+    with pytest.raises(KeyboardInterrupt):
+        rows(trial(request_, lambda: trials.launch_trial(request_).result), resume=False)
+    assert rows(trial(request_, lambda: {"n": 3})) == [{"n": 3}]
+
+
+def test_an_error_is_a_row_that_counts_again(request_: RunRequest) -> None:
+    def bug() -> dict[str, Any]:
+        raise KeyError("a bug")
+
+    assert rows(trial(request_, bug)) == [{"failed": "'a bug'"}]
+    assert rows(trial(request_)) == [{"failed": "'a bug'"}]
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"request": {}}', '{"request": 1, "row": {}}'])
+def test_a_broken_file_is_no_trial(text: str, request_: RunRequest) -> None:
+    rows(trial(request_))
+    assert request_.out is not None
+    (request_.out / "trial.json").write_text(text)
+    with pytest.raises(BadInput, match=r"trial\.json: is "):
+        rows(trial(request_))
