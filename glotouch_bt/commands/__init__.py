@@ -10,6 +10,7 @@ from glotouch_bt.commands.bench import bench
 from glotouch_bt.commands.check import check
 from glotouch_bt.commands.doctor import doctor
 from glotouch_bt.commands.faults import faults
+from glotouch_bt.commands.keys import keys
 from glotouch_bt.commands.missions import missions
 from glotouch_bt.commands.nodes import nodes
 from glotouch_bt.commands.replay import replay
@@ -32,6 +33,6 @@ COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
         "skills": skills,
         "schema": schema,
     },
-    "Robots and faults": {"backends": backends, "doctor": doctor, "faults": faults},
+    "Robots and faults": {"backends": backends, "doctor": doctor, "keys": keys, "faults": faults},
 }
 """Commands by use, in the order of `glotouch --help`."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import cast
 
 from glotouch_backends.flexiv_xense.client.link import OPEN_S, DriverLink
 from glotouch_backends.flexiv_xense.client.options import ClientOptions, read_options
@@ -14,6 +13,7 @@ from glotouch_backends.flexiv_xense.client.referee import RemoteReferee
 from glotouch_backends.flexiv_xense.client.robot import FlexivXenseRobot
 from glotouch_backends.flexiv_xense.driver import messages
 from glotouch_backends.rizon4 import RIZON4_XENSE
+from glotouch_backends.trial_message import trial_message
 from glotouch_bt.robot import Backend, Conditions, Limits, Pose, Robot, RobotDescription, World
 from glotouch_bt.robot.simulation import Referee
 
@@ -92,21 +92,19 @@ class FlexivXenseBackend(Backend):
         move: bool = True,
     ) -> FlexivXenseRobot:
         """Open a robot with converted options; enable nothing if `move` is False."""
+        trial = b"" if options.devices == "real" else trial_message(world, conditions, seed, options.world)
         process = None if options.driver else DriverProcess(options)
         link: DriverLink | None = None
         try:
             if process is not None:
-                if options.devices == "simulated":
-                    process.put_world(world, conditions, seed, options.world)
-                process.start()
+                process.start(trial)
             link = DriverLink(
                 options.driver or (process.address if process else ""),
                 (lambda: None) if process is None else process.gone,
                 paced=not options.lockstep,
                 keys=Path(options.keys) if options.keys else None,
             )
-            world_at = "" if process is None else process.world
-            request = self._request(options, settings, world_at, link.number(), move)
+            request = self._request(options, settings, trial if options.lockstep else b"", link.number(), move)
             opened = link.ask(request, messages.Opened, limit_s=OPEN_S, on_progress=lambda _: None)
             link.beat()
             first = link.wait(0, messages.Block, limit_s=10.0)
@@ -122,15 +120,13 @@ class FlexivXenseBackend(Backend):
         return robot
 
     def _request(
-        self, options: ClientOptions, settings: messages.DeviceSettings, world: str, number: int, move: bool
+        self, options: ClientOptions, settings: messages.DeviceSettings, world: bytes, number: int, move: bool
     ) -> messages.Open:
         hand = self._description.gripper
-        simulated = options.devices == "simulated"
-        kind = "real" if not simulated else "simulated" if options.lockstep else "cell"
         return messages.Open(
             number=number,
             protocol=messages.PROTOCOL,
-            devices=messages.Devices(kind=kind, settings=settings, world=world),
+            devices=messages.Devices(kind=options.devices, settings=settings, world=world),
             tool=_tool(self._description),
             arm=_arm_limits(self._description, self._limits),
             hand=messages.HandLimits(
@@ -149,5 +145,5 @@ class FlexivXenseBackend(Backend):
     def referee(self, robot: Robot) -> Referee | None:
         """See `Backend`; None for real devices."""
         if isinstance(robot, FlexivXenseRobot) and robot.info["devices"] != "real":
-            return cast("Referee", RemoteReferee(robot.link))
+            return RemoteReferee(robot.link)
         return None

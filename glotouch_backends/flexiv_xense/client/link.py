@@ -9,12 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-import msgspec
 import zmq
 import zmq.auth
 
-from glotouch_backends.flexiv_xense.driver import HEARTBEAT_SUFFIX, messages
-from glotouch_bt.robot import BackendError, ParamError, StaleReading
+from glotouch_backends.flexiv_xense.driver import HEARTBEAT_SUFFIX, load_secret_key, messages
+from glotouch_bt.robot import BackendError, BadInput, GlotouchError, ParamError, StaleReading
 
 A = TypeVar("A")
 BEAT_S = 0.1
@@ -25,8 +24,8 @@ SLOW_REQUEST_S = 10.0
 """The same while a slow request is pending: a blocking vendor call may stop the whole driver. Source: ours."""
 OPEN_S = 120.0
 """Longest wait for the devices to open. Source: ours."""
-LOCKSTEP_S = 120.0
-"""Longest wait for an answer in lock-step. Source: ours."""
+LOCKSTEP_S = 30.0
+"""Longest wait for an answer in lock-step, where a cycle takes milliseconds. Source: ours."""
 POLL_S = 0.2
 """Interval between two checks of the driver's process while waiting."""
 
@@ -35,8 +34,10 @@ class DeviceError(BackendError):
     """A device failed; the message ends with the arm's last event."""
 
 
-def failure(answer: messages.Failed) -> BackendError:
+def failure(answer: messages.Failed) -> GlotouchError:
     """Return our error for the driver's, with the arm's event log in its notes."""
+    if answer.kind == "input":
+        return BadInput(answer.message)
     if answer.kind == "stale":
         error: BackendError = StaleReading(answer.message, answer.age_s, answer.limit_s)
     else:
@@ -74,16 +75,21 @@ class DriverLink:
         self._stop = threading.Event()
         self._heart: threading.Thread | None = None
         self._closed = False
+        self._lost: str | None = None
 
     def _connect(self, name: bytes) -> zmq.Socket[bytes]:
         socket = self._context.socket(zmq.DEALER)
         socket.setsockopt(zmq.LINGER, 200)
         socket.setsockopt(zmq.IDENTITY, name)
+        socket.setsockopt(zmq.MAXMSGSIZE, messages.MAX_ANSWER_BYTES)
         if self._keys is not None:
-            public, secret = zmq.auth.load_certificate(self._keys / "client.key_secret")
-            server, _ = zmq.auth.load_certificate(self._keys / "driver.key")
-            socket.curve_publickey, socket.curve_secretkey = public, secret or b""
-            socket.curve_serverkey = server
+            try:
+                socket.curve_publickey, socket.curve_secretkey = load_secret_key(self._keys / "client.key_secret")
+                socket.curve_serverkey, _ = zmq.auth.load_certificate(self._keys / "driver.key")
+            except (OSError, ValueError) as e:
+                socket.close()
+                self._context.term()
+                raise BadInput(f"option keys: {e}") from e
         socket.connect(self._address)
         return socket
 
@@ -115,15 +121,18 @@ class DriverLink:
         request: messages.Request,
         answer: type[A],
         *,
-        limit_s: float = LOCKSTEP_S,
+        limit_s: float | None = None,
         on_progress: Callable[[str], None] | None = None,
     ) -> A:
-        """Send a request and wait for its answer.
+        """Send a request and wait for its answer, at most `limit_s` or LOCKSTEP_S.
 
         Raises:
-            BackendError: The driver has ended or is silent, or a device failed.
+            BackendError: The driver has ended or is silent, or a device failed. A lost driver is not waited for again.
+            BadInput: The driver cannot build the simulated world.
             ParamError: The driver refused a command.
         """
+        if self._lost is not None:
+            raise BackendError(self._lost)
         self.post(request)
         return self.wait(request.number, answer, limit_s=limit_s, on_progress=on_progress)  # type: ignore[union-attr]
 
@@ -132,12 +141,12 @@ class DriverLink:
         number: int,
         kind: type[A],
         *,
-        limit_s: float = LOCKSTEP_S,
+        limit_s: float | None = None,
         on_progress: Callable[[str], None] | None = None,
     ) -> A:
         """Wait for the answer to an earlier request; errors as in `ask`."""
         began = heard = time.perf_counter()
-        quiet_s = limit_s
+        limit_s = quiet_s = LOCKSTEP_S if limit_s is None else limit_s
         if self._paced and on_progress is None:
             quiet_s = SLOW_REQUEST_S if self.slow_request else MAX_SILENCE_S
         while True:
@@ -146,9 +155,9 @@ class DriverLink:
             if answer is None:
                 gone = self._alive()
                 if gone is not None:
-                    raise BackendError(f"the driver has ended: {gone}")
+                    raise self._lose(gone)
                 if now - heard > quiet_s:
-                    raise BackendError(f"nothing heard from the driver for {now - heard:.2f} s (limit {quiet_s:g} s)")
+                    raise self._lose(f"nothing heard from the driver for {now - heard:.2f} s (limit {quiet_s:g} s)")
                 continue
             heard = now
             if isinstance(answer, messages.OpenProgress) and on_progress is not None:
@@ -160,15 +169,19 @@ class DriverLink:
             if isinstance(answer, kind) and getattr(answer, "number", number) == number:
                 return answer
             if now - began > limit_s:
-                raise BackendError(f"the driver did not answer within {limit_s:g} s")
+                raise self._lose(f"the driver did not answer within {limit_s:g} s")
+
+    def _lose(self, why: str) -> BackendError:
+        self._lost = why
+        return BackendError(why)
 
     def _receive(self, timeout_s: float) -> messages.Answer | None:
         if not self._socket.poll(round(timeout_s * 1e3)):
             return None
         try:
             answer: messages.Answer = messages.decode_answer(self._socket.recv(zmq.NOBLOCK))
-        except msgspec.MsgspecError as e:
-            raise BackendError(f"the driver's answer cannot be read: {e}") from e
+        except messages.BadMessage as e:
+            raise self._lose(f"the driver's answer cannot be read: {e}") from e
         return answer
 
     def close(self) -> None:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import pickle
+import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 from glotouch_backends.flexiv_xense.client.options import ClientOptions
-from glotouch_backends.options import WorldOptions
-from glotouch_bt.robot import BackendError, Conditions, World
+from glotouch_bt.robot import BackendError, BadInput
 
 END_S = 15.0
 """Longest wait for a process to end before it is killed."""
@@ -24,7 +24,6 @@ class DriverProcess:
 
     Attributes:
         address: Address of the driver's socket.
-        world: File with the simulated world, or the cell's address.
         folder: Private folder; removed at the end, by the driver if this process is killed.
     """
 
@@ -32,7 +31,6 @@ class DriverProcess:
         self._options = options
         self.folder = Path(tempfile.mkdtemp(prefix="glotouch-"))  # mode 0700
         self.address = f"ipc://{self.folder / 'driver'}"
-        self.world = ""
         self.driver_log = Path(options.log) if options.log else self.folder / "driver.jsonl"
         self.cell_log = self.driver_log.with_name("cell.jsonl")
         self._process: subprocess.Popen[bytes] | None = None
@@ -43,28 +41,30 @@ class DriverProcess:
         """Process id of the driver; 0 before it starts."""
         return self._process.pid if self._process is not None else 0
 
-    def put_world(self, world: World, conditions: Conditions, seed: int, options: WorldOptions) -> None:
-        """Write the simulated world to a private file; for pace=real, start the cell with it."""
-        path = self.folder / "world.pickle"
-        path.write_bytes(pickle.dumps((world, conditions, seed, options)))
-        path.chmod(0o600)
-        self.world = str(path)
-        if self._options.pace == "real":
-            address = str(self.folder / "cell")
-            self._cell = self._spawn([sys.executable, "-m", CELL, str(path), address, str(self.cell_log)], "cell.txt")
-            self.world = address
+    def start(self, trial: bytes) -> None:
+        """Start the driver; the first request shows whether it came up.
 
-    def start(self) -> None:
-        """Start the driver; the first request shows whether it came up."""
+        Args:
+            trial: Message with the simulated world, for the cell of pace=real; empty for real devices.
+        """
         python = self._options.python
         module = HERE if python == sys.executable else INSTALLED
         arguments = ["--address", self.address, "--log", str(self.driver_log), "--private", str(self.folder)]
+        if self._options.lockstep:
+            arguments += ["--simulated"]
+        elif trial:
+            world, cell = self.folder / "world", str(self.folder / "cell")
+            world.touch(0o600, exist_ok=False)
+            world.write_bytes(trial)
+            self._cell = self._spawn([sys.executable, "-m", CELL, str(world), cell, str(self.cell_log)], "cell.txt")
+            arguments += ["--cell", cell]
         arguments += [] if self._options.lockstep else ["--urgent"]
         self._process = self._spawn([python, "-m", module, *arguments], "driver.txt")
 
     def _spawn(self, command: list[str], output: str) -> subprocess.Popen[bytes]:
         try:
-            with self.driver_log.with_name(output).open("wb") as out:
+            path, flags = self.driver_log.with_name(output), os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW
+            with open(os.open(path, flags, 0o600), "ab") as out:
                 return subprocess.Popen(
                     command, stdin=subprocess.DEVNULL, stdout=out, stderr=out, start_new_session=True
                 )
@@ -72,12 +72,21 @@ class DriverProcess:
             raise BackendError(f"{command[0]} cannot be started: {e}") from e
 
     def gone(self) -> str | None:
-        """Return why the driver has ended, or None while it runs."""
-        if self._process is None or self._process.poll() is None:
-            return None
-        said = self.driver_log.with_name("driver.txt").read_text(errors="replace").strip().splitlines()
-        why = f"exit code {self._process.returncode}"
-        return why if not said else f"{why}: {said[-1]}"
+        """Return that and why the driver or the cell has ended, or None while they run.
+
+        Raises:
+            BadInput: The cell cannot build its world.
+        """
+        for name, process in (("driver", self._process), ("cell", self._cell)):
+            if process is None or (code := process.poll()) is None:
+                continue
+            why = f"the {name} has ended: "
+            why += f"exit code {code}" if code >= 0 else f"killed by {signal.Signals(-code).name}"
+            said = self.driver_log.with_name(f"{name}.txt").read_text(errors="replace").strip().splitlines()
+            if process is self._cell and code == 2 and said:
+                raise BadInput(said[-1])
+            return f"{why}: {said[-1]}" if said and code >= 0 else why
+        return None
 
     def end(self) -> None:
         """Wait for the driver to end, kill it if it does not, then end the cell. Idempotent."""

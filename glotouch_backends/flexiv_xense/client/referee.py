@@ -1,17 +1,18 @@
-"""Ground truth of a simulated world over the link; the driver forwards question and answer undecoded."""
+"""Ground truth of a simulated world over the link."""
 
 from __future__ import annotations
 
-import pickle
-from collections.abc import Callable
-from typing import Any
+import numpy as np
 
 from glotouch_backends.flexiv_xense.client.link import DriverLink
 from glotouch_backends.flexiv_xense.driver import messages
+from glotouch_backends.trial_message import pose_of
+from glotouch_bt.robot import Array, Pose
+from glotouch_bt.robot.simulation import BareSteps, TrueObject
 
 
 class RemoteReferee:
-    """A `robot.simulation.Referee` whose every method asks the world's own referee.
+    """A `robot.simulation.Referee` that asks the world's own referee; each method may raise a BackendError.
 
     Args:
         link: Connection to a driver with simulated devices.
@@ -20,13 +21,38 @@ class RemoteReferee:
     def __init__(self, link: DriverLink) -> None:
         self._link = link
 
-    def __getattr__(self, method: str) -> Callable[..., Any]:
-        if method.startswith("_"):
-            raise AttributeError(method)
+    def _ask(self, method: str, force_B_N: tuple[float, ...] = (0.0, 0.0, 0.0)) -> messages.RefereeAnswer:
+        number = self._link.number()
+        request = messages.RefereeRequest(number=number, method=method, force_B_N=force_B_N)  # type: ignore[arg-type]
+        return self._link.ask(request, messages.RefereeAnswer)
 
-        def ask(*arguments: object) -> Any:
-            question = messages.RefereeRequest(number=self._link.number(), question=pickle.dumps((method, arguments)))
-            # Pickle is safe here: our own child process wrote the answer, over a socket only we can open.
-            return pickle.loads(self._link.ask(question, messages.RefereeAnswer).answer)
+    def objects(self) -> list[TrueObject]:
+        """See `Referee`."""
+        return [
+            TrueObject(o.name, pose_of(o.pose_B_O), o.mass_kg, np.array(o.outline_B_m), o.in_gripper)
+            for o in self._ask("objects").objects
+        ]
 
-        return ask
+    def pose_B_K(self) -> Pose:
+        """See `Referee`."""
+        return pose_of(self._ask("pose_B_K").numbers)
+
+    def tip_B_m(self) -> Array:
+        """See `Referee`."""
+        return np.array(self._ask("tip_B_m").numbers)
+
+    def push_tip(self, force_B_N: Array) -> None:
+        """See `Referee`."""
+        self._ask("push_tip", tuple(force_B_N.tolist()))
+
+    def probe_in_holder(self) -> bool:
+        """See `Referee`."""
+        return self._ask("probe_in_holder").numbers == (1.0,)
+
+    def peak_force_N(self) -> float:
+        """See `Referee`."""
+        return self._ask("peak_force_N").numbers[0]
+
+    def replay_bare_steps(self) -> BareSteps | None:
+        """See `Referee`; None, because the driver keeps no trace."""
+        return None

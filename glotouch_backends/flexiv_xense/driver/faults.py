@@ -13,7 +13,8 @@ class DeviceFault(Exception):
 
     Args:
         kind: connect (did not come up), fault (the arm reports a fault), state (reduced, recovery, stopped by a
-            person), link (lost), stale (old readings), vendor (a call failed), world (a simulation failed).
+            person), link (lost), stale (old readings), vendor (a call failed), world (a simulation failed), input (the
+            world of a simulation cannot be built).
         message: What happened and what was expected.
         events: The arm's event log.
         age_s, limit_s: For a stale reading.

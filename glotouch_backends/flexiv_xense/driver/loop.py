@@ -10,13 +10,14 @@ late command:
 from __future__ import annotations
 
 import gc
+import sys
 import time
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
 
 from . import messages
 from .endpoint import DriverSocket
-from .faults import CommandRefused, DeviceFault
+from .faults import CommandRefused, DeviceFault, vendor_call
 from .session import DriverSession
 
 SAMPLE_S = 0.001
@@ -55,6 +56,13 @@ class _DriverLoop:
                 session.hold()
         self._socket.send(error.answer(number))
 
+    def _note_lost_client(self, silent_s: float) -> None:
+        self._log("client lost", silent_s=silent_s, speed_m_s=self._session.speed_m_s,
+                  peak_force_N=self._session.peak_force_N)  # fmt: skip
+        sys.stderr.write(
+            f"no word from the client for {silent_s:.1f} s: it hung, or was stopped; the arm was stopped\n"
+        )
+
     def _answer(self, request: messages.Request) -> bool:
         """Answer a request other than a cycle; return False to end the loop."""
         session = self._session
@@ -73,8 +81,14 @@ class _DriverLoop:
             if ask is None:
                 fault = DeviceFault("vendor", "there is no referee: the devices are real")
                 self._socket.send(fault.answer(request.number))
+                return True
+            try:
+                with vendor_call("asking the referee", "world"):
+                    answer = ask(request)
+            except DeviceFault as e:
+                self._socket.send(e.answer(request.number))
             else:
-                self._socket.send(messages.RefereeAnswer(number=request.number, answer=ask(request.question)))
+                self._socket.send(answer)
         elif isinstance(request, messages.Quit):
             self._log("quit", peak_force_N=session.peak_force_N)
             return False
@@ -98,7 +112,7 @@ class Lockstep(_DriverLoop):
                 now = time.monotonic()
                 if request is None:
                     if now - heard > LOCKSTEP_CLIENT_LOST_S:
-                        self._log("client lost", peak_force_N=session.peak_force_N)
+                        self._note_lost_client(now - heard)
                         return
                     continue
                 heard = now
@@ -203,5 +217,5 @@ class Paced(_DriverLoop):
                 beaten = now
                 socket.send(messages.Beat())
             if now - heard > CLIENT_LOST_S:
-                self._log("client lost", silent_s=now - heard, speed_m_s=session.speed_m_s)
+                self._note_lost_client(now - heard)
                 return

@@ -1,21 +1,43 @@
 """Messages between client and driver: msgpack over one socket. SI units; frames as in `frames`.
 
 The driver answers each request once, with the request's number; heartbeats have no number. A message that cannot be
-decoded is refused.
+decoded is refused. No message names a file or a program: addresses of devices are serial numbers, network addresses and
+serial ports.
 """
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Callable
+from typing import Annotated, Any, Literal
 
 import msgspec
 
-PROTOCOL = 2
+PROTOCOL = 3
 """Version of the messages; client and driver must have the same."""
+MAX_REQUEST_BYTES = 64 * 1024
+"""Largest request without the world of simulated devices; `Open` with all its limits has 1 kB. Source: ours."""
+MAX_WORLD_BYTES = 64 * 1024 * 1024
+"""Largest world of simulated devices; the shipped objects have 1 MB in all. Source: ours."""
+MAX_ANSWER_BYTES = 64 * 1024 * 1024
+"""Largest answer: a minute of samples has 13 MB, the largest pair of depth maps 16 MB."""
 COLUMNS = 7 + 7 + 3 + 4 + 6
 """Columns of a sample: q, dq, position of P in B, quaternion of P in B (w x y z), wrench in S."""
 
 Numbers = tuple[float, ...]
+Three = Annotated[Numbers, msgspec.Meta(min_length=3, max_length=3)]
+Seven = Annotated[Numbers, msgspec.Meta(min_length=7, max_length=7)]
+Gripper = Annotated[
+    str, msgspec.Meta(max_length=200, pattern=r"^(serial:(/dev/(tty|cu\.|serial/by-(id|path)/))?)?[\w.:+-]*\Z")
+]
+"""Address of a gripper: one word, or a serial port; any other path is refused."""
+PixelCount = Annotated[int, msgspec.Meta(ge=1, le=1000)]
+# Ranges of the limits that a client sets: none may be so large, or NaN, that it limits nothing.
+Speed = Annotated[float, msgspec.Meta(gt=0.0, le=2.0)]
+Acceleration = Annotated[float, msgspec.Meta(gt=0.0, le=20.0)]
+Force = Annotated[float, msgspec.Meta(gt=0.0, le=200.0)]
+Torque = Annotated[float, msgspec.Meta(gt=0.0, le=50.0)]
+Length = Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
+Seconds = Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
 
 
 class ToolData(msgspec.Struct, frozen=True, kw_only=True):
@@ -26,9 +48,9 @@ class ToolData(msgspec.Struct, frozen=True, kw_only=True):
         pose_E_P: (7,) P, the arm's TCP, in the flange frame: x y z qw qx qy qz.
     """
 
-    mass_kg: float
-    com_E_m: Numbers
-    pose_E_P: Numbers
+    mass_kg: Annotated[float, msgspec.Meta(ge=0.0, le=50.0)]
+    com_E_m: Three
+    pose_E_P: Seven
 
 
 class ArmLimits(msgspec.Struct, frozen=True, kw_only=True):
@@ -41,25 +63,25 @@ class ArmLimits(msgspec.Struct, frozen=True, kw_only=True):
         max_age_s: Largest age of a reading.
     """
 
-    q_min: Numbers
-    q_max: Numbers
-    dq_max: Numbers
-    speed_m_s: float
-    acceleration_m_s2: float
-    stop_acceleration_m_s2: float
-    force_N: float
-    torque_Nm: float
-    max_age_s: float
+    q_min: Seven
+    q_max: Seven
+    dq_max: Seven
+    speed_m_s: Speed
+    acceleration_m_s2: Acceleration
+    stop_acceleration_m_s2: Acceleration
+    force_N: Force
+    torque_Nm: Torque
+    max_age_s: Seconds
 
 
 class HandLimits(msgspec.Struct, frozen=True, kw_only=True):
     """Ranges of the gripper and its pads."""
 
-    stroke_m: float
-    speed_m_s: float
-    force_N: float
-    pad_shape: tuple[int, int]
-    pad_depth_m: float
+    stroke_m: Length
+    speed_m_s: Speed
+    force_N: Force
+    pad_shape: tuple[PixelCount, PixelCount]
+    pad_depth_m: Length
 
 
 class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True):
@@ -67,7 +89,8 @@ class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         robot: Serial number of the arm, e.g. "Rizon4-123456".
-        gripper: MAC or IP address, or serial:PORT; "none" or empty for an arm without one.
+        gripper: MAC or IP address, or serial:PORT (a name, or /dev/tty..., /dev/serial/by-id/...); "none" or empty for
+            an arm without one.
         left_pad, right_pad: Serial numbers of the tactile sensors; both or none.
         network: Addresses of this machine's interfaces through which the arm may be reached; empty: any.
         api: Flexiv interface; empty: that of the installed version.
@@ -78,7 +101,7 @@ class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     robot: str = ""
-    gripper: str = ""
+    gripper: Gripper = ""
     left_pad: str = ""
     right_pad: str = ""
     network: tuple[str, ...] = ()
@@ -93,14 +116,14 @@ class Devices(msgspec.Struct, frozen=True, kw_only=True):
     """The devices of a session.
 
     Attributes:
-        kind: "real", "simulated" (in this process, in lock-step) or "cell" (simulated, in a process of its own).
+        kind: Devices that the client expects; the driver serves the kind that its command line names.
         settings: Addresses and options.
-        world: Simulated only: the file with the world, or the cell's address.
+        world: For devices that the driver itself simulates: their world, which the simulation decodes.
     """
 
-    kind: str
+    kind: Literal["real", "simulated"]
     settings: DeviceSettings = DeviceSettings()
-    world: str = ""
+    world: Annotated[bytes, msgspec.Meta(max_length=MAX_WORLD_BYTES)] = b""
 
 
 class Setpoint(msgspec.Struct, frozen=True, array_like=True):
@@ -143,8 +166,8 @@ class Open(_Numbered, frozen=True, kw_only=True):
     tool: ToolData
     arm: ArmLimits
     hand: HandLimits
-    posture: Numbers
-    period_s: float
+    posture: Seven
+    period_s: Seconds
     lockstep: bool
     move: bool = True  # False: observe only; nothing is enabled, switched or commanded
 
@@ -161,7 +184,7 @@ class TareRequest(_Numbered, frozen=True, kw_only=True):
     """Zero the wrist sensor. The answer is `Accepted`; a later block reports the end."""
 
     ticket: int
-    duration_s: float
+    duration_s: Annotated[float, msgspec.Meta(gt=0.0, le=60.0)]
 
 
 class PayloadRequest(_Numbered, frozen=True, kw_only=True):
@@ -169,7 +192,7 @@ class PayloadRequest(_Numbered, frozen=True, kw_only=True):
 
     ticket: int
     mass_kg: float
-    com_P_m: Numbers
+    com_P_m: Three
 
 
 class HoldRequest(_Numbered, frozen=True):
@@ -177,9 +200,17 @@ class HoldRequest(_Numbered, frozen=True):
 
 
 class RefereeRequest(_Numbered, frozen=True, kw_only=True):
-    """Simulated devices only: a question to the world's referee, which alone can decode it."""
+    """Simulated devices only: a question to the world's referee.
 
-    question: bytes
+    Attributes:
+        method: The question; see `robot.simulation.Referee` and, for `disturb`, the simulated devices.
+        force_B_N: (3,) for `push_tip`.
+        name: Name for `disturb`.
+    """
+
+    method: Literal["objects", "pose_B_K", "tip_B_m", "push_tip", "probe_in_holder", "peak_force_N", "disturb"]
+    force_B_N: Three = (0.0, 0.0, 0.0)
+    name: str = ""
 
 
 class Quit(_Numbered, frozen=True):
@@ -278,7 +309,7 @@ class Refused(_Numbered, frozen=True, kw_only=True):
 
 
 class Failed(_Numbered, frozen=True, kw_only=True):
-    """A device failed. `kind`: connect, fault, state, link, stale, vendor, world."""
+    """A device failed; `kind` as in `faults.DeviceFault`."""
 
     kind: str
     message: str
@@ -288,15 +319,44 @@ class Failed(_Numbered, frozen=True, kw_only=True):
     limit_s: float = 0.0
 
 
-class RefereeAnswer(_Numbered, frozen=True, kw_only=True):
-    """Answer of the referee."""
+class TrueBody(msgspec.Struct, frozen=True, array_like=True):
+    """One object as `robot.simulation.TrueObject` has it; the pose as x y z qw qx qy qz."""
 
-    answer: bytes
+    name: str
+    pose_B_O: Seven
+    mass_kg: float
+    outline_B_m: tuple[tuple[float, float], ...]
+    in_gripper: bool
+
+
+class RefereeAnswer(_Numbered, frozen=True, kw_only=True):
+    """Answer of the referee: the objects, or the numbers of a pose, a point, a force or a truth value."""
+
+    numbers: Numbers = ()
+    objects: tuple[TrueBody, ...] = ()
 
 
 Request = Open | Cycle | TareRequest | PayloadRequest | HoldRequest | RefereeRequest | Quit | Beat
 Answer = Opened | OpenProgress | Block | Accepted | Refused | Failed | RefereeAnswer | Beat
 
+
+class BadMessage(Exception):
+    """The bytes are no message of this protocol."""
+
+
+def _reader(kind: Any) -> Callable[[bytes], Any]:
+    """Return the decoder of a union of messages; whatever the bytes are, it raises nothing but `BadMessage`."""
+    decode = msgspec.msgpack.Decoder(kind).decode
+
+    def read(body: bytes) -> Any:
+        try:
+            return decode(body)
+        except (msgspec.MsgspecError, ValueError, RecursionError, OverflowError) as e:  # text that is no UTF-8, nesting
+            raise BadMessage(str(e)) from e
+
+    return read
+
+
 encode = msgspec.msgpack.Encoder().encode
-decode_request = msgspec.msgpack.Decoder(Request).decode
-decode_answer = msgspec.msgpack.Decoder(Answer).decode
+decode_request = _reader(Request)
+decode_answer = _reader(Answer)

@@ -9,11 +9,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from .devices import connect_devices
+from .devices import Served, connect_devices
 from .endpoint import DriverSocket
-from .faults import DeviceFault
+from .faults import DeviceFault, vendor_call
 from .loop import Lockstep, Paced
-from .messages import PROTOCOL, Beat, Failed, Open, Opened, OpenProgress, Quit
+from .messages import PROTOCOL, Failed, Open, Opened, OpenProgress
 from .session import DriverSession
 
 MAX_WAIT_FOR_OPEN_S = 60.0
@@ -39,8 +39,17 @@ class Log:
             self._file.close()
 
 
-def serve(socket: DriverSocket, log: Log, stopping: Callable[[], bool], *, forever: bool = False) -> int:
+def serve(
+    socket: DriverSocket, log: Log, stopping: Callable[[], bool], served: Served, *, forever: bool = False
+) -> int:
     """Serve one session from its Open to its end; stop and release the devices on every path.
+
+    Args:
+        socket: The client's way in.
+        log: Receives the events.
+        stopping: Returns True to end.
+        served: The devices.
+        forever: Wait for a client without limit.
 
     Returns:
         0: ended on request; 1: a device did not come up, or failed outside a cycle; 4: no client came.
@@ -53,19 +62,20 @@ def serve(socket: DriverSocket, log: Log, stopping: Callable[[], bool], *, forev
         socket.send(Failed(number=request.number, kind="connect", message=message))
         return 1
     try:
-        devices = connect_devices(request, lambda text: socket.send(OpenProgress(text)))
+        devices = connect_devices(request, served, lambda text: socket.send(OpenProgress(text)))
     except DeviceFault as e:
         log("not opened", kind=e.kind, message=e.message)
         socket.send(e.answer(request.number))
         return 1
     try:
-        session = DriverSession(devices, request)
-        low, high = devices.arm.joint_limits()
-        info = devices.arm.describe() | {"devices": request.devices.kind, "python": sys.version.split()[0]}
-        socket.send(Opened(number=request.number, info=info, q_min=low, q_max=high))
-        log("opened", kind=request.devices.kind)
-        loop = (Lockstep if request.lockstep else Paced)(session, socket, log, stopping)
-        loop.run(request.period_s)
+        with vendor_call("the session"):  # so that no client can end a driver that stays
+            session = DriverSession(devices, request)
+            low, high = devices.arm.joint_limits()
+            info = devices.arm.describe() | {"devices": served.kind, "python": sys.version.split()[0]}
+            socket.send(Opened(number=request.number, info=info, q_min=low, q_max=high))
+            log("opened", kind=served.kind)
+            loop = (Lockstep if request.lockstep else Paced)(session, socket, log, stopping)
+            loop.run(request.period_s)
     except DeviceFault as e:
         log("fault", kind=e.kind, message=e.message)
         socket.send(e.answer(request.number))
@@ -84,10 +94,6 @@ def _first(socket: DriverSocket, stopping: Callable[[], bool], *, forever: bool)
         request = socket.receive(1.0)
         if isinstance(request, Open):
             return request
-        if isinstance(request, Quit):
-            return None
-        if request is not None and not isinstance(request, Beat):
-            socket.send(Failed(number=request.number, kind="connect", message="the first request must be Open"))
         if not forever and time.monotonic() - began > MAX_WAIT_FOR_OPEN_S:
             return None
     return None

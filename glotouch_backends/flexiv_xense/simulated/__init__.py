@@ -5,6 +5,7 @@ from glotouch_backends.flexiv_xense.simulated.vendor import (
     GRIPPER_ADDRESS,
     PAD_SNS,
     ROBOT_SN,
+    UNUSABLE,
     SimulatedVendor,
     open_vendor,
 )

@@ -2,10 +2,10 @@
 
     python -m glotouch_backends.flexiv_xense.simulated.cell WORLD SOCKET LOG
 
-WORLD is a pickle of (World, Conditions, seed, WorldOptions), SOCKET the Unix socket to listen at, LOG a file of one
-JSON line per event. Like a real arm, the simulated one continues when its client dies. The log then says how fast the
-tool was, how long it took to stand still, how far it moved, and the largest contact force. The cell ends on SIGTERM, or
-ALONE_S after its last client once its parent process is gone.
+WORLD is a file with a trial message (`trial_message`), SOCKET the Unix socket to listen at, LOG a file of one JSON line
+per event. Like a real arm, the simulated one continues when its client dies. The log then says how fast the tool was,
+how long it took to stand still, how far it moved, and the largest contact force. The cell ends on SIGTERM, or ALONE_S
+after its last client once its parent process is gone. Exit codes: 0, or 2 if the world cannot be built.
 """
 
 from __future__ import annotations
@@ -24,11 +24,12 @@ from typing import IO, Any
 
 import numpy as np
 
-from glotouch_backends.flexiv_xense.driver import DEVICES_PRIORITY, Clock, request_realtime
+from glotouch_backends.flexiv_xense.driver import DEVICES_PRIORITY, Clock, messages, request_realtime
 from glotouch_backends.flexiv_xense.simulated.vendor import SimulatedVendor, assemble
-from glotouch_backends.flexiv_xense.simulated.wire import NEW, REFEREE, Reference
+from glotouch_backends.flexiv_xense.simulated.wire import MAX_BYTES, NEW, REFEREE, Reference, decode, encode
 from glotouch_backends.flexiv_xense.simulated.world import SimulatedWorld
 from glotouch_backends.mujoco.model import STEP_S
+from glotouch_bt.robot import GlotouchError
 
 ALONE_S = 20.0
 """Time without a client and without the parent process after which the cell ends."""
@@ -167,18 +168,19 @@ class Cell:
         """Serve one connection: requests in, results or exceptions out."""
         client = -1
         try:
-            client = connection.recv()
+            client = int(decode(connection.recv_bytes(MAX_BYTES)))
             with self.turn:
                 self._links[client] = self._links.get(client, 0) + 1
             while True:
-                request = connection.recv()
+                request = decode(connection.recv_bytes(MAX_BYTES))
                 try:
                     with self.turn:
-                        answer = True, self._do(client, *request)
+                        made = self._do(client, *request)
+                    answer = encode((True, made))
                 except Exception as e:  # errors of the stand-ins go to their caller
-                    answer = False, e
-                connection.send(answer)
-        except (EOFError, OSError):
+                    answer = encode((False, e))
+                connection.send_bytes(answer)
+        except (EOFError, OSError, TypeError, ValueError):  # it has gone, or does not speak our language
             pass
         finally:
             connection.close()
@@ -201,7 +203,7 @@ class Cell:
 
     def _do(self, client: int, what: str, *arguments: Any) -> Any:
         if what == REFEREE:
-            return self.vendor.referee(arguments[0])
+            return messages.encode(self.vendor.referee(messages.decode_request(arguments[0])))
         if what == NEW:
             name, args, kwargs = arguments
             args = [self._made[a.key][1] if isinstance(a, Reference) else a for a in args]
@@ -212,13 +214,20 @@ class Cell:
             self._made[key] = client, made
             return Reference(key)
         key, method, args, kwargs = arguments
-        return getattr(self._made[key][1], method)(*args, **kwargs)
+        made = self._made[key][1]
+        if method.startswith("_") or not callable(getattr(type(made), method, None)):
+            raise AttributeError(method)
+        return getattr(made, method)(*args, **kwargs)
 
 
 def main(argv: list[str]) -> int:
     """Run the cell; see the module's text."""
     world_file, address, log_file = argv
-    world = SimulatedWorld.unpickle(Path(world_file).read_bytes())
+    try:
+        world = SimulatedWorld.of_message(Path(world_file).read_bytes())
+    except GlotouchError as e:
+        sys.stderr.write(f"{e}\n")
+        return 2
     granted = request_realtime(DEVICES_PRIORITY)
     with Path(log_file).open("a") as log, Listener(address, family="AF_UNIX") as listener:
         cell = Cell(world, log)

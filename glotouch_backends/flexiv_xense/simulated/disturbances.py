@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from glotouch_backends.flexiv_xense.driver import messages
 from glotouch_backends.flexiv_xense.simulated.control_box import ControlBox
 from glotouch_backends.flexiv_xense.simulated.vendor_api import GripperLink, PadLink
 from glotouch_backends.mujoco.simulation import MujocoReferee, Simulated
+from glotouch_backends.trial_message import pose_numbers
 from glotouch_bt.robot import UnknownName
 
 NAMES = ("fault", "estop", "reduced", "link", "frozen", "gripper", "pads frozen", "pads missing")
@@ -23,6 +27,29 @@ class DisturbingReferee(MujocoReferee):
     def __init__(self, world: Simulated, box: ControlBox, gripper: GripperLink, pads: tuple[PadLink, PadLink]) -> None:
         super().__init__(world)
         self._box, self._gripper, self._pads = box, gripper, pads
+
+    def answer(self, request: messages.RefereeRequest) -> messages.RefereeAnswer:
+        """Answer a client's question."""
+        numbers: tuple[float, ...] = ()
+        bodies: list[messages.TrueBody] = []
+        match request.method:
+            case "objects":
+                for o in self.objects():
+                    pose, outline = pose_numbers(o.pose_B_O), tuple((x, y) for x, y in o.outline_B_m.tolist())
+                    bodies.append(messages.TrueBody(o.name, pose, o.mass_kg, outline, o.in_gripper))
+            case "pose_B_K":
+                numbers = pose_numbers(self.pose_B_K())
+            case "tip_B_m":
+                numbers = tuple(self.tip_B_m().tolist())
+            case "push_tip":
+                self.push_tip(np.array(request.force_B_N))
+            case "probe_in_holder":
+                numbers = (float(self.probe_in_holder()),)
+            case "peak_force_N":
+                numbers = (self.peak_force_N(),)
+            case "disturb":
+                self.disturb(request.name)
+        return messages.RefereeAnswer(number=request.number, numbers=numbers, objects=tuple(bodies))
 
     def disturb(self, name: str) -> None:
         """Start a disturbance.

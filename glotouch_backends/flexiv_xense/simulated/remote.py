@@ -10,9 +10,9 @@ from multiprocessing.connection import Client, Connection
 from types import SimpleNamespace
 from typing import Any
 
-from glotouch_backends.flexiv_xense.driver import Vendor, WallClock
+from glotouch_backends.flexiv_xense.driver import Vendor, WallClock, messages
 from glotouch_backends.flexiv_xense.simulated.vendor_api import flexivrdk, xensesdk
-from glotouch_backends.flexiv_xense.simulated.wire import CALL, NEW, REFEREE, Reference
+from glotouch_backends.flexiv_xense.simulated.wire import CALL, MAX_BYTES, NEW, REFEREE, Reference, decode, encode
 
 CONNECT_S = 120.0
 """Longest wait for a cell to accept a connection."""
@@ -39,8 +39,8 @@ class CellLink:
         """
         try:
             connection = self._connection()
-            connection.send(request)
-            done, answer = connection.recv()
+            connection.send_bytes(encode(request))
+            done, answer = decode(connection.recv_bytes(MAX_BYTES))
         except (EOFError, OSError) as e:
             raise RuntimeError(f"the simulated cell does not answer: {e}") from e
         if not done:
@@ -51,7 +51,7 @@ class CellLink:
         found: Connection[Any, Any] | None = getattr(self._mine, "connection", None)
         if found is None:
             found = self._connect()
-            found.send(os.getpid())
+            found.send_bytes(encode(os.getpid()))
             self._mine.connection = found
         return found
 
@@ -100,10 +100,9 @@ class RemoteVendor(Vendor):
 
     link: CellLink
 
-    def referee(self, question: bytes) -> bytes:
+    def referee(self, request: messages.RefereeRequest) -> messages.RefereeAnswer:
         """See `SimulatedVendor.referee`."""
-        answer = self.link.ask(REFEREE, question)
-        assert isinstance(answer, bytes)
+        answer: messages.RefereeAnswer = messages.decode_answer(self.link.ask(REFEREE, messages.encode(request)))
         return answer
 
 

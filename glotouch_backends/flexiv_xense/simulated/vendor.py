@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import pickle
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
-from glotouch_backends.flexiv_xense.driver import Clock, SteppedClock, Vendor
+from glotouch_backends.flexiv_xense.driver import Clock, SteppedClock, Vendor, messages
 from glotouch_backends.flexiv_xense.simulated.control_box import ControlBox
 from glotouch_backends.flexiv_xense.simulated.disturbances import DisturbingReferee
 from glotouch_backends.flexiv_xense.simulated.vendor_api import GripperLink, PadLink, flexivrdk, xensegripper, xensesdk
 from glotouch_backends.flexiv_xense.simulated.world import SimulatedWorld
+from glotouch_bt.robot import BadInput
 
 ROBOT_SN = "Rizon4-000001"
 GRIPPER_ADDRESS = "000000000001"  # network address and serial port
 PAD_SNS = ("OG000001", "OG000002")  # left, right
+UNUSABLE = BadInput
+"""Error of a world that cannot be built, for a driver that imports nothing else of this project."""
 
 
 @dataclass(frozen=True)
@@ -27,11 +29,9 @@ class SimulatedVendor(Vendor):
     gripper: GripperLink
     pads: tuple[PadLink, PadLink]
 
-    def referee(self, question: bytes) -> bytes:
-        """Call the world's referee: a pickled (method, arguments) in, the pickled result out."""
-        method, arguments = pickle.loads(question)
-        referee = DisturbingReferee(self.world, self.box, self.gripper, self.pads)
-        return pickle.dumps(getattr(referee, method)(*arguments))
+    def referee(self, request: messages.RefereeRequest) -> messages.RefereeAnswer:
+        """Ask the world's referee."""
+        return DisturbingReferee(self.world, self.box, self.gripper, self.pads).answer(request)
 
 
 def bound(cls: type[Any], **values: object) -> Any:
@@ -56,16 +56,17 @@ def modules(box: ControlBox, gripper: GripperLink, pads: tuple[PadLink, PadLink]
     )
 
 
-def open_vendor(world_blob: bytes) -> SimulatedVendor:
+def open_vendor(message: bytes) -> SimulatedVendor:
     """Return the vendors' modules over a new world in this process.
 
     Args:
-        world_blob: Pickle of (World, Conditions, seed, WorldOptions).
+        message: From `trial_message`.
 
     Raises:
-        GlotouchError: The world cannot be built.
+        BadInput: The world cannot be built from it.
+        BackendError: MuJoCo failed.
     """
-    world = SimulatedWorld.unpickle(world_blob)
+    world = SimulatedWorld.of_message(message)
     return assemble(world, SteppedClock(world.advance))
 
 

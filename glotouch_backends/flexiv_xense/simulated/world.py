@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import pickle
 
 import mujoco
 import numpy as np
@@ -16,6 +15,7 @@ from glotouch_backends.mujoco.model import STEP_S, STEPS
 from glotouch_backends.mujoco.simulation import ControlTrace
 from glotouch_backends.options import WorldOptions
 from glotouch_backends.rizon4 import RIZON4_XENSE
+from glotouch_backends.trial_message import trial_of_message
 from glotouch_bt.robot import BackendError, Conditions, RobotDescription, World
 
 
@@ -56,10 +56,10 @@ class SimulatedWorld:
         self._counted = np.array([1.0, 1.0, 1.0, 0.0])
 
     @classmethod
-    def unpickle(cls, blob: bytes) -> SimulatedWorld:
-        """Build the world from a pickle of (World, Conditions, seed, WorldOptions) that our client wrote."""
-        world, conditions, seed, options = pickle.loads(blob)
-        return cls(world, conditions, seed, options)
+    def of_message(cls, message: bytes) -> SimulatedWorld:
+        """Build the world of a trial message; errors as in `trial_of_message` and `build_world`."""
+        with trial_of_message(message) as trial:
+            return cls(*trial)
 
     @property
     def now_s(self) -> float:

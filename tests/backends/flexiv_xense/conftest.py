@@ -10,7 +10,7 @@ from glotouch_backends.flexiv_xense.client.backend import PERIOD_S, FlexivXenseB
 from glotouch_backends.flexiv_xense.client.link import DriverLink
 from glotouch_backends.flexiv_xense.client.options import read_options
 from glotouch_backends.flexiv_xense.client.robot import FlexivXenseRobot
-from glotouch_backends.flexiv_xense.driver.devices import connect
+from glotouch_backends.flexiv_xense.driver.devices import Served, connect
 from glotouch_backends.flexiv_xense.driver.endpoint import DriverSocket
 from glotouch_backends.flexiv_xense.driver.messages import Block, Opened
 from glotouch_backends.flexiv_xense.driver.serve import Log, serve
@@ -30,7 +30,7 @@ def open_robot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Open
         socket = DriverSocket(address)
         log = Log(tmp_path / "log.jsonl")
         stop = threading.Event()
-        thread = threading.Thread(target=serve, args=(socket, log, stop.is_set), daemon=True)
+        thread = threading.Thread(target=serve, args=(socket, log, stop.is_set, Served("simulated")), daemon=True)
         thread.start()
         options_, settings = read_options({"devices": "simulated", **options})
         backend = FlexivXenseBackend()
@@ -49,7 +49,7 @@ def open_robot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Open
         robot: FlexivXenseRobot | None = None
         ends.append(end)
         opened = link.ask(
-            backend._request(options_, settings, "", link.number(), True), Opened, on_progress=lambda _: None
+            backend._request(options_, settings, b"", link.number(), True), Opened, on_progress=lambda _: None
         )
         link.beat()
         first = link.wait(0, Block)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from glotouch_backends.flexiv_xense.simulated import ROBOT_SN, SimulatedVendor, open_vendor
 from glotouch_backends.options import WorldOptions
 from glotouch_backends.rizon4 import RIZON4_XENSE
+from glotouch_backends.trial_message import trial_message
 from glotouch_bt.robot import Array, Conditions
 from tests.conformance.conformance_world import OPTIONS, WORLD
 
@@ -18,7 +18,7 @@ LIMITS = (0.375, 2.0, 3.0, 10.0)
 
 
 def vendor(conditions: Conditions | None = None, seed: int = 0) -> SimulatedVendor:
-    return open_vendor(pickle.dumps((WORLD, conditions or Conditions(), seed, WorldOptions(**OPTIONS))))
+    return open_vendor(trial_message(WORLD, conditions or Conditions(), seed, WorldOptions(**OPTIONS)))
 
 
 class Bench:

@@ -7,11 +7,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from glotouch_backends.flexiv_xense.client.backend import FlexivXenseBackend
+from glotouch_backends.flexiv_xense.client.link import failure
+from glotouch_backends.flexiv_xense.client.options import read_options
+from glotouch_backends.flexiv_xense.driver.devices import Served, connect_devices
 from glotouch_backends.flexiv_xense.driver.faults import DeviceFault
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import (
     HOLD,
     BackendError,
+    BadInput,
     Command,
     GripperTarget,
     JointSetpoint,
@@ -344,6 +349,31 @@ def test_closing_stops_the_arm_and_releases_everything(open_robot: Open) -> None
     robot.hold()
     with pytest.raises(BackendError, match="closed"):
         robot.cycle(HOLD)
+
+
+@pytest.mark.parametrize(
+    ("kind", "world", "served"),
+    [
+        ("simulated", b"", Served()),
+        ("real", b"a world", Served()),
+        ("real", b"", Served("simulated")),
+        ("simulated", b"a world", Served("cell", "socket")),
+    ],
+)
+def test_a_client_cannot_choose_the_devices(kind: str, world: bytes, served: Served) -> None:
+    """They are those of the driver's command line; a driver for real devices builds no world."""
+    options, settings = read_options({"devices": kind, "robot": "Rizon4-000001"})
+    request = FlexivXenseBackend()._request(options, settings, world, 1, True)
+    with pytest.raises(DeviceFault, match=f"serves {served.kind} devices only"):
+        connect_devices(request, served, lambda _: None)
+
+
+def test_a_world_that_cannot_be_built_is_bad_input() -> None:
+    options, settings = read_options({"devices": "simulated"})
+    request = FlexivXenseBackend()._request(options, settings, b"rubbish", 1, True)
+    with pytest.raises(DeviceFault, match="cannot be read from its message") as e:
+        connect_devices(request, Served("simulated"), lambda _: None)
+    assert isinstance(failure(e.value.answer(1)), BadInput)
 
 
 def test_an_unknown_version_is_refused() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pickle
 import signal
 from collections.abc import Callable, Mapping
 
@@ -26,7 +25,7 @@ def disturb(name: str) -> Callable[[Robot], None]:
     def do(robot: Robot) -> None:
         assert isinstance(robot, FlexivXenseRobot)
         link = robot.link
-        link.ask(RefereeRequest(number=link.number(), question=pickle.dumps(("disturb", (name,)))), RefereeAnswer)
+        link.ask(RefereeRequest(number=link.number(), method="disturb", name=name), RefereeAnswer)
 
     return do
 

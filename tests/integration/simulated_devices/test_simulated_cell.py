@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import pickle
 import subprocess
 import sys
 import threading
@@ -14,9 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from glotouch_backends.flexiv_xense.driver.messages import RefereeRequest
 from glotouch_backends.flexiv_xense.simulated import PAD_SNS, ROBOT_SN, RemoteVendor, open_remote_vendor
 from glotouch_backends.flexiv_xense.simulated.arm import LINK_LOST_S, STOP_RAD_S2
 from glotouch_backends.options import WorldOptions
+from glotouch_backends.trial_message import trial_message
 from glotouch_bt.robot import Conditions
 from tests.conformance.conformance_world import OPTIONS, WORLD
 
@@ -33,7 +34,7 @@ def wait(seconds: float) -> None:
 @pytest.fixture
 def cell(tmp_path: Path) -> Iterator[Path]:
     """A running cell's folder: `socket` and `log`."""
-    (tmp_path / "world").write_bytes(pickle.dumps((WORLD, Conditions(), 0, WorldOptions(**OPTIONS))))
+    (tmp_path / "world").write_bytes(trial_message(WORLD, Conditions(), 0, WorldOptions(**OPTIONS)))
     module = "glotouch_backends.flexiv_xense.simulated.cell"
     command = [sys.executable, "-m", module, tmp_path / "world", tmp_path / "socket", tmp_path / "log"]
     process = subprocess.Popen(command, cwd=ROOT)
@@ -101,7 +102,7 @@ def test_calls_return_their_values_and_errors(cell: Path) -> None:
     pad = vendor.xensesdk.Sensor.create(PAD_SNS[1])
     depth = until(lambda: (pad.selectSensorInfo(kinds.Depth) is not None) and [pad.selectSensorInfo(kinds.Depth)])[0]
     assert np.asarray(depth).shape == (700, 400)
-    peak = pickle.loads(vendor.referee(pickle.dumps(("peak_force_N", ()))))
+    (peak,) = vendor.referee(RefereeRequest(number=1, method="peak_force_N")).numbers
     assert peak >= 0.0
-    pickle.loads(vendor.referee(pickle.dumps(("disturb", ("fault",)))))
+    vendor.referee(RefereeRequest(number=2, method="disturb", name="fault"))
     assert robot.fault()

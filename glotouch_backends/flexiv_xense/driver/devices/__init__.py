@@ -1,4 +1,4 @@
 """Adapters of the vendors' interfaces: the only files of the driver that call an SDK."""
 
 from .connect import Connected, connect_devices
-from .vendor import Vendor
+from .vendor import Served, Vendor

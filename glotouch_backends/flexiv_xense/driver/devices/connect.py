@@ -15,7 +15,7 @@ from .arm_19 import Arm19
 from .arm_20 import Arm20
 from .gripper import DriverGripper, open_gripper
 from .pads import TactileSensors, open_sensor
-from .vendor import Vendor, load_vendor
+from .vendor import Served, Vendor, load_vendor
 
 APIS = {"1.9": Arm19, "2.0": Arm20}
 
@@ -55,15 +55,17 @@ def api_of(rdk: Any, wanted: str) -> type[DriverArm]:
     raise DeviceFault("connect", f"flexivrdk {version} is not supported (supported: {', '.join(APIS)}){why}")
 
 
-def connect_devices(request: Open, progress: Callable[[str], None]) -> Connected:
+def connect_devices(request: Open, served: Served, progress: Callable[[str], None]) -> Connected:
     """Connect all devices and, unless the request only observes, make them ready for the first setpoint.
 
     Raises:
-        DeviceFault: A device did not come up; the others have been released.
+        DeviceFault: The client expects other devices, or one did not come up; the others have been released.
     """
-    kind, s = request.devices.kind, request.devices.settings
+    s, world = request.devices.settings, request.devices.world
+    if (request.devices.kind == "real") != (served.kind == "real") or (world and served.kind != "simulated"):
+        raise DeviceFault("connect", f"this driver serves {served.kind} devices only; the client asked for others")
     gripper = "" if s.gripper == "none" else s.gripper
-    vendor = load_vendor(kind, request.devices.world, gripper=bool(gripper), pads=bool(s.left_pad))
+    vendor = load_vendor(served, world, gripper=bool(gripper), pads=bool(s.left_pad))
     clock, rdk = vendor.clock, vendor.flexivrdk
     adapter = api_of(rdk, s.api)
     progress(f"connecting to the arm {s.robot}")
