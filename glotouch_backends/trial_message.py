@@ -17,6 +17,7 @@ import numpy as np
 
 from glotouch_backends.options import WorldOptions
 from glotouch_bt.robot import BadInput, Conditions, Container, Holder, ObjectSet, Pose, Probe, World, frozen_array
+from glotouch_bt.untrusted import read_file
 
 MAX_OBJECTS = 200
 """Largest number of objects. Source: ours."""
@@ -114,7 +115,7 @@ def _stl_files(objects: ObjectSet) -> dict[str, bytes]:
         )
     if len(names) > MAX_OBJECTS or sum(found[n].stat().st_size for n in names) > MAX_MESSAGE_BYTES:
         raise _too_large(objects.folder)
-    return {n: found[n].read_bytes() for n in names}
+    return {n: read_file(found[n], MAX_MESSAGE_BYTES, what="an STL file", links=True) for n in names}
 
 
 @contextmanager

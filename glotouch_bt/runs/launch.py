@@ -21,11 +21,11 @@ from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile, Chec
 from glotouch_bt.mission.execution import Control, Outcome, SkillHung, deferred_interrupt, run_mission
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import Record, Recorder, RunSummary
-from glotouch_bt.robot import Backend, BadInput, Conditions, GlotouchError, Robot, load_backend
+from glotouch_bt.robot import BadInput, Conditions, GlotouchError, Robot, load_backend
 from glotouch_bt.robot.simulation import Referee, TrueObject
 from glotouch_bt.runs.folder import RunFolder, locked
 from glotouch_bt.runs.request import RunRequest, RunResult
-from glotouch_bt.runs.result import description, installed_versions, mission_yaml, score, truth
+from glotouch_bt.runs.result import description, final_truth, installed_versions, mission_yaml, score, truth
 from glotouch_bt.runs.resume_point import ResumableRun, describe_checkpointed_run
 
 MAX_SEED = 2**32 - 1
@@ -82,13 +82,18 @@ def launch(
                     raise
                 known = ", ".join(mission.parameters) or "none"
                 raise BadInput(f"{e} (parameters of mission {mission.name!r}: {known})") from e
-            referee = backend.referee(robot)
-            world = None if resumable is None else resumable.file.world(resumable.row.number)
-            objects_at_start = referee.objects() if referee else []
-            if world is not None:
-                robot.restore(world)
-            if plan is not None:
-                robot = _faulted(robot, plan, request, backend)
+            try:
+                referee = backend.referee(robot)
+                world = None if resumable is None else resumable.file.world(resumable.row.number)
+                objects_at_start = referee.objects() if referee else []
+                if world is not None:
+                    robot.restore(world)
+                if plan is not None:
+                    disturber = backend.disturber(robot)
+                    robot = FaultInjector(robot, plan, request.seed, disturber=disturber, may_kill=request.may_kill)
+            except BaseException:
+                robot.close()
+                raise
         except BaseException:
             folder.discard()
             raise
@@ -108,16 +113,6 @@ def _fault_plan(request: RunRequest, mission: Mission) -> FaultPlan | None:
     if request.faults is None or isinstance(request.faults, FaultPlan):
         return request.faults
     return read_plan(request.faults, mission.spec, mission.name)
-
-
-def _faulted(robot: Robot, plan: FaultPlan, request: RunRequest, backend: Backend) -> Robot:
-    """Wrap the device in a fault injector; close it if the plan is impossible."""
-    try:
-        disturber = backend.disturber(robot)
-        return FaultInjector(robot, plan, request.seed, disturber=disturber, may_kill=request.may_kill)
-    except BaseException:
-        robot.close()
-        raise
 
 
 @dataclass(frozen=True)
@@ -196,7 +191,8 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
             raise
         with deferred_interrupt(raising=False):  # Ctrl-C must not lose the result
             ended = time.perf_counter()
-            result = score(request, mission, outcome, referee)
+            seen, unscored = final_truth(referee)
+            result = score(request, mission, outcome, seen) | ({"unscored": unscored} if unscored else {})
             result |= {"wall_time_s": round(ended - ready, 3), "wall_open_s": round(ready - run.began, 3)}
             if run.resumable is not None:
                 result["resumed"] = [*run.resumable.before, run.resumable.as_dict()]
@@ -205,9 +201,9 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
                 injector.conclude(outcome.status, str(root["code"]), str(root["message"]), outcome.end_s)
                 result |= {"faults": injector.report(), "held_at_end": injector.held}
             unwritten = _write_end(recorder, folder, result)
-            if referee is not None:
-                ends = {"start": truth(run.objects_at_start), "end": truth(referee.objects())}
-                truths = {**ends, "tip_B_m": referee.tip_B_m().tolist()}
+            if seen is not None:
+                ends = {"start": truth(run.objects_at_start), "end": truth(seen.objects)}
+                truths = {**ends, "tip_B_m": seen.tip_B_m}
                 unwritten += _errors_of(lambda: folder.write_json("truth.json", truths))
             if not unwritten:  # a run killed before this can be resumed
                 unwritten = _errors_of(lambda: store.note("ended", outcome.status))

@@ -6,6 +6,7 @@ The truth of a simulated world is read here after the run, for scoring only.
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,8 @@ from glotouch_bt.robot.simulation import Referee, TrueObject
 from glotouch_bt.runs.request import RunRequest
 from glotouch_bt.version import __version__
 
+GO_ON = "glotouch resume RUN"
+"""How an aborted run goes on, as in its result; RUN is its folder."""
 RECORDED_PACKAGES = ("mujoco", "numpy", "pin", "py_trees", "ruckig", "scipy", "trimesh")
 
 
@@ -48,18 +51,37 @@ def description(request: RunRequest, mission: Mission, conditions: Conditions, r
     }
 
 
-def score(request: RunRequest, mission: Mission, outcome: Outcome, referee: Referee | None) -> dict[str, Any]:
-    """Return the content of result.json without wall times."""
+@dataclass(frozen=True)
+class FinalTruth:
+    """The truth of a simulated world after a run; see `Referee`."""
+
+    objects: list[TrueObject]
+    peak_force_N: float
+    tip_B_m: list[float]
+
+
+def final_truth(referee: Referee | None) -> tuple[FinalTruth | None, str]:
+    """Return the truth, or None and why there is none. A dead or broken simulation must not cost the result."""
+    if referee is None:
+        return None, ""
+    try:
+        return FinalTruth(referee.objects(), referee.peak_force_N(), referee.tip_B_m().tolist()), ""
+    except Exception as e:  # also of the solver's geometry, when a world has exploded
+        return None, f"the simulated world can no longer be asked for the truth: {e}"
+
+
+def score(request: RunRequest, mission: Mission, outcome: Outcome, seen: FinalTruth | None) -> dict[str, Any]:
+    """Return the content of result.json without wall times; without the truth, nothing counts as retrieved."""
     found = outcome.summary
     target = _target(mission)
     retrieved: str | None = None
     correct: bool | None = None
     peak = found.peak_force_N
-    if referee is not None:
-        held = [o.name for o in referee.objects() if o.in_gripper]
+    if seen is not None:
+        held = [o.name for o in seen.objects if o.in_gripper]
         retrieved = held[0] if held else None
         correct = retrieved == target if target is not None else None
-        peak = referee.peak_force_N()
+        peak = seen.peak_force_N
     return {
         "mission": mission.name,
         "backend": request.backend,
@@ -85,7 +107,7 @@ def score(request: RunRequest, mission: Mission, outcome: Outcome, referee: Refe
         # without paths of this machine
         "parameters": {k: _stem(str(v)) if k in mission.stl_parameters else v for k, v in mission.parameters.items()},
         "versions": installed_versions(),
-    }
+    } | ({"go_on": GO_ON} if outcome.status == "aborted" else {})
 
 
 def _target(mission: Mission) -> str | None:

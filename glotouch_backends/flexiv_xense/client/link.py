@@ -151,9 +151,11 @@ class DriverLink:
             quiet_s = SLOW_REQUEST_S if self.slow_request else MAX_SILENCE_S
         while True:
             answer = self._receive(POLL_S)
-            now = time.perf_counter()
+            now, gone = time.perf_counter(), None
             if answer is None:
                 gone = self._alive()
+                answer = None if gone is None else self._receive(0.0)  # its last word may have come meanwhile
+            if answer is None:
                 if gone is not None:
                     raise self._lose(gone)
                 if now - heard > quiet_s:

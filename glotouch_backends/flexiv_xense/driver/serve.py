@@ -78,7 +78,7 @@ def serve(
             loop.run(request.period_s)
     except DeviceFault as e:
         log("fault", kind=e.kind, message=e.message)
-        socket.send(e.answer(request.number))
+        socket.send(e.answer(0))
         return 1
     finally:
         if request.move:

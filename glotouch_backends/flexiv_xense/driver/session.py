@@ -13,7 +13,7 @@ from . import messages
 from .checks import SetpointCheck, rest_pose
 from .clock_offset import StampConverter
 from .devices import Connected
-from .faults import CommandRefused, DeviceFault
+from .faults import CommandRefused, DeviceFault, vendor_call
 from .frames import payload_on_tool, wrench_map
 
 MIN_SAMPLES_OVER = 5
@@ -173,7 +173,8 @@ class DriverSession:
         Raises:
             DeviceFault: The arm cannot be read, or repeats an old reading.
         """
-        state = self._arm.state()
+        with vendor_call("reading the arm", "link"):
+            state = self._arm.state()
         now, self._read_s = self.clock.now_s(), time.monotonic()
         if state.stamp == self._device_stamp:
             age = now - self._fresh_s

@@ -42,7 +42,7 @@ class CellLink:
             connection.send_bytes(encode(request))
             done, answer = decode(connection.recv_bytes(MAX_BYTES))
         except (EOFError, OSError) as e:
-            raise RuntimeError(f"the simulated cell does not answer: {e}") from e
+            raise RuntimeError(f"the simulated cell does not answer ({str(e) or 'its connection is closed'})") from e
         if not done:
             raise answer
         return answer

@@ -102,6 +102,8 @@ def print_result(done: RunResult) -> None:
         console.print(f"{'  ' * i}{'because ' if i else ''}{reason}", markup=False, highlight=False, soft_wrap=True)
     if r.get("ending"):
         console.print(str(r["ending"]), markup=False, highlight=False, soft_wrap=True)
+    if r.get("unscored"):
+        console.print(f"not scored: {r['unscored']}", markup=False, highlight=False, soft_wrap=True)
     for fault in r.get("faults", ()):
         console.print(_fault_in_words(fault), markup=False, highlight=False, soft_wrap=True)
     if done.report is not None:

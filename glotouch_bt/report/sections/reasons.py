@@ -36,4 +36,8 @@ def reasons_section(record: RunRecord) -> str:
         more = "".join(f"<p>{part}</p>" for part in (evidence, advice) if part)
         items.append(f"<li>{code}{node}{esc(reason.get('message') or '')}{more}</li>")
     lead = "From what the mission as a whole reports down to the root cause."
-    return section("Why", lead, f'<ol class="chain">{"".join(items)}</ol>')
+    result = record.result
+    notes = [f"Not scored: {esc(result['unscored'])}"] if result.get("unscored") else []
+    notes += [f"To go on: <code>{esc(result['go_on'])}</code>"] if result.get("go_on") else []
+    more = "".join(f"<p>{note}</p>" for note in notes)
+    return section("Why", lead, f'<ol class="chain">{"".join(items)}</ol>{more}')
