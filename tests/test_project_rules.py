@@ -202,3 +202,58 @@ def test_a_user_s_own_folders_do_not_break_an_installed_wheel(wheel: Path, tmp_p
             assert done.stdout.splitlines() == [str(site / "glotouch_bt" / "__init__.py"), "[]", "failure"]
         else:
             assert "retrieve: ok" in done.stdout
+
+
+CODE_IN_DATA = ("pickle", "cPickle", "_pickle", "dill", "cloudpickle", "joblib", "marshal", "shelve", "jsonpickle")
+"""Modules whose reading of data can run code."""
+SOCKETS = {"glotouch_backends/flexiv_xense/simulated/cell.py", "glotouch_backends/flexiv_xense/simulated/remote.py"}
+"""Use `multiprocessing.connection` for its sockets; `send` and `recv`, which pickle, are banned there."""
+OWN_WORKERS = {"glotouch_bt/runs/workers.py"}
+"""Pickles between a process and the workers that it has started itself, over a pipe without a name."""
+BANNED_CALLS = {
+    "eval", "exec", "os.system", "os.popen", "tempfile.mktemp", "yaml.load", "yaml.load_all", "yaml.unsafe_load",
+    "yaml.full_load", "os.chmod", "os.umask",
+}  # fmt: skip
+"""Calls that run text as code, go through a shell, race for a file name, or open a file to others."""
+TEST_CALLS = {"os.chmod", "os.umask"}
+"""Banned calls that tests may use."""
+
+
+def dangers(path: Path) -> Iterator[str]:
+    """Yield what in a source file could run foreign code, or open a file to others."""
+    name = shown(path)
+    allowed = TEST_CALLS if name.startswith("tests/") else set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            modules = [node.module or ""] if isinstance(node, ast.ImportFrom) else [a.name for a in node.names]
+            yield from (f"{name}:{node.lineno}: {m}" for m in modules if m.partition(".")[0] in CODE_IN_DATA)
+        if not isinstance(node, ast.Call):
+            continue
+        called = ast.unparse(node.func)
+        given = {k.arg: ast.unparse(k.value) for k in node.keywords}
+        pickles = name in SOCKETS and called.endswith(("connection.send", "connection.recv"))
+        if called in BANNED_CALLS - allowed or pickles:
+            yield f"{name}:{node.lineno}: {called}"
+        if given.get("shell", "False") != "False" or given.get("allow_pickle", "False") != "False":
+            yield f"{name}:{node.lineno}: {called} with {given}"
+
+
+def test_nothing_runs_code_that_it_reads() -> None:
+    found = [d for path in sources(*PACKAGES, "tests", "docs", "examples") for d in dangers(path)]
+    assert found == []
+
+
+def test_connections_that_could_pickle_are_known() -> None:
+    users = {shown(p) for p in sources(*PACKAGES) if "multiprocessing.connection" in p.read_text()}
+    assert users - OWN_WORKERS == SOCKETS
+
+
+@pytest.mark.parametrize(
+    "code",
+    ["import pickle", "from pickle import loads", "eval('1')", "exec('1')", "subprocess.run('x', shell=True)",
+     "os.system('x')", "np.load('x', allow_pickle=True)", "import marshal", "yaml.load(x, L)", "tempfile.mktemp()"],
+)  # fmt: skip
+def test_dangers_are_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str) -> None:
+    monkeypatch.setattr(sys.modules[__name__], "shown", str)
+    (tmp_path / "x.py").write_text(code)
+    assert list(dangers(tmp_path / "x.py"))

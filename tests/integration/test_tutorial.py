@@ -71,8 +71,7 @@ def test_the_page_is_true(tmp_path: Path) -> None:
             (reader / step.file).write_text(step.body)
             continue
         done = subprocess.run(
-            step.body,
-            shell=True,
+            ["/bin/sh", "-c", step.body],
             cwd=reader,
             env=environment,
             stdout=subprocess.PIPE,
