@@ -5,12 +5,11 @@ Heavy imports stand inside the commands, so that `glotouch --help` is quick.
 
 from collections.abc import Callable, Mapping
 
-from glotouch_bt.commands.backends import backends
+from glotouch_bt.commands.backends import backends, keys
 from glotouch_bt.commands.bench import bench
 from glotouch_bt.commands.check import check
 from glotouch_bt.commands.doctor import doctor
 from glotouch_bt.commands.faults import faults
-from glotouch_bt.commands.keys import keys
 from glotouch_bt.commands.missions import missions
 from glotouch_bt.commands.nodes import nodes
 from glotouch_bt.commands.replay import replay

@@ -1,4 +1,4 @@
-"""Whatever dies under a mission: its folder holds a result with the cause and the way on, a report, and a whole record."""
+"""Whatever dies under a mission, its folder holds a result with cause and way on, a report, and a whole record."""
 
 from __future__ import annotations
 
