@@ -17,6 +17,7 @@ import numpy as np
 
 from glotouch_backends.options import WorldOptions
 from glotouch_bt.robot import BadInput, Conditions, Container, Holder, ObjectSet, Pose, Probe, World, frozen_array
+from glotouch_bt.robot.scene import stl_files
 from glotouch_bt.untrusted import read_file
 
 MAX_OBJECTS = 200
@@ -103,10 +104,7 @@ def _too_large(folder: Path) -> BadInput:
 
 def _stl_files(objects: ObjectSet) -> dict[str, bytes]:
     """Return the STL files of an object set by name, in its order."""
-    try:
-        found = {p.stem: p for p in sorted(objects.folder.iterdir()) if p.suffix.lower() == ".stl"}
-    except OSError as e:
-        raise BadInput(f"{objects.folder}: no such folder of STL files ({e.strerror})") from e
+    found = stl_files(objects.folder)
     names = objects.names or tuple(found)
     missing = [n for n in names if n not in found]
     if missing or not found:
