@@ -7,7 +7,7 @@ import os
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from glotouch_bt.robot import Array
+from glotouch_bt.untrusted import write_file
 
 
 @dataclass(frozen=True)
@@ -86,14 +87,10 @@ def write_parts(path: Path, key: str, parts: Parts, say: Callable[[str], None]) 
     If the folder cannot be written, report it: the next run must compute the parts again.
     """
     content = encode(key, parts)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_bytes(content)
-        os.replace(temporary, path)
+        write_file(path, content)
     except OSError as e:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
         say(f"convex parts cannot be kept in {path.parent} ({e.strerror}); they will be computed again next time")
     kept = decode(content, key)
     assert kept is not None
@@ -107,7 +104,8 @@ def locked(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
         import fcntl
 
         path.parent.mkdir(parents=True, exist_ok=True)
-        lock = path.with_name(f".{path.stem}.lock").open("w")
+        flags = os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW
+        lock = open(os.open(path.with_name(f".{path.stem}.lock"), flags, 0o600), "w")  # noqa: SIM115
     except (ImportError, OSError):
         yield
         return

@@ -7,7 +7,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any
 from glotouch_bt.bench.match.touchset_file import load_touchset, save_touchset
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.robot import BadInput
+from glotouch_bt.untrusted import write_file
 
 VERSION = 1
 Planar = tuple[float, float, float]
@@ -86,9 +86,7 @@ def write_layout(folder: Path, layout: Layout) -> Path:
             "version": VERSION, "seed": layout.seed, "conditions": layout.conditions, "objects": list(layout.objects),
             "ended": layout.ended, "sim_s": layout.sim_s, "candidates": candidates,
         }  # fmt: skip
-        part = folder / f".{stem}.json.part"
-        part.write_text(json.dumps(content, indent=1) + "\n")
-        os.replace(part, folder / f"{stem}.json")
+        write_file(folder / f"{stem}.json", (json.dumps(content, indent=1) + "\n").encode())
     except OSError as e:
         raise BadInput(f"{folder}: cannot be written ({e.strerror})") from e
     return folder / f"{stem}.json"

@@ -8,6 +8,7 @@ the field's default.
 
 from __future__ import annotations
 
+import io
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, Field, fields, replace
@@ -19,6 +20,7 @@ import numpy.typing as npt
 
 from glotouch_bt.perception.touch import Candidate, Contact, Contour, Layer, TouchSequence, TouchSet
 from glotouch_bt.robot import BadInput
+from glotouch_bt.untrusted import write_file
 
 VERSION = 1
 SHAPES: Mapping[str, tuple[int | None, ...]] = {
@@ -48,13 +50,11 @@ def save_touchset(path: Path, touchset: TouchSet) -> None:
     columns |= _columns("sequence", touchset.sequences)
     columns |= _columns("layer", touchset.layers)
     columns["sequence.layers"] = np.array([len(s.layers) for s in touchset.sequences], dtype=np.int64)
-    part = path.with_name(f".{path.name}.part")
+    packed = io.BytesIO()
+    np.savez_compressed(packed, **columns)  # type: ignore[arg-type]
     try:
-        with part.open("wb") as f:
-            np.savez_compressed(f, **columns)  # type: ignore[arg-type]
-        part.replace(path)
+        write_file(path, packed.getvalue())
     except OSError as e:
-        part.unlink(missing_ok=True)
         raise BadInput(f"{path}: cannot be written ({e.strerror})") from e
 
 
