@@ -1,4 +1,4 @@
-"""Pages on the program itself: the command line and the Python API."""
+"""Pages on the program itself: the command line, the Python API, and what the body of a skill uses."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ from markdown_text import NOTE, cell, code, prose, table
 
 import glotouch_bt
 from glotouch_bt.cli import app
+from glotouch_bt.motion import Arm, MoveResult
+from glotouch_bt.robot import Pose, SetPayload, Tare, World
+from glotouch_bt.skill import Context
 
 MAX_WIDTH = 90
 """Characters of a signature on one line."""
@@ -28,11 +31,21 @@ These names are public: `import glotouch_bt as gt`. Everything else may change w
 backends and mission tests also import from the doors of `glotouch_bt.skill`, `glotouch_bt.robot`,
 `glotouch_bt.conformance` and `glotouch_bt.mission_testing`.
 """
+MOTIONS = """# Inside a skill: motions and context
+
+`self.context` is a [Context](#context), and `self.context.arm` has the motions. A motion is a generator: write
+`result = yield from arm.shift(...)`. P is the mid-point between the pads, B the base of the arm. Options of all
+Cartesian motions are those of [follow](#follow). To wait, `yield from arm.hold(0.4)`.
+
+Slow requests go to the device: `ticket = self.context.requests.start(Tare())`, then
+`yield from finish(ticket, "the tare")` with `finish` of `glotouch_skills.common.hand`.
+"""
 
 
 def pages() -> dict[str, str]:
-    """Return both pages by their path below docs/."""
-    return {"reference/cli.md": NOTE + cli().rstrip() + "\n", "reference/api.md": NOTE + api().rstrip() + "\n"}
+    """Return the pages by their path below docs/."""
+    texts = {"cli": cli(), "motions": motions(), "api": api()}
+    return {f"reference/{name}.md": NOTE + text.rstrip() + "\n" for name, text in texts.items()}
 
 
 def cli() -> str:
@@ -102,13 +115,30 @@ def api() -> str:
     for name in sorted(getattr(glotouch_bt, "__all__", ()), key=str.lower):
         found = getattr(glotouch_bt, name)
         if inspect.isclass(found):
-            text.append(f"## {name}\n\n    {_signature('class ' + name, found)}\n\n{prose(found.__doc__ or '')}\n")
-            rows = [(code(m + _call(f)), prose(f.__doc__ or "").split("\n\n")[0]) for m, f in _members(found)]
-            text.append(table(("member", "what it does"), rows))
+            text += _class(name, found, [(m, f) for m, f in _members(found)])
         elif callable(found):
             text.append(f"## {name}\n\n    {_signature(name, found)}\n\n{prose(found.__doc__ or '')}\n")
         elif inspect.ismodule(found) or not isinstance(found, str):
-            text.append(f"## {name}\n\n{cell(prose(getattr(found, '__doc__', '') or ''))}\n")
+            doc = getattr(found, "__doc__", "") or ""
+            same = doc == type(found).__doc__  # an instance of a class that has its own entry
+            text.append(f"## {name}\n\n{code(repr(found)) if same else cell(prose(doc))}\n")
+    return "\n".join(t for t in text if t)
+
+
+def _class(name: str, kind: type, members: list[tuple[str, Any]]) -> list[str]:
+    rows = [(code(m + _call(f)), prose(f.__doc__ or "").split("\n\n")[0]) for m, f in members]
+    heading = f"## {name}\n\n    {_signature('class ' + name, kind)}\n\n{prose(kind.__doc__ or '')}\n"
+    return [heading, table(("member", "what it does"), rows)]
+
+
+def motions() -> str:
+    """Return the page on what the body of a skill uses: the arm's motions, requests, and the context."""
+    text = [MOTIONS]
+    for name in ("transit", "shift", "line", "arc", "joints", "jaws", "hold", "follow"):
+        found = getattr(Arm, name)
+        text.append(f"## {name}\n\n    {_signature(name, found)}\n\n{prose(found.__doc__ or '')}\n")
+    for kind in (MoveResult, Context, Pose, Tare, SetPayload, World):
+        text += _class(kind.__name__, kind, _members(kind))
     return "\n".join(t for t in text if t)
 
 
@@ -119,6 +149,7 @@ def _signature(name: str, found: Any) -> str:
         shown = ""
     for prefix in ("glotouch_bt.", "collections.abc.", "pathlib.", "numpy.typing."):
         shown = shown.replace(prefix, "")
+    shown = shown.replace("(self, ", "(")
     shown = re.sub(r"(: |-> )'([^']*)'", r"\1\2", shown)
     text = f"{name}{shown}"
     if len(text) <= MAX_WIDTH:

@@ -150,7 +150,7 @@ def missions() -> str:
         "description": "one sentence for people",
         "world": "a [world](worlds.md): a path, a shipped name, or the world itself",
         "parameters": "values that `--set NAME=VALUE` may change, used as `$NAME`",
-        "timeout_s": "longest duration of the mission on the robot's clock",
+        "timeout_s": "longest duration of the mission on the robot's clock, in seconds without a unit",
         "leaves": "states that a successful run must end in, for example `{hand: object}`",
         "subtrees": "subtrees held in the mission itself",
         "tree": "the tree",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, cast
 
 from glotouch_bt.faults import ListeningRecord, injector_in
 from glotouch_bt.mission import Mission
@@ -154,6 +154,8 @@ class _Heard(NullRecord):
 
 class StillArm:
     """Stand-in for the arm where no leaf moves."""
+
+    not_run: ClassVar[list[str]] = []
 
     def sync(self, observation: Observation) -> None:
         """Do nothing."""

@@ -7,8 +7,10 @@ be closed at any yield; the setpoint is then the last one yielded.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any, TypedDict, Unpack
+import sys
+from collections.abc import Callable, Generator, Mapping
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec, TypedDict, TypeVar, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -41,6 +43,29 @@ _START_RAD = 0.02
 """Maximum rotation of a path's start from the setpoint (servo error right after `sync`)."""
 
 
+P = ParamSpec("P")
+T = TypeVar("T")
+A = TypeVar("A", bound="Arm")
+
+
+def motion(make: Callable[Concatenate[A, P], Motion[T]]) -> Callable[Concatenate[A, P], Motion[T]]:
+    """Decorate a motion so that `Arm.not_run` names it until its first command: `yield from` is easily forgotten."""
+
+    @wraps(make)
+    def made(arm: A, /, *args: P.args, **kwargs: P.kwargs) -> Motion[T]:
+        caller = sys._getframe(1)
+        name = f"{make.__name__!r} at {caller.f_code.co_filename}:{caller.f_lineno}"
+        arm.not_run.append(name)
+        return _run(arm, name, make(arm, *args, **kwargs))
+
+    return made
+
+
+def _run(arm: Arm, name: str, body: Motion[T]) -> Generator[Command, Observation, T]:
+    arm.not_run.remove(name)
+    return (yield from body)
+
+
 class MoveOptions(TypedDict, total=False):
     """Keyword options of `Arm.follow`, accepted by every Cartesian motion."""
 
@@ -66,12 +91,14 @@ class Arm(Mover):
         kinematics: Forward and inverse kinematics.
         scene: Obstacles; skills add the objects they find.
         pause_signal: Pause state, written by the runner.
+        not_run: Motions that were made and not run, each with its place in the code.
     """
 
     def __init__(self, description: RobotDescription, limits: Limits, world: World, period_s: float) -> None:
         super().__init__(description, limits, period_s)
         self.world = world
         self.scene = Scene(self.kinematics, world)
+        self.not_run: list[str] = []
 
     def state(self) -> dict[str, Any]:
         """Return the state kept between two motions, including the scene, for `restore`."""
@@ -86,6 +113,7 @@ class Arm(Mover):
 
     # -- motions -----------------------------------------------------------------------------------------------------
 
+    @motion
     def hold(self, duration_s: float, *, tactile: bool = False) -> Motion[list[Observation]]:
         """Stay at rest for a whole number of periods (rounded up); return the observations."""
         out = []
@@ -95,6 +123,7 @@ class Arm(Mover):
             out.append(observation)
         return out
 
+    @motion
     def joints(self, q: npt.ArrayLike, speed: float = 0.5, *, check: bool = True) -> Motion[None]:
         """Move to joint positions `q` (dof,) rad along a straight line in joint space, from rest to rest.
 
@@ -117,6 +146,7 @@ class Arm(Mover):
                 return
             running = yield from self._pause_joints(running, k)
 
+    @motion
     def follow(
         self,
         path: Path,
@@ -172,11 +202,13 @@ class Arm(Mover):
             self._clear(np.concatenate([p.knots_q for p in plans]), what)
         return (yield from self._travel(plans, guard, tactile))
 
+    @motion
     def line(self, pose_B_P: Pose, speed_m_s: float, **options: Unpack[MoveOptions]) -> Motion[MoveResult]:
         """Move straight to a pose of P in B; options as in `follow`."""
         options.setdefault("what", "line")
         return (yield from self.follow(Line(self.pose_B_P, pose_B_P), speed_m_s, **options))
 
+    @motion
     def shift(
         self, displacement_B_m: npt.ArrayLike, speed_m_s: float, **options: Unpack[MoveOptions]
     ) -> Motion[MoveResult]:
@@ -186,6 +218,7 @@ class Arm(Mover):
         options.setdefault("what", "shift")
         return (yield from self.follow(Line(here, there), speed_m_s, **options))
 
+    @motion
     def arc(
         self,
         centre_B_m: npt.ArrayLike,
@@ -201,6 +234,7 @@ class Arm(Mover):
         path = Arc(self.pose_B_P, centre_B_m, axis, angle_rad, turn)
         return (yield from self.follow(path, speed_m_s, **options))
 
+    @motion
     def transit(
         self, pose_B_P: Pose, height_B_m: float, speed_m_s: float, **options: Unpack[MoveOptions]
     ) -> Motion[MoveResult]:
@@ -215,6 +249,7 @@ class Arm(Mover):
         path = Polyline((here, up, over, pose_B_P))
         return (yield from self.follow(path, speed_m_s, **options))
 
+    @motion
     def jaws(
         self,
         aperture_m: float,

@@ -149,10 +149,16 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
     def _body(self) -> SkillRun:
         if self.context.preempted:
             yield from come_to_rest(self.context)
+        self.context.arm.not_run.clear()
         body: Generator[Command, Observation, object] = self.run()
         returned = yield from body
         if returned is not None:  # most likely a status, which would be taken for success
             raise TypeError(f"run() returned {returned!r}; it returns nothing, and raises SkillFailed to fail")
+        if self.context.arm.not_run:
+            raise TypeError(f"the motion {self.context.arm.not_run[0]} was made and not run: write `yield from`")
+        for name in self.OUTPUT_PORTS:
+            if not self.blackboard_client.exists(name):
+                raise TypeError(f"run() ended without writing the output {name!r}: write `self.{name} = ...`")
 
     def update(self) -> Status:
         """Send the newest observation to the body and take its next command."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from glotouch_bt.errors import BadInput
 
-_SEQUENCES = {
+_SEQUENCES: dict[object, Any] = {
     list: list, collections.deque: collections.deque, set: set, frozenset: frozenset,
     abc.Sequence: (list, tuple), abc.Set: (set, frozenset), abc.Iterable: (list, tuple, set, frozenset),
     abc.Collection: (list, tuple, set, frozenset), abc.MutableSequence: list,

@@ -148,6 +148,8 @@ REGISTRY: dict[str, type[Skill]] = {
 
 
 class NoArm:
+    not_run: list[str] = []  # noqa: RUF012
+
     def sync(self, observation: Observation) -> None:
         pass
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import traceback
+from pathlib import Path
 
 from glotouch_bt.mission.checkpoint import WorldChanged
 from glotouch_bt.mission.execution.control import Preempted
@@ -27,8 +29,15 @@ def abort_failure(error: BaseException, node: str) -> NodeFailure:
     elif isinstance(error, BackendError):
         code, text = re.sub("(?<!^)(?=[A-Z])", "_", type(error).__name__).lower(), str(error)
     else:
-        code, text = "fault", f"{type(error).__name__}: {error}"
+        code, text = "fault", f"{type(error).__name__}: {error}{_place(error)}"
     return NodeFailure(node, text, Reason(code, text, _evidence(error), node=node))
+
+
+def _place(error: BaseException) -> str:
+    """Return the file and line of the innermost code outside this package that the error passed, such as a skill."""
+    frames = traceback.extract_tb(error.__traceback__)
+    outside = [f for f in frames if "glotouch_bt" not in Path(f.filename).parts and "site-packages" not in f.filename]
+    return f" ({Path(outside[-1].filename).name}:{outside[-1].lineno}; --debug shows the traceback)" if outside else ""
 
 
 def _evidence(error: BaseException) -> dict[str, float | int | str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Iterator, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from os.path import isfile
@@ -56,6 +57,16 @@ def shown(path: Path) -> str:
         return str(path)
 
 
+def _fault_of_module(error: Exception) -> str:
+    """Return an error of a skill's module with its place."""
+    if isinstance(error, SyntaxError):
+        return f"{error.filename}:{error.lineno}: {error.msg}"
+    if isinstance(error, ImportError | AttributeError):
+        return str(error)
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{last.filename}:{last.lineno}: {type(error).__name__}: {error}"
+
+
 class SkillRegistry(Mapping[str, type[Skill]]):
     """Installed skills by name. A skill's module is imported on first use.
 
@@ -64,7 +75,7 @@ class SkillRegistry(Mapping[str, type[Skill]]):
 
     Raises:
         UnknownName: On looking up a name that is not registered.
-        BadInput: On looking up a skill whose module cannot be imported here.
+        BadInput: On looking up a skill whose module cannot be imported here; with the place of the fault.
     """
 
     def __init__(self, group: str = SKILL_GROUP) -> None:
@@ -78,8 +89,8 @@ class SkillRegistry(Mapping[str, type[Skill]]):
         if name not in self._loaded:
             try:
                 found = self._points[name].load()
-            except (ImportError, AttributeError) as e:
-                raise BadInput(f"skill {name!r} cannot be used here: {e}") from e
+            except Exception as e:  # the module of a skill may raise anything
+                raise BadInput(f"skill {name!r} cannot be used here: {_fault_of_module(e)}") from e
             if not (isinstance(found, type) and issubclass(found, Skill)):
                 raise BadInput(f"entry point {name!r} of {self._group} is not a Skill class")
             self._loaded[name] = found

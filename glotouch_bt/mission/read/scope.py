@@ -10,7 +10,7 @@ from pathlib import Path
 from glotouch_bt.mission.spec import Findings, Node, Place, Wire
 from glotouch_bt.skill import Skill
 
-KEY = re.compile(r"[a-z][a-z0-9_]*")
+KEY = re.compile(r"[a-z][A-Za-z0-9_]*")
 
 
 @dataclass
@@ -76,6 +76,11 @@ class Scope:
     def wire(self, port: str, key: str, place: Place) -> Wire | None:
         """Return a port wired to a key of this tree; None (and a finding) if that is not a key."""
         if not KEY.fullmatch(key):
-            self.findings.add(place, "wrong_key", f"{key!r} is not a port key", valid="small letters, digits and _")
+            self.findings.add(
+                place,
+                "wrong_key",
+                f"{key!r} is not a port key",
+                valid="letters, digits and _, the first a small letter",
+            )
             return None
         return Wire(port, self.key(key), place)

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import pytest
@@ -263,7 +264,7 @@ def by_ticking(spec: NodeSpec) -> tuple[dict[tuple[str, str, str], int], set[tup
     whole = True
     for _ in range(MAX_RUNS):
         World.hand, World.steps, World.looks, World.hanging = "empty", 0, 0, False
-        context = Standing(None, None, None, None, None)  # type: ignore[arg-type]
+        context = Standing(None, SimpleNamespace(not_run=[]), None, None, None)  # type: ignore[arg-type]
         context.observation = type("Seen", (), {"now_s": 0.0})()
         context.command = HOLD
         built = build_tree(spec, context, "m")

@@ -90,6 +90,8 @@ class KeptRobot(ClockRobot):
 
 
 class KeptArm:
+    not_run: list[str] = []  # noqa: RUF012
+
     pause_signal = SimpleNamespace(requested=False, style="hold", standing=False, stops=False, deferred=False)
     period_s = 0.01
 
