@@ -90,6 +90,10 @@ class MujocoBackend(Backend):
         built = build_world(self._description, world, conditions, seed, chosen)
         return MujocoRobot(built, self._limits, chosen.trace)
 
+    def is_portable(self, option: str, value: object) -> bool:
+        """See `Backend`: every option describes the simulated world."""
+        return True
+
     def referee(self, robot: Robot) -> Referee | None:
         """See `Backend`."""
         return MujocoReferee(robot) if isinstance(robot, MujocoRobot) else None

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.shared import Json, guarded, print_json
+from glotouch_bt.commands.shared import BackendSettings, Json, Objects, guarded, print_json, read_settings
 
 
 @guarded
@@ -20,12 +20,15 @@ def resume(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="continue in a copy of the run in this folder")
     ] = None,
+    set_: BackendSettings = None,
+    objects: Objects = None,
     list_: Annotated[bool, typer.Option("--list", help="only show the checkpoints")] = False,
     json_: Json = False,
 ) -> int:
     """Continue an interrupted run from its last checkpoint.
 
-    After a crash, a kill, Ctrl-C or a safety stop. Finished skills do not run again.
+    After a crash, a kill, Ctrl-C or a safety stop. Finished skills do not run again. A run's folder names no programs,
+    paths, addresses and devices: give those of the run again.
     """
     from glotouch_bt.commands.terminal import RunProgress, print_end
     from glotouch_bt.runs import Operator, ResumableRun, operated
@@ -53,6 +56,8 @@ def resume(
             folder,
             start=from_,
             out=out,
+            settings=read_settings(set_),
+            objects=objects,
             on_found=show,
             on_start=progress.start,
             on_progress=progress.update,

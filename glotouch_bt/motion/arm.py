@@ -106,9 +106,15 @@ class Arm(Mover):
         return remembered | {"scene": self.scene.state()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Restore a `state`; call `sync` afterwards if the arm has moved since."""
-        self._q = np.array(state["q"])
-        self._aperture_m, self._last_contact = state["aperture_m"], None
+        """Restore a `state`; call `sync` afterwards if the arm has moved since.
+
+        Raises:
+            ValueError, TypeError, LookupError, BadInput: It does not fit this arm.
+        """
+        q, aperture_m = np.array(state["q"], dtype=np.float64), float(state["aperture_m"])
+        if q.shape != self._q.shape or not np.isfinite([*q, aperture_m]).all():
+            raise ValueError(f"joints {q.tolist()}, aperture {aperture_m} m")
+        self._q, self._aperture_m, self._last_contact = q, aperture_m, None
         self.scene.restore(state["scene"])
 
     # -- motions -----------------------------------------------------------------------------------------------------

@@ -5,28 +5,37 @@ Only the record is required. The record of a killed process is read up to its la
 
 from __future__ import annotations
 
-import json
-import struct
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
-import zstandard
-from mcap.exceptions import McapError
+from mcap.exceptions import InvalidMagic
 from mcap.records import Attachment, Chunk, Footer
-from mcap.stream_reader import StreamReader, breakup_chunk
 
-from glotouch_bt.mission.record import EVENT_PREFIX, RESULT_ATTACHMENT, RUN_ATTACHMENT, STAMP_S, join, to_step, unpack
+from glotouch_bt.mission.record import (
+    BROKEN,
+    EVENT_PREFIX,
+    RESULT_ATTACHMENT,
+    RUN_ATTACHMENT,
+    STAMP_S,
+    ChunkUnpacker,
+    join,
+    open_record,
+    record_items,
+    to_step,
+    unpack,
+)
 from glotouch_bt.robot import Array, BadInput, GlotouchError, Pose
+from glotouch_bt.untrusted import MAX_JSON_BYTES, TooLarge, parse_json, read_json, require_plain
 
 if TYPE_CHECKING:
     import pandas as pd
 
 RECORD_NAME, RESULT_NAME, TRUTH_NAME = "run.mcap", "result.json", "truth.json"
 _PACKED = {"/packed/samples": "samples", "/packed/cycles": "cycles", "/packed/tactile": "tactile"}
-_SCHEMA, _CHANNEL, _MESSAGE = 0x03, 0x04, 0x05
 
 
 @dataclass(frozen=True)
@@ -149,99 +158,89 @@ def read_run(path: str | Path) -> RunRecord:
     """Read a run's folder, or a record file.
 
     Raises:
-        BadInput: There is no record, or it is not an MCAP file at all.
+        BadInput: There is no record, it is not an MCAP file at all, it unpacks to more than is allowed, or the folder
+            holds links.
     """
     path = Path(path)
+    folder = path if path.is_dir() else path.parent
     file = path / RECORD_NAME if path.is_dir() else path
+    if path.is_dir():
+        require_plain(folder, (RECORD_NAME, RESULT_NAME, TRUTH_NAME))
     if not file.is_file():
         raise BadInput(f"{path}: no run here ({RECORD_NAME} is missing)")
     record = RunRecord(file)
     packed: dict[str, list[dict[str, Array]]] = {name: [] for name in _PACKED.values()}
-    try:
-        for topic, log_ns, data in _messages(file, record):
-            _store(record, packed, topic, log_ns, data)
-    except McapError as e:
-        if type(e).__name__ == "InvalidMagic":
+    with open_record(file, links=not path.is_dir()) as opened:
+        try:
+            for topic, log_ns, data in _messages(opened, record):
+                _store(record, packed, topic, log_ns, data)
+        except InvalidMagic as e:
             raise BadInput(f"{file}: is not an MCAP record") from e
-        record.complete = False
-    except (struct.error, zstandard.ZstdError, OSError, ValueError, OverflowError):
-        record.complete = False  # a cut or damaged tail; what came before is valid
+        except TooLarge:
+            raise
+        except (*BROKEN, GlotouchError):
+            record.complete = False  # a cut or damaged tail; what came before is valid
     record.samples, record.cycles, record.tactile = (join(packed[n]) for n in ("samples", "cycles", "tactile"))
-    folder = file.parent
     result = _json_file(folder / RESULT_NAME)
     record.result = result if isinstance(result, dict) and result else record.result
     record.truth = _json_file(folder / TRUTH_NAME)
     return record
 
 
-def _messages(file: Path, record: RunRecord) -> Iterator[tuple[str, int, bytes]]:
+def _messages(file: IO[bytes], record: RunRecord) -> Iterator[tuple[str, int, memoryview]]:
     """Yield topic, log time in ns and bytes of every message except plots (the packed channels hold their data)."""
-    topics: dict[int, str] = {}
-    with file.open("rb") as f:
-        for item in StreamReader(f, emit_chunks=True).records:
-            if isinstance(item, Attachment):
-                content = json.loads(item.data)
-                if item.name == RUN_ATTACHMENT:
-                    record.run = content
-                elif item.name == RESULT_ATTACHMENT:
-                    record.result = content
-            elif isinstance(item, Footer):
-                record.complete = True
-            elif isinstance(item, Chunk):
-                yield from _of_chunk(item, topics)
+    unpacker = ChunkUnpacker(os.fstat(file.fileno()).st_size, str(record.path))
+    text_bytes = 0
+    for item in record_items(file):
+        if isinstance(item, Attachment):
+            content = parse_json(item.data, f"{record.path}: {item.name}")
+            if item.name == RUN_ATTACHMENT and isinstance(content, dict):
+                record.run = content
+            elif item.name == RESULT_ATTACHMENT and isinstance(content, dict):
+                record.result = content
+        elif isinstance(item, Footer):
+            record.complete = True
+        elif isinstance(item, Chunk):
+            for topic, log_ns, data in unpacker.items(item):
+                if data is None or not topic.startswith((EVENT_PREFIX, "/packed/", "/tree/")):
+                    continue
+                text_bytes += 0 if topic in _PACKED else len(data)
+                if text_bytes > MAX_JSON_BYTES:
+                    raise TooLarge(f"{record.path}: its events are larger than {MAX_JSON_BYTES} bytes")
+                yield topic, log_ns, data
 
 
-def _of_chunk(chunk: Chunk, topics: dict[int, str]) -> Iterator[tuple[str, int, bytes]]:
-    """Yield the messages of one chunk except plots. The reader of `mcap` would take ten times as long."""
-    if chunk.compression != "zstd":
-        for r in breakup_chunk(chunk):
-            if type(r).__name__ == "Channel":
-                topics[r.id] = r.topic
-            elif type(r).__name__ == "Message" and _wanted(topics.get(r.channel_id, "")):
-                yield topics[r.channel_id], r.log_time, r.data
-        return
-    data = zstandard.decompress(chunk.data, chunk.uncompressed_size)
-    at, end = 0, len(data)
-    head = struct.Struct("<BQ")
-    message = struct.Struct("<HIQQ")
-    while at < end:
-        code, size = head.unpack_from(data, at)
-        at += head.size
-        if code == _CHANNEL:
-            number, _, length = struct.unpack_from("<HHI", data, at)
-            topics[number] = data[at + 8 : at + 8 + length].decode()
-        elif code == _MESSAGE:
-            number, _, log_ns, _ = message.unpack_from(data, at)
-            if _wanted(topics.get(number, "")):
-                yield topics[number], log_ns, data[at + message.size : at + size]
-        at += size
+def _store(
+    record: RunRecord, packed: dict[str, list[dict[str, Array]]], topic: str, log_ns: int, data: memoryview
+) -> None:
+    """Store one message.
 
-
-def _wanted(topic: str) -> bool:
-    return topic.startswith((EVENT_PREFIX, "/packed/", "/tree/"))
-
-
-def _store(record: RunRecord, packed: dict[str, list[dict[str, Array]]], topic: str, log_ns: int, data: bytes) -> None:
+    Raises:
+        ValueError, LookupError, TypeError, GlotouchError: It is damaged.
+    """
     if topic in _PACKED:
         start_ns, columns = unpack(data)
         for name in ("stamp_s", "gripper_stamp_s", "arrived_s"):
             if name in columns:
                 columns[name] = to_step(columns[name] + start_ns * 1e-9, STAMP_S)
-        packed[_PACKED[topic]].append(columns)
+        before = packed[_PACKED[topic]]
+        if before and {n: c.shape[1:] for n, c in columns.items()} != {n: c.shape[1:] for n, c in before[0].items()}:
+            raise ValueError(f"{topic}: other columns than before")
+        before.append(columns)
         return
-    content = json.loads(data)
+    content = parse_json(bytes(data), topic)
     stamp_s = log_ns * 1e-9
     if topic == "/tree/ticks":
-        record.ticks.append(Tick(stamp_s, content["node"], content["old"], content["new"]))
+        record.ticks.append(Tick(stamp_s, str(content["node"]), str(content["old"]), str(content["new"])))
     elif topic == "/tree/ports":
-        record.ports.append(PortWrite(stamp_s, content["key"], content["value"]))
+        record.ports.append(PortWrite(stamp_s, str(content["key"]), content["value"]))
     elif isinstance(content.get("data"), dict):
-        record.events.append(RecordedEvent(stamp_s, content["kind"], content["data"]))
+        record.events.append(RecordedEvent(stamp_s, str(content["kind"]), content["data"]))
 
 
 def _json_file(path: Path) -> Any:
     """Return the file's content, or None if there is no file or it is not JSON."""
     try:
-        return json.loads(path.read_text())
-    except (OSError, ValueError):
+        return read_json(path)
+    except BadInput:
         return None

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 from glotouch_bt.report.page import esc, page, section
 from glotouch_bt.report.run_record import RunRecord, read_run
 from glotouch_bt.report.sections import SECTIONS, verdict
 from glotouch_bt.robot import BadInput
+from glotouch_bt.untrusted import require_plain, write_file
 
 REPORT_NAME = "report.html"
 
@@ -23,16 +23,14 @@ def write_report(run_dir: Path) -> Path:
         The file written.
 
     Raises:
-        BadInput: There is no record, or the folder cannot be written.
+        BadInput: There is no record, or the folder cannot be written or holds links.
     """
-    target, part = run_dir / REPORT_NAME, run_dir / f".{REPORT_NAME}.part"
+    require_plain(run_dir, (REPORT_NAME, f".{REPORT_NAME}.part"))
+    target = run_dir / REPORT_NAME
     text = render(read_run(run_dir))
     try:
-        part.write_text(text, encoding="utf-8")
-        part.replace(target)
+        write_file(target, text.encode("utf-8", "backslashreplace"))
     except OSError as e:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
         raise BadInput(f"{target}: the report cannot be written ({e.strerror})") from e
     return target
 

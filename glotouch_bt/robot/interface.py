@@ -110,6 +110,14 @@ class Backend(ABC):
             BackendError: The device did not come up.
         """
 
+    def is_portable(self, option: str, value: object) -> bool:
+        """Return True if a run's folder, which may come from a stranger, may set this option when it is resumed.
+
+        Return False (the default) for all that names a program, a file, an address or a device: the user must give it
+        again.
+        """
+        return False
+
     def referee(self, robot: Robot) -> Referee | None:
         """Return access to the ground truth of `robot`'s world, for scoring only; None on hardware."""
         return None

@@ -10,7 +10,8 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +24,14 @@ from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import Record, Recorder, RunSummary
 from glotouch_bt.robot import BadInput, Conditions, GlotouchError, Robot, load_backend
 from glotouch_bt.robot.simulation import Referee, TrueObject
-from glotouch_bt.runs.folder import RunFolder, locked
+from glotouch_bt.runs.folder import MODELS, RunFolder, locked
 from glotouch_bt.runs.request import RunRequest, RunResult
 from glotouch_bt.runs.result import description, final_truth, installed_versions, mission_yaml, score, truth
 from glotouch_bt.runs.resume_point import ResumableRun, describe_checkpointed_run
 
 MAX_SEED = 2**32 - 1
+RECORD_PART = ".run.mcap.part"
+"""Name of a resumed run's record until its checkpoint is restored."""
 
 
 def launch(
@@ -59,21 +62,19 @@ def launch(
         mission = resumable.mission
     else:
         mission = load_mission(request.mission, request.settings, objects=request.objects)
-    conditions = load_conditions(request.conditions)
+    conditions = load_conditions(request.conditions) if resumable is None else resumable.conditions
     plan = _fault_plan(request, mission)
     load_all()
     backend = load_backend(request.backend)
     options = split_settings(mission, request.settings)
+    if resumable is not None:
+        options = resumable.options(backend, options)
     folder = RunFolder(request.out) if request.out else RunFolder.timestamped(mission.name, request.seed)
     with locked(folder.path):
         try:
             if resumable is None:
                 folder.check_free(request.overwrite)
-            if (
-                plan is not None
-                and resumable is None
-                and (models := wrong_models(plan, mission, folder.path / "models"))
-            ):
+            if plan is not None and resumable is None and (models := wrong_models(plan, mission, folder.path / MODELS)):
                 mission = load_mission(request.mission, {**request.settings, **models}, objects=request.objects)
             try:
                 robot = backend.open(mission.world, conditions, request.seed, options)
@@ -140,14 +141,7 @@ def _record(run: _Run) -> tuple[Recorder, CheckpointFile, CheckpointWriter]:
         described = describe_checkpointed_run(run.request.as_json(), run.mission, run.conditions, installed_versions())
         file = CheckpointFile.create(folder.path / CHECKPOINT_FILE, described)
         return recorder, file, CheckpointWriter(file, recorder)
-    part = folder.path / ".run.mcap.part"
-    recorder = Recorder(part, setup)
-    try:
-        resumable.begin(part, recorder, run.resume_point is not None and run.resume_point.same_world)
-    except BaseException:
-        recorder.close()
-        part.unlink(missing_ok=True)
-        raise
+    recorder = Recorder(folder.path / RECORD_PART, setup)
     return recorder, resumable.file, CheckpointWriter(resumable.file, recorder, resumable.row.number + 1)
 
 
@@ -157,6 +151,10 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
         folder.write_text("mission.yaml", mission_yaml(request, mission))
     ready = time.perf_counter()
     recorder, store, checkpoints = _record(run)
+    resume_point = run.resume_point
+    if run.resumable is not None and resume_point is not None:
+        begin = partial(run.resumable.begin, recorder.path, recorder, resume_point.same_world)
+        resume_point = replace(resume_point, on_restored=begin)
     injector = injector_in(robot)
     record: Record = recorder if injector is None else ListeningRecord(recorder, injector)
 
@@ -181,13 +179,15 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
                 control=control,
                 on_unresponsive=exit_stuck,
                 checkpoints=checkpoints,
-                resume_point=run.resume_point,
+                resume_point=resume_point,
             )
         except BaseException:  # it raises only before the first tick
             recorder.close()
             if run.resumable is None:
                 folder.clear()
                 folder.discard()
+            else:
+                (folder.path / RECORD_PART).unlink(missing_ok=True)
             raise
         with deferred_interrupt(raising=False):  # Ctrl-C must not lose the result
             ended = time.perf_counter()

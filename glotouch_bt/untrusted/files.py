@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import stat
 from collections.abc import Iterable
 from contextlib import suppress
@@ -65,6 +66,15 @@ def read_file(
     return data
 
 
+def read_start(path: Path, size: int) -> bytes:
+    """Return the first bytes of a regular file; fewer if it is shorter, none if it is no regular file."""
+    try:
+        with open_file(path, 2**63 - 1) as file:
+            return file.read(size)
+    except (BadInput, OSError):
+        return b""
+
+
 def require_plain(folder: Path, names: Iterable[str]) -> None:
     """Require that each of these names in a folder is absent, a regular file or a folder.
 
@@ -96,6 +106,17 @@ def create_file(path: Path) -> IO[bytes]:
             raise OSError(errno.EEXIST, "something that is no regular file is in its place", str(path))
         path.unlink()
     return os.fdopen(os.open(path, _CREATE | _NO_LINKS, 0o666), "wb")
+
+
+def copy_file(source: Path, target: Path, max_bytes: int) -> None:
+    """Copy a regular file to a new one.
+
+    Raises:
+        BadInput: See `open_file`.
+        OSError: It cannot be written.
+    """
+    with open_file(source, max_bytes) as old, create_file(target) as new:
+        shutil.copyfileobj(old, new)
 
 
 def write_file(path: Path, data: bytes, *, durable: bool = False) -> None:

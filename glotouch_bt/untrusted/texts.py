@@ -17,6 +17,10 @@ MAX_DIGITS = 20
 """Most characters of a whole number; 2^64 has 20 digits."""
 
 
+class TooLarge(BadInput):
+    """Something unpacks to more than is allowed."""
+
+
 def parse_json(data: bytes | str, shown: str, max_bytes: int = MAX_JSON_BYTES) -> Any:
     """Parse JSON text; NaN, infinities and whole numbers beyond 64 bit are not JSON here.
 
@@ -47,14 +51,15 @@ def unpack_zstd(data: bytes, max_bytes: int, shown: str) -> bytes:
     """Unpack one Zstandard frame that states its size, as our writers do.
 
     Raises:
-        BadInput: It is damaged, or unpacks to more than `max_bytes`, or to an unknown size.
+        TooLarge: It unpacks to more than `max_bytes`.
+        BadInput: It is damaged, or does not state its size.
     """
     try:
         size = zstandard.frame_content_size(data)
         if size < 0:
             raise BadInput(f"{shown}: does not state its unpacked size")
         if size > max_bytes:
-            raise BadInput(f"{shown}: unpacks to {size} bytes; at most {max_bytes} are allowed")
+            raise TooLarge(f"{shown}: unpacks to {size} bytes; at most {max_bytes} are allowed")
         return bytes(zstandard.ZstdDecompressor().decompress(data))
     except (zstandard.ZstdError, ValueError, MemoryError) as e:
         raise BadInput(f"{shown}: is damaged ({e})") from e

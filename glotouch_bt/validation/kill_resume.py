@@ -50,8 +50,12 @@ class KillStudy(Campaign):
         """Return the command that runs one mission."""
         sets = [w for k, v in self.settings.items() for w in ("--set", f"{k}={v}")]
         head = [*self.words, "run", self.mission, "--seed", str(seed), "--conditions", self.conditions]
-        box = [] if self.objects is None else ["--objects", str(self.objects)]
-        return [*head, *sets, *box, "--out", str(folder), "--overwrite", "--json"]
+        return [*head, *sets, *self.box, "--out", str(folder), "--overwrite", "--json"]
+
+    @property
+    def box(self) -> list[str]:
+        """The option that names the objects; a resumed run needs it again."""
+        return [] if self.objects is None else ["--objects", str(self.objects)]
 
     def memory(self, seed: int, name: str) -> TrialMemory:
         """Return the memory of a run in the folder `name`."""
@@ -176,7 +180,8 @@ def _trial(study: KillStudy, seed: int, number: int, share: float, twin: Twin) -
     if not (folder / CHECKPOINT_FILE).exists():
         return row | {"outcome": "not begun"}
     row |= _after_kill(folder, twin)
-    done = subprocess.run([*study.words, "resume", str(folder), "--json"], capture_output=True, env=_environment())
+    words = [*study.words, "resume", str(folder), *study.box, "--json"]
+    done = subprocess.run(words, capture_output=True, env=_environment())
     row |= {"exit_code": done.returncode, "message": done.stderr.decode().strip()[-300:]}
     if row.get("checkpoint") is not None and row["checkpoint"] == row.get("checkpoints"):
         row["outcome"] = "ended before"

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from glotouch_backends.flexiv_xense.client.link import OPEN_S, DriverLink
-from glotouch_backends.flexiv_xense.client.options import ClientOptions, read_options
+from glotouch_backends.flexiv_xense.client.options import SIMULATED_ONLY, ClientOptions, read_options
 from glotouch_backends.flexiv_xense.client.process import DriverProcess
 from glotouch_backends.flexiv_xense.client.referee import RemoteReferee
 from glotouch_backends.flexiv_xense.client.robot import FlexivXenseRobot
@@ -141,6 +141,10 @@ class FlexivXenseBackend(Backend):
             lockstep=options.lockstep,
             move=move,
         )
+
+    def is_portable(self, option: str, value: object) -> bool:
+        """See `Backend`: the options of simulated devices, and that the devices are simulated."""
+        return option in SIMULATED_ONLY or (option, value) == ("devices", "simulated")
 
     def referee(self, robot: Robot) -> Referee | None:
         """See `Backend`; None for real devices."""

@@ -19,6 +19,14 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from glotouch_backends.mujoco.simulation.snapshot_check import (
+    require_arrays,
+    require_attributes,
+    require_counts,
+    require_model,
+    require_stop,
+    require_time,
+)
 from glotouch_bt.robot import BadInput, SafetyStop, Snapshot
 
 FORMAT = 1
@@ -109,13 +117,23 @@ class SnapshotStore:
                 f"this robot has {ours[0]}, format {ours[1]}, MuJoCo {ours[2]}"
             )
         kept: Any = snapshot
-        shapes = {n: a.shape for n, a in kept["data"].items()}
-        if kept["sizes"] != self._sizes or shapes != {n: getattr(self._data, n).shape for n in self._kept_arrays}:
+        for name in ("sizes", "time_s", "awake", "data", "model", "parts", "tripped"):
+            if name not in kept:
+                raise BadInput(f"the saved world has no {name}: it is damaged")
+        if kept["sizes"] != self._sizes:
             raise BadInput("the saved world has other objects or parts than the one this robot was opened with")
-        for name, part in _parts(robot).items():
-            odd = sorted(kept["parts"][name].keys() ^ _names(part))
-            if odd:
-                raise BadInput(f"the saved state of {type(part).__name__} is of another version ({', '.join(odd)})")
+        require_arrays(kept["data"], {n: getattr(self._data, n) for n in self._kept_arrays}, self._model)
+        require_model(kept["model"], self._model)
+        require_counts(kept["awake"], self._model)
+        require_time(kept["time_s"])
+        require_stop(kept["tripped"])
+        parts = _parts(robot)
+        if not (isinstance(kept["parts"], dict) and kept["parts"].keys() == parts.keys()):
+            raise BadInput("the saved state of the robot's parts is of another version")
+        pad_shape = vars(robot)["description"].gripper.pad_shape
+        for name, part in parts.items():
+            now = {n: vars(part)[n] for n in _names(part)}
+            require_attributes(kept["parts"][name], now, type(part).__name__, pad_shape)
 
     @property
     def _sizes(self) -> tuple[int, ...]:

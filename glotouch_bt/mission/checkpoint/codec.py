@@ -1,14 +1,16 @@
 """Encode checkpoint values (port values, robot state) as MessagePack and decode them.
 
 Supported: plain data, tuples, mappings, sets, deques, numpy arrays and generators, enums and dataclasses. Decoding runs
-no code from the file: it can only name dataclasses and enums of `known_packages`. They are created without `__init__`,
-so that values come back to the bit. Shared objects stay shared; arrays keep dtype, order and the writeable flag.
+no code from the file: it can only name dataclasses and enums of `known_packages`, and their fields must fit their
+annotations. They are created without `__init__`, so that values come back to the bit. Shared objects stay shared, and
+arrays keep dtype, order and the writeable flag. The number of values is bounded before any is made (`bounds`).
 """
 
 from __future__ import annotations
 
 import dataclasses
 import importlib
+import sys
 from collections import deque
 from collections.abc import Callable, Mapping
 from enum import Enum
@@ -19,12 +21,16 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
+from glotouch_bt.mission.checkpoint.bounds import MAX_VALUES, require_few_values
 from glotouch_bt.robot import BadInput, GlotouchError
+from glotouch_bt.untrusted import field_types, require_type
 
 OWN_PACKAGES = ("glotouch_bt", "glotouch_skills", "glotouch_backends")
 GROUPS = ("glotouch_bt.skills", "glotouch_bt.backends")
 MAX_DEPTH = 200
 """Deepest nesting that is encoded; only a value that contains itself is deeper."""
+MAX_DIMENSIONS = 8
+"""Most dimensions of an array."""
 _MIN_INT, _MAX_INT = -(2**63), 2**64 - 1
 # One-letter tags; every value that MessagePack has no type for is a list [tag, ...].
 _TUPLE, _LIST, _MAP, _SET, _FROZENSET, _DEQUE = "t", "l", "m", "s", "f", "q"
@@ -46,7 +52,8 @@ def known_packages() -> frozenset[str]:
 
 
 _DAMAGED = (
-    msgspec.MsgspecError, ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError, OverflowError,
+    msgspec.MsgspecError, ValueError, TypeError, LookupError, AttributeError, RecursionError, OverflowError,
+    MemoryError,
 )  # fmt: skip
 """Errors that decoding damaged bytes can raise."""
 
@@ -64,8 +71,10 @@ def decode(data: bytes) -> Any:
     """Return the value that `encode` was given.
 
     Raises:
-        BadInput: The bytes are damaged, or name a class that is unknown here or of another version.
+        BadInput: The bytes are damaged, hold too many values, or name a class that is unknown here or of another
+            version.
     """
+    require_few_values(data)
     try:
         return _Decoder().value(msgspec.msgpack.decode(data))
     except BadInput:
@@ -188,8 +197,11 @@ def _named_class(name: str) -> type:
         BadInput: There is no such class, or a file may not name it.
     """
     module, _, qualname = name.partition(":")
-    if module.partition(".")[0] not in known_packages():
+    package = module.partition(".")[0]
+    if package not in known_packages():
         raise BadInput(f"the checkpoint names {name}; its package provides no skill or backend here")
+    if module not in sys.modules and (package not in OWN_PACKAGES or module.endswith("__main__")):
+        raise BadInput(f"the checkpoint names {name}, and nothing here imports that module")
     try:
         found: Any = importlib.import_module(module)
         for part in qualname.split("."):
@@ -204,6 +216,8 @@ def _named_class(name: str) -> type:
 class _Decoder:
     def __init__(self) -> None:
         self._made: list[Any] = []
+        self._weights: list[int] = []  # values in each object, shared ones counted each time
+        self._count = 0
         self._read: dict[str, Callable[[list[Any]], Any]] = {
             _TUPLE: lambda rest: tuple(self.value(v) for v in rest),
             _LIST: lambda rest: [self.value(v) for v in rest],
@@ -217,12 +231,14 @@ class _Decoder:
         }
 
     def value(self, plain: Any) -> Any:
+        self._add(1)
         if not isinstance(plain, list):
             if isinstance(plain, dict):
                 raise BadInput("checkpoint values cannot be read (a mapping without a tag)")
             return plain
         mark, *rest = plain
         if mark == _AGAIN:
+            self._add(self._weights[rest[0]])
             return self._made[rest[0]]
         if mark == _BIG:
             return int(rest[0])
@@ -233,14 +249,23 @@ class _Decoder:
             if not issubclass(kind, Enum) or rest[1] not in kind.__members__:
                 raise BadInput(f"the checkpoint names {rest[0]}.{rest[1]}, which does not exist here")
             return kind.__members__[rest[1]]
-        number = len(self._made)
+        number, before = len(self._made), self._count
         self._made.append(None)  # its number comes before those of the objects inside
+        self._weights.append(MAX_VALUES)  # it must not contain itself
         made = self._read[mark](rest)
-        self._made[number] = made
+        self._made[number], self._weights[number] = made, self._count - before
         return made
+
+    def _add(self, count: int) -> None:
+        """Count values; a shared one each time, because whoever walks through the result meets it each time."""
+        self._count += count
+        if self._count > MAX_VALUES:
+            raise BadInput(f"the checkpoint holds more than {MAX_VALUES} values, or one that contains itself")
 
     def _array(self, rest: list[Any]) -> Any:
         name, shape, order, writeable, data = rest
+        if len(shape) > MAX_DIMENSIONS or not all(type(n) is int and 0 <= n < 2**31 for n in shape):
+            raise BadInput(f"the checkpoint holds an array of shape {shape}")
         flat = np.frombuffer(data, _known_dtype(name))
         array = flat.reshape(tuple(shape), order="F" if order == "F" else "C").copy(order="K")
         array.setflags(write=bool(writeable))
@@ -263,10 +288,19 @@ class _Decoder:
                 f"the checkpoint has {rest[0]} with fields {', '.join(given)}; here it has {', '.join(known)}: "
                 "it is of another version"
             )
-        made = object.__new__(kind)
+        made, types = object.__new__(kind), field_types(kind)
         for name, plain in rest[1:]:
-            object.__setattr__(made, name, self.value(plain))
+            value = self.value(plain)
+            require_type(value, types.get(name, Any), f"{rest[0]}.{name}")
+            object.__setattr__(made, name, value)
+        _require_sound(made, kind)
         return made
+
+
+def _require_sound(made: Any, kind: Any) -> None:
+    """Raise what the dataclass raises for these values; the checked copy is dropped, as `__init__` may round."""
+    if hasattr(kind, "__post_init__") and all(f.init for f in dataclasses.fields(kind)):
+        kind(**{f.name: getattr(made, f.name) for f in dataclasses.fields(kind)})
 
 
 def _known_dtype(name: object) -> np.dtype[Any]:

@@ -6,7 +6,8 @@ length of the record, and in simulation the world.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,9 +20,19 @@ from glotouch_bt.mission.checkpoint.store import CheckpointFile, CheckpointRow
 from glotouch_bt.mission.checkpoint.tree_state import RestoredTree, start_at, tree_state
 from glotouch_bt.mission.checkpoint.world_check import world_check
 from glotouch_bt.mission.record import RecordedRequests, Recorder, RunSummary
-from glotouch_bt.mission.tree import BuiltTree, ReasonBook
-from glotouch_bt.robot import BadInput, Robot
+from glotouch_bt.mission.tree import BuiltTree, NodeFailure, ReasonBook
+from glotouch_bt.robot import BadInput, GlotouchError, Robot
 from glotouch_bt.skill import Context, Skill
+from glotouch_bt.untrusted import require_type
+
+STATE = {
+    "tree": dict[str, Any], "arm": dict[str, Any], "summary": dict[str, Any], "reasons": dict[str, NodeFailure],
+    "status": dict[str, str], "elapsed": tuple[float, float], "recorded": tuple[str, ...], "preempted": bool,
+    "paused_s": float, "ticks": int, "guards": dict[str, int], "requests": int,
+}  # fmt: skip
+"""Types of the values of a checkpoint that every run needs."""
+UNFIT = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, AssertionError, RecursionError)
+"""Errors that values of a damaged checkpoint can raise."""
 
 
 @dataclass
@@ -64,12 +75,14 @@ class ResumePoint:
         state: Its content.
         same_world: The robot was restored to the state it had then; otherwise robot and world are where they are.
         start: Path of the node to start at instead of the next one, or empty.
+        on_restored: Called when mission and tree are restored, before anything else happens.
     """
 
     number: int
     state: Mapping[str, Any]
     same_world: bool
     start: str = ""
+    on_restored: Callable[[], None] = lambda: None
 
 
 class CheckpointWriter:
@@ -169,11 +182,20 @@ class CheckpointHooks:
         """Restore the resume point, or write the first checkpoint; call before the first tick.
 
         Raises:
-            BadInput: The checkpoint is of another mission.
+            BadInput: The checkpoint is damaged or of another mission.
         """
         self._run, point = run, self._resume_point
         if point is not None:
-            self._restored = restore(run, point)
+            try:
+                self._restored = restore(run, point)
+            except BadInput:
+                raise
+            except (GlotouchError, *UNFIT) as e:
+                raise BadInput(
+                    f"checkpoint {point.number} cannot be restored ({type(e).__name__}: {e}): it is damaged or of "
+                    "another version; run the mission again"
+                ) from e
+            point.on_restored()
             if not point.same_world:
                 self.world_check = world_check(run.tree, run.context, point.start)
         elif self._writer is not None:
@@ -209,12 +231,16 @@ def restore(run: RunState, point: ResumePoint) -> RestoredTree | None:
     """Restore a mission that is about to start to a checkpoint; return the restored tree unless it starts at a node.
 
     Raises:
-        BadInput: The checkpoint is of another tree, or lacks what the tree needs.
+        BadInput: The checkpoint is of another tree, or lacks what the tree needs, or a value is of a wrong type.
+        GlotouchError, and the errors in `UNFIT`: A value inside does not fit.
     """
     state, tree, context = point.state, run.tree, run.context
-    for name in ("tree", "arm", "summary", "reasons", "status", "elapsed"):
+    for name, hint in STATE.items():
         if name not in state:
             raise BadInput(f"checkpoint {point.number} lacks the state of the {name}: it could not be saved")
+        require_type(state[name], hint, f"checkpoint {point.number}: {name}")
+    if not all(math.isfinite(s) for s in (*state["elapsed"], state["paused_s"])):
+        raise BadInput(f"checkpoint {point.number} is damaged: its times are not finite")
     for name, value in state.items():
         what, _, key = name.partition(" ")
         if what == "port":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from os.path import isdir
 from pathlib import Path
@@ -15,7 +15,7 @@ from glotouch_bt.mission.read.fields import validate
 from glotouch_bt.mission.read.library import find_shipped, shown
 from glotouch_bt.mission.read.yaml_source import read_yaml
 from glotouch_bt.mission.spec import Findings, Map, MissionFaults, Node, Place, Seq
-from glotouch_bt.robot import Conditions, Container, Holder, ObjectSet, ParamError, Pose, Probe, World
+from glotouch_bt.robot import BadInput, Conditions, Container, Holder, ObjectSet, ParamError, Pose, Probe, World
 
 T = TypeVar("T")
 Vec3 = tuple[float, float, float]
@@ -217,3 +217,15 @@ def load_conditions(given: str) -> Conditions:
     else:
         findings.add(node.place, "wrong_type", "conditions must be a mapping of field: value")
     raise MissionFaults(findings.sorted())
+
+
+def conditions_of(values: Mapping[str, object], shown: str) -> Conditions:
+    """Return the conditions that a run stored, as `dataclasses.asdict` gave them.
+
+    Raises:
+        BadInput: They are damaged.
+    """
+    try:
+        return Conditions(**ConditionsFile(**values).model_dump())
+    except (ValueError, TypeError) as e:  # also ValidationError
+        raise BadInput(f"{shown}: cannot be used ({e})") from e

@@ -1,6 +1,14 @@
 """Write and read the record of a run: one MCAP file with everything sensed, commanded, ticked and decided."""
 
-from glotouch_bt.mission.record.mcap_chunks import read_chunks
+from glotouch_bt.mission.record.mcap_chunks import (
+    BROKEN,
+    MAX_RECORD_BYTES,
+    MCAP_MAGIC,
+    ChunkUnpacker,
+    open_record,
+    read_chunks,
+    record_items,
+)
 from glotouch_bt.mission.record.mcap_json import Json, to_json
 from glotouch_bt.mission.record.mcap_packing import join, unpack
 from glotouch_bt.mission.record.mcap_schemas import EVENT_PREFIX

@@ -1,4 +1,4 @@
-"""Read the first chunks of a record, which the record of a resumed run starts with."""
+"""Read the chunks of a record within bounds. A resumed run's record starts with the first chunks of the old one."""
 
 from __future__ import annotations
 
@@ -7,13 +7,32 @@ import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import IO
 
-import zstandard
 from mcap.exceptions import McapError
-from mcap.records import Channel, Chunk, Message
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.records import Chunk, McapRecord
+from mcap.stream_reader import StreamReader
 
 from glotouch_bt.robot import BadInput
+from glotouch_bt.untrusted import TooLarge, open_file, unpack_zstd
+
+MCAP_MAGIC = b"\x89MCAP0\r\n"
+"""First bytes of an MCAP file."""
+MAX_RECORD_BYTES = 8_000_000_000
+"""Largest record file. Source: 24 h, the longest mission, take 4 GB."""
+MAX_ITEM_BYTES = 64_000_000
+"""Largest packed or unpacked chunk or attachment. Source: 200 times the largest chunk of ours."""
+MAX_UNPACKED_BYTES = 1 << 30
+"""Most bytes that one record unpacks to. Source: 85 minutes of a run."""
+FREE_BYTES, MAX_RATIO = 1 << 28, 16
+"""A record may unpack to FREE_BYTES, and beyond that to MAX_RATIO times its size; ours unpack to 5 times theirs."""
+BROKEN = (
+    McapError, struct.error, OSError, LookupError, TypeError, ValueError, AttributeError, OverflowError,
+    RecursionError, BadInput,
+)  # fmt: skip
+"""Errors that reading a damaged record can raise."""
+_CHANNEL, _MESSAGE = 0x04, 0x05
+_HEAD, _MESSAGE_HEAD = struct.Struct("<BQ"), struct.Struct("<HIQQ")
 
 
 @dataclass
@@ -29,6 +48,65 @@ class RecordChunk:
     messages: list[tuple[int, str, bytes]] = field(default_factory=list)
 
 
+def open_record(path: Path, *, links: bool = False) -> IO[bytes]:
+    """Open a record; errors as for `untrusted.open_file`."""
+    return open_file(path, MAX_RECORD_BYTES, what="an MCAP record", links=links)
+
+
+def record_items(file: IO[bytes]) -> Iterator[McapRecord]:
+    """Yield the items of a record: chunks as they are, attachments, and the footer."""
+    reader = StreamReader(file, emit_chunks=True, record_size_limit=MAX_ITEM_BYTES)
+    yield from reader.records
+
+
+class ChunkUnpacker:
+    """Unpack the chunks of one record, within the limits of all of them.
+
+    Args:
+        packed_bytes: Size of the record's file.
+        shown: Its name, for messages.
+    """
+
+    def __init__(self, packed_bytes: int, shown: str) -> None:
+        self._left = min(MAX_UNPACKED_BYTES, FREE_BYTES + MAX_RATIO * packed_bytes)
+        self._limit, self._shown = self._left, shown
+        self._topics: dict[int, str] = {}
+
+    def items(self, chunk: Chunk) -> Iterator[tuple[str, int, memoryview | None]]:
+        """Yield (topic, log time ns, message) of every message, and (topic, 0, None) of every channel that starts.
+
+        Raises:
+            TooLarge: The record unpacks to more than is allowed.
+            BadInput: The chunk is damaged.
+        """
+        data = self._unpack(chunk)
+        view, at, end = memoryview(data), 0, len(data)
+        while at < end:
+            code, size = _HEAD.unpack_from(data, at)
+            at += _HEAD.size
+            if size > end - at:
+                raise BadInput(f"{self._shown}: a message is longer than its chunk")
+            if code == _CHANNEL:
+                number, _, length = struct.unpack_from("<HHI", data, at)
+                self._topics[number] = topic = bytes(view[at + 8 : at + 8 + length]).decode()
+                yield topic, 0, None
+            elif code == _MESSAGE:
+                number, _, log_ns, _ = _MESSAGE_HEAD.unpack_from(data, at)
+                yield self._topics[number], log_ns, view[at + _MESSAGE_HEAD.size : at + size]
+            at += size
+
+    def _unpack(self, chunk: Chunk) -> bytes:
+        size = chunk.uncompressed_size
+        if size > MAX_ITEM_BYTES or size > self._left:
+            raise TooLarge(f"{self._shown}: unpacks to more than {self._limit} bytes")
+        self._left -= size
+        if chunk.compression == "":
+            return bytes(chunk.data)
+        if chunk.compression != "zstd":
+            raise BadInput(f"{self._shown}: is compressed with {chunk.compression!r}; only zstd is read")
+        return unpack_zstd(chunk.data, size, self._shown)
+
+
 def read_chunks(path: Path, length: int) -> Iterator[RecordChunk]:
     """Yield each chunk, in the order written.
 
@@ -39,25 +117,24 @@ def read_chunks(path: Path, length: int) -> Iterator[RecordChunk]:
     Raises:
         BadInput: The record is shorter, or damaged within that length.
     """
-    try:
-        with path.open("rb") as file:
-            head = file.read(length)
-    except OSError as e:
-        raise BadInput(f"{path}: cannot be read ({e.strerror})") from e
+    with open_record(path) as file:
+        head = file.read(min(length, MAX_RECORD_BYTES))
     if len(head) < length:
         raise BadInput(f"{path}: has {len(head)} bytes; the checkpoint was taken at {length}")
-    stream, topics = io.BytesIO(head), dict[int, str]()
+    stream, unpacker = io.BytesIO(head), ChunkUnpacker(length, str(path))
     try:
-        for item in StreamReader(stream, emit_chunks=True).records:
-            if isinstance(item, Chunk):
-                chunk = RecordChunk()
-                for inside in breakup_chunk(item):
-                    if isinstance(inside, Channel):
-                        topics[inside.id] = inside.topic
-                        chunk.topics.append(inside.topic)
-                    elif isinstance(inside, Message):
-                        chunk.messages.append((inside.log_time, topics[inside.channel_id], inside.data))
-                yield chunk
-    except (McapError, struct.error, zstandard.ZstdError, KeyError, ValueError, OverflowError) as e:
+        for item in record_items(stream):
+            if not isinstance(item, Chunk):
+                continue
+            chunk = RecordChunk()
+            for topic, log_ns, message in unpacker.items(item):
+                if message is None:
+                    chunk.topics.append(topic)
+                else:
+                    chunk.messages.append((log_ns, topic, bytes(message)))
+            yield chunk
+    except TooLarge:
+        raise
+    except BROKEN as e:
         if stream.tell() < length:
             raise BadInput(f"{path}: damaged at byte {stream.tell()} ({type(e).__name__})") from e

@@ -18,6 +18,8 @@ from glotouch_bt.robot import Array, GlotouchError
 
 PACKED_NAME = "glotouch.Packed"
 _NAN = -(2**31)
+MAX_ORDER, MAX_COLUMNS, MAX_DIMENSIONS = 2, 64, 4
+"""Largest layout that is read: differences along time, columns, dimensions of a row."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +48,17 @@ class Column:
 
     @classmethod
     def parse(cls, text: str) -> Column:
-        """Return the column that one word of a layout describes."""
+        """Return the column that one word of a layout describes.
+
+        Raises:
+            ValueError: It describes none, or one beyond the limits.
+        """
         name, shape, step, order = text.split(":")
-        return cls(name, () if shape == "1" else tuple(int(s) for s in shape.split("x")), float(step), int(order))
+        column = cls(name, () if shape == "1" else tuple(int(s) for s in shape.split("x")), float(step), int(order))
+        fits = len(column.shape) <= MAX_DIMENSIONS and all(1 <= n < 2**24 for n in column.shape)
+        if not (fits and 0.0 < column.step < 1e6 and 0 <= column.order <= MAX_ORDER):
+            raise ValueError(f"a column {text!r}")
+        return column
 
 
 def pack(start_ns: int, columns: Sequence[Column], values: Sequence[npt.ArrayLike]) -> bytes:
@@ -82,7 +92,7 @@ def pack(start_ns: int, columns: Sequence[Column], values: Sequence[npt.ArrayLik
     return b"".join((head, _field(3, layout), _field(4, data)))
 
 
-def unpack(message: bytes) -> tuple[int, dict[str, Array]]:
+def unpack(message: bytes | memoryview) -> tuple[int, dict[str, Array]]:
     """Return the start stamp in ns and the columns (rows, *shape) of a packed message.
 
     Raises:
@@ -98,12 +108,12 @@ def unpack(message: bytes) -> tuple[int, dict[str, Array]]:
                 start_ns, rows = (number, rows) if key >> 3 == 1 else (start_ns, number)
             elif key & 7 == 2:
                 size, at = _read_varint(message, at)
-                chunk, at = message[at : at + size], at + size
+                chunk, at = bytes(message[at : at + size]), at + size
                 layout, data = (chunk, data) if key >> 3 == 3 else (layout, chunk)
             else:
                 raise GlotouchError(f"not a {PACKED_NAME} message (wire type {key & 7})")
-        columns = [Column.parse(word) for word in layout.decode().split()]
-        if len(data) != 4 * rows * sum(c.width for c in columns):
+        columns = [Column.parse(word) for word in layout.decode().split(None, MAX_COLUMNS)]
+        if rows < 1 or not columns or len(data) != 4 * rows * sum(c.width for c in columns):
             raise GlotouchError(f"{PACKED_NAME}: {len(data)} bytes do not hold {rows} rows of {layout.decode()!r}")
     except (IndexError, ValueError) as e:
         raise GlotouchError(f"not a {PACKED_NAME} message ({e})") from e
@@ -138,7 +148,7 @@ def _varint(n: int) -> bytes:
     return bytes(out)
 
 
-def _read_varint(data: bytes, at: int) -> tuple[int, int]:
+def _read_varint(data: bytes | memoryview, at: int) -> tuple[int, int]:
     n = shift = 0
     while True:
         byte = data[at]
@@ -147,6 +157,8 @@ def _read_varint(data: bytes, at: int) -> tuple[int, int]:
         if byte < 0x80:
             return n, at
         shift += 7
+        if shift > 63:
+            raise ValueError("a number of more than 64 bit")
 
 
 def _tag(number: int, wire: int) -> bytes:

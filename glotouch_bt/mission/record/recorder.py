@@ -36,6 +36,7 @@ from glotouch_bt.mission.record.rounding import (
     TORQUE_NM,
 )
 from glotouch_bt.robot import BadInput, Command, GlotouchError, Observation
+from glotouch_bt.untrusted import create_file
 from glotouch_bt.version import __version__
 
 RUN_ATTACHMENT = "run.json"
@@ -73,7 +74,7 @@ class Recorder:
         self._next_image_ns = 0
         self._closed = False
         try:
-            self._file = path.open("wb")
+            self._file = create_file(path)
         except OSError as e:
             raise BadInput(f"{path}: the record cannot be written ({e.strerror})") from e
         self._writer = Writer(self._file, compression=CompressionType.ZSTD, chunk_size=4 << 20)

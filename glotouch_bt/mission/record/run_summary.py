@@ -9,6 +9,7 @@ import numpy as np
 
 from glotouch_bt.mission.record import Json, to_json
 from glotouch_bt.robot import Array, Command, Observation
+from glotouch_bt.untrusted import require_type
 
 
 class Record(Protocol):
@@ -101,7 +102,14 @@ class RunSummary:
         return {name: value for name, value in vars(self).items() if name not in _NOT_SAVED}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Continue from a `state`."""
+        """Continue from a `state`.
+
+        Raises:
+            BadInput: A value is of another type.
+        """
+        for name, value in state.items():
+            if name in vars(self) and name not in ("ranking", "_last_P_m"):
+                require_type(value, type(vars(self)[name]), f"summary.{name}")
         vars(self).update({name: value for name, value in state.items() if name in vars(self)})
 
     def tick(self, stamp_s: float, changes: Sequence[tuple[str, object, object]]) -> None:

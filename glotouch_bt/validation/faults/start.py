@@ -24,7 +24,9 @@ def _first(rows: list[CheckpointRow], node: str) -> tuple[str, CheckpointRow, in
     return None
 
 
-def start_from(twin: Path, out: Path, plan: FaultPlan, warm_up_s: float) -> ResumableRun | None:
+def start_from(
+    twin: Path, out: Path, plan: FaultPlan, warm_up_s: float, objects: Path | None = None
+) -> ResumableRun | None:
     """Copy the twin's run to `out`, resumable shortly before the fault; None if its node never ran.
 
     Args:
@@ -32,6 +34,7 @@ def start_from(twin: Path, out: Path, plan: FaultPlan, warm_up_s: float) -> Resu
         out: Folder of the trial; what is in it is removed.
         plan: Plan of one fault in the first run of a node.
         warm_up_s: Least run time before the fault begins, as far as the mission allows.
+        objects: Folder of STL files, if the twin was made with one.
 
     Raises:
         BadInput: The twin's checkpoints cannot be used.
@@ -50,6 +53,6 @@ def start_from(twin: Path, out: Path, plan: FaultPlan, warm_up_s: float) -> Resu
     soon = [r for r in rows[: index + 1] if r.stamp_s <= begins_s - warm_up_s] or rows[:1]
     shutil.rmtree(out, ignore_errors=True)
     copy_run(twin, out)
-    resumable = find_resumable(out, path, installed_versions())
+    resumable = find_resumable(out, path, installed_versions(), objects=objects)
     resumable.file.close()
     return replace(resumable, file=TwinWatch(out, twin, plan, begins_s), row=soon[-1], start="")

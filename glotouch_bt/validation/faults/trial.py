@@ -122,7 +122,7 @@ def _launched(request: RunRequest, twin: Path | None) -> Mapping[str, Any]:
         (spec,) = plan.faults
         if spec.kind.channel != "model":  # a different model makes a different mission
             (case,) = chosen_cases([spec.kind.name])
-            resumable = start_from(twin, request.out, plan, case.warm_up_s)
+            resumable = start_from(twin, request.out, plan, case.warm_up_s, request.objects)
     try:
         done = launch_trial(request, resumable=resumable)
     finally:

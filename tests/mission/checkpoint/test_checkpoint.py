@@ -47,7 +47,7 @@ def test_rows_states_and_worlds_come_back(file: CheckpointFile) -> None:
     assert np.array_equal(again.state(0)["port x"], state["port x"])
     assert again.world(0) is None
     assert np.array_equal(again.world(1)["data"]["qpos"], np.ones(2))  # type: ignore[index]
-    again.drop_after(0)
+    again.begin_again(0, [])
     assert again.rows() == rows[:1]
     again.close()
 

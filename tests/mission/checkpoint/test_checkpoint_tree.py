@@ -252,7 +252,7 @@ def test_a_resumed_tree_goes_on_as_the_one_that_was_not_broken_off(case: tuple[N
         rows = file.rows()
         row = rows[pick % len(rows)]
         state, world = file.state(row.number), file.world(row.number)
-        file.drop_after(row.number)
+        file.begin_again(row.number, [])
         taken = ResumePoint(row.number, state, same_world=True)
         resumed, rest = run(tree, file, row.number + 1, resume_point=taken, world=world)
         assert ending(resumed) == ending(whole)

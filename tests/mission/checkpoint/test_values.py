@@ -52,6 +52,9 @@ dtypes = st.sampled_from([np.float64, np.float32, np.int64, np.int32, np.uint8, 
 arrays = dtypes.flatmap(lambda d: hnp.arrays(d, hnp.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=4)))
 
 
+evidence = st.one_of(st.integers(), st.floats(), st.text(max_size=8))
+
+
 def _reason(parts: Any) -> Reason:
     return Reason("code", "text", parts)
 
@@ -63,7 +66,7 @@ values = st.recursive(
         st.lists(inner, max_size=4).map(tuple),
         st.dictionaries(st.text(max_size=4), inner, max_size=4),
         st.lists(inner, max_size=3).map(lambda v: deque(v, maxlen=5)),
-        st.dictionaries(st.text(max_size=4), inner, max_size=3).map(_reason),
+        st.dictionaries(st.text(max_size=4), evidence, max_size=3).map(_reason),
     ),
     max_leaves=12,
 )
