@@ -1,31 +1,50 @@
 """Disk cache of target models, memory-mapped.
 
 One file per model, named by the hash of mesh geometry, pad and table version: a JSON header, then the raw tables. Files
-are moved into place atomically. A damaged file is rebuilt; an unwritable folder is ignored.
+are moved into place atomically. A file is believed only if its axes are those of the mesh and its tables lie within the
+mesh; otherwise the model is built anew. An unwritable folder is ignored.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import tempfile
 import zlib
 from collections import OrderedDict
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from glotouch_bt.perception.recognition.model import VERSION, PadSpec, TargetModel, from_parts, to_parts
-from glotouch_bt.robot import ParamError
+from glotouch_bt.perception.recognition.model import (
+    TIP_RADIUS_M,
+    VERSION,
+    PadSpec,
+    TargetModel,
+    from_parts,
+    table_axes,
+    to_parts,
+)
+from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene import Mesh
+from glotouch_bt.untrusted import open_file, parse_json
 
 MAGIC = b"glotouch-model-1\n"
 """First bytes of a cache file."""
 ALIGN = 64
 """Alignment of the tables, bytes."""
+MAX_FILE_BYTES, MAX_HEADER_BYTES = 1_000_000_000, 1_000_000
+"""Largest file and header that are read. Source: four times those of the largest object, 0.3 m."""
+ROUNDING_M = 1e-5
+"""Largest distance of a table's value beyond the mesh, by rounding to 32 bit."""
+MAPPED_DTYPES = ("<f4",)
+"""Types of the tables."""
 MAX_MAPPED = 32
 """Maximum number of models mapped in this process."""
 _mapped: OrderedDict[Path, TargetModel] = OrderedDict()
@@ -54,7 +73,7 @@ def target_model(mesh: Mesh, pad: PadSpec | None = None, folder: Path | None = N
         _mapped.move_to_end(path)
         return _mapped[path]
     model = _read(path, mesh.name)
-    if model is None or model.digest != mesh.digest or model.pad != pad:
+    if model is None or not _is_of(model, mesh, pad):
         model = TargetModel.from_mesh(mesh, pad)
         _write(path, model)
     _mapped[path] = model
@@ -103,23 +122,63 @@ def _write(path: Path, model: TargetModel) -> None:
 def _read(path: Path, name: str) -> TargetModel | None:
     """Return the cached model, or None if it is missing or damaged."""
     try:
-        raw = np.memmap(path, dtype=np.uint8, mode="r")
+        with open_file(path, MAX_FILE_BYTES) as file:
+            raw = np.memmap(file, dtype=np.uint8, mode="r")
         size = len(MAGIC) + 16
         head = bytes(raw[:size])
-        if head[: len(MAGIC)] != MAGIC:
+        if head[: len(MAGIC)] != MAGIC or not 0 < int(head[len(MAGIC) :]) <= MAX_HEADER_BYTES:
             return None
         start = size + int(head[len(MAGIC) :])
-        content = json.loads(bytes(raw[size:start]))
+        content = parse_json(bytes(raw[size:start]), str(path))
         if len(raw) != start + content["bytes"]:
             return None
-        arrays = {}
-        for key, t in content["tables"].items():
-            dtype, shape = np.dtype(t["dtype"]), tuple(t["shape"])
-            at = start + t["offset"]
-            piece = raw[at : at + int(np.prod(shape)) * dtype.itemsize]
-            if zlib.crc32(piece.data) != t["crc"]:
-                return None
-            arrays[key] = piece.view(dtype).reshape(shape).view(np.ndarray)
+        arrays = {str(key): _table(raw[start:], t) for key, t in content["tables"].items()}
         return from_parts(name, content["facts"], arrays)
-    except (OSError, ValueError, KeyError, TypeError, ParamError):
+    except (BadInput, OSError, ValueError, LookupError, TypeError, AttributeError, OverflowError):
         return None
+
+
+def _table(raw: npt.NDArray[np.uint8], t: Mapping[str, Any]) -> npt.NDArray[Any]:
+    """Return one mapped table.
+
+    Raises:
+        ValueError, LookupError, TypeError: It is damaged.
+    """
+    shape, at = tuple(int(n) for n in t["shape"]), int(t["offset"])
+    if t["dtype"] not in MAPPED_DTYPES or at < 0 or len(shape) > 4 or min(shape, default=0) < 1:
+        raise ValueError(f"a table of {t['dtype']} {shape} at {at}")
+    dtype = np.dtype(t["dtype"])
+    piece = raw[at : at + math.prod(shape) * dtype.itemsize]
+    if zlib.crc32(piece.data) != t["crc"]:
+        raise ValueError("a damaged table")
+    return piece.view(dtype).reshape(shape).view(np.ndarray)
+
+
+def _is_of(model: TargetModel, mesh: Mesh, pad: PadSpec) -> bool:
+    """Return True if a cached model can be that of a mesh: its axes are the mesh's, its tables lie within the mesh."""
+    if (model.digest, model.pad) != (mesh.digest, pad):
+        return False
+    axes = table_axes(mesh, pad)
+    same = (
+        (model.phi_rad, axes.phi_rad), (model.l_m, axes.l_m), (model.z_m, axes.z_m), (model.centre_m, axes.centre_m),
+        ([model.height_m, model.anisotropy], [axes.height_m, axes.anisotropy]),
+        (model.fine_m.shape, (len(axes.phi_rad), len(axes.fine_l_m), len(axes.fine_z_m))),
+    )  # fmt: skip
+    if not all(np.array_equal(np.asarray(a), np.asarray(b)) for a, b in same):
+        return False
+    reach, fine = model.reach_m, model.fine_m
+    if np.isinf(reach).any() or np.isnan(fine).any() or not np.isfinite(reach).any():
+        return False
+    largest_m = axes.radius_m + ROUNDING_M
+    tables = all(np.abs(t[np.isfinite(t)]).max(initial=0.0) <= largest_m for t in (reach, fine))
+    images = np.isfinite(model.images_by_height).all() and np.isfinite(model.image_norms).all()
+    return bool(tables and images and _is_within(model, 4.0 * largest_m + TIP_RADIUS_M))
+
+
+def _is_within(model: TargetModel, largest_m: float) -> bool:
+    """Return True if the numbers of a model are finite, and the lengths of its outline at most `largest_m`."""
+    outline, fits = model.outline, (model.outline.as_round, model.outline.as_box)
+    lengths = [v for f in fits for v in (*f.centre_m, *f.size_m, *f.size_sd_m, f.centre_sd_m)]
+    others = [model.rho, model.rho_sd, model.normal_dispersion, *(v for f in fits for v in (f.yaw_rad, f.yaw_sd_rad))]
+    finite = bool(np.isfinite([*lengths, *others]).all())
+    return finite and max(map(abs, lengths)) <= largest_m and 0.0 <= outline.p_box <= 1.0

@@ -8,7 +8,8 @@ forty times more and misses edges. CoACD (Wei et al., SIGGRAPH 2022) cuts the me
     2. in the user's cache, $XDG_CACHE_HOME/glotouch-bt/hulls or ~/.cache/glotouch-bt/hulls
     3. else computed in a separate process and written to 2
 
-A damaged file, or one made with other parameters, counts as absent. New results are read back from the stored bytes, so
+A damaged file, one made with other parameters, and one of the user's cache whose hulls do not cover the mesh count as
+absent. New results are read back from the stored bytes, so
 that the first run and later ones use the same floats. docs/decisions/0004-convex-decomposition.md has the measurements
 behind the parameters.
 
@@ -29,11 +30,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import QhullError
 
 from glotouch_backends.mujoco.hulls.bulge import bulge_m, depth_inside_m
 from glotouch_backends.mujoco.hulls.convex_parts import trimmed_hull
 from glotouch_backends.mujoco.hulls.feet import foot_centres
-from glotouch_backends.mujoco.hulls.files import Parts, locked, package_file, read_parts, user_folder, write_parts
+from glotouch_backends.mujoco.hulls.files import (
+    MAX_VERTICES,
+    Parts,
+    locked,
+    package_file,
+    read_parts,
+    user_folder,
+    write_parts,
+)
 from glotouch_backends.mujoco.hulls.shells import shell_labels
 from glotouch_backends.mujoco.hulls.simplify import simplified
 from glotouch_bt.robot import Array, BadInput, frozen_array
@@ -42,9 +52,6 @@ from glotouch_bt.robot.scene import Mesh, load_folder
 Progress = Callable[[str], None]
 _log = logging.getLogger(__name__)
 
-MAX_VERTICES = 256
-"""Largest number of vertices of a hull. Source: measured; an apple's largest part misses its surface by 0.6 mm (p95)
-with 64, by 0.1 mm with 256. The step does not get slower, because MuJoCo walks the hull's graph."""
 TOLERANCE_M = 0.0001
 """Vertices that protrude less than this from the trimmed hull are dropped. Source: ours."""
 MAX_GAP_M = 0.002
@@ -133,14 +140,25 @@ def load_hulls(mesh: Mesh, progress: Progress | None = None) -> Hulls:
 
 
 def _from_folder(mesh: Mesh, path: Path, say: Progress) -> Parts:
-    found = read_parts(path, KEY)
+    found = _fitting(mesh, path)
     if found is not None:
         return found
     with locked(path, lambda: say(f"{mesh.name}: waiting for another process to decompose it")):
-        found = read_parts(path, KEY)  # another process may have written it meanwhile
+        found = _fitting(mesh, path)  # another process may have written it meanwhile
         if found is not None:
             return found
         return write_parts(path, KEY, decompose(mesh, say), say)
+
+
+def _fitting(mesh: Mesh, path: Path) -> Parts | None:
+    """Return the parts in a file if they cover the mesh and stay within its box, as every result of ours does."""
+    found = read_parts(path, KEY)
+    try:
+        if found is not None:
+            _check(mesh, found.hulls)
+    except (_CutFailed, QhullError, ValueError):  # hulls without a volume
+        return None
+    return found
 
 
 def decompose(mesh: Mesh, progress: Progress | None = None) -> Parts:

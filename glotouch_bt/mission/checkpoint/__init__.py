@@ -3,4 +3,4 @@
 from glotouch_bt.mission.checkpoint.codec import decode, encode
 from glotouch_bt.mission.checkpoint.store import CHECKPOINT_FILE, CheckpointFile, CheckpointRow
 from glotouch_bt.mission.checkpoint.world_check import WorldChanged
-from glotouch_bt.mission.checkpoint.writer import CheckpointHooks, CheckpointWriter, ResumePoint, RunState
+from glotouch_bt.mission.checkpoint.writer import UNFIT, CheckpointHooks, CheckpointWriter, ResumePoint, RunState

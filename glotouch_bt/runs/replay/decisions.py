@@ -5,6 +5,7 @@ This shows what the present matcher decides on recorded data, also of older vers
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,14 +13,15 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from glotouch_bt.mission import load_mission
+from glotouch_bt.mission import Mission, load_mission
 from glotouch_bt.perception import target_model
 from glotouch_bt.perception.recognition import MATCHERS, PadSpec, Ranking
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.report import RunRecord, read_run
 from glotouch_bt.robot import BadInput, GlotouchError
 from glotouch_bt.robot.scene import load_folder
-from glotouch_bt.runs.replay.run import replayed_robot
+from glotouch_bt.runs.folder import require_run_folder
+from glotouch_bt.runs.replay.run import replayed_robot, unfit_as_bad_input
 
 
 @dataclass(frozen=True)
@@ -65,11 +67,16 @@ def replay_decisions(folder: Path, *, objects: Path | None = None) -> list[Decis
     Raises:
         BadInput: There is no run, its mission cannot be loaded, or its record is of an unknown version.
     """
+    require_run_folder(folder)
     record = read_run(folder)
     mission = load_mission(record.path.parent / "mission.yaml", objects=objects)
     gripper = replayed_robot(record).description.gripper
     pads = PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
-    made: list[Decision] = []
+    with unfit_as_bad_input(record):
+        return list(_decisions(record, mission, pads))
+
+
+def _decisions(record: RunRecord, mission: Mission, pads: PadSpec) -> Iterator[Decision]:
     felt: dict[int, TouchSet] = {}
     for event in record.events:
         if event.kind == "touchset":
@@ -83,8 +90,7 @@ def replay_decisions(folder: Path, *, objects: Path | None = None) -> list[Decis
             if not given or matcher not in MATCHERS:
                 continue
             model = target_model(load_folder(mission.world.objects.folder, (target,))[0], pads)
-            made.append(Decision(event.stamp_s, target, matcher, then, MATCHERS[matcher](model, given)))
-    return made
+            yield Decision(event.stamp_s, target, matcher, then, MATCHERS[matcher](model, given))
 
 
 def _touchset(data: object, record: RunRecord) -> TouchSet:

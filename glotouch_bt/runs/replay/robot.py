@@ -14,6 +14,7 @@ import numpy as np
 from glotouch_bt.robot import (
     Array,
     BackendError,
+    BadInput,
     Command,
     GripperState,
     Limits,
@@ -30,6 +31,36 @@ SAME_RAD = 1e-4
 SAME_M = 1e-5
 SAME_M_S = 1e-4
 SAME_N = 1e-2
+
+
+SAMPLES: Mapping[str, tuple[str | int, ...]] = {
+    "stamp_s": (), "q": ("dof",), "dq": ("dof",), "position_B_P": (3,), "quat_B_P": (4,), "force_S_N": (3,),
+    "torque_S_Nm": (3,),
+}  # fmt: skip
+CYCLES: Mapping[str, tuple[str | int, ...]] = {
+    "stamp_s": (), "samples": (), "gripper_stamp_s": (), "gripper_aperture_m": (), "gripper_force_N": (),
+    "gripper_moving": (), "command_q": ("dof",), "command_dq": ("dof",), "command_aperture_m": (),
+    "command_speed_m_s": (), "command_force_N": (), "command_tactile": (),
+}  # fmt: skip
+TACTILE: Mapping[str, tuple[str | int, ...]] = {
+    "stamp_s": (), "arrived_s": (), "left_m": ("rows", "columns"), "right_m": ("rows", "columns"),
+}  # fmt: skip
+"""Shape of one row of each column; words are sizes of the robot."""
+
+
+def _require_columns(
+    given: Mapping[str, Array], expected: Mapping[str, tuple[str | int, ...]], sizes: Mapping[str, int], what: str
+) -> None:
+    """Require columns of equal length and of the shapes that the robot has, with times that are numbers."""
+    if "stamp_s" not in given:
+        raise BadInput(f"its {what}s have no times")
+    rows = len(given["stamp_s"])
+    for name, words in expected.items():
+        shape = (rows, *(sizes[w] if isinstance(w, str) else w for w in words))
+        if name not in given or given[name].shape != shape:
+            raise BadInput(f"its {what}s have no column {name} of shape {shape}")
+    if not np.isfinite(given["stamp_s"]).all():
+        raise BadInput(f"the time of a {what} is not a number")
 
 
 class RecordEnded(BackendError):
@@ -59,6 +90,9 @@ class ReplayedRobot(Robot):
         samples, cycles, tactile: The record's columns (`report.RunRecord`); row 0 of `cycles` was sensed before the
             first command.
         done_s: Robot clock at which each slow request was done, and its error, by its number.
+
+    Raises:
+        BadInput: A column is missing or has another shape, or the columns do not belong together.
     """
 
     def __init__(
@@ -72,6 +106,14 @@ class ReplayedRobot(Robot):
         done_s: Mapping[int, tuple[float, str | None]],
     ) -> None:
         self.description, self.limits, self.period_s = description, limits, period_s
+        _require_columns(samples, SAMPLES, {"dof": description.dof}, "sample")
+        _require_columns(cycles, CYCLES, {"dof": description.dof}, "cycle")
+        if tactile:
+            rows, columns = description.gripper.pad_shape
+            _require_columns(tactile, TACTILE, {"rows": rows, "columns": columns}, "depth map")
+        counts = cycles["samples"]
+        if not (np.isfinite(counts).all() and counts.min() >= 1 and counts.sum() <= len(samples["stamp_s"])):
+            raise BadInput("its cycles and samples do not belong together")
         self._samples, self._cycles, self._tactile, self._done_s = samples, cycles, tactile, done_s
         self._ends = np.cumsum(cycles["samples"]).astype(np.int64)
         frames = tactile["arrived_s"] if len(tactile) else np.zeros(0)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,12 +11,14 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from glotouch_bt.mission import load_mission
+from glotouch_bt.mission import Mission, load_mission
+from glotouch_bt.mission.checkpoint import UNFIT
 from glotouch_bt.mission.execution import Outcome, TimedPauses, run_mission
 from glotouch_bt.mission.record import REQUEST_DONE, Json, NullRecord, RunSummary, to_json
 from glotouch_bt.report import RecordedEvent, RunRecord, read_run
 from glotouch_bt.robot import BadInput, Limits, RobotDescription
 from glotouch_bt.robot.supervision import SupervisionLimits
+from glotouch_bt.runs.folder import require_run_folder
 from glotouch_bt.runs.replay.compare import ReplayDifference, compare_events, compare_ticks
 from glotouch_bt.runs.replay.robot import Divergence, RecordEnded, ReplayedRobot
 
@@ -72,8 +75,9 @@ class Replay:
 
     @property
     def same(self) -> bool:
-        """True if there is no difference."""
-        return not self.differences
+        """True if there is no difference, and the replay ends as the run did, as far as its end is recorded."""
+        then, now = self.statuses
+        return not self.differences and then in (now, "unknown")
 
 
 def replay(
@@ -94,12 +98,26 @@ def replay(
     Raises:
         BadInput: There is no run, its record is of an older version, or its mission cannot be loaded.
     """
+    require_run_folder(folder)
     record = read_run(folder)
     robot = replayed_robot(record)
+    if not record.ticks:
+        raise BadInput(f"{record.path}: it holds no tick of the tree, so there is nothing to compare")
     mission_file = record.path.parent / "mission.yaml"
     if not mission_file.is_file():
         raise BadInput(f"{folder}: its mission.yaml is missing")
     mission = load_mission(mission_file, objects=objects)
+    with unfit_as_bad_input(record):
+        return _replay(record, robot, mission, tolerance, on_progress)
+
+
+def _replay(
+    record: RunRecord,
+    robot: ReplayedRobot,
+    mission: Mission,
+    tolerance: float,
+    on_progress: Callable[[float, float], None] | None,
+) -> Replay:
     first_s, last_s = record.span_s
     log = _ReplayLog()
 
@@ -130,6 +148,17 @@ def replay(
     )
 
 
+@contextmanager
+def unfit_as_bad_input(record: RunRecord) -> Iterator[None]:
+    """Turn errors that only data of a wrong structure raise into a `BadInput`; a tick's own errors do not get here."""
+    try:
+        yield
+    except UNFIT as e:
+        raise BadInput(
+            f"{record.path}: cannot be replayed ({type(e).__name__}: {e}): it is damaged or of another version"
+        ) from e
+
+
 def _pauses(record: RunRecord) -> list[tuple[float, float]]:
     """Return (start, end) of each pause of the run; a pause without an end lasts for ever."""
     ends = [e.stamp_s for e in record.of_kind("resumed")]
@@ -157,12 +186,17 @@ def replayed_robot(record: RunRecord) -> ReplayedRobot:
         period_s = float(robot["period_s"])
     except (KeyError, TypeError, ValueError, msgspec.ValidationError) as e:
         raise BadInput(f"{record.path}: its robot description is of an unknown version ({e})") from e
+    if not 1e-4 <= period_s <= 1.0:
+        raise BadInput(f"{record.path}: its control period is {period_s} s, outside of 0.0001 .. 1 s")
     done = {
-        int(e.data["number"]): (e.stamp_s, e.data.get("error"))
+        int(e.data["number"]): (e.stamp_s, None if e.data.get("error") is None else str(e.data["error"]))
         for e in record.of_kind(REQUEST_DONE)
         if isinstance(e.data.get("number"), int)
     }
-    return ReplayedRobot(description, limits, period_s, record.samples, record.cycles, record.tactile, done)
+    try:
+        return ReplayedRobot(description, limits, period_s, record.samples, record.cycles, record.tactile, done)
+    except BadInput as e:
+        raise BadInput(f"{record.path}: {e}: it is damaged or of an older version") from e
 
 
 def _array(_: object, value: Json) -> np.ndarray[Any, Any]:
