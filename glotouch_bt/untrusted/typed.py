@@ -90,8 +90,8 @@ def _items_fit(value: tuple[Any, ...], inside: tuple[Any, ...]) -> bool:
 
 def _numbers_fit(dtype: np.dtype[Any], inside: tuple[Any, ...]) -> bool:
     """Return True if the numbers of an array are of the annotated kind, such as NDArray[float64]."""
-    wanted = [a for outer in inside for a in typing.get_args(outer) if isinstance(a, type)]
-    return not wanted or wanted[0] is Any or issubclass(dtype.type, wanted[0])
+    kinds = [a for i in inside if typing.get_origin(i) is np.dtype for a in typing.get_args(i)]
+    return not kinds or not isinstance(kinds[0], type) or kinds[0] is Any or issubclass(dtype.type, kinds[0])
 
 
 def _word(hint: Any) -> str:
