@@ -50,15 +50,17 @@ def test_a_bomb_is_refused_before_it_is_unpacked() -> None:
 
 
 FITTING: list[tuple[Any, Any]] = [
-    (1.0, float), (1, float), (np.float64(1.0), float), (np.int64(1), int), (True, bool), ("a", str), (None, str | None),
-    ((1, 2.0), tuple[int, float]), ((1, 2, 3), tuple[int, ...]), ((), tuple[int, ...]), ([1], list[int]),
+    (1.0, float), (1, float), (np.float64(1.0), float), (np.int64(1), int), (True, bool), ("a", str),
+    (None, str | None), ((1, 2.0), tuple[int, float]),
+    ((1, 2, 3), tuple[int, ...]), ((), tuple[int, ...]), ([1], list[int]),
     ({"a": 1}, Mapping[str, int]), ([1], Sequence[int]), (deque([1]), deque[int]), (frozenset("a"), frozenset[str]),
     (np.zeros(3), npt.NDArray[np.float64]), (np.zeros(3, bool), npt.NDArray[np.bool_]), ("a", Literal["a", "b"]),
     (Pose(np.zeros(3)), Pose), (3, Any), ([object()], Any),
 ]  # fmt: skip
 UNFITTING: list[tuple[Any, Any]] = [
-    ("1", float), (True, float), (1.0, int), (True, int), (1, bool), (None, str), (1, str | None), ((1,), tuple[int, int]),
-    ((1, "a"), tuple[int, ...]), ([1], tuple[int, ...]), ((1,), list[int]), ({1: 1}, dict[str, int]), ({"a": "b"}, dict[str, int]),
+    ("1", float), (True, float), (1.0, int), (True, int), (1, bool), (None, str), (1, str | None),
+    ((1,), tuple[int, int]), ((1, "a"), tuple[int, ...]), ([1], tuple[int, ...]), ((1,), list[int]),
+    ({1: 1}, dict[str, int]), ({"a": "b"}, dict[str, int]),
     ([1], np.ndarray), (np.zeros(3, np.int64), npt.NDArray[np.float64]), ("c", Literal["a", "b"]), ("a", Pose),
 ]  # fmt: skip
 
