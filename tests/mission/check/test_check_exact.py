@@ -278,8 +278,7 @@ def by_ticking(spec: NodeSpec) -> tuple[dict[tuple[str, str, str], int], set[tup
             else:
                 whole = False
             if built.root.status is not Status.RUNNING:
-                found = (built.value("a") is not None, built.value("b") is not None)
-                ends.add((built.root.status, World.hand, *found))
+                ends.add((built.root.status, World.hand, *(built.value(key) is not None for key in "ab")))
         except TooLong:
             whole = whole and World.steps <= MAX_STEPS
         finally:
