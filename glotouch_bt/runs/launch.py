@@ -163,9 +163,12 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
         try:
             record.event("stuck", outcome.end_s, {"node": stuck.node, "stack": stuck.stack})
             result = score(request, mission, outcome, None) | {"wall_time_s": round(time.perf_counter() - ready, 3)}
-            _write_end(recorder, folder, result)
+            _write_end(recorder, folder, result | {"unscored": "the process of the run hung"})
             sys.stderr.write(f"glotouch: {outcome.reasons[-1]}\n{stuck.stack}")
+            sys.stderr.write(f"glotouch resume {folder.path}   continues from the last checkpoint\n")
             sys.stderr.flush()
+            if request.report:
+                _report(folder.path)
         finally:
             os._exit(3)
 
