@@ -9,6 +9,8 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 from glotouch_bt.robot import ParamError, UnknownName
 
 Layout = Mapping[str, tuple[float, float, float]]
+MAX_COORDINATE = 1000.0
+"""Largest number of a place in a layout, m or rad; refuses infinities and what is not a number."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,11 +32,10 @@ def _layout(name: str, value: object) -> Layout:
         raise ParamError(name, value, rule)
     places: dict[str, tuple[float, float, float]] = {}
     for key, place in value.items():
-        try:
-            x, y, yaw = (float(v) for v in place)
-        except (TypeError, ValueError) as e:
-            raise ParamError(f"{name}[{key}]", place, rule) from e
-        places[str(key)] = (x, y, yaw)
+        numbers = tuple(place) if isinstance(place, (list, tuple)) else ()
+        if len(numbers) != 3 or not all(type(v) in (int, float) and abs(v) <= MAX_COORDINATE for v in numbers):
+            raise ParamError(f"{name}[{key}]", place, rule)
+        places[str(key)] = (float(numbers[0]), float(numbers[1]), float(numbers[2]))
     return places
 
 

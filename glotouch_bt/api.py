@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from glotouch_bt.faults import FaultPlan
@@ -24,6 +24,7 @@ def run(
     faults: str | Path | FaultPlan | None = None,
     out: str | Path | None = None,
     overwrite: bool = False,
+    allow_paths: Sequence[str | Path] = (),
     **settings: object,
 ) -> RunResult:
     """Run a mission, as `glotouch run` does: same defaults, folder and result.
@@ -37,6 +38,7 @@ def run(
         faults: A fault plan: a path, the name of a shipped plan, or a loaded plan.
         out: The run's folder (default: runs/<time>-<mission>-s<seed>).
         overwrite: Replace the run that `out` holds.
+        allow_paths: Folders in which subtrees may be, besides the mission's own.
         **settings: Mission parameters. Others go to the backend as options.
 
     Returns:
@@ -58,6 +60,7 @@ def run(
             None if out is None else Path(out),
             faults,
             overwrite=overwrite,
+            allow_paths=tuple(map(Path, allow_paths)),
         )
     )
     if isinstance(done.outcome.error, KeyboardInterrupt):
@@ -66,7 +69,11 @@ def run(
 
 
 def check(
-    mission: str | Path, settings: Mapping[str, str | Value] | None = None, *, objects: str | Path | None = None
+    mission: str | Path,
+    settings: Mapping[str, str | Value] | None = None,
+    *,
+    objects: str | Path | None = None,
+    allow_paths: Sequence[str | Path] = (),
 ) -> tuple[Finding, ...]:
     """Check a mission against every outcome of every skill, as `glotouch check` does.
 
@@ -74,6 +81,7 @@ def check(
         mission: Path of a mission file, or the name of a shipped mission.
         settings: Values of the mission's parameters.
         objects: Folder of watertight STL files in metres, instead of the world's.
+        allow_paths: Folders in which subtrees may be, besides the mission's own.
 
     Returns:
         Every mistake and warning (`Finding.severity`), with its place; empty for a mission without any.
@@ -82,7 +90,8 @@ def check(
         BadInput: The mission cannot be read at all.
     """
     try:
-        loaded = load_mission(mission, settings, objects=None if objects is None else Path(objects))
+        folder = None if objects is None else Path(objects)
+        loaded = load_mission(mission, settings, objects=folder, allow_paths=tuple(map(Path, allow_paths)))
     except MissionFaults as e:
         return (*e.findings, *e.warnings)
     return loaded.warnings

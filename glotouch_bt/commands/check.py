@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.shared import Json, Objects, Settings, guarded, print_json, read_settings
+from glotouch_bt.commands.shared import AllowPaths, Json, Objects, Settings, guarded, print_json, read_settings
 
 
 @guarded
@@ -16,6 +16,7 @@ def check(
     missions: Annotated[list[str], typer.Argument(metavar="MISSION", help="mission files or shipped names")],
     set_: Settings = None,
     objects: Objects = None,
+    allow_path: AllowPaths = None,
     strict: Annotated[bool, typer.Option("--strict", help="treat warnings as errors")] = False,
     json_: Json = False,
 ) -> int:
@@ -35,7 +36,7 @@ def check(
         report: dict[str, object] = {"mission": given, "ok": True}
         summary = ""
         try:
-            mission = load_mission(given, settings, objects=objects)
+            mission = load_mission(given, settings, objects=objects, allow_paths=allow_path or ())
         except MissionFaults as e:
             found = [*e.findings, *e.warnings]
         except BadInput as e:
@@ -72,7 +73,7 @@ def _show(given: str, found: Sequence[object], summary: str, *, ok: bool) -> Non
     from glotouch_bt.mission.spec import Finding
 
     findings = [f for f in found if isinstance(f, Finding)]
-    print_findings(findings, texts_of({f.place.file for f in findings}, shipped_root()))
+    print_findings(findings, texts_of({f.place.file for f in findings if f.place.line}, shipped_root()))
     counts = [(sum(f.severity == s for f in findings), s) for s in ("error", "warning")]
     counted = ", ".join(f"{n} {word}{'s' if n != 1 else ''}" for n, word in counts if n)
     if ok:

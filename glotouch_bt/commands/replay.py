@@ -34,9 +34,9 @@ def replay(
     Computes every fit, match and decision again from the recorded observations. Needs no robot and no simulator. The
     code that made the run gives no difference; other code shows its effect on this run. Exit code 1: differences.
     """
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
+    from glotouch_bt.commands.terminal import EscapingConsole
     from glotouch_bt.runs.replay import as_dict, as_lines, decision_as_dict, replay_decisions
     from glotouch_bt.runs.replay import replay as run_replay
 
@@ -48,8 +48,11 @@ def replay(
             sys.stdout.write("\n".join(map(str, made)) + "\n" if made else "this run made no decision\n")
         return 0 if all(d.same for d in made) else 1
     columns = (TextColumn("replaying"), BarColumn(), TextColumn("{task.completed:.0f} of {task.total:.0f} s"))
-    err = Console(stderr=True)
-    with Progress(*columns, console=err, transient=True, disable=json_ or not err.is_terminal) as progress:
+    err = EscapingConsole(stderr=True)
+    quiet = json_ or not err.is_terminal
+    with Progress(
+        *columns, console=err, transient=True, disable=quiet, redirect_stdout=False, redirect_stderr=False
+    ) as progress:
         task = progress.add_task("", total=1.0)
         done = run_replay(
             folder,

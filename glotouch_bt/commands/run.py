@@ -17,6 +17,7 @@ def run(
     seed: Annotated[int, typer.Option(help="source of every random draw")] = 0,
     set_: shared.Settings = None,
     objects: shared.Objects = None,
+    allow_path: shared.AllowPaths = None,
     conditions: shared.Conditions = "nominal",
     faults: Annotated[str | None, typer.Option(metavar="FILE", help="a fault plan (see: glotouch faults)")] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="the run's folder (default: runs/...)")] = None,
@@ -41,6 +42,7 @@ def run(
         faults,
         may_kill=True,
         overwrite=overwrite,
+        allow_paths=tuple(allow_path or ()),
     )
     with RunProgress(quiet=json_) as progress, operated(Operator()) as control:
         done = launch(request, on_start=progress.start, on_progress=progress.update, control=control)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.shared import MissionName, guarded
+from glotouch_bt.commands.shared import MissionName, guarded, styled_streams
 
 
 @guarded
@@ -36,7 +36,8 @@ def run_tests(
     load_mission(mission)
     words = [*(tests or []), "-q", "-p", "no:cacheprovider", "--glotouch-coverage"]
     words += [] if coverage is None else ["--glotouch-coverage-min", str(coverage)]
-    code = int(pytest.main(words))
+    with styled_streams():  # pytest colours its own text
+        code = int(pytest.main(words))
     if code == int(pytest.ExitCode.NO_TESTS_COLLECTED):
         raise BadInput(f"no tests in {', '.join(tests or ['this folder'])} (docs/tutorial.md shows how to write them)")
     return code if code in (0, 1) else 2

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.shared import MissionName, Objects, Settings, guarded, read_settings
+from glotouch_bt.commands.shared import AllowPaths, MissionName, Objects, Settings, guarded, read_settings
 
 
 class TreeFormat(StrEnum):
@@ -29,13 +29,14 @@ def tree(
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="file to write instead of stdout")] = None,
     set_: Settings = None,
     objects: Objects = None,
+    allow_path: AllowPaths = None,
 ) -> None:
     """Draw a mission's tree."""
     from glotouch_bt.mission import load_mission
     from glotouch_bt.mission.export import as_btcpp, as_svg, as_text
     from glotouch_bt.robot import BadInput
 
-    loaded = load_mission(mission, read_settings(set_), objects=objects)
+    loaded = load_mission(mission, read_settings(set_), objects=objects, allow_paths=allow_path or ())
     drawn = {TreeFormat.text: as_text, TreeFormat.svg: as_svg, TreeFormat.btcpp: as_btcpp}[format_](loaded)
     if out is None:
         sys.stdout.write(drawn)

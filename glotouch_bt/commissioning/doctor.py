@@ -28,6 +28,7 @@ from glotouch_bt.robot import (
     Tare,
     World,
 )
+from glotouch_bt.robot.scene import stl_files
 
 T = TypeVar("T")
 Ask = Callable[[str], bool]
@@ -103,7 +104,7 @@ def rest(robot: Robot, duration_s: float, command: Command = HOLD) -> list[Obser
 def nearly_empty(world: World) -> World:
     """Return a simulated world with one object, the fewest a container can hold."""
     objects = world.objects
-    names = objects.names or tuple(sorted(p.stem for p in objects.folder.glob("*.stl")))
+    names = objects.names or tuple(stl_files(objects.folder))
     return replace(world, objects=replace(objects, names=names[:1]))
 
 

@@ -8,7 +8,7 @@ from glotouch_bt.faults.effects import WrongScaleStlParams
 from glotouch_bt.faults.plan import FaultPlan
 from glotouch_bt.mission import Mission
 from glotouch_bt.robot import BadInput
-from glotouch_bt.robot.scene import load_mesh
+from glotouch_bt.robot.scene import load_mesh, stl_files
 
 
 def wrong_models(plan: FaultPlan, mission: Mission, folder: Path) -> dict[str, str]:
@@ -31,7 +31,7 @@ def wrong_models(plan: FaultPlan, mission: Mission, folder: Path) -> dict[str, s
         for name in mission.stl_parameters:
             source = Path(given.get(name, str(mission.parameters[name])))
             if source.suffix.lower() != ".stl":
-                source = mission.world.objects.folder / f"{source}.stl"
+                source = stl_files(mission.world.objects.folder)[str(source)]
             solid = load_mesh(source).as_trimesh()
             solid.apply_scale(spec.params.factor)
             target = folder / source.name

@@ -18,6 +18,7 @@ from typing import TypeVar
 
 from pydantic import BaseModel
 
+from glotouch_bt.escaped_text import fault_of_name
 from glotouch_bt.faults.effects import CATALOGUE, FaultKind, FaultParams
 from glotouch_bt.faults.trigger import Duration, Repeat, When, matches
 from glotouch_bt.mission.read import find_shipped, read_yaml, shown, validate
@@ -118,7 +119,7 @@ def _plan(source: Node, findings: Findings) -> FaultPlan | None:
     for key, _ in source.entries:
         if key.value not in PLAN_KEYS:
             findings.unknown(key.place, "unknown_key", "key of a fault plan:", str(key.value), PLAN_KEYS)
-    name = _text(source, "faults", findings)
+    name = _text(source, "faults", findings, is_name=True)
     if name is None and "faults" not in source:
         findings.add(source.place, "missing_key", "a fault plan needs 'faults', its name")
     seed = source.get("seed")
@@ -141,11 +142,14 @@ def _plan(source: Node, findings: Findings) -> FaultPlan | None:
     return FaultPlan(name or "", tuple(faults), number if isinstance(number, int) else None, text)
 
 
-def _text(source: Map, key: str, findings: Findings) -> str | None:
+def _text(source: Map, key: str, findings: Findings, *, is_name: bool = False) -> str | None:
     node = source.get(key)
     if node is None:
         return None
     if isinstance(node, Scalar) and isinstance(node.value, str) and node.value.strip():
+        if is_name and (fault := fault_of_name(node.value)):
+            findings.add(node.place, "wrong_name", f"{key}: {fault}")
+            return None
         return node.value
     findings.add(node.place, "wrong_type", f"{key}: must be text")
     return None
@@ -178,7 +182,7 @@ def _fault(source: Node, taken: set[str], findings: Findings) -> FaultSpec | Non
         findings.add(source.key_place("repeat"), "wrong_value", what, valid="for: 2 s, {cycles: 20} or node")
     if kind is None or params is None or when is None or duration is None or repeat is None:
         return None
-    base = _text(source, "name", findings) or word
+    base = _text(source, "name", findings, is_name=True) or word
     name, n = base, 2
     while name in taken:
         name, n = f"{base} {n}", n + 1

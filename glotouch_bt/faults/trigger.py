@@ -12,23 +12,34 @@ from pydantic import BaseModel, ConfigDict, Field
 from glotouch_bt.robot import Observation
 from glotouch_bt.skill import param
 
+MAX_TIME_S = 86_400.0
+"""Longest time in a plan; no mission may last longer."""
+MAX_COUNT = 10_000_000
+"""Largest count of periods or calls in a plan: as many as such a mission has."""
+MAX_FORCE_N = 10_000.0
+"""Largest threshold of a force."""
+
 
 class When(BaseModel):
     """Start condition. All given keys must hold at the start of a control period; without keys it holds at once."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    time_s: float | None = param("Robot time since the mission began", unit="s", default=None, ge=0.0)
-    node: str | None = param("This node runs: name or path, with * and ?", default=None, min_length=1)
-    visit: int = param("It runs for at least the n-th time", default=1, ge=1)
-    after_s: float = param("It has run for this long", unit="s", default=0.0, ge=0.0)
-    cycle: int | None = param("Number of control periods done", default=None, ge=0)
-    call: int | None = param("Number of robot calls done: observe, cycle, start", default=None, ge=0)
-    force_above_N: float | None = param("Sensed force (newest sample) is above", unit="N", default=None, ge=0.0)
-    force_below_N: float | None = param("Sensed force is below", unit="N", default=None, ge=0.0)
-    aperture_above_m: float | None = param("Sensed aperture is above", unit="m", default=None, ge=0.0)
-    aperture_below_m: float | None = param("Sensed aperture is below", unit="m", default=None, ge=0.0)
-    height_below_m: float | None = param("Height of the pads' mid-point in B is below", unit="m", default=None)
+    time_s: float | None = param("Robot time since the mission began", unit="s", default=None, ge=0.0, le=MAX_TIME_S)
+    node: str | None = param("This node runs: name or path, with * and ?", default=None, min_length=1, max_length=200)
+    visit: int = param("It runs for at least the n-th time", default=1, ge=1, le=MAX_COUNT)
+    after_s: float = param("It has run for this long", unit="s", default=0.0, ge=0.0, le=MAX_TIME_S)
+    cycle: int | None = param("Number of control periods done", default=None, ge=0, le=MAX_COUNT)
+    call: int | None = param("Number of robot calls done: observe, cycle, start", default=None, ge=0, le=MAX_COUNT)
+    force_above_N: float | None = param(
+        "Sensed force (newest sample) is above", unit="N", default=None, ge=0.0, le=MAX_FORCE_N
+    )
+    force_below_N: float | None = param("Sensed force is below", unit="N", default=None, ge=0.0, le=MAX_FORCE_N)
+    aperture_above_m: float | None = param("Sensed aperture is above", unit="m", default=None, ge=0.0, le=1.0)
+    aperture_below_m: float | None = param("Sensed aperture is below", unit="m", default=None, ge=0.0, le=1.0)
+    height_below_m: float | None = param(
+        "Height of the pads' mid-point in B is below", unit="m", default=None, ge=-10.0, le=10.0
+    )
 
 
 class Duration(BaseModel):
@@ -36,8 +47,8 @@ class Duration(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    duration_s: float | None = param("Robot time", unit="s", default=None, gt=0.0)
-    cycles: int | None = param("Control periods", default=None, ge=1)
+    duration_s: float | None = param("Robot time", unit="s", default=None, gt=0.0, le=MAX_TIME_S)
+    cycles: int | None = param("Control periods", default=None, ge=1, le=MAX_COUNT)
     until: Literal["node", "ever"] | None = Field(default=None, description="node: until it ends; ever: without end")
 
 
@@ -47,7 +58,7 @@ class Repeat(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     times: int = param("Largest number of starts", default=1, ge=1, le=100_000)
-    every_s: float = param("Least time between two starts", unit="s", default=0.0, ge=0.0)
+    every_s: float = param("Least time between two starts", unit="s", default=0.0, ge=0.0, le=MAX_TIME_S)
 
 
 @dataclass

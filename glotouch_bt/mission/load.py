@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os.path import isfile
 from pathlib import Path
@@ -24,6 +24,7 @@ from glotouch_bt.mission.read import (
     find_shipped,
     from_command_line,
     parse_tree,
+    read_named_yaml,
     read_parameters,
     read_world,
     read_yaml,
@@ -45,7 +46,8 @@ from glotouch_bt.mission.spec import (
     number_names,
     plain,
 )
-from glotouch_bt.robot import BadInput, World
+from glotouch_bt.robot import BadInput, ObjectSet, World
+from glotouch_bt.robot.scene import twins_of
 from glotouch_bt.skill import Context, Skill
 
 MISSION_KEYS = ("mission", "description", "world", "parameters", "tree", "timeout_s", "leaves", "subtrees")
@@ -101,6 +103,7 @@ def load_mission(
     *,
     skills: Mapping[str, type[Skill]] | None = None,
     objects: Path | None = None,
+    allow_paths: Sequence[Path] = (),
 ) -> Mission:
     """Load and check a mission.
 
@@ -109,6 +112,7 @@ def load_mission(
         settings: `--set` values; names the mission does not declare are left to the caller (`split_settings`).
         skills: Known skills (default: all that are installed).
         objects: A folder of STL files to use instead of the world's.
+        allow_paths: Folders in which subtrees may be, besides the mission's own.
 
     Raises:
         MissionFaults: It has errors; each has its place. (A `BadInput`.)
@@ -116,7 +120,9 @@ def load_mission(
     """
     path = find_shipped("", str(given), "mission")
     findings = Findings()
-    mission = _read(path, dict(settings or {}), SkillRegistry() if skills is None else skills, objects, findings)
+    roots = tuple(folder.resolve() for folder in (path.parent, *allow_paths))
+    skills = SkillRegistry() if skills is None else skills
+    mission = _read(path, dict(settings or {}), skills, objects, roots, findings)
     if mission is None or len(findings):
         raise MissionFaults(findings.errors, findings.warnings)
     return mission
@@ -147,11 +153,16 @@ def _read(
     settings: Mapping[str, str | Value],
     skills: Mapping[str, type[Skill]],
     objects: Path | None,
+    roots: tuple[Path, ...],
     findings: Findings,
 ) -> Mission | None:
     source = read_yaml(path, shown(path))
     if not isinstance(source, Map):
         findings.add(source.place, "wrong_type", "a mission must be a mapping", valid=", ".join(MISSION_KEYS))
+        return None
+    if not any(key in source for key in MISSION_KEYS):
+        what = "is no mission: it has none of the keys of one"
+        findings.add(Place(shown(path)), "wrong_type", what, valid=", ".join(MISSION_KEYS))
         return None
     for key, _ in source.entries:
         if key.value not in MISSION_KEYS:
@@ -169,7 +180,7 @@ def _read(
         findings.add(source.place, "missing_key", "a mission needs 'tree'")
         return None
     reading = Reading(carried=_carried(source, findings))
-    scope = Scope(skills, findings, path, folder, reading=reading)
+    scope = Scope(skills, findings, path, roots, folder, reading=reading)
     tree = parse_tree(substitute(tree_node, parameters, findings), scope)
     number_names(tree)
     check_used(source.get("parameters"), tree_node, findings)
@@ -177,12 +188,36 @@ def _read(
         if f"carried {key.value}" not in reading.sources.values():
             findings.add(key.place, "unused_subtree", f"no node uses the subtree {key.value!r}, so it is not checked")
     check_flow(tree, findings, _leaves(source, findings), timeout_s)
+    if world is not None and not len(findings):
+        _check_twins(parameters, given, section, world.objects, findings)
     if world is None or len(findings):
         return None
     values = {n: p.value for n, p in parameters.items() if p.value is not None}
     document = _document(source, name, world_document, parameters, reading)
     stl = tuple(n for n, p in parameters.items() if p.declared.type == "stl")
     return Mission(name, description, world, values, stl, tree, timeout_s, path, document, tuple(findings.warnings))
+
+
+def _check_twins(
+    parameters: Mapping[str, Parameter],
+    given: Mapping[str, Scalar],
+    section: Node | None,
+    objects: ObjectSet,
+    findings: Findings,
+) -> None:
+    """Report the objects that cannot be told from a target."""
+    for name, parameter in parameters.items():
+        if parameter.declared.type != "stl" or parameter.value is None:
+            continue
+        twins = twins_of(str(parameter.value), objects)
+        if twins:
+            place = given[name].place if name in given else _place_of(section, name)
+            what = f"{name} = {parameter.value!r}: {', '.join(twins)} {'has' if len(twins) == 1 else 'have'} its shape"
+            findings.add(place, "identical_objects", what)
+
+
+def _place_of(section: Node | None, key: str) -> Place:
+    return section.key_place(key) if isinstance(section, Map) else Place(key)
 
 
 def _text(source: Map, key: str, findings: Findings, *, required: bool) -> str:
@@ -226,7 +261,7 @@ def _world(source: Map, path: Path, objects: Path | None, findings: Findings) ->
         findings.unknown(node.place, "unknown_world", "world", node.value, names)
         return None, None
     try:
-        content = read_yaml(found, shown(found))
+        content = read_named_yaml(found, shown(found), "world")
     except BadInput as e:
         findings.add(node.place, "unusable_world", f"the world cannot be read: {e}")
         return None, None

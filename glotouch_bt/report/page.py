@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import html
 import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from glotouch_bt.escaped_text import html_text as esc
 from glotouch_bt.report.style import CSS
-
-
-def esc(value: object) -> str:
-    """Escape text for HTML and SVG, attributes included."""
-    return html.escape(str(value), quote=True)
 
 
 def number(value: object, digits: int = 1, unit: str = "", scale: float = 1.0) -> str:

@@ -58,10 +58,7 @@ def launch(
     began = time.perf_counter()
     if not 0 <= request.seed <= MAX_SEED:
         raise BadInput(f"--seed {request.seed}: must be in 0 .. {MAX_SEED}")
-    if resumable is not None:
-        mission = resumable.mission
-    else:
-        mission = load_mission(request.mission, request.settings, objects=request.objects)
+    mission = _mission(request) if resumable is None else resumable.mission
     conditions = load_conditions(request.conditions) if resumable is None else resumable.conditions
     plan = _fault_plan(request, mission)
     load_all()
@@ -75,7 +72,7 @@ def launch(
             if resumable is None:
                 folder.check_free(request.overwrite)
             if plan is not None and resumable is None and (models := wrong_models(plan, mission, folder.path / MODELS)):
-                mission = load_mission(request.mission, {**request.settings, **models}, objects=request.objects)
+                mission = _mission(request, **models)
             try:
                 robot = backend.open(mission.world, conditions, request.seed, options)
             except BadInput as e:
@@ -108,6 +105,11 @@ def launch(
                 request, mission, conditions, robot, referee, folder, objects_at_start, began, resumable, resume_point
             )
             return _run(run, on_progress, control)
+
+
+def _mission(request: RunRequest, **more: str) -> Mission:
+    settings = {**request.settings, **more}
+    return load_mission(request.mission, settings, objects=request.objects, allow_paths=request.allow_paths)
 
 
 def _fault_plan(request: RunRequest, mission: Mission) -> FaultPlan | None:
@@ -163,12 +165,9 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
         try:
             record.event("stuck", outcome.end_s, {"node": stuck.node, "stack": stuck.stack})
             result = score(request, mission, outcome, None) | {"wall_time_s": round(time.perf_counter() - ready, 3)}
-            _write_end(recorder, folder, result | {"unscored": "the process of the run hung"})
+            _write_end(recorder, folder, result)
             sys.stderr.write(f"glotouch: {outcome.reasons[-1]}\n{stuck.stack}")
-            sys.stderr.write(f"glotouch resume {folder.path}   continues from the last checkpoint\n")
             sys.stderr.flush()
-            if request.report:
-                _report(folder.path)
         finally:
             os._exit(3)
 

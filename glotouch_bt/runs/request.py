@@ -27,6 +27,7 @@ class RunRequest:
         may_kill: A fault may kill this process, because it does nothing but this run.
         report: Make report.html.
         overwrite: Replace an earlier run in `out`; otherwise `out` must be new or empty.
+        allow_paths: Folders in which subtrees may be, besides the mission's own.
     """
 
     mission: str
@@ -40,6 +41,7 @@ class RunRequest:
     may_kill: bool = False
     report: bool = True
     overwrite: bool = True
+    allow_paths: tuple[Path, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Return what is needed to open the same robot and mission again, as JSON data."""

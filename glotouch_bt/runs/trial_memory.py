@@ -11,8 +11,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from glotouch_bt.escaped_text import json_text
 from glotouch_bt.faults import FaultPlan, read_plan
-from glotouch_bt.json_text import json_text
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import to_json
@@ -90,17 +90,21 @@ def described_request(request: RunRequest) -> dict[str, Any]:
         "settings": dict(settings),
         "conditions": request.conditions,
         "faults": _described_plan(request),
-        "content": _content(request.mission, settings, request.objects, request.conditions),
+        "content": _content(request.mission, settings, request.objects, request.conditions, request.allow_paths),
         "versions": installed_versions(),
     }
 
 
 @lru_cache(maxsize=256)
 def _content(
-    mission: str, settings: tuple[tuple[str, str], ...], objects: Path | None, conditions: str
+    mission: str,
+    settings: tuple[tuple[str, str], ...],
+    objects: Path | None,
+    conditions: str,
+    allow_paths: tuple[Path, ...],
 ) -> dict[str, str]:
     """Return the digests of the mission with its world, of each object, and of the conditions."""
-    loaded = load_mission(mission, dict(settings), objects=objects)
+    loaded = load_mission(mission, dict(settings), objects=objects, allow_paths=allow_paths)
     chosen = loaded.world.objects
     world = replace(loaded.world, objects=replace(chosen, folder=Path()))
     parts: dict[str, Any] = {

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from glotouch_bt.json_text import json_text
+from glotouch_bt.escaped_text import json_text
 from glotouch_bt.robot import BadInput
 from glotouch_bt.runs.folder import RunFolder
 from glotouch_bt.runs.launch import launch

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import ClassVar, Literal
 
 from glotouch_bt.perception import recognition
 from glotouch_bt.perception.recognition import Ranking
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import HOLD
+from glotouch_bt.robot.scene import twins_of
 from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.planning import TOO_LOW, GraspPlan, load_target, load_target_model, plan_grasp
 
@@ -68,7 +70,7 @@ class MatchTarget(Skill):
         gripper = self.context.arm.description.gripper
         mesh = load_target(self.params.target, self.context.world.objects.folder)
         model = load_target_model(mesh, gripper)
-        ranking = recognition.MATCHERS[self.params.matcher](model, touchsets)
+        ranking = self._told_of_twins(recognition.MATCHERS[self.params.matcher](model, touchsets))
         self.ranking = ranking
         self.event("ranking", target=mesh.name, ranking=ranking, gates=ranking.gates, matcher=self.params.matcher)
         if not ranking.accepted:
@@ -87,6 +89,15 @@ class MatchTarget(Skill):
         best = next(t for t in touchsets if t.candidate.index == ranking.best.index)
         self.plan = plan_grasp(best, ranking.best, mesh, model, gripper)
         self.event("plan", plan=self.plan)
+
+    def _told_of_twins(self, ranking: Ranking) -> Ranking:
+        """Say which objects of the box have exactly the target's shape: nobody can tell them apart by touch."""
+        twins = twins_of(self.params.target, self.context.world.objects)
+        if not twins:
+            return ranking
+        what = f"{', '.join(twins)} {'has' if len(twins) == 1 else 'have'} exactly the shape of the target"
+        self.event("note", text=what)
+        return ranking if ranking.accepted else replace(ranking, reasons=(*ranking.reasons, what))
 
 
 def _advice(ranking: Ranking) -> str:

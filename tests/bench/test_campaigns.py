@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from glotouch_bt.json_text import finite, json_text
+from glotouch_bt.escaped_text import finite, json_text
 from glotouch_bt.robot import BadInput
 from glotouch_bt.runs import Campaign, Task, WorkerLost, gather, write_summary, write_table
 

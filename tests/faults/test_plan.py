@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import suppress
 from pathlib import Path
 
@@ -9,12 +10,16 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic import BaseModel
+from typer.testing import CliRunner
 
+from glotouch_bt.cli import app
 from glotouch_bt.faults import FaultInjector
 from glotouch_bt.faults.effects.catalogue import CATALOGUE, CAUSE_PATTERNS
 from glotouch_bt.faults.plan import check_plan, read_plan
-from glotouch_bt.faults.trigger import Duration, When
+from glotouch_bt.faults.trigger import Duration, Repeat, When
 from glotouch_bt.mission.load import load_mission
+from glotouch_bt.mission.read import limits_of
 from glotouch_bt.mission.read.library import shipped
 from glotouch_bt.mission.read.yaml_source import parse_yaml
 from glotouch_bt.mission.spec.findings import MissionFaults
@@ -171,3 +176,42 @@ def test_a_joint_that_the_arm_has_not_is_refused() -> None:
     plan = check_plan(parse_yaml("faults: f\nplan:\n  - {fault: following_error, with: {joint: 9}}\n", "bad.yaml"))
     with FakeRobot() as robot, pytest.raises(BadInput, match=r"bad\.yaml:3:5: .*joint 9: this arm has joints 0 to 6"):
         FaultInjector(robot, plan, 0)
+
+
+def numbers_of(model: type[BaseModel]) -> list[tuple[str, list[str]]]:
+    """Return (name, signs of the limits) of each parameter that is a number or a list of numbers."""
+    fields = model.model_fields.items()
+    return [(n, [sign[0] for sign, *_ in limits_of(f)]) for n, f in fields if re.search("int|float", str(f.annotation))]
+
+
+@pytest.mark.parametrize("model", [When, Duration, Repeat, *(k.effect.Params for k in CATALOGUE.values())])
+def test_every_number_of_a_plan_has_bounds(model: type[BaseModel]) -> None:
+    assert [name for name, signs in numbers_of(model) if {">", "<"} - set(signs)] == []
+
+
+@pytest.mark.parametrize(
+    "fault", ["container_offset, with: {shift_m: [1e308, 0]}", "wrench_bias, with: {force_N: [0, 0, -1e308]}",
+              "wrench_off, when: {time_s: 1e308}", "wrench_off, for: {cycles: 99999999999}"]
+)  # fmt: skip
+def test_huge_numbers_are_refused(fault: str) -> None:
+    (found,) = findings_of(f"faults: f\nplan:\n  - {{fault: {fault}}}\n")
+    assert found[0::2] == (3, "wrong_range")
+
+
+@pytest.mark.parametrize("fault", ["exception", "robot_fault"])
+def test_a_fault_at_the_first_call_is_an_error_of_the_robot(fault: str, tmp_path: Path) -> None:
+    (tmp_path / "f.yaml").write_text(f"faults: f\nplan:\n  - {{fault: {fault}, when: {{call: 0}}}}\n")
+    words = [
+        "run",
+        "calibrate",
+        "--backend",
+        "fake",
+        "--faults",
+        str(tmp_path / "f.yaml"),
+        "--out",
+        str(tmp_path / "o"),
+    ]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 3, done.output
+    assert "injected" in done.stderr
+    assert "internal error" not in done.stderr

@@ -36,7 +36,6 @@ from glotouch_backends.trial_message import pose_of
 NEW, CALL, REFEREE = "new", "call", "referee"
 MAX_BYTES = 16 * 1024 * 1024
 """Largest message; a depth map has 2 MB. Source: ours."""
-_DATA = {type(None), bool, int, float, str, bytes}
 ENUMS: tuple[type[Enum], ...] = (Mode, OperationalStatus, RobotEvent_Level, Sensor.OutputType)
 ERRORS = {kind.__name__: kind for kind in (ValueError, TypeError, RuntimeError, KeyError, AttributeError, OSError)}
 """Errors that keep their class; any other becomes an Exception with its text."""
@@ -73,18 +72,14 @@ def decode(body: bytes) -> Any:
 
 def _plain(value: Any) -> Any:
     kind = type(value)
-    if kind in _DATA:
-        return value
     if kind in (list, tuple):
         return [_plain(v) for v in value]
     if isinstance(value, Mapping):
         return {k: _plain(v) for k, v in value.items()}
     if isinstance(value, BaseException):
         return msgspec.msgpack.Ext(_NUMBERS[BaseException], encode([kind.__name__, str(value)]))
-    if kind not in _NUMBERS:
-        raise TypeError(f"a {kind.__name__} cannot be sent")
-    number = _NUMBERS[kind]
-    return msgspec.msgpack.Ext(number, encode(_TYPES[number][1](value)))
+    number = _NUMBERS.get(kind)
+    return value if number is None else msgspec.msgpack.Ext(number, encode(_TYPES[number][1](value)))
 
 
 def _read(number: int, data: memoryview) -> Any:

@@ -16,6 +16,7 @@ from glotouch_bt.mission.read import SkillRegistry, load_conditions, load_world
 from glotouch_bt.motion import Arm, Motion, drive
 from glotouch_bt.perception.touch import GuardParams, Payload
 from glotouch_bt.robot import HOLD, Array, BadInput, Command, MotionRefused, Observation, Robot, load_backend
+from glotouch_bt.robot.scene import stl_files
 from glotouch_bt.robot.simulation import Referee
 from glotouch_bt.skill import Context
 from glotouch_bt.skill.probing import HeldTool, Probed, Prober
@@ -59,8 +60,8 @@ class SimulatedProbe:
 
     def __init__(self, conditions: str, seed: int, backend: str = "mujoco") -> None:
         world = load_world(WORLD)
-        one = sorted(p.stem for p in world.objects.folder.glob("*.stl"))[:1]
-        self.world = dataclasses.replace(world, objects=dataclasses.replace(world.objects, names=tuple(one)))
+        one = tuple(stl_files(world.objects.folder))[:1]
+        self.world = dataclasses.replace(world, objects=dataclasses.replace(world.objects, names=one))
         made = load_backend(backend)
         known = load_conditions(conditions)
         self.robot: Robot = made.open(self.world, known, seed, {"layout": {one[0]: CORNER_K}})

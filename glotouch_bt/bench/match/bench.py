@@ -18,7 +18,7 @@ from glotouch_bt.bench.match.plots import plot_all
 from glotouch_bt.bench.match.summary import summarise
 from glotouch_bt.bench.match.timing import time_matching
 from glotouch_bt.bench.match.trials import PAIR_COLUMNS, TRIAL_COLUMNS, decide, models_of
-from glotouch_bt.json_text import finite
+from glotouch_bt.escaped_text import finite
 from glotouch_bt.mission import load_mission
 from glotouch_bt.robot.scene import load_folder, stl_files, stream
 from glotouch_bt.runs import Campaign, OnRow, RunRequest, Task, crashed, gather, silent, write_summary, write_table

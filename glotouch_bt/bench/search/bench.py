@@ -22,7 +22,7 @@ from glotouch_bt.bench.search.trial import (
     scene,
     sections_of,
 )
-from glotouch_bt.json_text import finite
+from glotouch_bt.escaped_text import finite
 from glotouch_bt.perception.search import POLICIES
 from glotouch_bt.robot import BadInput
 from glotouch_bt.runs import (

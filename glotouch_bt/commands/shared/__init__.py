@@ -3,6 +3,7 @@
 from glotouch_bt.commands.shared.errors import guarded, set_debug, showing_tracebacks
 from glotouch_bt.commands.shared.experiments import print_summary, progress, put_few_in_box, run_in_pool
 from glotouch_bt.commands.shared.options import (
+    AllowPaths,
     Backend,
     BackendSettings,
     BenchFolder,
@@ -24,4 +25,4 @@ from glotouch_bt.commands.shared.options import (
     check_parameters,
     read_settings,
 )
-from glotouch_bt.commands.shared.output import print_json
+from glotouch_bt.commands.shared.output import print_json, styled_streams

@@ -24,6 +24,10 @@ BackendSettings = Annotated[list[str] | None, typer.Option("--set", metavar="NAM
 Objects = Annotated[
     Path | None, typer.Option("--objects", metavar="DIR", help="folder of watertight STL files in metres")
 ]
+AllowPaths = Annotated[
+    list[Path] | None,
+    typer.Option("--allow-path", metavar="DIR", help="further folder that the mission's subtrees may be in"),
+]
 Backend = Annotated[str, typer.Option(help="a registered backend (see: glotouch backends)")]
 Conditions = Annotated[str, typer.Option(help="disturbances: ideal, nominal, harsh, or a file")]
 Json = Annotated[bool, typer.Option("--json", help="print JSON on stdout, nothing else")]

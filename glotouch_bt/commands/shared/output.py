@@ -1,7 +1,7 @@
-"""Standard streams that survive a reader that has gone: a closed pipe (`| head`) or terminal must not end a mission.
+"""Standard streams of a command: they show what a terminal would obey, and survive a reader that has gone.
 
-Text for a closed pipe, a hung-up terminal or a stream that was never open is dropped. Any other refusal of stdout (a
-full disk) is reported when the command has ended.
+A closed pipe (`| head`) or terminal must not end a mission. Text for it, or for a stream that was never open, is
+dropped. Any other refusal of stdout (a full disk) is reported when the command has ended.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
-from glotouch_bt.json_text import json_text
+from glotouch_bt.escaped_text import json_text, visible
 
 GONE = (errno.EPIPE, errno.EIO)
 """Errors of a pipe without a reader, and of a terminal that was hung up."""
@@ -61,17 +61,55 @@ class TolerantStream:
                 os.close(nowhere)
 
 
+class EscapedStream:
+    """A text stream that shows control characters instead of sending them. All but writing is the inner stream's own.
+
+    Args:
+        styled: The stream to write to.
+
+    Attributes:
+        styled: The same stream, for programs that colour their own text and escape what is not theirs.
+    """
+
+    def __init__(self, styled: TolerantStream) -> None:
+        self.styled = styled
+
+    @property
+    def rich_proxied_file(self) -> TolerantStream:
+        """The stream that rich writes to; `terminal.console` escapes its text before it is coloured."""
+        return self.styled
+
+    def write(self, text: str) -> int:
+        """Write text; show control characters as escapes."""
+        self.styled.write(visible(text))
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.styled, name)
+
+
 @contextmanager
 def tolerant_streams() -> Iterator[TolerantStream]:
-    """Replace stdout (yielded) and stderr by tolerant streams while the block runs."""
+    """Replace stdout (yielded) and stderr by tolerant, escaped streams while the block runs."""
     before = sys.stdout, sys.stderr
     out, err = TolerantStream(sys.stdout), TolerantStream(sys.stderr)
-    sys.stdout, sys.stderr = out, err
+    sys.stdout, sys.stderr = EscapedStream(out), EscapedStream(err)
     try:
         yield out
     finally:
         out.flush()
         err.flush()
+        sys.stdout, sys.stderr = before
+
+
+@contextmanager
+def styled_streams() -> Iterator[None]:
+    """Let a trusted program write to the terminal as it likes while the block runs."""
+    before = sys.stdout, sys.stderr
+    sys.stdout, sys.stderr = (getattr(stream, "styled", stream) for stream in before)
+    try:
+        yield
+    finally:
         sys.stdout, sys.stderr = before
 
 

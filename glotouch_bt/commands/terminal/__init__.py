@@ -10,7 +10,14 @@ from glotouch_bt.commands.terminal.bench_tables import (
     print_search,
     print_speed,
 )
-from glotouch_bt.commands.terminal.console import RunProgress, print_settings, print_skill, print_skills, print_table
+from glotouch_bt.commands.terminal.console import (
+    EscapingConsole,
+    RunProgress,
+    print_settings,
+    print_skill,
+    print_skills,
+    print_table,
+)
 from glotouch_bt.commands.terminal.fault_tables import print_exhaustive, print_faults
 from glotouch_bt.commands.terminal.findings import print_findings, texts_of
 from glotouch_bt.commands.terminal.run_end import print_end

@@ -5,9 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-
-from glotouch_bt.commands.terminal.console import print_table
+from glotouch_bt.commands.terminal.console import EscapingConsole, print_table
 
 
 def _mean(m: dict[str, Any] | None) -> str:
@@ -29,9 +27,10 @@ def print_retrieve(summary: dict[str, Any], folder: Path) -> None:
     print_table(title, ("", "rate [Wilson 95 %]"), rows)
     if summary["causes"]:
         print_table("causes of failure", ("cause", "trials"), [(c, str(n)) for c, n in summary["causes"].items()])
-    Console().print(
+    EscapingConsole().print(
         f"robot time {summary['sim_s']['mean']:.0f} s, wall time {summary['wall_s']['mean']:.0f} s for each mission; "
-        f"largest peak force {summary['largest_peak_force_N']:.1f} N\n{folder / 'summary.json'}"
+        f"largest peak force {summary['largest_peak_force_N']:.1f} N\n{folder / 'summary.json'}",
+        markup=False,
     )
 
 
@@ -83,7 +82,7 @@ def print_speed(summary: dict[str, Any], folder: Path) -> None:
     parts += [(f"  tree: {k}", f"{s:.2f}", f"{100 * s / wall:.0f} %") for k, s in summary["leaves_s"].items()]
     print_table(f"a mission's {wall:.1f} s, mean", ("", "s", "share"), parts)
     same = "every replay ended in the same state" if summary["same_end_state"] else "a REPLAY ENDED IN ANOTHER STATE"
-    Console().print(
+    EscapingConsole().print(
         f"not counted as wall time: opening {summary['open_s']:.1f} s, report {summary['report_s']:.1f} s\n"
         f"{same}; {summary['succeeded']} of {len(seeds)} missions succeeded\n{folder / 'summary.json'}",
         highlight=False,
@@ -121,7 +120,7 @@ def print_search(summary: dict[str, Any], folder: Path) -> None:
             if q["n"]
         ]
         print_table("candidates of the first policy", ("error", "median", "95 %", "n"), errors)
-    Console().print(f"{folder / 'summary.json'}", markup=False, highlight=False, soft_wrap=True)
+    EscapingConsole().print(f"{folder / 'summary.json'}", markup=False, highlight=False, soft_wrap=True)
 
 
 def print_contact(summary: dict[str, Any], folder: Path) -> None:
@@ -149,7 +148,7 @@ def print_contact(summary: dict[str, Any], folder: Path) -> None:
     print_table(title + f"{summary['contacts_per_side']} contacts per side", head, rows)
     if summary["not_traced"]:
         print_table("not traced", ("trial and cause",), [(c,) for c in summary["not_traced"]])
-    Console().print(f"{folder / 'summary.json'}", markup=False, highlight=False, soft_wrap=True)
+    EscapingConsole().print(f"{folder / 'summary.json'}", markup=False, highlight=False, soft_wrap=True)
 
 
 def print_match(summary: dict[str, Any], folder: Path) -> None:
@@ -224,4 +223,6 @@ def print_match(summary: dict[str, Any], folder: Path) -> None:
         f"a cached one {value(timing.get('load_stl_ms'), 0)} ms"
     )
     felt = f"{summary['touched']} of {summary['objects']} objects touched, {summary['nameless']} false candidates"
-    Console().print(f"{cost_of_stl}\n{felt}\n{folder / 'summary.json'}", markup=False, highlight=False, soft_wrap=True)
+    EscapingConsole().print(
+        f"{cost_of_stl}\n{felt}\n{folder / 'summary.json'}", markup=False, highlight=False, soft_wrap=True
+    )

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.live import Live
 from rich.markup import escape
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
+
+from glotouch_bt.escaped_text import visible
 
 if TYPE_CHECKING:
     from glotouch_bt.mission import Mission
@@ -20,6 +23,15 @@ if TYPE_CHECKING:
     from glotouch_bt.runs import RunResult
 
 REFRESH_S = 0.1
+
+
+class EscapingConsole(Console):
+    """The console of all commands: control characters in texts are shown; only its own styles reach the terminal."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterator[Segment]:
+        """See `Console`."""
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else Segment(visible(segment.text), segment.style)
 
 
 def print_error(message: str) -> None:
@@ -31,7 +43,7 @@ class RunProgress:
     """Progress on stderr: a live line on a terminal, plain lines elsewhere. Use as a context manager."""
 
     def __init__(self, quiet: bool) -> None:
-        self._console = Console(stderr=True)
+        self._console = EscapingConsole(stderr=True)
         self._quiet = quiet
         self._live: Live | None = None
         self._shown_s = 0.0
@@ -50,7 +62,10 @@ class RunProgress:
             return
         self._console.print(f"[bold]{escape(mission.name)}[/] in {escape(mission.world.name)} -> {escape(str(folder))}")
         if self._console.is_terminal:
-            self._live = Live(console=self._console, auto_refresh=False, transient=True)
+            # What others write is not redirected: rich would obey the escape sequences in it.
+            self._live = Live(
+                console=self._console, auto_refresh=False, transient=True, redirect_stdout=False, redirect_stderr=False
+            )
             self._live.start()
 
     def update(self, robot_s: float, summary: RunSummary) -> None:
@@ -77,7 +92,7 @@ class RunProgress:
 
 def print_result(done: RunResult) -> None:
     """Print the end of a run: the retrieved object or the reasons, the faults, the path of the report."""
-    console = Console()
+    console = EscapingConsole()
     r = done.result
     head = {"success": "[bold green]done[/]", "failure": "[bold red]failed[/]"}.get(
         str(r["status"]), "[bold red]aborted[/]"
@@ -127,7 +142,7 @@ def _fault_in_words(fault: Mapping[str, Any]) -> str:
 
 def print_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     """Print a table on stdout; cells are plain text."""
-    console = Console()
+    console = EscapingConsole()
     table = Table(title=title, title_justify="left", header_style="bold", show_edge=False)
     for i, name in enumerate(head):
         table.add_column(name, overflow="fold", no_wrap=i == 0)

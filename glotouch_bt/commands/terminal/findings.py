@@ -6,8 +6,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
 from rich.text import Text
+
+from glotouch_bt.commands.terminal.console import EscapingConsole
 
 if TYPE_CHECKING:
     from glotouch_bt.mission.spec import Finding
@@ -24,7 +25,7 @@ def print_findings(findings: Iterable[Finding], lines: dict[str, list[str]]) -> 
         findings: In the order to print.
         lines: Lines of each file, by the name in the findings; a missing file is not quoted.
     """
-    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    console = EscapingConsole(stderr=True, soft_wrap=True, highlight=False)
     for finding in findings:
         place, colour = finding.place, _COLOUR[finding.severity]
         head = Text(f"{place}: ", style="bold")
@@ -70,11 +71,15 @@ def path_in_words(path: tuple[str, ...]) -> str:
 
 def texts_of(files: Iterable[str], root: Path) -> dict[str, list[str]]:
     """Return the lines of mission files by their name in messages (`glotouch_missions/...` for shipped files)."""
+    from glotouch_bt.mission.read import MAX_BYTES
+    from glotouch_bt.robot import BadInput
+    from glotouch_bt.untrusted import read_file
+
     found: dict[str, list[str]] = {}
     for name in files:
         path = root / name.removeprefix("glotouch_missions/") if name.startswith("glotouch_missions/") else Path(name)
         try:
-            found[name] = path.read_text(encoding="utf-8").splitlines()
-        except (OSError, UnicodeDecodeError):
+            found[name] = read_file(path, MAX_BYTES, links=True).decode().splitlines()
+        except (BadInput, UnicodeDecodeError):
             continue
     return found

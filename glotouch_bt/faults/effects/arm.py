@@ -123,7 +123,7 @@ class StaleData(Effect[FaultParams]):
 class RobotFaultParams(FaultParams):
     """Parameters of `robot_fault`."""
 
-    message: str = param("Message of the controller", default="servo fault (injected)")
+    message: str = param("Message of the controller", default="servo fault (injected)", max_length=200)
 
 
 class RobotFault(Effect[RobotFaultParams]):

@@ -9,7 +9,7 @@ from typing import Any
 
 from glotouch_bt.faults.effects import arm, gripper, model, process, tactile, world, wrench
 from glotouch_bt.faults.effects.base import Effect
-from glotouch_bt.mission.read import unit_of
+from glotouch_bt.mission.read import limits_of, unit_of
 
 CHANNELS = ("wrench", "touch", "gripper", "arm", "world", "model", "process")
 
@@ -55,12 +55,7 @@ class FaultKind:
         """Return name, unit, default, valid range and description of each parameter."""
         rows = []
         for name, field in self.effect.Params.model_fields.items():
-            rules = [
-                f"{symbol} {getattr(m, key)}"
-                for m in field.metadata
-                for key, symbol in (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
-                if getattr(m, key, None) is not None
-            ]
+            rules = [f"{symbol} {limit}" for symbol, limit, _ in limits_of(field)]
             choices = getattr(field.annotation, "__args__", ())
             if not rules and choices and all(isinstance(c, str) for c in choices):
                 rules = [" or ".join(choices)]

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
 from glotouch_bt.faults.effects.base import Effect, EffectContext, FaultParams, P, param, require_disturber
 from glotouch_bt.robot import Array, Command, Observation
@@ -185,10 +186,14 @@ class ObjectAdded(WorldEffect[ObjectParams]):
         self.note(self._index, before, "added")
 
 
+Shift = Annotated[float, Field(ge=-1.0, le=1.0)]
+"""Shift of the container along one axis, m: at most about its own size."""
+
+
 class ContainerOffsetParams(FaultParams):
     """Parameters of `container_offset`."""
 
-    shift_m: tuple[float, float] = param("Shift of the container in B", unit="m", default=(0.01, 0.005))
+    shift_m: tuple[Shift, Shift] = param("Shift of the container in B", unit="m", default=(0.01, 0.005))
     yaw_rad: float = param("Rotation about its middle", unit="rad", default=0.0, ge=-0.5, le=0.5)
 
 

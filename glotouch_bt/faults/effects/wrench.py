@@ -6,14 +6,18 @@ They alter what is reported. A device that watches its own sensor internally is 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from pydantic import Field
 
 from glotouch_bt.faults.effects.base import Effect, EffectContext, FaultParams, P, param
 from glotouch_bt.robot import Array, Observation, Request, Tare, Ticket
 
-Triple = tuple[float, float, float]
+MAX_ADDED = 1000.0
+"""Largest component of a force (N), a torque (Nm) or a rate (N/s) that a fault adds: beyond any wrist sensor."""
+Added = Annotated[float, Field(ge=-MAX_ADDED, le=MAX_ADDED)]
+Triple = tuple[Added, Added, Added]
 
 
 class WrenchEffect(Effect[P]):

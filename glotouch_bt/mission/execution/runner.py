@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
@@ -18,7 +19,7 @@ from glotouch_bt.mission.execution.watchdog import STUCK_S, SkillHung, Watchdog,
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.record import Record, RecordedRequests, Rounding, RunSummary
 from glotouch_bt.mission.tree import NodeFailure, ReasonBook, build_tree, sensed
-from glotouch_bt.robot import HOLD, Command, GuardTripped, Observation, Robot, World
+from glotouch_bt.robot import HOLD, BackendError, Command, GlotouchError, GuardTripped, Observation, Robot, World
 from glotouch_bt.robot.supervision import GuardFinding, SupervisionLimits, Supervisor
 from glotouch_bt.skill import Context, Reason, Skill
 
@@ -112,10 +113,12 @@ def run_mission(
         resume_point: Checkpoint to continue from; with `same_world` the robot has been restored to it already.
     """
     summary = RunSummary(record)
-    supervisor = Supervisor(robot, supervision)
+    with _device_errors():
+        supervisor = Supervisor(robot, supervision)
     supervisor.on_finding = lambda finding: _record_finding(summary, finding)
     arm = make_arm(supervisor, mission.world)
-    observation = supervisor.observe()
+    with _device_errors():
+        observation = supervisor.observe()
     rounding = Rounding(observation.q.shape[1])
     observation = rounding(observation)
     arm.sync(observation)
@@ -163,6 +166,17 @@ def run_mission(
             summary.flush()
             tree.forget()
     return outcome
+
+
+@contextmanager
+def _device_errors() -> Iterator[None]:
+    """Turn an undocumented error of the device into a `BackendError`; nothing can be aborted before the first tick."""
+    try:
+        yield
+    except GlotouchError:
+        raise
+    except Exception as e:
+        raise BackendError(f"the robot failed before the first tick: {type(e).__name__}: {e}") from e
 
 
 def _record_finding(summary: RunSummary, finding: GuardFinding) -> None:

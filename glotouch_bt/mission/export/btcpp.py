@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 
+from glotouch_bt.escaped_text import xml_text
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.nodes import btcpp_value, kind_of
 from glotouch_bt.mission.spec import NodeSpec
@@ -32,7 +33,8 @@ def _add(above: ET.Element, node: NodeSpec, models: dict[str, ET.Element]) -> No
         for child in node.children:
             _add(above, child, models)
         return
-    made = ET.SubElement(above, form.tag, {"name": node.name, **form.attributes})
+    attributes = {"name": node.name, **form.attributes}
+    made = ET.SubElement(above, form.tag, {name: xml_text(value) for name, value in attributes.items()})
     if form.custom:
         models.setdefault(form.tag, _model(node, form.tag))
     for child in node.children:

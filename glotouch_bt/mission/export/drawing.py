@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from html import escape
 
+from glotouch_bt.escaped_text import html_text, visible
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.nodes import kind_of
 from glotouch_bt.mission.spec import NodeSpec
@@ -29,7 +29,7 @@ def as_text(mission: Mission) -> str:
             add(child, indent + ("   " if last else "│  "), i == len(node.children) - 1)
 
     add(mission.spec, "", True)
-    return "\n".join(lines) + "\n"
+    return visible("\n".join(lines)) + "\n"
 
 
 @dataclass
@@ -82,13 +82,13 @@ def as_svg(mission: Mission) -> str:
         kind = kind_of(box.node)
         radius = 14 if box.node.skill_type is None else 3
         shapes.append(
-            f"<g><title>{escape(box.node.kind)}: {escape(details(box.node))} ({escape(str(box.node.place))})</title>"
+            f"<g><title>{html_text(f'{box.node.kind}: {details(box.node)} ({box.node.place})')}</title>"
             f'<rect x="{box.x:.1f}" y="{box.y:.1f}" width="{box.width:.1f}" height="{BOX_H}" rx="{radius}" '
             f'fill="{kind.fill}" stroke="#44505f"/>'
             f'<text x="{box.middle:.1f}" y="{title_y:.1f}" text-anchor="middle" font-weight="600">'
-            f"{kind.sign} {escape(box.lines[0])}</text>"
+            f"{kind.sign} {html_text(box.lines[0])}</text>"
             f'<text x="{box.middle:.1f}" y="{box.y + 36:.1f}" text-anchor="middle" font-size="10.5" fill="#5b6675">'
-            f"{escape(box.lines[1])}</text></g>"
+            f"{html_text(box.lines[1])}</text></g>"
         )
         for child in box.children:
             draw(child)
@@ -98,6 +98,6 @@ def as_svg(mission: Mission) -> str:
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
         f'viewBox="0 0 {width:.0f} {height:.0f}" font-family="ui-monospace, monospace" font-size="12.5" fill="#1d2733">'
-        f"<title>{escape(mission.name)}</title>"
+        f"<title>{html_text(mission.name)}</title>"
         f'<rect width="100%" height="100%" fill="#fbfcfd"/>{"".join(shapes)}</svg>\n'
     )

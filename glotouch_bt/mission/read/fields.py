@@ -7,7 +7,7 @@ import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType, UnionType
-from typing import Any, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
@@ -64,9 +64,17 @@ def named_by(field: FieldInfo) -> str:
 
 
 def limits_of(field: FieldInfo) -> list[tuple[str, float, Callable[[float, float], bool]]]:
-    """Return (symbol, limit, comparison) of each limit of a number."""
-    found = ((symbol, getattr(m, word, None), holds) for m in field.metadata for word, symbol, holds in _RULES)
-    return [(symbol, limit, holds) for symbol, limit, holds in found if isinstance(limit, (int, float))]
+    """Return (symbol, limit, comparison) of each limit of a number, or of each number of a list."""
+    rules = [*field.metadata, *(rule for item in _items(field) for rule in item.metadata)]
+    found = ((symbol, getattr(m, word, None), holds) for m in rules for word, symbol, holds in _RULES)
+    numbers = [(symbol, limit, holds) for symbol, limit, holds in found if isinstance(limit, (int, float))]
+    return list(dict.fromkeys(numbers))
+
+
+def _items(field: FieldInfo) -> list[FieldInfo]:
+    """Return the rules that a list's items have."""
+    annotated = (a for a in get_args(field.annotation) if get_origin(a) is Annotated)
+    return [rule for a in annotated for rule in a.__metadata__ if isinstance(rule, FieldInfo)]
 
 
 def _extra(field: FieldInfo, word: str) -> str:
@@ -283,6 +291,8 @@ def _valid(field: FieldInfo | None, unit: str) -> str:
 def _kind_in_words(annotation: Any) -> str:
     """Return a field's type in words; empty where the message names it already."""
     origin, inside = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return _kind_in_words(inside[0])
     if origin is tuple:
         return "a list" if Ellipsis in inside else f"[{', '.join(map(_kind_in_words, inside))}]"
     if origin is dict:

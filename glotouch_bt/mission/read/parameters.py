@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from glotouch_bt.mission.read.fields import validate
 from glotouch_bt.mission.read.library import shown
+from glotouch_bt.mission.read.yaml_source import number_of
 from glotouch_bt.mission.spec import (
     UNITS,
     Findings,
@@ -30,7 +31,7 @@ from glotouch_bt.mission.spec import (
     walk,
 )
 from glotouch_bt.robot import BadInput
-from glotouch_bt.robot.scene import is_sound_stl, load_mesh
+from glotouch_bt.robot.scene import is_sound_stl, load_mesh, stl_files
 
 Value = bool | int | float | str
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -210,10 +211,10 @@ def _from_text(given: str | Value, kind: str) -> Value:
     text = given.strip()
     if kind == "bool":
         return True if text.lower() in _TRUE else False if text.lower() in _FALSE else given
-    try:
-        return int(text) if kind == "int" else float(text) if kind == "float" else given
-    except ValueError:
+    number = number_of(text)
+    if number is None or kind not in ("int", "float") or (kind == "int" and isinstance(number, float)):
         return given
+    return number if kind == "int" else float(number)
 
 
 def _fault(value: Value, declared: Declaration) -> str:
@@ -241,7 +242,7 @@ def stl_usable(name: str, folder: Path | None, place: Place, findings: Findings)
         return True
     path = Path(name)
     if path.suffix.lower() != ".stl":
-        files = {p.stem: p for p in sorted(folder.iterdir()) if p.suffix.lower() == ".stl"} if isdir(folder) else {}
+        files = stl_files(folder) if isdir(folder) else {}
         if name not in files:
             findings.unknown(place, "no_such_stl", f"object (in {shown(folder)})", name, files)
             return False

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 
+from glotouch_bt.escaped_text import fault_of_name
 from glotouch_bt.mission.nodes import NODES, NodeKind, SubtreeSettings
 from glotouch_bt.mission.read.fields import named_by, validate
 from glotouch_bt.mission.read.literals import is_literal, read_literal
@@ -116,10 +117,13 @@ def _title(taken: Mapping[str, tuple[Place, Node]], default: str, scope: Scope) 
     if "name" not in taken:
         return default
     node = taken["name"][1]
-    if isinstance(node, Scalar) and isinstance(node.value, str) and node.value.strip():
-        return node.value.strip()[:80]
-    scope.findings.add(node.place, "wrong_type", "name: must be text")
-    return default
+    if not isinstance(node, Scalar) or not isinstance(node.value, str) or not node.value.strip():
+        scope.findings.add(node.place, "wrong_type", "name: must be text")
+        return default
+    if fault := fault_of_name(node.value.strip()):
+        scope.findings.add(node.place, "wrong_name", f"name: {fault}")
+        return default
+    return node.value.strip()[:80]
 
 
 def _node_named(name: str, place: Place, body: Node, scope: Scope) -> NodeSpec:

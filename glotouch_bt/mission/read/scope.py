@@ -53,6 +53,7 @@ class Scope:
         skills: Known skills.
         findings: Where faults go.
         file: The file being read; subtrees are found relative to it.
+        roots: Folders in which the files of subtrees may be, besides the shipped one.
         stl_folder: The world's objects, for stl parameters of subtrees.
         prefix: Prefix of private keys ("" in the mission itself).
         ports: Subtree key -> absolute key; None in the mission itself, where a key is its own name.
@@ -63,6 +64,7 @@ class Scope:
     skills: Mapping[str, type[Skill]]
     findings: Findings
     file: Path
+    roots: tuple[Path, ...] = ()
     stl_folder: Path | None = None
     prefix: str = ""
     ports: Mapping[str, str] = field(default_factory=dict)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from dataclasses import replace
 from os.path import isfile
 from pathlib import Path
 
+from glotouch_bt.escaped_text import fault_of_name
 from glotouch_bt.mission.read.library import shipped_root, shown
 from glotouch_bt.mission.read.parameters import Parameter, check_used, read_parameters
 from glotouch_bt.mission.read.scope import Scope
-from glotouch_bt.mission.read.yaml_source import read_yaml
+from glotouch_bt.mission.read.yaml_source import read_named_yaml
 from glotouch_bt.mission.spec import Map, Node, Place, Scalar
 from glotouch_bt.robot import BadInput
 
@@ -33,22 +35,37 @@ def handed_on(given: Map) -> tuple[dict[Scalar, Scalar], Map]:
 def find_subtree(given: str, at: Place, scope: Scope) -> tuple[Path, str, Node] | None:
     """Find a subtree: in the mission itself, else a file beside the present one, else a shipped file.
 
+    A file must be in the mission's folder, in the shipped one, or in a folder that the user allows.
+
     Returns: Its path, its identity, and its content; None if that gave a finding.
     """
+    if fault := fault_of_name(given):
+        scope.findings.add(at, "wrong_name", f"the name of the subtree {fault}")
+        return None
     if given in scope.reading.carried:
         path, identity = scope.file.parent / given, f"carried {given}"
     else:
         beside, shipped = scope.file.parent / given, shipped_root() / given
         path = shipped if isfile(shipped) and not isfile(beside) else beside
-        identity = str(path.resolve())
+        try:
+            resolved = path.resolve()
+        except (OSError, RuntimeError) as e:  # links in a circle
+            scope.findings.add(at, "unusable_subtree", f"subtree {given!r} cannot be found ({e})")
+            return None
+        if not any(resolved.is_relative_to(root) for root in (*scope.roots, shipped_root())):
+            option = f"--allow-path {shlex.quote(str(resolved.parent))}"
+            what = f"subtree {given!r} is outside of the mission's folder; {option} allows it"
+            scope.findings.add(at, "subtree_outside", what)
+            return None
+        identity = str(resolved)
     if identity in (*scope.trail, str(scope.file.resolve())) or len(scope.trail) >= MAX_SUBTREE_DEPTH:
         scope.findings.add(at, "subtree_loop", f"subtree {given!r} contains itself or is nested too deep")
         return None
     if given in scope.reading.carried:
         return path, identity, scope.reading.carried[given]
     try:
-        return path, identity, read_yaml(path, shown(path))
-    except (BadInput, ValueError) as e:  # ValueError: a null byte in the name
+        return path, identity, read_named_yaml(path, shown(path), "tree")
+    except BadInput as e:
         near = scope.findings.nearest(given, _subtrees_near(scope))
         scope.findings.add(at, "unusable_subtree", f"subtree cannot be read: {e}", hint=near)
         return None

@@ -11,11 +11,13 @@ from typing import TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
+from glotouch_bt.escaped_text import fault_of_name
 from glotouch_bt.mission.read.fields import validate
 from glotouch_bt.mission.read.library import find_shipped, shown
 from glotouch_bt.mission.read.yaml_source import read_yaml
 from glotouch_bt.mission.spec import Findings, Map, MissionFaults, Node, Place, Seq
 from glotouch_bt.robot import BadInput, Conditions, Container, Holder, ObjectSet, ParamError, Pose, Probe, World
+from glotouch_bt.robot.scene import stl_files
 
 T = TypeVar("T")
 Vec3 = tuple[float, float, float]
@@ -105,6 +107,10 @@ def read_world(node: Node, file: Path, findings: Findings, objects: Path | None 
     if given is None:
         return None
 
+    if fault := fault_of_name(given.world):
+        findings.add((node.get("world") or node).place, "wrong_name", f"world: {fault}")
+        return None
+
     def made(section: str, make: Callable[[], T]) -> T | None:
         try:
             return make()
@@ -141,17 +147,14 @@ def _objects(
 ) -> ObjectSet | None:
     gap, wall_gap = given.min_gap_m, given.min_wall_gap_m
     if override is not None:
-        if not _stems(override):
-            findings.add(Place(f"--objects {override}"), "no_objects", "is not a folder with .stl files in it")
+        if not _stems(override, Place(f"--objects {override}"), "is not a folder with .stl files in it", findings):
             return None
         return ObjectSet(folder=override, min_gap_m=gap, min_wall_gap_m=wall_gap)
     folder = (file.parent / given.folder).resolve()
-    stems = _stems(folder)
     at = node.get("folder") or node
+    what = f"objects.folder {given.folder!r} ({folder}) is not a folder with .stl files"
+    stems = _stems(folder, at.place, what, findings)
     if not stems:
-        findings.add(
-            at.place, "no_objects", f"objects.folder {given.folder!r} ({folder}) is not a folder with .stl files"
-        )
         return None
     before = len(findings)
     written = node.get("names")
@@ -170,8 +173,16 @@ def _objects(
     return ObjectSet(folder=folder, names=given.names, min_gap_m=gap, min_wall_gap_m=wall_gap)
 
 
-def _stems(folder: Path) -> list[str]:
-    return sorted(p.stem for p in folder.iterdir() if p.suffix.lower() == ".stl") if isdir(folder) else []
+def _stems(folder: Path, at: Place, missing: str, findings: Findings) -> list[str]:
+    """Return the names of the objects of a folder; none if that gave a finding (`missing`: what it says)."""
+    try:
+        files = stl_files(folder) if isdir(folder) else {}
+    except BadInput as e:
+        findings.add(at, "unusable_stl", str(e))
+        return []
+    if not files:
+        findings.add(at, "no_objects", missing)
+    return list(files)
 
 
 def _section_place(node: Map, section: str, dotted: str) -> Place:

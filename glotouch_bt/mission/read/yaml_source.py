@@ -13,6 +13,7 @@ from typing import Any
 
 import yaml
 
+from glotouch_bt.escaped_text import fault_of_name, fault_of_text
 from glotouch_bt.mission.spec import Map, Node, Place, Scalar, Seq
 from glotouch_bt.robot import BadInput
 from glotouch_bt.untrusted import read_file
@@ -41,6 +42,21 @@ def read_yaml(path: Path, shown: str | None = None) -> Node:
     shown = shown or str(path)
     data = read_file(path, MAX_BYTES, what="a YAML file", links=True, shown=shown)
     return parse_yaml(data, shown)
+
+
+def read_named_yaml(path: Path, shown: str, key: str) -> Map:
+    """Read a mapping with a certain key from a file that another file names; no message quotes what it holds.
+
+    Raises:
+        BadInput: As `read_yaml`, or the file is something else.
+    """
+    try:
+        node = read_yaml(path, shown)
+    except YamlRefused as e:
+        raise BadInput(e.unquoted) from e
+    if not isinstance(node, Map) or key not in node:
+        raise BadInput(f"{shown}: is something else: it must be a mapping with {key!r}")
+    return node
 
 
 def parse_yaml(data: bytes | str, shown: str) -> Node:
@@ -82,6 +98,23 @@ def _at(text: str, position: int, shown: str) -> str:
     return f"{shown}:{before.count(chr(10)) + 1}:{len(before) - (before.rfind(chr(10)) + 1) + 1}"
 
 
+class YamlRefused(BadInput):
+    """A document that may not be read.
+
+    Args:
+        place: Where.
+        what: What is wrong; `{}` stands for a piece of the document.
+        piece: That piece.
+
+    Attributes:
+        unquoted: The message without the piece, for a file that the user did not name.
+    """
+
+    def __init__(self, place: Place, what: str, piece: str) -> None:
+        super().__init__(f"{place}: {what.format(piece)}")
+        self.unquoted = f"{place}: {what.format('...')}"
+
+
 class _Open:
     """A collection under construction."""
 
@@ -102,7 +135,9 @@ class _Open:
             raise BadInput(f"{key.place}: merge keys (<<) are not allowed")
         if key.value in self.seen:
             first = self.seen[key.value]
-            raise BadInput(f"{key.place}: duplicate key {key.value!r} (first at line {first.line})")
+            raise YamlRefused(key.place, f"duplicate key {{}} (first at line {first.line})", repr(key.value))
+        if key.value and (fault := fault_of_name(key.value)):
+            raise BadInput(f"{key.place}: this key {fault}")
         self.seen[key.value] = key.place
 
     def close(self) -> Node:
@@ -146,26 +181,31 @@ def _place(event: Any, shown: str) -> Place:
 def _refuse(event: Any, shown: str) -> None:
     place = _place(event, shown)
     if isinstance(event, yaml.AliasEvent):
-        raise BadInput(f"{place}: aliases (*{event.anchor}) are not allowed; write the value out")
+        raise YamlRefused(place, "aliases (*{}) are not allowed; write the value out", str(event.anchor))
     if getattr(event, "anchor", None):
-        raise BadInput(f"{place}: anchors (&{event.anchor}) are not allowed; write the value out")
+        raise YamlRefused(place, "anchors (&{}) are not allowed; write the value out", event.anchor)
     if getattr(event, "tag", None):
-        raise BadInput(f"{place}: tags ({event.tag}) are not allowed; only plain values, lists and mappings")
+        raise YamlRefused(place, "tags ({}) are not allowed; only plain values, lists and mappings", event.tag)
 
 
 def _scalar(event: Any, shown: str) -> Scalar:
     place, text = _place(event, shown), event.value
+    if fault := fault_of_text(text):
+        raise BadInput(f"{place}: this text {fault}; a terminal would obey it")
     if event.style not in (None, ""):
         return Scalar(text, place)
     if text in ("", "~", "null", "Null", "NULL"):
         return Scalar(None, place)
     if text in ("true", "True", "TRUE", "false", "False", "FALSE"):
         return Scalar(text.lower() == "true", place)
+    number = float("nan") if _NOT_FINITE.fullmatch(text) else number_of(text)
+    if isinstance(number, float) and not math.isfinite(number):
+        raise YamlRefused(place, "{} is not a finite number", text[:40])
+    return Scalar(text if number is None else number, place)
+
+
+def number_of(text: str) -> int | float | None:
+    """Return the number that a text is, as in YAML and on the command line; None for other text (`1_0`, `0x10`)."""
     if _INT.fullmatch(text):
-        return Scalar(int(text), place)
-    if _FLOAT.fullmatch(text) or _NOT_FINITE.fullmatch(text):
-        number = float("nan") if _NOT_FINITE.fullmatch(text) else float(text)
-        if not math.isfinite(number):
-            raise BadInput(f"{place}: {text[:40]} is not a finite number")
-        return Scalar(number, place)
-    return Scalar(text, place)
+        return int(text)
+    return float(text) if _FLOAT.fullmatch(text) else None

@@ -59,6 +59,12 @@ _KINDS = (
     _Error("unknown_skill", "no skill or node has this name"),
     _Error("unusable_skill", "the skill's module cannot be imported"),
     _Error("unusable_subtree", "the subtree cannot be read"),
+    _Error(
+        "subtree_outside",
+        "the subtree's file is outside of the mission's folder",
+        "a mission from somebody else could show what your files hold",
+        "move the file beside the mission, or allow its folder",
+    ),
     _Error("subtree_loop", "a subtree contains itself", "the tree would have no end"),
     # ports and keys
     _Error("unknown_port", "no such port exists"),
@@ -151,6 +157,12 @@ _KINDS = (
         "a float is compared for equality",
         "measured numbers are hardly ever exactly equal",
         "use at_least and at_most",
+    ),
+    _Warning(
+        "identical_objects",
+        "another object has exactly the shape of the target",
+        "touch cannot tell them apart: no candidate will be accepted, or either of them",
+        "take one of them out of the folder, or choose another target",
     ),
     _Warning("unused_parameter", "no node uses the parameter", "setting it changes nothing"),
     _Warning("unused_subtree", "no node uses the subtree", "it does nothing and is not checked"),

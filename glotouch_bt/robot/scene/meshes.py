@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import io
 from dataclasses import dataclass
-from os.path import isdir, isfile
+from os.path import isfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,7 +27,15 @@ else:
     trimesh = lazy_module("trimesh")
 
 MAX_STL_BYTES = 64_000_000
-"""Largest size of an STL file; a binary one then has 1.3 million triangles."""
+"""Largest size of an STL file; a text of this size has about 250,000 triangles."""
+MAX_TRIANGLES = 300_000
+"""Largest number of triangles of an object. A scan with more shows less than a pad can feel: 1 mm2 each on 0.3 m2."""
+MAX_SHELLS = 1000
+"""Largest number of closed surfaces that make up an object."""
+MAX_ROUNDS = 100
+"""Rounds of label propagation, which halve the distances; more are given to the thorough check."""
+SIZE_DECIMALS = 6
+"""Decimals of a metre to which sizes are compared and shown, because files of 32 bit floats are no more exact."""
 MIN_SIZE_M = 0.005
 """Least size of an object along any axis of its file."""
 MAX_SIZE_M = 0.30
@@ -71,16 +79,30 @@ class Mesh:
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
+def read_stl(path: Path) -> bytes:
+    """Return the content of an STL file of bounded size.
+
+    Raises:
+        BadInput: It cannot be read or is too large.
+    """
+    return read_file(path, MAX_STL_BYTES, what="an STL file", links=True)
+
+
+def triangles_of(data: bytes) -> npt.NDArray[np.void] | None:
+    """Return the triangles of a binary STL, or None if it is none."""
+    count = int.from_bytes(data[80:84], "little")
+    return np.frombuffer(data, _FACET, offset=84) if len(data) == 84 + _FACET.itemsize * count else None
+
+
 def is_sound_stl(path: Path) -> bool:
     """Return True if a binary STL is surely a solid that `load_mesh` accepts: closed, in one piece, of a valid size.
 
     False leaves the verdict to `load_mesh`. This takes milliseconds and only numpy.
     """
-    data = read_file(path, MAX_STL_BYTES, what="an STL file", links=True)
-    count = int.from_bytes(data[80:84], "little")
-    if count < 4 or len(data) != 84 + _FACET.itemsize * count:
+    triangles = triangles_of(read_stl(path))
+    if triangles is None or not 4 <= len(triangles) <= MAX_TRIANGLES:
         return False
-    corners = np.frombuffer(data, _FACET, offset=84)["corners"].astype(np.float64)
+    count, corners = len(triangles), triangles["corners"].astype(np.float64)
     if not np.isfinite(corners).all():
         return False
     size = np.ptp(corners.reshape(-1, 3), axis=0)
@@ -101,13 +123,15 @@ def is_sound_stl(path: Path) -> bool:
 
 
 def _in_one_piece(start: npt.NDArray[np.intp], end: npt.NDArray[np.intp]) -> bool:
-    """Return True if edges connect all vertices. Each vertex takes the least label beside it until none changes."""
-    label, before = np.arange(start.max() + 1), None
-    while before is None or (label != before).any():
+    """Return True if edges surely connect all vertices. Each takes the least label beside it until none changes."""
+    label = np.arange(start.max() + 1)
+    for _ in range(MAX_ROUNDS):
         before = label.copy()
         np.minimum.at(label, start.ravel(), before[end.ravel()])
         label = label[label]
-    return not label.any()
+        if np.array_equal(label, before):
+            return not label.any()
+    return False
 
 
 def load_mesh(path: Path) -> Mesh:
@@ -122,11 +146,11 @@ def load_mesh(path: Path) -> Mesh:
     """
     if not isfile(path):
         raise BadInput(f"{path}: no such STL file")
-    data = io.BytesIO(read_file(path, MAX_STL_BYTES, what="an STL file", links=True))
+    data = _bounded(path, read_stl(path))
     try:
-        mesh = trimesh.load_mesh(data, file_type="stl", process=True)
-    except Exception as e:  # trimesh raises many kinds on a broken file
-        raise BadInput(f"{path}: not a readable STL ({e})") from e
+        mesh = trimesh.load_mesh(io.BytesIO(data), file_type="stl", process=True)
+    except Exception as e:  # trimesh raises many kinds on a broken file; their texts may quote it
+        raise BadInput(f"{path}: {UNREADABLE}") from e
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) < 4:
         raise BadInput(f"{path}: holds no solid (fewer than 4 triangles)")
     if not np.isfinite(mesh.vertices).all():
@@ -145,17 +169,42 @@ def load_mesh(path: Path) -> Mesh:
     return Mesh(path.stem, vertices, faces, digest)
 
 
+UNREADABLE = "is not a readable STL file; export it again as a binary STL in metres"
+
+
+def _bounded(path: Path, data: bytes) -> bytes:
+    """Return a file of bounded length as a reader may take it: a binary STL as it is, a text without odd characters.
+
+    Raises:
+        BadInput: It has too many triangles, or is neither a binary STL nor a text.
+    """
+    triangles = triangles_of(data)
+    if triangles is not None:
+        count = len(triangles)
+    else:
+        words = data.lower()
+        if b"endsolid" not in words:
+            raise BadInput(f"{path}: {UNREADABLE}")
+        count = words.count(b"vertex") // 3
+        data = data.decode("ascii", "replace").encode()
+    if count > MAX_TRIANGLES:
+        raise BadInput(
+            f"{path}: has {count} triangles; at most {MAX_TRIANGLES} are allowed: simplify it in a mesh editor"
+        )
+    return data
+
+
 def _require_size(path: Path, mesh: trimesh.Trimesh) -> None:
-    thickness, largest = float(mesh.extents.min()), float(mesh.extents.max())
+    thickness, largest = (round(float(size), SIZE_DECIMALS) for size in (mesh.extents.min(), mesh.extents.max()))
     if largest > MAX_SIZE_M:
         fitting = {u: f for u, f in _UNITS_M.items() if thickness * f >= MIN_SIZE_M and largest * f <= MAX_SIZE_M}
         hint = "; ".join(f"in {u}? then scale it by {f:g} to {largest * f:.3g} m" for u, f in fitting.items())
         raise BadInput(
-            f"{path}: is {largest:.3g} m large; STL files must be in METRES and at most {MAX_SIZE_M} m"
+            f"{path}: is {largest:.7g} m large; STL files must be in METRES and at most {MAX_SIZE_M} m"
             + (f" ({hint})" if hint else "")
         )
     if thickness < MIN_SIZE_M:
-        raise BadInput(f"{path}: is only {thickness:.3g} m thick; at least {MIN_SIZE_M} m is needed")
+        raise BadInput(f"{path}: is only {thickness:.6g} m thick; at least {MIN_SIZE_M} m is needed")
 
 
 def _close(path: Path, mesh: trimesh.Trimesh) -> None:
@@ -207,44 +256,14 @@ def _require_one_body(path: Path, mesh: trimesh.Trimesh) -> None:
     if mesh.body_count == 1:
         return
     label = trimesh.graph.connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces))
-    corners = [mesh.triangles[label == i].reshape(-1, 3) for i in range(label.max() + 1)]
-    low, high = np.array([c.min(axis=0) for c in corners]), np.array([c.max(axis=0) for c in corners])
+    shells = int(label.max()) + 1
+    if shells > MAX_SHELLS:
+        raise BadInput(f"{path}: holds {shells} separate bodies; one object per file")
+    low, high = np.full((shells, 3), np.inf), np.full((shells, 3), -np.inf)
+    np.minimum.at(low, label, mesh.triangles.min(axis=1))
+    np.maximum.at(high, label, mesh.triangles.max(axis=1))
     rows, columns = np.nonzero((low[:, None] <= high[None]).all(axis=2) & (high[:, None] >= low[None]).all(axis=2))
     graph = scipy.sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(low), len(low)))
     count = int(scipy.sparse.csgraph.connected_components(graph, directed=False)[0])
     if count > 1:
         raise BadInput(f"{path}: holds {count} separate bodies; one object per file")
-
-
-def stl_files(folder: Path) -> dict[str, Path]:
-    """Return the STL files of a folder by the name of their object, sorted.
-
-    Raises:
-        BadInput: There is no such folder, two files have the same name of an object, or a name has control characters.
-    """
-    if not isdir(folder):
-        raise BadInput(f"{folder}: no such folder of STL files")
-    files: dict[str, Path] = {}
-    for path in sorted(folder.iterdir()):
-        if path.suffix.lower() != ".stl":
-            continue
-        if path.stem in files:
-            both = f"{files[path.stem].name} and {path.name}"
-            raise BadInput(f"{folder}: {both} are two files for one object; rename one of them")
-        files[path.stem] = path
-    return files
-
-
-def load_folder(folder: Path, names: tuple[str, ...] = ()) -> list[Mesh]:
-    """Load every STL of a folder, sorted by name, or the named files in order.
-
-    Raises:
-        BadInput: The folder is missing or empty, a name is not in it, or a file is unusable.
-    """
-    files = stl_files(folder)
-    if not files:
-        raise BadInput(f"{folder}: holds no .stl file")
-    missing = [n for n in names if n not in files]
-    if missing:
-        raise BadInput(f"{folder}: has no {', '.join(missing)} (it has {', '.join(files)})")
-    return [load_mesh(files[n]) for n in (names or tuple(files))]

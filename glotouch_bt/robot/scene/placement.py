@@ -21,6 +21,8 @@ MAX_TRIES_PER_OBJECT = 400
 """Number of poses to try for one object before a restart."""
 MAX_RESTARTS = 60
 """Number of layouts to try."""
+ROUNDING_M = 1e-9
+"""Bound of the rounding errors of a distance."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,7 @@ def _place_all(
 ) -> list[Placement] | int:
     """Try to place all outlines in the given order; return the index that does not fit if it fails."""
     done: list[Placement] = []
-    polygons: list[Array] = []
+    placed: list[tuple[Array, Placement, float]] = []
     limit = half - min_wall_gap_m
     for i, shape in enumerate(outlines):
         reach = float(np.linalg.norm(shape, axis=1).max())
@@ -86,9 +88,14 @@ def _place_all(
             polygon = transformed(shape, place)
             if (np.abs(polygon) > limit).any():
                 continue
-            if all(gap(polygon, other) >= min_gap_m for other in polygons):
+            clear = (
+                np.hypot(x - there.x_m, y - there.y_m) - reach - far > min_gap_m + ROUNDING_M
+                or gap(polygon, other) >= min_gap_m
+                for other, there, far in placed
+            )
+            if all(clear):
                 done.append(place)
-                polygons.append(polygon)
+                placed.append((polygon, place, reach))
                 break
         else:
             return i
@@ -116,20 +123,26 @@ def place_objects(
     """
     outlines = [outline(m) for m in meshes]
     half = 0.5 * np.array(interior_m)
-    areas = [scipy.spatial.ConvexHull(o).volume for o in outlines]  # in the plane, scipy's volume is the area
+    hulls = [scipy.spatial.ConvexHull(o) for o in outlines]
+    areas = [h.volume for h in hulls]  # in the plane, scipy's volume is the area and its area the circumference
     order = sorted(range(len(meshes)), key=lambda i: (-areas[i], i))
-    failed = 0
-    for _ in range(MAX_RESTARTS):
-        result = _place_all([outlines[i] for i in order], half, min_gap_m, min_wall_gap_m, rng)
-        if isinstance(result, list):
-            places: list[Placement] = [result[0]] * len(meshes) if result else []
-            for i, place in zip(order, result, strict=True):
-                places[i] = place
-            return places
-        failed = max(failed, result)
-    name = meshes[order[failed]].name
+    # Outlines grown by half a gap do not overlap, and stay inside the walls' gap less half a gap.
+    r = 0.5 * min_gap_m
+    needed = np.cumsum([areas[i] + hulls[i].area * r + np.pi * r * r for i in order])
+    there = float(np.prod(np.maximum(2.0 * (half - min_wall_gap_m + r), 0.0))) * (1.0 + ROUNDING_M)
+    failed = int((needed <= there).sum())
+    if failed == len(meshes):
+        failed = 0
+        for _ in range(MAX_RESTARTS):
+            result = _place_all([outlines[i] for i in order], half, min_gap_m, min_wall_gap_m, rng)
+            if isinstance(result, list):
+                places: list[Placement] = [result[0]] * len(meshes) if result else []
+                for i, place in zip(order, result, strict=True):
+                    places[i] = place
+                return places
+            failed = max(failed, result)
     raise BadInput(
-        f"{len(meshes)} objects do not fit into the container: no place found for {name!r} in {MAX_RESTARTS} layouts "
+        f"{len(meshes)} objects do not fit into the container: no place found for {meshes[order[failed]].name!r} "
         f"(outlines cover {sum(areas) * 1e4:.0f} of {interior_m[0] * interior_m[1] * 1e4:.0f} cm2, gaps of "
         f"{min_gap_m * 1e3:.0f} mm between objects and {min_wall_gap_m * 1e3:.0f} mm to walls asked); "
         "use fewer or smaller objects, smaller gaps or a larger container"

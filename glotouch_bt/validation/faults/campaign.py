@@ -14,8 +14,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from glotouch_bt.escaped_text import finite
 from glotouch_bt.faults import FaultPlan
-from glotouch_bt.json_text import finite
 from glotouch_bt.robot import BadInput, Limits, ObjectSet
 from glotouch_bt.robot.scene import load_folder, stl_files
 from glotouch_bt.runs import (

@@ -119,7 +119,9 @@ def _spec(text: str) -> tuple[NodeSpec, Findings]:
     parameters = read_parameters(source.get("parameters"), {}, findings, None)
     tree = source.get("tree")
     assert tree is not None
-    spec = parse_tree(substitute(tree, parameters, findings), Scope(SkillRegistry(), findings, Path("m.yaml")))
+    spec = parse_tree(
+        substitute(tree, parameters, findings), Scope(SkillRegistry(), findings, Path("m.yaml"), (Path().resolve(),))
+    )
     number_names(spec)
     return spec, findings
 

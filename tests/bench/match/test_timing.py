@@ -9,7 +9,7 @@ import numpy as np
 from glotouch_bt.bench.match.dataset import Layout, Touched
 from glotouch_bt.bench.match.timing import time_matching
 from glotouch_bt.perception.recognition import PadSpec
-from glotouch_bt.robot.scene.meshes import load_folder
+from glotouch_bt.robot.scene import load_folder
 from tests.support.acquisition import NOMINAL, acquire
 
 

@@ -14,7 +14,7 @@ import pytest
 from glotouch_bt.bench.match.summary import calibration, column_decisions, loss_matrix, separation, summarise
 from glotouch_bt.bench.match.trials import decide, pose_errors, signed_margin, symmetries_rad
 from glotouch_bt.perception.recognition import Match
-from glotouch_bt.robot.scene.meshes import load_folder
+from glotouch_bt.robot.scene import load_folder
 from tests.bench.match.conftest import a_layout, by_size
 
 HERE, THERE = Path("here"), Path("there")

@@ -9,7 +9,7 @@ from glotouch_bt.bench.planar import ContactModel, planar_world
 from glotouch_bt.bench.planar.explore import explore, refine_all
 from glotouch_bt.mission.load import load_mission
 from glotouch_bt.perception.search import search_policy
-from glotouch_bt.robot.scene.meshes import load_folder
+from glotouch_bt.robot.scene import load_folder
 from glotouch_bt.robot.scene.placement import draw_layout
 from tests.bench.planar.conftest import WorldOf, centres_of, cylinder
 

@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 
 from glotouch_bt.bench.planar import felt_section
 from glotouch_bt.perception.touch import area_and_centroid, minimum_rectangle
-from glotouch_bt.robot.scene.meshes import load_folder
+from glotouch_bt.robot.scene import load_folder
 from tests.bench.planar.conftest import TIP, box, cylinder, mushroom
 
 EXACT_M = 0.00005

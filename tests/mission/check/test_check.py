@@ -136,7 +136,7 @@ def test_set_overrides_are_typed_and_ranged(load: Callable[..., Any]) -> None:
     assert mission.spec.params is not None
     assert mission.spec.params.model_dump() == {"how_many": 4, "speed_m_s": 0.05, "mode": "fast"}
     assert mission.document["parameters"]["n"]["default"] == 4
-    for name, value, word in (("n", "9", "[1, 5]"), ("n", "2.0", "whole"), ("t", "nobody", "unknown object"), ("b", "maybe", "true or false"), ("v", "inf", "finite"), ("v", "4 N", "not 'N'")):  # fmt: skip
+    for name, value, word in (("n", "9", "[1, 5]"), ("n", "2.0", "whole"), ("t", "nobody", "unknown object"), ("b", "maybe", "true or false"), ("v", "inf", "must be a number"), ("n", "1_0", "whole"), ("v", "1_0", "must be a number"), ("v", "4 N", "not 'N'")):  # fmt: skip
         with pytest.raises(BadInput, match=f"--set {name}: ") as e:
             load(text, **{name: value})
         assert word in str(e.value)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+import trimesh
 from typer.testing import CliRunner
 
 from glotouch_bt.cli import app
@@ -39,6 +40,7 @@ EXAMPLES = {
     "no_objects": WORLD,
     "unusable_stl": HEAD + "parameters:\n  t: {type: stl, default: flat.stl}\ntree:\n  - match: {target: $t}\n",
     "too_large": HEAD + "tree: [" + "bare_hand, " * 3001 + "]\n",
+    "subtree_outside": HEAD + "tree: {subtree: {file: /etc/shadow}}\n",
     "subtree_loop": HEAD + "tree: {subtree: {file: round}}\nsubtrees:\n  round: {tree: {subtree: {file: round}}}\n",
     "written_twice": HEAD + "tree:\n  - parallel: [tool_pickup, {tool_calibrate: {out: {tool: tool}}}]\n",
     "unknown_state": HEAD.replace("[probe, empty]", "[probe, empti]") + "tree: [tool_pickup]\n",
@@ -46,6 +48,8 @@ EXAMPLES = {
     "renamed": HEAD + "tree: [bare_hand, guarded_sweep, {orbit_probe: {least_contacts: 4}}]\n",
     "input_never_written": HEAD + "tree: [bare_hand, guarded_sweep, orbit_probe, {match: {target: apple}}]\n",
     "not_put_back": "mission: m\nworld: worlds/container_five.yaml\ntree: [tool_pickup]\n",
+    "identical_objects": WORLD.replace("nowhere", "twins").replace("[bare_hand]", "{match: {target: $t}}")
+    + "parameters: {t: {type: stl, default: one}}\n",
     "never_succeeds": HEAD + "tree: {fail: bare_hand}\n",
     "never_fails": HEAD + "tree: {succeed: bare_hand}\n",
     "unused_subtree": HEAD + "tree: [bare_hand]\nsubtrees:\n  other: {tree: bare_hand}\n",
@@ -59,6 +63,9 @@ ELSEWHERE = {"unreadable", "unusable_skill", "unknown_fault", "unknown_node"}
 def test_each_example_raises_its_finding(code: str, tmp_path: Path, found_in: Callable[..., list[Finding]]) -> None:
     (tmp_path / "broken.yaml").write_text("a: [")
     (tmp_path / "flat.stl").write_bytes(b"solid\nendsolid\n")
+    (tmp_path / "twins").mkdir()
+    for name in ("one", "two"):
+        trimesh.creation.box((0.05, 0.04, 0.06)).export(tmp_path / "twins" / f"{name}.stl")
     text = EXAMPLES[code].replace("flat.stl", str(tmp_path / "flat.stl"))
     assert code in {f.code for f in found_in(text, every=True)}
 

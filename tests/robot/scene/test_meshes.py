@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from glotouch_bt.robot import BadInput
-from glotouch_bt.robot.scene.meshes import is_sound_stl, load_folder, load_mesh
+from glotouch_bt.robot.scene import is_sound_stl, load_folder, load_mesh
 
 SIZE = np.array([0.06, 0.04, 0.05])
 

@@ -22,7 +22,7 @@ from glotouch_backends.mujoco.hulls.convex_parts import trimmed_hull
 from glotouch_backends.mujoco.hulls.decompose import KEY, MAX_VERTICES, load_hulls
 from glotouch_backends.mujoco.hulls.feet import FOOT_PROTRUSION_M, FOOT_RADIUS_M, MAX_FEET, foot_centres
 from glotouch_backends.mujoco.hulls.files import Parts, decode, encode, read_parts, user_folder
-from glotouch_bt.robot.scene.meshes import Mesh, load_folder, load_mesh
+from glotouch_bt.robot.scene import Mesh, load_folder, load_mesh
 
 
 @pytest.fixture(autouse=True)
