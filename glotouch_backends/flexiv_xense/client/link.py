@@ -69,7 +69,11 @@ class DriverLink:
         self._address, self._keys = address, keys
         self._context = zmq.Context()
         self._name = uuid.uuid4().hex.encode()  # hex: it never ends with HEARTBEAT_SUFFIX or begins with a zero byte
-        self._socket = self._connect(self._name)
+        try:
+            self._socket = self._connect(self._name)
+        except BaseException:
+            self._context.term()
+            raise
         self.slow_request = False
         self._number = 0
         self._stop = threading.Event()
@@ -82,15 +86,14 @@ class DriverLink:
         socket.setsockopt(zmq.LINGER, 200)
         socket.setsockopt(zmq.IDENTITY, name)
         socket.setsockopt(zmq.MAXMSGSIZE, messages.MAX_ANSWER_BYTES)
-        if self._keys is not None:
-            try:
+        try:
+            if self._keys is not None:
                 socket.curve_publickey, socket.curve_secretkey = load_secret_key(self._keys / "client.key_secret")
                 socket.curve_serverkey, _ = zmq.auth.load_certificate(self._keys / "driver.key")
-            except (OSError, ValueError) as e:
-                socket.close()
-                self._context.term()
-                raise BadInput(f"option keys: {e}") from e
-        socket.connect(self._address)
+            socket.connect(self._address)
+        except (OSError, ValueError, zmq.ZMQError) as e:
+            socket.close()
+            raise BadInput(f"options driver and keys: no connection to {self._address} can be made ({e})") from e
         return socket
 
     def number(self) -> int:

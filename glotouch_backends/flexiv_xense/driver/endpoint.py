@@ -77,6 +77,9 @@ class DriverSocket:
                 self._guard.start()
                 self._guard.configure_curve(domain="*", location=str(keys / "clients"))
             self._socket.bind(address)
+        except zmq.ZMQError as e:
+            self.close()
+            raise OSError(f"{address}: {e.strerror}") from e
         except BaseException:
             self.close()
             raise

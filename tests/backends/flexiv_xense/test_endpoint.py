@@ -241,6 +241,19 @@ def test_simulated_devices_are_not_served_on_the_network(keys: Path, capsys: pyt
         assert "ipc:// only" in capsys.readouterr().err
 
 
+def test_unusable_addresses_and_keys_are_named(keys: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for address in ("nonsense", "tcp://", "udp://x:1"):
+        with pytest.raises(BadInput, match="no connection to"):
+            DriverLink(address, lambda: None, paced=False)
+    for name in ("client/driver.key", "client/client.key_secret", "driver/driver.key_secret"):
+        (keys / name).write_text('metadata\ncurve\n    public-key = "short"\n    secret-key = "short"\n')
+    with pytest.raises(BadInput, match="no connection to"):
+        DriverLink("tcp://127.0.0.1:48656", lambda: None, paced=False, keys=keys / "client")
+    assert main(["--address", "tcp://127.0.0.1:48656", "--keys", str(keys / "driver")]) == 2
+    assert main(["--address", "ipc://" + "x" * 200]) == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
 def test_a_driver_needs_usable_keys(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--address", "tcp://127.0.0.1:48657", "--keys", str(tmp_path)]) == 2
     assert "driver.key_secret" in capsys.readouterr().err
