@@ -89,10 +89,17 @@ def trial_message(world: World, conditions: Conditions, seed: int, options: Worl
         seed=seed,
         options=options,
     )
-    message = msgspec.msgpack.encode(data)
+    message = msgspec.msgpack.encode(data, enc_hook=_plain_number)
     if len(message) > MAX_MESSAGE_BYTES:
         raise _too_large(objects.folder)
     return message
+
+
+def _plain_number(value: object) -> object:
+    """Return a number of numpy as one of Python."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise BadInput(f"a simulated world cannot hold a {type(value).__name__} ({value!r:.100})")
 
 
 def _too_large(folder: Path) -> BadInput:

@@ -101,3 +101,13 @@ def test_missing_objects_are_named(tmp_path: Path) -> None:
         trial_message(with_objects(tmp_path / "none"), load_conditions("nominal"), 0, OPTIONS)
     with pytest.raises(BadInput, match="has no "):
         trial_message(with_objects(tmp_path), load_conditions("nominal"), 0, OPTIONS)
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    size = tuple(np.array(WORLD.container.interior_m))
+    world = dataclasses.replace(WORLD, container=dataclasses.replace(WORLD.container, interior_m=size))
+    conditions = dataclasses.replace(load_conditions("nominal"), force_noise_sd_N=np.float64(0.5))
+    with trial_of_message(trial_message(world, conditions, np.int64(3), OPTIONS)) as (back, its, seed, _):  # type: ignore[arg-type]
+        assert (back.container.interior_m, its.force_noise_sd_N, seed) == (size, 0.5, 3)
+    with pytest.raises(BadInput, match="cannot hold a"):
+        trial_message(world, dataclasses.replace(conditions, name=object()), 3, OPTIONS)  # type: ignore[arg-type]

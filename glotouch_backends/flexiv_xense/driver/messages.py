@@ -357,6 +357,13 @@ def _reader(kind: Any) -> Callable[[bytes], Any]:
     return read
 
 
-encode = msgspec.msgpack.Encoder().encode
+def _plain_number(value: Any) -> object:
+    """Return a number of numpy as one of Python."""
+    if not hasattr(value, "item"):
+        raise TypeError(f"a {type(value).__name__} cannot be sent")
+    return value.item()
+
+
+encode = msgspec.msgpack.Encoder(enc_hook=_plain_number).encode
 decode_request = _reader(Request)
 decode_answer = _reader(Answer)
