@@ -58,7 +58,7 @@ def test_a_device_that_dies_or_hangs_ends_the_run_with_a_result(
         start(self, trial)
 
     def hit(robot_s: float, summary: RunSummary) -> None:
-        if robot_s > 1.0:
+        if robot_s > 0.3:
             os.kill(getattr(started[0], victim).pid, number)
 
     monkeypatch.setattr(DriverProcess, "start", noted)
