@@ -224,8 +224,9 @@ def _find_resumable(
     if path and row is None:
         _require_inputs(mission, path, file.state(rows[-1].number))
     leads, conditions = row is not None, conditions_of(run["conditions"], f"{folder}: conditions")
-    before = tuple(run["resumed"])
-    return ResumableRun(folder, file, row or rows[-1], mission, path, leads, conditions, request, before, notes)
+    chosen, before = row or rows[-1], tuple(run["resumed"])
+    file.state(chosen.number), file.world(chosen.number)  # raise before anything is opened
+    return ResumableRun(folder, file, chosen, mission, path, leads, conditions, request, before, notes)
 
 
 def _stored(file: CheckpointFile) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from glotouch_bt.commands import shared
 
 @shared.guarded
 def fuzz(
-    kind: Annotated[str, typer.Option(help="what is fuzzed: missions (with fault plans) or meshes")] = "missions",
+    kind: Annotated[str, typer.Option(help="what is fuzzed: missions (with fault plans), meshes or runs")] = "missions",
     trials: Annotated[int, typer.Option(min=1, help="number of inputs")] = 20_000,
     seed: shared.FirstSeed = 0,
     workers: shared.Workers = 2,

@@ -15,9 +15,10 @@ from glotouch_bt.runs import OnRow, Task, gather, silent, write_summary
 from glotouch_bt.validation.fuzz.kind import BAD, FuzzKind
 from glotouch_bt.validation.fuzz.meshes import MeshKind
 from glotouch_bt.validation.fuzz.missions import MissionKind
+from glotouch_bt.validation.fuzz.runs import RunKind
 from glotouch_bt.validation.fuzz.trial import MAX_DURATION_S, Result, run_trials, stream_of
 
-KINDS: dict[str, FuzzKind] = {kind.name: kind for kind in (MissionKind(), MeshKind())}
+KINDS: dict[str, FuzzKind] = {kind.name: kind for kind in (MissionKind(), MeshKind(), RunKind())}
 """Every kind by its name; a new kind is registered here."""
 CHUNK = 50
 """Trials of one task."""
