@@ -52,7 +52,7 @@ class Wait(Skill):
 
 class NullArm:
     def __init__(self, *args: Any) -> None:
-        pass
+        self.not_run: list[str] = []
 
     def sync(self, observation: Observation) -> None:
         pass

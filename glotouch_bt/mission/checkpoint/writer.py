@@ -188,13 +188,9 @@ class CheckpointHooks:
         if point is not None:
             try:
                 self._restored = restore(run, point)
-            except BadInput:
-                raise
             except (GlotouchError, *UNFIT) as e:
-                raise BadInput(
-                    f"checkpoint {point.number} cannot be restored ({type(e).__name__}: {e}): it is damaged or of "
-                    "another version; run the mission again"
-                ) from e
+                why = str(e) if isinstance(e, BadInput) else f"{type(e).__name__}: {e}"
+                raise BadInput(f"checkpoint {point.number} cannot be restored ({why}); run the mission again") from e
             point.on_restored()
             if not point.same_world:
                 self.world_check = world_check(run.tree, run.context, point.start)

@@ -120,7 +120,7 @@ def test_a_path_to_objects_is_given_again(run: Path, base: Path, tmp_path: Path)
     describe(run, objects="/somewhere")
     assert "--objects DIR" in refused("resume", run)
     assert left_alone(run, base)
-    assert "no_objects" in refused("resume", run, "--objects", tmp_path)
+    assert "is not a folder with .stl files" in refused("resume", run, "--objects", tmp_path)
 
 
 def test_no_path_of_a_request_is_opened(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
