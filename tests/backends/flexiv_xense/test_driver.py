@@ -7,17 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from glotouch_backends.flexiv_xense.client.backend import FlexivXenseBackend
-from glotouch_backends.flexiv_xense.client.link import failure
-from glotouch_backends.flexiv_xense.client.options import read_options
-from glotouch_backends.flexiv_xense.driver import messages
-from glotouch_backends.flexiv_xense.driver.devices import Served, connect_devices
 from glotouch_backends.flexiv_xense.driver.faults import DeviceFault
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import (
     HOLD,
     BackendError,
-    BadInput,
     Command,
     GripperTarget,
     JointSetpoint,
@@ -352,31 +346,6 @@ def test_closing_stops_the_arm_and_releases_everything(open_robot: Open) -> None
         robot.cycle(HOLD)
 
 
-@pytest.mark.parametrize(
-    ("kind", "world", "served"),
-    [
-        ("simulated", b"", Served()),
-        ("real", b"a world", Served()),
-        ("real", b"", Served("simulated")),
-        ("simulated", b"a world", Served("cell", "socket")),
-    ],
-)
-def test_a_client_cannot_choose_the_devices(kind: str, world: bytes, served: Served) -> None:
-    """They are those of the driver's command line; a driver for real devices builds no world."""
-    options, settings = read_options({"devices": kind, "robot": "Rizon4-000001"})
-    request = FlexivXenseBackend()._request(options, settings, world, 1, True)
-    with pytest.raises(DeviceFault, match=f"serves {served.kind} devices only"):
-        connect_devices(request, served, lambda _: None)
-
-
-def test_a_world_that_cannot_be_built_is_bad_input() -> None:
-    options, settings = read_options({"devices": "simulated"})
-    request = FlexivXenseBackend()._request(options, settings, b"rubbish", 1, True)
-    with pytest.raises(DeviceFault, match="cannot be read from its message") as e:
-        connect_devices(request, Served("simulated"), lambda _: None)
-    assert isinstance(failure(e.value.answer(1)), BadInput)
-
-
 def test_an_unknown_version_is_refused() -> None:
     from glotouch_backends.flexiv_xense.driver.devices.connect import api_of
 
@@ -384,29 +353,3 @@ def test_an_unknown_version_is_refused() -> None:
         api_of(SimpleNamespace(__version__="2.1.0"), "")
     assert api_of(SimpleNamespace(__version__="1.9.4.1"), "").api == "1.9"
     assert api_of(SimpleNamespace(__version__="2.0.0"), "").api == "2.0"
-
-
-def test_no_request_ends_the_driver(open_robot: Open) -> None:
-    """Neither damaged bytes nor requests with extreme numbers: the driver answers, and its client can still hold."""
-    robot = open_robot(ScriptedVendor())
-    rng = np.random.default_rng(0)
-    extremes = [float("nan"), float("inf"), -1e308, 0.0, 5e-324]
-    seeds = [
-        messages.Cycle(number=1, setpoint=messages.Setpoint(tuple(HOME.tolist()), (0.0,) * 7, (0.0,) * 7, (0.0,) * 6)),
-        messages.Cycle(number=2, jaws=messages.JawTarget(0.05, 0.05, 10.0), tactile=True),
-        *(messages.Cycle(number=3, jaws=messages.JawTarget(e, e, e)) for e in extremes),
-        *(messages.Cycle(number=3, setpoint=messages.Setpoint(*((e,) * 7,) * 4)) for e in extremes),
-        messages.PayloadRequest(number=4, ticket=4, mass_kg=-1e308, com_P_m=(float("nan"),) * 3),
-        messages.TareRequest(number=5, ticket=5, duration_s=5e-324),
-        messages.RefereeRequest(number=6, method="objects"),
-        messages.HoldRequest(number=7),
-    ]
-    for trial in range(1500):
-        body = bytearray(messages.encode(seeds[trial % len(seeds)]))
-        for _ in range(trial // len(seeds) % 4):
-            body[rng.integers(len(body))] = rng.integers(256)
-        robot.link._socket.send(bytes(body))
-    link = robot.link
-    link._socket.send(messages.encode(messages.HoldRequest(number=10**9)))
-    answers = iter(lambda: link._receive(5.0), None)
-    assert any(getattr(a, "number", 0) == 10**9 for a in answers)
