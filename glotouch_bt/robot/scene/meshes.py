@@ -27,7 +27,7 @@ else:
     trimesh = lazy_module("trimesh")
 
 MAX_STL_BYTES = 64_000_000
-"""Largest size of an STL file; a text of this size has about 250,000 triangles."""
+"""Largest size of an STL file; a text of this size has about 200,000 triangles."""
 MAX_TRIANGLES = 300_000
 """Largest number of triangles of an object. A scan with more shows less than a pad can feel: 1 mm2 each on 0.3 m2."""
 MAX_SHELLS = 1000

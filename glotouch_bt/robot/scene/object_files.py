@@ -58,6 +58,8 @@ def twins_of(target: str, objects: ObjectSet) -> tuple[str, ...]:
     Raises:
         BadInput: A file cannot be read.
     """
+    if not isdir(objects.folder):
+        return ()
     files = stl_files(objects.folder)
     path = Path(target) if target.lower().endswith(".stl") else files[target]
     shape = _shape(path)

@@ -21,6 +21,10 @@ MAX_TRIES_PER_OBJECT = 400
 """Number of poses to try for one object before a restart."""
 MAX_RESTARTS = 60
 """Number of layouts to try."""
+HOPELESS_AFTER = 10
+"""Number of layouts after which to give up if none had room for `HOPELESS_SHARE` of the objects."""
+HOPELESS_SHARE = 0.75
+"""See `HOPELESS_AFTER`."""
 ROUNDING_M = 1e-9
 """Bound of the rounding errors of a distance."""
 
@@ -133,7 +137,9 @@ def place_objects(
     failed = int((needed <= there).sum())
     if failed == len(meshes):
         failed = 0
-        for _ in range(MAX_RESTARTS):
+        for n in range(MAX_RESTARTS):
+            if n >= HOPELESS_AFTER and failed <= HOPELESS_SHARE * len(meshes):
+                break
             result = _place_all([outlines[i] for i in order], half, min_gap_m, min_wall_gap_m, rng)
             if isinstance(result, list):
                 places: list[Placement] = [result[0]] * len(meshes) if result else []

@@ -7,7 +7,11 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
+from glotouch_bt.robot import BadInput
 from glotouch_bt.validation.kill_resume import KillStudy, run_study, summarise
+from tests.support.fake_cli import install_fakes
 
 FAKE_CLI = Path(__file__).parents[2] / "support" / "fake_cli.py"
 MISSION = """mission: m
@@ -20,7 +24,8 @@ tree:
 """
 
 
-def test_a_killed_run_is_compared_with_its_twin(tmp_path: Path) -> None:
+def test_a_killed_run_is_compared_with_its_twin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install_fakes(monkeypatch.setattr)
     (tmp_path / "m.yaml").write_text(MISSION)
     study = KillStudy(
         mission=str(tmp_path / "m.yaml"),
@@ -43,6 +48,8 @@ def test_a_killed_run_is_compared_with_its_twin(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "out" / "summary.json").read_text()) == json.loads(json.dumps(summary))
     again = run_study(replace(study, resume=True, words=("false",)))
     assert again["same_record"] == summary["same_record"], "nothing was run again"
+    with pytest.raises(BadInput, match="made otherwise: conditions"):
+        run_study(replace(study, resume=True, conditions="harsh"))
 
 
 def test_a_moment_outside_the_mission_is_no_kill() -> None:

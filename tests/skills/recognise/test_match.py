@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -75,6 +76,19 @@ def test_match__not_recognised(make, touchsets) -> None:
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "not_recognised")
     assert len(skill.ranking.matches) == 2
     assert skill.reason.message.startswith("no candidate is surely block: ")
+
+
+def test_an_identical_object_is_named(make, touchsets, folder, tmp_path) -> None:
+    """The box holds a second block under another name: the reasons say that touch cannot tell them apart."""
+    for name in ("block", "can"):
+        shutil.copyfile(folder / f"{name}.stl", tmp_path / f"{name}.stl")
+    shutil.copyfile(folder / "block.stl", tmp_path / "brick.stl")
+    twin = replace(touchsets[0], candidate=replace(touchsets[0].candidate, index=1))
+    b, skill = make("block", (touchsets[0], twin))
+    b.context.world = replace(b.world, objects=replace(b.world.objects, folder=tmp_path))
+    b.run(skill)
+    assert skill.ranking.reasons[-1] == "brick has exactly the shape of the target"
+    assert "brick has exactly the shape of the target" in skill.reason.message
 
 
 def test_broken_off(make, touchsets) -> None:
