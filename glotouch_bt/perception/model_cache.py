@@ -151,7 +151,8 @@ def _table(raw: npt.NDArray[np.uint8], t: Mapping[str, Any]) -> npt.NDArray[Any]
     piece = raw[at : at + math.prod(shape) * dtype.itemsize]
     if zlib.crc32(piece.data) != t["crc"]:
         raise ValueError("a damaged table")
-    return piece.view(dtype).reshape(shape).view(np.ndarray)
+    table: npt.NDArray[Any] = piece.view(dtype).reshape(shape).view(np.ndarray)
+    return table
 
 
 def _is_of(model: TargetModel, mesh: Mesh, pad: PadSpec) -> bool:

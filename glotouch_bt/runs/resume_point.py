@@ -112,7 +112,7 @@ class ResumableRun:
                 raise BadInput("the robot clock started again (it is in the folder 'earlier')")
             if self.row.record_bytes is None:
                 raise BadInput(f"{record}: the checkpoint was taken without a record")
-            state = self.file.state(self.row.number).get("record")
+            state: Any = self.file.state(self.row.number).get("record")
             require_type(state, dict[str, int], "the state of the record")
             recorder.continue_from(list(read_chunks(record, self.row.record_bytes)), state)
         except (BadInput, LookupError) as e:

@@ -26,12 +26,14 @@ MAX_UNPACKED_BYTES = 1 << 30
 """Most bytes that one record unpacks to. Source: 85 minutes of a run."""
 FREE_BYTES, MAX_RATIO = 1 << 28, 16
 """A record may unpack to FREE_BYTES, and beyond that to MAX_RATIO times its size; ours unpack to 5 times theirs."""
+MAX_ITEMS = 4_000_000
+"""Most messages and channels of one record. Source: an hour has 1 million; to count them takes 2 s."""
 BROKEN = (
     McapError, struct.error, OSError, LookupError, TypeError, ValueError, AttributeError, OverflowError,
     RecursionError, BadInput,
 )  # fmt: skip
 """Errors that reading a damaged record can raise."""
-_CHANNEL, _MESSAGE = 0x04, 0x05
+_SCHEMA, _CHANNEL, _MESSAGE = 0x03, 0x04, 0x05
 _HEAD, _MESSAGE_HEAD = struct.Struct("<BQ"), struct.Struct("<HIQQ")
 
 
@@ -71,6 +73,7 @@ class ChunkUnpacker:
         self._left = min(MAX_UNPACKED_BYTES, FREE_BYTES + MAX_RATIO * packed_bytes)
         self._limit, self._shown = self._left, shown
         self._topics: dict[int, str] = {}
+        self._items = 0
 
     def items(self, chunk: Chunk) -> Iterator[tuple[str, int, memoryview | None]]:
         """Yield (topic, log time ns, message) of every message, and (topic, 0, None) of every channel that starts.
@@ -84,8 +87,11 @@ class ChunkUnpacker:
         while at < end:
             code, size = _HEAD.unpack_from(data, at)
             at += _HEAD.size
-            if size > end - at:
-                raise BadInput(f"{self._shown}: a message is longer than its chunk")
+            if size > end - at or not _SCHEMA <= code <= _MESSAGE:
+                raise BadInput(f"{self._shown}: a chunk holds no messages where it should")
+            self._items += 1
+            if self._items > MAX_ITEMS:
+                raise TooLarge(f"{self._shown}: unpacks to more than {MAX_ITEMS} messages")
             if code == _CHANNEL:
                 number, _, length = struct.unpack_from("<HHI", data, at)
                 self._topics[number] = topic = bytes(view[at + 8 : at + 8 + length]).decode()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -71,6 +73,41 @@ def test_a_damaged_file_is_built_again(tmp_path, mesh, fresh, solids, damage: st
     same(built, target_model(mesh, folder=tmp_path))
     fresh()
     assert model_cache._read(file, mesh.name) is not None
+
+
+ABSURD = {
+    "reach beyond the mesh": {"reach_m": lambda t: t + np.float32(1.0)},
+    "no reach at all": {"reach_m": lambda t: np.full_like(t, np.nan)},
+    "infinite reach": {"reach_m": lambda t: np.full_like(t, np.inf)},
+    "side images beyond the mesh": {"fine_m": lambda t: np.full_like(t, 9.0)},
+    "side images of another size": {"fine_m": lambda t: t[:, :-1]},
+    "empty tables": {"reach_m": lambda t: t[:, :0], "z_m": lambda z: z[:0]},
+    "other heights": {"z_m": lambda z: z + 0.01},
+    "another top": {"height_m": lambda h: h + 0.1},
+    "a middle that is not finite": {"centre_m": lambda c: c * np.nan},
+    "nonplanarity that is not finite": {"rho": lambda r: float("nan")},
+}
+
+
+@pytest.mark.parametrize("what", ABSURD)
+def test_an_absurd_file_is_not_believed(tmp_path, mesh, fresh, what: str) -> None:
+    """Its checksums are right."""
+    built = target_model(mesh, folder=tmp_path)
+    (file,) = tmp_path.iterdir()
+    file.unlink()
+    built.images  # noqa: B018 - so that the tables are those of the model
+    changes = {name: change(getattr(built, name)) for name, change in ABSURD[what].items()}
+    model_cache._write(file, dataclasses.replace(built, **changes))
+    fresh()
+    same(built, target_model(mesh, folder=tmp_path))
+
+
+def test_a_link_in_the_cache_is_not_followed(tmp_path, mesh, fresh) -> None:
+    target_model(mesh, folder=tmp_path)
+    (file,) = tmp_path.iterdir()
+    file.rename(tmp_path / "elsewhere")
+    file.symlink_to(tmp_path / "elsewhere")
+    assert model_cache._read(file, mesh.name) is None
 
 
 def test_a_folder_that_cannot_be_written_is_done_without(tmp_path, mesh, fresh) -> None:

@@ -118,10 +118,12 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(room, "_run_coacd", lambda mesh, *_: [mesh.vertices_m])
 
 
+DAMAGE = ("truncated", "garbage", "empty", "other key", "wrong counts", "not finite", "folder", "beyond the mesh",
+          "not covering the mesh", "flat", "a bomb", "objects")  # fmt: skip
+
+
 @pytest.mark.usefixtures("quick")
-@pytest.mark.parametrize(
-    "damage", ["truncated", "garbage", "empty", "other key", "wrong counts", "not finite", "folder"]
-)
+@pytest.mark.parametrize("damage", DAMAGE)
 def test_a_damaged_file_is_replaced(damage: str, tmp_path: Path, cache: Path) -> None:
     mesh = box(tmp_path)
     load_hulls(mesh)
@@ -141,6 +143,16 @@ def test_a_damaged_file_is_replaced(damage: str, tmp_path: Path, cache: Path) ->
             file.write_bytes(encode(KEY, Parts((hull, hull[:3]))))
         case "not finite":
             file.write_bytes(encode(KEY, Parts((hull * np.nan,))))
+        case "beyond the mesh":
+            file.write_bytes(encode(KEY, Parts((3 * hull,))))
+        case "not covering the mesh":
+            file.write_bytes(encode(KEY, Parts((0.2 * hull,))))
+        case "flat":
+            file.write_bytes(encode(KEY, Parts((hull * [1, 1, 0],))))
+        case "a bomb":
+            np.savez_compressed(file, vertices=np.zeros((10**7, 3)), counts=[10**7], key=KEY, note="")
+        case "objects":
+            np.savez_compressed(file, vertices=np.array([None]), counts=[4], key=KEY, note="")
         case "folder":
             file.unlink()
             file.mkdir()
