@@ -6,7 +6,6 @@ import mujoco
 import numpy as np
 
 from glotouch_backends.mujoco.control import (
-    CHUNK,
     PAYLOAD_S,
     HardLimitGuard,
     JawReports,
@@ -34,6 +33,10 @@ from glotouch_bt.robot import (
     Ticket,
 )
 
+REST_RAD_S = 1e-3
+"""A stopped arm stands still below this speed of every joint. Source: ours."""
+MOVING_RAD_S = 0.02
+"""The arm moves if a joint or its setpoint is faster: 15 mm/s at the hand. Source: ours."""
 MAX_HELD_DISTANCE_M = 0.02
 """The probe counts as held while its handle is within this distance of P. Source: ours."""
 
@@ -61,13 +64,10 @@ class MujocoRobot(Robot):
         self._samples = np.zeros((STEPS, model.nsensordata))
         self._external = np.zeros((STEPS, 4, 6))  # torque, force
         # Views of one step each, made once, so that the loop around mj_step only copies (memoryviews copy 3x faster).
-        rows = [
+        self._rows = [
             (c.data, s.data, e.data)
             for c, s, e in zip(self._ctrl, self._samples, self._external.reshape(STEPS, -1), strict=True)
         ]
-        wrenches = self._samples[:, s.force.start : s.torque.stop]
-        chunks = [slice(i, i + CHUNK) for i in range(0, STEPS, CHUNK)]
-        self._chunks = [(self._ctrl[c], rows[c], wrenches[c]) for c in chunks]
         self._ctrl_now, self._sensed = memoryview(data.ctrl), memoryview(data.sensordata)
         self._external_now = memoryview(data.cfrc_ext[handles.held_bodies].reshape(-1))
         self._counted = np.array([1.0, 1.0, 1.0, 0.0])
@@ -172,27 +172,27 @@ class MujocoRobot(Robot):
             self.trace = ControlTrace(self.model, self.data)
 
     def _advance(self) -> None:
-        """Do the period's solver steps; check the wrench after each chunk."""
-        model, data, step = self.model, self.data, mujoco.mj_step
+        """Do the period's solver steps; check the wrench after each, and brake once its limit has tripped."""
+        model, data, step, guard = self.model, self.data, mujoco.mj_step, self._guard
         ctrl_now, sensed, external_now = self._ctrl_now, self._sensed, self._external_now
-        trace = self.trace
-        for controls, rows, wrenches in self._chunks:
-            if trace is not None:
-                trace.add(controls, model.actuator_forcerange)
-            for ctrl, sample, external in rows:
-                ctrl_now[:] = ctrl
-                step(model, data)
-                sample[:] = sensed
-                external[:] = external_now
+        felt, expected = slice(self._s.force.start, self._s.torque.stop), self._expected.tolist()
+        speed_rad_s = float(np.abs(data.qvel[self.handles.arm_dof]).max())
+        moves = max(speed_rad_s, self._servo.speed_rad_s) > MOVING_RAD_S
+        stands = guard.tripped is not None and speed_rad_s < REST_RAD_S
+        for i, (ctrl, sample, external) in enumerate(self._rows):
+            if guard.tripped is not None and not stands:
+                self._servo.brake(self._arm_ctrl[i])
+            ctrl_now[:] = ctrl
+            step(model, data)
+            sample[:] = sensed
+            external[:] = external_now
             # The sensor reads the force of the hand on the arm; the hand feels its opposite.
-            if self._guard.tripped is None and self._guard.check(-wrenches - self._expected, data.time):
-                self._stop_here()
-
-    def _stop_here(self) -> None:
-        """Freeze the arm at its present posture from the next step on; the jaws keep their grip."""
-        q = np.array(self.data.qpos[self.handles.arm_qpos])
-        self._servo.reset(q)
-        self._arm_ctrl[:] = q
+            if guard.tripped is None:
+                guard.check([-w - e for w, e in zip(sample[felt], expected, strict=True)], moves, data.time)
+        if guard.tripped is not None and not stands:
+            self._servo.reset(np.array(data.qpos[self.handles.arm_qpos]))
+        if self.trace is not None:
+            self.trace.add(self._ctrl, model.actuator_forcerange)
 
     def _carry(self) -> Array:
         """Return the joint torques (dof,) that carry the believed payload: J^T times its weight."""

@@ -133,6 +133,7 @@ class RobotDescription:
         home_q: Posture well inside the limits with the hand pointing down; also the target of the posture task.
         gripper: The hand.
         source: Origin of the numbers.
+        wrist_feels_inertia: The wrist's force contains the inertia of the moving hand. False only without physics.
     """
 
     name: str
@@ -142,6 +143,7 @@ class RobotDescription:
     home_q: tuple[float, ...]
     gripper: Gripper
     source: str = field(default="")
+    wrist_feels_inertia: bool = True
 
     @property
     def dof(self) -> int:

@@ -7,7 +7,7 @@ test gives), the jaws grip a rigid width, and the gels are flat. No randomness, 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import acos, atan2, hypot, pi
 
 import numpy as np
@@ -171,7 +171,7 @@ class FakeRobot(Robot):
         grip_width_m: float | None = None,
         frame_rate_Hz: float = 60.0,
     ) -> None:
-        self.description, self.period_s = description, period_s
+        self.description, self.period_s = replace(description, wrist_feels_inertia=False), period_s
         self.limits = Limits() if limits is None else limits
         self.walls, self.wrench, self.grip_width_m = tuple(walls), wrench, grip_width_m
         self._tip_P = frozen_array("tip_P_m", tip_P_m, (3,))

@@ -15,10 +15,12 @@ class Limits:
     Joint position, velocity and torque limits are in `description.Joint`, next to the kinematics they belong to.
 
     Attributes:
-        hard_force_N: Norm of the tared contact force at which the robot stops itself. Source: the maximum contact
-            wrench that public code sets for a Rizon 4 with a Xense gripper.
-        hard_torque_Nm: Norm of the tared torque at S at which it stops. Source: the force limit on the probe's 0.34 m
-            lever.
+        hard_force_N: Norm of the contact force that the true peak must not pass. Source: the maximum contact wrench
+            that public code sets for a Rizon 4 with a Xense gripper.
+        hard_torque_Nm: The same for the torque at S. Source: the force limit on the probe's 0.34 m lever.
+        stop_share: Share of both at which the robot stops itself. Source: ours; above the 25 N of a snagging probe.
+        stop_ahead_s: The robot also stops where the force would be too large after this time at its present rise.
+            Source: measured; three samples to see the rise and 5 ms to stop 0.1 m/s.
         tcp_speed_m_s: Largest commanded speed of P. Source: vendor default of motion-force mode, 0.5 m/s, halved.
         tcp_acceleration_m_s2: Largest commanded acceleration of P. Source: vendor default 2.0, halved.
         tcp_jerk_m_s3: Largest commanded jerk of P. Source: ours.
@@ -31,6 +33,8 @@ class Limits:
 
     hard_force_N: float = 30.0
     hard_torque_Nm: float = 10.2
+    stop_share: float = 0.9
+    stop_ahead_s: float = 0.008
     tcp_speed_m_s: float = 0.25
     tcp_acceleration_m_s2: float = 1.0
     tcp_jerk_m_s3: float = 20.0
@@ -43,3 +47,15 @@ class Limits:
             value = getattr(self, f.name)
             if not (math.isfinite(value) and value > 0):
                 raise ParamError(f.name, value, "finite and positive")
+        if self.stop_share > 1.0:
+            raise ParamError("stop_share", self.stop_share, "at most 1")
+
+    @property
+    def stop_force_N(self) -> float:
+        """Contact force at which the robot stops itself."""
+        return self.stop_share * self.hard_force_N
+
+    @property
+    def stop_torque_Nm(self) -> float:
+        """Torque at which the robot stops itself."""
+        return self.stop_share * self.hard_torque_Nm

@@ -35,7 +35,7 @@ class Squeeze(Skill):
     Params = ClosureParams
     params: ClosureParams
 
-    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers"}), "wrist": frozenset({"tared"})}
     POSTCONDITIONS: ClassVar = {"hand": "empty"}
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
     USES: ClassVar = frozenset({"arm"})

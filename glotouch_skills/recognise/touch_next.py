@@ -58,7 +58,7 @@ class TouchNext(Skill):
     Params = TouchNextParams
     params: TouchNextParams
 
-    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers"}), "wrist": frozenset({"tared"})}
     POSTCONDITIONS: ClassVar = {"hand": "empty"}
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
     USES: ClassVar = frozenset({"arm"})

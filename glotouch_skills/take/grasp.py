@@ -43,7 +43,7 @@ class Grasp(Skill):
     Params = GraspParams
     params: GraspParams
 
-    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers"}), "wrist": frozenset({"tared"})}
     POSTCONDITIONS: ClassVar = {"hand": "object"}
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
     USES: ClassVar = frozenset({"arm"})

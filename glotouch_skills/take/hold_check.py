@@ -1,15 +1,11 @@
-"""Check that the lifted object is held as it was taken, by two of weight, aperture and gels."""
+"""Check that the lifted object is held as it was taken, by two of weight, jaws and gels."""
 
 from __future__ import annotations
 
 from typing import ClassVar
 
-import numpy as np
-
-from glotouch_bt.perception.touch import patch_statistics
-from glotouch_bt.robot import TactileFrame
 from glotouch_bt.skill import UNCHANGED, Failure, In, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import weigh_N
+from glotouch_skills.common.hand import feel_hold
 
 
 class HoldCheckParams(SkillParams):
@@ -35,7 +31,7 @@ class HoldCheck(Skill):
     Params = HoldCheckParams
     params: HoldCheckParams
 
-    PRECONDITIONS: ClassVar = {"hand": frozenset({"object"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"object"}), "wrist": frozenset({"tared"})}
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
     USES: ClassVar = frozenset({"arm"})
 
@@ -51,35 +47,15 @@ class HoldCheck(Skill):
 
     def run(self) -> SkillRun:
         """See the class."""
-        arm, p = self.context.arm, self.params
-        blocks = yield from arm.hold(p.look_s, tactile=True)
-        weight = yield from weigh_N(arm)
-        apart = float(np.median([b.gripper.aperture_m for b in blocks]))
-        frames = [b.tactile for b in blocks if b.tactile is not None]
-        touched = _touched(frames[-1]) if frames else None
-        moved = apart - self.grip_m
-        self.event(
-            "hold", weight_N=weight, aperture_m=apart, moved_m=moved, gels_touched=-1 if touched is None else touched
-        )
-        heavy = weight >= p.weight_kept * self.before_N
-        steady = abs(moved) <= p.slip_m
-        against = [not heavy, not steady, touched == 0]
-        if sum(against) >= 2:
-            raise self.LOST(
-                f"{weight:.2f} N of {self.before_N:.2f} N hang in the hand, the jaws moved by {moved * 1e3:.1f} mm, "
-                f"{'unknown' if touched is None else touched} of 2 gels are touched",
-                weight_N=weight,
-                moved_m=moved,
-                gels_touched=-1 if touched is None else touched,
-            )
-        if not steady:
+        p = self.params
+        hold = yield from feel_hold(self.context.arm, self.grip_m, p.look_s)
+        self.event("hold", **hold.as_dict())
+        doubts = hold.doubts(p.weight_kept * self.before_N, p.slip_m)
+        if len(doubts) >= 2:
+            raise self.LOST("; ".join(doubts), **hold.as_dict())
+        if not abs(hold.moved_m) <= p.slip_m:
             raise self.SLIPPED(
-                f"the jaws moved by {moved * 1e3:.1f} mm while it was lifted ({p.slip_m * 1e3:g} mm are allowed)",
-                moved_m=moved,
+                f"the jaws moved by {hold.moved_m * 1e3:.1f} mm since they closed; {p.slip_m * 1e3:g} mm are allowed",
+                moved_m=hold.moved_m,
                 slip_limit_m=p.slip_m,
             )
-
-
-def _touched(frame: TactileFrame) -> int:
-    """Return how many of the two gels are touched."""
-    return sum(patch_statistics(d).valid for d in (frame.left_m, frame.right_m))

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import weigh_N
+from glotouch_skills.common.hand import MIN_GRIP_M, feel_hold
 
 
 class LiftParams(SkillParams):
@@ -19,12 +19,18 @@ class LiftParams(SkillParams):
         "Least weight of a lifted object", unit="N", default=0.3, ge=0.0, formerly="least_weight_N"
     )
     min_aperture_m: float = param(
-        "Least aperture of jaws that hold something", unit="m", default=0.003, ge=0.0, formerly="least_aperture_m"
+        "Least aperture of jaws that hold something", unit="m", default=MIN_GRIP_M, ge=0.0, formerly="least_aperture_m"
     )
+    slip_m: float = param(
+        "Largest change of the aperture since the jaws closed", unit="m", default=0.004, gt=0.0, le=0.02
+    )
+    look_s: float = param("Time for which gels and jaws are measured", unit="s", default=0.2, ge=0.05, le=2.0)
 
 
 class Lift(Skill):
-    """Raise the hand and check weight and aperture at the top.
+    """Raise the hand and check the hold at the top: by weight, by the jaws (aperture and force), and by the gels.
+
+    No single witness is believed: a wrist may be off zero, and jaws may report what they were told. All must agree.
 
     SUCCESS: an object with weight hangs in the jaws, and the arm holds it up.
     """
@@ -32,12 +38,16 @@ class Lift(Skill):
     Params = LiftParams
     params: LiftParams
 
-    PRECONDITIONS: ClassVar = {"hand": frozenset({"object"})}
-    # `lost` is decided by weight and aperture: a light object may still be between the pads.
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"object"}), "wrist": frozenset({"tared"})}
+    # `lost` if any witness says so: the object may still be between the pads.
     FAILURE_STATES: ClassVar = {"hand": frozenset({"object", "empty"})}
     USES: ClassVar = frozenset({"arm"})
 
-    LOST = Failure("lost", "the jaws are empty at the top", advice="grasp nearer to the centre of mass, or harder")
+    LOST = Failure(
+        "lost",
+        "not all of weight, jaws and gels show the object at the top",
+        advice="grasp nearer to the centre of mass, or harder",
+    )
     FAILURES: ClassVar = (MOTION_REFUSED.with_meaning("the arm cannot be raised so far"),)
 
     grip_m = In(float, "aperture of the closed jaws")
@@ -47,13 +57,9 @@ class Lift(Skill):
         """See the class."""
         arm, p = self.context.arm, self.params
         yield from arm.shift(np.array([0.0, 0.0, p.height_m]), p.speed_m_s, check=False)
-        weight = yield from weigh_N(arm)
-        state = self.context.observation.gripper
-        self.event("lift", weight_N=weight, aperture_m=state.aperture_m)
-        if weight < p.min_weight_N or state.aperture_m < p.min_aperture_m:
-            raise self.LOST(
-                f"{weight:.2f} N hang in the hand and the jaws are {state.aperture_m * 1e3:.1f} mm apart",
-                weight_N=weight,
-                aperture_m=state.aperture_m,
-            )
-        self.weight_N = weight
+        hold = yield from feel_hold(arm, self.grip_m, p.look_s)
+        self.event("lift", **hold.as_dict())
+        doubts = hold.doubts(p.min_weight_N, p.slip_m, p.min_aperture_m)
+        if doubts:
+            raise self.LOST("; ".join(doubts), **hold.as_dict())
+        self.weight_N = hold.weight_N

@@ -39,7 +39,7 @@ class BareHand(Skill):
     params: BareHandParams
 
     PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
-    POSTCONDITIONS: ClassVar = {"hand": "fingers"}
+    POSTCONDITIONS: ClassVar = {"hand": "fingers", "wrist": "tared"}
     USES: ClassVar = frozenset({"arm"})
 
     PROBE_HELD = Failure("probe_held", "the probe is in the jaws", advice="return it first with tool_return")

@@ -37,8 +37,8 @@ class Stow(Skill):
     params: StowParams
 
     PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "untared", "probe", "object"})}
-    POSTCONDITIONS: ClassVar = {"hand": "empty"}
-    FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "untared"})}
+    POSTCONDITIONS: ClassVar = {"hand": "empty", "wrist": "tared"}
+    FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "untared"}), "wrist": frozenset({UNCHANGED})}
     USES: ClassVar = frozenset({"arm"})
 
     OBJECT_HELD = Failure(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from glotouch_bt.robot import Tare
-from glotouch_bt.skill import MOTION_REFUSED, Skill, SkillParams, SkillRun, param
+from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import REQUEST_FAILED, RISE_M_S, finish, rise_clear
 
 
@@ -27,6 +27,8 @@ class TareWrist(Skill):
 
     # The weight of an object in the hand, unknown to the controller, would be tared away.
     PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "probe"})}
+    POSTCONDITIONS: ClassVar = {"wrist": "tared"}
+    FAILURE_STATES: ClassVar = {"wrist": frozenset({UNCHANGED})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = (REQUEST_FAILED, MOTION_REFUSED.with_meaning("the hand cannot rise"))
 

@@ -42,7 +42,10 @@ class ToolCheck(Skill):
     params: ToolCheckParams
 
     # After success the probe is in the hand, whatever happened before.
-    PRECONDITIONS: ClassVar = {"hand": frozenset({"probe", "empty", "untared"})}
+    PRECONDITIONS: ClassVar = {
+        "hand": frozenset({"probe", "empty", "untared"}),
+        "wrist": frozenset({"tared", "stale"}),  # where the weight disagrees with the jaws, the floor decides
+    }
     POSTCONDITIONS: ClassVar = {"hand": "probe"}
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED})}
     USES: ClassVar = frozenset({"arm"})

@@ -62,8 +62,11 @@ class ToolPickup(Skill):
     params: ToolPickupParams
 
     PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "untared", "probe"})}
-    POSTCONDITIONS: ClassVar = {"hand": "probe"}
-    FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "empty", "probe"})}
+    POSTCONDITIONS: ClassVar = {"hand": "probe", "wrist": "tared"}
+    FAILURE_STATES: ClassVar = {
+        "hand": frozenset({UNCHANGED, "empty", "probe"}),
+        "wrist": frozenset({UNCHANGED, "tared", "stale"}),
+    }
     RESTORED_BY: ClassVar = {"hand": "tool_return"}
     USES: ClassVar = frozenset({"arm"})
 

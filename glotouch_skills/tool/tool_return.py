@@ -29,8 +29,8 @@ class ToolReturn(Skill):
 
     # `untared`: the probe is released, but the wrist is not yet tared; only this skill or `tool_pickup` may follow.
     PRECONDITIONS: ClassVar = {"hand": frozenset({"probe", "untared"})}
-    POSTCONDITIONS: ClassVar = {"hand": "empty"}
-    FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "untared"})}
+    POSTCONDITIONS: ClassVar = {"hand": "empty", "wrist": "tared"}
+    FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "untared"}), "wrist": frozenset({UNCHANGED})}
     USES: ClassVar = frozenset({"arm"})
     FAILURES: ClassVar = (
         *RETURN_PROBE_FAILURES,

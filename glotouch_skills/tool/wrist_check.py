@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.skill import MOTION_REFUSED, Failure, Skill, SkillParams, SkillRun, param
+from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import RISE_M_S, STAND_S, rise_clear
 
 
@@ -33,6 +33,8 @@ class WristCheck(Skill):
     params: WristCheckParams
 
     PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "probe"})}
+    POSTCONDITIONS: ClassVar = {"wrist": "tared"}  # whatever it was: it reads zero
+    FAILURE_STATES: ClassVar = {"wrist": frozenset({UNCHANGED})}
     USES: ClassVar = frozenset({"arm"})
 
     OFF_ZERO = Failure(

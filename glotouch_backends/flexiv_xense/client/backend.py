@@ -40,8 +40,8 @@ def _arm_limits(description: RobotDescription, limits: Limits) -> messages.ArmLi
         speed_m_s=limits.tcp_speed_m_s,
         acceleration_m_s2=limits.tcp_acceleration_m_s2,
         stop_acceleration_m_s2=limits.stop_acceleration_m_s2,
-        force_N=limits.hard_force_N,
-        torque_Nm=limits.hard_torque_Nm,
+        force_N=limits.stop_force_N,
+        torque_Nm=limits.stop_torque_Nm,
         max_age_s=limits.max_age_s,
     )
 

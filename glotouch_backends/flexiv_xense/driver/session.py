@@ -18,6 +18,14 @@ from .frames import payload_on_tool, wrench_map
 
 MIN_SAMPLES_OVER = 5
 """Consecutive samples beyond the hard limit that stop the arm (5 ms); a single one may be noise. Source: ours."""
+MIN_SAMPLES_RISING = 2
+"""Consecutive samples that stop a moving arm because the force rises steeply. Source: as in the simulated robot."""
+MIN_RISING_SHARE = 0.25
+"""Share of the limit below which no rise counts. Source: as in the simulated robot."""
+STOP_AHEAD_S = 0.008
+"""Extrapolate the force of a moving arm over this time: it presses harder until it stands. Source: as there."""
+MIN_MOVING_M_S = 0.015
+"""The arm moves if P is faster. Source: as there."""
 MAX_BUFFERED_SAMPLES = 60_000
 """Samples buffered while the client requests none (60 s)."""
 SPEED_SAMPLES = 20
@@ -50,7 +58,8 @@ class DriverSession:
         self._device_stamp: object = None
         self._to_our_clock = StampConverter()
         self._fresh_s = self._zero_s
-        self._over = 0
+        self._over = self._rising = 0
+        self._felt = (self._zero_s, 0.0, 0.0)  # time, force, torque of the last sample
         self._newest: list[float] | None = None
         self._last: messages.Setpoint | None = None  # the last one sent, while the arm follows setpoints
         self._rest: tuple[float, ...] | None = None  # pose of rest, once told to hold
@@ -199,19 +208,26 @@ class DriverSession:
         self.peak_force_N = max(self.peak_force_N, force)
         self.recent_peak_N = max(self.recent_peak_N, force)
         limits = self._limits
-        if force <= limits.force_N and torque <= limits.torque_Nm:
-            self._over = 0
+        (then, force_then, torque_then), self._felt = self._felt, (now, force, torque)
+        values = {"force_N": (force, limits.force_N), "torque_Nm": (torque, limits.torque_Nm)}
+        if _share(values) <= MIN_RISING_SHARE:
+            self._over = self._rising = 0
             return
-        self._over += 1
-        if self._over < MIN_SAMPLES_OVER or self.stop is not None or self._busy:
+        self._over = self._over + 1 if _share(values) > 1.0 else 0
+        ahead = STOP_AHEAD_S / (now - then) if now > then and self.speed_m_s > MIN_MOVING_M_S else 0.0
+        soon = {
+            "rising_force_N": (force + ahead * (force - force_then), limits.force_N),
+            "rising_torque_Nm": (torque + ahead * (torque - torque_then), limits.torque_Nm),
+        }
+        self._rising = self._rising + 1 if ahead > 0.0 and _share(soon) > 1.0 else 0
+        if self.stop is not None or self._busy:
             return
-        beyond = force > limits.force_N
-        self.stop = (
-            "force_N" if beyond else "torque_Nm",
-            force if beyond else torque,
-            limits.force_N if beyond else limits.torque_Nm,
-            now - self._zero_s,
-        )
+        if self._over < MIN_SAMPLES_OVER:
+            if self._rising < MIN_SAMPLES_RISING:
+                return
+            values = soon
+        quantity = max(values, key=lambda name: values[name][0] / values[name][1])
+        self.stop = (quantity, *values[quantity], now - self._zero_s)
         self._rest = tuple(pose)  # later holds use this pose, not the last setpoint's
         if self._moves:
             self._arm.hold_at(self._rest)
@@ -255,3 +271,8 @@ class DriverSession:
             sent_s=self._sent_s,
             read_s=self._read_s,
         )
+
+
+def _share(values: dict[str, tuple[float, float]]) -> float:
+    """Return the largest of some values over their limits."""
+    return max(value / limit for value, limit in values.values())

@@ -10,6 +10,8 @@ from glotouch_bt.robot import Array, JointSetpoint, ParamError, RobotDescription
 
 BRAKE_REACH_M = 0.8
 """Distance of the hand from the axes that converts a Cartesian deceleration into a joint deceleration. Source: ours."""
+BRAKE_S = 0.003
+"""Time constant of the joints' speed during a safety stop, as far as the motors' torque allows. Source: ours."""
 MAX_ACCELERATION_RAD_S2 = 1e3
 """Refuse a larger feed-forward acceleration. Source: ours."""
 VELOCITY_SLACK = 1.02
@@ -47,7 +49,9 @@ class Servo:
         period_s: float,
         stop_acceleration_m_s2: float,
     ) -> None:
-        self._model, self._data, self._dof = model, data, handles.arm_dof
+        self._model, self._data = model, data
+        self._dof, self._arm_qpos = handles.arm_dof, handles.arm_qpos
+        self._diagonal = (model.M_rowadr + model.M_rownnz - 1)[handles.arm_dof]  # the last entry of each row
         joints = description.joints
         n = description.dof
         lower, upper = np.array([j.lower_rad for j in joints]), np.array([j.upper_rad for j in joints])
@@ -78,11 +82,22 @@ class Servo:
         """Setpoint (dof,) at the end of the last period, rad."""
         return np.asarray(self._knots[2])
 
+    @property
+    def speed_rad_s(self) -> float:
+        """Mean speed of the fastest joint's setpoint over the period that was planned last."""
+        return float(np.abs(self._knots[2] - self._knots[0]).max()) / self._period
+
     def reset(self, q: Array) -> None:
         """Set the setpoint to `q` (dof,) at rest, without a ramp."""
         self._knots[0] = self._knots[2] = q
         self._knots[1] = self._knots[3] = 0.0
         self._ddq[:] = 0.0
+
+    def brake(self, ctrl: Array) -> None:
+        """Fill ctrl (dof,) for one step: brake every joint as hard as its motor allows, wherever it is."""
+        q, dq = self._data.qpos[self._arm_qpos], self._data.qvel[self._dof]
+        inertia = self._data.M[self._diagonal]
+        ctrl[:] = q - np.maximum(inertia / BRAKE_S * self._per_kp - self._lead, 0.0) * dq + self._terms[10]
 
     def load(self, torque_Nm: Array) -> None:
         """Set the constant feed-forward torque (dof,) that carries a payload's weight."""

@@ -37,13 +37,13 @@ FIXED: Mapping[str, frozenset[str]] = {
             *("description", "limits", "period_s", "world", "truth", "model", "data", "handles", "trace"),
             *("_s", "_warnings", "_probe_now", "_pads_now", "_keeper", "_failed", "_closed", *PARTS),
             # views of the arrays that are kept
-            *("_chunks", "_ctrl_now", "_sensed", "_external_now"),
+            *("_rows", "_ctrl_now", "_sensed", "_external_now"),
         )
     ),
-    "Servo": frozenset(("_model", "_data", "_dof", "_names")),
+    "Servo": frozenset(("_model", "_data", "_dof", "_arm_qpos", "_diagonal", "_names")),
     "JawServo": frozenset(("_gripper",)),
     "WristSensor": frozenset(("_P_in_S",)),
-    "HardLimitGuard": frozenset(("_limits", "tripped")),
+    "HardLimitGuard": frozenset(("_max_N", "_max_Nm", "_ahead", "tripped")),
     "Tactile": frozenset(("_data", "_pads", "_site", "_gel", "_meshes", "_rays", "_c")),
     "JawReports": frozenset(("_c",)),
 }

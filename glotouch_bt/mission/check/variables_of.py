@@ -6,8 +6,8 @@ from glotouch_bt.mission.nodes import StateVariables, ValueKind, kind_of
 from glotouch_bt.mission.spec import NodeSpec
 from glotouch_bt.skill import UNCHANGED
 
-FIRST_STATE = "empty"
-"""The state of every resource when a mission begins."""
+FIRST_STATES = {"wrist": "untared"}
+"""State of a resource when a mission begins; `empty` if it is not named here."""
 
 
 def variables_of(tree: NodeSpec) -> StateVariables:
@@ -18,16 +18,20 @@ def variables_of(tree: NodeSpec) -> StateVariables:
 def _states(tree: NodeSpec) -> dict[str, list[str]]:
     """Return every state of every resource that some skill of the tree names, the first state first."""
     states: dict[str, dict[str, None]] = {}
+
+    def named(resource: str) -> dict[str, None]:
+        return states.setdefault(resource, {FIRST_STATES.get(resource, "empty"): None})
+
     for node in tree.walk():
         skill = node.skill_type
         if skill is None:
             continue
         for table in (skill.PRECONDITIONS, skill.FAILURE_STATES):
-            for resource, named in table.items():
-                states.setdefault(resource, {FIRST_STATE: None}).update(dict.fromkeys(sorted(named - {UNCHANGED})))
+            for resource, some in table.items():
+                named(resource).update(dict.fromkeys(sorted(some - {UNCHANGED})))
         for resource, one in skill.POSTCONDITIONS.items():
-            states.setdefault(resource, {FIRST_STATE: None})[one] = None
-    return {resource: list(named) for resource, named in states.items()}
+            named(resource)[one] = None
+    return {resource: list(names) for resource, names in states.items()}
 
 
 def _kinds(tree: NodeSpec) -> dict[str, dict[ValueKind, None]]:

@@ -15,10 +15,11 @@ GUARDS = {
     "joint_range": "a joint is measured outside its range",
     "joint_speed": "a joint is measured faster than its limit",
     "out_of_reach": "a pose beyond the reach of any arm, or a quaternion that is not of unit length",
-    "wrench": "consecutive samples of the wrench are beyond the hard limit",
+    "wrench": "consecutive samples of the wrench are beyond the limit at which the robot stops",
     "wrench_stuck": "some or all components of a noisy wrench sensor stand still",
+    "wrench_silent": "the wrist does not feel the inertia of the moving hand",
     "wrench_noise": "the force jumps from sample to sample (only recorded)",
-    "following": "the hand is not where it was told to be",
+    "following": "the hand is not where it was told to be, or will not be soon",
     "gripper_stale": "the gripper stopped reporting",
     "tactile_stale": "requested depth maps do not arrive",
     "tactile_frozen": "noisy depth maps repeat",
@@ -40,12 +41,15 @@ class SupervisionLimits:
         speed_slack: Measured over allowed joint speed. Source: ours; differentiated encoders are noisy.
         reach_m: Largest distance of the hand from the base. Source: twice the reach of the largest supported arm.
         start_rad: After a hold, largest distance of a setpoint from the measured joint. Source: ours, 3 degrees.
-        wrench_samples: Consecutive samples beyond the hard wrench limit that trip the guard. Source: the simulated
-            backend's own limit, 5 ms; shorter peaks are noise or the ringing of a stop.
+        wrench_samples: Consecutive samples beyond the stop limit of the wrench that trip the guard. Source: the
+            simulated backend's own limit, 5 ms; shorter peaks are noise or the ringing of a stop.
         following_m, following_rad: Largest distance and angle between the hand's measured and commanded pose. The
             joints
             are not compared: a device that is sent poses chooses its own posture. Source: ten times the values measured
             in a whole retrieval (harsh, MuJoCo): 0.5 mm at 8 N, 0.003 rad.
+        following_periods: A hand that leaves its path must also be within these distances so many periods later, at
+            its present speed away from it. Source: ours, the periods until a stop takes effect, doubled. Undisturbed
+            hands leave their paths at 20 mm/s at most.
         touching_N, touching_m: Above this force only this distance is allowed, because a servo that does not follow
             presses harder with every millimetre. Source: twice the distance measured in whole retrievals beyond 4 N
             (MuJoCo, nominal: 0.8 mm; 1.7 mm in one that pressed sideways with 11 N).
@@ -56,8 +60,11 @@ class SupervisionLimits:
             `Limits.max_age_s`; five times the slowest gripper of CONDITIONS, twice its slowest depth maps.
         stuck_s: Duration of bit-identical wrench samples. Source: ours, a third of the shortest rest at which a probing
             skill averages the force (120 ms).
-        noisy_s: A sensor counts as noisy after this time without a repeated or (`noise_N`) unchanged force; only a
-            noisy sensor can be stuck. Noise-free simulations never reach it. Source: ours.
+        noisy_s: A sensor counts as noisy after this time in which the force went up and down in every period by more
+            than `noise_N`; only a noisy sensor can be stuck. Noise-free simulations never reach it. Source: ours.
+        proof_N2: Sum over periods of the squared inertial force of the hand after which the wrist must have shown it.
+            Source: ours; 40 ms at the largest acceleration, before the hand moves at 0.1 m/s.
+        silent_share: Least share of that sum. Source: ours; a delay of 0.05 s leaves a tenth, one of 0.1 s nothing.
         noise_N: A smaller change between two periods is not noise. Source: ours, a fiftieth of the sensors' resolution.
         max_noise_N, noise_over_s: Mean jump of a force component from sample to sample, over this time. Source: three
             times that of harsh CONDITIONS (noise of 0.15 N sd jumps by 0.17 N).
@@ -78,6 +85,7 @@ class SupervisionLimits:
     wrench_samples: int = 5
     following_m: float = 0.006
     following_rad: float = 0.03
+    following_periods: float = 4.0
     touching_N: float = 8.0
     touching_m: float = 0.003
     lag_s: float = 0.1
@@ -85,7 +93,9 @@ class SupervisionLimits:
     gripper_age_s: float = 0.2
     tactile_age_s: float = 0.2
     stuck_s: float = 0.04
-    noisy_s: float = 5.0
+    noisy_s: float = 2.0
+    proof_N2: float = 3.0
+    silent_share: float = 0.05
     noise_N: float = 1e-6
     max_noise_N: float = 0.5
     noise_over_s: float = 0.3

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import replace
+from itertools import pairwise
 from operator import lt
 from typing import Any
 
@@ -15,6 +16,7 @@ from glotouch_bt.robot.geometry import Array
 from glotouch_bt.robot.interface import Robot
 from glotouch_bt.robot.observation import SAMPLED, Observation
 from glotouch_bt.robot.supervision.limits import GuardFinding, SupervisionLimits, TransientCounter
+from glotouch_bt.robot.supervision.response import WristResponseGuard
 from glotouch_bt.robot.supervision.signals import TactileSignalGuard, WrenchSignalGuard
 
 MAX_REST_SPEED_RAD_S = 0.01
@@ -23,6 +25,8 @@ MAX_NORM_ERROR = 0.01
 """Tolerated error of a quaternion's squared norm. Source: ours."""
 LATE_PERIODS = 0.5
 """A cycle is late when it lasts this many periods more than one. Source: ours."""
+MAX_LAG_M = 0.001
+"""Compare a hand that is farther from its newest target with its whole path of the last `lag_s`. Source: ours."""
 MIN_SAMPLE_SHARE = 0.25
 """A block with fewer than this share of its samples is reported. Source: measured; a device that is polled every
 millisecond by a soft real-time loop gives 0.7-0.9 of them, on a loaded machine 0.5."""
@@ -49,10 +53,9 @@ class ReadingsGuard:
         self._ranges = [(j.lower_rad - slack, j.upper_rad + slack) for j in self._joints]
         self._max_speeds = rules.speed_slack * np.array([j.velocity_rad_s for j in self._joints])
         # The fast test compares sums of squares over a block: below the limit no sample can exceed it or be NaN.
-        self._per_limit = np.array([1.0 / limits.hard_force_N] * 3 + [1.0 / limits.hard_torque_Nm] * 3)
+        self._per_limit = np.array([1.0 / limits.stop_force_N] * 3 + [1.0 / limits.stop_torque_Nm] * 3)
         self._max_speed_2, self._max_reach_2 = float(self._max_speeds.min()) ** 2, rules.reach_m**2
-        self._max_error_2, self._min_dot = rules.following_m**2, math.cos(0.5 * rules.following_rad)
-        self._min_pressing_force_2, self._max_pressing_error_2 = rules.touching_N**2, rules.touching_m**2
+        self._min_dot, self._min_pressing_force_2 = math.cos(0.5 * rules.following_rad), rules.touching_N**2
         # Recently commanded positions and quaternions of P in B, newest last; empty while the arm brakes to an unknown
         # place.
         self._targets: deque[list[float]] = deque(maxlen=max(1, round(rules.lag_s / period_s)))
@@ -60,6 +63,8 @@ class ReadingsGuard:
         self._moving = False
         self._was_moving = False  # by the command before the newest: a late cycle waited with that one
         self._samples_over = 0
+        self._away_m = 0.0  # of the hand from its path, in the block before
+        self._response = WristResponseGuard(robot, rules) if robot.description.wrist_feels_inertia else None
         self._wrist = WrenchSignalGuard(period_s, rules, self._transients)
         self._pads = TactileSignalGuard(rules, self._transients)
 
@@ -67,6 +72,8 @@ class ReadingsGuard:
         """Start again from `newest`: the robot was restored to an earlier state."""
         self._last_s = float(newest.stamp_s[-1])
         self._wrist.reset()
+        if self._response is not None:
+            self._response.reset()
         self._pads.reset()
         self._targets.clear()
         self._moving = self._has_velocity = self._was_moving = False
@@ -107,6 +114,8 @@ class ReadingsGuard:
             o = self._check_each(o, findings)
         self._last_s = stamp_s = float(o.stamp_s[-1])
         self._wrist.check(o, findings)
+        if self._response is not None:
+            self._response.check(o, findings)
         jaws = o.gripper
         if not (stamp_s - jaws.stamp_s <= self._rules.gripper_age_s and math.isfinite(jaws.aperture_m + jaws.force_N)):
             self._check_jaws(o, findings)
@@ -144,9 +153,10 @@ class ReadingsGuard:
             return True
         a, b, c, d, e, f, g = self._targets[-1]
         away_2 = (x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2
-        if away_2 > self._max_pressing_error_2 and self._pressing(o):
+        if away_2 > MAX_LAG_M**2:
             return False
-        return bool(away_2 <= self._max_error_2 and abs(w * d + i * e + j * f + k * g) >= self._min_dot)
+        self._away_m = math.sqrt(away_2)
+        return bool(abs(w * d + i * e + j * f + k * g) >= self._min_dot)
 
     def _pressing(self, o: Observation) -> bool:
         """Return True if the newest sample shows more force than a servo without error may press with."""
@@ -242,39 +252,39 @@ class ReadingsGuard:
         if not self._targets:
             return
         rules, p, q = self._rules, o.position_B_P[-1].tolist(), o.quat_B_P[-1].tolist()
-        aways = [(math.dist(p, t[:3]), _angle_rad(q, t[3:])) for t in self._targets]
+        away_m, before_m = distance_to_path(p, [t[:3] for t in self._targets]), self._away_m
+        self._away_m = away_m
         touches = self._pressing(o)
         max_m = min(rules.touching_m, rules.following_m) if touches else rules.following_m
-        if any(m <= max_m and rad <= rules.following_rad for m, rad in aways):
-            return
-        told = "told to " + ("be" if self._moving else "stay")
-        m, rad = min(aways)
-        if m > max_m:
-            what = f"the hand is {m * 1e3:.1f} mm from where it was {told}; {max_m * 1e3:.1f} mm are allowed"
+        told, stamp_s = "told to " + ("be" if self._moving else "stay"), float(o.stamp_s[-1])
+        soon_m = away_m + rules.following_periods * max(away_m - before_m, 0.0)
+        if soon_m > max_m:
+            what = f"the hand is {away_m * 1e3:.1f} mm from where it was {told}"
+            if away_m <= max_m:
+                what += f" and leaves it at {(away_m - before_m) / self._period_s * 1e3:.0f} mm/s"
+            what += f"; {max_m * 1e3:.1f} mm are allowed"
             if touches:
                 what += f" while it presses with {float(np.linalg.norm(o.wrench_S[-1, :3])):.0f} N"
-            findings.append(GuardFinding("following", what, m, max_m, float(o.stamp_s[-1])))
-        else:
+            findings.append(GuardFinding("following", what, soon_m, max_m, stamp_s))
+        rad = min(_angle_rad(q, t[3:]) for t in self._targets)
+        if rad > rules.following_rad:
             what = (
                 f"the hand is turned by {rad:.3f} rad from how it was {told}; {rules.following_rad:.3f} rad are allowed"
             )
-            findings.append(GuardFinding("following", what, rad, rules.following_rad, float(o.stamp_s[-1])))
+            findings.append(GuardFinding("following", what, rad, rules.following_rad, stamp_s))
 
     def _check_wrench(self, o: Observation, findings: list[GuardFinding]) -> None:
-        """Count consecutive samples beyond the hard limit, also across blocks."""
+        """Count consecutive samples beyond the stop limit, also across blocks."""
         limits = self._limits
         force, torque = (np.linalg.norm(w, axis=1) for w in (o.wrench_S[:, :3], o.wrench_S[:, 3:]))
-        beyond = (force > limits.hard_force_N) | (torque > limits.hard_torque_Nm)
+        max_N, max_Nm = limits.stop_force_N, limits.stop_torque_Nm
+        beyond = (force > max_N) | (torque > max_Nm)
         for i, over in enumerate(beyond.tolist()):
             self._samples_over = self._samples_over + 1 if over else 0
             if self._samples_over < self._rules.wrench_samples:
                 continue
-            by_force = force[i] / limits.hard_force_N >= torque[i] / limits.hard_torque_Nm
-            value, limit, unit = (
-                (float(force[i]), limits.hard_force_N, "N")
-                if by_force
-                else (float(torque[i]), limits.hard_torque_Nm, "Nm")
-            )
+            by_force = force[i] / max_N >= torque[i] / max_Nm
+            value, limit, unit = (float(force[i]), max_N, "N") if by_force else (float(torque[i]), max_Nm, "Nm")
             n = self._samples_over
             what = f"{value:.1f} {unit} sensed at the wrist; {n} consecutive samples are beyond {limit:.1f} {unit}"
             findings.append(GuardFinding("wrench", what, value, limit, float(o.stamp_s[i])))
@@ -302,6 +312,19 @@ def _within_limits(wrench: Array) -> bool:
     """Return True if no sample of a block (n, 6), scaled by the limits, exceeds 1."""
     squares = (wrench * wrench).reshape(-1, 2, 3).sum(axis=2)
     return bool(squares.max() < 1.0)
+
+
+def distance_to_path(point: list[float], path: list[list[float]]) -> float:
+    """Return the distance of a point (3,) from a path of points joined by straight lines."""
+    x, y, z = point
+    least = math.dist(point, path[0])
+    for (a, b, c), (d, e, f) in pairwise(path):
+        u, v, w = d - a, e - b, f - c
+        length_2 = u * u + v * v + w * w
+        along = 0.0 if length_2 == 0.0 else ((x - a) * u + (y - b) * v + (z - c) * w) / length_2
+        along = min(max(along, 0.0), 1.0)
+        least = min(least, math.dist(point, (a + along * u, b + along * v, c + along * w)))
+    return least
 
 
 def _angle_rad(a: list[float], b: list[float]) -> float:

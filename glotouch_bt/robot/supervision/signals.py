@@ -12,6 +12,8 @@ from glotouch_bt.robot.geometry import Array
 from glotouch_bt.robot.observation import Observation, TactileFrame
 from glotouch_bt.robot.supervision.limits import GuardFinding, SupervisionLimits, TransientCounter
 
+MIN_TURNS = 2
+"""Least turning points of a noisy force in a block; ten samples of white noise have five. Source: ours."""
 MIN_NOISY_FRAMES = 5
 """Pads count as noisy after this many different pairs of maps without a touch. Source: ours."""
 MAX_EQUAL_FRAMES = 3
@@ -42,19 +44,29 @@ class WrenchSignalGuard:
             self._check_stuck(w, o.now_s, findings)
         else:
             self._same_periods = 0
-            change = abs(newest.item(0) - first.item(0))
-            self._noisy_periods = self._noisy_periods + 1 if change > self._rules.noise_N else 0
+            if not self._noisy:
+                self._noisy_periods = self._noisy_periods + 1 if self._restless(w) else 0
         step = abs(newest.item(0) - w[-2].item(0)) if len(w) > 1 else 0.0
         self._noise_N += self._share * (step - self._noise_N)
         if self._noise_N > self._rules.max_noise_N:
             self._record_noise(o.now_s, findings)
+
+    @property
+    def _noisy(self) -> bool:
+        return self._noisy_periods * self._period_s >= self._rules.noisy_s
+
+    def _restless(self, w: Array) -> bool:
+        """Return True if the force goes up and down within a block, as noise does and a motion does not."""
+        steps = np.diff(w[:, 0])
+        steps = steps[np.abs(steps) > self._rules.noise_N]
+        return bool(np.count_nonzero(steps[1:] * steps[:-1] < 0.0) >= MIN_TURNS)
 
     def _check_stuck(self, w: Array, stamp_s: float, findings: list[GuardFinding]) -> None:
         rules = self._rules
         constant = (w == w[-1]).all(axis=0)
         if not constant.any():
             return
-        noisy = self._noisy_periods * self._period_s >= rules.noisy_s
+        noisy = self._noisy
         if not constant.all():
             if noisy:
                 names = [n for n, c in zip(("Fx", "Fy", "Fz", "Tx", "Ty", "Tz"), constant, strict=True) if c]

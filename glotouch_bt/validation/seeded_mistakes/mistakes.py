@@ -162,7 +162,7 @@ _HEAD = "mission: m\nworld: worlds/container_five.yaml\n"
 _TOOL = "leaves: {hand: probe}\ntree:\n  - tool_pickup\n"
 RIGHT: dict[str, str] = {
     "as it is": MISSION,
-    "no probe, a known place": _HEAD + "tree:\n  - grasp: {in: {plan: {candidate: 0, position_K_m: [0, 0, 25 mm], yaw_rad: 30 deg, aperture_m: 50 mm, opening_m: 80 mm}}}\n  - lift\n",
+    "no probe, a known place": _HEAD + "tree:\n  - tare\n  - grasp: {in: {plan: {candidate: 0, position_K_m: [0, 0, 25 mm], yaw_rad: 30 deg, aperture_m: 50 mm, opening_m: 80 mm}}}\n  - lift\n",
     "the probe stays, and it is said": _HEAD + _TOOL,
     "either of two states in the end": _HEAD + "leaves: {hand: [probe, empty]}\ntree:\n  - tool_pickup\n  - succeed: {timeout: {seconds: 30, do: tool_calibrate}}\n",
     "pickup again after its failure": _HEAD + "leaves: {hand: probe}\ntree:\n  retry: {attempts: 3, do: [tool_pickup, tool_calibrate]}\n",

@@ -14,4 +14,4 @@ from glotouch_skills.common.hand.line_guard import (
 )
 from glotouch_skills.common.hand.retract import CAUGHT_N, RISE_M_S, rise_clear
 from glotouch_skills.common.hand.wait_for import REQUEST_FAILED, finish, set_payload_and_tare
-from glotouch_skills.common.hand.weighing import GRAVITY_M_S2, STAND_S, weigh, weigh_N
+from glotouch_skills.common.hand.weighing import GRAVITY_M_S2, MIN_GRIP_M, STAND_S, Hold, feel_hold, weigh, weigh_N

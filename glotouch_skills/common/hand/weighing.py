@@ -1,4 +1,4 @@
-"""Weigh what hangs in the hand, by the tared wrist."""
+"""Weigh what hangs in the hand, by the tared wrist, and ask all other witnesses of a hold."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from glotouch_bt.motion import Arm, Motion
+from glotouch_bt.perception.touch import patch_statistics
+from glotouch_bt.robot import TactileFrame
 
 GRAVITY_M_S2 = 9.81
 """Standard gravity, rounded."""
@@ -14,6 +16,10 @@ STAND_S = 0.1
 """Stand still for this long first: the end of a stop is felt as a force, too."""
 WEIGH_S = 0.25
 """Average the wrench over this time."""
+MIN_GRIP_N = 1.0
+"""Least force of jaws that hold something. Source: ours; jaws at their target report none."""
+MIN_GRIP_M = 0.003
+"""Least aperture of jaws that hold something, by default. Source: ours."""
 
 
 @dataclass(frozen=True)
@@ -42,3 +48,66 @@ def weigh(arm: Arm) -> Motion[Weighed]:
 def weigh_N(arm: Arm) -> Motion[float]:
     """Return the weight in the hand, N; the tare was taken with the hand empty and upright."""
     return (yield from weigh(arm)).weight_N
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Hold of an object as wrist, jaws and gels show it.
+
+    Attributes:
+        weight_N: Weight in the hand.
+        aperture_m: Median aperture of the jaws.
+        moved_m: Change of the aperture since the jaws closed.
+        jaw_N: Median force of one jaw.
+        gels_touched: Number of touched gels; None without depth maps.
+    """
+
+    weight_N: float
+    aperture_m: float
+    moved_m: float
+    jaw_N: float
+    gels_touched: int | None
+
+    def doubts(self, min_weight_N: float, slip_m: float, min_aperture_m: float = MIN_GRIP_M) -> list[str]:
+        """Return what each witness (wrist, jaws, gels) has against the hold."""
+        found = []
+        if not self.weight_N >= min_weight_N:
+            found.append(f"{self.weight_N:.2f} N hang in the hand, at least {min_weight_N:.2f} N are expected")
+        if not (abs(self.moved_m) <= slip_m and self.aperture_m >= min_aperture_m and self.jaw_N >= MIN_GRIP_N):
+            moved, apart = self.moved_m * 1e3, self.aperture_m * 1e3
+            found.append(f"the jaws moved by {moved:.1f} mm to {apart:.1f} mm and press with {self.jaw_N:.1f} N")
+        if self.gels_touched == 0:
+            found.append("neither gel is touched")
+        return found
+
+    def as_dict(self) -> dict[str, float]:
+        """Return it as the evidence of a failure, -1 gels without depth maps."""
+        touched = -1 if self.gels_touched is None else self.gels_touched
+        return {
+            "weight_N": self.weight_N,
+            "aperture_m": self.aperture_m,
+            "moved_m": self.moved_m,
+            "jaw_N": self.jaw_N,
+            "gels_touched": touched,
+        }
+
+
+def feel_hold(arm: Arm, grip_m: float, look_s: float) -> Motion[Hold]:
+    """Stand still and ask every witness of the hold.
+
+    Args:
+        arm: At rest, the object lifted.
+        grip_m: Aperture when the jaws had closed.
+        look_s: Time for which jaws and gels are measured.
+    """
+    blocks = yield from arm.hold(look_s, tactile=True)
+    weight_N = yield from weigh_N(arm)
+    apart = float(np.median([b.gripper.aperture_m for b in blocks]))
+    jaw_N = float(np.median([b.gripper.force_N for b in blocks]))
+    frames = [b.tactile for b in blocks if b.tactile is not None]
+    return Hold(weight_N, apart, apart - grip_m, jaw_N, _touched(frames[-1]) if frames else None)
+
+
+def _touched(frame: TactileFrame) -> int:
+    """Return how many of the two gels are touched."""
+    return sum(patch_statistics(d).valid for d in (frame.left_m, frame.right_m))

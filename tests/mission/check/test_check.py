@@ -259,3 +259,19 @@ def test_what_a_mission_leaves_is_checked(load: Callable[..., Any]) -> None:
         with pytest.raises(MissionFaults) as e:
             load(HEAD + f"leaves: {text}\ntree: act\n")
         assert [f.code for f in e.value.findings] == [code]
+
+
+@pytest.mark.parametrize("tares", ["", "tare, ", "{succeed: tare}, "])
+def test_wrong_state__what_weighs_needs_a_tared_wrist(tares: str, tmp_path: Path) -> None:
+    """An untared wrist weighs the hand itself: 8.7 N in empty jaws."""
+    plan = "{candidate: 0, position_K_m: [0, 0, 25 mm], yaw_rad: 0 deg, aperture_m: 50 mm, opening_m: 80 mm}"
+    path = tmp_path / "m.yaml"
+    path.write_text(f"{HEAD}leaves: {{hand: object}}\ntree: [{tares}{{grasp: {{in: {{plan: {plan}}}}}}}, lift]\n")
+    if tares == "tare, ":
+        load_mission(path)
+        return
+    with pytest.raises(MissionFaults) as e:
+        load_mission(path)
+    found = [f for f in e.value.findings if f.code == "wrong_state"]
+    assert found
+    assert all("wrist" in f.what and "'untared'" in f.what and f.valid == "tared" for f in found)

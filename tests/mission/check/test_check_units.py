@@ -93,9 +93,9 @@ def test_a_condition_compares_in_si(written: str, node: str, load: Load) -> None
 @pytest.mark.parametrize(
     ("node", "place"),
     [
-        ("condition: {port: grip_m, at_least: 4 N}", (6, 23)),
-        ("condition: {port: grip_m, at_least: $w}", (6, 23)),
-        ("repeat: {until: {port: grip_m, at_most: 4 N}, limit: 2, do: [put_back, PLAN]}", (6, 28)),
+        ("condition: {port: grip_m, at_least: 4 N}", (7, 23)),
+        ("condition: {port: grip_m, at_least: $w}", (7, 23)),
+        ("repeat: {until: {port: grip_m, at_most: 4 N}, limit: 2, do: [put_back, PLAN]}", (7, 28)),
     ],
 )
 def test_a_condition_in_another_quantity(node: str, place: tuple[int, int], tmp_path: Path) -> None:
@@ -104,12 +104,12 @@ def test_a_condition_in_another_quantity(node: str, place: tuple[int, int], tmp_
         "{grasp: {in: {plan: {candidate: 0, position_K_m: [0, 0, 0], yaw_rad: 0, aperture_m: 0.05, opening_m: 0.08}}}}"
     )
     path = tmp_path / "m.yaml"
-    path.write_text(text + f"  - PLAN\n  - {node}\n".replace("PLAN", plan))
+    path.write_text(text + f"  - tare\n  - PLAN\n  - {node}\n".replace("PLAN", plan))
     with pytest.raises(MissionFaults) as e:
         load_mission(path)
     (found,) = e.value.findings
     assert ((found.place.line, found.place.column), found.code) == (place, "port_unit")
-    assert "in N, but 'grasp' (line 5) writes it in m: another quantity" in found.what
+    assert "in N, but 'grasp' (line 6) writes it in m: another quantity" in found.what
 
 
 @pytest.mark.parametrize(
@@ -147,7 +147,7 @@ PLAN = "candidate: 0, position_K_m: [0, 0, 25 mm], yaw_rad: 30 deg, aperture_m: 
 
 
 def lifted(plan: str, grip: str = "grip_m") -> str:
-    tree = f"  - grasp: {{in: {{plan: {{{plan}}}}}}}\n  - lift: {{in: {{grip_m: {grip}}}}}\n"
+    tree = f"  - tare\n  - grasp: {{in: {{plan: {{{plan}}}}}}}\n  - lift: {{in: {{grip_m: {grip}}}}}\n"
     return HEAD + "leaves: {hand: object}\ntree:\n" + tree
 
 
@@ -171,7 +171,7 @@ def test_a_plan_in_the_wrong_unit(old: str, new: str, code: str, words: str, tmp
     (found,) = e.value.findings
     line = path.read_text().splitlines()[found.place.line - 1]
     named = words.partition(":")[0] if code == "wrong_type" else found.what.split("'plan': ")[-1].partition(" ")[0]
-    assert (found.place.line, found.code) == (5, code)
+    assert (found.place.line, found.code) == (6, code)
     assert line[: found.place.column - 1].endswith(f"{named}: ")
     assert words in found.what
 

@@ -25,6 +25,7 @@ from glotouch_bt.robot import (
 )
 from glotouch_bt.robot.fake import FakeRobot, forward
 from glotouch_bt.robot.supervision.limits import GUARDS, SupervisionLimits
+from glotouch_bt.robot.supervision.readings import distance_to_path
 from glotouch_bt.robot.supervision.supervisor import MAX_RECORDED
 from tests.robot.supervision.supervised import (
     Device,
@@ -335,3 +336,27 @@ def test_a_guard_of_the_supervisor_is_not_recorded_again() -> None:
     count = len(found)
     robot.trip_by(trip.value)
     assert len(found) == count
+
+
+def test_following__a_hand_that_leaves_its_path_fast_is_stopped_before_the_limit() -> None:
+    """0.2 m/s: a tenth of a second of motion would be 20 mm."""
+
+    def leaves(seen: Observation) -> Observation:
+        away = [[0.2, 0.0, 0.0]] * np.maximum(seen.stamp_s[:, None] - 0.2, 0.0)
+        return dataclasses.replace(seen, position_B_P=seen.position_B_P + away)
+
+    device = Device(leaves)
+    robot, found = supervised(device)
+    robot.cycle(setpoint(device.description.home_q))
+    with pytest.raises(GuardTripped, match="leaves it at 200 mm/s") as trip:
+        spin(robot, 100)
+    assert trip.value.stamp_s < 0.2 + 0.011
+    assert found[-1].guard == "following"
+
+
+def test_distance_to_path__between_its_points() -> None:
+    path = [[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.01, 0.01, 0.0]]
+    assert distance_to_path([0.005, 0.001, 0.0], path) == pytest.approx(0.001)
+    assert distance_to_path([0.012, 0.004, 0.0], path) == pytest.approx(0.002)
+    assert distance_to_path([0.01, 0.02, 0.0], path) == pytest.approx(0.01)
+    assert distance_to_path([0.0, 0.0, 0.003], path[:1]) == pytest.approx(0.003)

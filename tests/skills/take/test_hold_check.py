@@ -61,7 +61,7 @@ def test_hold_check__lost(make, kw) -> None:
     b, skill = make(**kw)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "lost")
-    assert {"weight_N", "moved_m", "gels_touched"} == set(skill.reason.evidence)
+    assert {"weight_N", "moved_m", "gels_touched"} < set(skill.reason.evidence)
 
 
 @pytest.mark.parametrize("grip_m", [0.045, 0.035])

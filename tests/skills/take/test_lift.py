@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from py_trees.common import Status
 
+from glotouch_bt.robot import TactileFrame
 from glotouch_skills.take.lift import Lift
+
+
+PRESSED = np.pad(np.full((15, 10), 4e-4), ((10, 10), (5, 5)))
+FLAT = np.zeros_like(PRESSED)
 
 
 @pytest.fixture
 def make(bench):
-    def make_one(weight_N=2.5, grip_width_m=0.04, **params):
+    def make_one(weight_N=2.5, grip_width_m=0.04, gel_m=PRESSED, jaws=None, **params):
         start = {}
 
         def weight(position, aperture):
@@ -21,6 +28,15 @@ def make(bench):
         b.go(b.arm.shift((0.0, 0.0, -0.2), 0.25))
         b.go(b.arm.jaws(0.0, speed_m_s=0.2))
         start["z"] = float(b.arm.pose_B_P.position_m[2])
+        cycle = b.robot.cycle
+
+        def reported(command):
+            seen = cycle(command)
+            if seen.tactile is not None:
+                seen = dataclasses.replace(seen, tactile=TactileFrame(seen.tactile.stamp_s, gel_m, gel_m))
+            return dataclasses.replace(seen, gripper=dataclasses.replace(seen.gripper, **(jaws or {})))
+
+        b.robot.cycle = reported
         return b, b.make(Lift, inputs={"grip_m": 0.04}, **params)
 
     return make_one
@@ -37,12 +53,22 @@ def test_the_weight_is_what_hangs_in_the_hand(make) -> None:
     assert all(c.gripper is None for c in b.commands[begun:]), "the jaws are left alone"
 
 
-@pytest.mark.parametrize(("weight_N", "width_m"), [(0.1, 0.04), (2.5, None)], ids=["no weight", "closed jaws"])
-def test_lift__lost(make, weight_N: float, width_m: float | None) -> None:
-    b, skill = make(weight_N, width_m)
+@pytest.mark.parametrize(
+    "against",
+    [
+        {"weight_N": 0.1},
+        {"grip_width_m": None},
+        {"gel_m": FLAT},
+        {"jaws": {"aperture_m": 0.08}},
+        {"jaws": {"force_N": 0.0}},
+    ],
+    ids=["no weight", "closed jaws", "untouched gels", "opened jaws", "jaws without force"],
+)
+def test_lift__lost_if_any_witness_says_so(make, against) -> None:
+    b, skill = make(**against)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "lost")
-    assert set(skill.reason.evidence) == {"weight_N", "aperture_m"}
+    assert set(skill.reason.evidence) == {"weight_N", "aperture_m", "moved_m", "jaw_N", "gels_touched"}
 
 
 def test_broken_off_anywhere(make, preempt_all_along) -> None:
