@@ -11,7 +11,6 @@ from py_trees.common import Status
 from glotouch_bt.robot import TactileFrame
 from glotouch_skills.take.lift import Lift
 
-
 PRESSED = np.pad(np.full((15, 10), 4e-4), ((10, 10), (5, 5)))
 FLAT = np.zeros_like(PRESSED)
 
