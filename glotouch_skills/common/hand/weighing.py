@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -80,7 +81,7 @@ class Hold:
             found.append("neither gel is touched")
         return found
 
-    def as_dict(self) -> dict[str, float]:
+    def as_dict(self) -> dict[str, Any]:
         """Return it as the evidence of a failure, -1 gels without depth maps."""
         touched = -1 if self.gels_touched is None else self.gels_touched
         return {
