@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from glotouch_backends.mujoco.control import (
+    BRAKE_REACH_M,
     PAYLOAD_S,
     HardLimitGuard,
     JawReports,
@@ -35,8 +36,6 @@ from glotouch_bt.robot import (
 
 REST_RAD_S = 1e-3
 """A stopped arm stands still below this speed of every joint. Source: ours."""
-MOVING_RAD_S = 0.02
-"""The arm moves if a joint or its setpoint is faster: 15 mm/s at the hand. Source: ours."""
 MAX_HELD_DISTANCE_M = 0.02
 """The probe counts as held while its handle is within this distance of P. Source: ours."""
 
@@ -177,7 +176,7 @@ class MujocoRobot(Robot):
         ctrl_now, sensed, external_now = self._ctrl_now, self._sensed, self._external_now
         felt, expected = slice(self._s.force.start, self._s.torque.stop), self._expected.tolist()
         speed_rad_s = float(np.abs(data.qvel[self.handles.arm_dof]).max())
-        moves = max(speed_rad_s, self._servo.speed_rad_s) > MOVING_RAD_S
+        speed_m_s = BRAKE_REACH_M * max(speed_rad_s, self._servo.speed_rad_s)
         stands = guard.tripped is not None and speed_rad_s < REST_RAD_S
         for i, (ctrl, sample, external) in enumerate(self._rows):
             if guard.tripped is not None and not stands:
@@ -188,7 +187,7 @@ class MujocoRobot(Robot):
             external[:] = external_now
             # The sensor reads the force of the hand on the arm; the hand feels its opposite.
             if guard.tripped is None:
-                guard.check([-w - e for w, e in zip(sample[felt], expected, strict=True)], moves, data.time)
+                guard.check([-w - e for w, e in zip(sample[felt], expected, strict=True)], speed_m_s, data.time)
         if guard.tripped is not None and not stands:
             self._servo.reset(np.array(data.qpos[self.handles.arm_qpos]))
         if self.trace is not None:

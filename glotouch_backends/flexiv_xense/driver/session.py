@@ -24,6 +24,10 @@ MIN_RISING_SHARE = 0.25
 """Share of the limit below which no rise counts. Source: as in the simulated robot."""
 STOP_AHEAD_S = 0.008
 """Extrapolate the force of a moving arm over this time: it presses harder until it stands. Source: as there."""
+CONTACT_STIFFNESS_N_M = 60e3
+"""An arm that moves at v presses harder by at most this times v. Source: as there."""
+LEVER_M = 0.34
+"""Lever of a force on the probe's tip. Source: as of the hard torque limit."""
 MIN_MOVING_M_S = 0.015
 """The arm moves if P is faster. Source: as there."""
 MAX_BUFFERED_SAMPLES = 60_000
@@ -215,9 +219,10 @@ class DriverSession:
             return
         self._over = self._over + 1 if _share(values) > 1.0 else 0
         ahead = STOP_AHEAD_S / (now - then) if now > then and self.speed_m_s > MIN_MOVING_M_S else 0.0
+        max_rise_N = CONTACT_STIFFNESS_N_M * self.speed_m_s * STOP_AHEAD_S
         soon = {
-            "rising_force_N": (force + ahead * (force - force_then), limits.force_N),
-            "rising_torque_Nm": (torque + ahead * (torque - torque_then), limits.torque_Nm),
+            "rising_force_N": (force + min(ahead * (force - force_then), max_rise_N), limits.force_N),
+            "rising_torque_Nm": (torque + min(ahead * (torque - torque_then), LEVER_M * max_rise_N), limits.torque_Nm),
         }
         self._rising = self._rising + 1 if ahead > 0.0 and _share(soon) > 1.0 else 0
         if self.stop is not None or self._busy:

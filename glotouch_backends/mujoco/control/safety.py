@@ -18,6 +18,13 @@ MAX_SAMPLES_RISING = 2
 """Consecutive samples that trip it while the arm moves and the force rises steeply, or is beyond the limit. An impact
 on a free object rises for one sample, by up to 16 N; an arm that presses on something fixed rises in every sample.
 Source: measured in whole retrievals."""
+CONTACT_STIFFNESS_N_M = 60e3
+"""Stiffness of a rigid contact with the arm behind it: an arm that moves at v presses harder by at most this times v,
+however steeply an impact rises. Source: measured, 54 N/mm."""
+MIN_MOVING_M_S = 0.015
+"""The arm moves if the hand is faster. Source: ours."""
+LEVER_M = 0.34
+"""Lever of a force on the probe's tip. Source: as of the hard torque limit."""
 MIN_RISING_SHARE = 0.25
 """Share of the stop limit below which no rise counts: a light object rattles below it. Source: as above."""
 
@@ -25,23 +32,26 @@ MIN_RISING_SHARE = 0.25
 class HardLimitGuard:
     """Check the raw contact wrench after every step; once tripped it stays tripped.
 
-    While the arm moves, the force is extrapolated at its present rise, because the arm presses harder until it stands.
-    Against an object that jumps between closing jaws, a standing arm can do nothing.
+    While the arm moves, the force is extrapolated at its present rise, because the arm presses harder until it stands,
+    but no faster than its speed allows: the impact of the probe on its holder rises steeply and ends by itself. Against
+    an object that jumps between closing jaws, a standing arm can do nothing.
     """
 
     def __init__(self, limits: Limits) -> None:
         self._max_N, self._max_Nm = limits.stop_force_N, limits.stop_torque_Nm
-        self._ahead = limits.stop_ahead_s / STEP_S
+        self._ahead_s = limits.stop_ahead_s
         self._last_N = self._last_Nm = 0.0
         self._over = self._rising = 0
         self.tripped: SafetyStop | None = None
 
-    def check(self, contact: Sequence[float], moves: bool, stamp_s: float) -> None:
-        """Check one contact wrench (6,); `moves` is true while the arm moves."""
+    def check(self, contact: Sequence[float], speed_m_s: float, stamp_s: float) -> None:
+        """Check one contact wrench (6,); `speed_m_s` is an upper bound of the hand's speed."""
         x, y, z, a, b, c = contact
         force, torque = math.sqrt(x * x + y * y + z * z), math.sqrt(a * a + b * b + c * c)
-        force_soon = force + self._ahead * (force - self._last_N)
-        torque_soon = torque + self._ahead * (torque - self._last_Nm)
+        periods, max_rise_N = self._ahead_s / STEP_S, CONTACT_STIFFNESS_N_M * speed_m_s * self._ahead_s
+        force_soon = force + min(periods * (force - self._last_N), max_rise_N)
+        torque_soon = torque + min(periods * (torque - self._last_Nm), LEVER_M * max_rise_N)
+        moves = speed_m_s > MIN_MOVING_M_S
         self._last_N, self._last_Nm = force, torque
         share = max(force / self._max_N, torque / self._max_Nm)
         soon = max(force_soon / self._max_N, torque_soon / self._max_Nm)
