@@ -42,7 +42,7 @@ def test_an_impact_on_a_free_object_does_not_trip_it() -> None:
 
 
 def test_a_slow_hand_that_sets_the_probe_down_does_not_trip_it() -> None:
-    """The probe meets its seat at 10 mm/s: an impact of some milliseconds, after which the arm presses little harder."""
+    """The probe meets its seat at 10 mm/s: an impact of some milliseconds; the arm presses little harder after it."""
     assert tripped_after([0.2, 6.0, 12.0, 14.0, 13.0, 11.0, 9.0], speed_m_s=0.02) is None
 
 
