@@ -6,7 +6,6 @@ import mujoco
 import numpy as np
 
 from glotouch_backends.mujoco.control import (
-    BRAKE_REACH_M,
     PAYLOAD_S,
     HardLimitGuard,
     JawReports,
@@ -176,7 +175,7 @@ class MujocoRobot(Robot):
         ctrl_now, sensed, external_now = self._ctrl_now, self._sensed, self._external_now
         felt, expected = slice(self._s.force.start, self._s.torque.stop), self._expected.tolist()
         speed_rad_s = float(np.abs(data.qvel[self.handles.arm_dof]).max())
-        speed_m_s = BRAKE_REACH_M * max(speed_rad_s, self._servo.speed_rad_s)
+        place = self._s.position
         stands = guard.tripped is not None and speed_rad_s < REST_RAD_S
         for i, (ctrl, sample, external) in enumerate(self._rows):
             if guard.tripped is not None and not stands:
@@ -187,7 +186,8 @@ class MujocoRobot(Robot):
             external[:] = external_now
             # The sensor reads the force of the hand on the arm; the hand feels its opposite.
             if guard.tripped is None:
-                guard.check([-w - e for w, e in zip(sample[felt], expected, strict=True)], speed_m_s, data.time)
+                contact = [-w - e for w, e in zip(sample[felt], expected, strict=True)]
+                guard.check(contact, sample[place].tolist(), data.time)
         if guard.tripped is not None and not stands:
             self._servo.reset(np.array(data.qpos[self.handles.arm_qpos]))
         if self.trace is not None:

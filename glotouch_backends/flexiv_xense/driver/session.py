@@ -28,8 +28,8 @@ CONTACT_STIFFNESS_N_M = 60e3
 """An arm that moves at v presses harder by at most this times v. Source: as there."""
 LEVER_M = 0.34
 """Lever of a force on the probe's tip. Source: as of the hard torque limit."""
-MIN_MOVING_M_S = 0.015
-"""The arm moves if P is faster. Source: as there."""
+MIN_MOVING_M_S = 0.042
+"""A steep rise counts only above this speed of P. Source: as there."""
 MAX_BUFFERED_SAMPLES = 60_000
 """Samples buffered while the client requests none (60 s)."""
 SPEED_SAMPLES = 20

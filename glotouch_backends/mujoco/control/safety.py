@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 
 import mujoco
@@ -21,8 +22,11 @@ Source: measured in whole retrievals."""
 CONTACT_STIFFNESS_N_M = 60e3
 """Stiffness of a rigid contact with the arm behind it: an arm that moves at v presses harder by at most this times v,
 however steeply an impact rises. Source: measured, 54 N/mm."""
-MIN_MOVING_M_S = 0.015
-"""The arm moves if the hand is faster. Source: ours."""
+MIN_MOVING_M_S = 0.042
+"""A steep rise counts only above this speed of P. Source: ours; contacts of guarded motions, at 40 mm/s at most, rise
+as steeply as collisions, and end by themselves."""
+SPEED_SAMPLES = 10
+"""Samples over which the speed of P is measured."""
 LEVER_M = 0.34
 """Lever of a force on the probe's tip. Source: as of the hard torque limit."""
 MIN_RISING_SHARE = 0.25
@@ -32,9 +36,9 @@ MIN_RISING_SHARE = 0.25
 class HardLimitGuard:
     """Check the raw contact wrench after every step; once tripped it stays tripped.
 
-    While the arm moves, the force is extrapolated at its present rise, because the arm presses harder until it stands,
-    but no faster than its speed allows: the impact of the probe on its holder rises steeply and ends by itself. Against
-    an object that jumps between closing jaws, a standing arm can do nothing.
+    While the arm moves faster than any guarded motion, the force is extrapolated at its present rise, because the arm
+    presses harder until it stands, but no faster than its speed allows. Against an object that jumps between closing
+    jaws, a standing arm can do nothing.
     """
 
     def __init__(self, limits: Limits) -> None:
@@ -42,21 +46,27 @@ class HardLimitGuard:
         self._ahead_s = limits.stop_ahead_s
         self._last_N = self._last_Nm = 0.0
         self._over = self._rising = 0
+        self._places: deque[Sequence[float]] = deque(maxlen=SPEED_SAMPLES)
         self.tripped: SafetyStop | None = None
 
-    def check(self, contact: Sequence[float], speed_m_s: float, stamp_s: float) -> None:
-        """Check one contact wrench (6,); `speed_m_s` is an upper bound of the hand's speed."""
+    def check(self, contact: Sequence[float], position_B_P: Sequence[float], stamp_s: float) -> None:
+        """Check one contact wrench (6,) with P at a position (3,)."""
+        self._places.append(position_B_P)
         x, y, z, a, b, c = contact
         force, torque = math.sqrt(x * x + y * y + z * z), math.sqrt(a * a + b * b + c * c)
-        periods, max_rise_N = self._ahead_s / STEP_S, CONTACT_STIFFNESS_N_M * speed_m_s * self._ahead_s
-        force_soon = force + min(periods * (force - self._last_N), max_rise_N)
-        torque_soon = torque + min(periods * (torque - self._last_Nm), LEVER_M * max_rise_N)
-        moves = speed_m_s > MIN_MOVING_M_S
+        rise_N, rise_Nm = force - self._last_N, torque - self._last_Nm
         self._last_N, self._last_Nm = force, torque
         share = max(force / self._max_N, torque / self._max_Nm)
+        if share < MIN_RISING_SHARE:
+            self._over = self._rising = 0
+            return
+        speed_m_s = math.dist(self._places[0], position_B_P) / (max(1, len(self._places) - 1) * STEP_S)
+        periods, max_rise_N = self._ahead_s / STEP_S, CONTACT_STIFFNESS_N_M * speed_m_s * self._ahead_s
+        force_soon = force + min(periods * rise_N, max_rise_N)
+        torque_soon = torque + min(periods * rise_Nm, LEVER_M * max_rise_N)
         soon = max(force_soon / self._max_N, torque_soon / self._max_Nm)
         self._over = self._over + 1 if share > 1.0 else 0
-        self._rising = self._rising + 1 if moves and soon > 1.0 and share > MIN_RISING_SHARE else 0
+        self._rising = self._rising + 1 if speed_m_s > MIN_MOVING_M_S and soon > 1.0 else 0
         if self._over < MAX_SAMPLES_OVER and self._rising < MAX_SAMPLES_RISING:
             return
         if self._over >= MAX_SAMPLES_OVER:

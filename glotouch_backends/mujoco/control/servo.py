@@ -82,11 +82,6 @@ class Servo:
         """Setpoint (dof,) at the end of the last period, rad."""
         return np.asarray(self._knots[2])
 
-    @property
-    def speed_rad_s(self) -> float:
-        """Mean speed of the fastest joint's setpoint over the period that was planned last."""
-        return float(np.abs(self._knots[2] - self._knots[0]).max()) / self._period
-
     def reset(self, q: Array) -> None:
         """Set the setpoint to `q` (dof,) at rest, without a ramp."""
         self._knots[0] = self._knots[2] = q
