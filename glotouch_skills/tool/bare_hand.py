@@ -11,7 +11,7 @@ from glotouch_bt.perception.touch.detection import Polygon
 from glotouch_bt.robot import Pose
 from glotouch_bt.skill import MOTION_REFUSED, Failure, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
-from glotouch_skills.common.hand import REQUEST_FAILED, set_payload_and_tare
+from glotouch_skills.common.hand import REQUEST_FAILED, WRIST_STATES, set_payload_and_tare
 from glotouch_skills.common.probe import corner_place
 
 TRAVEL_M_S = 0.1
@@ -38,7 +38,7 @@ class BareHand(Skill):
     Params = BareHandParams
     params: BareHandParams
 
-    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers"}), "wrist": WRIST_STATES}
     POSTCONDITIONS: ClassVar = {"hand": "fingers", "wrist": "tared"}
     USES: ClassVar = frozenset({"arm"})
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Probe
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import GRAVITY_M_S2, RISE_M_S, rise_clear, set_payload_and_tare, weigh_N
+from glotouch_skills.common.hand import GRAVITY_M_S2, RISE_M_S, WRIST_STATES, rise_clear, set_payload_and_tare, weigh_N
 from glotouch_skills.common.probe import HELD_TOLERANCE_M, RETURN_PROBE_FAILURES, return_probe
 
 MIN_HELD_M = 0.003
@@ -36,7 +36,10 @@ class Stow(Skill):
     Params = StowParams
     params: StowParams
 
-    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "untared", "probe", "object"})}
+    PRECONDITIONS: ClassVar = {
+        "hand": frozenset({"empty", "fingers", "untared", "probe", "object"}),
+        "wrist": WRIST_STATES,
+    }
     POSTCONDITIONS: ClassVar = {"hand": "empty", "wrist": "tared"}
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "untared"}), "wrist": frozenset({UNCHANGED})}
     USES: ClassVar = frozenset({"arm"})

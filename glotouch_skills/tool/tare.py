@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from glotouch_bt.robot import Tare
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import REQUEST_FAILED, RISE_M_S, finish, rise_clear
+from glotouch_skills.common.hand import REQUEST_FAILED, RISE_M_S, WRIST_STATES, finish, rise_clear
 
 
 class TareParams(SkillParams):
@@ -26,7 +26,7 @@ class TareWrist(Skill):
     params: TareParams
 
     # The weight of an object in the hand, unknown to the controller, would be tared away.
-    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "probe"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "probe"}), "wrist": WRIST_STATES}
     POSTCONDITIONS: ClassVar = {"wrist": "tared"}
     FAILURE_STATES: ClassVar = {"wrist": frozenset({UNCHANGED})}
     USES: ClassVar = frozenset({"arm"})

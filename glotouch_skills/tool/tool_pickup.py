@@ -17,6 +17,7 @@ from glotouch_skills.common.hand import (
     GRAVITY_M_S2,
     REQUEST_FAILED,
     UP_B,
+    WRIST_STATES,
     describe_stop,
     finish,
     may_touch,
@@ -61,7 +62,7 @@ class ToolPickup(Skill):
     Params = ToolPickupParams
     params: ToolPickupParams
 
-    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "untared", "probe"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "untared", "probe"}), "wrist": WRIST_STATES}
     POSTCONDITIONS: ClassVar = {"hand": "probe", "wrist": "tared"}
     FAILURE_STATES: ClassVar = {
         "hand": frozenset({UNCHANGED, "empty", "probe"}),

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, In, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
+from glotouch_skills.common.hand import WRIST_STATES
 from glotouch_skills.common.probe import RETURN_PROBE_FAILURES, return_probe
 
 
@@ -28,7 +29,7 @@ class ToolReturn(Skill):
     params: ToolReturnParams
 
     # `untared`: the probe is released, but the wrist is not yet tared; only this skill or `tool_pickup` may follow.
-    PRECONDITIONS: ClassVar = {"hand": frozenset({"probe", "untared"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"probe", "untared"}), "wrist": WRIST_STATES}
     POSTCONDITIONS: ClassVar = {"hand": "empty", "wrist": "tared"}
     FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "untared"}), "wrist": frozenset({UNCHANGED})}
     USES: ClassVar = frozenset({"arm"})

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import RISE_M_S, STAND_S, rise_clear
+from glotouch_skills.common.hand import RISE_M_S, STAND_S, WRIST_STATES, rise_clear
 
 
 class WristCheckParams(SkillParams):
@@ -32,7 +32,7 @@ class WristCheck(Skill):
     Params = WristCheckParams
     params: WristCheckParams
 
-    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "probe"})}
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers", "probe"}), "wrist": WRIST_STATES}
     POSTCONDITIONS: ClassVar = {"wrist": "tared"}  # whatever it was: it reads zero
     FAILURE_STATES: ClassVar = {"wrist": frozenset({UNCHANGED})}
     USES: ClassVar = frozenset({"arm"})

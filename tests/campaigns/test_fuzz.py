@@ -43,7 +43,7 @@ def test_a_document_does_not_depend_on_those_before_it() -> None:
 
 
 def test_documents_are_of_both_kinds_and_in_all_states() -> None:
-    documents = [drawn(SEED, n) for n in range(300)]
+    documents = [drawn(SEED, n) for n in range(600)]
     assert {kind for kind, _ in documents} == {"mission", "fault plan"}
     texts = [text for _, text in documents]
     assert any(b"!!python" in t for t in texts), "tags"

@@ -13,5 +13,5 @@ from glotouch_skills.common.hand.line_guard import (
     straight_guard,
 )
 from glotouch_skills.common.hand.retract import CAUGHT_N, RISE_M_S, rise_clear
-from glotouch_skills.common.hand.wait_for import REQUEST_FAILED, finish, set_payload_and_tare
+from glotouch_skills.common.hand.wait_for import REQUEST_FAILED, WRIST_STATES, finish, set_payload_and_tare
 from glotouch_skills.common.hand.weighing import GRAVITY_M_S2, MIN_GRIP_M, STAND_S, Hold, feel_hold, weigh, weigh_N

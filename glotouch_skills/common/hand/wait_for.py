@@ -15,6 +15,9 @@ REQUEST_FAILED = Failure(
     advice="see the device's own log; the skill may be tried again",
 )
 
+WRIST_STATES = frozenset({"untared", "tared", "stale"})
+"""Every state of the wrist sensor: precondition of skills that set its state whatever it was."""
+
 
 def finish(ticket: Ticket, what: str) -> SkillRun:
     """Hold the arm until `ticket` is done.
