@@ -33,10 +33,14 @@ def _layout(name: str, value: object) -> Layout:
     places: dict[str, tuple[float, float, float]] = {}
     for key, place in value.items():
         numbers = tuple(place) if isinstance(place, (list, tuple)) else ()
-        if len(numbers) != 3 or not all(type(v) in (int, float) and abs(v) <= MAX_COORDINATE for v in numbers):
+        if len(numbers) != 3 or not all(_is_coordinate(v) for v in numbers):
             raise ParamError(f"{name}[{key}]", place, rule)
         places[str(key)] = (float(numbers[0]), float(numbers[1]), float(numbers[2]))
     return places
+
+
+def _is_coordinate(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= MAX_COORDINATE
 
 
 def _switch(name: str, value: object) -> bool:
