@@ -185,6 +185,7 @@ def test_a_wrong_object_is_put_back_and_the_next_is_taken(run: Run, tmp_path: Pa
     tree = """
 sequence:
   - sure
+  - tare
   - subtree:
       file: SUBTREES/take_target.yaml
       parameters: {target: block}
@@ -326,6 +327,7 @@ def test_what_frozen_gels_did_not_feel_is_touched_again(run: Run, found: Any) ->
     tree = """
 sequence:
   - known
+  - tare
   - subtree: {file: SUBTREES/squeeze_all.yaml, ports: {candidates: candidates, touchsets: touchsets}}
   - subtree:
       file: SUBTREES/take_target.yaml
