@@ -18,7 +18,8 @@ class Limits:
         hard_force_N: Norm of the contact force that the true peak must not pass. Source: the maximum contact wrench
             that public code sets for a Rizon 4 with a Xense gripper.
         hard_torque_Nm: The same for the torque at S. Source: the force limit on the probe's 0.34 m lever.
-        stop_share: Share of both at which the robot stops itself. Source: ours; above the 25 N of a snagging probe.
+        stop_share: Share of both at which the robot stops itself. Source: ours; above the 27.5 N with which a probe
+            that slipped snags on its way back.
         stop_ahead_s: The robot also stops where the force would be too large after this time at its present rise.
             Source: measured; three samples to see the rise and 5 ms to stop 0.1 m/s.
         tcp_speed_m_s: Largest commanded speed of P. Source: vendor default of motion-force mode, 0.5 m/s, halved.
@@ -33,7 +34,7 @@ class Limits:
 
     hard_force_N: float = 30.0
     hard_torque_Nm: float = 10.2
-    stop_share: float = 0.9
+    stop_share: float = 0.95
     stop_ahead_s: float = 0.008
     tcp_speed_m_s: float = 0.25
     tcp_acceleration_m_s2: float = 1.0

@@ -78,5 +78,5 @@ def test_zeroing_and_entering_name_the_group(arm: Arm20) -> None:
     calls = dict(arm.robot.calls)
     assert calls["ExecutePrimitive"] == ({JointGroup.ARMS: ("ZeroFTSensor", {"dataCollectTime": 0.2})},)
     assert calls["SetForceControlAxis"] == (JointGroup.ARMS, [False] * 6)
-    assert calls["SetMaxContactWrench"][1] == pytest.approx([29.7] * 3 + [10.098] * 3)
+    assert calls["SetMaxContactWrench"][1] == pytest.approx([1.05 * 28.5] * 3 + [1.05 * 9.69] * 3)
     assert [c for c, _ in arm.robot.calls][-1] == "SetMaxContactWrench"

@@ -35,7 +35,7 @@ MAX_ANGULAR_RAD_S2 = 40.0
 so a small error needs much acceleration. Source: measured; with 10 rad/s2 the simulated hand lagged by 0.1 rad."""
 SMOOTHING_HEADROOM = 1.5
 """Limits of the arm's own smoothing over those of the plan; with 1 it could never catch up. Source: ours."""
-DEVICE_WRENCH_SHARE = 1.1
+DEVICE_WRENCH_SHARE = 1.05
 """The device's contact limit over the driver's: the driver stops the arm, the device bounds the peak. Source: ours."""
 
 
