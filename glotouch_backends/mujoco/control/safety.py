@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Sequence
 
 import mujoco
@@ -46,12 +45,14 @@ class HardLimitGuard:
         self._ahead_s = limits.stop_ahead_s
         self._last_N = self._last_Nm = 0.0
         self._over = self._rising = 0
-        self._places: deque[Sequence[float]] = deque(maxlen=SPEED_SAMPLES)
+        self._places = np.zeros((SPEED_SAMPLES, 3))  # of P, the newest at `_seen - 1`
+        self._seen = 0
         self.tripped: SafetyStop | None = None
 
     def check(self, contact: Sequence[float], position_B_P: Sequence[float], stamp_s: float) -> None:
         """Check one contact wrench (6,) with P at a position (3,)."""
-        self._places.append(position_B_P)
+        self._places[self._seen % SPEED_SAMPLES] = position_B_P
+        self._seen += 1
         x, y, z, a, b, c = contact
         force, torque = math.sqrt(x * x + y * y + z * z), math.sqrt(a * a + b * b + c * c)
         rise_N, rise_Nm = force - self._last_N, torque - self._last_Nm
@@ -60,7 +61,9 @@ class HardLimitGuard:
         if share < MIN_RISING_SHARE:
             self._over = self._rising = 0
             return
-        speed_m_s = math.dist(self._places[0], position_B_P) / (max(1, len(self._places) - 1) * STEP_S)
+        n = min(self._seen, SPEED_SAMPLES)
+        oldest = self._places[(self._seen - n) % SPEED_SAMPLES].tolist()
+        speed_m_s = math.dist(oldest, position_B_P) / (max(1, n - 1) * STEP_S)
         periods, max_rise_N = self._ahead_s / STEP_S, CONTACT_STIFFNESS_N_M * speed_m_s * self._ahead_s
         force_soon = force + min(periods * rise_N, max_rise_N)
         torque_soon = torque + min(periods * rise_Nm, LEVER_M * max_rise_N)
