@@ -1,4 +1,4 @@
-"""What a terminal, HTML or XML would obey is shown instead; only the names that can be seen are names."""
+"""Control sequences and markup in foreign text are escaped; names with invisible characters are refused."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class Piece(Path, Protocol):
 
     @property
     def pieces(self) -> tuple[Piece, ...]:
-        """Itself, or nothing when it has no length."""
+        """A tuple with this path; empty if its length is zero."""
         return (self,) if self.length_m > 1e-9 else ()
 
     def pose(self, s: float) -> Pose:

@@ -1,4 +1,4 @@
-"""What a finished trial of a campaign leaves in its folder: the request it was made with, and its row."""
+"""The file that a finished trial of a campaign leaves in its folder: its request and its row of results."""
 
 from __future__ import annotations
 

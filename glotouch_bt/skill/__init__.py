@@ -1,4 +1,4 @@
-"""What a skill is made of: ports, parameters, failures, its context, and the base class `Skill`."""
+"""The parts of a skill: ports, parameters, failures, its context, and the base class `Skill`."""
 
 from glotouch_bt.skill.context import Context, Journal, RobotRequests, SkillRun, come_to_rest
 from glotouch_bt.skill.failures import MOTION_REFUSED, Failure, Reason, SkillFailed, UndeclaredFailure

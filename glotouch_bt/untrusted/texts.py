@@ -14,7 +14,7 @@ from glotouch_bt.untrusted.files import read_file
 MAX_JSON_BYTES = 32_000_000
 """Largest JSON text. Source: 20 times the largest result of ours; as Python data it takes at most 0.8 GB."""
 MAX_DIGITS = 20
-"""Most characters of a whole number; 2^64 has 20 digits."""
+"""Maximum number of characters of an integer; 2^64 has 20 digits."""
 
 
 class TooLarge(BadInput):

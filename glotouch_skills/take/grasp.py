@@ -28,7 +28,7 @@ class GraspParams(SkillParams):
     )
     side_gap_m: float = param("Least gap between open jaw and object", unit="m", default=0.005, ge=0.001, le=0.03)
     min_aperture_m: float = param(
-        "Least aperture of jaws that hold something", unit="m", default=0.003, ge=0.0, formerly="least_aperture_m"
+        "Minimum aperture of jaws that hold something", unit="m", default=0.003, ge=0.0, formerly="least_aperture_m"
     )
 
 

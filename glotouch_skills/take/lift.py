@@ -19,7 +19,11 @@ class LiftParams(SkillParams):
         "Least weight of a lifted object", unit="N", default=0.3, ge=0.0, formerly="least_weight_N"
     )
     min_aperture_m: float = param(
-        "Least aperture of jaws that hold something", unit="m", default=MIN_GRIP_M, ge=0.0, formerly="least_aperture_m"
+        "Minimum aperture of jaws that hold something",
+        unit="m",
+        default=MIN_GRIP_M,
+        ge=0.0,
+        formerly="least_aperture_m",
     )
     slip_m: float = param(
         "Largest change of the aperture since the jaws closed", unit="m", default=0.004, gt=0.0, le=0.02

@@ -31,7 +31,7 @@ class PutBackParams(SkillParams):
     drop_m: float = param("Largest height above its place at which it may be released", unit="m", default=0.015, ge=0.0,
                           le=0.05)  # fmt: skip
     min_aperture_m: float = param(
-        "Least aperture of jaws that hold something", unit="m", default=0.003, ge=0.0, formerly="least_aperture_m"
+        "Minimum aperture of jaws that hold something", unit="m", default=0.003, ge=0.0, formerly="least_aperture_m"
     )
 
 

@@ -1,4 +1,4 @@
-"""What campaigns share: gathered results, requests of trials, and the files they write."""
+"""Functions shared by campaigns: gathering results, trial requests, and output files."""
 
 from __future__ import annotations
 

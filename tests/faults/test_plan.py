@@ -1,4 +1,4 @@
-"""What is wrong with a plan is said all at once, each with its place; nothing else ever happens."""
+"""All errors of a plan are reported at once, each with its place; nothing else ever happens."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a fault does to the simulated world, against mechanics and against what else the simulator says."""
+"""The effect of faults on the simulated world, against mechanics and the simulator's other outputs."""
 
 from __future__ import annotations
 

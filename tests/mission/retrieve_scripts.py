@@ -1,4 +1,4 @@
-"""What the specification of glotouch_missions/retrieve.yaml is written with."""
+"""Scripted leaves for the specification of glotouch_missions/retrieve.yaml."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def candidates(*qualities: float) -> tuple[Candidate, ...]:
 
 
 def found(n: int, **ports: Any) -> Any:
-    """What orbit_probe says when so many objects are known."""
+    """Return orbit_probe's answer when this many objects are known."""
     return ok(candidates=candidates(*[0.5] * n), found=n, **ports)
 
 

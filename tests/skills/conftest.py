@@ -224,7 +224,7 @@ class Bench:
 
 @pytest.fixture(scope="session")
 def things() -> SimpleNamespace:
-    """What can stand in the container: `floor(top_m)`, `post(centre_m, radius_m, top_m)`."""
+    """Objects that can stand in the container: `floor(top_m)`, `post(centre_m, radius_m, top_m)`."""
     return SimpleNamespace(floor=floor, post=post)
 
 

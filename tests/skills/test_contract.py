@@ -1,4 +1,4 @@
-"""What skills declare about failures and resources, against their own code: every `Failure` in reach, by AST."""
+"""Declared failures and resources of skills agree with their code: every `Failure` in reach, by AST."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every skill does: ends with reasons, closes its body, holds the arm, and takes over from a braking arm."""
+"""Behaviour of every skill: ends with reasons, closes its body, holds the arm, and takes over from a braking arm."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ class DriverProcess:
             raise BackendError(f"{command[0]} cannot be started: {e}") from e
 
     def gone(self) -> str | None:
-        """Return that and why the driver or the cell has ended, or None while they run.
+        """Return a sentence that says why the driver or the cell has ended, or None while both run.
 
         Raises:
             BadInput: The cell cannot build its world.

@@ -151,7 +151,7 @@ def _from_folder(mesh: Mesh, path: Path, say: Progress) -> Parts:
 
 
 def _fitting(mesh: Mesh, path: Path) -> Parts | None:
-    """Return the parts in a file if they cover the mesh and stay within its box, as every result of ours does."""
+    """Return the parts in a file if they cover the mesh and stay within its bounding box."""
     found = read_parts(path, KEY)
     try:
         if found is not None:

@@ -20,9 +20,9 @@ from glotouch_bt.untrusted import read_file, write_file
 
 MEMBERS = ("vertices", "counts", "key", "note")
 MAX_FILE_BYTES, MAX_UNPACKED_BYTES, MAX_NOTE = 4_000_000, 16_000_000, 1000
-"""Largest file, its largest content, and the longest note. Source: 50 times the largest of ours, 0.08 MB."""
+"""Largest file, its largest content, and the longest note. Source: 50 times the largest shipped file, 0.08 MB."""
 MAX_PARTS = 1000
-"""Most hulls of a mesh; `FINE` asks for 32, and for one of each closed surface."""
+"""Maximum number of hulls of a mesh. `FINE` asks for 32, and for one for each closed surface."""
 MAX_VERTICES = 256
 """Largest number of vertices of a hull. Source: measured; an apple's largest part misses its surface by 0.6 mm (p95)
 with 64, by 0.1 mm with 256. The step does not get slower, because MuJoCo walks the hull's graph."""
@@ -66,7 +66,7 @@ def encode(key: str, parts: Parts) -> bytes:
 
 
 def decode(content: bytes, key: str) -> Parts | None:
-    """Return the parts in a file's bytes, or None if they are damaged, absurd, or were made with another key."""
+    """Return the parts in a file's bytes, or None if they are damaged, out of bounds, or were made with another key."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             items = archive.infolist()

@@ -22,7 +22,7 @@ from glotouch_bt.robot import BadInput, SetPayload, TactileFrame, Tare
 MAX_TIME_S = 1e6
 """Latest simulated time of a snapshot. Source: ten times the longest mission."""
 MAX_QUEUE = 1000
-"""Most late reports or frames under way; one a control period and 10 s of latency."""
+"""Maximum number of delayed reports or frames in transit: one per control period over 10 s of latency."""
 MAY_BE_NAN = ("left_m", "right_m")
 """Depth maps: NaN marks a dead taxel."""
 UNBOUNDED = ("_solved",)

@@ -157,7 +157,7 @@ class PlanarWorld:
         return self._go(onset + over * u, contact)
 
     def _first_touch(self, u: Array, length: float) -> tuple[float, int | None]:
-        """How far along the direction u the first touch comes, and of what; (length, None) if there is none."""
+        """Return the distance along u to the first touch, and what is touched; (length, None) without a touch."""
         best, which = self._to_wall(u, length)
         along = (self.poses[:, :2] - self.tip_K_m) @ u
         off = self.poses[:, :2] - self.tip_K_m - np.clip(along, 0.0, length)[:, None] * u

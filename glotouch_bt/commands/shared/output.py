@@ -1,4 +1,4 @@
-"""Standard streams of a command: they show what a terminal would obey, and survive a reader that has gone.
+"""Standard streams of a command: escape sequences are shown, not executed, and a closed pipe is no error.
 
 A closed pipe (`| head`) or terminal must not end a mission. Text for it, or for a stream that was never open, is
 dropped. Any other refusal of stdout (a full disk) is reported when the command has ended.

@@ -62,7 +62,7 @@ class RunProgress:
             return
         self._console.print(f"[bold]{escape(mission.name)}[/] in {escape(mission.world.name)} -> {escape(str(folder))}")
         if self._console.is_terminal:
-            # What others write is not redirected: rich would obey the escape sequences in it.
+            # Other writers are not redirected: rich would execute their escape sequences.
             self._live = Live(
                 console=self._console, auto_refresh=False, transient=True, redirect_stdout=False, redirect_stderr=False
             )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from glotouch_bt.robot import BadInput
 
 MAX_VALUES = 2_000_000
-"""Most values of one message, shared ones counted each time (0.3 GB). Source: 100 times the largest of ours."""
+"""Maximum number of values in a message, shared ones counted repeatedly (0.3 GB). Source: 100 times the largest."""
 _SIZES = {0xC0: 0, 0xC2: 0, 0xC3: 0, 0xCA: 4, 0xCB: 8, 0xCC: 1, 0xCD: 2, 0xCE: 4, 0xCF: 8, 0xD0: 1, 0xD1: 2, 0xD2: 4,
           0xD3: 8, 0xD4: 2, 0xD5: 3, 0xD6: 5, 0xD7: 9, 0xD8: 17}  # fmt: skip
 """Bytes after the first one, of values of a fixed size."""

@@ -30,7 +30,7 @@ GROUPS = ("glotouch_bt.skills", "glotouch_bt.backends")
 MAX_DEPTH = 200
 """Deepest nesting that is encoded; only a value that contains itself is deeper."""
 MAX_DIMENSIONS = 8
-"""Most dimensions of an array."""
+"""Maximum number of dimensions of an array."""
 _MIN_INT, _MAX_INT = -(2**63), 2**64 - 1
 # One-letter tags; every value that MessagePack has no type for is a list [tag, ...].
 _TUPLE, _LIST, _MAP, _SET, _FROZENSET, _DEQUE = "t", "l", "m", "s", "f", "q"

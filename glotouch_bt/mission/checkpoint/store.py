@@ -42,11 +42,11 @@ _MARK_AT = 68
 MAX_FILE_BYTES = 2_000_000_000
 """Largest file, and largest write-ahead log. Source: 10,000 checkpoints of ours."""
 MAX_ROWS = 100_000
-"""Most checkpoints, and most items of `run`."""
+"""Maximum number of checkpoints, and of items of `run`."""
 MAX_VALUE_BYTES = 16_000_000
 """Largest value of a column. Source: 80 times the largest state of ours."""
 MAX_UNPACKED_BYTES = 64_000_000
-"""Largest unpacked state or world. Source: 100 times the largest of ours."""
+"""Largest unpacked state or world. Source: 100 times the largest measured."""
 MAX_OPEN_S = 20.0
 """Longest time for the checks of an existing file; a file of the largest size takes 5 s."""
 _TABLES = """

@@ -34,7 +34,7 @@ ROUNDING_S = 1e-6
 
 @dataclass
 class Outcome:
-    """How a mission ended.
+    """Result of a mission.
 
     Attributes:
         status: success; failure (the tree failed or time ran out); aborted (stopped from outside or by a fault).

@@ -191,7 +191,7 @@ def _refuse(event: Any, shown: str) -> None:
 def _scalar(event: Any, shown: str) -> Scalar:
     place, text = _place(event, shown), event.value
     if fault := fault_of_text(text):
-        raise BadInput(f"{place}: this text {fault}; a terminal would obey it")
+        raise BadInput(f"{place}: this text {fault}; a terminal would execute it")
     if event.style not in (None, ""):
         return Scalar(text, place)
     if text in ("", "~", "null", "Null", "NULL"):

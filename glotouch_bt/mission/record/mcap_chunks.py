@@ -23,11 +23,11 @@ MAX_RECORD_BYTES = 8_000_000_000
 MAX_ITEM_BYTES = 64_000_000
 """Largest packed or unpacked chunk or attachment. Source: 200 times the largest chunk of ours."""
 MAX_UNPACKED_BYTES = 1 << 30
-"""Most bytes that one record unpacks to. Source: 85 minutes of a run."""
+"""Maximum unpacked size of a record, bytes. Source: 85 minutes of a run."""
 FREE_BYTES, MAX_RATIO = 1 << 28, 16
 """A record may unpack to FREE_BYTES, and beyond that to MAX_RATIO times its size; ours unpack to 5 times theirs."""
 MAX_ITEMS = 4_000_000
-"""Most messages and channels of one record. Source: an hour has 1 million; to count them takes 2 s."""
+"""Maximum number of messages and of channels of a record. Source: an hour has 1 million; counting them takes 2 s."""
 BROKEN = (
     McapError, struct.error, OSError, LookupError, TypeError, ValueError, AttributeError, OverflowError,
     RecursionError, BadInput,

@@ -13,7 +13,7 @@ from glotouch_bt.robot.observation import Observation, TactileFrame
 from glotouch_bt.robot.supervision.limits import GuardFinding, SupervisionLimits, TransientCounter
 
 MIN_TURNS = 2
-"""Least turning points of a noisy force in a block; ten samples of white noise have five. Source: ours."""
+"""Minimum number of turning points of a noisy force in a block; ten samples of white noise have five. Source: ours."""
 MIN_NOISY_FRAMES = 5
 """Pads count as noisy after this many different pairs of maps without a touch. Source: ours."""
 MAX_EQUAL_FRAMES = 3

@@ -1,4 +1,4 @@
-"""What is fuzzed: a kind makes random inputs and tries each. One file a kind, registered in `KINDS` (`campaign`)."""
+"""Base class of fuzzers: a kind makes and tries random inputs. One file per kind, registered in `KINDS` (`campaign`)."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ RELEASED_FORCE_N = 1.0
 MAX_CLOSING_FORCE_N = 12.0
 """End a gentle closure at this force on the hand; gentle jaws push with 6 N at most, so more means a wedged object."""
 MIN_PRESSING_LIMIT_N = 10.0
-"""Least force on the hand that ends a closure while resting jaws press. At 10 N of jaw force, 97 of 100 closures stay
+"""Minimum force on the hand that ends a closure while resting jaws press. At 10 N of jaw force, 97 of 100 closures stay
 below 4 N, on slopes as on walls."""
 PRESSING_LIMIT_SHARE = 0.6
 """The same limit as a share of the jaw force, where that is larger."""

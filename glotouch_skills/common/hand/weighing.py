@@ -18,9 +18,9 @@ STAND_S = 0.1
 WEIGH_S = 0.25
 """Average the wrench over this time."""
 MIN_GRIP_N = 1.0
-"""Least force of jaws that hold something. Source: ours; jaws at their target report none."""
+"""Minimum force of jaws that hold something. Source: ours; jaws at their target report none."""
 MIN_GRIP_M = 0.003
-"""Least aperture of jaws that hold something, by default. Source: ours."""
+"""Default minimum aperture of jaws that hold something. Source: ours."""
 
 
 @dataclass(frozen=True)

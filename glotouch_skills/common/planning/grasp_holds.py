@@ -49,7 +49,7 @@ class Holds:
         worth: 0..1.
         width_m: Aperture of the touching jaws; NaN where one touches nothing.
         middle_m: y_P of the pads' mid-point then.
-        opening_m: Least aperture, about that middle, with which the descending fingers clear the object.
+        opening_m: Smallest aperture, about that middle, with which the descending fingers clear the object.
     """
 
     phi_rad: Array

@@ -1,4 +1,4 @@
-"""What crosses the cell's socket: plain data and a fixed list of types, to the bit; nothing else is made."""
+"""The protocol of the cell's socket: plain data and a fixed list of types arrive unchanged; nothing else is decoded."""
 
 from __future__ import annotations
 

@@ -121,7 +121,7 @@ def test_the_shipped_objects_zero_level_touches_their_surface() -> None:
 
 
 def _to_triangles(point: np.ndarray, triangles: np.ndarray) -> float:
-    """Least distance of a point from triangles (n, 3, 3), by projection and clamping to edges (Ericson 5.1.5)."""
+    """Smallest distance of a point from triangles (n, 3, 3), by projection and clamping to edges (Ericson 5.1.5)."""
     a, b, c = triangles.transpose(1, 0, 2)
     best = np.inf
     for p, q in ((a, b), (b, c), (c, a)):

@@ -1,4 +1,4 @@
-"""What is wrong is said in words that help: the nearest name, where it belongs, which types there are."""
+"""Messages of `check` help: the nearest name, where it belongs, which types there are."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What passes between loops, subtrees and the mission: items of a tuple, private keys, states in the end."""
+"""Values that pass between loops, subtrees and the mission: items of a tuple, private keys, states in the end."""
 
 from __future__ import annotations
 

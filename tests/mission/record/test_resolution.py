@@ -1,4 +1,4 @@
-"""What skills are given is what the record holds, to the bit."""
+"""The record holds exactly, to the bit, what skills are given."""
 
 from __future__ import annotations
 

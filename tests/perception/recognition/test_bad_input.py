@@ -1,4 +1,4 @@
-"""What cannot be recognised is refused in words, or is no evidence; it never makes a ranking confident."""
+"""Unusable input is refused with a sentence, or counts as no evidence; it never makes a ranking confident."""
 
 from __future__ import annotations
 

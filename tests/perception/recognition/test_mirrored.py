@@ -1,4 +1,4 @@
-"""What tells a solid from its mirror image: which pad feels what, never the widths at one yaw."""
+"""A solid differs from its mirror image in which pad feels what, never in the widths at one yaw."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the tree's own py_trees nodes share: access to the run's keys, a reason of failure, progress for checkpoints."""
+"""Base classes of our py_trees nodes: access to the run's keys, a reason of failure, progress for checkpoints."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Keys:
 
 @dataclass(frozen=True)
 class BuildContext:
-    """What a node kind needs to build its py_trees node.
+    """Everything that a node kind needs to build its py_trees node.
 
     Attributes:
         context: What skills are lent; `context.mission_s` is the clock of timeouts.
@@ -74,7 +74,7 @@ class MissionDecorator(Decorator):
 
     @property
     def progress(self) -> dict[str, Any]:
-        """What a checkpoint keeps, by name."""
+        """State that a checkpoint keeps, by name."""
         return {name.lstrip("_"): getattr(self, name) for name in self.kept}
 
     @progress.setter

@@ -17,7 +17,7 @@ UNSET, ANYTHING = 0, 1
 
 @dataclass(frozen=True)
 class ValueKind:
-    """What is known of a value.
+    """Static knowledge about one value.
 
     Attributes:
         data_type: Its type; `object` when not known.

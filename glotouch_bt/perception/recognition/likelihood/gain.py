@@ -46,7 +46,7 @@ NEAR_RAD = math.radians(20.0)
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Most probable poses of the target if it is this candidate.
+    """The target's most probable poses, given that it is this candidate.
 
     Attributes:
         candidate: The candidate.

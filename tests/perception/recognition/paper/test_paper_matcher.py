@@ -87,7 +87,7 @@ def test_width_alone_takes_a_cylinder_for_a_box(models, nominal) -> None:
 
 
 def test_undisturbed_touches_fit_almost_exactly(models, meshes) -> None:
-    """What is left: the gels' give (0.4 to 2 mm, fitted by the bias at 0.05 a mm) and the yaw's 5 degree step."""
+    """The rest is the gels' compliance (0.4 to 2 mm, fitted by the bias at 0.05 a mm) and yaw steps of 5 degrees."""
     for i, mesh in enumerate(meshes):
         m = paper_match(models[i], touched(mesh, IDEAL, i), FULL.width_only())
         assert m.loss < 0.3, (i, m.terms)
@@ -198,7 +198,7 @@ def test_normals_of_a_closed_mesh_average_to_nothing(meshes) -> None:
 
 
 def test_more_weight_never_lowers_the_loss(models, nominal) -> None:
-    """The least of sums that grow term by term grows."""
+    """The minimum of sums that grow term by term grows as well."""
     base = FULL.width_only()
     for name in ("w_absolute", "w_centred", "w_vertical", "w_cross", "coverage", "bias", "scale_prior"):
         more = replace(base, **{name: 2 * getattr(base, name)})

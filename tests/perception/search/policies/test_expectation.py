@@ -1,4 +1,4 @@
-"""What may still be hidden, and the way to it: against closed forms."""
+"""Expected undiscovered objects, and the path to them, against closed forms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a closure did to its object, against objects moved by hand-worked kinematics."""
+"""The motion of an object under a closure, against objects moved by hand-worked kinematics."""
 
 from __future__ import annotations
 
