@@ -1,4 +1,4 @@
-"""Base class of fuzzers: a kind makes and tries random inputs. One file per kind, registered in `KINDS` (`campaign`)."""
+"""The base of fuzzers: a kind makes and tries random inputs. One file per kind, registered in `KINDS` (`campaign`)."""
 
 from __future__ import annotations
 
