@@ -175,7 +175,6 @@ class MujocoRobot(Robot):
         ctrl_now, sensed, external_now = self._ctrl_now, self._sensed, self._external_now
         felt, expected = slice(self._s.force.start, self._s.torque.stop), self._expected.tolist()
         speed_rad_s = float(np.abs(data.qvel[self.handles.arm_dof]).max())
-        place = self._s.position
         stands = guard.tripped is not None and speed_rad_s < REST_RAD_S
         for i, (ctrl, sample, external) in enumerate(self._rows):
             if guard.tripped is not None and not stands:
@@ -187,11 +186,19 @@ class MujocoRobot(Robot):
             # The sensor reads the force of the hand on the arm; the hand feels its opposite.
             if guard.tripped is None:
                 contact = [-w - e for w, e in zip(sample[felt], expected, strict=True)]
-                guard.check(contact, sample[place].tolist(), data.time)
+                guard.check(contact, self._twists_S, data.time)
         if guard.tripped is not None and not stands:
             self._servo.reset(np.array(data.qpos[self.handles.arm_qpos]))
         if self.trace is not None:
             self.trace.add(self._ctrl, model.actuator_forcerange)
+
+    def _twists_S(self) -> Array:
+        """Return the hand's twists (2, 6) at S in S, linear m/s then angular rad/s: measured, and of the setpoint."""
+        h, jacobian = self.handles, np.zeros((6, self.model.nv))
+        mujoco.mj_jacSite(self.model, self.data, jacobian[:3], jacobian[3:], h.sensor_site)
+        rates = np.stack([self.data.qvel[h.arm_dof], self._servo.rate])
+        rotation = self.data.site_xmat[h.sensor_site].reshape(3, 3)
+        return ((rates @ jacobian[:, h.arm_dof].T).reshape(2, 2, 3) @ rotation).reshape(2, 6)
 
     def _carry(self) -> Array:
         """Return the joint torques (dof,) that carry the believed payload: J^T times its weight."""

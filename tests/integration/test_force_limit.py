@@ -56,7 +56,7 @@ def faulted(block: Path, tmp_path: Path) -> Any:
     return run
 
 
-@pytest.mark.parametrize(("joint", "rate_rad_s"), [(3, 0.12), (0, 0.06)])
+@pytest.mark.parametrize(("joint", "rate_rad_s"), [(3, 0.12), (0, 0.06), (1, -0.06), (1, -0.12)])
 def test_a_joint_that_leaves_its_setpoint_while_the_probe_is_drawn(faulted: Any, joint: int, rate_rad_s: float) -> None:
     """The probe stands in its holder, which gives by 1 mm for 54 N."""
     given = {"joint": joint, "offset_rad": rate_rad_s, "rise_s": 1.0}

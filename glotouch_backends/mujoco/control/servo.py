@@ -82,6 +82,11 @@ class Servo:
         """Setpoint (dof,) at the end of the last period, rad."""
         return np.asarray(self._knots[2])
 
+    @property
+    def rate(self) -> Array:
+        """Mean rate (dof,) of the setpoint over the present period, rad/s."""
+        return np.asarray((self._knots[2] - self._knots[0]) / self._period)
+
     def reset(self, q: Array) -> None:
         """Set the setpoint to `q` (dof,) at rest, without a ramp."""
         self._knots[0] = self._knots[2] = q

@@ -31,16 +31,21 @@ class FollowingError(Effect[FollowingErrorParams]):
 
     def begin(self) -> None:
         """See `Effect`."""
-        self._share = 0.0
+        self._periods = 0
 
     def command(self, command: Command) -> Command:
         """See `Effect`."""
         if command.motion is None:
             return command
-        self._share = min(1.0, self._share + self.context.period_s / self.params.rise_s)
-        q = np.array(command.motion.q)
-        q[self._joint] = np.clip(q[self._joint] + self._share * self.params.offset_rad, *self._range)
-        return replace(command, motion=replace(command.motion, q=q))
+        # The joint reaches its speed in the first period and stops in the one after the last.
+        n = max(1, round(self.params.rise_s / self.context.period_s))
+        self._periods = min(self._periods + 1, n + 1)
+        q, dq = np.array(command.motion.q), np.array(command.motion.dq)
+        away_rad = self.params.offset_rad * min((self._periods - 0.5) / n, 1.0)
+        q[self._joint] = np.clip(q[self._joint] + away_rad, *self._range)
+        if self._periods <= n:
+            dq[self._joint] += self.params.offset_rad / (n * self.context.period_s)
+        return replace(command, motion=replace(command.motion, q=q, dq=dq))
 
 
 class JointLimitParams(FaultParams):
