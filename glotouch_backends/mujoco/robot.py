@@ -198,7 +198,7 @@ class MujocoRobot(Robot):
         mujoco.mj_jacSite(self.model, self.data, jacobian[:3], jacobian[3:], h.sensor_site)
         rates = np.stack([self.data.qvel[h.arm_dof], self._servo.rate])
         rotation = self.data.site_xmat[h.sensor_site].reshape(3, 3)
-        return ((rates @ jacobian[:, h.arm_dof].T).reshape(2, 2, 3) @ rotation).reshape(2, 6)
+        return np.asarray((rates @ jacobian[:, h.arm_dof].T).reshape(2, 2, 3) @ rotation).reshape(2, 6)
 
     def _carry(self) -> Array:
         """Return the joint torques (dof,) that carry the believed payload: J^T times its weight."""

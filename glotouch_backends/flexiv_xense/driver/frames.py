@@ -12,6 +12,7 @@ Xense: millimetres, mm/s, N; depth maps in millimetres, positive when the gel is
 
 from __future__ import annotations
 
+import math
 from typing import cast
 
 import numpy as np
@@ -31,6 +32,17 @@ def rotation(quat: npt.ArrayLike) -> Array:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def twist_between(before: npt.ArrayLike, after: npt.ArrayLike, duration_s: float) -> Array:
+    """Return the mean twist (6,) between two poses (7,) x y z qw qx qy qz, linear m/s and angular rad/s, written in B.
+
+    The angular part is the rotation vector to first order; poses a few milliseconds apart differ by little.
+    """
+    a, b = np.asarray(before, dtype=np.float64), np.asarray(after, dtype=np.float64)
+    turned = a[3] * b[4:] - b[3] * a[4:] - np.cross(b[4:], a[4:])  # vector part of q_b times the conjugate of q_a
+    same = math.copysign(2.0, a[3:] @ b[3:])  # q and -q are the same rotation
+    return np.concatenate([b[:3] - a[:3], same * turned]) / duration_s
 
 
 def wrench_map(pose_E_P: npt.ArrayLike) -> Array:

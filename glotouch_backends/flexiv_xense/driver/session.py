@@ -12,28 +12,18 @@ import numpy as np
 from . import messages
 from .checks import SetpointCheck, rest_pose
 from .clock_offset import StampConverter
-from .devices import Connected
+from .devices import ArmState, Connected
 from .faults import CommandRefused, DeviceFault, vendor_call
-from .frames import payload_on_tool, wrench_map
+from .frames import payload_on_tool, twist_between, wrench_map
+from .hard_limit import HardLimit, pressing_power_W
 
-MIN_SAMPLES_OVER = 5
-"""Consecutive samples beyond the hard limit that stop the arm (5 ms); a single one may be noise. Source: ours."""
-MIN_SAMPLES_RISING = 2
-"""Consecutive samples that stop a moving arm because the force rises steeply. Source: as in the simulated robot."""
-MIN_RISING_SHARE = 0.25
-"""Share of the limit below which no rise counts. Source: as in the simulated robot."""
-STOP_AHEAD_S = 0.008
-"""Extrapolate the force of a moving arm over this time: it presses harder until it stands. Source: as there."""
-CONTACT_STIFFNESS_N_M = 60e3
-"""An arm that moves at v presses harder by at most this times v. Source: as there."""
-LEVER_M = 0.34
-"""Lever of a force on the probe's tip. Source: as of the hard torque limit."""
-MIN_MOVING_M_S = 0.042
-"""A steep rise counts only above this speed of P. Source: as there."""
 MAX_BUFFERED_SAMPLES = 60_000
 """Samples buffered while the client requests none (60 s)."""
 SPEED_SAMPLES = 20
 """Samples over which the speed of P is measured."""
+TWIST_SAMPLES = 5
+"""Samples over which the twist of a pressing hand is measured; it must be known within milliseconds."""
+NO_TWIST = (0.0,) * 6
 NO_JAWS = messages.JawState(0.0, math.nan, 0.0, False)
 
 
@@ -62,8 +52,7 @@ class DriverSession:
         self._device_stamp: object = None
         self._to_our_clock = StampConverter()
         self._fresh_s = self._zero_s
-        self._over = self._rising = 0
-        self._felt = (self._zero_s, 0.0, 0.0)  # time, force, torque of the last sample
+        self._hard_limit = HardLimit(request.arm.force_N, request.arm.torque_Nm)
         self._newest: list[float] | None = None
         self._last: messages.Setpoint | None = None  # the last one sent, while the arm follows setpoints
         self._rest: tuple[float, ...] | None = None  # pose of rest, once told to hold
@@ -90,7 +79,7 @@ class DriverSession:
     def speed_m_s(self) -> float:
         """Speed of P over the last `SPEED_SAMPLES`."""
         (begin, first), (end, last) = self._track[0], self._track[-1]
-        return math.dist(first, last) / (end - begin) if end > begin else 0.0
+        return math.dist(first[:3], last[:3]) / (end - begin) if end > begin else 0.0
 
     # -- commands ----------------------------------------------------------------------------------------------------
 
@@ -200,42 +189,31 @@ class DriverSession:
         row = [*state.q, *state.dq, *state.pose, *wrench]
         if not math.isfinite(math.fsum(row)):
             raise DeviceFault("vendor", "the arm reports numbers that are not finite")
-        self._track.append((now, row[14:17]))
+        self._track.append((now, row[14:21]))
         self._fresh_s, self._newest = now, row
         self._stamps.append(self._to_our_clock(state.stamp, now - self._zero_s))
         self._rows.append(row)
-        self._enforce_hard_limit(wrench, state.pose, now)
+        self._enforce_hard_limit(wrench, state, now)
 
-    def _enforce_hard_limit(self, wrench: list[float], pose: Sequence[float], now: float) -> None:
-        """Stop the arm where it is when a hard limit trips, and keep it stopped."""
-        force, torque = math.hypot(*wrench[:3]), math.hypot(*wrench[3:])
+    def _enforce_hard_limit(self, wrench: list[float], state: ArmState, now: float) -> None:
+        """Stop the arm where it is when the hard limit trips, and keep it stopped."""
+        force = math.hypot(*wrench[:3])
         self.peak_force_N = max(self.peak_force_N, force)
         self.recent_peak_N = max(self.recent_peak_N, force)
-        limits = self._limits
-        (then, force_then, torque_then), self._felt = self._felt, (now, force, torque)
-        values = {"force_N": (force, limits.force_N), "torque_Nm": (torque, limits.torque_Nm)}
-        if _share(values) <= MIN_RISING_SHARE:
-            self._over = self._rising = 0
+        tripped = self._hard_limit.check(wrench, lambda: pressing_power_W(state.wrench, state.pose, self._twists()))
+        if tripped is None or self.stop is not None or self._busy:
             return
-        self._over = self._over + 1 if _share(values) > 1.0 else 0
-        ahead = STOP_AHEAD_S / (now - then) if now > then and self.speed_m_s > MIN_MOVING_M_S else 0.0
-        max_rise_N = CONTACT_STIFFNESS_N_M * self.speed_m_s * STOP_AHEAD_S
-        soon = {
-            "rising_force_N": (force + min(ahead * (force - force_then), max_rise_N), limits.force_N),
-            "rising_torque_Nm": (torque + min(ahead * (torque - torque_then), LEVER_M * max_rise_N), limits.torque_Nm),
-        }
-        self._rising = self._rising + 1 if ahead > 0.0 and _share(soon) > 1.0 else 0
-        if self.stop is not None or self._busy:
-            return
-        if self._over < MIN_SAMPLES_OVER:
-            if self._rising < MIN_SAMPLES_RISING:
-                return
-            values = soon
-        quantity = max(values, key=lambda name: values[name][0] / values[name][1])
-        self.stop = (quantity, *values[quantity], now - self._zero_s)
-        self._rest = tuple(pose)  # later holds use this pose, not the last setpoint's
+        self.stop = (*tripped, now - self._zero_s)
+        self._rest = tuple(state.pose)  # later holds use this pose, not the last setpoint's
         if self._moves:
             self._arm.hold_at(self._rest)
+
+    def _twists(self) -> list[Sequence[float]]:
+        """Return the twists (6,) of P in B: the measured one, and the setpoint's while the arm follows it."""
+        (then, before), (now, after) = self._track[-min(len(self._track), TWIST_SAMPLES)], self._track[-1]
+        measured = twist_between(before, after, now - then).tolist() if now > then else NO_TWIST
+        followed = self._last.twist if self._last is not None and self._rest is None else NO_TWIST
+        return [measured, followed]
 
     def poll(self) -> None:
         """Check the arm's flags and read the gripper; call once a period.
@@ -276,8 +254,3 @@ class DriverSession:
             sent_s=self._sent_s,
             read_s=self._read_s,
         )
-
-
-def _share(values: dict[str, tuple[float, float]]) -> float:
-    """Return the largest of some values over their limits."""
-    return max(value / limit for value, limit in values.values())

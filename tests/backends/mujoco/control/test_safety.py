@@ -67,15 +67,15 @@ def test_an_arm_that_presses_on_is_stopped_before_the_limit(speed_m_s: float, so
     rise_N = 54.0 * speed_m_s
     count = tripped_after([rise_N * i for i in range(80)], **{source: speed_m_s})
     assert count is not None
-    braking_N = 54e3 * speed_m_s * 0.003
+    braking_N = 54e3 * speed_m_s * 0.0025
 
     assert rise_N * (count - 1) + braking_N < Limits().hard_force_N
 
 
 def test_a_hand_that_turns_into_a_contact_presses_too() -> None:
-    """The power of the torque counts: 5 Nm at 0.2 rad/s with 10 N is an approach of 0.1 m/s."""
-    assert tripped_after([10.0] * 5, torque_Nm=5.0, turning_rad_s=-0.2) == 2
-    assert tripped_after([10.0] * 5, torque_Nm=5.0, turning_rad_s=0.2) is None
+    """The power of the torque counts: 5 Nm at 0.1 rad/s with 10 N is an approach of 0.05 m/s."""
+    assert tripped_after([10.0] * 5, torque_Nm=5.0, turning_rad_s=-0.1) == 2
+    assert tripped_after([10.0] * 5, torque_Nm=5.0, turning_rad_s=0.1) is None
 
 
 def test_the_motion_is_computed_only_while_something_presses() -> None:
