@@ -74,8 +74,8 @@ def test_an_arm_that_presses_on_is_stopped_before_the_limit(speed_m_s: float, so
 
 def test_a_hand_that_turns_into_a_contact_presses_too() -> None:
     """The power of the torque counts: 5 Nm at 0.1 rad/s with 10 N is an approach of 0.05 m/s."""
-    assert tripped_after([10.0] * 5, torque_Nm=5.0, turning_rad_s=-0.1) == 2
-    assert tripped_after([10.0] * 5, torque_Nm=5.0, turning_rad_s=0.1) is None
+    assert tripped_after([10.0 + i for i in range(5)], torque_Nm=5.0, turning_rad_s=-0.1) == 2
+    assert tripped_after([10.0 + i for i in range(5)], torque_Nm=5.0, turning_rad_s=0.1) is None
 
 
 def test_the_motion_is_computed_only_while_something_presses() -> None:
