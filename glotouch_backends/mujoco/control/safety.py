@@ -9,12 +9,13 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from glotouch_backends.mujoco.model import STEP_S
 from glotouch_bt.robot import Array, BackendError, Limits, SafetyStop
 
 MAX_SAMPLES_OVER = 5
 """Consecutive samples (5 ms) beyond the stop limit that trip it; a single one may be an impact. Source: ours."""
 MAX_SAMPLES_PRESSING = 2
-"""Consecutive samples (2 ms) that trip it while the hand presses harder and harder. Source: ours, as above."""
+"""Consecutive samples (2 ms) that trip it while the hand presses on. Source: ours, as above."""
 MAX_SHARE_SOON = 2.0
 """Extrapolated share of the stop limit that trips it at once. Source: ours; 0.1 m/s, beyond guarded motions."""
 CONTACT_STIFFNESS_N_M = 60e3
@@ -22,6 +23,9 @@ CONTACT_STIFFNESS_N_M = 60e3
 MIN_PRESSING_SHARE = 0.25
 """Share of the stop limit below which a pressing hand is not judged. Source: measured in whole retrievals; objects
 that the hand meets at 50 mm/s push it with 4 N."""
+MAX_STEEPENING = 4.0
+"""Mean rise of a contact over that of one sample. The weight of an object that is lifted takes power too, but hardly
+rises. Source: ours."""
 MIN_PRESSING_M_S = 0.002
 """A hand that presses on more slowly counts as standing. Source: ours; it gains 0.6 N in five samples."""
 
@@ -38,6 +42,7 @@ class HardLimitGuard:
     def __init__(self, limits: Limits) -> None:
         self._max_N, self._max_Nm = limits.stop_force_N, limits.stop_torque_Nm
         self._rise_s_m = CONTACT_STIFFNESS_N_M * limits.stop_ahead_s / self._max_N
+        self._samples_ahead = limits.stop_ahead_s / STEP_S
         self._over = self._pressing = 0
         self._last = 0.0
         self.tripped: SafetyStop | None = None
@@ -50,15 +55,15 @@ class HardLimitGuard:
         x, y, z, a, b, c = contact
         force, torque = math.sqrt(x * x + y * y + z * z), math.sqrt(a * a + b * b + c * c)
         share = max(force / self._max_N, torque / self._max_Nm)
-        rises, self._last = share > self._last, share
+        rise, self._last = share - self._last, share
         if share < MIN_PRESSING_SHARE:
             self._over = self._pressing = 0
             return
         power_W = float((twists() @ np.negative(contact)).max())
         speed_m_s = max(0.0, power_W) / max(force, MIN_PRESSING_SHARE * self._max_N)
-        soon = share + self._rise_s_m * speed_m_s
+        soon = share + min(self._rise_s_m * speed_m_s, self._samples_ahead * MAX_STEEPENING * max(0.0, rise))
         self._over = self._over + 1 if share > 1.0 else 0
-        self._pressing = self._pressing + 1 if soon > 1.0 and rises and speed_m_s > MIN_PRESSING_M_S else 0
+        self._pressing = self._pressing + 1 if soon > 1.0 and speed_m_s > MIN_PRESSING_M_S else 0
         if self._over >= MAX_SAMPLES_OVER:
             kind, ahead = "", 1.0
         elif self._pressing >= (MAX_SAMPLES_PRESSING if soon < MAX_SHARE_SOON else 1):

@@ -73,9 +73,16 @@ def test_an_arm_that_presses_on_is_stopped_before_the_limit(speed_m_s: float, so
 
 
 def test_a_hand_that_turns_into_a_contact_presses_too() -> None:
-    """The power of the torque counts: 5 Nm at 0.1 rad/s with 10 N is an approach of 0.05 m/s."""
-    assert tripped_after([10.0 + i for i in range(5)], torque_Nm=5.0, turning_rad_s=-0.1) == 2
-    assert tripped_after([10.0 + i for i in range(5)], torque_Nm=5.0, turning_rad_s=0.1) is None
+    """The power of the torque counts: 2.5 Nm at 0.2 rad/s with 10 N is an approach of 0.05 m/s."""
+    forces_N = [0.0, *(7.5 + i for i in range(10))]
+    assert tripped_after(forces_N, torque_Nm=2.5, turning_rad_s=-0.2) == 4
+    assert tripped_after(forces_N, torque_Nm=2.5, turning_rad_s=0.2) is None
+
+
+def test_a_heavy_object_can_be_lifted_fast() -> None:
+    """1.5 kg at 0.15 m/s, with the jerk limit of 20 m/s3."""
+    weights_N = [*np.linspace(0.0, 1.5 * 9.81, 200), *(1.5 * (9.81 + 0.02 * i) for i in range(50))]
+    assert tripped_after(weights_N, measured_m_s=0.15, setpoint_m_s=0.15) is None
 
 
 def test_the_motion_is_computed_only_while_something_presses() -> None:
