@@ -20,8 +20,9 @@ GROUPS = (
 
 def print_forces(summary: Mapping[str, Any], out: Path) -> None:
     """Print peaks and counts by group, the rates, and how to repeat each offending trial."""
-    head = ("trials", "over the limit", "false success", "no result", "largest peak, N", "mean wall time, s")
-    for key, name in GROUPS:
+    limit = summary["hard_force_N"]
+    head = ("trials", f"> {limit:g} N", "false success", "no result", "peak, N", "wall, s")
+    for key, name in GROUPS[1:] if summary["by_moment"] else GROUPS[:1]:
         rows = []
         for title, group in summary[key].items():
             counts = [str(group[k] or "") for k in ("over", "false_success", "no_result")]
@@ -29,9 +30,9 @@ def print_forces(summary: Mapping[str, Any], out: Path) -> None:
             rows.append((title, str(group["trials"]), *counts, peak, f"{group['mean_wall_s']:.1f}"))
         if rows:
             print_table(summary["set"], (name, *head), rows)
-    limit = summary["hard_force_N"]
     lines = (
-        ("trials", f"{summary['trials']}; faults without effect in {len(summary['without_effect'])} more"),
+        ("trials", f"{summary['trials']}, in {summary['several_effective']} of them several faults had an effect"),
+        ("no effect", f"{len(summary['without_effect'])} more trials"),
         ("refused plans", "; ".join(summary["refused"]) or "none"),
         (f"peak over {limit:g} N", rate_text(summary["over_hard_limit"])),
         ("false success", rate_text(summary["false_success"])),

@@ -22,10 +22,12 @@ def summarise(rows: Rows) -> dict[str, Any]:
     A trial whose faults altered nothing, or whose plan was refused, is counted apart.
     """
     tried = [r for r in rows if r["effective"]]
+    cells = [r for r in tried if "moment" in r]
     found = Counter(what for r in tried for what in offences(r))
     known = sorted((r for r in rows if _peak(r) is not None), key=lambda r: -(_peak(r) or 0.0))
     return {
         "trials": len(tried),
+        "several_effective": sum(r["effective"] > 1 for r in tried),
         "without_effect": [r["folder"] for r in rows if not r["effective"] and r["status"] != "refused"],
         "refused": [f"{r['folder']}: {r['cause']}" for r in rows if r["status"] == "refused"],
         "over_hard_limit": wilson(found[OVER], len(tried)),
@@ -41,9 +43,9 @@ def summarise(rows: Rows) -> dict[str, Any]:
         ],
         "by_scene": _grouped(tried, lambda r: f"{r['mission']} on {r['backend']}"),
         "by_fault": _grouped_by_fault(tried),
-        "by_moment": _grouped([r for r in tried if "moment" in r], lambda r: str(r["moment"])),
-        "by_rate": _grouped([r for r in tried if "moment" in r], lambda r: f"{abs(r['rate_rad_s']):.2f} rad/s"),
-        "by_joint": _grouped([r for r in tried if "moment" in r], lambda r: f"joint {r['joint']}"),
+        "by_moment": _grouped(cells, lambda r: f"{r['moment']} on {r['backend']}"),
+        "by_joint": _grouped(cells, lambda r: f"joint {r['joint']}"),
+        "by_rate": _grouped(cells, lambda r: f"{abs(r['rate_rad_s']):.2f} rad/s"),
     }
 
 
@@ -68,7 +70,7 @@ def _grouped_by_fault(rows: Rows) -> dict[str, dict[str, Any]]:
     groups: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
         for fault in str(row["faults"]).split("; "):
-            name = fault.split(" ", 1)[0]
+            name = fault.split("(", 1)[0]
             if name not in row.get("without_effect", ()):
                 groups.setdefault(name, []).append(row)
     return {name: _group(groups[name]) for name in sorted(groups)}

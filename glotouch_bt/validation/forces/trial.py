@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from glotouch_bt.faults import FaultPlan
+from glotouch_bt.faults import FaultPlan, FaultSpec
 from glotouch_bt.report import read_run
 from glotouch_bt.robot import BadInput, Limits
 from glotouch_bt.runs import Row, RunRequest, crashed, launch_trial
@@ -119,17 +118,28 @@ def offences(row: Mapping[str, Any]) -> list[str]:
 
 def described(plan: FaultPlan) -> str:
     """Return the faults of a plan with parameters, start and duration, on one line."""
-    return "; ".join(_described(f.name, f.requested()) for f in plan.faults)
+    return "; ".join(_described(f) for f in plan.faults)
 
 
-def _described(name: str, requested: Mapping[str, Any]) -> str:
-    given, when, lasts = requested["with"], requested["when"], requested["for"]
-    parts = [name]
-    if given:
-        parts.append(json.dumps(given).replace('"', ""))
-    parts.append("from " + (json.dumps(when).replace('"', "") if when else "the start"))
-    parts.append(f"for {lasts['duration_s']:g} s" if "duration_s" in lasts else str(lasts.get("until", lasts)))
+def _described(fault: FaultSpec) -> str:
+    given = ", ".join(f"{key}={_plain(value)}" for key, value in fault.params.model_dump(mode="json").items())
+    when, lasts = fault.when.model_dump(exclude_defaults=True), fault.duration
+    parts = [f"{fault.name}({given})"]
+    if "time_s" in when:
+        parts.append(f"at {when.pop('time_s'):g} s")
+    if "node" in when:
+        parts.append(f"in {when.pop('node')}")
+    if "after_s" in when:
+        parts.append(f"after {when.pop('after_s'):g} s")
+    parts += [f"with {key}={value:g}" for key, value in when.items()]
+    if len(parts) == 1:
+        parts.append("from the first sample")
+    parts.append("until the end" if lasts.duration_s is None else f"for {lasts.duration_s:g} s")
     return " ".join(parts)
+
+
+def _plain(value: object) -> str:
+    return str(value).replace("'", "").replace("; ", ", ")
 
 
 def _leaves(folder: Path) -> dict[str, float]:
