@@ -31,7 +31,7 @@ from glotouch_bt.runs import (
     write_table,
 )
 from glotouch_bt.validation.forces.draw import draw_plan, draw_scene
-from glotouch_bt.validation.forces.following import Cell
+from glotouch_bt.validation.forces.following import MatrixCell
 from glotouch_bt.validation.forces.summary import summarise
 from glotouch_bt.validation.forces.trial import PLAN, described, failed_trial, offences, run_trial, run_twin
 
@@ -56,7 +56,7 @@ class ForceCampaign:
 
     scenes: tuple[Campaign, ...]
     keep: bool = False
-    cells: tuple[tuple[Cell, int], ...] = ()
+    cells: tuple[tuple[MatrixCell, int], ...] = ()
 
     @property
     def out(self) -> Path:

@@ -56,7 +56,7 @@ MOMENTS = (
 
 
 @dataclass(frozen=True)
-class Cell:
+class MatrixCell:
     """One trial of the matrix: `rate_rad_s` has the sign of its direction."""
 
     moment: Moment
@@ -102,10 +102,10 @@ def chosen_joints(numbers: Iterable[int]) -> tuple[int, ...]:
     return wanted or JOINTS
 
 
-def matrix(moments: Sequence[Moment], joints: Sequence[int]) -> Iterator[Cell]:
+def matrix(moments: Sequence[Moment], joints: Sequence[int]) -> Iterator[MatrixCell]:
     """Yield every trial of these moments and joints."""
     for moment, joint, rate, sign in itertools.product(moments, joints, RATES_RAD_S, (1.0, -1.0)):
-        yield Cell(moment, joint, sign * rate)
+        yield MatrixCell(moment, joint, sign * rate)
 
 
 def scene_of(moment: Moment, base: Campaign) -> Campaign:
