@@ -123,17 +123,28 @@ def test_the_summary_of_rows() -> None:
         row(4, effective=0, peak_force_N=29.0),
         row(5, status="refused", effective=0, peak_force_N=None, result_written=None, cause="no room"),
         row(6, peak_force_N=30.0),
+        row(7, status="not started", effective=0, peak_force_N=None, result_written=None, cause="no robot"),
     ]
     found = summarise(rows)
     assert (found["trials"], found["several_effective"], found["without_effect"]) == (5, 4, ["s4"])
     assert [found[k]["rate"] for k in ("over_hard_limit", "false_success", "no_result")] == [0.2, 0.2, 0.2]
     assert found["refused"] == ["s5: no room"]
+    assert found["not_started"] == ["s7: no robot"]
     assert found["true_peak_unknown"] == ["s3"]
     assert found["largest_peak_force_N"] == 30.01
     assert [p["folder"] for p in found["largest_peaks"]] == ["s1", "s6", "s4", "s2", "s0"]
     assert found["by_scene"]["m on b"]["trials"] == 5
     assert (found["by_fault"]["a"]["trials"], found["by_fault"]["b"]["trials"]) == (5, 4)
-    assert [offences(r) for r in rows] == [[], ["over the hard limit"], ["false success"], ["no result"], [], [], []]
+    assert [offences(r) for r in rows] == [
+        [],
+        ["over the hard limit"],
+        ["false success"],
+        ["no result"],
+        [],
+        [],
+        [],
+        [],
+    ]
 
 
 RESULT: dict[str, Any] = {

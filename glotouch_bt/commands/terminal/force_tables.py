@@ -21,18 +21,18 @@ GROUPS = (
 def print_forces(summary: Mapping[str, Any], out: Path) -> None:
     """Print peaks and counts by group, the rates, and how to repeat each offending trial."""
     limit = summary["hard_force_N"]
-    head = ("trials", f"> {limit:g} N", "false success", "no result", "peak, N", "wall, s")
+    head = ("trials", "offending", "largest peak, N", "mean wall, s")
     for key, name in GROUPS[1:] if summary["by_moment"] else GROUPS[:1]:
         rows = []
         for title, group in summary[key].items():
-            counts = [str(group[k] or "") for k in ("over", "false_success", "no_result")]
-            peak = _force(group["largest_peak_force_N"])
-            rows.append((title, str(group["trials"]), *counts, peak, f"{group['mean_wall_s']:.1f}"))
+            counts = str(group["trials"]), str(group["offending"] or "")
+            rows.append((title, *counts, _force(group["largest_peak_force_N"]), f"{group['mean_wall_s']:.1f}"))
         if rows:
             print_table(summary["set"], (name, *head), rows)
     lines = (
         ("trials", f"{summary['trials']}, in {summary['several_effective']} of them several faults had an effect"),
         ("no effect", f"{len(summary['without_effect'])} more trials"),
+        ("not started", f"{len(summary['not_started'])} more trials: the robot failed before the first tick"),
         ("refused plans", "; ".join(summary["refused"]) or "none"),
         (f"peak over {limit:g} N", rate_text(summary["over_hard_limit"])),
         ("false success", rate_text(summary["false_success"])),

@@ -8,7 +8,7 @@ from typing import Any
 
 from glotouch_bt.bench import wilson
 from glotouch_bt.robot import Limits
-from glotouch_bt.validation.forces.trial import FALSE, NO_RESULT, OVER, offences
+from glotouch_bt.validation.forces.trial import FALSE, NO_RESULT, NOT_STARTED, OVER, REFUSED, offences
 
 LISTED = 10
 """Number of largest peaks that the summary lists."""
@@ -19,7 +19,8 @@ Rows = Sequence[Mapping[str, Any]]
 def summarise(rows: Rows) -> dict[str, Any]:
     """Return rates with Wilson intervals over the trials in which a fault altered something; forces in N, times in s.
 
-    A trial whose faults altered nothing, or whose plan was refused, is counted apart.
+    Trials whose faults altered nothing, whose plan was refused, or whose robot failed before the first tick are listed
+    apart.
     """
     tried = [r for r in rows if r["effective"]]
     cells = [r for r in tried if "moment" in r]
@@ -28,8 +29,11 @@ def summarise(rows: Rows) -> dict[str, Any]:
     return {
         "trials": len(tried),
         "several_effective": sum(r["effective"] > 1 for r in tried),
-        "without_effect": [r["folder"] for r in rows if not r["effective"] and r["status"] != "refused"],
-        "refused": [f"{r['folder']}: {r['cause']}" for r in rows if r["status"] == "refused"],
+        "without_effect": [
+            r["folder"] for r in rows if not r["effective"] and r["status"] not in (REFUSED, NOT_STARTED)
+        ],
+        "refused": [f"{r['folder']}: {r['cause']}" for r in rows if r["status"] == REFUSED],
+        "not_started": [f"{r['folder']}: {r['cause']}" for r in rows if r["status"] == NOT_STARTED],
         "over_hard_limit": wilson(found[OVER], len(tried)),
         "false_success": wilson(found[FALSE], len(tried)),
         "no_result": wilson(found[NO_RESULT], len(tried)),
@@ -80,6 +84,7 @@ def _group(rows: Rows) -> dict[str, Any]:
     counts = Counter(what for r in rows for what in offences(r))
     return {
         "trials": len(rows),
+        "offending": sum(bool(offences(r)) for r in rows),
         "over": counts[OVER],
         "false_success": counts[FALSE],
         "no_result": counts[NO_RESULT],

@@ -9,7 +9,7 @@ from typing import Any
 
 from glotouch_bt.faults import FaultPlan, FaultSpec
 from glotouch_bt.report import read_run
-from glotouch_bt.robot import BadInput, Limits
+from glotouch_bt.robot import BackendError, BadInput, Limits
 from glotouch_bt.runs import Row, RunRequest, crashed, launch_trial
 from glotouch_bt.untrusted import read_json
 from glotouch_bt.validation.forces.accepted import accepted_faults
@@ -18,6 +18,9 @@ from glotouch_bt.validation.trial import Hung, durations, hang_guard, tidy
 PLAN = "plan.yaml"
 """Name of the plan in the folder of an offending trial."""
 OVER, FALSE, NO_RESULT = "over the hard limit", "false success", "no result"
+"""Offences."""
+REFUSED, NOT_STARTED = "refused", "not started"
+"""Status of a trial whose plan cannot be applied, and of one whose robot failed before the first tick of the tree."""
 
 
 def run_twin(request: RunRequest, labels: Mapping[str, Any]) -> Row:
@@ -63,7 +66,9 @@ def run_trial(request: RunRequest, labels: Mapping[str, Any], lifts: bool, keep:
     except Hung as e:
         row = failed_trial(labels, request.out, e)
     except BadInput as e:  # the drawn plan cannot be applied; the undisturbed run of the same request was accepted
-        row = dict(labels) | {"status": "refused", "cause": str(e), "effective": 0, "wall_s": 0.0}
+        row = dict(labels) | {"status": REFUSED, "cause": str(e), "effective": 0, "wall_s": 0.0}
+    except BackendError as e:  # a fault stopped the robot before the first tick: nothing moved, no run was begun
+        row = dict(labels) | {"status": NOT_STARTED, "cause": str(e), "effective": 0, "wall_s": 0.0}
     else:
         row = dict(labels) | row_of(result, lifts) | {"result_written": result_written(request.out)}
     row["wall_s"] = round(time.perf_counter() - began, 2)
@@ -109,7 +114,7 @@ def result_written(folder: Path) -> bool:
 
 def offences(row: Mapping[str, Any]) -> list[str]:
     """Return what a trial did that none may do; empty if nothing."""
-    if row["status"] == "refused":
+    if row["status"] in (REFUSED, NOT_STARTED):
         return []
     peak = row.get("peak_force_N")
     found = ((OVER, peak is not None and float(peak) > Limits().hard_force_N), (FALSE, bool(row.get("false_success"))))
