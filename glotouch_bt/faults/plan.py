@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
+import yaml
 from pydantic import BaseModel
 
 from glotouch_bt.escaped_text import fault_of_name
@@ -83,6 +84,14 @@ class FaultPlan:
     def from_yaml(cls, given: str | Path) -> FaultPlan:
         """Read and check a plan by path or shipped name; errors as in `read_plan`."""
         return read_plan(given)
+
+    def as_yaml(self) -> str:
+        """Return the plan as YAML from which the same plan is read."""
+        seed = {} if self.seed is None else {"seed": self.seed}
+        text = {"description": self.description} if self.description else {}
+        faults = [{"fault": f.kind.name, "name": f.name, **f.requested()} for f in self.faults]
+        data = {"faults": self.name, **text, **seed, "plan": faults}
+        return str(yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=110))
 
 
 def read_plan(given: str | Path, tree: NodeSpec | None = None, root: str = "") -> FaultPlan:

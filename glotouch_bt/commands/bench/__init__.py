@@ -8,6 +8,7 @@ from glotouch_bt.commands.bench.check import check
 from glotouch_bt.commands.bench.contact import contact
 from glotouch_bt.commands.bench.detection import detection
 from glotouch_bt.commands.bench.faults import faults
+from glotouch_bt.commands.bench.forces import forces
 from glotouch_bt.commands.bench.fuzz import fuzz
 from glotouch_bt.commands.bench.link import link
 from glotouch_bt.commands.bench.match import match
@@ -23,5 +24,19 @@ bench = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
 )
-for _experiment in (retrieve, search, match, contact, detection, speed, faults, resume, pause, link, fuzz, check):
+for _experiment in (
+    retrieve,
+    search,
+    match,
+    contact,
+    detection,
+    speed,
+    faults,
+    forces,
+    resume,
+    pause,
+    link,
+    fuzz,
+    check,
+):
     bench.command()(_experiment)

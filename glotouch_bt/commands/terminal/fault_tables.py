@@ -10,7 +10,8 @@ from typing import Any
 from glotouch_bt.commands.terminal.console import print_table
 
 
-def _rate(rate: Mapping[str, Any]) -> str:
+def rate_text(rate: Mapping[str, Any]) -> str:
+    """Return a rate with its interval and number of trials."""
     if not rate["n"]:
         return "none"
     return f"{100 * rate['rate']:.1f} % ({100 * rate['lo']:.1f} .. {100 * rate['hi']:.1f}, n = {rate['n']})"
@@ -29,9 +30,9 @@ def print_faults(summary: Mapping[str, Any], out: Path) -> None:
         ("trials", f"{summary['trials']}, and {summary['twins_succeeded']} of {summary['twins']} twins succeeded"),
         ("hard limit broken", f"{summary['hard_limit_broken']} (largest peak {summary['largest_peak_force_N']:.1f} N)"),
         ("tracebacks, hangs, lost", f"{summary['tracebacks']}, {summary['hangs']}, {summary['lost']}"),
-        ("wrong object lifted", _rate(summary["wrong_object"])),
-        ("cause named", _rate(summary["named"])),
-        ("recoverable recovered", _rate(summary["recovered"])),
+        ("wrong object lifted", rate_text(summary["wrong_object"])),
+        ("cause named", rate_text(summary["named"])),
+        ("recoverable recovered", rate_text(summary["recovered"])),
         ("no effect", "; ".join(summary["altered_nothing"]) or "none"),
     )
     for name, text in lines:

@@ -3,47 +3,20 @@
 from __future__ import annotations
 
 import json
-import shutil
-import signal
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 from glotouch_bt.faults import CATALOGUE, FaultPlan
-from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE
-from glotouch_bt.report import read_run
 from glotouch_bt.robot.scene import stream
-from glotouch_bt.runs import EARLIER, Row, RunRequest, crashed, launch_trial
+from glotouch_bt.runs import Row, RunRequest, crashed, launch_trial
 from glotouch_bt.validation.faults.cases import chosen_cases
 from glotouch_bt.validation.faults.rejoin import Rejoined
 from glotouch_bt.validation.faults.start import start_from
+from glotouch_bt.validation.trial import Hung, durations, hang_guard, tidy
 
-HUNG_S = 900.0
-"""Wall time after which a trial counts as hanging, s."""
 VERDICTS = ("recovered", "safely ended", "wrong", "unsafe")
-
-
-class Hung(BaseException):
-    """The trial exceeded its wall time."""
-
-
-@contextmanager
-def hang_guard(seconds: float = HUNG_S) -> Iterator[None]:
-    """Raise `Hung` in the main thread after `seconds` of wall time."""
-
-    def ring(number: int, frame: FrameType | None) -> None:
-        raise Hung
-
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
 
 
 def verdict(result: Mapping[str, Any], hard_force_N: float) -> str:
@@ -63,19 +36,6 @@ def verdict(result: Mapping[str, Any], hard_force_N: float) -> str:
     if success:
         return "recovered"
     return "safely ended" if result["held_at_end"] and result["reasons"] else "unsafe"
-
-
-def durations(folder: Path) -> dict[str, float]:
-    """Return the duration of each skill's first run by node name, from a run's record."""
-    began: dict[str, float] = {}
-    found: dict[str, float] = {}
-    for tick in read_run(folder).ticks:
-        name = tick.node.rsplit("/", 1)[-1]
-        if tick.new == "RUNNING":
-            began.setdefault(name, tick.stamp_s)
-        elif name in began and name not in found:
-            found[name] = tick.stamp_s - began[name]
-    return found
 
 
 def run_trial(
@@ -104,7 +64,7 @@ def run_trial(
     row["wall_s"] = round(time.perf_counter() - began, 2)
     request.out.mkdir(parents=True, exist_ok=True)
     if labels["class"] != "none":
-        _tidy(request.out, everything=not keep and row.get("verdict") in ("recovered", "safely ended"))
+        tidy(request.out, everything=not keep and row.get("verdict") in ("recovered", "safely ended"))
     return row
 
 
@@ -138,16 +98,6 @@ def _launched(request: RunRequest, twin: Path | None) -> Mapping[str, Any]:
     latency_s = None if seen is None else seen["stamp_s"] - fault["first_s"]
     fault = fault | {"sightings": sightings, "seen": seen, "latency_s": latency_s, "outcome": known["status"]}
     return known | {"faults": [fault], "rejoined": True}
-
-
-def _tidy(folder: Path, everything: bool) -> None:
-    """Remove files that the twin has or that can be regenerated; with `everything`, the record too."""
-    shutil.rmtree(folder / EARLIER, ignore_errors=True)
-    for file in folder.glob(f"{CHECKPOINT_FILE}*"):
-        file.unlink()
-    if everything:
-        for name in ("run.mcap", "truth.json", "mission.yaml"):
-            (folder / name).unlink(missing_ok=True)
 
 
 def _row(result: Mapping[str, Any], hard_force_N: float) -> Row:
