@@ -6,7 +6,7 @@ Fixtures: `scripted` runs a mission with scripted leaves, `fake_robot` makes rob
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -142,6 +142,28 @@ def faulty() -> Iterator[Callable[..., FaultInjector]]:
     for injector in made:
         if found := idle(injector):
             pytest.fail(f"altered nothing: {', '.join(found)}", pytrace=False)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Show what is wrong with a mission or a script, and the test's line, without a traceback through this package."""
+    report = yield
+    if report.failed and call.excinfo is not None:
+        from glotouch_bt.errors import BadInput
+
+        if isinstance(call.excinfo.value, BadInput) and _is_users_mistake(call.excinfo.value):
+            lines = [entry.lineno + 1 for entry in call.excinfo.traceback if entry.path == item.path]
+            report.longrepr = f"{item.path.name}:{lines[-1] if lines else 1}: {call.excinfo.exconly()}"
+    return report
+
+
+def _is_users_mistake(error: Exception) -> bool:
+    from glotouch_bt.mission.spec import MissionFaults
+    from glotouch_bt.mission_testing.casting import ScriptError
+
+    return isinstance(error, MissionFaults | ScriptError)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

@@ -101,4 +101,6 @@ def test_a_mission_that_does_not_pass_the_check_fails_its_test(folder: pytest.Py
     folder.makepyfile(WEAK)
     done = folder.runpytest_inprocess()
     done.assert_outcomes(failed=1)
-    done.stdout.fnmatch_lines(["*did you mean 'tool_return'*"])
+    done.stdout.fnmatch_lines(["test_*.py:2: *MissionFaults: *did you mean 'tool_return'*"])
+    assert "Traceback" not in done.stdout.str()
+    assert "casting.py" not in done.stdout.str()
