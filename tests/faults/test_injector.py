@@ -10,7 +10,16 @@ import pytest
 
 from glotouch_bt.faults import FaultInjector
 from glotouch_bt.faults.plan import FaultPlan
-from glotouch_bt.robot import HOLD, BackendError, BadInput, Command, GripperTarget, JointSetpoint, ParamError
+from glotouch_bt.robot import (
+    HOLD,
+    BackendError,
+    BadInput,
+    Command,
+    GripperTarget,
+    JointSetpoint,
+    Observation,
+    ParamError,
+)
 from glotouch_bt.robot.fake import FakeRobot
 from tests.faults.conftest import Pair, plan_of, wave
 
@@ -126,6 +135,32 @@ def setpoint(q: np.ndarray) -> Command:
     from glotouch_bt.robot.fake import FAKE_ARM, forward
 
     return Command(JointSetpoint(q, np.zeros(7), np.zeros(7), forward(FAKE_ARM, q)))
+
+
+def test_a_following_error_is_a_motion_without_jumps(pair: Make) -> None:
+    """Position and velocity of every setpoint agree, also after a hold in which the arm braked by itself."""
+    made = pair("  - {fault: following_error, with: {joint: 2, offset_rad: -0.05, rise_s: 0.2}}")
+    q, period_s = np.array(made.device.description.home_q), made.device.period_s
+    sent: list[tuple[float, float]] = []
+    cycle = made.device.cycle
+
+    def spy(command: Command) -> Observation:
+        if command.motion is not None:
+            sent.append((command.motion.q[2] - q[2], command.motion.dq[2]))
+        return cycle(command)
+
+    made.device.cycle = spy  # type: ignore[method-assign]
+    for i in range(60):
+        made.injector.cycle(HOLD if i in (6, 7, 8) else setpoint(q))
+    x, v = np.array(sent).T
+    for stretch in (slice(0, 6), slice(6, None)):
+        mean = 0.5 * (v[stretch][1:] + v[stretch][:-1])
+        jumps = np.abs(np.diff(x[stretch]) - mean * period_s)
+        assert jumps.max() <= 0.125 * period_s + 1e-9  # in the last period it ends exactly at its deviation
+        assert np.count_nonzero(jumps > 1e-5) <= 1
+    assert abs(x[6] - x[5]) < 0.25 * period_s
+    assert x[-1] == pytest.approx(-0.05)
+    assert np.abs(v).max() == pytest.approx(0.25)
 
 
 def test_arm_faults(pair: Make) -> None:

@@ -31,21 +31,36 @@ class FollowingError(Effect[FollowingErrorParams]):
 
     def begin(self) -> None:
         """See `Effect`."""
-        self._periods = 0
+        self._away_rad = self._rate_rad_s = 0.0
+        self._held = False
 
     def command(self, command: Command) -> Command:
         """See `Effect`."""
         if command.motion is None:
+            self._held = True
             return command
-        # The joint reaches its speed in the first period and stops in the one after the last.
-        n = max(1, round(self.params.rise_s / self.context.period_s))
-        self._periods = min(self._periods + 1, n + 1)
         q, dq = np.array(command.motion.q), np.array(command.motion.dq)
-        away_rad = self.params.offset_rad * min((self._periods - 0.5) / n, 1.0)
-        q[self._joint] = np.clip(q[self._joint] + away_rad, *self._range)
-        if self._periods <= n:
-            dq[self._joint] += self.params.offset_rad / (n * self.context.period_s)
+        if self._held:  # the arm has braked by itself; the deviation grows from where the joint stands
+            self._away_rad = float(self.context.sensed.q[-1, self._joint]) - float(q[self._joint])
+            self._rate_rad_s, self._held = 0.0, False
+        self._deviate()
+        q[self._joint] = np.clip(q[self._joint] + self._away_rad, *self._range)
+        dq[self._joint] += self._rate_rad_s
         return replace(command, motion=replace(command.motion, q=q, dq=dq))
+
+    def _deviate(self) -> None:
+        """Let the deviation grow for one period; the joint takes a period to reach its speed, and one to stop."""
+        before, offset_rad = self._rate_rad_s, self.params.offset_rad
+        rate_rad_s = offset_rad / self.params.rise_s
+        half_step = 0.5 * self.context.period_s * rate_rad_s
+        left = (offset_rad - self._away_rad) * (1.0 if offset_rad > 0.0 else -1.0)
+        if left > 1.001 * abs(half_step):
+            self._rate_rad_s = rate_rad_s
+            self._away_rad += half_step + 0.5 * self.context.period_s * before
+        else:
+            self._rate_rad_s = 0.0
+            if left > 0.0:  # otherwise it has braked beyond its final deviation, and stays there
+                self._away_rad = offset_rad
 
 
 class JointLimitParams(FaultParams):
