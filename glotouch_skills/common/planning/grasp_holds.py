@@ -62,7 +62,7 @@ class Holds:
 
 
 def holds_of(model: TargetModel, com_m: Array, gripper: Gripper, lowest_m: float, force_N: float) -> Holds:
-    """Rate all holds.
+    """Rate all holds; there are none if the table ends below `lowest_m`.
 
     Args:
         model: Tables of the mesh.
@@ -76,9 +76,12 @@ def holds_of(model: TargetModel, com_m: Array, gripper: Gripper, lowest_m: float
     x = hand_axes(model.phi_rad[yaws])[0]
     com_l = x @ (com_m[:2] - model.centre_m)  # (yaws,) each yaw has its own
     near = np.flatnonzero(np.abs(model.l_m) <= float(np.abs(com_l).max()) + SHIFTS_M)
-    heights = np.flatnonzero((model.z_m >= lowest_m - 1e-9) & (model.z_m <= model.height_m))
+    heights = np.flatnonzero(model.z_m >= lowest_m - 1e-9)  # above the top, the lower half of the pads holds
     pick = np.ix_(yaws, near, heights)
     l, z = model.l_m[near], model.z_m[heights]
+    if not heights.size:
+        none = np.zeros((len(yaws), len(near), 0))
+        return Holds(model.phi_rad[yaws], l, z, none, none, none, none)
     sides = (model.fine_m, mirrored(model.fine_m))
     felt = [_felt(fine, yaws, near, heights, model, force_N) for fine in sides]
     apart2 = sum((a - b) ** 2 for a, b in zip(felt[0].middle_m, felt[1].middle_m, strict=True))

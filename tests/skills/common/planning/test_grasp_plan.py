@@ -191,3 +191,14 @@ def test_the_fingers_pass_what_overhangs_their_hold() -> None:
     assert holds.width_m[0, j, k] == pytest.approx(0.03, abs=1e-4)
     assert holds.opening_m[0, j, k] == pytest.approx(0.07, abs=1e-4)
     assert holds.worth[:, :, k].max() == 0.0, "the fingers would meet the slab, the pads nothing"
+
+
+@pytest.mark.parametrize("height_m", [0.013, 0.014, 0.016, 0.018, 0.020, 0.022, 0.030])
+def test_a_low_object_is_held_with_the_lower_half_of_the_pads_or_not_at_all(height_m: float) -> None:
+    """The pads' mid-point cannot go below 21 mm; the gel reaches 14 mm below it."""
+    mesh = block(height_m)
+    model = TargetModel.from_mesh(mesh, PadSpec())
+    holds = holds_of(model, np.array([0.0, 0.0, 0.5 * height_m]), XENSE_GRIPPER, 0.021, 30.0)
+    assert holds.worth.shape == (len(holds.phi_rad), len(holds.l_m), len(holds.z_m))
+    assert (holds.z_m >= 0.021 - 1e-9).all()
+    assert (holds.worth.max(initial=0.0) > 0.0) == (height_m >= 0.014)
