@@ -13,6 +13,8 @@ from glotouch_bt.untrusted.files import read_file
 
 MAX_JSON_BYTES = 32_000_000
 """Largest JSON text. Source: 20 times the largest result of ours; as Python data it takes at most 0.8 GB."""
+MAX_LEVELS = 64
+"""Maximum nesting of JSON. Source: ours; results have 6 levels, and code that walks them may recurse."""
 MAX_DIGITS = 20
 """Maximum number of characters of an integer; 2^64 has 20 digits."""
 
@@ -35,11 +37,30 @@ def parse_json(data: bytes | str, shown: str, max_bytes: int = MAX_JSON_BYTES) -
     if len(data) > max_bytes:
         raise BadInput(f"{shown}: is larger than {max_bytes} bytes")
     try:
-        return json.loads(data, parse_constant=_no_number, parse_int=_whole)
+        value = json.loads(data, parse_constant=_no_number, parse_int=_whole)
     except RecursionError as e:
         raise BadInput(f"{shown}: is nested too deep") from e
     except ValueError as e:  # also UnicodeDecodeError
         raise BadInput(f"{shown}: is not JSON ({e})") from e
+    opened = data.count("[") + data.count("{") if isinstance(data, str) else data.count(b"[") + data.count(b"{")
+    if opened > MAX_LEVELS and _is_deep(value):
+        raise BadInput(f"{shown}: is nested deeper than {MAX_LEVELS} levels")
+    return value
+
+
+def _is_deep(value: Any) -> bool:
+    """Return True if a JSON value has more than `MAX_LEVELS` levels."""
+    level = [value]
+    for _ in range(MAX_LEVELS):
+        level = [
+            v
+            for container in level
+            if isinstance(container, dict | list)
+            for v in (container.values() if isinstance(container, dict) else container)
+        ]
+        if not level:
+            return False
+    return any(isinstance(v, dict | list) for v in level)
 
 
 def read_json(path: Path, max_bytes: int = MAX_JSON_BYTES) -> Any:

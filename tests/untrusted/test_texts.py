@@ -14,6 +14,7 @@ import zstandard
 
 from glotouch_bt.robot import BadInput, Pose
 from glotouch_bt.untrusted import TooLarge, parse_json, read_json, require_type, unpack_zstd
+from glotouch_bt.untrusted.texts import MAX_LEVELS
 
 
 @pytest.mark.parametrize(
@@ -74,3 +75,20 @@ def test_values_that_fit(value: Any, hint: Any) -> None:
 def test_values_that_do_not_fit(value: Any, hint: Any) -> None:
     with pytest.raises(BadInput, match="here is a"):
         require_type(value, hint, "here")
+
+
+@pytest.mark.parametrize("opening", ["[", '{"a":'])
+def test_json_that_is_nested_deep_is_refused_before_anything_walks_it(opening: str) -> None:
+    closing = "]" if opening == "[" else "}"
+    for levels, refused in ((MAX_LEVELS, False), (MAX_LEVELS + 1, True), (300, True)):
+        text = opening * levels + "1" + closing * levels
+        for data in (text, text.encode(), text.encode("utf-16")):
+            if refused:
+                with pytest.raises(BadInput, match="nested"):
+                    parse_json(data, "result.json")
+            else:
+                parse_json(data, "result.json")
+
+
+def test_wide_json_is_read() -> None:
+    assert len(parse_json("[" + ",".join(["[]"] * 10_000) + "]", "f")) == 10_000

@@ -6,6 +6,7 @@ import numpy as np
 
 from glotouch_bt.motion import Motion
 from glotouch_bt.perception.touch import GuardParams
+from glotouch_bt.robot import MotionRefused
 from glotouch_bt.skill import Context
 from glotouch_bt.skill.probing import HeldTool, Prober
 from glotouch_skills.common.hand import may_touch
@@ -13,10 +14,13 @@ from glotouch_skills.common.probe.free_corner import corner_place
 
 FLOOR_SEARCH_M = 0.005
 """Search for the floor down to this far below its nominal height."""
+RIM_M = 0.015
+"""The descent is guarded from this height above the container's rim to this depth below it: the registration may be
+wrong by more than the distance to the walls."""
 GUARDED_FROM_M = 0.04
 """Height above the floor from which the descent is guarded: the probe may have sunk in the jaws by its handle."""
 GUARDED_M_S = 0.02
-"""Speed of the descent from there."""
+"""Speed of the descent from there, and past the rim."""
 SLOW_FROM_M = 0.02
 """Height above the floor from which the descent is slow."""
 SLOW_M_S = 0.01
@@ -40,13 +44,17 @@ def feel_floor(context: Context, tool: HeldTool, corner_gap_m: float, speed_m_s:
 
     Raises:
         SkillFailed: `hard_contact`.
-        MotionRefused: The corner cannot be reached.
+        MotionRefused: The corner cannot be reached, or the probe met the rim.
     """
     world, arm = context.world, context.arm
     corner = corner_place(world, corner_gap_m)
     prober = Prober(context, tool, GuardParams())
-    high = world.container.interior_m[2] + 0.06
-    yield from prober.hop(np.array([*corner, 0.0]), max(high, float(prober.tip_K_m[2])), speed_m_s)
+    rim = world.container.interior_m[2]
+    yield from prober.hop(np.array([*corner, 0.0]), max(rim + 0.06, float(prober.tip_K_m[2])), speed_m_s)
+    yield from arm.line(tool.pose_B_P(world, np.array([*corner, rim + RIM_M])), speed_m_s)
+    probed = yield from prober.move(np.array([*corner, rim - RIM_M]), GUARDED_M_S)
+    if probed.contact is not None:
+        raise MotionRefused("floor", "the probe met something at the container's rim; is the container registered?")
     yield from arm.line(tool.pose_B_P(world, np.array([*corner, tool.floor_z_K_m + GUARDED_FROM_M])), speed_m_s)
     probed = yield from prober.move(np.array([*corner, tool.floor_z_K_m + SLOW_FROM_M]), GUARDED_M_S)
     with may_touch(arm, "tool", "floor"):
