@@ -7,7 +7,7 @@ import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO
+from typing import IO, cast
 
 from mcap.exceptions import McapError
 from mcap.records import Chunk, McapRecord
@@ -55,9 +55,25 @@ def open_record(path: Path, *, links: bool = False) -> IO[bytes]:
     return open_file(path, MAX_RECORD_BYTES, what="an MCAP record", links=links)
 
 
+class _BoundedReads(io.RawIOBase):
+    """A file that is not read in larger pieces than an item: lengths inside an item may be damaged, too."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+
+    def read(self, size: int = -1) -> bytes:
+        if not 0 <= size <= MAX_ITEM_BYTES:
+            raise BadInput(f"an item of the record states a length of {size} bytes")
+        return self._file.read(size)
+
+
 def record_items(file: IO[bytes]) -> Iterator[McapRecord]:
-    """Yield the items of a record: chunks as they are, attachments, and the footer."""
-    reader = StreamReader(file, emit_chunks=True, record_size_limit=MAX_ITEM_BYTES)
+    """Yield the items of a record: chunks as they are, attachments, and the footer.
+
+    Raises:
+        BadInput: An item states too large a length.
+    """
+    reader = StreamReader(cast("IO[bytes]", _BoundedReads(file)), emit_chunks=True, record_size_limit=MAX_ITEM_BYTES)
     yield from reader.records
 
 

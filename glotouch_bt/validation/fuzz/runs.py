@@ -78,6 +78,8 @@ class RunKind(FuzzKind):
             with suppress(*DAMAGED):  # by the change before
                 CHANGES[sort](run, rng)
             sorts.add(sort)
+            if sort == "links":  # a change of a linked file would change what it points to
+                break
         return min(sorts)
 
     def attempt(self, sort: str, folder: Path, rng: Rng) -> tuple[Class, str]:

@@ -57,6 +57,9 @@ def test_a_bomb_is_bad_input(tmp_path: Path, what: str) -> None:
 
 
 UNKNOWN_CHANNEL = b"\x05" + struct.pack("<Q", 30) + struct.pack("<HIQQ", 99, 0, 0, 0) + bytes(8)
+_ATTACHMENT = struct.pack("<QQIIQ", 0, 0, 0, 0, 2**60) + b"data" + bytes(4)
+LONG_ATTACHMENT = b"\x09" + struct.pack("<Q", len(_ATTACHMENT)) + _ATTACHMENT
+"""Its data says to be longer than the file, which must not be allocated."""
 DAMAGED = [
     chunk(b"", packed=b"rubbish", size=7),
     chunk(b"x", compression=b"lz4"),
@@ -64,6 +67,7 @@ DAMAGED = [
     chunk(UNKNOWN_CHANNEL),
     chunk(bytes(1000)),
     b"\x06" + struct.pack("<Q", 2**62),
+    LONG_ATTACHMENT,
 ]
 
 
@@ -87,7 +91,7 @@ def test_limits_leave_room_for_the_longest_mission() -> None:
 @pytest.mark.parametrize(
     "word", ["a:1:0:1", "a:1:nan:1", "a:1:-1:1", "a:1:1:99999999999", "a:-1:1:1", "a:0:1:1", "a:1x1x1x1x1:1:1"]
 )
-def test_absurd_layouts_are_refused(word: str) -> None:
+def test_layouts_out_of_bounds_are_refused(word: str) -> None:
     with pytest.raises(ValueError, match="a column"):
         Column.parse(word)
 
