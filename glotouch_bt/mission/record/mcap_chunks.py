@@ -55,7 +55,7 @@ def open_record(path: Path, *, links: bool = False) -> IO[bytes]:
     return open_file(path, MAX_RECORD_BYTES, what="an MCAP record", links=links)
 
 
-class _BoundedReads(io.RawIOBase):
+class _BoundedReads:
     """A file that is not read in larger pieces than an item: lengths inside an item may be damaged, too."""
 
     def __init__(self, file: IO[bytes]) -> None:
