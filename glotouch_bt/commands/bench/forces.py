@@ -33,10 +33,10 @@ def forces(
     trials: shared.Trials = 300,
     seed: shared.FirstSeed = 0,
     following: Annotated[
-        bool, typer.Option("--following", help="instead let each joint leave its setpoint, at four rates and moments")
+        bool, typer.Option("--following", help="instead let each joint leave its setpoint, at four rates and five moments")
     ] = False,
     moment: Annotated[
-        list[str] | None, typer.Option(help="with --following: only sweep, draw, squeeze or lift")
+        list[str] | None, typer.Option(help="with --following: only sweep, contact, draw, squeeze or lift")
     ] = None,
     joint: Annotated[list[int] | None, typer.Option(help="with --following: only these joints, from 0")] = None,
     conditions: shared.Conditions = "nominal",
