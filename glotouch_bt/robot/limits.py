@@ -20,8 +20,8 @@ class Limits:
         hard_torque_Nm: The same for the torque at S. Source: the force limit on the probe's 0.34 m lever.
         stop_share: Share of both at which the robot stops itself. Source: ours; above the 27.5 N with which a probe
             that slipped snags on its way back.
-        stop_ahead_s: The robot also stops where the force would be too large after this time at its present rise.
-            Source: measured; three samples to see the rise and 5 ms to stop 0.1 m/s.
+        stop_ahead_s: The robot also stops if a hand that presses on would pass that share within this time. Source:
+            measured; three samples to see it and 5 ms to stop 0.1 m/s.
         tcp_speed_m_s: Largest commanded speed of P. Source: vendor default of motion-force mode, 0.5 m/s, halved.
         tcp_acceleration_m_s2: Largest commanded acceleration of P. Source: vendor default 2.0, halved.
         tcp_jerk_m_s3: Largest commanded jerk of P. Source: ours.

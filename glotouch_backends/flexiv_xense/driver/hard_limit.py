@@ -70,7 +70,7 @@ class HardLimit:
         if self._over >= MAX_SAMPLES_OVER:
             kind, ahead = "", 1.0
         elif self._pressing >= (MAX_SAMPLES_PRESSING if soon < MAX_SHARE_SOON else 1):
-            kind, ahead = "rising_", soon / share
+            kind, ahead = "extrapolated_", soon / share
         else:
             return None
         if force / self._max_N >= torque / self._max_Nm:

@@ -33,7 +33,8 @@ def forces(
     trials: shared.Trials = 300,
     seed: shared.FirstSeed = 0,
     following: Annotated[
-        bool, typer.Option("--following", help="instead let each joint leave its setpoint, at four rates and five moments")
+        bool,
+        typer.Option("--following", help="instead let each joint leave its setpoint, at four rates and five moments"),
     ] = False,
     moment: Annotated[
         list[str] | None, typer.Option(help="with --following: only sweep, contact, draw, squeeze or lift")
