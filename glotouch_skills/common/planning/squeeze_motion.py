@@ -22,6 +22,8 @@ OVER_TOP_M = 0.02
 """Height above a candidate's top from which the descent is slow."""
 FAST_DESCENT_RATIO = 3.0
 """Speed of the descent above that height over the slow speed."""
+FAST_RISE_RATIO = 5.0
+"""Speed of moving up beside the object over the slow speed: the open fingers have just come down that way."""
 OPENING_M_S = 0.2
 """Speed at which the empty jaws open."""
 
@@ -117,7 +119,8 @@ class Squeezing:
 
     def move_to(self, height_m: float) -> Motion[bool]:
         """Move up or down beside the object with open jaws; return False if the fingers touched something."""
-        return (yield from glide(self._context, self._pose(height_m), self._p.descent_speed_m_s))
+        ratio = FAST_RISE_RATIO if height_m > pads_height_m(self._context) else 1.0
+        return (yield from glide(self._context, self._pose(height_m), ratio * self._p.descent_speed_m_s))
 
     def close(self) -> Motion[tuple[Layer, ObjectMotion]]:
         """Close once where the hand is, and open again; a pause waits until then.

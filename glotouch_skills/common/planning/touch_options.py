@@ -10,7 +10,13 @@ import numpy as np
 from glotouch_bt.perception.recognition import Closure
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import Array, Gripper
-from glotouch_skills.common.planning.squeeze_motion import FAST_DESCENT_RATIO, OVER_TOP_M, ClosureParams, layer_heights
+from glotouch_skills.common.planning.squeeze_motion import (
+    FAST_DESCENT_RATIO,
+    FAST_RISE_RATIO,
+    OVER_TOP_M,
+    ClosureParams,
+    layer_heights,
+)
 from glotouch_skills.common.planning.squeeze_plan import Stance, schemes, stance
 
 YAWS_RAD = np.deg2rad(np.arange(0.0, 180.0, 30.0))
@@ -94,7 +100,7 @@ def options(
         here = standing if standing is not None and standing.candidate == candidate.index else None
         if here is not None:
             for z in heights[heights > here.height_m + SAME_M]:
-                seconds = CLOSURE_S + STOP_S + (z - here.height_m) / p.descent_speed_m_s
+                seconds = CLOSURE_S + STOP_S + (z - here.height_m) / (FAST_RISE_RATIO * p.descent_speed_m_s)
                 out.append(Option(here.at, _closure(candidate, here.at, float(z)), float(seconds)))
         for at in stances_over(candidate, gripper, p.side_gap_m):
             if _used(touchset, at):
@@ -102,7 +108,7 @@ def options(
             lowest, *higher = (_closure(candidate, at, float(z)) for z in heights)
             seconds = _travel_s(candidate, at, float(heights[0]), hand_K_m, p) + CLOSURE_S
             gap = float(np.ptp(heights)) / max(len(heights) - 1, 1)
-            more = CLOSURE_S + STOP_S + gap / p.descent_speed_m_s
+            more = CLOSURE_S + STOP_S + gap / (FAST_RISE_RATIO * p.descent_speed_m_s)
             out.append(Option(at, lowest, seconds, tuple(higher), more))
     return out
 
