@@ -43,13 +43,22 @@ def test_a_document_does_not_depend_on_those_before_it() -> None:
 
 
 def test_documents_are_of_both_kinds_and_in_all_states() -> None:
-    documents = [drawn(SEED, n) for n in range(600)]
-    assert {kind for kind, _ in documents} == {"mission", "fault plan"}
-    texts = [text for _, text in documents]
-    assert any(b"!!python" in t for t in texts), "tags"
-    assert any(b"&a" in t for t in texts), "anchors"
-    assert any(t.count(b"[" * 20) or t.count(b"- " * 20) for t in texts), "deep nesting"
-    assert sum(b"tool_pickup" in t for t in texts) > 20, "and things that make sense"
+    """Each within the first few thousand; which ones have it changes with every skill and fault that is added."""
+    missing = {"tags", "anchors", "deep nesting", "a mission", "a fault plan", "things that make sense"}
+    for n in range(5000):
+        kind, text = drawn(SEED, n)
+        found = {
+            "tags": b"!!python" in text,
+            "anchors": b"&a" in text,
+            "deep nesting": b"[" * 20 in text or b"- " * 20 in text,
+            "a mission": kind == "mission",
+            "a fault plan": kind == "fault plan",
+            "things that make sense": b"tool_pickup" in text,
+        }
+        missing -= {name for name, there in found.items() if there}
+        if not missing:
+            return
+    pytest.fail(f"never drawn: {missing}")
 
 
 @pytest.mark.parametrize(
