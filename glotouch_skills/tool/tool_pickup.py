@@ -9,7 +9,7 @@ import numpy as np
 
 from glotouch_bt.motion import Motion, yaw_near_home
 from glotouch_bt.perception.touch.calibration import JawZero, measured_zero
-from glotouch_bt.robot import Pose, SetPayload, Tare
+from glotouch_bt.robot import MotionRefused, Pose, SetPayload, Tare
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
 from glotouch_skills.common.hand import (
@@ -36,6 +36,8 @@ MAX_PULL_M_S = 0.05
 stops, which stays below the hard limit."""
 HANDLE_TOLERANCE_M = 0.004
 """The jaws hold the handle if the aperture is within this of its width: twice the largest bias, and compliance."""
+MIN_OPEN_M = 0.01
+"""The jaws are opened at least this much wider than the handle before they go down over it."""
 
 
 class ToolPickupParams(SkillParams):
@@ -95,7 +97,7 @@ class ToolPickup(Skill):
     FAILURES: ClassVar = (
         REQUEST_FAILED,
         *FEEL_FLOOR_FAILURES,
-        MOTION_REFUSED.with_meaning("the holder cannot be reached"),
+        MOTION_REFUSED.with_meaning("the holder cannot be reached, or the jaws do not open"),
     )
 
     tool = Out(HeldTool, "the probe in the jaws")
@@ -164,6 +166,9 @@ class ToolPickup(Skill):
             above, height_B_m=max(above.position_m[2], arm.pose_B_P.position_m[2]), speed_m_s=p.free_speed_m_s
         )
         yield from finish(self.context.requests.start(Tare()), "tare")
+        state = yield from arm.jaws(opening, speed_m_s=0.15)  # again: closed fingertips would land on the handle
+        if state.aperture_m < handle + MIN_OPEN_M:
+            raise MotionRefused("jaws", f"they stay {state.aperture_m * 1e3:.1f} mm apart; the way down needs more")
         with may_touch(arm, "hand", "probe", "holder"):
             guard = yield from straight_guard(arm, DOWN_B, MAX_APPROACH_FORCE_N)
             moved = yield from arm.line(grasp, 0.05, guard=guard)
