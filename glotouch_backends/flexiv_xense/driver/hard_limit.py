@@ -29,6 +29,9 @@ MAX_STEEPENING = 4.0
 """Mean rise of a contact over that of one sample; the weight of an object that is lifted hardly rises."""
 SAMPLE_S = 0.001
 """Nominal time between samples."""
+FREE_M_S = 0.015
+"""Speed that adds nothing: guarded motions end such contacts themselves. A probe that snags on its way into the holder
+at 10 mm/s meets 27.5 N. Source: as there."""
 MIN_PRESSING_M_S = 0.002
 """A hand that presses on more slowly counts as standing."""
 
@@ -64,7 +67,9 @@ class HardLimit:
             self._over = self._pressing = 0
             return None
         speed_m_s = max(0.0, power_W()) / max(force, MIN_PRESSING_SHARE * self._max_N)
-        soon = share + min(self._rise_s_m * speed_m_s, self._samples_ahead * MAX_STEEPENING * max(0.0, rise))
+        soon = share + min(
+            self._rise_s_m * max(0.0, speed_m_s - FREE_M_S), self._samples_ahead * MAX_STEEPENING * max(0.0, rise)
+        )
         self._over = self._over + 1 if share > 1.0 else 0
         self._pressing = self._pressing + 1 if soon > 1.0 and speed_m_s > MIN_PRESSING_M_S else 0
         if self._over >= MAX_SAMPLES_OVER:
