@@ -91,5 +91,5 @@ def figure(value: Any, row: dict[str, Any]) -> str:
 
 
 def _percent(share: float) -> str:
-    percent = 100 * share
+    percent = round(100 * share, 9)
     return f"{percent:.1g}" if 0 < percent < 0.05 else f"{percent:.1f}".removesuffix(".0")

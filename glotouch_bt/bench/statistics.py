@@ -40,7 +40,9 @@ def wilson(successes: int, n: int) -> Rate:
     p = successes / n
     centre = (p + z2 / (2 * n)) / (1 + z2 / n)
     half = np.sqrt(z2 * (p * (1 - p) / n + z2 / (4 * n * n))) / (1 + z2 / n)
-    return {"rate": p, "lo": max(0.0, float(centre - half)), "hi": min(1.0, float(centre + half)), "n": n}
+    lo = 0.0 if successes == 0 else float(centre - half)
+    hi = 1.0 if successes == n else float(centre + half)
+    return {"rate": p, "lo": lo, "hi": hi, "n": n}
 
 
 def bootstrap_mean(values: npt.ArrayLike, resamples: int = 2000, seed: int = 0) -> Mean:

@@ -12,7 +12,7 @@ from glotouch_bt.errors import BadInput
 from glotouch_bt.untrusted.files import read_file
 
 MAX_JSON_BYTES = 32_000_000
-"""Largest JSON text. Source: 20 times the largest result of ours; as Python data it takes at most 0.8 GB."""
+"""Largest JSON text. Source: 20 times the largest result that is written; as Python data it takes up to 0.8 GB."""
 MAX_LEVELS = 64
 """Maximum nesting of JSON. Source: ours; results have 6 levels, and code that walks them may recurse."""
 MAX_DIGITS = 20

@@ -37,7 +37,7 @@ stops, which stays below the hard limit."""
 HANDLE_TOLERANCE_M = 0.004
 """The jaws hold the handle if the aperture is within this of its width: twice the largest bias, and compliance."""
 MIN_OPEN_M = 0.01
-"""The jaws are opened at least this much wider than the handle before they go down over it."""
+"""The jaws are opened at least this much wider than the handle before they go down over it. Source: ours."""
 
 
 class ToolPickupParams(SkillParams):

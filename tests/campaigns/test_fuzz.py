@@ -44,7 +44,8 @@ def test_a_document_does_not_depend_on_those_before_it() -> None:
 
 def test_documents_are_of_both_kinds_and_in_all_states() -> None:
     """Each within the first few thousand; which ones have it changes with every skill and fault that is added."""
-    missing = {"tags", "anchors", "deep nesting", "a mission", "a fault plan", "things that make sense"}
+    missing = {"tags", "anchors", "deep nesting", "a mission", "a fault plan"}
+    pickups = 0
     for n in range(5000):
         kind, text = drawn(SEED, n)
         found = {
@@ -53,12 +54,12 @@ def test_documents_are_of_both_kinds_and_in_all_states() -> None:
             "deep nesting": b"[" * 20 in text or b"- " * 20 in text,
             "a mission": kind == "mission",
             "a fault plan": kind == "fault plan",
-            "things that make sense": b"tool_pickup" in text,
         }
         missing -= {name for name, there in found.items() if there}
-        if not missing:
+        pickups += b"tool_pickup" in text
+        if not missing and pickups > 20:
             return
-    pytest.fail(f"never drawn: {missing}")
+    pytest.fail(f"never drawn: {missing}; {pickups} documents with a skill of this project")
 
 
 @pytest.mark.parametrize(

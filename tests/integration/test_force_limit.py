@@ -11,14 +11,8 @@ import trimesh
 
 from glotouch_bt.robot import Limits
 from glotouch_bt.runs import RunRequest, launch
+from glotouch_bt.validation.forces.following import MISSIONS
 
-PICKUP = """mission: pickup
-world: worlds/container_five.yaml
-leaves: {hand: probe}
-tree:
-  sequence:
-    - tool_pickup: {floor_touch: false}
-"""
 AT_PLACE = {"x": "20", "y": "50", "width": "40", "layout": json.dumps({"block": [0.02, 0.05, 0.0]})}
 
 
@@ -32,7 +26,7 @@ def block(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def faulted(block: Path, tmp_path: Path) -> Any:
     """Run a mission with one fault; return its result after the checks that hold for every run."""
-    (tmp_path / "pickup.yaml").write_text(PICKUP)
+    (tmp_path / "pickup.yaml").write_text(MISSIONS["pickup"])
 
     def run(mission: str, fault: str, given: dict[str, Any], when: dict[str, Any]) -> dict[str, Any]:
         plan = {"fault": fault, "with": given, "when": when, "for": "ever"}

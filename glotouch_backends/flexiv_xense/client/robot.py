@@ -45,7 +45,7 @@ class FlexivXenseRobot(Robot):
     Attributes:
         link, process: Connection to the driver, and its process if we started it.
         info: Facts about the devices, for display.
-        late_periods: Control periods so far without a command of ours.
+        late_periods: Control periods so far without a command from this client.
         latency_s: Of the last cycle: from the call until the arm has the setpoint, plus from reading the newest sample
             to the observation, without the wait for the period's end. Valid on one machine only.
     """

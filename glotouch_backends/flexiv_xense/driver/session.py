@@ -162,7 +162,7 @@ class DriverSession:
         self._busy = False
 
     def _reset_to_measured(self) -> None:
-        """Continue from the measured pose: the arm's own controller has moved it, not a setpoint of ours."""
+        """Continue from the measured pose: the arm's own controller has moved it, not a setpoint sent from here."""
         self._last = self._rest = None
         if self._newest is not None:
             self._check.reset_to(self._newest[:7], self._newest[14:21])

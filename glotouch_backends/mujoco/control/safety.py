@@ -17,18 +17,18 @@ MAX_SAMPLES_OVER = 5
 MAX_SAMPLES_PRESSING = 2
 """Consecutive samples (2 ms) that trip it while the hand presses on. Source: ours, as above."""
 MAX_SHARE_SOON = 2.0
-"""Extrapolated share of the stop limit that trips it at once. Source: ours; 0.1 m/s, beyond guarded motions."""
+"""Extrapolated share of the stop limit that trips it at once: 0.12 m/s at 7 N. Source: ours."""
 CONTACT_STIFFNESS_N_M = 60e3
 """Stiffness of the arm on something rigid. Source: measured, 54 N/mm."""
 MIN_PRESSING_SHARE = 0.25
-"""Share of the stop limit below which a pressing hand is not judged. Source: measured in whole retrievals; objects
-that the hand meets at 50 mm/s push it with 4 N."""
+"""Share of the stop limit below which a pressing hand is not judged. Source: measured in a nominal
+retrieval of seed 9401; objects that the hand meets at 50 mm/s push it with 4 N."""
 MAX_STEEPENING = 4.0
 """Mean rise of a contact over that of one sample. The weight of an object that is lifted takes power too, but hardly
 rises. Source: ours."""
 FREE_M_S = 0.015
 """Speed that adds nothing: guarded motions end such contacts themselves. A probe that snags on its way into the holder
-at 10 mm/s meets 27.5 N. Source: measured."""
+at 10 mm/s meets 27.5 N. Source: measured in tests/integration/test_recovery.py."""
 MIN_PRESSING_M_S = 0.002
 """A hand that presses on more slowly counts as standing. Source: ours; it gains 0.6 N in five samples."""
 

@@ -40,11 +40,11 @@ _MARK = 0x474C4F54  # "GLOT", SQLite's application_id
 _MARK_AT = 68
 """Offset of the application_id in an SQLite file, bytes."""
 MAX_FILE_BYTES = 2_000_000_000
-"""Largest file, and largest write-ahead log. Source: 10,000 checkpoints of ours."""
+"""Largest file, and largest write-ahead log. Source: 10,000 checkpoints as this program writes them."""
 MAX_ROWS = 100_000
 """Maximum number of checkpoints, and of items of `run`."""
 MAX_VALUE_BYTES = 16_000_000
-"""Largest value of a column. Source: 80 times the largest state of ours."""
+"""Largest value of a column. Source: 80 times the largest state this program writes."""
 MAX_UNPACKED_BYTES = 64_000_000
 """Largest unpacked state or world. Source: 100 times the largest measured."""
 MAX_OPEN_S = 20.0
@@ -107,7 +107,9 @@ class CheckpointFile:
         if not path.is_file():
             raise BadInput(f"{path.parent}: no checkpoint here ({path.name} is missing)")
         if path.with_name(journal).exists():  # SQLite would delete the file that a journal names
-            raise BadInput(f"{path.with_name(journal)}: a run of ours leaves no such file; remove it")
+            raise BadInput(
+                f"{path.with_name(journal)}: this program leaves no such file beside a checkpoint; remove it"
+            )
         for name in (path.name, log):
             if path.with_name(name).exists():
                 open_file(path.with_name(name), MAX_FILE_BYTES, what="a checkpoint file").close()
@@ -269,7 +271,9 @@ class CheckpointFile:
         if version != FORMAT:
             raise BadInput(f"{self.path}: its format is {version}; this version reads and writes format {FORMAT}")
         if _schema_of(db) != _our_schema():
-            raise BadInput(f"{self.path}: holds other tables than a checkpoint file; no run of ours wrote it")
+            raise BadInput(
+                f"{self.path}: holds other tables than a checkpoint file; it was not written by this program"
+            )
         sound = db.execute("PRAGMA quick_check(1)").fetchone()
         if sound != ("ok",):
             raise BadInput(f"{self.path}: is damaged ({sound})")

@@ -2,7 +2,8 @@
 
 Composites and decorators are BehaviorTree.CPP's own where it has them (its `Sequence` and `Fallback` remember their
 running child, as ours do). A skill is an `Action` with its ports and parameters. A node kind that BehaviorTree.CPP
-lacks is a `Decorator` of ours. Actions and our decorators stand in the `TreeNodesModel`. `is_set(key)` is ours, too.
+lacks is a `Decorator` defined here. Actions and these decorators stand in the `TreeNodesModel`. `is_set(key)`
+is an extension, too.
 """
 
 from __future__ import annotations

@@ -350,7 +350,7 @@ class ForEachKind(NodeKind):
         return ForEach(node.name, children[0], keys, items, item, collect, node.settings)
 
     def btcpp_form(self, node: NodeSpec) -> BtcppForm:
-        """Return it as a decorator of ours."""
+        """Return it as this project's decorator."""
         assert isinstance(node.settings, ForEachSettings)
         items, item = node.reads["items"].key, node.writes["item"].key
         attributes = {"items": btcpp_key(items), "item": btcpp_key(item)}

@@ -192,7 +192,7 @@ class RepeatKind(LoopKind):
         return [*([f"until {node.reads['until'].key}"] if own else []), *super().details(node)]
 
     def btcpp_form(self, node: NodeSpec) -> BtcppForm:
-        """Return it as `Repeat`, or as a `RepeatUntil` of ours."""
+        """Return it as `Repeat`, or as this project's `RepeatUntil`."""
         settings = node.settings
         assert isinstance(settings, RepeatSettings)
         if settings.until is None:

@@ -21,7 +21,7 @@ MCAP_MAGIC = b"\x89MCAP0\r\n"
 MAX_RECORD_BYTES = 8_000_000_000
 """Largest record file. Source: 24 h, the longest mission, take 4 GB."""
 MAX_ITEM_BYTES = 64_000_000
-"""Largest packed or unpacked chunk or attachment. Source: 200 times the largest chunk of ours."""
+"""Largest packed or unpacked chunk or attachment. Source: 200 times the largest chunk this program writes."""
 MAX_UNPACKED_BYTES = 1 << 30
 """Maximum unpacked size of a record, bytes. Source: 85 minutes of a run."""
 FREE_BYTES, MAX_RATIO = 1 << 28, 16

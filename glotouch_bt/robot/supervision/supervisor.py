@@ -111,7 +111,7 @@ class Supervisor(Robot):
         self._sensed.reset(newest)
 
     def trip_by(self, error: GuardTripped) -> None:
-        """Hold from now on because a guard above this robot (a skill's own) tripped; record it like one of ours."""
+        """Hold from now on because a guard above this robot (a skill's own) tripped; record it like the others."""
         if error is not self._error:
             self._robot.hold()
             self._error = error

@@ -23,7 +23,8 @@ OVER_TOP_M = 0.02
 FAST_DESCENT_RATIO = 3.0
 """Speed of the descent above that height over the slow speed."""
 FAST_RISE_RATIO = 5.0
-"""Speed of moving up beside the object over the slow speed: the open fingers have just come down that way."""
+"""Speed of moving up beside the object over the slow speed: the open fingers have just come down that way. Source:
+ours; 50 mm/s by default."""
 OPENING_M_S = 0.2
 """Speed at which the empty jaws open."""
 

@@ -16,7 +16,7 @@ FLOOR_SEARCH_M = 0.005
 """Search for the floor down to this far below its nominal height."""
 RIM_M = 0.015
 """The descent is guarded from this height above the container's rim to this depth below it: the registration may be
-wrong by more than the distance to the walls."""
+wrong by more than the distance to the walls. Source: ours."""
 GUARDED_FROM_M = 0.04
 """Height above the floor from which the descent is guarded: the probe may have sunk in the jaws by its handle."""
 GUARDED_M_S = 0.02
