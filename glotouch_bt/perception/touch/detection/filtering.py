@@ -68,7 +68,7 @@ def _filtered(coefficients: tuple[float, ...], samples: Array, state: Array) -> 
     """Return the filtered samples (n, channels) and the next state (2, channels): transposed direct form II."""
     b0, b1, b2, a1, a2 = coefficients
     first, second = state
-    out = np.empty_like(samples)
+    out = np.zeros_like(samples)
     for i, x in enumerate(samples):
         y = b0 * x + first
         first = b1 * x - a1 * y + second
