@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -10,11 +10,8 @@ from glotouch_bt.perception import recognition
 from glotouch_bt.perception.recognition import PARTS, ProbeOption, ProbeTouch, excluded, next_probe_touch
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import HOLD, Array
-from glotouch_bt.skill import Context, Failure, In, Out, Skill, SkillParams, SkillRun, param
+from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.planning import TOO_LOW, load_target, load_target_model
-
-if TYPE_CHECKING:
-    from glotouch_bt.perception.recognition import TargetModel
 
 PART_S = {"outline": 29.0, "top": 18.0}
 """Robot time of `refine_outline` and `touch_top` on one candidate. Source: measured, seed 7000."""
@@ -61,10 +58,6 @@ class NextProbe(Skill):
     postponed = Out(int, "number of candidates that may be the target and are not measured yet")
     unmeasured = Out(int, "number of all candidates that are not measured yet")
 
-    def __init__(self, name: str, params: SkillParams, context: Context) -> None:
-        super().__init__(name, params, context)
-        self._model: TargetModel | None = None
-
     def run(self) -> SkillRun:
         """See the class."""
         if not self.known:
@@ -83,9 +76,11 @@ class NextProbe(Skill):
         self.candidate = next(c for c in candidates if touch is None or c.index == touch.candidate)
 
     def _by_target(self, candidates: tuple[Candidate, ...], left: list[ProbeTouch]) -> ProbeTouch | None:
+        mesh = load_target(self.params.target, self.context.world.objects.folder)
+        model = load_target_model(mesh, self.context.arm.description.gripper)
         felt = {t.candidate.index: t.sequences for t in self.felt or ()}
         touchsets = tuple(TouchSet(c, felt.get(c.index, ())) for c in candidates)
-        belief = recognition.infer_belief(self._target_model(), touchsets)
+        belief = recognition.infer_belief(model, touchsets)
         chosen = next_probe_touch(belief, [self._option(c, left) for c in candidates if c.index in _indices(left)])
         out = excluded(belief)
         self.postponed = len(_indices(left) - out)
@@ -102,17 +97,6 @@ class NextProbe(Skill):
             excluded=sorted(out),
         )
         return chosen.touch if chosen else None
-
-    def _target_model(self) -> TargetModel:
-        """Return the target's model, kept in memory.
-
-        Raises:
-            SkillFailed: `too_low`.
-        """
-        if self._model is None:
-            mesh = load_target(self.params.target, self.context.world.objects.folder)
-            self._model = load_target_model(mesh, self.context.arm.description.gripper)
-        return self._model
 
     def _option(self, candidate: Candidate, left: list[ProbeTouch]) -> ProbeOption:
         """Return what is left to measure of a candidate, with the way to it."""
