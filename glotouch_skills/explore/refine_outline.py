@@ -63,7 +63,13 @@ class RefineOutline(Skill):
         explorer = Explorer(self.context, tool, p.speeds(), self.event)
         half = 0.5 * np.array(self.context.world.container.interior_m[:2]) - p.wall_gap_m
         plan = trace_more(
-            before.contacts, explorer.tip_K_m, tool.tip_radius_m, p.rule(), round_tip=tool.round, half_extent_m=half
+            before.contacts,
+            explorer.tip_K_m,
+            tool.tip_radius_m,
+            p.rule(),
+            round_tip=tool.round,
+            half_extent_m=half,
+            columns=explorer.columns,
         )
         traced = yield from explorer.run(plan)
         better = refined(before, traced)

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.motion import Motion, MoveResult
+from glotouch_bt.motion import Motion, MoveResult, Paces
 from glotouch_bt.perception.touch import (
     Baseline,
     Contact,
@@ -110,8 +110,10 @@ class Prober:
         self.resting_up_N.append(float((self._context.arm.pose_B_P.rotation @ baseline.median[:3])[2]))
         return baseline
 
-    def move(self, tip_K_m: Array, speed_m_s: float, *, any_direction: bool = False) -> Motion[Probed]:
-        """Move the ball straight to `tip_K_m` (3,) under a guard.
+    def move(
+        self, tip_K_m: Array, speed_m_s: float, *, any_direction: bool = False, paces: Paces = ()
+    ) -> Motion[Probed]:
+        """Move the ball straight to `tip_K_m` (3,) under a guard; `paces` as in `Arm.follow`.
 
         Stop at the first contact that opposes the motion or, with `any_direction`, at any contact, even a graze.
 
@@ -126,9 +128,16 @@ class Prober:
         step_B = self._world.container.pose_B_K.rotation @ step
         guard = yield from self._guard_for(step_B / length, any_direction)
         result = yield from self._context.arm.shift(
-            step_B, speed_m_s, acceleration_m_s2=GUARDED_ACCELERATION_M_S2, jerk_m_s3=GUARDED_JERK_M_S3, guard=guard
+            step_B,
+            speed_m_s,
+            acceleration_m_s2=GUARDED_ACCELERATION_M_S2,
+            jerk_m_s3=GUARDED_JERK_M_S3,
+            paces=paces,
+            guard=guard,
         )
-        return self._outcome(result, step / length)
+        probed = self._outcome(result, step / length)
+        self._context.arm.felt.add(probed.path_K_m, None if probed.contact is None else probed.contact.point_K_m)
+        return probed
 
     def retreat(self, direction_K: Array, distance_m: float, speed_m_s: float) -> Motion[None]:
         """Move away from a contact along `direction_K` (3,), unguarded, then rest until the wrench has settled."""

@@ -23,6 +23,9 @@ _Outcome = TypeVar("_Outcome")
 
 AT_HEIGHT_M = 0.004
 """The ball is at sensing height within this tolerance."""
+IN_COLUMN_M = 0.002
+"""A descent within this distance of a place where the tool stood before is free: the difference of the radii of ball
+and shaft. Source: ours."""
 HELD_TOLERANCE_M = 0.004
 """The tool is held if the aperture is within this of the one at which the jaws closed on it."""
 MAX_LOST_SHARE = 0.5
@@ -46,6 +49,7 @@ class ExploringSpeeds:
     probe_m_s: float = 0.03
     travel_m_s: float = 0.10
     lower_m_s: float = 0.02
+    lower_free_m_s: float = 0.10
     height_m: float = 0.018
     headroom_m: float = 0.13
 
@@ -88,6 +92,10 @@ class Explorer:
     def tip_K_m(self) -> Array:
         """(2,) position of the ball in K."""
         return self._prober.tip_K_m[:2]
+
+    def columns(self) -> Array:
+        """Return the places (n, 2) above which the space is free, down to sensing height."""
+        return self._arm.felt.columns(self._height_m + AT_HEIGHT_M)
 
     @property
     def _height_m(self) -> float:
@@ -173,7 +181,11 @@ class Explorer:
         if np.linalg.norm(goal_K_m - tip[:2]) > 0.002:
             above = max(float(tip[2]), self._tool.floor_z_K_m + s.headroom_m)
             yield from self._prober.hop(np.array([*goal_K_m, 0.0]), above, s.travel_m_s)
-        probed = yield from self._prober.move(np.array([*goal_K_m, self._height_m]), s.lower_m_s)
+        known = self.columns()
+        free = bool((np.linalg.norm(known - goal_K_m, axis=1) < IN_COLUMN_M).any())
+        probed = yield from self._prober.move(
+            np.array([*goal_K_m, self._height_m]), s.lower_free_m_s if free else s.lower_m_s
+        )
         if probed.contact is not None:
             yield from self._prober.retreat(np.array([0.0, 0.0, 1.0]), OFF_TOP_M, s.step_m_s)
             return probed.contact, np.zeros((0, 3))
