@@ -32,6 +32,13 @@ REST_S = 0.12
 """Time for which wrench and twist must be steady before a guarded move."""
 MAX_REST_S = 0.6
 """Longest wait for that."""
+LIFT_M_S = 0.10
+"""Largest speed of the lift before a hop. Its column is free, except for what reaches over the ball beside the shaft.
+The robot stops in time at this speed (`Limits.stop_ahead_s`)."""
+BASELINE_AGE_S = 3.0
+"""Longest time for which a wrench measured at rest is used again. Source: ours; harsh CONDITIONS drift by 0.02 N."""
+STAND_S = 0.02
+"""Time of standing before a guarded move with such a wrench. Source: ours; twice the window of the measured inertia."""
 GUARDED_ACCELERATION_M_S2 = 0.5
 """Acceleration limit of a guarded move. With the hand's inertia compensated, less than 0.05 N of it remain at the tip
 (simulation)."""
@@ -81,6 +88,7 @@ class Prober:
         probe = context.world.probe if context.arm.scene.holding_tool else None
         self._carried = carried or Payload.hand(context.arm.description.gripper, probe)
         self._rested: tuple[float, Baseline] | None = None
+        self._untouched = False
         self.resting_up_N: list[float] = []
 
     @property
@@ -107,8 +115,28 @@ class Prober:
         inertia = self._inertia()  # at rest this is only its measurement noise
         baseline = fit_baseline(np.concatenate([o.wrench_S - inertia(o) for o in window]))
         self._rested = (window[-1].now_s, baseline)
+        self._untouched = True
         self.resting_up_N.append(float((self._context.arm.pose_B_P.rotation @ baseline.median[:3])[2]))
         return baseline
+
+    def _ready(self) -> Motion[tuple[Baseline, MeasuredInertia]]:
+        """Return the wrench without contact, and the inertia as of now.
+
+        Without a contact since a recent rest, its wrench still holds: the hand has its orientation, and the sensor has
+        hardly drifted. Then stand only until the end of the last motion is in the measured inertia.
+        """
+        inertia, now_s = self._inertia(), self._context.observation.now_s
+        if self._rested is None or not self._untouched or now_s - self._rested[0] > BASELINE_AGE_S:
+            return (yield from self.rest()), inertia
+        at_s, baseline = self._rested
+        if now_s == at_s:
+            return baseline, inertia
+        blocks = yield from self._context.arm.hold(STAND_S)
+        if blocks[-1].now_s - now_s > 2.0 * STAND_S:  # a pause
+            return (yield from self.rest()), inertia
+        for seen in blocks:
+            inertia(seen)
+        return baseline, inertia
 
     def move(
         self, tip_K_m: Array, speed_m_s: float, *, any_direction: bool = False, paces: Paces = ()
@@ -135,6 +163,7 @@ class Prober:
             paces=paces,
             guard=guard,
         )
+        self._untouched &= result.stop is None
         probed = self._outcome(result, step / length)
         self._context.arm.felt.add(probed.path_K_m, None if probed.contact is None else probed.contact.point_K_m)
         return probed
@@ -148,15 +177,17 @@ class Prober:
     def hop(self, tip_K_m: Array, height_K_m: float, speed_m_s: float) -> Motion[None]:
         """Raise the ball's centre to `height_K_m`, then move across to above `tip_K_m`, unguarded."""
         tip = self.tip_K_m
-        for goal in (np.array([tip[0], tip[1], height_K_m]), np.array([tip_K_m[0], tip_K_m[1], height_K_m])):
+        for goal, speed in (
+            (np.array([tip[0], tip[1], height_K_m]), min(speed_m_s, LIFT_M_S)),
+            (np.array([tip_K_m[0], tip_K_m[1], height_K_m]), speed_m_s),
+        ):
             if np.linalg.norm(goal - self.tip_K_m) > 1e-4:
-                yield from self._context.arm.line(self._tool.pose_B_P(self._world, goal), speed_m_s)
+                yield from self._context.arm.line(self._tool.pose_B_P(self._world, goal), speed)
 
     def _guard_for(self, direction_B: Array, any_direction: bool) -> Motion[_TwoGuards]:
-        baseline = yield from self.rest()
+        baseline, inertial = yield from self._ready()
         arm, params = self._context.arm, self._guard
         gripper = arm.description.gripper
-        inertial = self._inertia()
         approach_B = None if any_direction else direction_B
         soft = ContactGuard(baseline, approach_B, self._tool.tip_P_m, gripper.pose_E_P, params, inertial)
         return _TwoGuards(HardStop(baseline, params), soft)

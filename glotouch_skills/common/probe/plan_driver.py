@@ -47,7 +47,7 @@ class ExploringSpeeds:
     sweep_m_s: float = 0.04
     step_m_s: float = 0.05
     probe_m_s: float = 0.03
-    travel_m_s: float = 0.10
+    travel_m_s: float = 0.25
     lower_m_s: float = 0.02
     lower_free_m_s: float = 0.10
     height_m: float = 0.018
