@@ -49,6 +49,13 @@ class FeltSpace:
             far &= np.sum((low - touched) ** 2, axis=1) >= CLEAR_OF_TOUCH_M**2
         return low[far]
 
+    def covers(self, places_K_m: Array, within_m: float) -> bool:
+        """Return True if the tool stood free within a distance of each place (n, 2), near touches or not."""
+        if not len(self._free_K_m):
+            return False
+        away = np.linalg.norm(self._free_K_m[None, :, :2] - places_K_m[:, None], axis=2).min(axis=1)
+        return bool(away.max() <= within_m)
+
     def state(self) -> dict[str, Any]:
         """Return the record, for `restore`."""
         return {"free_K_m": self._free_K_m.copy(), "touched_K_m": self._touched_K_m.copy()}
