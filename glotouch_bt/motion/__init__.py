@@ -2,7 +2,7 @@
 
 from glotouch_bt.motion.arm import Arm
 from glotouch_bt.motion.clearance import Scene
-from glotouch_bt.motion.felt_space import FeltSpace
+from glotouch_bt.motion.felt_space import FREE_M_S, FeltSpace
 from glotouch_bt.motion.hand_pose import hand_pose_B, yaw_near_home
 from glotouch_bt.motion.jaws import JawRestDetector
 from glotouch_bt.motion.kinematics import Kinematics

@@ -14,6 +14,9 @@ import numpy as np
 
 from glotouch_bt.robot import Array
 
+FREE_M_S = 0.10
+"""Speed at which the tool or the open fingers move through space that was felt to be free. Source:
+`Limits.stop_ahead_s`: at this speed the robot still stops in time by itself."""
 STEP_M = 0.003
 """Spacing of the recorded places. Source: ours; half of the ball's radius."""
 CLEAR_OF_TOUCH_M = 0.015
@@ -37,6 +40,11 @@ class FeltSpace:
         if touch_K_m is not None:
             self._touched_K_m = np.concatenate([self._touched_K_m, np.asarray(touch_K_m)[None, :2]])
 
+    def add_hand(self, places_K_m: Array) -> None:
+        """Record places (n, 2) where the open hand came down; they tell nothing of the wider ball."""
+        above = np.column_stack([places_K_m, np.full(len(places_K_m), np.inf)])
+        self._free_K_m = np.concatenate([self._free_K_m, above])
+
     def forget(self) -> None:
         """Remove everything: the objects may have been moved, or the tool was not held."""
         self._free_K_m, self._touched_K_m = np.zeros((0, 3)), np.zeros((0, 2))
@@ -50,7 +58,7 @@ class FeltSpace:
         return low[far]
 
     def covers(self, places_K_m: Array, within_m: float) -> bool:
-        """Return True if the tool stood free within a distance of each place (n, 2), near touches or not."""
+        """Return True if tool or hand stood free within a distance of each place (n, 2), near touches or not."""
         if not len(self._free_K_m):
             return False
         away = np.linalg.norm(self._free_K_m[None, :, :2] - places_K_m[:, None], axis=2).min(axis=1)

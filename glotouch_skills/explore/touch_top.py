@@ -8,12 +8,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.motion import Motion
+from glotouch_bt.motion import FREE_M_S, Motion
 from glotouch_bt.perception.search import BallMove, BallOutcome, TopPlan, TopRule, rounds, top_plan
 from glotouch_bt.perception.touch import Candidate, GuardParams
 from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
-from glotouch_bt.skill.probing import LIFT_M_S, HeldTool, Prober
+from glotouch_bt.skill.probing import HeldTool, Prober
 from glotouch_skills.common.probe import drive
 
 RIM_PLACES = 4
@@ -113,7 +113,7 @@ class TouchTop(Skill):
                 way = goal - tip
                 length = float(np.linalg.norm(way))
                 if length > 1e-4:
-                    yield from prober.retreat(way / length, length, min(p.travel_speed_m_s, LIFT_M_S))
+                    yield from prober.retreat(way / length, length, min(p.travel_speed_m_s, FREE_M_S))
             else:
                 speed = {"down": p.down_speed_m_s, "feel": p.feel_speed_m_s, "pass": p.pass_speed_m_s}[move.kind]
                 probed = yield from prober.move(goal, speed, any_direction=move.kind != "down")

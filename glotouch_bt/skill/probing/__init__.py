@@ -3,7 +3,6 @@
 from glotouch_bt.skill.probing.guarded_probe import (
     GUARDED_ACCELERATION_M_S2,
     GUARDED_JERK_M_S3,
-    LIFT_M_S,
     Probed,
     Prober,
 )

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.motion import Motion, MoveResult, Paces
+from glotouch_bt.motion import FREE_M_S, Motion, MoveResult, Paces
 from glotouch_bt.perception.touch import (
     Baseline,
     Contact,
@@ -32,9 +32,6 @@ REST_S = 0.12
 """Time for which wrench and twist must be steady before a guarded move."""
 MAX_REST_S = 0.6
 """Longest wait for that."""
-LIFT_M_S = 0.10
-"""Largest speed of the lift before a hop. Its column is free, except for what reaches over the ball beside the shaft.
-The robot stops in time at this speed (`Limits.stop_ahead_s`)."""
 BASELINE_AGE_S = 3.0
 """Longest time for which a wrench measured at rest is used again. Source: ours; harsh CONDITIONS drift by 0.02 N."""
 STAND_S = 0.02
@@ -175,10 +172,13 @@ class Prober:
         yield from self.rest()
 
     def hop(self, tip_K_m: Array, height_K_m: float, speed_m_s: float) -> Motion[None]:
-        """Raise the ball's centre to `height_K_m`, then move across to above `tip_K_m`, unguarded."""
+        """Raise the ball's centre to `height_K_m`, then move across to above `tip_K_m`, unguarded.
+
+        It is raised at `FREE_M_S` at most: something may reach over the ball beside the shaft.
+        """
         tip = self.tip_K_m
         for goal, speed in (
-            (np.array([tip[0], tip[1], height_K_m]), min(speed_m_s, LIFT_M_S)),
+            (np.array([tip[0], tip[1], height_K_m]), min(speed_m_s, FREE_M_S)),
             (np.array([tip_K_m[0], tip_K_m[1], height_K_m]), speed_m_s),
         ):
             if np.linalg.norm(goal - self.tip_K_m) > 1e-4:

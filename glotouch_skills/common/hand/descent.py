@@ -1,15 +1,14 @@
-"""Speed of the open fingers on their way down, from what is known of the space below them."""
+"""Descent of the open fingers beside an object, as fast as the knowledge of the space below them allows."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from glotouch_bt.motion import Arm, Paces
+from glotouch_bt.motion import FREE_M_S, Arm, Motion, Paces
 from glotouch_bt.robot import Array, Pose
+from glotouch_bt.skill import Context
+from glotouch_skills.common.hand.hand import glide
 
-FREE_M_S = 0.10
-"""Speed through space that was felt to be free, above the object. Source: `Limits.stop_ahead_s`: at this speed the
-robot still stops in time by itself."""
 BESIDE_M_S = 0.05
 """Speed through such space beside the object. Source: ours; that of moving up again beside it."""
 ABOVE_RATIO = 3.0
@@ -27,25 +26,34 @@ EDGE_PLACES = 5
 """Number of places on each finger's inner edge."""
 
 
-def descent_paces(arm: Arm, goal_B_P: Pose, opening_m: float, top_m: float, slow_m_s: float) -> Paces:
-    """Return the speeds of the fingers from here straight down to a pose beside an object.
+def descend(context: Context, goal_B_P: Pose, opening_m: float, top_m: float, slow_m_s: float) -> Motion[bool]:
+    """Move the open hand from above an object straight down beside it; return False if the fingers touched something.
 
-    Where the held probe has felt free space between object and fingers, only the last millimetres are slow. Else the
-    fingers are slow from just above the object's top on.
+    Where the held probe has felt free space between object and fingers, or the hand came down before, only the last
+    millimetres are slow. Else the fingers are slow from just above the object's top on.
 
     Args:
-        arm: At rest above the goal.
+        context: The skill's.
         goal_B_P: Goal of P in B.
         opening_m: Aperture.
         top_m: Height of the object's top above the floor; infinite if unknown.
         slow_m_s: Speed towards what may be there.
+
+    Raises:
+        MotionRefused: Before moving.
     """
-    gripper, pose_K_B = arm.description.gripper, arm.world.container.pose_B_K.inverse()
-    tips = float(pose_K_B.apply(arm.pose_B_P.position_m)[2]) - gripper.fingertip_below_P_m
+    arm = context.arm
+    edges = _inner_edges(arm, goal_B_P, opening_m)
+    at = arm.world.container.pose_B_K.inverse().apply(arm.pose_B_P.position_m)
+    tips = float(at[2]) - arm.description.gripper.fingertip_below_P_m
     beside = max(tips - top_m - OVER_TOP_M, 0.0)
-    if not arm.felt.covers(_inner_edges(arm, goal_B_P, opening_m), FELT_WITHIN_M):
-        return ((0.0, ABOVE_RATIO * slow_m_s), (beside, slow_m_s))
-    return ((0.0, FREE_M_S), (beside, BESIDE_M_S), (max(tips - FOOT_M, beside), slow_m_s))
+    paces: Paces = ((0.0, ABOVE_RATIO * slow_m_s), (beside, slow_m_s))
+    if arm.felt.covers(edges, FELT_WITHIN_M):
+        paces = ((0.0, FREE_M_S), (beside, BESIDE_M_S), (max(tips - FOOT_M, beside), slow_m_s))
+    reached = yield from glide(context, goal_B_P, FREE_M_S, paces)
+    if reached:
+        arm.felt.add_hand(edges)
+    return reached
 
 
 def _inner_edges(arm: Arm, goal_B_P: Pose, opening_m: float) -> Array:

@@ -11,7 +11,7 @@ from glotouch_bt.perception.touch import Candidate, Layer, ObjectMotion, estimat
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose
 from glotouch_bt.skill import Context, SkillParams, param
-from glotouch_skills.common.hand import close_compliantly, descent_paces, glide, release
+from glotouch_skills.common.hand import close_compliantly, descend, glide, release
 from glotouch_skills.common.planning.squeeze_plan import Stance
 
 HAND_CLEARANCE_M = 0.005
@@ -108,8 +108,8 @@ class Squeezing:
         travel_z = max(float(arm.pose_B_P.position_m[2]), float(above.position_m[2]))
         yield from arm.transit(above, height_B_m=travel_z, speed_m_s=p.travel_speed_m_s)
         goal = self._pose(height_m)
-        paces = descent_paces(arm, goal, self.at.opening_m, self.candidate.height_m, p.descent_speed_m_s)
-        if not (yield from glide(self._context, goal, p.descent_speed_m_s, paces)):
+        top_m, slow_m_s = self.candidate.height_m, p.descent_speed_m_s
+        if not (yield from descend(self._context, goal, self.at.opening_m, top_m, slow_m_s)):
             height = pads_height_m(self._context)
             yield from self.rise()
             raise MotionRefused("squeeze", f"the fingers met something {height * 1e3:.0f} mm above the floor")

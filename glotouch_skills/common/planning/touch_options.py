@@ -144,8 +144,6 @@ def _travel_s(candidate: Candidate, at: Stance, height_m: float, hand_K_m: Array
     careful = max(min(candidate.height_m + OVER_TOP_M, high) - height_m, 0.0)
     quick = max(high - candidate.height_m - OVER_TOP_M, 0.0)
     way = (
-        (up + across) / p.travel_speed_m_s
-        + quick / (ABOVE_RATIO * p.descent_speed_m_s)
-        + careful / p.descent_speed_m_s
+        (up + across) / p.travel_speed_m_s + quick / (ABOVE_RATIO * p.descent_speed_m_s) + careful / p.descent_speed_m_s
     )
     return way + TURN_S + 4 * STOP_S

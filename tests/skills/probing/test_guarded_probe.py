@@ -90,13 +90,13 @@ def test_a_rest_lasts_until_the_wrench_is_steady_and_no_longer_than_allowed(make
 
 def test_a_move_after_one_without_contact_starts_with_the_same_baseline(make) -> None:
     b, prober = make()
-    b.go(prober.move(START + [0, 0, 0.01], 0.03))
+    b.go(prober.move(START + np.array([0, 0, 0.01]), 0.03))
     after_rest = b.context.observation.now_s
     b.go(prober.move(START, 0.03))
     back = b.context.observation.now_s - after_rest
     b.go(b.arm.hold(BASELINE_AGE_S))
     late = b.context.observation.now_s
-    b.go(prober.move(START + [0, 0, 0.01], 0.03))
+    b.go(prober.move(START + np.array([0, 0, 0.01]), 0.03))
     assert b.context.observation.now_s - late - back == pytest.approx(REST_S - STAND_S, abs=0.011)
 
 
