@@ -36,6 +36,7 @@ class FeltSpace:
         path = np.asarray(path_K_m, dtype=np.float64).reshape(-1, 3)
         length = np.cumsum(np.linalg.norm(np.diff(path, axis=0, prepend=path[:1]), axis=1))
         new = np.diff(length // STEP_M, prepend=-1.0) > 0
+        new[-1:] = True
         self._free_K_m = np.concatenate([self._free_K_m, path[new]])
         if touch_K_m is not None:
             self._touched_K_m = np.concatenate([self._touched_K_m, np.asarray(touch_K_m)[None, :2]])
