@@ -22,7 +22,7 @@ class ToolCheckParams(SkillParams):
     touch: bool = param("Touch the floor even if jaws and weight agree", default=False)
     speed_m_s: float = param("Speed with the probe in the hand", unit="m/s", default=0.25, gt=0.0, le=0.25)
     corner_gap_m: float = param(
-        "Distance of the ball's centre from each wall of that corner", unit="m", default=0.014, ge=0.008, le=0.05
+        "Distance of the ball's centre from each wall of that corner", unit="m", default=0.018, ge=0.008, le=0.05
     )
 
 

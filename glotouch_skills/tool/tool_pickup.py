@@ -50,7 +50,7 @@ class ToolPickupParams(SkillParams):
     free_speed_m_s: float = param("Speed of the empty hand", unit="m/s", default=0.25, gt=0.0, le=0.25)
     floor_touch: bool = param("Touch the floor in a free corner to measure its height", default=True)
     corner_gap_m: float = param(
-        "Distance of the ball's centre from each wall of that corner", unit="m", default=0.014, ge=0.008, le=0.05
+        "Distance of the ball's centre from each wall of that corner", unit="m", default=0.018, ge=0.008, le=0.05
     )
 
 

@@ -32,6 +32,9 @@ REST_S = 0.12
 """Time for which wrench and twist must be steady before a guarded move."""
 MAX_REST_S = 0.6
 """Longest wait for that."""
+FIXTURE_M = 0.003
+"""A contact within this distance of the floor or a wall is one with the container, which cannot be pushed. Source: ours;
+twice the registration's error (harsh CONDITIONS)."""
 BASELINE_AGE_S = 3.0
 """Longest time for which a wrench measured at rest is used again. Source: ours; harsh CONDITIONS drift by 0.02 N."""
 STAND_S = 0.02
@@ -162,8 +165,18 @@ class Prober:
         )
         self._untouched &= result.stop is None
         probed = self._outcome(result, step / length)
-        self._context.arm.felt.add(probed.path_K_m, None if probed.contact is None else probed.contact.point_K_m)
+        self._remember(probed)
         return probed
+
+    def _remember(self, probed: Probed) -> None:
+        """Record where the tool was free, and where it touched anything but the container."""
+        touch, interior = probed.contact, self._world.container.interior_m
+        if touch is not None:
+            walls = np.abs(touch.point_K_m[:2]) > 0.5 * np.array(interior[:2]) - FIXTURE_M
+            floor = touch.tip_K_m[2] - self._tool.tip_radius_m < self._tool.floor_z_K_m + FIXTURE_M
+            if walls.any() or floor:
+                touch = None
+        self._context.arm.felt.add(probed.path_K_m, None if touch is None else touch.point_K_m)
 
     def retreat(self, direction_K: Array, distance_m: float, speed_m_s: float) -> Motion[None]:
         """Move away from a contact along `direction_K` (3,), unguarded, then rest until the wrench has settled."""
