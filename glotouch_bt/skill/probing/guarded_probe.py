@@ -33,10 +33,13 @@ REST_S = 0.12
 MAX_REST_S = 0.6
 """Longest wait for that."""
 FIXTURE_M = 0.003
-"""A contact within this distance of the floor or a wall is one with the container, which cannot be pushed. Source: ours;
-twice the registration's error (harsh CONDITIONS)."""
+"""A contact within this distance of the floor or a wall is one with the container, which cannot be pushed. Source:
+ours; twice the registration's error (harsh CONDITIONS)."""
 BASELINE_AGE_S = 3.0
 """Longest time for which a wrench measured at rest is used again. Source: ours; harsh CONDITIONS drift by 0.02 N."""
+SAME_N, SAME_NM = 0.1, 0.02
+"""Largest differences of the standing hand's wrench from it: else the tool was not quite free when it was measured.
+Source: those of `settled`."""
 STAND_S = 0.02
 """Time of standing before a guarded move with such a wrench. Source: ours; twice the window of the measured inertia."""
 GUARDED_ACCELERATION_M_S2 = 0.5
@@ -123,10 +126,12 @@ class Prober:
         """Return the wrench without contact, and the inertia as of now.
 
         Without a contact since a recent rest, its wrench still holds: the hand has its orientation, and the sensor has
-        hardly drifted. Then stand only until the end of the last motion is in the measured inertia.
+        hardly drifted. Then stand only until the end of the last motion is in the measured inertia. Bare fingers always
+        rest: with a wrench from before, they traced a square worse (`bench contact`).
         """
         inertia, now_s = self._inertia(), self._context.observation.now_s
-        if self._rested is None or not self._untouched or now_s - self._rested[0] > BASELINE_AGE_S:
+        recent = self._rested is not None and self._untouched and now_s - self._rested[0] <= BASELINE_AGE_S
+        if self._rested is None or not (recent and self._tool.round):
             return (yield from self.rest()), inertia
         at_s, baseline = self._rested
         if now_s == at_s:
@@ -134,8 +139,9 @@ class Prober:
         blocks = yield from self._context.arm.hold(STAND_S)
         if blocks[-1].now_s - now_s > 2.0 * STAND_S:  # a pause
             return (yield from self.rest()), inertia
-        for seen in blocks:
-            inertia(seen)
+        felt = np.concatenate([seen.wrench_S - inertia(seen) for seen in blocks]).mean(axis=0) - baseline.median
+        if np.linalg.norm(felt[:3]) > SAME_N or np.linalg.norm(felt[3:]) > SAME_NM:
+            return (yield from self.rest()), self._inertia()
         return baseline, inertia
 
     def move(
