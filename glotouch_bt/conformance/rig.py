@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glotouch_bt.motion import Kinematics, Line, plan_piece
+from glotouch_bt.motion import Kinematics, Line, ProfileLimits, plan_piece
 from glotouch_bt.robot import HOLD, Array, Command, JointSetpoint, Observation, Pose, Request, Robot
 
 MAX_REQUEST_S = 10.0
@@ -93,9 +93,7 @@ class Rig:
             self.kinematics,
             piece,
             self.q,
-            speed_m_s=speed_m_s,
-            acceleration_m_s2=limits.tcp_acceleration_m_s2,
-            jerk_m_s3=limits.tcp_jerk_m_s3,
+            limits=ProfileLimits(speed_m_s, limits.tcp_acceleration_m_s2, limits.tcp_jerk_m_s3),
             period_s=self.period_s,
             posture_gain=0.0,
             what="conformance",

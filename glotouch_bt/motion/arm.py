@@ -16,11 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from glotouch_bt.motion.clearance import Scene
+from glotouch_bt.motion.felt_space import FeltSpace
 from glotouch_bt.motion.jaws import JawRestDetector
 from glotouch_bt.motion.joints import plan_joints
 from glotouch_bt.motion.paths import Arc, Line, Path, Polyline
 from glotouch_bt.motion.plan import plan_piece
-from glotouch_bt.motion.timing import JointProfile
+from glotouch_bt.motion.timing import JointProfile, Paces, ProfileLimits
 from glotouch_bt.motion.travel import Guard, Motion, Mover, MoveResult
 from glotouch_bt.robot import (
     Array,
@@ -71,6 +72,7 @@ class MoveOptions(TypedDict, total=False):
 
     acceleration_m_s2: float | None
     jerk_m_s3: float | None
+    paces: Paces
     guard: Guard | None
     check: bool
     tactile: bool
@@ -90,6 +92,7 @@ class Arm(Mover):
     Attributes:
         kinematics: Forward and inverse kinematics.
         scene: Obstacles; skills add the objects they find.
+        felt: Space that the held tool has felt to be free.
         pause_signal: Pause state, written by the runner.
         not_run: Motions that were made and not run, each with its place in the code.
     """
@@ -98,12 +101,13 @@ class Arm(Mover):
         super().__init__(description, limits, period_s)
         self.world = world
         self.scene = Scene(self.kinematics, world)
+        self.felt = FeltSpace()
         self.not_run: list[str] = []
 
     def state(self) -> dict[str, Any]:
         """Return the state kept between two motions, including the scene, for `restore`."""
         remembered = {"q": self._q.copy(), "aperture_m": self._aperture_m}
-        return remembered | {"scene": self.scene.state()}
+        return remembered | {"scene": self.scene.state(), "felt": self.felt.state()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Restore a `state`; call `sync` afterwards if the arm has moved since.
@@ -116,6 +120,7 @@ class Arm(Mover):
             raise ValueError(f"joints {q.tolist()}, aperture {aperture_m} m")
         self._q, self._aperture_m, self._last_contact = q, aperture_m, None
         self.scene.restore(state["scene"])
+        self.felt.restore(state["felt"])
 
     # -- motions -----------------------------------------------------------------------------------------------------
 
@@ -160,6 +165,7 @@ class Arm(Mover):
         *,
         acceleration_m_s2: float | None = None,
         jerk_m_s3: float | None = None,
+        paces: Paces = (),
         guard: Guard | None = None,
         check: bool = True,
         tactile: bool = False,
@@ -171,6 +177,8 @@ class Arm(Mover):
         Args:
             path: Path that begins at the current pose of P.
             speed_m_s, acceleration_m_s2, jerk_m_s3: Limits along the path; the last two default to the robot's limits.
+            paces: Speeds that replace `speed_m_s` from path coordinates on: (coordinate m, speed m/s), ascending. The
+                arm changes between them without a stop.
             guard: Called once a period with the newest observation. Any value but None stops the motion with the stop
                 deceleration and jerk of the limits, and is returned as `stop`.
             check: Check clearance along the path (reach and joint limits are always checked).
@@ -184,25 +192,24 @@ class Arm(Mover):
         """
         acceleration = self.limits.tcp_acceleration_m_s2 if acceleration_m_s2 is None else acceleration_m_s2
         jerk = self.limits.tcp_jerk_m_s3 if jerk_m_s3 is None else jerk_m_s3
-        self._within_limits(speed_m_s, acceleration, jerk, what)
+        for speed in (speed_m_s, *(pace for _, pace in paces)):
+            self._within_limits(speed, acceleration, jerk, what)
         if posture_gain is None:
             posture_gain = POSTURE_GAIN_1_M if guard is None else 0.0
         self._begins_here(path, what)
         plans = []
-        q = self._q
+        q, begin_m = self._q, 0.0
         for piece in path.pieces:
             plan = plan_piece(
                 self.kinematics,
                 piece,
                 q,
-                speed_m_s=speed_m_s,
-                acceleration_m_s2=acceleration,
-                jerk_m_s3=jerk,
+                limits=ProfileLimits(speed_m_s, acceleration, jerk, tuple((at - begin_m, pace) for at, pace in paces)),
                 period_s=self.period_s,
                 posture_gain=posture_gain,
                 what=what,
             )
-            q = plan.knots_q[-1]
+            q, begin_m = plan.knots_q[-1], begin_m + piece.length_m
             plans.append(plan)
         if check and plans:
             self._clear(np.concatenate([p.knots_q for p in plans]), what)

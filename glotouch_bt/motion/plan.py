@@ -14,7 +14,7 @@ import scipy
 
 from glotouch_bt.motion.kinematics import Kinematics, known_pose
 from glotouch_bt.motion.paths import Piece, quats_to_matrices
-from glotouch_bt.motion.timing import ProfileLimits, Progress, between, brake, rest_to_rest
+from glotouch_bt.motion.timing import ProfileLimits, Progress, between, brake
 from glotouch_bt.robot import Array, JointSetpoint, MotionRefused
 
 KNOT_SPACING_M = 0.005
@@ -63,8 +63,7 @@ class MotionPlan:
 
     def between(self, s0: float, s1: float, period_s: float, max_m_s: float = np.inf) -> MotionPlan:
         """Plan a move from rest to rest along this path, m, in either direction, at most at `max_m_s`."""
-        limits = ProfileLimits(min(self.limits.speed, max_m_s), self.limits.acceleration, self.limits.jerk)
-        return self._timed(between(s0, s1, limits, period_s))
+        return self._timed(between(s0, s1, self.limits.at_most(max_m_s), period_s))
 
     def _timed(self, progress: Progress) -> MotionPlan:
         return _along(self.piece, self.knots_s, self.knots_q, self.spline, self.limits, progress)
@@ -75,9 +74,7 @@ def plan_piece(
     piece: Piece,
     q_start: Array,
     *,
-    speed_m_s: float,
-    acceleration_m_s2: float,
-    jerk_m_s3: float,
+    limits: ProfileLimits,
     period_s: float,
     posture_gain: float,
     what: str,
@@ -88,8 +85,8 @@ def plan_piece(
         kinematics: The arm.
         piece: The path; it must begin at the pose of P at `q_start`.
         q_start: (dof,) rad.
-        speed_m_s, acceleration_m_s2, jerk_m_s3: Limits along the path. On an arc the speed is lowered so that the
-            centripetal acceleration stays below the limit.
+        limits: Limits along the path, m/s, m/s2, m/s3. On an arc the speed is lowered so that the centripetal
+            acceleration stays below the limit.
         period_s: Control period.
         posture_gain: Null-space pull towards home, per metre; 0 gives the minimum joint motion.
         what: Name of the motion for the error message.
@@ -109,10 +106,9 @@ def plan_piece(
             f"{joint.lower_rad:.3f}..{joint.upper_rad:.3f}) {s[k] * 1e3:.0f} mm along the path",
         )
     if piece.curvature_1_m > 0:
-        speed_m_s = min(speed_m_s, float(np.sqrt(acceleration_m_s2 / piece.curvature_1_m)))
-    progress = rest_to_rest(length, speed_m_s, acceleration_m_s2, jerk_m_s3, period_s)
+        limits = limits.at_most(float(np.sqrt(limits.acceleration / piece.curvature_1_m)))
+    progress = between(0.0, length, limits, period_s)
     spline = scipy.interpolate.CubicSpline(s, q, bc_type=((1, tangents[0]), (1, tangents[-1])))
-    limits = ProfileLimits(speed_m_s, acceleration_m_s2, jerk_m_s3)
     plan = _along(piece, s, q, spline, limits, progress)
     share = np.abs(plan.dq) / kinematics.velocity
     k, i = divmod(int(np.argmax(share)), share.shape[1])

@@ -5,7 +5,10 @@ Only ruckig's local state-to-state solver is used: it ignores position limits, a
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import ruckig
@@ -28,13 +31,35 @@ class Progress:
     a: Array
 
 
+Paces = tuple[tuple[float, float], ...]
+"""Speed limits by place: pairs of a path coordinate, m, in ascending order, and the speed from there on, m/s."""
+
+
 @dataclass(frozen=True)
 class ProfileLimits:
-    """Limits of a time profile: m/s, m/s2, m/s3 (for a joint move per s, s2, s3 of the fraction travelled)."""
+    """Limits of a time profile: m/s, m/s2, m/s3 (for a joint move per s, s2, s3 of the fraction travelled).
+
+    `paces` replace the speed from their places on. The profile does not stop where the speed limit changes.
+    """
 
     speed: float
     acceleration: float
     jerk: float
+    paces: Paces = ()
+
+    def at_most(self, speed: float) -> ProfileLimits:
+        """Return the same limits with every speed limited."""
+        paces = tuple((place, min(pace, speed)) for place, pace in self.paces)
+        return ProfileLimits(min(self.speed, speed), self.acceleration, self.jerk, paces)
+
+    def stretches(self, s0: float, s1: float) -> tuple[list[float], list[float]]:
+        """Return the lengths and speed limits of the stretches between two coordinates, in order of travel."""
+        low, high = min(s0, s1), max(s0, s1)
+        places = [place for place, _ in self.paces]
+        marks = [low, *sorted({place for place in places if low < place < high}), high]
+        speeds = [(self.speed, *(pace for _, pace in self.paces))[bisect_right(places, mark)] for mark in marks[:-1]]
+        lengths = [b - a for a, b in pairwise(marks)]
+        return (lengths, speeds) if s1 >= s0 else (lengths[::-1], speeds[::-1])
 
 
 ACCELERATION_RETRIES = (1.0, 1.0 - 1e-6, 1.0 - 1e-4)
@@ -65,11 +90,35 @@ def rest_to_rest(length_m: float, speed: float, acceleration: float, jerk: float
     Raises:
         BackendError: Ruckig found no profile (a limit is not positive or not finite).
     """
-    p = ruckig.InputParameter(1)
-    p.current_position, p.target_position = [0.0], [length_m]
-    p.max_velocity, p.max_acceleration, p.max_jerk = [speed], [acceleration], [jerk]
-    trajectory = _solve(1, p)
-    return _sample(trajectory, period_s, length_m)
+    return between(0.0, length_m, ProfileLimits(speed, acceleration, jerk), period_s)
+
+
+def _transfer_m(v0: float, v1: float, limits: ProfileLimits) -> float:
+    """Return the least distance to change the speed from v0 to v1, without acceleration at both ends."""
+    change, a, j = abs(v1 - v0), limits.acceleration, limits.jerk
+    duration = change / a + a / j if change >= a * a / j else 2.0 * float(np.sqrt(change / j))
+    return 0.5 * (v0 + v1) * duration
+
+
+def _reachable(v0: float, v1: float, length: float, limits: ProfileLimits) -> float:
+    """Return the speed nearest to v1 > v0 that can be reached from v0 within a length, by bisection."""
+    if v1 <= v0 or _transfer_m(v0, v1, limits) <= length:
+        return v1
+    low, high = v0, v1
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _transfer_m(v0, middle, limits) <= length else (low, middle)
+    return low
+
+
+def _crossings(lengths: Sequence[float], speeds: Sequence[float], limits: ProfileLimits) -> list[float]:
+    """Return the speed at each end of the stretches: the lower limit, or less where that cannot be reached."""
+    out = [0.0, *(min(a, b) for a, b in pairwise(speeds)), 0.0]
+    for k, length in enumerate(lengths):
+        out[k + 1] = min(out[k + 1], _reachable(out[k], out[k + 1], length, limits))
+    for k in range(len(lengths) - 1, -1, -1):
+        out[k] = min(out[k], _reachable(out[k + 1], out[k], lengths[k], limits))
+    return out
 
 
 def stop(s: float, v: float, a: float, acceleration: float, jerk: float, period_s: float) -> Progress:
@@ -80,12 +129,25 @@ def stop(s: float, v: float, a: float, acceleration: float, jerk: float, period_
     p.target_velocity, p.target_acceleration = [0.0], [0.0]
     p.max_acceleration, p.max_jerk = [acceleration], [jerk]
     trajectory = _solve(1, p)
-    return _sample(trajectory, period_s, trajectory.at_time(trajectory.duration)[0][0])
+    return _sample([trajectory], [trajectory.at_time(trajectory.duration)[0][0]], period_s)
 
 
 def between(s0: float, s1: float, limits: ProfileLimits, period_s: float) -> Progress:
-    """Return the fastest profile from rest at `s0` to rest at `s1`, forwards or backwards along the path."""
-    way = rest_to_rest(abs(s1 - s0), limits.speed, limits.acceleration, limits.jerk, period_s)
+    """Return the fastest profile from rest at `s0` to rest at `s1`, forwards or backwards along the path.
+
+    Raises:
+        BackendError: Ruckig found no profile (a limit is not positive or not finite).
+    """
+    lengths, speeds = limits.stretches(s0, s1)
+    crossings = _crossings(lengths, speeds, limits)
+    parts: list[ruckig.Trajectory] = []
+    for length, speed, begin, end in zip(lengths, speeds, crossings[:-1], crossings[1:], strict=True):
+        p = ruckig.InputParameter(1)
+        p.current_position, p.current_velocity = [0.0], [begin]
+        p.target_position, p.target_velocity = [length], [end]
+        p.max_velocity, p.max_acceleration, p.max_jerk = [speed], [limits.acceleration], [limits.jerk]
+        parts.append(_solve(1, p))
+    way = _sample(parts, lengths, period_s)
     sign = 1.0 if s1 >= s0 else -1.0
     s = s0 + sign * way.s
     s[-1] = s1
@@ -103,11 +165,18 @@ def brake(progress: Progress, k: int, acceleration: float, jerk: float, period_s
     return stop(s, v, a, acceleration, jerk, period_s)
 
 
-def _sample(trajectory: ruckig.Trajectory, period_s: float, end: float) -> Progress:
+def _sample(parts: Sequence[ruckig.Trajectory], lengths: Sequence[float], period_s: float) -> Progress:
+    """Sample trajectories over consecutive lengths, m, at the end of each period; the last sample is at rest."""
+    ends = np.cumsum([part.duration for part in parts])
+    begins, places = ends - [part.duration for part in parts], np.cumsum([0.0, *lengths])
     # The tolerance keeps rounding from adding a period to a whole number of periods.
-    n = max(1, int(np.ceil(trajectory.duration / period_s - 1e-9)))
-    rows = np.array([trajectory.at_time(k * period_s) for k in range(1, n)]).reshape(-1, 3)
-    rows = np.vstack([rows, [end, 0.0, 0.0]])
+    n = max(1, int(np.ceil(ends[-1] / period_s - 1e-9)))
+    rows = np.zeros((n, 3))
+    for k in range(1, n):
+        i = min(int(np.searchsorted(ends, k * period_s)), len(parts) - 1)
+        rows[k - 1] = np.ravel(parts[i].at_time(k * period_s - begins[i]))
+        rows[k - 1, 0] += places[i]
+    rows[-1] = places[-1], 0.0, 0.0
     return Progress(rows[:, 0].copy(), rows[:, 1].copy(), rows[:, 2].copy())
 
 

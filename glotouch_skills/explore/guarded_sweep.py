@@ -25,7 +25,7 @@ class GuardedSweepParams(SkillParams):
         "Height of the ball's centre above the floor while sweeping", unit="m", default=0.018, ge=0.009, le=0.06
     )
     speed_m_s: float = param("Sweeping speed", unit="m/s", default=0.04, gt=0.0, le=0.08)
-    travel_speed_m_s: float = param("Speed above the objects", unit="m/s", default=0.10, gt=0.0, le=0.15)
+    travel_speed_m_s: float = param("Speed above the objects", unit="m/s", default=0.25, gt=0.0, le=0.25)
     headroom_m: float = param(
         "Height of the ball above the floor when crossing objects", unit="m", default=0.13, ge=0.02, le=0.2
     )

@@ -24,11 +24,14 @@ class RefineOutlineParams(TracingParams):
     wall_gap_m: float = param(
         "Distance of the ball's centre from the walls", unit="m", default=0.012, ge=0.008, le=0.05
     )
-    hop_m: float = param("Travel that a way over the top counts as", unit="m", default=0.1, ge=0.02, le=1.0)
+    hop_m: float = param("Travel that a way over the top counts as", unit="m", default=0.2, ge=0.02, le=1.0)
+    round_m: float = param("Longest way round the object to the next probe", unit="m", default=0.1, ge=0.02, le=1.0)
 
     def rule(self) -> TraceParams:
         """Return them as the trace plan takes them, closing the gaps between contacts also on the far side."""
-        return replace(super().rule(), hop_m=self.hop_m, keen=2.0, odd_near_m=GAP_M[0], odd_far_m=GAP_M[1])
+        return replace(
+            super().rule(), hop_m=self.hop_m, step_m=self.round_m, keen=2.0, odd_near_m=GAP_M[0], odd_far_m=GAP_M[1]
+        )
 
 
 class RefineOutline(Skill):
@@ -63,7 +66,13 @@ class RefineOutline(Skill):
         explorer = Explorer(self.context, tool, p.speeds(), self.event)
         half = 0.5 * np.array(self.context.world.container.interior_m[:2]) - p.wall_gap_m
         plan = trace_more(
-            before.contacts, explorer.tip_K_m, tool.tip_radius_m, p.rule(), round_tip=tool.round, half_extent_m=half
+            before.contacts,
+            explorer.tip_K_m,
+            tool.tip_radius_m,
+            p.rule(),
+            round_tip=tool.round,
+            half_extent_m=half,
+            columns=explorer.columns,
         )
         traced = yield from explorer.run(plan)
         better = refined(before, traced)

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.motion import Motion
+from glotouch_bt.motion import FREE_M_S, Motion
 from glotouch_bt.perception.search import BallMove, BallOutcome, TopPlan, TopRule, rounds, top_plan
 from glotouch_bt.perception.touch import Candidate, GuardParams
 from glotouch_bt.robot import Array, MotionRefused
@@ -29,7 +29,7 @@ class TouchTopParams(SkillParams):
     pass_speed_m_s: float = param("Speed of the passes above it", unit="m/s", default=0.04, gt=0.0, le=0.06)
     feel_speed_m_s: float = param("Speed of passes likely to touch something", unit="m/s", default=0.02, gt=0.0,
                                   le=0.06)  # fmt: skip
-    travel_speed_m_s: float = param("Speed above all objects", unit="m/s", default=0.10, gt=0.0, le=0.15)
+    travel_speed_m_s: float = param("Speed above all objects", unit="m/s", default=0.25, gt=0.0, le=0.25)
     clearance_m: float = param("Height of the passes above the known top", unit="m", default=0.0008, ge=0.0003, le=0.01)
     inset_m: float = param("Distance of the passes inside the outline", unit="m", default=0.010, ge=0.0, le=0.03)
     reach_m: float = param("Largest distance of any place from the passes", unit="m", default=0.014, ge=0.003, le=0.05)
@@ -113,7 +113,7 @@ class TouchTop(Skill):
                 way = goal - tip
                 length = float(np.linalg.norm(way))
                 if length > 1e-4:
-                    yield from prober.retreat(way / length, length, p.travel_speed_m_s)
+                    yield from prober.retreat(way / length, length, min(p.travel_speed_m_s, FREE_M_S))
             else:
                 speed = {"down": p.down_speed_m_s, "feel": p.feel_speed_m_s, "pass": p.pass_speed_m_s}[move.kind]
                 probed = yield from prober.move(goal, speed, any_direction=move.kind != "down")

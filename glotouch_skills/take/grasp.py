@@ -10,7 +10,13 @@ from glotouch_bt.motion import Motion, hand_pose_B
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import MotionRefused, Pose
 from glotouch_bt.skill import UNCHANGED, Failure, In, Out, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import CLEARANCE_M, close_compliantly, glide, keeping_clear_of, require_clear
+from glotouch_skills.common.hand import (
+    CLEARANCE_M,
+    close_compliantly,
+    descend,
+    keeping_clear_of,
+    require_clear,
+)
 from glotouch_skills.common.planning import GraspPlan
 
 
@@ -95,7 +101,8 @@ class Grasp(Skill):
         yield from arm.jaws(opening, speed_m_s=0.2)
         travel_z = max(float(arm.pose_B_P.position_m[2]), float(above.position_m[2]))
         yield from arm.transit(above, height_B_m=travel_z, speed_m_s=p.travel_speed_m_s)
-        if not (yield from glide(self.context, goal, p.descent_speed_m_s)):
+        top_m = max((c.height_m for c in self.known or () if c.index == plan.candidate), default=np.inf)
+        if not (yield from descend(self.context, goal, opening, top_m, p.descent_speed_m_s)):
             yield from arm.line(above, p.travel_speed_m_s, check=False)
             raise MotionRefused("grasp", "the fingers stood on something on the way down")
         try:

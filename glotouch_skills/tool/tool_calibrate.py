@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.motion import Motion
+from glotouch_bt.motion import FREE_M_S, Motion
 from glotouch_bt.perception.touch import GuardParams
 from glotouch_bt.perception.touch.calibration import TipCalibration, WallTouch, solve_tip, wrench_delay
 from glotouch_bt.robot import Array, MotionRefused, Observation
@@ -47,7 +47,8 @@ class ToolCalibrateParams(SkillParams):
     )
     turn_deg: float = param("Turn of the hand to either side", unit="deg", default=90.0, ge=20.0, le=90.0)
     speed_m_s: float = param("Speed towards the walls", unit="m/s", default=0.015, gt=0.0, le=0.03)
-    travel_speed_m_s: float = param("Speed between touches", unit="m/s", default=0.10, gt=0.0, le=0.15)
+    travel_speed_m_s: float = param("Speed above the walls, and of a turn 0.1 m from its axis", unit="m/s",
+                                    default=0.25, gt=0.0, le=0.25)  # fmt: skip
     search_m: float = param("Search for the walls this far past their nominal place", unit="m", default=0.010, ge=0.001,
                             le=0.02)  # fmt: skip
 
@@ -121,7 +122,7 @@ class ToolCalibrate(Skill):
             high = max(world.container.interior_m[2] + 0.06, float(prober.tip_K_m[2]))
             yield from prober.hop(place, high, p.travel_speed_m_s)
         low = np.array([*place[:2], tool.floor_z_K_m + LOW_M])
-        yield from self.context.arm.line(tool.pose_B_P(world, low), p.travel_speed_m_s)
+        yield from self.context.arm.line(tool.pose_B_P(world, low), min(p.travel_speed_m_s, FREE_M_S))
 
     def _rise(self, tool: HeldTool, place: Array) -> Motion[tuple[float, float]]:
         """Rise to the touching height; return the sensor's latency and its standard deviation, s. A pause waits."""
@@ -131,7 +132,7 @@ class ToolCalibrate(Skill):
             blocks += yield from arm.hold(0.1)
             yield from arm.line(
                 tool.pose_B_P(self.context.world, place),
-                self.params.travel_speed_m_s,
+                min(self.params.travel_speed_m_s, FREE_M_S),
                 acceleration_m_s2=RISE_ACCELERATION_M_S2,
                 jerk_m_s3=RISE_JERK_M_S3,
                 guard=blocks.append,
@@ -175,7 +176,7 @@ class ToolCalibrate(Skill):
                 )
             )
             back = float((prober.tip_K_m - place) @ out)
-            yield from prober.retreat(-out, back, p.travel_speed_m_s)
+            yield from prober.retreat(-out, back, min(p.travel_speed_m_s, FREE_M_S))
         return found
 
     def _measured(self, tool: HeldTool, found: TipCalibration) -> HeldTool:

@@ -20,9 +20,9 @@ class ToolCheckParams(SkillParams):
     askew: float = param("Sine of the largest tilt, from its moment", default=0.25, gt=0.0, lt=1.0)
     slip_m: float = param("Largest change of the floor's height", unit="m", default=0.002, gt=0.0, le=0.005)
     touch: bool = param("Touch the floor even if jaws and weight agree", default=False)
-    speed_m_s: float = param("Speed with the probe in the hand", unit="m/s", default=0.10, gt=0.0, le=0.15)
+    speed_m_s: float = param("Speed with the probe in the hand", unit="m/s", default=0.25, gt=0.0, le=0.25)
     corner_gap_m: float = param(
-        "Distance of the ball's centre from each wall of that corner", unit="m", default=0.014, ge=0.008, le=0.05
+        "Distance of the ball's centre from each wall of that corner", unit="m", default=0.018, ge=0.008, le=0.05
     )
 
 
@@ -77,7 +77,7 @@ class ToolCheck(Skill):
         if not arm.scene.holding_tool:
             self.tool_lost = True
             raise self.TOOL_LOST("the probe is not in the hand any more")
-        yield from rise_clear(arm, p.speed_m_s)
+        yield from rise_clear(arm)
         felt = yield from weigh(arm)  # the tare was taken with the probe in the hand
         missing_N = -felt.weight_N
         weight_N = self.context.world.probe.mass_kg * GRAVITY_M_S2
@@ -96,6 +96,7 @@ class ToolCheck(Skill):
             self.tool_lost = True
             why = "" if light and other else ", and nothing was met where the floor is"
             arm.scene.hold_tool(False)
+            arm.felt.forget()
             raise self.TOOL_LOST(
                 f"the probe is not in the hand: {missing_N:.2f} N of its {weight_N:.2f} N are missing, the jaws are "
                 f"{apart * 1e3:.1f} mm apart and were {tool.aperture_m * 1e3:.1f} with it" + why,

@@ -31,6 +31,8 @@ MAX_APPROACH_FORCE_N = 8.0
 MAX_PULL_FORCE_N = 25.0
 """Change of force that stops the extraction. A ball that snags on its slot needs up to 23 N and comes out (harsh,
 simulated)."""
+OUT_M = 0.01
+"""Height of the ball above the holder from which it rises fast. Source: ours."""
 MAX_PULL_M_S = 0.05
 """Largest speed of the extraction. At this speed, a probe stuck with 3 N/mm is pulled by 2.5 N more until the arm
 stops, which stays below the hard limit."""
@@ -44,11 +46,11 @@ class ToolPickupParams(SkillParams):
     """Parameters of `tool_pickup`."""
 
     grip_N: float = param("Jaw force on the handle", unit="N", default=60.0, gt=0.0, le=60.0)
-    speed_m_s: float = param("Speed with the probe in the hand", unit="m/s", default=0.10, gt=0.0, le=0.15)
+    speed_m_s: float = param("Speed with the probe in the hand", unit="m/s", default=0.25, gt=0.0, le=0.25)
     free_speed_m_s: float = param("Speed of the empty hand", unit="m/s", default=0.25, gt=0.0, le=0.25)
     floor_touch: bool = param("Touch the floor in a free corner to measure its height", default=True)
     corner_gap_m: float = param(
-        "Distance of the ball's centre from each wall of that corner", unit="m", default=0.014, ge=0.008, le=0.05
+        "Distance of the ball's centre from each wall of that corner", unit="m", default=0.018, ge=0.008, le=0.05
     )
 
 
@@ -188,6 +190,7 @@ class ToolPickup(Skill):
                     aperture_m=state.aperture_m,
                 )
         arm.scene.hold_tool(True)
+        arm.felt.forget()
         return state.aperture_m
 
     def _rise(self, short_m: float) -> Motion[None]:
@@ -197,11 +200,12 @@ class ToolPickup(Skill):
             SkillFailed: `hard_contact`.
             GuardTripped: The arm does not follow its setpoints.
         """
-        arm, up = self.context.arm, self.context.world.probe.length_m + 0.06 + short_m
+        arm, out = self.context.arm, self.context.world.probe.length_m + short_m
+        up = out + 0.06
         if up <= 1e-4:
             return
         guard = yield from straight_guard(arm, UP_B, MAX_PULL_FORCE_N)
-        speed_m_s = min(self.params.speed_m_s, MAX_PULL_M_S)
-        moved = yield from arm.shift(up * UP_B, speed_m_s, check=False, guard=guard)
+        paces = ((0.0, min(self.params.speed_m_s, MAX_PULL_M_S)), (max(out + OUT_M, 0.0), self.params.speed_m_s))
+        moved = yield from arm.shift(up * UP_B, self.params.speed_m_s, check=False, paces=paces, guard=guard)
         if (why := describe_stop(moved)) is not None:
             raise self.HARD_CONTACT(f"the probe does not come out of its holder: {why}", travelled_m=moved.travelled_m)

@@ -13,7 +13,7 @@ from glotouch_skills.common.probe import RETURN_PROBE_FAILURES, return_probe
 class ToolReturnParams(SkillParams):
     """Parameters of `tool_return`."""
 
-    speed_m_s: float = param("Speed with the probe in the hand", unit="m/s", default=0.10, gt=0.0, le=0.15)
+    speed_m_s: float = param("Speed with the probe in the hand", unit="m/s", default=0.25, gt=0.0, le=0.25)
     insert_speed_m_s: float = param("Speed into the holder", unit="m/s", default=0.02, gt=0.0, le=0.1)
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glotouch_bt.motion.timing import joint_move, rest_to_rest, stop
+from glotouch_bt.motion.timing import ProfileLimits, between, joint_move, rest_to_rest, stop
 
 PERIOD = 0.01
 positive = st.floats
@@ -33,6 +33,33 @@ def test_travel_stays_within_its_limits(length: float, v: float, a: float, j: fl
     assert np.abs(profile.a).max() <= a + 1e-9
     assert np.abs(np.diff(profile.a)).max(initial=0.0) <= j * PERIOD + 1e-6
     assert (profile.s[-1], profile.v[-1], profile.a[-1]) == (length, 0.0, 0.0)
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    length=positive(1e-3, 0.5),
+    v=positive(0.005, 0.25),
+    marks=st.lists(st.tuples(positive(-0.1, 0.6), positive(0.005, 0.25)), max_size=4),
+    a=positive(0.1, 2.0),
+    j=positive(2.0, 200.0),
+    backwards=st.booleans(),
+)
+def test_paces_hold_where_they_begin_and_are_passed_without_a_stop(
+    length: float, v: float, marks: list[tuple[float, float]], a: float, j: float, backwards: bool
+) -> None:
+    paces = tuple(sorted(marks))
+    limits = ProfileLimits(v, a, j, paces)
+    ends = (length, 0.0) if backwards else (0.0, length)
+    profile = between(*ends, limits, PERIOD)
+    s = np.concatenate([[ends[0]], profile.s])
+    assert (np.sign(ends[1] - ends[0]) * np.diff(s)).min() >= -1e-9
+    allowed = np.full(len(profile.s), v)
+    for at, pace in paces:
+        allowed[profile.s > at] = pace
+    assert (np.abs(profile.v) <= allowed + 1e-6).all()
+    assert np.abs(profile.a).max() <= a + 1e-6
+    assert (np.abs(profile.v[:-1]) > 0).all()
+    assert (profile.s[-1], profile.v[-1], profile.a[-1]) == (ends[1], 0.0, 0.0)
 
 
 @settings(max_examples=100, deadline=None)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from glotouch_bt.motion import Arm, Motion
+from glotouch_bt.motion import Arm, Motion, Paces
 from glotouch_bt.perception.touch import ContactGuard, GuardParams, fit_baseline
 from glotouch_bt.robot import MotionRefused, Pose
 from glotouch_bt.skill import Context
@@ -37,10 +37,10 @@ def require_clear(arm: Arm, pose_B_P: Pose, aperture_m: float, margin_m: float |
         raise MotionRefused("pose", blocked)
 
 
-def glide(context: Context, pose_B_P: Pose, speed_m_s: float) -> Motion[bool]:
+def glide(context: Context, pose_B_P: Pose, speed_m_s: float, paces: Paces = ()) -> Motion[bool]:
     """Move straight to a pose among objects and stop if the fingers touch one; return True if the pose was reached.
 
-    The orientation must be the present one. The hand stops within 1 to 2 mm of the touch.
+    The orientation must be the present one. The hand stops within 1 to 2 mm of the touch. `paces` as in `Arm.follow`.
 
     Raises:
         MotionRefused: Before moving.
@@ -60,6 +60,11 @@ def glide(context: Context, pose_B_P: Pose, speed_m_s: float) -> Motion[bool]:
         replace(GuardParams(), directional_N=BUMP_N, total_N=BUMP_N, cutoff_Hz=BUMP_CUTOFF_HZ),
     )
     result = yield from arm.line(
-        pose_B_P, speed_m_s, acceleration_m_s2=GLIDE_ACCELERATION_M_S2, jerk_m_s3=GLIDE_JERK_M_S3, guard=guard
+        pose_B_P,
+        speed_m_s,
+        acceleration_m_s2=GLIDE_ACCELERATION_M_S2,
+        jerk_m_s3=GLIDE_JERK_M_S3,
+        paces=paces,
+        guard=guard,
     )
     return result.stop is None

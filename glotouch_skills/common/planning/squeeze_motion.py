@@ -11,17 +11,13 @@ from glotouch_bt.perception.touch import Candidate, Layer, ObjectMotion, estimat
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose
 from glotouch_bt.skill import Context, SkillParams, param
-from glotouch_skills.common.hand import close_compliantly, glide, release
+from glotouch_skills.common.hand import close_compliantly, descend, glide, release
 from glotouch_skills.common.planning.squeeze_plan import Stance
 
 HAND_CLEARANCE_M = 0.005
 """Least distance of the fingertips from the floor, and of the hand's body from a candidate's top."""
 MIN_GAP_M = 0.003
 """Least height between two different closures."""
-OVER_TOP_M = 0.02
-"""Height above a candidate's top from which the descent is slow."""
-FAST_DESCENT_RATIO = 3.0
-"""Speed of the descent above that height over the slow speed."""
 FAST_RISE_RATIO = 5.0
 """Speed of moving up beside the object over the slow speed: the open fingers have just come down that way. Source:
 ours; 50 mm/s by default."""
@@ -111,9 +107,9 @@ class Squeezing:
         yield from arm.jaws(self.at.opening_m, speed_m_s=OPENING_M_S)
         travel_z = max(float(arm.pose_B_P.position_m[2]), float(above.position_m[2]))
         yield from arm.transit(above, height_B_m=travel_z, speed_m_s=p.travel_speed_m_s)
-        near = min(self.candidate.height_m + OVER_TOP_M, p.headroom_m) + tips
-        yield from glide(self._context, self._pose(near), FAST_DESCENT_RATIO * p.descent_speed_m_s)
-        if not (yield from self.move_to(height_m)):
+        goal = self._pose(height_m)
+        top_m, slow_m_s = self.candidate.height_m, p.descent_speed_m_s
+        if not (yield from descend(self._context, goal, self.at.opening_m, top_m, slow_m_s)):
             height = pads_height_m(self._context)
             yield from self.rise()
             raise MotionRefused("squeeze", f"the fingers met something {height * 1e3:.0f} mm above the floor")

@@ -10,13 +10,8 @@ import numpy as np
 from glotouch_bt.perception.recognition import Closure
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import Array, Gripper
-from glotouch_skills.common.planning.squeeze_motion import (
-    FAST_DESCENT_RATIO,
-    FAST_RISE_RATIO,
-    OVER_TOP_M,
-    ClosureParams,
-    layer_heights,
-)
+from glotouch_skills.common.hand import ABOVE_RATIO, OVER_TOP_M
+from glotouch_skills.common.planning.squeeze_motion import FAST_RISE_RATIO, ClosureParams, layer_heights
 from glotouch_skills.common.planning.squeeze_plan import Stance, schemes, stance
 
 YAWS_RAD = np.deg2rad(np.arange(0.0, 180.0, 30.0))
@@ -149,8 +144,6 @@ def _travel_s(candidate: Candidate, at: Stance, height_m: float, hand_K_m: Array
     careful = max(min(candidate.height_m + OVER_TOP_M, high) - height_m, 0.0)
     quick = max(high - candidate.height_m - OVER_TOP_M, 0.0)
     way = (
-        (up + across) / p.travel_speed_m_s
-        + quick / (FAST_DESCENT_RATIO * p.descent_speed_m_s)
-        + careful / p.descent_speed_m_s
+        (up + across) / p.travel_speed_m_s + quick / (ABOVE_RATIO * p.descent_speed_m_s) + careful / p.descent_speed_m_s
     )
     return way + TURN_S + 4 * STOP_S

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from glotouch_bt.motion import Motion
+from glotouch_bt.motion import FREE_M_S, Motion
 from glotouch_bt.perception.touch import GuardParams
 from glotouch_bt.robot import MotionRefused
 from glotouch_bt.skill import Context
@@ -51,17 +51,19 @@ def feel_floor(context: Context, tool: HeldTool, corner_gap_m: float, speed_m_s:
     prober = Prober(context, tool, GuardParams())
     rim = world.container.interior_m[2]
     yield from prober.hop(np.array([*corner, 0.0]), max(rim + 0.06, float(prober.tip_K_m[2])), speed_m_s)
-    yield from arm.line(tool.pose_B_P(world, np.array([*corner, rim + RIM_M])), speed_m_s)
-    probed = yield from prober.move(np.array([*corner, rim - RIM_M]), GUARDED_M_S)
-    if probed.contact is not None:
-        raise MotionRefused("floor", "the probe met something at the container's rim; is the container registered?")
-    yield from arm.line(tool.pose_B_P(world, np.array([*corner, tool.floor_z_K_m + GUARDED_FROM_M])), speed_m_s)
-    probed = yield from prober.move(np.array([*corner, tool.floor_z_K_m + SLOW_FROM_M]), GUARDED_M_S)
+    high, floor = float(prober.tip_K_m[2]), tool.floor_z_K_m
+    paces = (
+        (high - rim - RIM_M, GUARDED_M_S),
+        (high - rim + RIM_M, min(speed_m_s, FREE_M_S)),
+        (high - floor - GUARDED_FROM_M, GUARDED_M_S),
+        (high - floor - SLOW_FROM_M, SLOW_M_S),
+    )
     with may_touch(arm, "tool", "floor"):
-        lowest = tool.floor_z_K_m + tool.tip_radius_m - FLOOR_SEARCH_M
-        if probed.contact is None:
-            probed = yield from prober.move(np.array([*corner, lowest]), SLOW_M_S)
+        lowest = np.array([*corner, floor + tool.tip_radius_m - FLOOR_SEARCH_M])
+        probed = yield from prober.move(lowest, speed_m_s, paces=paces)
         if probed.contact is None:
             return None
+        if probed.contact.tip_K_m[2] > rim - RIM_M:
+            raise MotionRefused("floor", "the probe met something at the container's rim; is the container registered?")
         yield from prober.retreat(np.array([0.0, 0.0, 1.0]), RETREAT_M, RETREAT_M_S)
     return float(probed.contact.tip_K_m[2]) - tool.tip_radius_m

@@ -10,7 +10,7 @@ from typing import ClassVar, TypeVar
 
 import numpy as np
 
-from glotouch_bt.motion import Motion
+from glotouch_bt.motion import FREE_M_S, Motion
 from glotouch_bt.perception.search import Move, MoveOutcome, SearchPlan, T
 from glotouch_bt.perception.touch import Contact, GuardParams
 from glotouch_bt.robot import Array, MotionRefused
@@ -23,6 +23,9 @@ _Outcome = TypeVar("_Outcome")
 
 AT_HEIGHT_M = 0.004
 """The ball is at sensing height within this tolerance."""
+IN_COLUMN_M = 0.002
+"""A descent within this distance of a place where the tool stood before is free: the difference of the radii of ball
+and shaft. Source: ours."""
 HELD_TOLERANCE_M = 0.004
 """The tool is held if the aperture is within this of the one at which the jaws closed on it."""
 MAX_LOST_SHARE = 0.5
@@ -44,7 +47,7 @@ class ExploringSpeeds:
     sweep_m_s: float = 0.04
     step_m_s: float = 0.05
     probe_m_s: float = 0.03
-    travel_m_s: float = 0.10
+    travel_m_s: float = 0.25
     lower_m_s: float = 0.02
     height_m: float = 0.018
     headroom_m: float = 0.13
@@ -89,6 +92,10 @@ class Explorer:
         """(2,) position of the ball in K."""
         return self._prober.tip_K_m[:2]
 
+    def columns(self) -> Array:
+        """Return the places (n, 2) above which the space is free, down to sensing height."""
+        return self._arm.felt.columns(self._height_m + AT_HEIGHT_M)
+
     @property
     def _height_m(self) -> float:
         return self._tool.floor_z_K_m + self._speeds.height_m
@@ -124,6 +131,7 @@ class Explorer:
         """Check that the aperture is the one at which the tool was taken; without the tool nothing would be touched."""
         apart, taken = self._arm.aperture_m, self._tool.aperture_m
         if abs(apart - taken) > HELD_TOLERANCE_M:
+            self._arm.felt.forget()
             raise TOOL_LOST(
                 f"the jaws are {apart * 1e3:.1f} mm apart, with the tool in them they were {taken * 1e3:.1f}",
                 aperture_m=apart,
@@ -144,6 +152,7 @@ class Explorer:
         yield from rise_clear(self._arm)
         missing_N = -(yield from weigh_N(self._arm)) - before_N
         if missing_N > MAX_LOST_SHARE * self._weight_N:
+            self._arm.felt.forget()
             raise TOOL_LOST(
                 f"the hand is lighter by {missing_N:.2f} N than a moment ago, the probe weighs {self._weight_N:.2f} N",
                 advice="check the probe with tool_check",
@@ -173,7 +182,9 @@ class Explorer:
         if np.linalg.norm(goal_K_m - tip[:2]) > 0.002:
             above = max(float(tip[2]), self._tool.floor_z_K_m + s.headroom_m)
             yield from self._prober.hop(np.array([*goal_K_m, 0.0]), above, s.travel_m_s)
-        probed = yield from self._prober.move(np.array([*goal_K_m, self._height_m]), s.lower_m_s)
+        known = self.columns()
+        free = bool((np.linalg.norm(known - goal_K_m, axis=1) < IN_COLUMN_M).any())
+        probed = yield from self._prober.move(np.array([*goal_K_m, self._height_m]), FREE_M_S if free else s.lower_m_s)
         if probed.contact is not None:
             yield from self._prober.retreat(np.array([0.0, 0.0, 1.0]), OFF_TOP_M, s.step_m_s)
             return probed.contact, np.zeros((0, 3))

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from glotouch_bt.motion import Motion, MoveResult
+from glotouch_bt.motion import FREE_M_S, Motion, MoveResult, Paces
 from glotouch_bt.robot import MotionRefused, Observation, Pose
 from glotouch_bt.skill import Context, Failure, SkillRun
 from glotouch_skills.common.hand import (
@@ -27,8 +27,14 @@ OVER_HOLDER_M = 0.002
 """Within this distance of the holder's axis, the probe is in the holder or entering it (after a preemption)."""
 SLOW_FROM_M = 0.02
 """Height above its place from which the probe is lowered slowly."""
+ENTRY_M = 0.02
+"""Height of the ball above the holder from which the probe is lowered at the speed of the insertion. Source: ours."""
 SLOW_M_S = 0.01
 """Largest speed from there."""
+SEAT_M = 0.003
+"""Height above its place from which the probe is lowered to its seat. Source: ours; a slip of 2 mm is found before."""
+SEAT_M_S = 0.005
+"""Largest speed from there: the arm moves on for two periods after the handle has met the holder."""
 IN_PLACE_M = 0.001
 """Within this distance of its place, the probe may have been released already."""
 MAX_INSERT_FORCE_N = 6.0
@@ -107,11 +113,15 @@ def return_probe(
         yield from arm.transit(above, height_B_m=height, speed_m_s=speed_m_s)
     near = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, SLOW_FROM_M]))
     if float(arm.pose_B_P.position_m[2]) > float(near.position_m[2]):
-        moved = yield from _lower(context, near, insert_speed_m_s, aperture_m, MAX_INSERT_FORCE_N)
+        outside = float(arm.pose_B_P.position_m[2] - grasp.position_m[2]) - world.probe.length_m - ENTRY_M
+        paces = ((0.0, max(FREE_M_S, insert_speed_m_s)), (max(outside, 0.0), insert_speed_m_s))
+        moved = yield from _lower(context, near, paces, aperture_m, MAX_INSERT_FORCE_N)
         if (why := describe_stop(moved)) is not None:
             yield from _rise(context, insert_speed_m_s)  # do not keep pressing on the holder
             raise MotionRefused("into the holder", why)
-    moved = yield from _lower(context, grasp, min(SLOW_M_S, insert_speed_m_s), aperture_m, MAX_INSERT_FORCE_N)
+    left = float(np.linalg.norm(arm.pose_B_P.position_m - grasp.position_m))
+    paces = ((0.0, min(SLOW_M_S, insert_speed_m_s)), (left - SEAT_M, min(SEAT_M_S, insert_speed_m_s)))
+    moved = yield from _lower(context, grasp, paces, aperture_m, MAX_INSERT_FORCE_N)
     why = describe_stop(moved)
     if isinstance(moved.stop, Strayed):
         yield from _rise(context, insert_speed_m_s)
@@ -122,8 +132,8 @@ def return_probe(
     yield from set_payload_and_tare(context)
 
 
-def _lower(context: Context, goal: Pose, speed_m_s: float, aperture_m: float, max_N: float) -> Motion[MoveResult]:
-    """Move down to `goal`, until the force changes by more than `max_N`.
+def _lower(context: Context, goal: Pose, paces: Paces, aperture_m: float, max_N: float) -> Motion[MoveResult]:
+    """Move down to `goal`, until the force changes by more than `max_N`; `paces` begin at 0.
 
     Raises:
         SkillFailed: `tool_lost`; the hand has risen again.
@@ -132,11 +142,12 @@ def _lower(context: Context, goal: Pose, speed_m_s: float, aperture_m: float, ma
     straight = yield from straight_guard(arm, DOWN_B, max_N)
     released = not arm.scene.holding_tool or np.linalg.norm(goal.position_m - arm.pose_B_P.position_m) < IN_PLACE_M
     guard = straight if released else Lowering(straight, aperture_m)  # released before a preemption
-    moved = yield from arm.line(goal, speed_m_s, check=False, guard=guard)
+    moved = yield from arm.line(goal, paces[0][1], check=False, paces=paces, guard=guard)
     if not isinstance(moved.stop, Dropped):
         return moved
     arm.scene.hold_tool(False)
-    yield from _rise(context, speed_m_s)
+    arm.felt.forget()
+    yield from _rise(context, paces[-1][1])
     raise TOOL_LOST(
         f"the probe was dropped on its way into the holder: {moved.stop}",
         aperture_m=moved.stop.apart_m,

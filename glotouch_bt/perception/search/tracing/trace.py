@@ -69,27 +69,33 @@ def trace_more(
     *,
     round_tip: bool = True,
     half_extent_m: Array | None = None,
+    columns: Callable[[], Array] | None = None,
 ) -> SearchPlan[OutlineTrace]:
     """Continue the trace of an object from above: hop to where the outline is least certain.
 
     Args:
         known: Its contacts, at its current position.
         tip_K_m, tip_radius_m, params, round_tip, half_extent_m: As for `trace`; the ball may be raised.
+        columns: Returns the places (n, 2) where the ball can come down through felt, free space.
     """
     p = params or TraceParams()
     s = TraceState.begin(_still(known), tip_K_m, tip_radius_m, round_tip, half_extent_m)
     s.known = s.given = len(known)
+    s.columns = columns or s.columns
     outline = s.outline()
     bearings = all_bearings()
     distance, sd = s.ring(outline, bearings, p)
     within = np.all(np.abs(_beside(outline, bearings, distance, sd, p)) <= s.half, axis=1)
     for i in _apart(np.where(within, sd, -1.0), p.misses):
-        if not (yield from _come_down(outline, s, p, float(bearings[i]))):
+        down, met = yield from _come_down(outline, s, p, float(bearings[i]))
+        if not down:
             continue
-        outcome = yield Move("probe", outline.centre_K_m + INSIDE_M * unit(s.tip - outline.centre_K_m))
-        s.record(outcome)
-        if outcome.contact is not None and s.belongs(outline, outcome.contact, p):
-            s.add(outcome.contact, outline, p)
+        if met is None:
+            outcome = yield Move("probe", outline.centre_K_m + INSIDE_M * unit(s.tip - outline.centre_K_m))
+            s.record(outcome)
+            met = outcome.contact
+        if met is not None and s.belongs(outline, met, p):
+            s.add(met, outline, p)
             yield from _retreat(s, p)
             return (yield from _until_known(s, p))
     return replace(s.trace(outline, "it was not met again"), missing=True)
@@ -244,8 +250,9 @@ def _probe_at(outline: OutlineBelief, s: TraceState, p: TraceParams, aim: _Aim) 
     If the outline is too uncertain on the way, follow the surface from the last contact instead.
     """
     if aim.over:
-        if not (yield from _come_down(outline, s, p, aim.bearing)):
-            return None
+        down, met = yield from _come_down(outline, s, p, aim.bearing)
+        if met is not None or not down:
+            return met
     else:
         beside = float(np.linalg.norm(s.tip - s.raw[-1].tip_K_m[:2])) < 3.0 * p.clearance_m
         if beside and _doubt(outline, s, p, aim.bearing, aim.side) > p.doubt_m:
@@ -265,22 +272,47 @@ def _probe_at(outline: OutlineBelief, s: TraceState, p: TraceParams, aim: _Aim) 
     return outcome.contact
 
 
-def _come_down(outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: float) -> SearchPlan[bool]:
-    """Hop beside the object at `bearing`, farther out after landing on it; return True at sensing height."""
+def _come_down(
+    outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: float
+) -> SearchPlan[tuple[bool, Contact | None]]:
+    """Hop beside the object at `bearing`, farther out after landing on it.
+
+    If a free column is near, come down there and step beside the object, which is faster than to descend slowly.
+
+    Returns:
+        True at sensing height, and the contact of that step, or None.
+    """
     at = np.array([bearing])
     distance, sd = s.ring(outline, at, p)
     for farther in OUTWARDS_M:
         place = _beside(outline, at, distance + farther, sd, p)[0]
         if np.any(np.abs(place) > s.half):
-            return False
-        outcome = yield Move("hop", place)
+            return False, None
+        column = _column(outline, s, p, place) if farther == 0.0 else None
+        outcome = yield Move("hop", place if column is None else column)
         s.record(outcome)
         if outcome.refused:
-            return False
+            return False, None
         s.raised = outcome.contact is not None
-        if not s.raised:
-            return True
-    return False
+        if s.raised:
+            continue
+        if column is not None:
+            outcome = yield Move("step", place)
+            s.record(outcome)
+        return not outcome.refused, outcome.contact
+    return False, None
+
+
+def _column(outline: OutlineBelief, s: TraceState, p: TraceParams, place: Array) -> Array | None:
+    """Return the nearest free column from which the ball can step to `place` beside the outline, or None."""
+    found = s.columns()
+    away = np.linalg.norm(found - place, axis=1)
+    for i in np.argsort(away, kind="stable"):
+        if away[i] > p.aside_m:
+            break
+        if _clear(s, found[i], place, outline, p):
+            return np.asarray(found[i])
+    return None
 
 
 def _beside(outline: OutlineBelief, bearings: Array, distance: Array, sd: Array, p: TraceParams) -> Array:

@@ -27,6 +27,7 @@ class TraceParams:
         back: Factor on the worth of bearings against the current direction.
         way_m: Travel of a probe in and out, added to the travel to its bearing.
         hop_m: Cost of a hop, as travel; infinite: no hops.
+        aside_m: Maximum distance from a hop's goal of a free column where the ball comes down instead.
         keen: Exponent of the standard deviation in a bearing's worth; 2 gives the variance.
         reach_sds: Depth of a probe past the prediction, in standard deviations.
         facing: Minimum cosine between the force on the ball and the direction from the object's centre for the contact
@@ -64,6 +65,7 @@ class TraceParams:
     back: float = 0.4
     way_m: float = 0.03
     hop_m: float = math.inf
+    aside_m: float = 0.06
     keen: float = 1.0
     reach_sds: float = 2.5
     facing: float = -0.4

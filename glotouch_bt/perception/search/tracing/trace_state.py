@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -104,6 +104,7 @@ class TraceState:
         shift_information: (2, 2) 1/m^2 information of the new contacts about an unobserved motion.
         given: Number of contacts in `raw` at the start.
         known: Number of contacts in `raw` from an earlier trace.
+        columns: Returns the places (n, 2) where the ball can come down through felt, free space.
     """
 
     tip: Array
@@ -123,6 +124,7 @@ class TraceState:
     known: int = 0
     raised: bool = False
     shift_information: Array = field(default_factory=lambda: np.zeros((2, 2)))
+    columns: Callable[[], Array] = lambda: np.zeros((0, 2))
 
     @classmethod
     def begin(

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from glotouch_bt.motion import FREE_M_S
 from glotouch_bt.perception.search import Move, MoveOutcome
 from glotouch_bt.skill import SkillFailed
 from glotouch_skills.common.probe.plan_driver import Explorer, ExploringSpeeds
@@ -94,3 +95,17 @@ def test_plan_driver__tool_lost__aperture_changed(make, tool, off_mm: float, los
     with pytest.raises(SkillFailed, match="mm apart") as failed:
         go(b, explorer, move)
     assert failed.value.reason.code == "tool_lost"
+
+
+def test_the_ball_comes_down_fast_only_where_it_has_felt_free_space(make) -> None:
+    felt, new = np.array([-0.03, 0.06]), np.array([-0.03, 0.14])
+    b, explorer, _ = make()
+    go(b, explorer, Move("sweep", felt))
+    stamps = []
+    for goal in (new, felt, new):
+        stamps.append(b.context.observation.now_s)
+        go(b, explorer, Move("hop", goal))
+    slow, fast, again = np.diff([*stamps, b.context.observation.now_s])
+    height = ExploringSpeeds().headroom_m - ExploringSpeeds().height_m
+    assert slow - fast == pytest.approx(height / ExploringSpeeds().lower_m_s - height / FREE_M_S, abs=0.3)
+    assert again == pytest.approx(fast, abs=0.1), "it has been there by now"

@@ -1,0 +1,65 @@
+"""Descent of the open fingers beside an object, as fast as the knowledge of the space below them allows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glotouch_bt.motion import FREE_M_S, Arm, Motion, Paces
+from glotouch_bt.robot import Array, Pose
+from glotouch_bt.skill import Context
+from glotouch_skills.common.hand.hand import glide
+
+BESIDE_M_S = 0.05
+"""Speed through such space beside the object. Source: ours; that of moving up again beside it."""
+ABOVE_RATIO = 3.0
+"""Speed above an object, where nothing else is known, over the slow speed. Source: ours."""
+OVER_TOP_M = 0.02
+"""Height above an object's top from which the hand counts as beside it."""
+FOOT_M = 0.015
+"""Height of the fingertips above the floor from which they are slow: the probe's ball passes 12 mm above the floor and
+does not feel a foot that is lower. Source: `ExploringSpeeds.height_m` less the ball's radius, and 3 mm."""
+FELT_WITHIN_M = 0.010
+"""The space below a finger was felt if the tool stood within this distance of every place on its inner edge. What
+reaches under the finger from the object would have been touched there. Source: ours; ball and shaft have radii of 6
+and 4 mm."""
+EDGE_PLACES = 5
+"""Number of places on each finger's inner edge."""
+
+
+def descend(context: Context, goal_B_P: Pose, opening_m: float, top_m: float, slow_m_s: float) -> Motion[bool]:
+    """Move the open hand from above an object straight down beside it; return False if the fingers touched something.
+
+    Where the held probe has felt free space between object and fingers, or the hand came down before, only the last
+    millimetres are slow. Else the fingers are slow from just above the object's top on.
+
+    Args:
+        context: The skill's.
+        goal_B_P: Goal of P in B.
+        opening_m: Aperture.
+        top_m: Height of the object's top above the floor; infinite if unknown.
+        slow_m_s: Speed towards what may be there.
+
+    Raises:
+        MotionRefused: Before moving.
+    """
+    arm = context.arm
+    edges = _inner_edges(arm, goal_B_P, opening_m)
+    at = arm.world.container.pose_B_K.inverse().apply(arm.pose_B_P.position_m)
+    tips = float(at[2]) - arm.description.gripper.fingertip_below_P_m
+    beside = max(tips - top_m - OVER_TOP_M, 0.0)
+    paces: Paces = ((0.0, ABOVE_RATIO * slow_m_s), (beside, slow_m_s))
+    if arm.felt.covers(edges, FELT_WITHIN_M):
+        paces = ((0.0, FREE_M_S), (beside, BESIDE_M_S), (max(tips - FOOT_M, beside), slow_m_s))
+    reached = yield from glide(context, goal_B_P, FREE_M_S, paces)
+    if reached:
+        arm.felt.add_hand(edges)
+    return reached
+
+
+def _inner_edges(arm: Arm, goal_B_P: Pose, opening_m: float) -> Array:
+    """Return places (n, 2) in K on the inner edges of both fingers at a pose."""
+    finger = arm.description.gripper.finger
+    x = finger.centre_m[0] + finger.half_m[0] * np.linspace(-1.0, 1.0, EDGE_PLACES)
+    edges_P = [np.column_stack([x, np.full_like(x, side * 0.5 * opening_m), 0.0 * x]) for side in (-1.0, 1.0)]
+    pose_K_P = arm.world.container.pose_B_K.inverse() @ goal_B_P
+    return np.asarray(pose_K_P.apply(np.concatenate(edges_P)))[:, :2]

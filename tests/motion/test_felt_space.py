@@ -1,0 +1,55 @@
+"""Space that the held tool has felt to be free."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glotouch_bt.motion.felt_space import CLEAR_OF_TOUCH_M, STEP_M, FeltSpace
+
+LOW, HIGH = 0.018, 0.13
+
+
+def path(x0: float, x1: float, z: float = LOW) -> np.ndarray:
+    x = np.linspace(x0, x1, 401)
+    return np.column_stack([x, 0.0 * x, z + 0.0 * x])
+
+
+def test_columns_follow_the_path_at_a_low_height_only() -> None:
+    felt = FeltSpace()
+    felt.add(path(0.0, 0.2))
+    felt.add(path(0.3, 0.4, HIGH))
+    columns = felt.columns(LOW + 0.001)
+    x = np.sort(columns[:, 0])
+    assert x[0] == 0.0
+    assert np.diff(x).max() <= STEP_M + 1e-3
+    assert x[-1] <= 0.2
+    assert len(felt.columns(HIGH)) > len(columns)
+
+
+def test_columns_keep_away_from_every_touch_whenever_it_was() -> None:
+    felt = FeltSpace()
+    felt.add(path(0.0, 0.1), np.array([0.106, 0.0, 0.018]))
+    felt.add(path(0.1, 0.0))
+    assert len(felt.columns(LOW)) > 0
+    assert felt.columns(LOW)[:, 0].max() <= 0.106 - CLEAR_OF_TOUCH_M
+
+
+def test_places_are_covered_by_tool_and_hand() -> None:
+    felt = FeltSpace()
+    places = np.array([[0.05, 0.004], [0.08, 0.0]])
+    assert not felt.covers(places, 0.005)
+    felt.add(path(0.0, 0.07))
+    assert not felt.covers(places, 0.005)
+    felt.add_hand(np.array([[0.081, 0.0]]))
+    assert felt.covers(places, 0.005)
+    assert felt.columns(1.0)[:, 0].max() <= 0.07, "where the fingers were, the ball may not fit"
+
+
+def test_the_record_is_kept_and_forgotten() -> None:
+    felt, other = FeltSpace(), FeltSpace()
+    felt.add(path(0.0, 0.1), np.array([0.2, 0.0]))
+    other.restore(felt.state())
+    np.testing.assert_array_equal(other.columns(LOW), felt.columns(LOW))
+    felt.forget()
+    assert len(felt.columns(LOW)) == 0
+    assert len(other.columns(LOW)) > 0
