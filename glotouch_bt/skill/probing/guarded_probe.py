@@ -35,13 +35,6 @@ MAX_REST_S = 0.6
 FIXTURE_M = 0.003
 """A contact within this distance of the floor or a wall is one with the container, which cannot be pushed. Source:
 ours; twice the registration's error (harsh CONDITIONS)."""
-BASELINE_AGE_S = 3.0
-"""Longest time for which a wrench measured at rest is used again. Source: ours; harsh CONDITIONS drift by 0.02 N."""
-SAME_N, SAME_NM = 0.1, 0.02
-"""Largest differences of the standing hand's wrench from it: else the tool was not quite free when it was measured.
-Source: those of `settled`."""
-STAND_S = 0.02
-"""Time of standing before a guarded move with such a wrench. Source: ours; twice the window of the measured inertia."""
 GUARDED_ACCELERATION_M_S2 = 0.5
 """Acceleration limit of a guarded move. With the hand's inertia compensated, less than 0.05 N of it remain at the tip
 (simulation)."""
@@ -91,7 +84,6 @@ class Prober:
         probe = context.world.probe if context.arm.scene.holding_tool else None
         self._carried = carried or Payload.hand(context.arm.description.gripper, probe)
         self._rested: tuple[float, Baseline] | None = None
-        self._untouched = False
         self.resting_up_N: list[float] = []
 
     @property
@@ -118,31 +110,8 @@ class Prober:
         inertia = self._inertia()  # at rest this is only its measurement noise
         baseline = fit_baseline(np.concatenate([o.wrench_S - inertia(o) for o in window]))
         self._rested = (window[-1].now_s, baseline)
-        self._untouched = True
         self.resting_up_N.append(float((self._context.arm.pose_B_P.rotation @ baseline.median[:3])[2]))
         return baseline
-
-    def _ready(self) -> Motion[tuple[Baseline, MeasuredInertia]]:
-        """Return the wrench without contact, and the inertia as of now.
-
-        Without a contact since a recent rest, its wrench still holds: the hand has its orientation, and the sensor has
-        hardly drifted. Then stand only until the end of the last motion is in the measured inertia. Bare fingers always
-        rest: with a wrench from before, they traced a square worse (`bench contact`).
-        """
-        inertia, now_s = self._inertia(), self._context.observation.now_s
-        recent = self._rested is not None and self._untouched and now_s - self._rested[0] <= BASELINE_AGE_S
-        if self._rested is None or not (recent and self._tool.round):
-            return (yield from self.rest()), inertia
-        at_s, baseline = self._rested
-        if now_s == at_s:
-            return baseline, inertia
-        blocks = yield from self._context.arm.hold(STAND_S)
-        if blocks[-1].now_s - now_s > 2.0 * STAND_S:  # a pause
-            return (yield from self.rest()), inertia
-        felt = np.concatenate([seen.wrench_S - inertia(seen) for seen in blocks]).mean(axis=0) - baseline.median
-        if np.linalg.norm(felt[:3]) > SAME_N or np.linalg.norm(felt[3:]) > SAME_NM:
-            return (yield from self.rest()), self._inertia()
-        return baseline, inertia
 
     def move(
         self, tip_K_m: Array, speed_m_s: float, *, any_direction: bool = False, paces: Paces = ()
@@ -169,7 +138,6 @@ class Prober:
             paces=paces,
             guard=guard,
         )
-        self._untouched &= result.stop is None
         probed = self._outcome(result, step / length)
         self._remember(probed)
         return probed
@@ -204,9 +172,10 @@ class Prober:
                 yield from self._context.arm.line(self._tool.pose_B_P(self._world, goal), speed)
 
     def _guard_for(self, direction_B: Array, any_direction: bool) -> Motion[_TwoGuards]:
-        baseline, inertial = yield from self._ready()
+        baseline = yield from self.rest()
         arm, params = self._context.arm, self._guard
         gripper = arm.description.gripper
+        inertial = self._inertia()
         approach_B = None if any_direction else direction_B
         soft = ContactGuard(baseline, approach_B, self._tool.tip_P_m, gripper.pose_E_P, params, inertial)
         return _TwoGuards(HardStop(baseline, params), soft)

@@ -9,7 +9,7 @@ import pytest
 
 from glotouch_bt.perception.touch import GuardParams
 from glotouch_bt.skill import SkillFailed
-from glotouch_bt.skill.probing.guarded_probe import BASELINE_AGE_S, MAX_REST_S, REST_S, STAND_S, Prober
+from glotouch_bt.skill.probing.guarded_probe import MAX_REST_S, REST_S, Prober
 
 START = np.array([-0.05, 0.1, 0.06])
 
@@ -86,18 +86,6 @@ def test_a_rest_lasts_until_the_wrench_is_steady_and_no_longer_than_allowed(make
         b.go(prober.rest())
         assert b.context.observation.now_s - begin <= max_delay_s + 1e-9
         assert b.context.observation.now_s - begin > REST_S + 0.05
-
-
-def test_a_move_after_one_without_contact_starts_with_the_same_baseline(make) -> None:
-    b, prober = make()
-    b.go(prober.move(START + np.array([0, 0, 0.01]), 0.03))
-    after_rest = b.context.observation.now_s
-    b.go(prober.move(START, 0.03))
-    back = b.context.observation.now_s - after_rest
-    b.go(b.arm.hold(BASELINE_AGE_S))
-    late = b.context.observation.now_s
-    b.go(prober.move(START + np.array([0, 0, 0.01]), 0.03))
-    assert b.context.observation.now_s - late - back == pytest.approx(REST_S - STAND_S, abs=0.011)
 
 
 def swinging(ends_s):
