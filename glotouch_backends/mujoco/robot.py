@@ -60,7 +60,8 @@ class MujocoRobot(Robot):
         self._ctrl = np.zeros((STEPS, model.nu))
         self._arm_ctrl, self._jaw_ctrl = self._ctrl[:, handles.arm_ctrl], self._ctrl[:, handles.jaw_ctrl]
         self._samples = np.zeros((STEPS, model.nsensordata))
-        self._external = np.zeros((STEPS, 4, 6))  # torque, force
+        held = handles.held_bodies.stop - handles.held_bodies.start
+        self._external = np.zeros((STEPS, held, 6))  # torque, force
         # Views of one step each, made once, so that the loop around mj_step only copies (memoryviews copy 3x faster).
         self._rows = [
             (c.data, s.data, e.data)
@@ -68,7 +69,7 @@ class MujocoRobot(Robot):
         ]
         self._ctrl_now, self._sensed = memoryview(data.ctrl), memoryview(data.sensordata)
         self._external_now = memoryview(data.cfrc_ext[handles.held_bodies].reshape(-1))
-        self._counted = np.array([1.0, 1.0, 1.0, 0.0])
+        self._counted = np.ones(held)  # the probe's bodies, from 3 on, count while it is held
         self._warnings = data.warning.number
         self._probe_now = data.xpos[handles.probe_body]
         self._pads_now = data.site_xpos[handles.pads_site], data.site_xmat[handles.pads_site].reshape(3, 3)
@@ -243,7 +244,7 @@ class MujocoRobot(Robot):
     def _note_peak(self) -> None:
         """Update the largest true contact force on the hand, and on the probe while it is held."""
         x, y, z = (self._probe_now - self._samples[-1, self._s.position]).tolist()
-        self._counted[3] = x * x + y * y + z * z < MAX_HELD_DISTANCE_M**2
+        self._counted[3:] = x * x + y * y + z * z < MAX_HELD_DISTANCE_M**2
         force = (self._counted @ self._external)[:, 3:]
         flat = force.ravel()
         if flat @ flat > self.peak_force_N**2:  # otherwise no sample can be a new peak

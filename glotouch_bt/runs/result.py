@@ -13,7 +13,7 @@ from typing import Any
 
 from glotouch_bt.mission import Mission
 from glotouch_bt.mission.execution import Outcome
-from glotouch_bt.mission.read import shown
+from glotouch_bt.mission.read import conditions_name, shown
 from glotouch_bt.mission.record import to_json
 from glotouch_bt.robot import Conditions, Robot
 from glotouch_bt.robot.simulation import Referee, TrueObject
@@ -86,7 +86,7 @@ def score(request: RunRequest, mission: Mission, outcome: Outcome, seen: FinalTr
         "mission": mission.name,
         "backend": request.backend,
         "seed": request.seed,
-        "conditions": Path(request.conditions).stem,
+        "conditions": conditions_name(request.conditions),
         "status": outcome.status,
         "reasons": outcome.reasons,
         "reason_chain": [to_json(f.as_dict()) for f in outcome.chain],

@@ -50,10 +50,11 @@ class SimulatedWorld:
         self._ctrl = np.array(self.data.ctrl)
         self._arm_ctrl, self._jaw_ctrl = self._ctrl[h.arm_ctrl], self._ctrl[h.jaw_ctrl]
         self._jaw_rows = np.zeros((STEPS, 2))
-        self._external = np.zeros((STEPS, 4, 6))  # torque, force
+        held = h.held_bodies.stop - h.held_bodies.start
+        self._external = np.zeros((STEPS, held, 6))  # torque, force
         self._external_now = self.data.cfrc_ext[h.held_bodies]
         self._samples = np.zeros((STEPS, self.model.nsensordata))
-        self._counted = np.array([1.0, 1.0, 1.0, 0.0])
+        self._counted = np.ones(held)  # the probe's bodies, from 3 on, count while it is held
 
     @classmethod
     def of_message(cls, message: bytes) -> SimulatedWorld:
@@ -107,6 +108,6 @@ class SimulatedWorld:
         """Update the largest true contact force on the hand, and on the probe while it is held."""
         h = self.handles
         gap = self.data.xpos[h.probe_body] - self._samples[-1, h.sensors.position]
-        self._counted[3] = float(gap @ gap) < MAX_HELD_DISTANCE_M**2
+        self._counted[3:] = float(gap @ gap) < MAX_HELD_DISTANCE_M**2
         force = (self._counted @ self._external)[:, 3:]
         self.peak_force_N = max(self.peak_force_N, float((force * force).sum(axis=1).max()) ** 0.5)

@@ -56,7 +56,7 @@ class MujocoReferee:
 
     def push_tip(self, force_B_N: Array) -> None:
         """See `Referee`."""
-        r, body = self._robot, self._robot.handles.probe_body
+        r, body = self._robot, self._robot.handles.tip_body
         lever = self.tip_B_m() - r.data.xipos[body]
         r.data.xfrc_applied[body] = np.concatenate([force_B_N, np.cross(lever, force_B_N)])
 
