@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from glotouch_bt.robot import Array, BackendError, Conditions
+from glotouch_bt.robot import Array, Conditions
 from glotouch_bt.robot.scene import AXES
 
 Value = float | Array
@@ -31,19 +31,6 @@ class AxisProof:
         self._used[index] = True
         self._altered[index] = not np.array_equal(before, after, equal_nan=True)
 
-    def altered(self) -> tuple[str, ...]:
-        """Return the axes that altered something."""
-        return tuple(name for name, i in self._open.items() if self._altered[i])
-
     def silent(self) -> tuple[str, ...]:
         """Return the axes that were used and altered nothing."""
         return tuple(name for name, i in self._open.items() if self._used[i] and not self._altered[i])
-
-    def require_effect(self) -> None:
-        """Refuse a run whose axes had no effect.
-
-        Raises:
-            BackendError: An axis was used and altered nothing.
-        """
-        if silent := self.silent():
-            raise BackendError(f"conditions {', '.join(silent)} altered no reading: choose a larger value, or none")

@@ -16,7 +16,7 @@ from glotouch_backends.mujoco.control import (
     check_sane,
 )
 from glotouch_backends.mujoco.model import STEP_S, STEPS, BuiltWorld
-from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, Tactile, WristSensor, up_in
+from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, PoseReports, Tactile, WristSensor, up_in
 from glotouch_backends.mujoco.simulation import ControlTrace, SnapshotStore
 from glotouch_bt.robot import (
     Array,
@@ -51,12 +51,16 @@ class MujocoRobot(Robot):
         s = handles.sensors
         self._s = s
         self._aperture = aperture = float(data.qpos[handles.jaw_qpos].sum())
-        self._servo = Servo(model, data, handles, description, self.period_s, limits.stop_acceleration_m_s2)
+        lag_s = conditions.following_error_s
+        self._servo = Servo(model, data, handles, description, self.period_s, limits.stop_acceleration_m_s2, lag_s)
+        built.proof.saw("following_error_s", 0.0, lag_s)
         self._servo.reset(np.array(data.qpos[handles.arm_qpos]))
-        self._jaws = JawServo(model, handles, description.gripper, aperture)
-        self._wrist = WristSensor(description, conditions, seed)
+        self._jaws = JawServo(built, aperture)
+        self._wrist = WristSensor(description, conditions, seed, built.proof)
         self._guard = HardLimitGuard(limits)
         self._tactile = Tactile(built)
+        self._depth, self.proof = self._tactile.depth, built.proof
+        self._poses = PoseReports(built)
         self._ctrl = np.zeros((STEPS, model.nu))
         self._arm_ctrl, self._jaw_ctrl = self._ctrl[:, handles.arm_ctrl], self._ctrl[:, handles.jaw_ctrl]
         self._samples = np.zeros((STEPS, model.nsensordata))
@@ -90,7 +94,7 @@ class MujocoRobot(Robot):
         self._wrist.fill(-self._samples[0, s.force.start : s.torque.stop])
         self._expected = self._wrist.expected(up_in(self._samples[0, s.quat]))
         first = GripperState(0.0, aperture, 0.0, False)
-        self._reports = JawReports(conditions, seed, self.period_s, first)
+        self._reports = JawReports(conditions, seed, built.proof, self.period_s, first)
         self._observation = self._observe(Command())
 
     def observe(self) -> Observation:
@@ -212,6 +216,7 @@ class MujocoRobot(Robot):
         """Return the observation of the samples just taken."""
         s, rows = self._s, self._samples.copy()
         now_s = self._cycles * self.period_s
+        self._poses.correct(rows, s)
         wrench, quat = rows[:, s.force.start : s.torque.stop], rows[:, s.quat]
         np.negative(wrench, out=wrench)
         self._set_payload()

@@ -58,6 +58,7 @@ class FinalTruth:
     objects: list[TrueObject]
     peak_force_N: float
     tip_B_m: list[float]
+    silent_axes: tuple[str, ...]
 
 
 def final_truth(referee: Referee | None) -> tuple[FinalTruth | None, str]:
@@ -65,7 +66,9 @@ def final_truth(referee: Referee | None) -> tuple[FinalTruth | None, str]:
     if referee is None:
         return None, ""
     try:
-        return FinalTruth(referee.objects(), referee.peak_force_N(), referee.tip_B_m().tolist()), ""
+        return FinalTruth(
+            referee.objects(), referee.peak_force_N(), referee.tip_B_m().tolist(), referee.silent_axes()
+        ), ""
     except Exception as e:  # also of the solver's geometry, when a world has exploded
         return None, f"the simulated world can no longer be asked for the truth: {e}"
 

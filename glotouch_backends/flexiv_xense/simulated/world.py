@@ -16,7 +16,7 @@ from glotouch_backends.mujoco.simulation import ControlTrace
 from glotouch_backends.options import WorldOptions
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_backends.trial_message import trial_of_message
-from glotouch_bt.robot import BackendError, Conditions, RobotDescription, World
+from glotouch_bt.robot import BackendError, BadInput, Conditions, RobotDescription, World
 
 
 class SimulatedWorld:
@@ -39,10 +39,15 @@ class SimulatedWorld:
         description: RobotDescription = RIZON4_XENSE,
     ) -> None:
         self.world, self.description = world, description
+        exact = [axis for axis in ("kinematic_error_sd_m", "following_error_s") if getattr(conditions, axis)]
+        if exact:
+            changes = "".join(f"+{axis}=0" for axis in exact)
+            raise BadInput(f"the simulated arm has no {', '.join(exact)}; use --conditions {conditions.name}{changes}")
         built = build_world(description, world, conditions, seed, options)
         self.truth, self.model, self.data, self.handles = built.truth, built.model, built.data, built.handles
         self.trace: ControlTrace | None = None
         self.peak_force_N = 0.0
+        self.proof = built.proof
         self.arm = SimulatedArm(built)
         self.hand = SimulatedHand(built)
         self.steps = 0
