@@ -34,8 +34,8 @@ MIN_BALL_CLEARANCE_M = 0.001
 """Smallest gap between ball and rail on each side. Source: ours."""
 LEDGE_M = 0.0015
 """Overlap of a rail with the handle. Source: ours."""
-MAX_SHAFT_STIFFNESS_NM_RAD = 300.0
-"""Largest stiffness between handle and shaft, or 1 ms steps become unstable; 0.06 mm/N at the ball. Source: ours."""
+MAX_SHAFT_STIFFNESS_NM_RAD = 170.0
+"""Largest stiffness between handle and shaft, or 1 ms steps become unstable; 0.1 mm/N at the ball. Source: ours."""
 GEL_DAMPING_RATIO = 0.5
 """Damping ratio of the shaft in the gel. Source: ours; silicone gels damp strongly."""
 HANDLE_COLOUR, STEEL_COLOUR, STAND_COLOUR = (0.15, 0.35, 0.65, 1.0), (0.75, 0.77, 0.80, 1.0), (0.3, 0.32, 0.3, 1.0)
@@ -56,12 +56,11 @@ def _compliant(spec: mujoco.MjSpec, body: mujoco.MjsBody, probe: Probe, truth: T
     stiffness = truth.probe_stiffness_Nm_rad
     if all(map(math.isinf, stiffness)):
         return body
-    # The shaft is a uniform rod, and the handle is as heavy as the probe's centre of mass says.
+    # The shaft is a uniform rod, and the handle is as heavy as the probe's centre of mass says. The handle keeps the
+    # inertia of the whole probe: with its own, 4e-6 kg m2, the springs are too stiff for steps of 1 ms.
     middle_m = 0.5 * (probe.handle_m[2] + probe.length_m)
     mass = probe.mass_kg * probe.com_below_grasp_m / middle_m
-    x, y, z = (size * size for size in probe.handle_m)
-    rest = (probe.mass_kg - mass) / 12.0
-    body.mass, body.ipos, body.inertia = probe.mass_kg - mass, np.zeros(3), (rest * (y + z), rest * (x + z), rest * (x + y))
+    body.mass, body.ipos = probe.mass_kg - mass, np.zeros(3)
     shaft = body.add_body(name="shaft", mass=mass, explicitinertial=True)
     shaft.ipos = truth.pose_handle_shaft.apply((0.0, 0.0, middle_m))
     rod = mass * probe.length_m**2 / 12.0
