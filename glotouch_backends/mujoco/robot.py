@@ -56,7 +56,7 @@ class MujocoRobot(Robot):
         built.proof.saw("following_error_s", 0.0, lag_s)
         self._servo.reset(np.array(data.qpos[handles.arm_qpos]))
         self._jaws = JawServo(built, aperture)
-        self._wrist = WristSensor(description, conditions, seed, built.proof)
+        self._wrist = WristSensor(description, conditions, seed, proof=built.proof)
         self._guard = HardLimitGuard(limits)
         self._tactile = Tactile(built)
         self._depth, self.proof = self._tactile.depth, built.proof
@@ -94,7 +94,7 @@ class MujocoRobot(Robot):
         self._wrist.fill(-self._samples[0, s.force.start : s.torque.stop])
         self._expected = self._wrist.expected(up_in(self._samples[0, s.quat]))
         first = GripperState(0.0, aperture, 0.0, False)
-        self._reports = JawReports(conditions, seed, built.proof, self.period_s, first)
+        self._reports = JawReports(conditions, seed, self.period_s, first, built.proof)
         self._observation = self._observe(Command())
 
     def observe(self) -> Observation:

@@ -97,7 +97,13 @@ def _true_shaft(world: World, conditions: Conditions, rng: np.random.Generator) 
 
 
 def _object(
-    stl: Mesh, place: Placement, mass_kg: float, friction: float, c: Conditions, rng: np.random.Generator, proof: AxisProof
+    stl: Mesh,
+    place: Placement,
+    mass_kg: float,
+    friction: float,
+    c: Conditions,
+    rng: np.random.Generator,
+    proof: AxisProof,
 ) -> ObjectTruth:
     """Draw the shape, the balance and the base of one object; every axis takes its numbers, set or not."""
     scale, offset = float(rng.uniform(*c.object_scale)), float(rng.uniform(*c.object_surface_offset_m))

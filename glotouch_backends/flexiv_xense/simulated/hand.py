@@ -46,7 +46,7 @@ class SimulatedHand:
         self._rows = np.zeros((STEPS, 2))
         self._tactile = Tactile(built)
         first = GripperState(0.0, aperture, 0.0, False)
-        self._reports = JawReports(conditions, built.seed, built.proof, PERIOD_S, first)
+        self._reports = JawReports(conditions, built.seed, PERIOD_S, first, built.proof)
         late = round(conditions.gripper_latency_s / PERIOD_S)
         self._speeds: deque[float] = deque([0.0] * (late + 1), maxlen=late + 1)
         self._now_s = 0.0

@@ -94,15 +94,20 @@ class JawReports:
 
     Args:
         conditions, seed: The disturbances and the source of their draws.
-        proof: Notes which axes altered a report.
         period_s: Control period.
         first: First true state.
+        proof: Notes which axes altered a report; default: one of its own.
     """
 
     def __init__(
-        self, conditions: Conditions, seed: int, proof: AxisProof, period_s: float, first: GripperState
+        self,
+        conditions: Conditions,
+        seed: int,
+        period_s: float,
+        first: GripperState,
+        proof: AxisProof | None = None,
     ) -> None:
-        self._c, self._proof = conditions, proof
+        self._c, self._proof = conditions, proof or AxisProof(conditions)
         self._rng = stream(seed, "aperture")
         self._force_gain, self._force_offset_N = force_errors(conditions, seed)
         self._motor_m = first.aperture_m + 0.5 * conditions.jaw_backlash_m
@@ -122,8 +127,8 @@ class JawReports:
             self._motor_m = min(max(self._motor_m, aperture - play), aperture + play)
             self._proof.saw("jaw_backlash_m", aperture, self._motor_m)
             aperture = self._motor_m
-        if force > 0.0:
-            force = max(0.0, (force - self._force_offset_N) / self._force_gain)
+        offset_N = min(max(self._force_offset_N, -force), force)  # no force is reported as none
+        force = (force - offset_N) / self._force_gain
         aperture += self._bias
         if c.aperture_noise_sd_m > 0.0:
             aperture += c.aperture_noise_sd_m * float(self._rng.standard_normal())

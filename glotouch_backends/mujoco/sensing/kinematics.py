@@ -1,4 +1,4 @@
-"""Reported pose of P: forward kinematics of the described arm, while the true arm's joint frames are turned a little."""
+"""Reported pose of P: kinematics of the described arm, while the true arm's joint frames are turned a little."""
 
 from __future__ import annotations
 

@@ -78,9 +78,8 @@ class PadContacts:
         forces = (max(float(along[on_left].sum()), 0.0), max(-float(along[~on_left].sum()), 0.0))
         return forces, set(self._body_of[other].tolist())
 
-
     def tangential_N(self) -> Array:
-        """Return the tangential force (2, 2) on the left and the right pad along x_P and z_P, as of the last `touch`."""
+        """Return the tangential forces (2, 2) of the last `touch`: left and right pad, along x_P and z_P."""
         if len(self._force_B) == 0:
             return np.zeros((2, 2))
         aside = self._force_B @ self._axes.reshape(3, 3)[:, [0, 2]]

@@ -29,8 +29,8 @@ def weight_matrix(mass_kg: float, com_S_m: Array) -> Array:
 def calibration_errors(conditions: Conditions, seed: int) -> tuple[Array, Array]:
     """Return the gain errors (6,) and the cross-talk (6, 6, zero diagonal) of the sensor's axes.
 
-    Cross-talk is relative to the axes' ranges. Five independent entries of sd / sqrt(5) make a row: with equal shares of
-    the other ranges applied, the reading has the given sd.
+    Cross-talk is relative to the axes' ranges. Five independent entries of sd / sqrt(5) make a row: with equal shares
+    of the other ranges applied, the reading has the given sd.
     """
     rng = stream(seed, "wrench calibration")
     gain = conditions.wrench_gain_sd * rng.standard_normal(6)
@@ -49,19 +49,25 @@ def up_in(quat_B_S: Array) -> Array:
 class WristSensor:
     """Turn the true wrench of each step into the controller's report.
 
-    reported(t) = C true(t - latency) + white noise + random walk - weight model - tare. C (6, 6) is the calibration error. Before the first tare the report
-    contains the hand's weight; after it, only the error of the controller's weight model remains when the hand turns.
+    reported(t) = C true(t - latency) + white noise + random walk - weight model - tare, with the calibration error
+    C (6, 6). Before the first tare the report contains the hand's weight; after it, only the error of the controller's
+    weight model, and of the calibration, remains when the hand turns.
 
     Args:
         description, conditions, seed: The robot, the sensor's disturbances, and their seed.
-        proof: Notes which axes altered a reading.
         steps: Samples in a block of `measure`; the noise of a sample does not depend on it.
+        proof: Notes which axes altered a reading; default: one of its own.
     """
 
     def __init__(
-        self, description: RobotDescription, conditions: Conditions, seed: int, proof: AxisProof, steps: int = STEPS
+        self,
+        description: RobotDescription,
+        conditions: Conditions,
+        seed: int,
+        steps: int = STEPS,
+        proof: AxisProof | None = None,
     ) -> None:
-        self._steps, self._proof = steps, proof
+        self._steps, self._proof = steps, proof or AxisProof(conditions)
         self._rng = stream(seed, "wrench")
         draw = stream(seed, "payload")
         self._mass_factor = 1.0 + conditions.payload_mass_error * float(draw.standard_normal())
