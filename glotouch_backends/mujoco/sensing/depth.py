@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import correlate1d
 
 from glotouch_backends.mujoco.axis_proof import AxisProof
 from glotouch_bt.robot import Array, Conditions
@@ -28,8 +28,21 @@ SMOOTH_LENGTH_M = 0.005
 """Correlation length of the smooth error. Source: ours; published depth maps err over regions, not pixels."""
 RECOVERY_S = 2.0
 """Time constant in which an unloaded gel recovers. Source: ours; silicone recovers within seconds."""
-FIELD_REACH = 3.0
+KERNEL_REACH = 3.5
 """Half width of a smoothing kernel over its sd."""
+
+
+def gaussian_weights(sd: float) -> Array:
+    """Return a Gaussian kernel (2 n + 1,) of sum one; `sd` in taxels, 0 for a kernel that changes nothing."""
+    n = math.ceil(KERNEL_REACH * sd)
+    weights = np.exp(-0.5 * (np.arange(-n, n + 1) / max(sd, 1e-9)) ** 2)
+    return np.asarray(weights / weights.sum())
+
+
+def smoothed(maps: Array, kernel: tuple[Array, Array]) -> Array:
+    """Return maps (n, rows, cols) smoothed along rows and columns; beyond an edge they continue with its values."""
+    rows = correlate1d(maps, kernel[0], axis=1, mode="nearest")
+    return np.asarray(correlate1d(rows, kernel[1], axis=2, mode="nearest"))
 
 
 class DepthErrors:
@@ -53,7 +66,7 @@ class DepthErrors:
         c = conditions
         self._proof = proof
         self._pitch = window_m[1] / shape[0], window_m[0] / shape[1]  # along rows, along columns
-        self._blur = self._kernel(c.gel_blur_m)
+        self._blur_sd, self._blur = c.gel_blur_m, self._kernel(c.gel_blur_m)
         self._bulge, self._bulge_kernel = c.gel_bulge_fraction, self._kernel(BULGE_WIDTH_M)
         self._hysteresis = c.tactile_hysteresis_fraction
         self._gain: Array = stream(seed, "tactile gain").uniform(*c.tactile_gain, (2, 1, 1))
@@ -66,8 +79,9 @@ class DepthErrors:
         self._touched = False
         self._draw()
 
-    def _kernel(self, sd_m: float) -> tuple[float, float, float]:
-        return 0.0, sd_m / self._pitch[0], sd_m / self._pitch[1]
+    def _kernel(self, sd_m: float) -> tuple[Array, Array]:
+        rows, cols = self._pitch
+        return gaussian_weights(sd_m / rows), gaussian_weights(sd_m / cols)
 
     def feel(self, maps_m: Array, now_s: float) -> None:
         """Note the true indentation (2, rows, cols) at a time; call whenever it was computed anew."""
@@ -84,11 +98,11 @@ class DepthErrors:
         """Return the maps (2, rows, cols) that the sensor computes for a true indentation."""
         out, saw, inside = maps_m, self._proof.saw, maps_m > 0.0
         if self._touched and not inside.all():
-            if self._blur[1] > 0.0:
-                before, out = out, np.where(inside, out, gaussian_filter(maps_m, self._blur, mode="nearest"))
+            if self._blur_sd > 0.0:
+                before, out = out, np.where(inside, out, smoothed(maps_m, self._blur))
                 saw("gel_blur_m", before, out)
             if self._bulge > 0.0:
-                around = gaussian_filter(maps_m, self._bulge_kernel, mode="nearest")
+                around = smoothed(maps_m, self._bulge_kernel)
                 top, deepest = around.max(axis=(1, 2)), maps_m.max(axis=(1, 2))
                 height = self._bulge * np.divide(deepest, top, out=np.zeros(2), where=top > 0.0)
                 before, out = out, np.where(inside, out, out - height[:, None, None] * around)
@@ -110,13 +124,11 @@ class DepthErrors:
         """Draw the smooth error of both pads: white noise on a larger area, filtered, of unit variance, and cut out."""
         if self._smooth_sd == 0.0:
             return
-        _, sd_rows, sd_cols = self._smooth_kernel
-        pad = math.ceil(FIELD_REACH * sd_rows), math.ceil(FIELD_REACH * sd_cols)
+        along, across = self._smooth_kernel
         rows, cols = self._field.shape[1:]
+        pad = len(along) // 2, len(across) // 2
         white = self._rng.standard_normal((2, rows + 2 * pad[0], cols + 2 * pad[1]))
-        smooth = gaussian_filter(white, self._smooth_kernel, mode="constant", truncate=FIELD_REACH)
-        one = np.zeros((2 * pad[0] + 1, 2 * pad[1] + 1))
-        one[pad] = 1.0
-        kernel = gaussian_filter(one, self._smooth_kernel[1:], mode="constant", truncate=FIELD_REACH)
-        unit = math.sqrt(float((kernel * kernel).sum()))
-        self._field[:] = self._smooth_sd / unit * smooth[:, pad[0] : pad[0] + rows, pad[1] : pad[1] + cols]
+        unit = math.sqrt(float((along @ along) * (across @ across)))
+        self._field[:] = (
+            self._smooth_sd / unit * smoothed(white, (along, across))[:, pad[0] : -pad[0], pad[1] : -pad[1]]
+        )

@@ -18,31 +18,30 @@ class PoseReports:
     """
 
     def __init__(self, built: BuiltWorld) -> None:
-        joints = built.description.joints
-        bodies = [built.model.body(j.link.name).id for j in joints]
-        self._data, self._bodies = built.data, np.array(bodies)
-        self._parents = built.model.body_parentid[bodies]
-        errors = built.truth.joint_errors_rad
+        joints, errors = built.description.joints, built.truth.joint_errors_rad
+        first = int(built.model.body(joints[0].link.name).id)  # the links are numbered along the chain, after the base
+        self._active = bool(errors.any())
+        self._rotations = built.data.xmat[first - 1 : first - 1 + len(joints)].reshape(-1, 3, 3)
+        self._origins = built.data.xpos[first : first + len(joints)]
         self._errors_parent: Array = np.array(
             [rpy_to_matrix(j.origin_rpy_rad) @ e for j, e in zip(joints, errors, strict=True)]
-        )[:, :, None]
-        self._active = bool(errors.any())
+        )[:, None, :]
 
     def correct(self, rows: Array, columns: SensorMap) -> None:
         """Replace position and orientation of P in sensor rows (n, nsensordata) of one period."""
         if not self._active:
             return
-        data = self._data
-        turns = (data.xmat[self._parents].reshape(-1, 3, 3) @ self._errors_parent)[:, :, 0]
-        turn = turns.sum(axis=0)
-        position = rows[:, columns.position]
-        x, y, z = turn.tolist()
-        # sum of e_i x (p - p_i)
-        shift = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) @ position[-1]
-        moment = data.xpos[self._bodies].T @ turns  # (3, 3): sum of p_i e_i
-        shift -= (moment[2, 1] - moment[1, 2], moment[0, 2] - moment[2, 0], moment[1, 0] - moment[0, 1])
-        position -= shift
+        turns = (self._rotations * self._errors_parent).sum(axis=2)  # e_i in B
+        ((_, mxy, mxz), (myx, _, myz), (mzx, mzy, _)) = (self._origins.T @ turns).tolist()  # sum of p_i e_i
+        x, y, z = turns.sum(axis=0).tolist()
+        px, py, pz = rows[-1, columns.position].tolist()
+        # the sum of e_i x (p - p_i) is (sum of e_i) x p + sum of p_i x e_i
+        rows[:, columns.position] -= (
+            y * pz - z * py + myz - mzy,
+            z * px - x * pz + mzx - mxz,
+            x * py - y * px + mxy - myx,
+        )
         a, b, c = -0.5 * x, -0.5 * y, -0.5 * z
         w = math.sqrt(1.0 - a * a - b * b - c * c)
-        left = np.array([[w, -a, -b, -c], [a, w, -c, b], [b, c, w, -a], [c, -b, a, w]])
+        left = np.array(((w, -a, -b, -c), (a, w, -c, b), (b, c, w, -a), (c, -b, a, w)))
         rows[:, columns.quat] = rows[:, columns.quat] @ left.T

@@ -45,7 +45,20 @@ FIXED: Mapping[str, frozenset[str]] = {
     "WristSensor": frozenset(("_P_in_S", "_proof", "_gain_error", "_cross_talk", "_reach", "_jitter", "_calibrated")),
     "HardLimitGuard": frozenset(("_max_N", "_max_Nm", "_rise_s_m", "_samples_ahead", "tripped")),
     "Tactile": frozenset(("_data", "_pads", "_site", "_gel", "_meshes", "_rays", "_c", "depth", "_proof", "_smooth")),
-    "DepthErrors": frozenset(("_proof", "_pitch", "_blur", "_bulge_kernel", "_smooth_kernel", "_gain")),
+    "DepthErrors": frozenset(
+        (
+            "_proof",
+            "_pitch",
+            "_blur",
+            "_blur_sd",
+            "_bulge",
+            "_hysteresis",
+            "_smooth_sd",
+            "_bulge_kernel",
+            "_smooth_kernel",
+            "_gain",
+        )
+    ),
     "JawReports": frozenset(("_c", "_proof")),
     "AxisProof": frozenset(("_open",)),
 }
