@@ -207,7 +207,7 @@ def _check_twins(
 ) -> None:
     """Report the objects that cannot be told from a target."""
     for name, parameter in parameters.items():
-        if parameter.declared.type != "stl" or parameter.value is None:
+        if parameter.declared.type != "stl" or not parameter.value:
             continue
         twins = twins_of(str(parameter.value), objects)
         if twins:

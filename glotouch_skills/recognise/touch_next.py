@@ -9,6 +9,7 @@ import numpy as np
 
 from glotouch_bt.motion import Motion, hand_pose_B
 from glotouch_bt.perception import recognition
+from glotouch_bt.perception.recognition import PARTS, ProbeTouch
 from glotouch_bt.perception.touch import Candidate, Layer, TouchSequence, TouchSet
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import HOLD, Array, MotionRefused
@@ -43,6 +44,7 @@ class TouchNextParams(ClosureParams):
 
     target: str = param("The object to find: an STL file, or the name of one in the world's object folder", names="stl")
     confidence: float = param("Sufficient probability", default=0.95, gt=0.5, lt=1.0)
+    unmeasured: bool = param("Touch candidates that the probe did not measure, too", default=False)
     min_gain_nats: float = param("Least expected gain of a closure", default=0.005, ge=0.0, formerly="least_gain_nats")
 
 
@@ -73,6 +75,7 @@ class TouchNext(Skill):
     candidates = In(tuple, "objects that may be touched", element=Candidate)
     felt = In(tuple, "touches so far", key="touchsets", element=TouchSet, required=False)
     rejected = In(tuple, "indices of rejected candidates", required=False)
+    probed = In(tuple, "what the probe measured; not given: everything", element=ProbeTouch, required=False)
     jaw_zero = In(JawZero, "offset of the reported aperture", required=False)
     touchsets = Out(tuple, "touches, one TouchSet for each candidate", element=TouchSet)
     decided = Out(bool, "no further closure is needed")
@@ -120,7 +123,7 @@ class TouchNext(Skill):
         belief = recognition.infer_belief(self._target_model(), touchsets)
         vain = (t for t in touchsets if not any(layer.stable for layer in t.layers))
         self._hopeless = frozenset(t.candidate.index for t in vain if len(t.layers) >= MAX_VAIN_CLOSURES)
-        why = self._enough(belief)
+        why = recognition.enough(belief, self.params.confidence, self._hopeless)
         chosen = None if why else self._choose(belief, down)
         if chosen is None:
             yield from self._end(belief, down, why or "no closure is expected to tell more")
@@ -156,20 +159,6 @@ class TouchNext(Skill):
             self._model = load_target_model(mesh, self.context.arm.description.gripper)
         return self._model
 
-    def _enough(self, belief: Belief) -> str:
-        """Return why no further closure is needed, or an empty text.
-
-        Conclude that the target is absent only when every candidate was touched, and the likeliest as often as taking
-        it would require. Outlines and single closures do not suffice.
-        """
-        ranking = belief.ranking
-        best = max(ranking.matches, key=lambda m: m.probability)
-        if best.probability >= self.params.confidence and ranking.accepted:
-            return f"candidate {best.index} is the target (probability {best.probability:.3f})"
-        if ranking.p_absent >= self.params.confidence and not self._wanted(belief):
-            return f"none of them is the target (probability {ranking.p_absent:.3f})"
-        return ""
-
     def _choose(self, belief: Belief, down: Squeezing | None) -> Option | None:
         """Return the feasible closure with the most gain per time, or None if none gains enough."""
         p, arm = self.params, self.context.arm
@@ -178,7 +167,8 @@ class TouchNext(Skill):
         if down is not None:
             standing = Standing(down.candidate.index, down.at, float(pose_K_P.position_m[2]))
         found = options(belief.touchsets, standing, pose_K_P.position_m, arm.description.gripper, p)
-        found = [o for o in found if _key(o) not in self._refused and o.closure.candidate not in self._hopeless]
+        barred = self._hopeless | self._unmeasured(belief)
+        found = [o for o in found if _key(o) not in self._refused and o.closure.candidate not in barred]
         if not found:
             return None
         closures = [c for o in found for c in (o.closure, *o.after)]
@@ -186,15 +176,24 @@ class TouchNext(Skill):
         rates = best_rates(found, gains)
         worth = np.array([g.max() for g in gains]) >= p.min_gain_nats
         quick = np.array([1.0 / o.seconds for o in found])
+        wanted = recognition.wanted(belief, p.confidence, self._hopeless)
+        short = recognition.short_of_evidence(belief)
         for score in (
-            quick * [o.closure.candidate in self._wanted(belief) for o in found],
+            quick * [o.closure.candidate in wanted for o in found],
             rates * worth,
-            quick * [o.closure.candidate in _short_of_evidence(belief) for o in found],
+            quick * [o.closure.candidate in short for o in found],
         ):
             option = self._first(belief, found, gains, score, down)
             if option is not None:
                 return option
         return None
+
+    def _unmeasured(self, belief: Belief) -> frozenset[int]:
+        """Return the candidates whose outline or top the probe did not measure, unless the jaws may close on them."""
+        if self.probed is None or self.params.unmeasured:
+            return frozenset()
+        tried = [t.candidate for t in self.probed]
+        return frozenset(t.candidate.index for t in belief.touchsets if tried.count(t.candidate.index) < len(PARTS))
 
     def _first(
         self, belief: Belief, found: list[Option], gains: list[Array], score: Array, down: Squeezing | None
@@ -210,16 +209,6 @@ class TouchNext(Skill):
                 return replace(option, closure=replace(option.closure, gain_nats=float(gains[i][0])))
             self._refused.add(_key(option))
         return None
-
-    def _wanted(self, belief: Belief) -> set[int]:
-        """Return candidates to touch whatever the gain, where a decision lacks only evidence; mostly none."""
-        ranking, confidence = belief.ranking, self.params.confidence
-        if max(m.probability for m in ranking.matches) >= confidence:
-            return _short_of_evidence(belief)
-        if ranking.p_absent >= confidence:
-            unfelt = {t.candidate.index for t in belief.touchsets if not any(layer.stable for layer in t.layers)}
-            return (unfelt or _short_of_evidence(belief)) - self._hopeless
-        return set()
 
     def _fits(self, belief: Belief, option: Option, down: Squeezing | None) -> bool:
         """Return True if the open hand fits beside the neighbours, as it does where it already stands."""
@@ -300,12 +289,6 @@ def _with_layer(touchset: TouchSet, hand: Squeezing, layer: Layer) -> TouchSet:
         return replace(touchset, sequences=(*touchset.sequences[:-1], replace(last, layers=(*last.layers, layer))))
     begun = TouchSequence(hand.at.position_K_m, hand.yaw_K_rad, (layer,))
     return replace(touchset, sequences=(*touchset.sequences, begun))
-
-
-def _short_of_evidence(belief: Belief) -> set[int]:
-    """Return the likeliest candidate if both pads did not touch it as often as a decision requires."""
-    best = max(belief.ranking.matches, key=lambda m: m.probability)
-    return {best.index} if best.evidence < belief.params.evidence else set()
 
 
 def _key(option: Option) -> tuple[int, int, int, int]:

@@ -137,7 +137,7 @@ def test_check_reports_every_file(command: CliRunner, tmp_path: Path) -> None:
 def test_tree_draws_text_and_svg(command: CliRunner, tmp_path: Path) -> None:
     text = command.invoke(cli.app, ["tree", "retrieve"])
     assert text.exit_code == 0
-    for name in ("tool_pickup", "guarded_sweep", "orbit_probe", "squeeze", "match", "grasp", "lift"):
+    for name in ("tool_pickup", "guarded_sweep", "orbit_probe", "touch_next", "match", "grasp", "lift"):
         assert name in text.stdout
     import xml.etree.ElementTree as ET
 

@@ -1,4 +1,4 @@
-"""Scripted leaves for the specification of glotouch_missions/retrieve.yaml."""
+"""Scripted leaves for the specification of glotouch_missions/retrieve_fixed.yaml and retrieve.yaml."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from glotouch_bt.mission.read.library import SkillRegistry
-from glotouch_bt.mission_testing import ScriptedRun, ok, stand_in
+from glotouch_bt.mission_testing import Call, ScriptedRun, ok, stand_in
+from glotouch_bt.perception.recognition import PARTS, ProbeTouch
 from glotouch_bt.perception.touch import Candidate
 
 SWEEP, JAWS, TAKE = "*/explore/*", "*/squeeze_all/*", "*/take_target/*"
@@ -22,10 +23,10 @@ Run = Callable[..., ScriptedRun]
 
 @pytest.fixture
 def retrieve(scripted: Any) -> Run:
-    """Run the mission with a script; all that is not scripted succeeds, and what is swept is one object."""
+    """Run `retrieve_fixed` with a script; all that is not scripted succeeds, and what is swept is one object."""
 
-    def run(script: dict[str, Any] | None = None, **settings: Any) -> ScriptedRun:
-        done: ScriptedRun = scripted("retrieve", script or {}, settings=settings)
+    def run(script: dict[str, Any] | None = None, mission: str = "retrieve_fixed", **settings: Any) -> ScriptedRun:
+        done: ScriptedRun = scripted(mission, {"next_probe*": measures(), **(script or {})}, settings=settings)
         return done
 
     return run
@@ -43,6 +44,29 @@ def candidates(*qualities: float) -> tuple[Candidate, ...]:
 def found(n: int, **ports: Any) -> Any:
     """Return orbit_probe's answer when this many objects are known."""
     return ok(candidates=candidates(*[0.5] * n), found=n, **ports)
+
+
+def measures(*only: int) -> Any:
+    """Return next_probe's answers: each candidate's outline, then its top, the worst known first; `only` some of them.
+
+    With a target, those left out count as excluded.
+    """
+
+    def answer(call: Call) -> Any:
+        new, tried = call.inputs.get("measured"), call.inputs.get("before") or ()
+        known = tuple(new if new is not None and new.index == c.index else c for c in call.inputs["known"])
+        done = {(t.candidate, t.part) for t in tried}
+        left = [(c, part) for c in sorted(known, key=lambda c: c.quality) for part in PARTS]
+        left = [(c, part) for c, part in left if (c.index, part) not in done]
+        todo = [(c, part) for c, part in left if not (only and call.params.target) or c.index in only]
+        c, part = todo[0] if todo else (known[0], "")
+        probed = (*tried, ProbeTouch(c.index, part)) if todo else tried
+        return ok(
+            candidates=known, candidate=c, next_part=part, probed=probed, measured_enough=not todo,
+            unmeasured=len({c.index for c, _ in left}),
+        )  # fmt: skip
+
+    return answer
 
 
 def skills(run: ScriptedRun, pattern: str) -> list[str]:

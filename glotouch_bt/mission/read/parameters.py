@@ -165,7 +165,8 @@ def _valued(name: str, declared: Declaration, given: Scalar, findings: Findings,
         return lost
     if declared.type == "float":
         value = float(value)
-    if declared.type == "stl" and not stl_usable(str(value), folder, place, findings):
+    named = declared.type == "stl" and not (value == "" and declared.default == "")  # empty: no object
+    if named and not stl_usable(str(value), folder, place, findings):
         return lost
     _check_span(name, given, declared, unit, findings)
     return Parameter(name, declared, value, unit)

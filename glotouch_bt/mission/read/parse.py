@@ -179,6 +179,8 @@ def _skill(name: str, skill: type[Skill], place: Place, body: Node, scope: Scope
     for key, value in rest.entries if scope.stl_folder is not None else ():
         field = skill.Params.model_fields.get(str(key.value))
         if field is not None and named_by(field) == "stl" and isinstance(value, Scalar) and not value.poisoned:
+            if value.value == "" and field.default == "":
+                continue  # no object
             stl_usable(str(value.value), scope.stl_folder, value.place, scope.findings)
     keys = skill.default_keys()
     reads = {p: Wire(p, scope.key(keys[p]), place) for p in skill.INPUT_PORTS}

@@ -7,16 +7,27 @@ ranking = MATCHERS["likelihood"](model, touchsets)
 from typing import TYPE_CHECKING
 
 from glotouch_bt.lazy import lazy_door
-from glotouch_bt.perception.recognition.decision import Closure, Fit, Gates, Match, Ranking, rank
+from glotouch_bt.perception.recognition.decision import PARTS, Closure, Fit, Gates, Match, ProbeTouch, Ranking, rank
 
 if TYPE_CHECKING:
     from glotouch_bt.perception.recognition.likelihood import Belief, expected_gain, infer_belief
     from glotouch_bt.perception.recognition.matchers import MATCHERS, Matcher
     from glotouch_bt.perception.recognition.model import PadSpec, TargetModel
+    from glotouch_bt.perception.recognition.schedule import (
+        ProbeOption,
+        enough,
+        excluded,
+        next_probe_touch,
+        short_of_evidence,
+        wanted,
+    )
 
 __getattr__ = lazy_door(
     __name__,
     **dict.fromkeys(("Belief", "infer_belief", "expected_gain"), "likelihood"),
     **dict.fromkeys(("MATCHERS", "Matcher"), "matchers"),
     **dict.fromkeys(("PadSpec", "TargetModel"), "model"),
+    **dict.fromkeys(
+        ("ProbeOption", "enough", "excluded", "next_probe_touch", "short_of_evidence", "wanted"), "schedule"
+    ),
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 from glotouch_bt.robot import Array, ParamError
 
@@ -51,6 +52,26 @@ class Match:
     pose_K_O: tuple[float, float, float]
     evidence: float
     probability: float = math.nan
+
+
+Part = Literal["outline", "top"]
+PARTS: tuple[Part, ...] = ("outline", "top")
+"""What the probe measures of a candidate, in the order of the fixed scheme."""
+
+
+@dataclass(frozen=True)
+class ProbeTouch:
+    """A possible next measurement with the probe.
+
+    Attributes:
+        candidate: Index of the candidate.
+        part: Its outline at the sensing height, or its top.
+        gain_nats: As in `Closure`.
+    """
+
+    candidate: int
+    part: Part
+    gain_nats: float = math.nan
 
 
 @dataclass(frozen=True)

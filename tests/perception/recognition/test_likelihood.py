@@ -21,6 +21,10 @@ from tests.support.acquisition import HARSH, IDEAL, NOMINAL, acquire
 
 likelihood = MATCHERS["likelihood"]
 
+PRIOR = LikelihoodParams()
+BY_OUTLINE = 1 / (1 + PRIOR.twin * PRIOR.prior_absent / (1 - PRIOR.prior_absent))
+"""Largest probability of one candidate without closures: a twin may have the same outline and height."""
+
 
 @pytest.fixture(scope="module")
 def meshes(solids):
@@ -177,7 +181,7 @@ def test_no_touch_is_no_evidence(meshes) -> None:
         ranking = likelihood(model, [t])
         assert ranking.best.evidence == 0
         assert ranking.best.fit is None
-        assert ranking.best.probability < 0.95
+        assert ranking.best.probability < BY_OUTLINE
         assert not ranking.accepted
         assert "no evidence" in ranking.reasons[0]
         assert total(ranking) == pytest.approx(1.0)

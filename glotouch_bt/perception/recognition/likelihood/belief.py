@@ -8,11 +8,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from glotouch_bt.perception.recognition.decision import Closure, Ranking
+from glotouch_bt.perception.recognition.decision import Closure, ProbeTouch, Ranking
 from glotouch_bt.perception.recognition.likelihood.gain import expected_gains, predict
 from glotouch_bt.perception.recognition.likelihood.pair import Pair, TouchSetReading, compare, read_touchset
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.perception.recognition.likelihood.posterior import decide
+from glotouch_bt.perception.recognition.likelihood.probe_gain import expected_probe_gains
 from glotouch_bt.perception.recognition.model import TargetModel
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.robot import Array, ParamError
@@ -91,18 +92,23 @@ def check(touchsets: Sequence[TouchSet]) -> None:
             raise ParamError(f"candidate {t.candidate.index}", "outline or height", "finite")
 
 
-def expected_gain(belief: Belief, closures: Sequence[Closure]) -> Array:
-    """Return the expected information gain (n,), nats, of each closure about which candidate, or none, is the target.
+def expected_gain(belief: Belief, touches: Sequence[Closure] | Sequence[ProbeTouch]) -> Array:
+    """Return the expected information gain (n,), nats, of each touch about which candidate, or none, is the target.
 
     Raises:
-        ParamError: A closure on an unknown candidate.
+        ParamError: A touch on an unknown candidate.
     """
     known = {x.index for x in belief.pairs}
-    for c in closures:
+    for c in touches:
         if c.candidate not in known:
-            raise ParamError("closure.candidate", c.candidate, f"one of {sorted(known)}")
+            raise ParamError("touch.candidate", c.candidate, f"one of {sorted(known)}")
     shares = {m.index: m.probability for m in belief.ranking.matches}
     model, p = belief.model, belief.params
+    probed = [t for t in touches if isinstance(t, ProbeTouch)]
+    if probed:
+        candidates = [t.candidate for t in belief.touchsets]
+        return expected_probe_gains(model, candidates, belief.pairs, belief.ranking, probed, p)
+    closures = [t for t in touches if isinstance(t, Closure)]
     predictions = {x.index: predict(model, r, x, p) for r, x in zip(belief.readings, belief.pairs, strict=True)}
     return expected_gains(model, predictions, shares, belief.ranking.p_absent, closures, p)
 

@@ -120,7 +120,7 @@ def expected_gains(
             ratio += _image_ratios(side, library, others, generic_other, q.weight, p)
         ratio *= p.slope * novelty[:, None]
         s = width.shape[1]
-        out[where] = _gains(ratio[:, :s], q.weight, ratio[:, s:], shares[candidate], entropy)
+        out[where] = entropy_decrease(ratio[:, :s], q.weight, ratio[:, s:], shares[candidate], entropy)
     return out
 
 
@@ -152,8 +152,16 @@ def _image_ratios(
     return np.asarray(p.temper_image * np.log((1 - p.image_outlier) * ratio + p.image_outlier), dtype=np.float64)
 
 
-def _gains(there: Array, weight: Array, not_there: Array, share: float, entropy: float) -> Array:
-    """Return entropy minus its expectation (n,) after an observation that changes one candidate's odds."""
+def entropy_decrease(there: Array, weight: Array, not_there: Array, share: float, entropy: float) -> Array:
+    """Return entropy minus its expectation (n,), nats, after an observation that changes one candidate's odds.
+
+    Args:
+        there: (n, s) changes of its log odds, nats, if it is the target.
+        weight: (s,) their weights, summing to 1.
+        not_there: (n, o) changes of its log odds if it is not, equally likely.
+        share: Its probability.
+        entropy: Entropy of {candidates, none} before, nats.
+    """
     if share <= 0 or share >= 1:
         return np.zeros(len(there))
     own = -(share * math.log(share) + (1 - share) * math.log1p(-share))

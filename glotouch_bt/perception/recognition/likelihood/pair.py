@@ -114,7 +114,7 @@ def compare(model: TargetModel, reading: TouchSetReading, p: LikelihoodParams) -
         "contour": contour_ratio(model, candidate, p),
     }
     if not reading.sequences:
-        ratio = p.offset + p.slope * sum(terms.values())
+        ratio = p.outline_offset + p.slope * sum(terms.values())
         return Pair(candidate.index, ratio, 0.0, terms, None, 0.0, 0.0, None, contour_pose(touchset), 0.0)
     zero_sd = max(layer.zero_sd_m for layer in touchset.layers)
     grid = Grid.of(p, zero_sd)

@@ -35,6 +35,7 @@ class LikelihoodParams:
         yaw_sd_rad: Standard deviation of a box contour's direction.
         temper_width, temper_image: Tempering exponents for correlated observations.
         slope, offset: Calibration: log odds against the background = offset + slope * summed log ratios.
+        outline_offset: The same offset for a candidate of which only outline and height were measured.
         prior_absent: Prior probability that the target is none of the candidates.
         twin: Prior probability that another object is a twin, i.e. similar to the target.
         twin_width: Probability that a twin differs at a closure, or in a height band.
@@ -73,6 +74,7 @@ class LikelihoodParams:
     temper_image: float = 0.35
     slope: float = 0.8
     offset: float = -3.2
+    outline_offset: float = -1.0
     prior_absent: float = 0.2
     twin: float = 0.12
     twin_width: float = 0.5
@@ -85,7 +87,7 @@ class LikelihoodParams:
     def __post_init__(self) -> None:
         for f in fields(self):
             v = getattr(self, f.name)
-            if not math.isfinite(v) or (v < 0 and f.name != "offset"):
+            if not math.isfinite(v) or (v < 0 and not f.name.endswith("offset")):
                 raise ParamError(f"likelihood.{f.name}", v, "finite and not negative")
             if (f.name.endswith(("_sd_m", "_sd_rad", "_range_m")) or f.name.startswith("image_s")) and v == 0:
                 raise ParamError(f"likelihood.{f.name}", v, "positive")

@@ -35,12 +35,16 @@ def ratios(pairs: Sequence[Pair], p: LikelihoodParams) -> list[float]:
     A twin would fit its own closures as well as the best candidate fits the target, per two-sided layer. A worse fit is
     evidence for the twin. This separates candidates by images where widths cannot, e.g. mirror images.
     """
-    rates = [x.log_ratio / max(x.evidence, 1.0) for x in pairs]
-    level = max(rates, default=0.0)
-    return [
-        log_ratio_to_others(x.log_ratio, x.log_twin, p, p.twin_fit * max(level - rate, 0.0) * max(x.evidence, 1.0))
-        for x, rate in zip(pairs, rates, strict=True)
-    ]
+    level = max((x.log_ratio / max(x.evidence, 1.0) for x in pairs if x.evidence > 0), default=0.0)
+
+    def missed(x: Pair) -> float:
+        """Return what a twin would fit better; nothing without closures, which outlines cannot be compared with."""
+        if x.evidence == 0:
+            return 0.0
+        layers = max(x.evidence, 1.0)
+        return p.twin_fit * max(level - x.log_ratio / layers, 0.0) * layers
+
+    return [log_ratio_to_others(x.log_ratio, x.log_twin, p, missed(x)) for x in pairs]
 
 
 def probabilities(log_ratios: Sequence[float], p: LikelihoodParams) -> tuple[Array, float]:

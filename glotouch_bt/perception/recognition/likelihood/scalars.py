@@ -48,7 +48,7 @@ def contour_ratio(model: TargetModel, candidate: Candidate, p: LikelihoodParams)
     low, high = SIZES_M
     good = other = 1.0
     for i in range(1 if one else 2):
-        sd = math.sqrt(p.contour_sd_m**2 + traced.size_sd_m[i] ** 2 + _size_variance_m2(contour, i))
+        sd = math.sqrt(p.contour_sd_m**2 + traced.size_sd_m[i] ** 2 + size_variance_m2(contour, i))
         good *= _student((contour.size_m[i] - traced.size_m[i]) / sd) / sd
         other /= high - low
     return math.log((1 - p.contour_outlier) * good / other + p.contour_outlier)
@@ -86,8 +86,14 @@ def _student(z: float) -> float:
     return float(c * (1 + z * z / TAIL) ** (-0.5 * (TAIL + 1)))
 
 
-def _size_variance_m2(contour: Contour, side: int) -> float:
-    """Return the variance of a whole side from the fit's covariance of the half; 0 if unknown."""
-    at = {"circle": 2, "rectangle": 3 + side}.get(contour.family or "", len(contour.covariance))
-    variance = 4.0 * float(contour.covariance[at, at]) if at < len(contour.covariance) else 0.0
+def size_variance_m2(contour: Contour, side: int) -> float:
+    """Return the variance of a whole side from the fit's covariance of the half; 0 if unknown.
+
+    A free outline has a covariance of its centre only; half a side is at most as uncertain as that.
+    """
+    covariance = contour.covariance
+    if contour.family == "free" and covariance.shape == (2, 2) and np.isfinite(covariance).all():
+        return 4.0 * float(np.linalg.eigvalsh(covariance)[-1])
+    at = {"circle": 2, "rectangle": 3 + side}.get(contour.family or "", len(covariance))
+    variance = 4.0 * float(covariance[at, at]) if at < len(covariance) else 0.0
     return variance if math.isfinite(variance) else 0.0

@@ -1,0 +1,120 @@
+"""Choose what the probe measures next: the outline or the top of a candidate."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from glotouch_bt.perception import recognition
+from glotouch_bt.perception.recognition import PARTS, ProbeOption, ProbeTouch, excluded, next_probe_touch
+from glotouch_bt.perception.touch import Candidate, TouchSet
+from glotouch_bt.robot import HOLD, Array
+from glotouch_bt.skill import Context, Failure, In, Out, Skill, SkillParams, SkillRun, param
+from glotouch_skills.common.planning import TOO_LOW, load_target, load_target_model
+
+if TYPE_CHECKING:
+    from glotouch_bt.perception.recognition import TargetModel
+
+OUTLINE_S, TOP_S = 29.0, 18.0
+"""Robot time of `refine_outline` and `touch_top` on one candidate. Source: measured, seed 7000."""
+TRAVEL_M_S = 0.1
+"""Speed on the way to a candidate."""
+
+
+class NextProbeParams(SkillParams):
+    """Parameters of `next_probe`."""
+
+    target: str = param(
+        "The object wanted: an STL file, or the name of one in the world's object folder; empty: measure everything",
+        default="",
+        names="stl",
+    )
+
+
+class NextProbe(Skill):
+    """Choose the measurement that is expected to tell most per second about which candidate is the target.
+
+    Repeat it, and make what it chose with `refine_outline` or `touch_top`, until `measured_enough`. A candidate that
+    the target's STL excludes already is not measured. Without a target all are, the least certain outline first.
+
+    SUCCESS: `candidate` and `next_part` are chosen, or `measured_enough` is true and `next_part` is empty.
+    """
+
+    Params = NextProbeParams
+    params: NextProbeParams
+
+    USES: ClassVar = frozenset({"arm"})  # it holds the arm while it computes
+
+    NO_CANDIDATES = Failure("no_candidates", "there is nothing to measure", advice="explore first")
+    FAILURES: ClassVar = (TOO_LOW,)
+
+    known = In(tuple, "all candidates", key="candidates", element=Candidate, required=False)
+    measured = In(Candidate, "the candidate measured last", key="candidate", required=False)
+    before = In(tuple, "measurements tried so far", key="probed", element=ProbeTouch, required=False)
+    candidates = Out(tuple, "all candidates, with what was measured last", element=Candidate)
+    candidate = Out(Candidate, "the candidate to measure")
+    next_part = Out(str, 'what to measure of it: "outline", "top", or nothing')
+    probed = Out(tuple, "measurements tried, with the one chosen now", element=ProbeTouch)
+    measured_enough = Out(bool, "no measurement is left that is worth its time")
+    unmeasured = Out(int, "number of candidates whose outline or top was left out")
+
+    def __init__(self, name: str, params: SkillParams, context: Context) -> None:
+        super().__init__(name, params, context)
+        self._model: TargetModel | None = None
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        if not self.known:
+            raise self.NO_CANDIDATES("there is no candidate to measure")
+        yield HOLD  # the computation takes longer than a control period; on hardware the arm holds meanwhile
+        new, before = self.measured, self.before or ()
+        candidates = tuple(new if new is not None and new.index == c.index else c for c in self.known)
+        tried = {(t.candidate, t.part) for t in before}
+        left = [ProbeTouch(c.index, part) for c in candidates for part in PARTS if (c.index, part) not in tried]
+        touch = self._by_target(candidates, left) if self.params.target else _worst_known(candidates, left)
+        self.candidates, self.measured_enough = candidates, touch is None
+        self.unmeasured = len({t.candidate for t in left})
+        self.next_part = "" if touch is None else touch.part
+        self.probed = before if touch is None else (*before, touch)
+        self.candidate = next(c for c in candidates if touch is None or c.index == touch.candidate)
+
+    def _by_target(self, candidates: tuple[Candidate, ...], left: list[ProbeTouch]) -> ProbeTouch | None:
+        belief = recognition.infer_belief(self._target_model(), tuple(TouchSet(c, ()) for c in candidates))
+        chosen = next_probe_touch(belief, [ProbeOption(t, self._seconds(candidates, t)) for t in left])
+        out = excluded(belief)
+        self.event(
+            "next_probe",
+            touch=chosen.touch if chosen else None,
+            seconds=chosen.seconds if chosen else 0.0,
+            probability={m.index: m.probability for m in belief.ranking.matches},
+            p_absent=belief.ranking.p_absent,
+            excluded=sorted(out),
+        )
+        return chosen.touch if chosen else None
+
+    def _target_model(self) -> TargetModel:
+        """Return the target's model, kept in memory.
+
+        Raises:
+            SkillFailed: `too_low`.
+        """
+        if self._model is None:
+            mesh = load_target(self.params.target, self.context.world.objects.folder)
+            self._model = load_target_model(mesh, self.context.arm.description.gripper)
+        return self._model
+
+    def _seconds(self, candidates: tuple[Candidate, ...], touch: ProbeTouch) -> float:
+        """Return the robot time of a measurement, with the way to it."""
+        arm, container = self.context.arm, self.context.world.container
+        here: Array = container.pose_B_K.inverse().apply(arm.pose_B_P.position_m)[:2]
+        (centre,) = (c.contour.centre_K_m for c in candidates if c.index == touch.candidate)
+        way_s = float(np.linalg.norm(centre - here)) / TRAVEL_M_S
+        return way_s + (OUTLINE_S if touch.part == "outline" else TOP_S)
+
+
+def _worst_known(candidates: tuple[Candidate, ...], left: list[ProbeTouch]) -> ProbeTouch | None:
+    """Return the next measurement of all: one candidate after the other, the least certain outline first."""
+    begun = {t.candidate for t in left if t.part == "top"} - {t.candidate for t in left if t.part == "outline"}
+    quality = {c.index: c.quality for c in candidates}
+    return min(left, key=lambda t: (t.candidate not in begun, quality[t.candidate], PARTS.index(t.part)), default=None)

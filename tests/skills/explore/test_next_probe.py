@@ -1,0 +1,85 @@
+"""next_probe: which candidate's outline or top the probe measures next."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import trimesh
+from py_trees.common import Status
+
+from glotouch_bt.perception.recognition import ProbeTouch
+from glotouch_skills.explore.next_probe import NextProbe
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory):
+    path = tmp_path_factory.mktemp("stl")
+    trimesh.creation.cylinder(0.030, 0.070, sections=96).export(path / "can.stl")
+    return path
+
+
+@pytest.fixture
+def asked(bench, folder):
+    def ask(known, target="", **inputs):
+        b = bench()
+        b.context.world = replace(b.world, objects=replace(b.world.objects, folder=folder))
+        skill = b.make(NextProbe, inputs={"known": known, **inputs}, target=target)
+        b.run(skill)
+        assert not [c for c in b.commands if c.motion is not None]
+        return skill
+
+    return ask
+
+
+@pytest.fixture
+def things(found):
+    """Outlines of the can, and of two objects that it cannot be: one is higher, the tops of the others are unknown."""
+    can, thin, long = found.round((0.0, 0.0), 0.03), found.round((0.1, 0.0), 0.012, index=1), found.box(
+        (-0.1, 0.0), (0.10, 0.04), index=2
+    )  # fmt: skip
+    known = zip((can, thin, long), (0.018, 0.1, 0.018), (0.9, 0.2, 0.5), strict=True)
+    return tuple(replace(c, height_m=z, quality=q) for c, z, q in known)
+
+
+def walk(asked, known, target=""):
+    """Return (candidate, part) of all measurements, and the last answer."""
+    made, inputs = [], {}
+    for _ in range(20):
+        skill = asked(known, target, **inputs)
+        assert skill.status is Status.SUCCESS, skill.feedback_message
+        if skill.measured_enough:
+            assert skill.next_part == ""
+            return made, skill
+        made.append((skill.candidate.index, skill.next_part))
+        known, inputs = skill.candidates, {"before": skill.probed}
+    pytest.fail("it never ends")
+
+
+def test_without_a_target_everything_is_measured_the_worst_known_first(asked, things) -> None:
+    made, last = walk(asked, things)
+    assert made == [(i, part) for i in (1, 2, 0) for part in ("outline", "top")]
+    assert last.unmeasured == 0
+    assert last.probed == tuple(ProbeTouch(i, part) for i, part in made)
+
+
+def test_with_a_target_only_what_may_be_it_is_measured(asked, things) -> None:
+    made, last = walk(asked, things, "can")
+    assert {i for i, _ in made} == {0}
+    assert sorted(part for _, part in made) == ["outline", "top"]
+    assert last.unmeasured == 2
+
+
+def test_what_was_measured_last_replaces_what_was_known(asked, things) -> None:
+    new = replace(things[1], height_m=0.05)
+    skill = asked(things, measured=new, before=(ProbeTouch(1, "outline"),))
+    assert skill.candidates == (things[0], new, things[2])
+    assert (skill.candidate, skill.next_part) == (new, "top")
+
+
+@pytest.mark.parametrize("known", [None, ()])
+def test_nothing_is_known(bench, known) -> None:
+    b = bench()
+    skill = b.make(NextProbe, inputs={} if known is None else {"known": known})
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_candidates")
