@@ -44,6 +44,11 @@ def test_the_method_reads_no_conditions(path: Path) -> None:
     assert not any("glotouch_missions/conditions" in u or u.startswith("glotouch_backends") for u in used)
 
 
+@pytest.mark.parametrize("path", sources(*METHOD), ids=lambda p: str(p.relative_to(ROOT)))
+def test_the_method_is_not_told_how_objects_are_placed(path: Path) -> None:
+    assert set(names_in(path)).isdisjoint({"min_gap_m", "min_wall_gap_m", "stance", "draw_layout"})
+
+
 @pytest.mark.parametrize("path", sources(*SIMULATOR), ids=lambda p: str(p.relative_to(ROOT)))
 def test_the_simulator_reads_no_beliefs(path: Path) -> None:
     modules = [n for n in names_in(path) if n.startswith("glotouch_")]

@@ -83,7 +83,9 @@ class ObjectsSection(_Section):
     )
     min_gap_m: float = Field(default=ObjectSet.min_gap_m, ge=0, le=1.0)
     min_wall_gap_m: float = Field(default=ObjectSet.min_wall_gap_m, ge=0, le=1.0)
-    stance: Literal["upright", "any"] = ObjectSet.stance
+    stance: Literal["upright", "any"] = Field(
+        default=ObjectSet.stance, description="upright as in the file, or each object on any of its stable sides"
+    )
 
 
 class WorldFile(_Section):
