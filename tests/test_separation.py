@@ -46,7 +46,7 @@ def test_the_method_reads_no_conditions(path: Path) -> None:
 
 @pytest.mark.parametrize("path", sources(*METHOD), ids=lambda p: str(p.relative_to(ROOT)))
 def test_the_method_is_not_told_how_objects_are_placed(path: Path) -> None:
-    assert set(names_in(path)).isdisjoint({"min_gap_m", "min_wall_gap_m", "stance", "draw_layout"})
+    assert set(names_in(path)).isdisjoint({"min_gap_m", "min_wall_gap_m", "draw_stance", "draw_layout"})
 
 
 @pytest.mark.parametrize("path", sources(*SIMULATOR), ids=lambda p: str(p.relative_to(ROOT)))
