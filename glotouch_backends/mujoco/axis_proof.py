@@ -24,12 +24,12 @@ class AxisProof:
         self._altered = np.zeros(len(AXES), dtype=bool)
 
     def saw(self, axis: str, before: Value, after: Value) -> None:
-        """Note a value before and after an axis acted on it; they differ by at least one bit if it had an effect."""
+        """Note a value before and after an axis acted on it (shapes may broadcast); a difference is an effect."""
         index = self._open.get(axis)
         if index is None or self._altered[index]:
             return
         self._used[index] = True
-        self._altered[index] = not np.array_equal(before, after, equal_nan=True)
+        self._altered[index] = bool(np.not_equal(before, after).any())
 
     def silent(self) -> tuple[str, ...]:
         """Return the axes that were used and altered nothing."""

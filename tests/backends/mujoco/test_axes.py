@@ -99,6 +99,7 @@ def test_an_axis_alone_alters_what_is_sensed(
 def test_an_axis_that_alters_nothing_is_told() -> None:
     proof = AxisProof(Conditions(gel_blur_m=0.001, tactile_gain=(1.1, 1.1)))
     proof.saw("gel_blur_m", np.zeros(3), np.zeros(3))
+    proof.saw("gel_blur_m", 0.0, np.zeros(3))
     proof.saw("gel_bulge_fraction", 1.0, 1.0)  # not set
     assert proof.silent() == ("gel_blur_m",)
     proof.saw("gel_blur_m", np.zeros(3), np.array([0.0, 5e-324, 0.0]))
