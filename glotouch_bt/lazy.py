@@ -14,7 +14,7 @@ from typing import Any
 
 _MODULES: list[str] = []
 _DOORS: list[tuple[str, str]] = []
-_SCIPY = ("interpolate", "linalg.lapack", "ndimage", "signal", "sparse.csgraph", "spatial", "special")
+_SCIPY = ("interpolate", "linalg.lapack", "ndimage", "sparse.csgraph", "spatial", "special")
 
 
 def lazy_module(name: str) -> ModuleType:

@@ -10,7 +10,6 @@ HEAVY = (
     "pinocchio",
     "fcl",
     "trimesh",
-    "scipy.signal",
     "scipy.ndimage",
     "scipy.spatial",
     "mcap",

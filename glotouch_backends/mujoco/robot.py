@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+
 import mujoco
 import numpy as np
 
@@ -35,6 +37,8 @@ from glotouch_bt.robot import (
 
 REST_RAD_S = 1e-3
 """A stopped arm stands still below this speed of every joint. Source: ours."""
+READ_WRENCH = struct.Struct("6d").unpack_from
+"""Reads the wrist's force and torque from the bytes of sensordata."""
 MAX_HELD_DISTANCE_M = 0.02
 """The probe counts as held while its handle is within this distance of P. Source: ours."""
 
@@ -178,7 +182,7 @@ class MujocoRobot(Robot):
         """Do the period's solver steps; check the wrench after each, and brake once its limit has tripped."""
         model, data, step, guard = self.model, self.data, mujoco.mj_step, self._guard
         ctrl_now, sensed, external_now = self._ctrl_now, self._sensed, self._external_now
-        felt, expected = slice(self._s.force.start, self._s.torque.stop), self._expected.tolist()
+        is_quiet, read, at, expected = guard.is_quiet, READ_WRENCH, 8 * self._s.force.start, self._expected.tolist()
         speed_rad_s = float(np.abs(data.qvel[self.handles.arm_dof]).max())
         stands = guard.tripped is not None and speed_rad_s < REST_RAD_S
         for i, (ctrl, sample, external) in enumerate(self._rows):
@@ -188,9 +192,10 @@ class MujocoRobot(Robot):
             step(model, data)
             sample[:] = sensed
             external[:] = external_now
-            # The sensor reads the force of the hand on the arm; the hand feels its opposite.
-            if guard.tripped is None:
-                contact = [-w - e for w, e in zip(sample[felt], expected, strict=True)]
+            reading = read(sensed, at)
+            if guard.tripped is None and not is_quiet(reading, expected):
+                # The sensor reads the force of the hand on the arm; the hand feels its opposite.
+                contact = [-w - e for w, e in zip(reading, expected, strict=True)]
                 guard.check(contact, self._twists_S, data.time)
         if guard.tripped is not None and not stands:
             self._servo.reset(np.array(data.qpos[self.handles.arm_qpos]))

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from glotouch_bt.lazy import load_all
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.execution import run_mission
 from glotouch_bt.mission.read import load_conditions
@@ -167,6 +168,7 @@ def run_trial(study: Campaign, seed: int) -> SpeedTrial:
     """
     folder = RunFolder(study.out / f"s{seed}")
     opening = time.perf_counter()
+    load_all()  # as a run does before it starts
     mission = load_mission(study.mission, study.settings, objects=study.objects)
     conditions = load_conditions(study.conditions)
     backend = load_backend(study.backend)

@@ -189,7 +189,8 @@ def read_run(path: str | Path) -> RunRecord:
 
 def _messages(file: IO[bytes], record: RunRecord) -> Iterator[tuple[str, int, memoryview]]:
     """Yield topic, log time in ns and bytes of every message except plots (the packed channels hold their data)."""
-    unpacker = ChunkUnpacker(os.fstat(file.fileno()).st_size, str(record.path))
+    wanted = (EVENT_PREFIX, "/packed/", "/tree/")
+    unpacker = ChunkUnpacker(os.fstat(file.fileno()).st_size, str(record.path), wanted)
     text_bytes = 0
     for item in record_items(file):
         if isinstance(item, Attachment):
@@ -202,7 +203,7 @@ def _messages(file: IO[bytes], record: RunRecord) -> Iterator[tuple[str, int, me
             record.complete = True
         elif isinstance(item, Chunk):
             for topic, log_ns, data in unpacker.items(item):
-                if data is None or not topic.startswith((EVENT_PREFIX, "/packed/", "/tree/")):
+                if data is None:
                     continue
                 text_bytes += 0 if topic in _PACKED else len(data)
                 if text_bytes > MAX_JSON_BYTES:

@@ -40,7 +40,10 @@ class Port(Generic[T]):
 
 
 class In(Port[T]):
-    """An input port: read as an attribute. With `required=False` it is None until it is written."""
+    """An input port: read as an attribute. With `required=False` it is None until it is written.
+
+    `expected=False`: a mission in which nothing writes it is usual, so `glotouch check` does not warn.
+    """
 
     def __init__(
         self,
@@ -50,9 +53,10 @@ class In(Port[T]):
         key: str | None = None,
         element: type | None = None,
         required: bool = True,
+        expected: bool = True,
     ) -> None:
         super().__init__(data_type, description, key=key, element=element)
-        self.required = required
+        self.required, self.expected = required, expected
 
     def _value(self, skill: Skill) -> object:
         missing = not self.required and not skill.blackboard_client.exists(self.name)

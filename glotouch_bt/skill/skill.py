@@ -111,6 +111,7 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
         self.context = context
         self.reason: Reason | None = None
         self._run: SkillRun | None = None
+        self._ahead: Status | None = None
 
     @classmethod
     def default_keys(cls) -> dict[str, str]:
@@ -160,8 +161,20 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
             if not self.blackboard_client.exists(name):
                 raise TypeError(f"run() ended without writing the output {name!r}: write `self.{name} = ...`")
 
+    def update_ahead(self) -> Status:
+        """Update before the tree is ticked, and return the result; the next `update` returns it again."""
+        self._ahead = status = self.update()
+        return status
+
+    def forget_update(self) -> None:
+        """Let the next `update` update again: the tree will not be ticked."""
+        self._ahead = None
+
     def update(self) -> Status:
         """Send the newest observation to the body and take its next command."""
+        if self._ahead is not None:
+            status, self._ahead = self._ahead, None
+            return status
         assert self._run is not None
         if self.context.mission_s - self._begun_s > self.MAX_DURATION_S:
             return self._too_long()

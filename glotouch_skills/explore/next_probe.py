@@ -16,7 +16,7 @@ from glotouch_skills.common.planning import TOO_LOW, load_target, load_target_mo
 if TYPE_CHECKING:
     from glotouch_bt.perception.recognition import TargetModel
 
-OUTLINE_S, TOP_S = 29.0, 18.0
+PART_S = {"outline": 29.0, "top": 18.0}
 """Robot time of `refine_outline` and `touch_top` on one candidate. Source: measured, seed 7000."""
 TRAVEL_M_S = 0.1
 """Speed on the way to a candidate."""
@@ -51,13 +51,15 @@ class NextProbe(Skill):
 
     known = In(tuple, "all candidates", key="candidates", element=Candidate, required=False)
     measured = In(Candidate, "the candidate measured last", key="candidate", required=False)
+    felt = In(tuple, "closures so far", element=TouchSet, required=False, expected=False)
     before = In(tuple, "measurements tried so far", key="probed", element=ProbeTouch, required=False)
     candidates = Out(tuple, "all candidates, with what was measured last", element=Candidate)
     candidate = Out(Candidate, "the candidate to measure")
     next_part = Out(str, 'what to measure of it: "outline", "top", or nothing')
     probed = Out(tuple, "measurements tried, with the one chosen now", element=ProbeTouch)
     measured_enough = Out(bool, "no measurement is left that is worth its time")
-    unmeasured = Out(int, "number of candidates whose outline or top was left out")
+    postponed = Out(int, "number of candidates that may be the target and are not measured yet")
+    unmeasured = Out(int, "number of all candidates that are not measured yet")
 
     def __init__(self, name: str, params: SkillParams, context: Context) -> None:
         super().__init__(name, params, context)
@@ -72,21 +74,29 @@ class NextProbe(Skill):
         candidates = tuple(new if new is not None and new.index == c.index else c for c in self.known)
         tried = {(t.candidate, t.part) for t in before}
         left = [ProbeTouch(c.index, part) for c in candidates for part in PARTS if (c.index, part) not in tried]
+        self.postponed = 0
         touch = self._by_target(candidates, left) if self.params.target else _worst_known(candidates, left)
         self.candidates, self.measured_enough = candidates, touch is None
-        self.unmeasured = len({t.candidate for t in left})
+        self.unmeasured = len(_indices(left))
         self.next_part = "" if touch is None else touch.part
         self.probed = before if touch is None else (*before, touch)
         self.candidate = next(c for c in candidates if touch is None or c.index == touch.candidate)
 
     def _by_target(self, candidates: tuple[Candidate, ...], left: list[ProbeTouch]) -> ProbeTouch | None:
-        belief = recognition.infer_belief(self._target_model(), tuple(TouchSet(c, ()) for c in candidates))
-        chosen = next_probe_touch(belief, [ProbeOption(t, self._seconds(candidates, t)) for t in left])
+        felt = {t.candidate.index: t.sequences for t in self.felt or ()}
+        touchsets = tuple(TouchSet(c, felt.get(c.index, ())) for c in candidates)
+        belief = recognition.infer_belief(self._target_model(), touchsets)
+        chosen = next_probe_touch(belief, [self._option(c, left) for c in candidates if c.index in _indices(left)])
         out = excluded(belief)
+        self.postponed = len(_indices(left) - out)
+        why = "most expected gain per second" if chosen else "every other candidate is excluded"
+        if chosen is None and self.postponed:
+            why = "the jaws first: one of those measured is probably the target"
         self.event(
             "next_probe",
             touch=chosen.touch if chosen else None,
             seconds=chosen.seconds if chosen else 0.0,
+            why=why,
             probability={m.index: m.probability for m in belief.ranking.matches},
             p_absent=belief.ranking.p_absent,
             excluded=sorted(out),
@@ -104,13 +114,19 @@ class NextProbe(Skill):
             self._model = load_target_model(mesh, self.context.arm.description.gripper)
         return self._model
 
-    def _seconds(self, candidates: tuple[Candidate, ...], touch: ProbeTouch) -> float:
-        """Return the robot time of a measurement, with the way to it."""
+    def _option(self, candidate: Candidate, left: list[ProbeTouch]) -> ProbeOption:
+        """Return what is left to measure of a candidate, with the way to it."""
         arm, container = self.context.arm, self.context.world.container
         here: Array = container.pose_B_K.inverse().apply(arm.pose_B_P.position_m)[:2]
-        (centre,) = (c.contour.centre_K_m for c in candidates if c.index == touch.candidate)
-        way_s = float(np.linalg.norm(centre - here)) / TRAVEL_M_S
-        return way_s + (OUTLINE_S if touch.part == "outline" else TOP_S)
+        way_s = float(np.linalg.norm(candidate.contour.centre_K_m - here)) / TRAVEL_M_S
+        first, *then = (t for t in left if t.candidate == candidate.index)
+        if not then:
+            return ProbeOption(first, way_s + PART_S[first.part])
+        return ProbeOption(first, way_s + PART_S[first.part], then[0], PART_S[then[0].part])
+
+
+def _indices(touches: list[ProbeTouch]) -> set[int]:
+    return {t.candidate for t in touches}
 
 
 def _worst_known(candidates: tuple[Candidate, ...], left: list[ProbeTouch]) -> ProbeTouch | None:

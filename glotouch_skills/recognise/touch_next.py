@@ -9,7 +9,7 @@ import numpy as np
 
 from glotouch_bt.motion import Motion, hand_pose_B
 from glotouch_bt.perception import recognition
-from glotouch_bt.perception.recognition import PARTS, ProbeTouch
+from glotouch_bt.perception.recognition import CHANGE_S, PARTS, ProbeTouch
 from glotouch_bt.perception.touch import Candidate, Layer, TouchSequence, TouchSet
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import HOLD, Array, MotionRefused
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 MAX_VAIN_CLOSURES = 4
 """Number of closures without any plateau after which a candidate is skipped: it is not where it was traced."""
 
+MEASURE_S = CHANGE_S + 47.0
+"""Robot time of taking the probe again and measuring one candidate. Source: as of `CHANGE_S` and `next_probe`."""
 STILL_THERE_M = 0.003
 """After a resume, the hand still stands beside its candidate if it moved by less than this."""
 
@@ -74,8 +76,10 @@ class TouchNext(Skill):
 
     candidates = In(tuple, "objects that may be touched", element=Candidate)
     felt = In(tuple, "touches so far", key="touchsets", element=TouchSet, required=False)
-    rejected = In(tuple, "indices of rejected candidates", required=False)
-    probed = In(tuple, "what the probe measured; not given: everything", element=ProbeTouch, required=False)
+    rejected = In(tuple, "indices of rejected candidates", required=False, expected=False)
+    probed = In(
+        tuple, "what the probe measured; not given: everything", element=ProbeTouch, required=False, expected=False
+    )
     jaw_zero = In(JawZero, "offset of the reported aperture", required=False)
     touchsets = Out(tuple, "touches, one TouchSet for each candidate", element=TouchSet)
     decided = Out(bool, "no further closure is needed")
@@ -109,9 +113,9 @@ class TouchNext(Skill):
         if not wanted:
             raise self.NO_CANDIDATES("there is no candidate to touch", candidates=len(candidates))
         touchsets: tuple[TouchSet, ...] = self.felt or ()
-        if {t.candidate.index for t in touchsets} != {c.index for c in wanted}:
-            felt = {t.candidate.index: t for t in touchsets}
-            touchsets = tuple(felt.get(c.index, TouchSet(c, ())) for c in wanted)
+        if [_state(t.candidate) for t in touchsets] != [_state(c) for c in wanted]:  # found, rejected, or measured anew
+            made = {t.candidate.index: t.sequences for t in touchsets}
+            touchsets = tuple(TouchSet(c, made.get(c.index, ())) for c in wanted)
             self._refused.clear()
             self._down = None
         down, self._down = self._down, None  # after a preemption the hand's place is unknown
@@ -125,7 +129,9 @@ class TouchNext(Skill):
         self._hopeless = frozenset(t.candidate.index for t in vain if len(t.layers) >= MAX_VAIN_CLOSURES)
         why = recognition.enough(belief, self.params.confidence, self._hopeless)
         chosen = None if why else self._choose(belief, down)
-        if chosen is None:
+        if chosen is not None and chosen.closure.candidate in self._unmeasured(belief):
+            why = f"candidate {chosen.closure.candidate} would tell most, once the probe has measured it"
+        if why or chosen is None:
             yield from self._end(belief, down, why or "no closure is expected to tell more")
             return
         try:
@@ -160,15 +166,19 @@ class TouchNext(Skill):
         return self._model
 
     def _choose(self, belief: Belief, down: Squeezing | None) -> Option | None:
-        """Return the feasible closure with the most gain per time, or None if none gains enough."""
+        """Return the feasible closure with the most gain per time, or None if none gains enough.
+
+        It may be on a candidate that the probe must measure first; the time of that counts.
+        """
         p, arm = self.params, self.context.arm
         pose_K_P = self.context.world.container.pose_B_K.inverse() @ arm.pose_B_P
         standing = None
         if down is not None:
             standing = Standing(down.candidate.index, down.at, float(pose_K_P.position_m[2]))
         found = options(belief.touchsets, standing, pose_K_P.position_m, arm.description.gripper, p)
-        barred = self._hopeless | self._unmeasured(belief)
-        found = [o for o in found if _key(o) not in self._refused and o.closure.candidate not in barred]
+        found = [o for o in found if _key(o) not in self._refused and o.closure.candidate not in self._hopeless]
+        later = self._unmeasured(belief)
+        found = [replace(o, seconds=o.seconds + MEASURE_S) if o.closure.candidate in later else o for o in found]
         if not found:
             return None
         closures = [c for o in found for c in (o.closure, *o.after)]
@@ -289,6 +299,11 @@ def _with_layer(touchset: TouchSet, hand: Squeezing, layer: Layer) -> TouchSet:
         return replace(touchset, sequences=(*touchset.sequences[:-1], replace(last, layers=(*last.layers, layer))))
     begun = TouchSequence(hand.at.position_K_m, hand.yaw_K_rad, (layer,))
     return replace(touchset, sequences=(*touchset.sequences, begun))
+
+
+def _state(candidate: Candidate) -> tuple[int, float, int]:
+    """Return what changes when the probe measures a candidate: index, height and number of contacts."""
+    return candidate.index, candidate.height_m, len(candidate.contacts)
 
 
 def _key(option: Option) -> tuple[int, int, int, int]:

@@ -46,10 +46,10 @@ def found(n: int, **ports: Any) -> Any:
     return ok(candidates=candidates(*[0.5] * n), found=n, **ports)
 
 
-def measures(*only: int) -> Any:
+def measures(*only: int, postponed: int = 0) -> Any:
     """Return next_probe's answers: each candidate's outline, then its top, the worst known first; `only` some of them.
 
-    With a target, those left out count as excluded.
+    With a target, those left out count as excluded; but `postponed` of them may still be it.
     """
 
     def answer(call: Call) -> Any:
@@ -62,7 +62,7 @@ def measures(*only: int) -> Any:
         c, part = todo[0] if todo else (known[0], "")
         probed = (*tried, ProbeTouch(c.index, part)) if todo else tried
         return ok(
-            candidates=known, candidate=c, next_part=part, probed=probed, measured_enough=not todo,
+            candidates=known, candidate=c, next_part=part, probed=probed, measured_enough=not todo, postponed=postponed,
             unmeasured=len({c.index for c, _ in left}),
         )  # fmt: skip
 

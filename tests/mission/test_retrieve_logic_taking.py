@@ -51,7 +51,7 @@ def test_what_is_not_recognised_is_not_taken(retrieve: Run) -> None:
 def test_what_is_not_held_is_put_back_and_taken_anew(retrieve: Run, node: str, code: str) -> None:
     run = retrieve({node: [fails(code), fails(code), ok()]})
     assert run.succeeded
-    stage = ["put_back", "wrist_check 8", "grasp", "lift", "hold_check"]
+    stage = ["put_back", "wrist_check 10", "grasp", "lift", "hold_check"]
     once = stage[: stage.index(node) + 1]
     assert [c.node for c in run.calls_of("*/hold/*")] == once * 2 + stage
 
@@ -72,10 +72,10 @@ def test_without_an_empty_hand_nothing_is_grasped(retrieve: Run, code: str) -> N
 
 
 def test_the_wrist_is_zeroed_before_a_grasp_if_need_be(retrieve: Run) -> None:
-    run = retrieve({"wrist_check 8": fails("off_zero")})
+    run = retrieve({"wrist_check 10": fails("off_zero")})
     assert run.succeeded
-    assert run.order[run.order.index("grasp") - 4 :][:4] == ["put_back", "wrist_check 8", "tare 5", "wrist_check 9"]
-    off = retrieve({"wrist_check 8": fails("off_zero"), "wrist_check 9": fails("off_zero")})
+    assert run.order[run.order.index("grasp") - 4 :][:4] == ["put_back", "wrist_check 10", "tare 6", "wrist_check 11"]
+    off = retrieve({"wrist_check 10": fails("off_zero"), "wrist_check 11": fails("off_zero")})
     assert safely(off, "off_zero")
     assert off.never_ran("grasp")
 
@@ -87,7 +87,7 @@ def test_the_wrist_is_zeroed_before_a_grasp_if_need_be(retrieve: Run) -> None:
 def test_what_does_not_fit_is_put_back_and_the_next_one_is_taken(retrieve: Run, code: str) -> None:
     run = retrieve({"object_check": [fails(code, fits=False, impossible=True), ok()], "reject": ok(rejected=(4,))})
     assert run.succeeded
-    stage = ["match", "put_back", "wrist_check 8", "grasp", "lift", "hold_check", "object_check"]
+    stage = ["match", "put_back", "wrist_check 10", "grasp", "lift", "hold_check", "object_check"]
     assert [c.node for c in run.calls_of(TAKE)] == [*stage, "put_back 3", "reject", *stage]
     assert run.calls_of("match")[1].inputs["rejected"] == (4,)
     assert run.calls_of("reject")[0].params.most == 2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from glotouch_bt.mission_testing import fails, ok
-from tests.mission.retrieve_scripts import Run, each_code, found, measures, retrieve, safely
+from tests.mission.retrieve_scripts import Run, each_code, found, measures, retrieve, safely, skills
 
 __all__ = ["retrieve"]
 
@@ -23,14 +23,14 @@ def test_it_goes_through_its_stages_in_order(retrieve: Run) -> None:
         "tool_check", "wrist_check", "guarded_sweep", "orbit_probe",
         "next_probe", "refine_outline", "next_probe", "touch_top", "next_probe", "tool_check 3", "tool_return",
         "wrist_check 3", "touch_next", "touch_next",
-        "match", "put_back", "wrist_check 7", "grasp", "lift", "hold_check", "object_check",
+        "match", "put_back", "wrist_check 9", "grasp", "lift", "hold_check", "object_check",
     ]  # fmt: skip
 
 
 def test_every_skill_is_told_the_target(retrieve: Run) -> None:
     script = {"match": REFUSED, "match 2": REFUSED, "match 3": ok(), "touch_next*": DECIDED, "orbit_probe": found(2)}
     run = scheduled(retrieve, script, 0, target="truck")
-    rest = run.calls_of("*/measure the rest/*/next_probe*")
+    rest = run.calls_of("*/measure what was excluded/*next_probe*")
     told = {c.params.target for c in run.calls if hasattr(c.params, "target") and c not in rest}
     assert told == {"truck"}
     assert {c.params.target for c in rest} == {""}, "the rest is measured whatever the target"
@@ -44,34 +44,58 @@ def test_what_is_excluded_is_neither_refined_nor_topped(retrieve: Run) -> None:
     assert {t.candidate for t in run.calls_of("touch_next")[0].inputs["probed"]} == {1}
 
 
-def test_if_the_evidence_does_not_suffice_the_rest_is_measured(retrieve: Run) -> None:
+def test_if_the_evidence_does_not_suffice_what_was_put_off_is_measured(retrieve: Run) -> None:
     script = {"match": REFUSED, "match 2": REFUSED, "match 3": ok(), "touch_next*": DECIDED, "orbit_probe": found(3)}
+    late = "*/measure what was put off/*"
+    script |= {"next_probe*": measures(1, postponed=1), late + "next_probe*": measures(1, 2)}
+    run = retrieve(script, mission="retrieve")
+    assert run.succeeded
+    assert skills(run, late) == [
+        "tool_pickup", "tool_calibrate", "next_probe", "refine_outline", "next_probe", "touch_top", "next_probe",
+        "tool_check", "tool_return", "wrist_check", "touch_next", "match",
+    ]  # fmt: skip
+    (touched,) = run.calls_of(late + "touch_next*")
+    assert not touched.params.unmeasured
+    assert {t.candidate for t in touched.inputs["probed"]} == {1, 2}
+
+
+def test_if_that_does_not_suffice_what_was_excluded_is_measured(retrieve: Run) -> None:
+    script = {"match": REFUSED, "match 2": REFUSED, "match 4": ok(), "touch_next*": DECIDED, "orbit_probe": found(3)}
     run = scheduled(retrieve, script, 1)
     assert run.succeeded
-    assert (run.ran("tool_pickup 3"), run.ran("tool_return 2")) == (1, 1)
-    assert (run.ran("refine_outline 2"), run.ran("touch_top 2")) == (2, 2)
-    assert run.before("tool_return 2", "touch_next 3")
-    assert run.calls_of("touch_next 3")[0].params.unmeasured
-    assert {t.candidate for t in run.calls_of("touch_next 3")[0].inputs["probed"]} == {0, 1, 2}
+    assert not run.calls_of("*/measure what was put off/*tool_pickup*")
+    last = "*/measure what was excluded/*"
+    assert skills(run, last).count("refine_outline") == skills(run, last).count("touch_top") == 2
+    (touched,) = run.calls_of(last + "touch_next*")
+    assert touched.params.unmeasured
+    assert {t.candidate for t in touched.inputs["probed"]} == {0, 1, 2}
 
 
 def test_if_all_was_measured_the_probe_is_not_taken_again(retrieve: Run) -> None:
     run = scheduled(retrieve, {"match*": REFUSED, "touch_next*": DECIDED})
     assert safely(run, "not_recognised")
-    assert (run.ran("match"), run.ran("match 2"), run.never_ran("tool_pickup 3")) == (1, 1, True)
+    assert (run.ran("match"), run.ran("match 2"), len(run.calls_of("tool_pickup*"))) == (1, 1, 1)
 
 
 @each_code("tool_pickup")
 def test_without_the_probe_the_rest_is_touched_as_it_is(retrieve: Run, code: str) -> None:
-    script = {"match": REFUSED, "match 2": REFUSED, "match 3": ok(), "touch_next*": DECIDED, "orbit_probe": found(2)}
-    run = scheduled(retrieve, script | {"tool_pickup 3": fails(code)}, 1)
+    script = {"match": REFUSED, "match 2": REFUSED, "match 4": ok(), "touch_next*": DECIDED, "orbit_probe": found(2)}
+    last = "*/measure what was excluded/*"
+    run = scheduled(retrieve, script | {last + "tool_pickup*": fails(code)}, 1)
     assert run.succeeded
-    assert run.ran("tool_pickup 3") == 3
-    assert (run.never_ran("refine_outline 2"), run.ran("touch_next 3")) == (True, 1)
+    assert len(run.calls_of(last + "tool_pickup*")) == 3
+    assert not run.calls_of(last + "refine_outline*")
+    assert len(run.calls_of(last + "touch_next*")) == 1
 
 
 def test_a_hand_that_cannot_be_cleared_then_touches_nothing(retrieve: Run) -> None:
-    script = {"match*": REFUSED, "touch_next*": DECIDED, "orbit_probe": found(2), "tool_check 4": fails("tool_lost")}
-    run = scheduled(retrieve, script | {"*/measure the rest/stow*": fails("object_held")}, 1)
+    last = "*/measure what was excluded/*"
+    script = {
+        "match*": REFUSED,
+        "touch_next*": DECIDED,
+        "orbit_probe": found(2),
+        last + "tool_check*": fails("tool_lost"),
+    }
+    run = scheduled(retrieve, script | {last + "stow*": fails("object_held")}, 1)
     assert not run.succeeded
-    assert run.never_ran("touch_next 3")
+    assert not run.calls_of(last + "touch_next*")

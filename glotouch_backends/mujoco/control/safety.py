@@ -23,6 +23,8 @@ CONTACT_STIFFNESS_N_M = 60e3
 MIN_PRESSING_SHARE = 0.25
 """Share of the stop limit below which a pressing hand is not judged. Source: measured in a nominal
 retrieval of seed 9401; objects that the hand meets at 50 mm/s push it with 4 N."""
+QUIET_SHARE = 0.99 * MIN_PRESSING_SHARE
+"""Smaller samples are not judged, whatever the rounding."""
 MAX_STEEPENING = 4.0
 """Mean rise of a contact over that of one sample. The weight of an object that is lifted takes power too, but hardly
 rises. Source: ours."""
@@ -47,8 +49,28 @@ class HardLimitGuard:
         self._rise_s_m = CONTACT_STIFFNESS_N_M * limits.stop_ahead_s / self._max_N
         self._samples_ahead = limits.stop_ahead_s / STEP_S
         self._over = self._pressing = 0
-        self._last = 0.0
+        self._last = (0.0, 0.0)  # squares of force and torque
+        self._quiet = (QUIET_SHARE * self._max_N) ** 2, (QUIET_SHARE * self._max_Nm) ** 2
         self.tripped: SafetyStop | None = None
+
+    def is_quiet(self, reading: Sequence[float], expected: Sequence[float]) -> bool:
+        """Return True if a sample is too small to be judged; else it must be given to `check`.
+
+        The wrenches (6,) are the sensor's reading and what it reads without contact, the latter with opposite sign.
+        """
+        (x, y, z, a, b, c), (ex, ey, ez, ea, eb, ec) = reading, expected
+        x, y, z, a, b, c = x + ex, y + ey, z + ez, a + ea, b + eb, c + ec
+        force_2, torque_2 = x * x + y * y + z * z, a * a + b * b + c * c
+        if force_2 >= self._quiet[0] or torque_2 >= self._quiet[1]:
+            return False
+        self._last = force_2, torque_2
+        self._over = self._pressing = 0
+        return True
+
+    def _share(self, force_2: float, torque_2: float) -> tuple[float, float, float]:
+        """Return force N, torque Nm, and the larger share of its limit."""
+        force, torque = math.sqrt(force_2), math.sqrt(torque_2)
+        return force, torque, max(force / self._max_N, torque / self._max_Nm)
 
     def check(self, contact: Sequence[float], twists: Callable[[], Array], stamp_s: float) -> None:
         """Check one contact wrench (6,) in S, force N then torque Nm about its origin.
@@ -56,9 +78,9 @@ class HardLimitGuard:
         `twists` returns motions (n, 6) of the hand at S in S, linear m/s then angular rad/s; called only if needed.
         """
         x, y, z, a, b, c = contact
-        force, torque = math.sqrt(x * x + y * y + z * z), math.sqrt(a * a + b * b + c * c)
-        share = max(force / self._max_N, torque / self._max_Nm)
-        rise, self._last = share - self._last, share
+        squares = x * x + y * y + z * z, a * a + b * b + c * c
+        force, torque, share = self._share(*squares)
+        rise, self._last = share - self._share(*self._last)[2], squares
         if share < MIN_PRESSING_SHARE:
             self._over = self._pressing = 0
             return

@@ -89,7 +89,8 @@ class _Rules:
             if bad := found - requirement.good:
                 self._wrong_state(flow, requirement, bad, always=not found & requirement.good)
             return
-        optional = requirement.unset == "allowed" and requirement.node.skill_type is not None
+        skill = requirement.node.skill_type
+        optional = requirement.unset == "allowed" and skill is not None and getattr(skill, requirement.port).expected
         if optional and not self._exact.has_unknown and not self._writers.get(requirement.key):
             self._unwritten.setdefault(requirement.key.rpartition("/")[2], []).append(requirement)
         if self._never_written(requirement, found):

@@ -18,7 +18,7 @@ from glotouch_bt.mission.execution.safe_stop import stop_safely
 from glotouch_bt.mission.execution.watchdog import STUCK_S, SkillHung, Watchdog, deferred_interrupt
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.record import Record, RecordedRequests, Rounding, RunSummary
-from glotouch_bt.mission.tree import NodeFailure, ReasonBook, build_tree, sensed
+from glotouch_bt.mission.tree import NodeFailure, ReasonBook, RunningSkill, build_tree, sensed
 from glotouch_bt.robot import HOLD, BackendError, Command, GlotouchError, GuardTripped, Observation, Robot, World
 from glotouch_bt.robot.supervision import GuardFinding, SupervisionLimits, Supervisor
 from glotouch_bt.skill import Context, Reason, Skill
@@ -217,6 +217,7 @@ class _TickLoop:
         self._next_progress_s = outcome.start_s
         self._interrupted: Callable[[], bool] = lambda: False
         self._nodes = list(state.tree.root.iterate())
+        self._running = RunningSkill(state.tree.root)
         self.watchdog: Watchdog | None = None
 
     def begin(self) -> None:
@@ -342,7 +343,9 @@ class _TickLoop:
         return found or self.running_node()
 
     def _tick(self, now_s: float) -> None:
-        """Tick the tree once and record changes. A node that keeps running costs one comparison."""
+        """Tick the tree once and record changes."""
+        if self._running.keeps_running():
+            return
         changed = False
         status, book, hooks = self._state.status, self._state.book, self._hooks
         for node in self._tree.root.tick():
@@ -359,6 +362,7 @@ class _TickLoop:
         if changed:
             hooks.on_tick_done()
             self._record_changes(now_s)
+            self._running.find()
 
     def _record_changes(self, now_s: float) -> None:
         changes: list[tuple[str, object, object]] = []

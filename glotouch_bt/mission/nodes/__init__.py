@@ -27,7 +27,7 @@ from glotouch_bt.mission.nodes.base import (
     register,
 )
 from glotouch_bt.mission.nodes.condition import ConditionKind
-from glotouch_bt.mission.nodes.for_each import ForEachKind, ForEachSettings
+from glotouch_bt.mission.nodes.for_each import ForEach, ForEachKind, ForEachSettings
 from glotouch_bt.mission.nodes.ordered import SelectorKind, SequenceKind
 from glotouch_bt.mission.nodes.outcomes import FailKind, InvertKind, SucceedKind
 from glotouch_bt.mission.nodes.parallel import ParallelKind, ParallelSettings

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import IO, cast
 
 from mcap.exceptions import McapError
+from mcap.opcode import Opcode
 from mcap.records import Chunk, McapRecord
 from mcap.stream_reader import StreamReader
 
@@ -67,13 +68,23 @@ class _BoundedReads:
         return self._file.read(size)
 
 
+class _ItemReader(StreamReader):
+    """A reader that skips what `record_items` does not yield, above all the index of every chunk."""
+
+    def _read_record(self, opcode: int, length: int) -> McapRecord | None:
+        if opcode in (Opcode.CHUNK, Opcode.ATTACHMENT, Opcode.FOOTER):
+            return super()._read_record(opcode, length)
+        self._stream.read(length)
+        return None
+
+
 def record_items(file: IO[bytes]) -> Iterator[McapRecord]:
     """Yield the items of a record: chunks as they are, attachments, and the footer.
 
     Raises:
         BadInput: An item states too large a length.
     """
-    reader = StreamReader(cast("IO[bytes]", _BoundedReads(file)), emit_chunks=True, record_size_limit=MAX_ITEM_BYTES)
+    reader = _ItemReader(cast("IO[bytes]", _BoundedReads(file)), emit_chunks=True, record_size_limit=MAX_ITEM_BYTES)
     yield from reader.records
 
 
@@ -83,16 +94,19 @@ class ChunkUnpacker:
     Args:
         packed_bytes: Size of the record's file.
         shown: Its name, for messages.
+        prefixes: Only messages of topics that begin with one of these are unpacked.
     """
 
-    def __init__(self, packed_bytes: int, shown: str) -> None:
+    def __init__(self, packed_bytes: int, shown: str, prefixes: tuple[str, ...] = ("",)) -> None:
         self._left = min(MAX_UNPACKED_BYTES, FREE_BYTES + MAX_RATIO * packed_bytes)
         self._limit, self._shown = self._left, shown
+        self._prefixes = prefixes
         self._topics: dict[int, str] = {}
+        self._skipped: set[int] = set()
         self._items = 0
 
     def items(self, chunk: Chunk) -> Iterator[tuple[str, int, memoryview | None]]:
-        """Yield (topic, log time ns, message) of every message, and (topic, 0, None) of every channel that starts.
+        """Yield (topic, log time ns, message) of the messages, and (topic, 0, None) of every channel that starts.
 
         Raises:
             TooLarge: The record unpacks to more than is allowed.
@@ -111,10 +125,12 @@ class ChunkUnpacker:
             if code == _CHANNEL:
                 number, _, length = struct.unpack_from("<HHI", data, at)
                 self._topics[number] = topic = bytes(view[at + 8 : at + 8 + length]).decode()
+                (self._skipped.discard if topic.startswith(self._prefixes) else self._skipped.add)(number)
                 yield topic, 0, None
             elif code == _MESSAGE:
                 number, _, log_ns, _ = _MESSAGE_HEAD.unpack_from(data, at)
-                yield self._topics[number], log_ns, view[at + _MESSAGE_HEAD.size : at + size]
+                if number not in self._skipped:
+                    yield self._topics[number], log_ns, view[at + _MESSAGE_HEAD.size : at + size]
             at += size
 
     def _unpack(self, chunk: Chunk) -> bytes:

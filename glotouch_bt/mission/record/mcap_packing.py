@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -38,7 +39,7 @@ class Column:
     step: float
     order: int
 
-    @property
+    @cached_property
     def width(self) -> int:
         """Count of numbers in one row."""
         return math.prod(self.shape)
@@ -112,7 +113,7 @@ def unpack(message: bytes | memoryview) -> tuple[int, dict[str, Array]]:
                 layout, data = (chunk, data) if key >> 3 == 3 else (layout, chunk)
             else:
                 raise GlotouchError(f"not a {PACKED_NAME} message (wire type {key & 7})")
-        columns = [Column.parse(word) for word in layout.decode().split(None, MAX_COLUMNS)]
+        columns = _columns(layout)
         if rows < 1 or not columns or len(data) != 4 * rows * sum(c.width for c in columns):
             raise GlotouchError(f"{PACKED_NAME}: {len(data)} bytes do not hold {rows} rows of {layout.decode()!r}")
     except (IndexError, ValueError) as e:
@@ -123,13 +124,21 @@ def unpack(message: bytes | memoryview) -> tuple[int, dict[str, Array]]:
         size = 4 * rows * c.width
         planes = np.frombuffer(data, np.uint8, size, at).reshape(c.width, 4, rows)
         at += size
-        steps = np.ascontiguousarray(planes.transpose(2, 0, 1)).view("<i4").reshape(rows, c.width)
+        steps = planes.transpose(0, 2, 1).copy().view("<i4").reshape(c.width, rows)
         for _ in range(c.order):
-            steps = np.cumsum(steps, axis=0, dtype=np.int32)
+            np.add.accumulate(steps, axis=1, dtype=np.int32, out=steps)
         values = steps * c.step
-        values[steps == _NAN] = np.nan
-        out[c.name] = values.reshape(rows, *c.shape)
+        missing = steps == _NAN
+        if np.count_nonzero(missing):
+            values[missing] = np.nan
+        out[c.name] = values.T.reshape(rows, *c.shape)
     return start_ns - 2**64 if start_ns >= 2**63 else start_ns, out
+
+
+@lru_cache(maxsize=64)
+def _columns(layout: bytes) -> tuple[Column, ...]:
+    """Return the columns of a layout; raises as `Column.parse`."""
+    return tuple(Column.parse(word) for word in layout.decode().split(None, MAX_COLUMNS))
 
 
 def join(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:

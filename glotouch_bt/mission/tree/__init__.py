@@ -2,3 +2,4 @@
 
 from glotouch_bt.mission.tree.build import BuiltTree, build_tree
 from glotouch_bt.mission.tree.failure_chain import NodeFailure, ReasonBook, sensed
+from glotouch_bt.mission.tree.running_skill import RunningSkill

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from glotouch_bt.perception.recognition.matchers import MATCHERS, Matcher
     from glotouch_bt.perception.recognition.model import PadSpec, TargetModel
     from glotouch_bt.perception.recognition.schedule import (
+        CHANGE_S,
         ProbeOption,
         enough,
         excluded,
@@ -28,6 +29,6 @@ __getattr__ = lazy_door(
     **dict.fromkeys(("MATCHERS", "Matcher"), "matchers"),
     **dict.fromkeys(("PadSpec", "TargetModel"), "model"),
     **dict.fromkeys(
-        ("ProbeOption", "enough", "excluded", "next_probe_touch", "short_of_evidence", "wanted"), "schedule"
+        ("CHANGE_S", "ProbeOption", "enough", "excluded", "next_probe_touch", "short_of_evidence", "wanted"), "schedule"
     ),
 )

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from glotouch_bt.report.run_record import RunRecord
 from glotouch_bt.report.sections.about import about_section
+from glotouch_bt.report.sections.decisions import decisions_section
 from glotouch_bt.report.sections.faults import faults_section
 from glotouch_bt.report.sections.force import force_section
 from glotouch_bt.report.sections.header import header_section, verdict
@@ -24,6 +25,7 @@ SECTIONS: tuple[tuple[str, Callable[[RunRecord], str]], ...] = (
     ("Map", map_section),
     ("Force", force_section),
     ("Squeezes", squeezes_section),
+    ("Decisions", decisions_section),
     ("Recognition", recognition_section),
     ("Timeline of the tree", timeline_section),
     ("Log", log_section),

@@ -9,6 +9,7 @@ import pytest
 
 from glotouch_bt.perception.recognition import ProbeOption, ProbeTouch, TargetModel, excluded, next_probe_touch
 from glotouch_bt.perception.recognition.likelihood import Belief, expected_gain, infer_belief
+from glotouch_bt.perception.recognition.schedule import CHANGE_S, pays_now
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import ParamError
 from tests.support.acquisition import IDEAL, acquire
@@ -77,7 +78,6 @@ def test_two_equal_outlines_are_told_apart_by_their_tops(solids, target, model) 
     belief = believed(model, *coarse)
     gains = expected_gain(belief, [ProbeTouch(0, "top"), ProbeTouch(0, "outline")])
     assert gains[0] > 10 * gains[1], "the outline is known already"
-    assert next_probe_touch(belief, [option(0, "outline"), option(0, "top")]).touch.part == "top"
     after = believed(model, replace(coarse[0], height_m=0.070), replace(coarse[1], height_m=0.095))
     assert excluded(after) == {1}
 
@@ -102,6 +102,26 @@ def test_the_gain_is_what_the_entropy_loses_on_average(target, model) -> None:
         left.append(entropy(believed(model, replace(start[0], height_m=max(height, 0.022)), *start[1:])))
     gain = float(expected_gain(before, [ProbeTouch(0, "top")])[0])
     assert entropy(before) - np.mean(left) == pytest.approx(gain, rel=0.3)
+
+
+def test_an_outline_is_worth_the_top_that_it_makes_possible(solids, target, model) -> None:
+    """Both outlines are known well, so another trace tells nothing; but only then the top may be touched."""
+    belief = believed(model, candidate(target, 0, UNKNOWN_M), candidate(solids.cylinder(0.033, 0.070), 1, UNKNOWN_M))
+    then = replace(option(0, "outline"), then=ProbeTouch(0, "top"), more_s=10.0)
+    chosen = next_probe_touch(belief, [then, option(1, "outline")])
+    assert chosen is not None
+    assert (chosen.touch.candidate, chosen.touch.part) == (0, "outline")
+
+
+@pytest.mark.parametrize("seconds", [2.0, 10.0, 50.0, 200.0])
+def test_what_is_probably_not_needed_is_put_off(target, model, seconds: float) -> None:
+    """Against the expected time of both orders, if the target is one of the two."""
+    belief = believed(model, candidate(target, 0), candidate(target, 1, UNKNOWN_M))
+    share = {m.index: m.probability for m in belief.ranking.matches}
+    now_s = (share[0] + share[1]) * seconds
+    later_s = share[1] * (CHANGE_S + seconds)
+    assert pays_now(belief, option(1, "top", seconds), {1}) == (now_s <= later_s)
+    assert pays_now(belief, option(1, "top", seconds), {0, 1}), "nothing was measured yet"
 
 
 def test_time_counts(target, model) -> None:

@@ -12,7 +12,7 @@ from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
 import glotouch_skills.recognise.touch_next as module
-from glotouch_bt.perception.recognition import Closure, Match, Ranking
+from glotouch_bt.perception.recognition import PARTS, Closure, Match, ProbeTouch, Ranking
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
 from glotouch_skills.recognise.touch_next import TouchNext
 
@@ -52,13 +52,14 @@ class Oracle:
 
 @pytest.fixture
 def make(bench, found, folder, monkeypatch):
-    def make_one(oracle: Oracle, things=None, grip_width_m=WIDTH, stuff=(), tip_P_m=0.13, **params):
+    def make_one(oracle, things=None, grip_width_m=WIDTH, stuff=(), tip_P_m=0.13, probed=None, felt=None, **params):
         b = bench(grip_width_m=grip_width_m, things=stuff, tip_P_m=tip_P_m)
         b.context.world = replace(b.world, objects=replace(b.world.objects, folder=folder))
         monkeypatch.setattr(module.recognition, "infer_belief", oracle.infer_belief)
         monkeypatch.setattr(module.recognition, "expected_gain", oracle.expected_gain)
         things = things or (found.round((0.0, -0.08), 0.025), found.round((0.0, 0.08), 0.025, index=1))
-        return b, b.make(TouchNext, inputs={"candidates": things}, target="can", **params)
+        given = {"candidates": things} | {k: v for k, v in (("probed", probed), ("felt", felt)) if v is not None}
+        return b, b.make(TouchNext, inputs=given, target="can", **params)
 
     return make_one
 
@@ -133,6 +134,34 @@ def test_sure_but_with_too_little_evidence_is_touched_again(make, monkeypatch) -
     b, skill = make(oracle)
     repeat(b, skill)
     assert [len(t.layers) for t in skill.touchsets] == [0, 2]
+
+
+def measured(*indices: int) -> tuple[ProbeTouch, ...]:
+    return tuple(ProbeTouch(i, part) for i in indices for part in PARTS)
+
+
+def test_what_tells_most_but_was_not_measured_is_left_to_the_probe(make) -> None:
+    b, skill = make(Oracle(right=1, enough=3), probed=measured(0))
+    repeat(b, skill)
+    assert [len(t.layers) for t in skill.touchsets][1] == 0
+    assert "candidate 1 would tell most, once the probe has measured it" in b.of_kind("decided")[0]["why"]
+
+
+def test_it_may_be_told_to_touch_what_was_not_measured(make) -> None:
+    b, skill = make(Oracle(right=1, enough=3), probed=measured(0), unmeasured=True)
+    repeat(b, skill)
+    assert [len(t.layers) for t in skill.touchsets] == [0, 3]
+
+
+def test_touches_are_kept_when_a_candidate_is_measured_anew(make, found) -> None:
+    things = found.round((0.0, -0.08), 0.025), found.round((0.0, 0.08), 0.025, index=1)
+    b, skill = make(Oracle(right=1, enough=3), things)
+    b.run(skill)
+    higher = replace(things[1], height_m=things[1].height_m + 0.01)
+    _, again = make(Oracle(right=1, enough=3), (things[0], higher), felt=skill.touchsets)
+    b.run(again)
+    assert again.touchsets[1].candidate.height_m == higher.height_m
+    assert len(again.touchsets[1].layers) >= 1
 
 
 def test_a_candidate_that_is_gone_is_left_alone(make) -> None:

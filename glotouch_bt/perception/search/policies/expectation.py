@@ -90,10 +90,13 @@ class _SearchLattice:
 def touched(centre: Array, reach: Array, a: Array, b: Array) -> Mask:
     """Return (l, h) True where a segment a-b (l, 2) comes within reach (h,) of a centre (h, 2)."""
     ab = b - a
-    square = np.maximum((ab * ab).sum(axis=1), 1e-12)
-    t = ((centre[None] - a[:, None]) * ab[:, None]).sum(axis=2) / square[:, None]
-    nearest = a[:, None] + np.clip(t, 0.0, 1.0)[..., None] * ab[:, None]
-    return np.asarray(((centre[None] - nearest) ** 2).sum(axis=2) < reach[None] ** 2)
+    along_x, along_y = ab[:, :1], ab[:, 1:]
+    x, y = centre.T
+    t = (x - a[:, :1]) * along_x + (y - a[:, 1:]) * along_y
+    t /= np.maximum((ab * ab).sum(axis=1), 1e-12)[:, None]
+    np.clip(t, 0.0, 1.0, out=t)
+    away_x, away_y = x - (a[:, :1] + t * along_x), y - (a[:, 1:] + t * along_y)
+    return np.asarray(away_x * away_x + away_y * away_y < reach**2)
 
 
 @lru_cache(maxsize=4)
@@ -137,7 +140,7 @@ def _free_legs(half: tuple[float, float], p: ExpectationParams, exclusions: tupl
 
 
 class ExpectedFind:
-    """Policy of this module. Stateless; about 20 ms per call, 0.5 s for the first one.
+    """Policy of this module. Stateless; about 20 ms per call, 0.15 s for the first one.
 
     Args:
         params: See `ExpectationParams`.

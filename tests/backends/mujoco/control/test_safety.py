@@ -94,3 +94,24 @@ def test_the_motion_is_computed_only_while_something_presses() -> None:
 
 def test_the_torque_is_limited_too() -> None:
     assert tripped_after([0.0] * 10, torque_Nm=Limits().stop_torque_Nm + 0.1) == 5
+
+
+def test_samples_that_are_passed_as_quiet_change_nothing() -> None:
+    """Noise and rising presses, with and without the shortcut, trip at the same sample."""
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        forces = np.concatenate([rng.uniform(0.0, 0.4 * STOP_N, 20), rng.uniform(0.2, 0.4) * STOP_N * np.arange(12)])
+        stops = []
+        for shortcut in (False, True):
+            guard = HardLimitGuard(Limits())
+            twists = np.zeros((2, 6))
+            twists[:, :3] = -0.05 * ALONG
+            for i, force in enumerate(forces):
+                contact = [*(force * ALONG), 0.0, 0.0, 0.0]
+                if not (shortcut and guard.is_quiet([-c for c in contact], [0.0] * 6)):
+                    guard.check(contact, lambda twists=twists: twists, 0.001 * i)
+                if guard.tripped is not None:
+                    break
+            assert guard.tripped is not None
+            stops.append((i, guard.tripped.value, guard.tripped.quantity))
+        assert stops[0] == stops[1]
