@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
@@ -45,6 +45,7 @@ class TrialData(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     stl: Annotated[dict[Stem, bytes], msgspec.Meta(max_length=MAX_OBJECTS)]
     min_gap_m: float
     min_wall_gap_m: float
+    stance: Literal["upright", "any"]
     conditions: Conditions
     seed: Annotated[int, msgspec.Meta(ge=0)]
     options: WorldOptions
@@ -85,6 +86,7 @@ def trial_message(world: World, conditions: Conditions, seed: int, options: Worl
         stl=_stl_files(objects),
         min_gap_m=objects.min_gap_m,
         min_wall_gap_m=objects.min_wall_gap_m,
+        stance=objects.stance,
         conditions=conditions,
         seed=seed,
         options=options,
@@ -138,7 +140,11 @@ def trial_of_message(message: bytes) -> Iterator[Trial]:
         raise BadInput(f"the simulated world cannot be read from its message: {e}") from e
     with tempfile.TemporaryDirectory(prefix="glotouch-") as folder:
         objects = ObjectSet(
-            folder=Path(folder), names=tuple(data.stl), min_gap_m=data.min_gap_m, min_wall_gap_m=data.min_wall_gap_m
+            folder=Path(folder),
+            names=tuple(data.stl),
+            min_gap_m=data.min_gap_m,
+            min_wall_gap_m=data.min_wall_gap_m,
+            stance=data.stance,
         )
         for name, content in data.stl.items():
             (objects.folder / f"{name}.stl").write_bytes(content)

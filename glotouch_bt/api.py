@@ -34,7 +34,8 @@ def run(
         backend: Name of a registered backend (`glotouch backends`).
         seed: Source of every random draw, 0 .. 2**32 - 1.
         objects: Folder of watertight STL files in metres, instead of the world's.
-        conditions: Disturbances: ideal, nominal, harsh, or the path of a file.
+        conditions: Disturbances: ideal, nominal, harsh, realistic, or the path of a file; NAME+FIELD=VALUE changes a
+            field.
         faults: A fault plan: a path, the name of a shipped plan, or a loaded plan.
         out: The run's folder (default: runs/<time>-<mission>-s<seed>).
         overwrite: Replace the run that `out` holds.
@@ -110,7 +111,8 @@ def open_robot(
     Args:
         backend: Name of a registered backend (`glotouch backends`).
         world: A world, the path of a world file, or the name of a shipped world.
-        conditions: Disturbances: ideal, nominal, harsh, or the path of a file.
+        conditions: Disturbances: ideal, nominal, harsh, realistic, or the path of a file; NAME+FIELD=VALUE changes a
+            field.
         seed: Source of every random draw, 0 .. 2**32 - 1.
         **options: Options of the backend.
 

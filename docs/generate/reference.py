@@ -261,18 +261,24 @@ def worlds() -> str:
 def conditions() -> str:
     """Return the page on conditions: every field of the shipped profiles side by side."""
     files = shipped("conditions")
-    notes = dict(re.findall(r"^(\w+): .*?#\s*(.*)$", files["nominal"].read_text(), re.MULTILINE))
+    notes = dict(re.findall(r"^(\w+): .*?#\s*(.*)$", files["realistic"].read_text(), re.MULTILINE))
     read = {n: yaml.safe_load(p.read_text()) for n, p in files.items()}
-    names = [n for n in ("ideal", "nominal", "harsh") if n in read]
-    keys = [k for k in read["nominal"] if k != "name"]
+    names = [n for n in ("ideal", "nominal", "harsh", "realistic") if n in read]
+    keys = [k for k in read["realistic"] if k != "name"]
     rows = [(code(k), notes.get(k, ""), *(read[n].get(k, "") for n in names)) for k in keys]
     text = (
         "# Conditions\n\nConditions are the disturbances of a simulated run. `run --conditions NAME` takes a shipped "
         "profile or a YAML file with these keys. `sd` is one standard deviation; `[low, high]` is a uniform range. "
         "Values are drawn per run from the seed. Skills are never told them. A field that a profile leaves out is zero "
         "or the default of `glotouch_bt.robot.Conditions`.\n\n"
+        "`--conditions NAME+FIELD=VALUE` changes a field of a profile, and `run --set-condition FIELD=VALUE` does the "
+        "same; VALUE is a number, or `LOW,HIGH` for a range. So an axis can be studied alone "
+        "(`--conditions nominal --set-condition gel_blur_m=0.0015`) or left out "
+        "(`--conditions realistic+following_error_s=0`). The fields from `object_scale` on are axes that have no "
+        "effect in the other profiles. A run in which such an axis is set, its sensor is used, and not a single bit "
+        "of the model or of a reading changes, ends with an error.\n\n"
     )
-    return text + table(("field", "unit, meaning", *names), rows)
+    return text + table(("field", "unit, meaning, source", *names), rows)
 
 
 def faults() -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
+from glotouch_backends.mujoco.axis_proof import AxisProof
 from glotouch_backends.mujoco.control import check_sane, silence_mujoco
 from glotouch_backends.mujoco.model import BuiltWorld, Handles, compile_world
 from glotouch_backends.mujoco.robot import MujocoRobot
@@ -60,14 +61,15 @@ def build_world(
         BackendError: MuJoCo failed; cause chained.
     """
     silence_mujoco()
-    truth = replace(draw_truth(world, conditions, seed, options.layout), fixed=options.fixed)
+    proof = AxisProof(conditions)
+    truth = replace(draw_truth(description, world, conditions, seed, proof, options.layout), fixed=options.fixed)
     model, handles = compile_world(description, world, truth)
     data = mujoco.MjData(model)
     try:
         _settle(model, data, handles, description)
     except mujoco.FatalError as e:
         raise BackendError(f"MuJoCo failed while the world {world.name!r} settled: {e}") from e
-    return BuiltWorld(description, world, conditions, seed, truth, model, data, handles)
+    return BuiltWorld(description, world, conditions, seed, truth, model, data, handles, proof)
 
 
 class MujocoBackend(Backend):

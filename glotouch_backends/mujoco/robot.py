@@ -18,7 +18,7 @@ from glotouch_backends.mujoco.control import (
     check_sane,
 )
 from glotouch_backends.mujoco.model import STEP_S, STEPS, BuiltWorld
-from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, Tactile, WristSensor, up_in
+from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, PoseReports, Tactile, WristSensor, up_in
 from glotouch_backends.mujoco.simulation import ControlTrace, SnapshotStore
 from glotouch_bt.robot import (
     Array,
@@ -55,16 +55,21 @@ class MujocoRobot(Robot):
         s = handles.sensors
         self._s = s
         self._aperture = aperture = float(data.qpos[handles.jaw_qpos].sum())
-        self._servo = Servo(model, data, handles, description, self.period_s, limits.stop_acceleration_m_s2)
+        lag_s = conditions.following_error_s
+        self._servo = Servo(model, data, handles, description, self.period_s, limits.stop_acceleration_m_s2, lag_s)
+        built.proof.saw("following_error_s", 0.0, lag_s)
         self._servo.reset(np.array(data.qpos[handles.arm_qpos]))
-        self._jaws = JawServo(model, handles, description.gripper, aperture)
-        self._wrist = WristSensor(description, conditions, seed)
+        self._jaws = JawServo(built, aperture)
+        self._wrist = WristSensor(description, conditions, seed, proof=built.proof)
         self._guard = HardLimitGuard(limits)
         self._tactile = Tactile(built)
+        self._depth, self.proof = self._tactile.depth, built.proof
+        self._poses = PoseReports(built)
         self._ctrl = np.zeros((STEPS, model.nu))
         self._arm_ctrl, self._jaw_ctrl = self._ctrl[:, handles.arm_ctrl], self._ctrl[:, handles.jaw_ctrl]
         self._samples = np.zeros((STEPS, model.nsensordata))
-        self._external = np.zeros((STEPS, 4, 6))  # torque, force
+        held = handles.held_bodies.stop - handles.held_bodies.start
+        self._external = np.zeros((STEPS, held, 6))  # torque, force
         # Views of one step each, made once, so that the loop around mj_step only copies (memoryviews copy 3x faster).
         self._rows = [
             (c.data, s.data, e.data)
@@ -72,7 +77,7 @@ class MujocoRobot(Robot):
         ]
         self._ctrl_now, self._sensed = memoryview(data.ctrl), memoryview(data.sensordata)
         self._external_now = memoryview(data.cfrc_ext[handles.held_bodies].reshape(-1))
-        self._counted = np.array([1.0, 1.0, 1.0, 0.0])
+        self._counted = np.ones(held)  # the probe's bodies, from 3 on, count while it is held
         self._warnings = data.warning.number
         self._probe_now = data.xpos[handles.probe_body]
         self._pads_now = data.site_xpos[handles.pads_site], data.site_xmat[handles.pads_site].reshape(3, 3)
@@ -93,7 +98,7 @@ class MujocoRobot(Robot):
         self._wrist.fill(-self._samples[0, s.force.start : s.torque.stop])
         self._expected = self._wrist.expected(up_in(self._samples[0, s.quat]))
         first = GripperState(0.0, aperture, 0.0, False)
-        self._reports = JawReports(conditions, seed, self.period_s, first)
+        self._reports = JawReports(conditions, seed, self.period_s, first, built.proof)
         self._observation = self._observe(Command())
 
     def observe(self) -> Observation:
@@ -216,6 +221,7 @@ class MujocoRobot(Robot):
         """Return the observation of the samples just taken."""
         s, rows = self._s, self._samples.copy()
         now_s = self._cycles * self.period_s
+        self._poses.correct(rows, s)
         wrench, quat = rows[:, s.force.start : s.torque.stop], rows[:, s.quat]
         np.negative(wrench, out=wrench)
         self._set_payload()
@@ -248,7 +254,7 @@ class MujocoRobot(Robot):
     def _note_peak(self) -> None:
         """Update the largest true contact force on the hand, and on the probe while it is held."""
         x, y, z = (self._probe_now - self._samples[-1, self._s.position]).tolist()
-        self._counted[3] = x * x + y * y + z * z < MAX_HELD_DISTANCE_M**2
+        self._counted[3:] = x * x + y * y + z * z < MAX_HELD_DISTANCE_M**2
         force = (self._counted @ self._external)[:, 3:]
         flat = force.ravel()
         if flat @ flat > self.peak_force_N**2:  # otherwise no sample can be a new peak

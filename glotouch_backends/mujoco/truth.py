@@ -2,23 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from glotouch_bt.robot import Array, BadInput, Conditions, Pose, World
+from glotouch_backends.mujoco.axis_proof import AxisProof
+from glotouch_backends.mujoco.printed import printed_mesh
+from glotouch_bt.robot import Array, BadInput, Conditions, Pose, RobotDescription, World, rpy_to_matrix
 from glotouch_bt.robot.scene import Mesh, Placement, draw_layout, load_folder, stream
 
 
 @dataclass(frozen=True)
 class ObjectTruth:
-    """One object: its mesh, its place in the true K, its mass, and its friction on the floor."""
+    """One object.
+
+    Attributes:
+        mesh: The true solid.
+        place: Its place in the true K.
+        mass_kg: Mass.
+        friction: Friction on the floor.
+        stl: The solid of its file.
+        scale, offset_m: The changes that lead from the file to the true solid; see `printed`.
+        com_error_m: (3,) true centre of mass from that of a uniform solid, in the mesh frame.
+        lean_rad, lean_about_rad: Lean on its uneven base, and the direction in which its top leans.
+    """
 
     mesh: Mesh
     place: Placement
     mass_kg: float
     friction: float
+    stl: Mesh
+    scale: float
+    offset_m: float
+    com_error_m: Array
+    lean_rad: float
+    lean_about_rad: float
 
 
 @dataclass(frozen=True)
@@ -31,6 +51,9 @@ class Truth:
             grasp offset, so that the ball is not exactly at its nominal place.
         pad_friction: Friction of the pads.
         objects: In the order of the world's object set.
+        probe_stiffness_Nm_rad: Of the held probe about x_P and about y_P, infinite if rigid.
+        joint_errors_rad: (joints, 3) rotation vector of each joint's frame against the description.
+        contact_s, housing_s: Time constants of contacts; see `Conditions`.
         fixed: The objects are bolted to the container's floor instead of standing on it.
     """
 
@@ -38,6 +61,10 @@ class Truth:
     pose_handle_shaft: Pose
     pad_friction: float
     objects: tuple[ObjectTruth, ...]
+    probe_stiffness_Nm_rad: tuple[float, float]
+    joint_errors_rad: Array
+    contact_s: float
+    housing_s: float
     fixed: bool = False
 
 
@@ -49,11 +76,17 @@ def rotation_vector(v: Array) -> Pose:
     return Pose(np.zeros(3), quat / np.linalg.norm(quat))
 
 
-def _true_container(world: World, conditions: Conditions, rng: np.random.Generator) -> Pose:
+def _true_container(world: World, conditions: Conditions, seed: int, proof: AxisProof) -> Pose:
+    rng, tilt_rng = stream(seed, "registration"), stream(seed, "floor tilt")
     nominal = world.container.pose_B_K
     shift = conditions.registration_sd_m * rng.standard_normal(3)
     yaw = np.deg2rad(conditions.registration_sd_deg) * rng.standard_normal()
-    return nominal @ Pose.planar(shift, float(yaw))
+    there = nominal @ Pose.planar(shift, float(yaw))
+    if conditions.floor_tilt_sd_deg == 0.0:
+        return there
+    tilt = np.deg2rad(conditions.floor_tilt_sd_deg) * tilt_rng.standard_normal(2)
+    proof.saw("floor_tilt_sd_deg", 0.0, tilt)
+    return there @ rotation_vector(np.array([tilt[0], tilt[1], 0.0]))
 
 
 def _true_shaft(world: World, conditions: Conditions, rng: np.random.Generator) -> Pose:
@@ -63,15 +96,90 @@ def _true_shaft(world: World, conditions: Conditions, rng: np.random.Generator) 
     return Pose(np.array([shift[0], shift[1], 0.0])) @ rotation_vector(np.array([tilt[0], tilt[1], 0.0]))
 
 
+def _object(
+    stl: Mesh,
+    place: Placement,
+    mass_kg: float,
+    friction: float,
+    c: Conditions,
+    rng: np.random.Generator,
+    proof: AxisProof,
+) -> ObjectTruth:
+    """Draw the shape, the balance and the base of one object; every axis takes its numbers, set or not."""
+    scale, offset = float(rng.uniform(*c.object_scale)), float(rng.uniform(*c.object_surface_offset_m))
+    com = c.object_com_sd_m * rng.standard_normal(3)
+    lean, about = np.deg2rad(float(rng.uniform(*c.object_lean_deg))), float(rng.uniform(-np.pi, np.pi))
+    proof.saw("object_scale", stl.vertices_m, scale * stl.vertices_m)
+    mesh = printed_mesh(stl, scale, offset)
+    proof.saw("object_surface_offset_m", scale * stl.vertices_m, mesh.vertices_m)
+    proof.saw("object_com_sd_m", 0.0, com)
+    proof.saw("object_lean_deg", 0.0, lean)
+    return ObjectTruth(mesh, place, mass_kg, friction, stl, scale, offset, com, float(lean), about)
+
+
+def _probe_stiffness(
+    world: World, conditions: Conditions, rng: np.random.Generator, proof: AxisProof
+) -> tuple[float, float]:
+    """Return the stiffness about x_P and y_P, Nm/rad, that gives the ball's compliance: lever squared over it."""
+    stiffness = []
+    for axis in ("probe_compliance_across_m_per_N", "probe_compliance_about_m_per_N"):
+        compliance = float(rng.uniform(*getattr(conditions, axis)))
+        proof.saw(axis, 0.0, compliance)
+        stiffness.append(world.probe.grasp_to_tip_m**2 / compliance if compliance > 0.0 else math.inf)
+    return stiffness[0], stiffness[1]
+
+
+def _joint_errors(
+    description: RobotDescription, world: World, conditions: Conditions, rng: np.random.Generator, proof: AxisProof
+) -> Array:
+    """Draw small rotations of the joints' frames that displace P above the box with the given sd along an axis.
+
+    A rotation by e displaces a point at r from the joint by e x r; an isotropic e of sd s gives s |r| sqrt(2 / 3) along
+    an axis, in the mean over the directions. The displacements of the joints add up as squares.
+    """
+    errors = rng.standard_normal((len(description.joints), 3))
+    if conditions.kinematic_error_sd_m == 0.0:
+        return np.zeros_like(errors)
+    place = world.container.pose_B_K.position_m + np.array([0.0, 0.0, world.container.interior_m[2]])
+    levers = np.array([pose.position_m for pose in joint_poses(description, description.home_q)]) - place
+    errors *= conditions.kinematic_error_sd_m / math.sqrt(2.0 / 3.0 * float((levers * levers).sum()))
+    proof.saw("kinematic_error_sd_m", 0.0, errors)
+    return errors
+
+
+def joint_poses(description: RobotDescription, q: Sequence[float]) -> list[Pose]:
+    """Return the frame in B of each joint, before its rotation."""
+    pose, frames = Pose(np.zeros(3)), []
+    for joint, angle in zip(description.joints, q, strict=True):
+        pose = pose @ Pose.from_matrix(joint.origin_m, rpy_to_matrix(joint.origin_rpy_rad))
+        frames.append(pose)
+        pose = pose @ rotation_vector(angle * np.asarray(joint.axis))
+    return frames
+
+
+def _softness(axis: str, conditions: Conditions, seed: int, proof: AxisProof) -> float:
+    """Draw a time constant."""
+    drawn = float(stream(seed, axis).uniform(*getattr(conditions, axis)))
+    proof.saw(axis, getattr(Conditions(), axis)[0], drawn)
+    return drawn
+
+
 def draw_truth(
-    world: World, conditions: Conditions, seed: int, layout: Mapping[str, tuple[float, float, float]] | None = None
+    description: RobotDescription,
+    world: World,
+    conditions: Conditions,
+    seed: int,
+    proof: AxisProof,
+    layout: Mapping[str, tuple[float, float, float]] | None = None,
 ) -> Truth:
     """Draw the ground truth of a trial.
 
     Args:
+        description: The robot as it is believed to be.
         world: The nominal world.
         conditions: The disturbances.
         seed: Seed of all draws, with one random stream a purpose.
+        proof: Notes which axes alter the world.
         layout: (x m, y m, yaw rad) in K of every object by name, instead of random places.
 
     Raises:
@@ -91,11 +199,15 @@ def draw_truth(
     masses = rng.uniform(*conditions.object_mass_kg, len(meshes))
     frictions = rng.uniform(*conditions.object_friction, len(meshes))
     return Truth(
-        pose_B_K=_true_container(world, conditions, stream(seed, "registration")),
+        pose_B_K=_true_container(world, conditions, seed, proof),
         pose_handle_shaft=_true_shaft(world, conditions, stream(seed, "probe")),
         pad_friction=float(stream(seed, "pads").uniform(*conditions.pad_friction)),
         objects=tuple(
-            ObjectTruth(m, p, float(mass), float(mu))
+            _object(m, p, float(mass), float(mu), conditions, stream(seed, f"object {m.name}"), proof)
             for m, p, mass, mu in zip(meshes, places, masses, frictions, strict=True)
         ),
+        probe_stiffness_Nm_rad=_probe_stiffness(world, conditions, stream(seed, "probe compliance"), proof),
+        joint_errors_rad=_joint_errors(description, world, conditions, stream(seed, "kinematics"), proof),
+        contact_s=_softness("contact_softness_s", conditions, seed, proof),
+        housing_s=_softness("housing_softness_s", conditions, seed, proof),
     )

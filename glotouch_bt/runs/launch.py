@@ -22,7 +22,7 @@ from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile, Chec
 from glotouch_bt.mission.execution import Control, Outcome, SkillHung, deferred_interrupt, run_mission
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import Record, Recorder, RunSummary
-from glotouch_bt.robot import BadInput, Conditions, GlotouchError, Robot, load_backend
+from glotouch_bt.robot import BackendError, BadInput, Conditions, GlotouchError, Robot, load_backend
 from glotouch_bt.robot.simulation import Referee, TrueObject
 from glotouch_bt.runs.folder import MODELS, RunFolder, locked
 from glotouch_bt.runs.request import RunRequest, RunResult
@@ -53,7 +53,8 @@ def launch(
 
     Raises:
         BadInput: The request is wrong; nothing moved and nothing is left on disk.
-        BackendError: The backend did not open; nothing is left on disk.
+        BackendError: The backend did not open, and nothing is left on disk; or the run has ended and an axis of the
+            conditions altered nothing, although its sensor was used.
     """
     began = time.perf_counter()
     if not 0 <= request.seed <= MAX_SEED:
@@ -210,6 +211,11 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
             if not unwritten:  # a run killed before this can be resumed
                 unwritten = _errors_of(lambda: store.note("ended", outcome.status))
     report, warning = _report(folder.path) if request.report else (None, "")
+    if seen is not None and seen.silent_axes and outcome.status != "aborted":
+        raise BackendError(
+            f"conditions {', '.join(seen.silent_axes)} altered nothing in this run ({folder.path}): "
+            "choose a larger value, or leave them out"
+        )
     return RunResult(folder.path, result, outcome, report, warning, tuple(unwritten))
 
 

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from glotouch_bt.faults import FaultPlan
 from glotouch_bt.mission.execution import Outcome
+from glotouch_bt.mission.read import split_conditions
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class RunRequest:
         seed: Source of every random draw, 0 .. 2**32 - 1.
         settings: `--set` values: mission parameters; names that are no parameter go to the backend.
         objects: Folder of STL files instead of the world's.
-        conditions: Path or shipped name.
+        conditions: Path or shipped name, with changes as in `load_conditions`.
         out: The run's folder (default: runs/<time>-<mission>-s<seed>).
         faults: A fault plan: a path, the name of a shipped plan, or a plan that has been read.
         may_kill: A fault may kill this process, because it does nothing but this run.
@@ -45,6 +46,7 @@ class RunRequest:
 
     def as_json(self) -> dict[str, Any]:
         """Return what is needed to open the same robot and mission again, as JSON data."""
+        profile, changes = split_conditions(self.conditions)
         plan = self.faults.name if isinstance(self.faults, FaultPlan) else self.faults
         return {
             "mission": _absolute(self.mission),
@@ -52,7 +54,7 @@ class RunRequest:
             "seed": self.seed,
             "settings": dict(self.settings),
             "objects": None if self.objects is None else str(self.objects.resolve()),
-            "conditions": _absolute(self.conditions),
+            "conditions": "+".join([_absolute(profile), *changes]),
             "faults": None if plan is None else str(plan),
         }
 

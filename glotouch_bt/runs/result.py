@@ -13,7 +13,7 @@ from typing import Any
 
 from glotouch_bt.mission import Mission
 from glotouch_bt.mission.execution import Outcome
-from glotouch_bt.mission.read import shown
+from glotouch_bt.mission.read import conditions_name, shown
 from glotouch_bt.mission.record import to_json
 from glotouch_bt.robot import Conditions, Robot
 from glotouch_bt.robot.simulation import Referee, TrueObject
@@ -58,6 +58,7 @@ class FinalTruth:
     objects: list[TrueObject]
     peak_force_N: float
     tip_B_m: list[float]
+    silent_axes: tuple[str, ...]
 
 
 def final_truth(referee: Referee | None) -> tuple[FinalTruth | None, str]:
@@ -65,7 +66,9 @@ def final_truth(referee: Referee | None) -> tuple[FinalTruth | None, str]:
     if referee is None:
         return None, ""
     try:
-        return FinalTruth(referee.objects(), referee.peak_force_N(), referee.tip_B_m().tolist()), ""
+        return FinalTruth(
+            referee.objects(), referee.peak_force_N(), referee.tip_B_m().tolist(), referee.silent_axes()
+        ), ""
     except Exception as e:  # also of the solver's geometry, when a world has exploded
         return None, f"the simulated world can no longer be asked for the truth: {e}"
 
@@ -86,7 +89,7 @@ def score(request: RunRequest, mission: Mission, outcome: Outcome, seen: FinalTr
         "mission": mission.name,
         "backend": request.backend,
         "seed": request.seed,
-        "conditions": Path(request.conditions).stem,
+        "conditions": conditions_name(request.conditions),
         "status": outcome.status,
         "reasons": outcome.reasons,
         "reason_chain": [to_json(f.as_dict()) for f in outcome.chain],

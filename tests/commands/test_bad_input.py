@@ -130,7 +130,10 @@ CASES = [
     ('run survey --set layout={"apple":[0,0,0]}', "option layout: no place for nailong, train, truck, wukong"),
     ("run survey --seed 4294967296", "--seed 4294967296: must be in 0 .. 4294967295"),
     ("run survey --seed x", "'--seed'"),
-    ("run survey --conditions gone.yaml", "gone.yaml: no such conditions file (shipped: harsh, ideal, nominal)"),
+    (
+        "run survey --conditions gone.yaml",
+        "no such conditions file (shipped: harsh, ideal, nominal, realistic)",
+    ),
     ("run survey --conditions loud.yaml", "loud.yaml:2:19: force_noise_sd_N = 'loud': must be a number or a list"),
     ("run survey --conditions turned.yaml", "turned.yaml:2:17: conditions.object_mass_kg = (0.4, 0.1): must be"),
     ("run survey --conditions noise.yaml", "unknown parameter of conditions: 'force_noise'; did you mean"),

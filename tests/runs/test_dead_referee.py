@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from glotouch_bt.robot import BackendError, FakeRobot
@@ -26,9 +27,25 @@ class DyingReferee:
         return []
 
 
-def backend_with(monkeypatch: pytest.MonkeyPatch, answers: int) -> None:
+class TellingReferee(DyingReferee):
+    """Answers always, and tells of an axis of the conditions without effect."""
+
+    def __init__(self) -> None:
+        super().__init__(10)
+
+    def peak_force_N(self) -> float:
+        return 0.0
+
+    def tip_B_m(self) -> np.ndarray:
+        return np.zeros(3)
+
+    def silent_axes(self) -> tuple[str, ...]:
+        return ("gel_blur_m",)
+
+
+def backend_with(monkeypatch: pytest.MonkeyPatch, answers: int, referee: DyingReferee | None = None) -> None:
     backend = FakeBackend()
-    referee = DyingReferee(answers)
+    referee = referee or DyingReferee(answers)
     monkeypatch.setattr(backend, "referee", lambda robot: referee, raising=False)
     monkeypatch.setitem(launch.__globals__, "load_backend", lambda name: backend)
 
@@ -52,3 +69,11 @@ def test_a_robot_that_cannot_start_its_run_is_closed(monkeypatch: pytest.MonkeyP
         launch(RunRequest("calibrate", "fake", out=tmp_path / "run"))
     assert closed
     assert not (tmp_path / "run").exists()
+
+
+def test_an_axis_without_effect_is_an_error_after_the_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    backend_with(monkeypatch, 0, TellingReferee())
+    with pytest.raises(BackendError, match=r"conditions gel_blur_m altered nothing in this run .* choose a larger"):
+        launch(RunRequest("calibrate", "fake", conditions="ideal+gel_blur_m=1e-9", out=tmp_path / "run", report=False))
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert (result["status"], result["conditions"]) == ("failure", "ideal+gel_blur_m=1e-9")

@@ -8,6 +8,7 @@ from glotouch_backends.flexiv_xense.client.link import DriverLink
 from glotouch_backends.flexiv_xense.driver import messages
 from glotouch_backends.trial_message import pose_of
 from glotouch_bt.robot import Array, Pose
+from glotouch_bt.robot.scene import AXES
 from glotouch_bt.robot.simulation import BareSteps, TrueObject
 
 
@@ -52,6 +53,10 @@ class RemoteReferee:
     def peak_force_N(self) -> float:
         """See `Referee`."""
         return self._ask("peak_force_N").numbers[0]
+
+    def silent_axes(self) -> tuple[str, ...]:
+        """See `Referee`; the answer holds their places in `AXES`."""
+        return tuple(AXES[int(i)] for i in self._ask("silent_axes").numbers)
 
     def replay_bare_steps(self) -> BareSteps | None:
         """See `Referee`; None, because the driver keeps no trace."""

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-PROTOCOL = 3
+PROTOCOL = 4
 """Version of the messages; client and driver must have the same."""
 MAX_REQUEST_BYTES = 64 * 1024
 """Largest request without the world of simulated devices; `Open` with all its limits has 1 kB. Source: ours."""
@@ -208,7 +208,9 @@ class RefereeRequest(_Numbered, frozen=True, kw_only=True):
         name: Name for `disturb`.
     """
 
-    method: Literal["objects", "pose_B_K", "tip_B_m", "push_tip", "probe_in_holder", "peak_force_N", "disturb"]
+    method: Literal[
+        "objects", "pose_B_K", "tip_B_m", "push_tip", "probe_in_holder", "peak_force_N", "silent_axes", "disturb"
+    ]
     force_B_N: Three = (0.0, 0.0, 0.0)
     name: str = ""
 

@@ -106,7 +106,7 @@ class SimulatedArm:
         self._vector, self._product = np.zeros(model.nv), np.zeros(model.nv)
         self._jacobian = np.zeros((6, model.nv))
         self._hand = description.gripper.mass_and_com_E()
-        self._wrist = WristSensor(description, built.conditions, built.seed, steps=1)
+        self._wrist = WristSensor(description, built.conditions, built.seed, steps=1, proof=built.proof)
         self._offset_S = OFFSET_SD * stream(built.seed, "unzeroed").standard_normal(6)
         self._bias = np.zeros(6)
         self._taring: list[Array] | None = None

@@ -10,6 +10,7 @@ from glotouch_backends.flexiv_xense.simulated.vendor_api import GripperLink, Pad
 from glotouch_backends.mujoco.simulation import MujocoReferee, Simulated
 from glotouch_backends.trial_message import pose_numbers
 from glotouch_bt.robot import UnknownName
+from glotouch_bt.robot.scene import AXES
 
 NAMES = ("fault", "estop", "reduced", "link", "frozen", "gripper", "pads frozen", "pads missing")
 COLLISION = 200101
@@ -47,6 +48,8 @@ class DisturbingReferee(MujocoReferee):
                 numbers = (float(self.probe_in_holder()),)
             case "peak_force_N":
                 numbers = (self.peak_force_N(),)
+            case "silent_axes":
+                numbers = tuple(float(AXES.index(axis)) for axis in self.silent_axes())
             case "disturb":
                 self.disturb(request.name)
         return messages.RefereeAnswer(number=request.number, numbers=numbers, objects=tuple(bodies))

@@ -42,10 +42,11 @@ class SimulatedHand:
         self._s = handles.sensors
         self.gripper = built.description.gripper
         self._aperture = aperture = float(built.data.qpos[handles.jaw_qpos].sum())
-        self._jaws = JawServo(built.model, handles, self.gripper, aperture)
+        self._jaws = JawServo(built, aperture)
         self._rows = np.zeros((STEPS, 2))
         self._tactile = Tactile(built)
-        self._reports = JawReports(conditions, built.seed, PERIOD_S, GripperState(0.0, aperture, 0.0, False))
+        first = GripperState(0.0, aperture, 0.0, False)
+        self._reports = JawReports(conditions, built.seed, PERIOD_S, first, built.proof)
         late = round(conditions.gripper_latency_s / PERIOD_S)
         self._speeds: deque[float] = deque([0.0] * (late + 1), maxlen=late + 1)
         self._now_s = 0.0

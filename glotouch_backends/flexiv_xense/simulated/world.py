@@ -16,7 +16,7 @@ from glotouch_backends.mujoco.simulation import ControlTrace
 from glotouch_backends.options import WorldOptions
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_backends.trial_message import trial_of_message
-from glotouch_bt.robot import BackendError, Conditions, RobotDescription, World
+from glotouch_bt.robot import BackendError, BadInput, Conditions, RobotDescription, World
 
 
 class SimulatedWorld:
@@ -39,10 +39,15 @@ class SimulatedWorld:
         description: RobotDescription = RIZON4_XENSE,
     ) -> None:
         self.world, self.description = world, description
+        exact = [axis for axis in ("kinematic_error_sd_m", "following_error_s") if getattr(conditions, axis)]
+        if exact:
+            changes = "".join(f"+{axis}=0" for axis in exact)
+            raise BadInput(f"the simulated arm has no {', '.join(exact)}; use --conditions {conditions.name}{changes}")
         built = build_world(description, world, conditions, seed, options)
         self.truth, self.model, self.data, self.handles = built.truth, built.model, built.data, built.handles
         self.trace: ControlTrace | None = None
         self.peak_force_N = 0.0
+        self.proof = built.proof
         self.arm = SimulatedArm(built)
         self.hand = SimulatedHand(built)
         self.steps = 0
@@ -50,10 +55,11 @@ class SimulatedWorld:
         self._ctrl = np.array(self.data.ctrl)
         self._arm_ctrl, self._jaw_ctrl = self._ctrl[h.arm_ctrl], self._ctrl[h.jaw_ctrl]
         self._jaw_rows = np.zeros((STEPS, 2))
-        self._external = np.zeros((STEPS, 4, 6))  # torque, force
+        held = h.held_bodies.stop - h.held_bodies.start
+        self._external = np.zeros((STEPS, held, 6))  # torque, force
         self._external_now = self.data.cfrc_ext[h.held_bodies]
         self._samples = np.zeros((STEPS, self.model.nsensordata))
-        self._counted = np.array([1.0, 1.0, 1.0, 0.0])
+        self._counted = np.ones(held)  # the probe's bodies, from 3 on, count while it is held
 
     @classmethod
     def of_message(cls, message: bytes) -> SimulatedWorld:
@@ -107,6 +113,6 @@ class SimulatedWorld:
         """Update the largest true contact force on the hand, and on the probe while it is held."""
         h = self.handles
         gap = self.data.xpos[h.probe_body] - self._samples[-1, h.sensors.position]
-        self._counted[3] = float(gap @ gap) < MAX_HELD_DISTANCE_M**2
+        self._counted[3:] = float(gap @ gap) < MAX_HELD_DISTANCE_M**2
         force = (self._counted @ self._external)[:, 3:]
         self.peak_force_N = max(self.peak_force_N, float((force * force).sum(axis=1).max()) ** 0.5)

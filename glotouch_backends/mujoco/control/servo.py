@@ -38,6 +38,7 @@ class Servo:
 
     MuJoCo's position servo gives kp (ctrl - q) - kv dq; with
     ctrl = q + ((kv + damping) dq + M ddq) / kp the joints follow q without lag (M includes the armature).
+    With `lag_s` less feed-forward they follow that much later: at a constant speed v by v lag_s.
     """
 
     def __init__(
@@ -48,6 +49,7 @@ class Servo:
         description: RobotDescription,
         period_s: float,
         stop_acceleration_m_s2: float,
+        lag_s: float = 0.0,
     ) -> None:
         self._model, self._data = model, data
         self._dof, self._arm_qpos = handles.arm_dof, handles.arm_qpos
@@ -65,6 +67,7 @@ class Servo:
         kp = np.array(STIFFNESS_NM_RAD)
         self._per_kp = 1.0 / kp
         self._lead = DAMPING_PER_STIFFNESS_S + JOINT_DAMPING / kp
+        self._ahead = self._lead - lag_s
         self._period = period_s
         self._brake_step = stop_acceleration_m_s2 / BRAKE_REACH_M * period_s
         along = (np.arange(STEPS) / STEPS)[:, None]
@@ -146,7 +149,7 @@ class Servo:
         q, dq, ddq = self._brake() if target is None else target
         k[0], k[1] = k[2], k[3]
         k[2], k[3] = q, dq
-        np.multiply(k, self._lead, out=terms[4:8])
+        np.multiply(k, self._ahead, out=terms[4:8])
         terms[8] = self._inertia(self._ddq)
         terms[9] = self._inertia(ddq)
         np.matmul(self._basis, terms, out=ctrl)

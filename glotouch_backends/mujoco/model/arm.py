@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import mujoco
+import numpy as np
 
 from glotouch_backends.mujoco.model.contact import HAND, HAND_FRICTION, set_category, set_friction
-from glotouch_bt.robot import Link, ParamError, RobotDescription, matrix_to_quat, rpy_to_matrix
+from glotouch_backends.mujoco.truth import rotation_vector
+from glotouch_bt.robot import Array, Link, ParamError, Pose, RobotDescription, matrix_to_quat, rpy_to_matrix
 
 JOINT_DAMPING = 2.0
 """Joint damping, Nm s/rad. Source: ours."""
@@ -33,8 +35,10 @@ def _dress(body: mujoco.MjsBody, link: Link) -> None:
         set_friction(geom, HAND_FRICTION)
 
 
-def add_arm(spec: mujoco.MjSpec, description: RobotDescription) -> mujoco.MjsBody:
+def add_arm(spec: mujoco.MjSpec, description: RobotDescription, errors_rad: Array) -> mujoco.MjsBody:
     """Add the arm and its servos (actuators named as the joints); return the body of the flange frame E, still empty.
+
+    `errors_rad` (joints, 3) are rotation vectors by which the true joint frames differ from the description.
 
     Raises:
         ParamError: The servo gains are for a seven-axis arm.
@@ -45,10 +49,11 @@ def add_arm(spec: mujoco.MjSpec, description: RobotDescription) -> mujoco.MjsBod
     _dress(body, description.base)
     for geom in body.geoms:  # the base stands on the table
         geom.contype = geom.conaffinity = 0
-    for joint, kp in zip(description.joints, STIFFNESS_NM_RAD, strict=True):
-        body = body.add_body(
-            name=joint.link.name, pos=joint.origin_m, quat=matrix_to_quat(rpy_to_matrix(joint.origin_rpy_rad))
-        )
+    for joint, kp, error in zip(description.joints, STIFFNESS_NM_RAD, errors_rad, strict=True):
+        quat = matrix_to_quat(rpy_to_matrix(joint.origin_rpy_rad))
+        if error.any():
+            quat = (Pose(np.zeros(3), quat) @ rotation_vector(error)).quat
+        body = body.add_body(name=joint.link.name, pos=joint.origin_m, quat=quat)
         if joint is description.joints[0]:  # the sleep policy of a tree is that of its root
             body.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER
         body.add_joint(

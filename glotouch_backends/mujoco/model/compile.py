@@ -8,8 +8,9 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from glotouch_backends.mujoco.axis_proof import AxisProof
 from glotouch_backends.mujoco.model.arm import add_arm
-from glotouch_backends.mujoco.model.contact import GROUP_VISUAL, set_options
+from glotouch_backends.mujoco.model.contact import GROUP_VISUAL, set_options, set_softness
 from glotouch_backends.mujoco.model.container import add_container
 from glotouch_backends.mujoco.model.gripper import add_gripper
 from glotouch_backends.mujoco.model.objects import add_object
@@ -48,8 +49,8 @@ class Handles:
         arm_qpos, arm_dof, arm_ctrl: Slices of the arm in qpos, qvel and ctrl.
         jaw_qpos, jaw_ctrl: Slices of the two jaws in qpos and ctrl.
         hand_bodies: Slice of the bodies hand, finger_left, finger_right.
-        held_bodies: The same and the probe.
-        probe_body, tip_site, pads_site, sensor_site: Ids.
+        held_bodies: The same and the probe, of one body, or of two if its shaft is compliant.
+        probe_body, tip_body, tip_site, pads_site, sensor_site: Ids.
         object_bodies: (n,) body of each object.
         container_body, holder_body: Ids.
         pad_geoms: (left, right).
@@ -64,6 +65,7 @@ class Handles:
     hand_bodies: slice
     held_bodies: slice
     probe_body: int
+    tip_body: int
     tip_site: int
     pads_site: int
     sensor_site: int
@@ -86,6 +88,7 @@ class BuiltWorld:
     model: mujoco.MjModel
     data: mujoco.MjData
     handles: Handles
+    proof: AxisProof
 
 
 def _add_sensors(spec: mujoco.MjSpec, description: RobotDescription) -> None:
@@ -125,6 +128,8 @@ def _handles(model: mujoco.MjModel, description: RobotDescription, objects: int)
     dof = description.dof
     hand = model.body("hand").id
     assert [model.body(hand + i).name for i in range(4)] == ["hand", "finger_left", "finger_right", "probe"]
+    tip_body = int(model.site("tip").bodyid[0])
+    assert hand + 3 <= tip_body <= hand + 4
     assert last.dofadr[0] - first.dofadr[0] == dof - 1
     actuator, grip = model.actuator(description.joints[0].name).id, model.actuator("jaw_left").id
     return Handles(
@@ -134,8 +139,9 @@ def _handles(model: mujoco.MjModel, description: RobotDescription, objects: int)
         jaw_qpos=slice(int(jaw.qposadr[0]), int(jaw.qposadr[0]) + 2),
         jaw_ctrl=slice(grip, grip + 2),
         hand_bodies=slice(hand, hand + 3),
-        held_bodies=slice(hand, hand + 4),
+        held_bodies=slice(hand, tip_body + 1),
         probe_body=model.body("probe").id,
+        tip_body=tip_body,
         tip_site=model.site("tip").id,
         pads_site=model.site("P").id,
         sensor_site=model.site("S").id,
@@ -179,12 +185,13 @@ def build_spec(description: RobotDescription, world: World, truth: Truth) -> muj
     spec.compiler.degree = False
     set_options(spec, STEP_S)
     _dress(spec, float(world.container.pose_B_K.position_m[2]))
-    hand = add_arm(spec, description)
+    hand = add_arm(spec, description, truth.joint_errors_rad)
     add_gripper(spec, hand, description.gripper, truth.pad_friction)
-    add_probe(spec, world.probe, world.holder, truth.pose_handle_shaft, truth.pad_friction)
+    add_probe(spec, world.probe, world.holder, truth)
     add_container(spec, world.container, truth.pose_B_K)
     for index, item in enumerate(truth.objects):
         add_object(spec, index, item, truth.pose_B_K, fixed=truth.fixed)
+    set_softness(spec, truth.contact_s, truth.housing_s)
     _add_sensors(spec, description)
     return spec
 

@@ -52,6 +52,13 @@ def set_category(geom: mujoco.MjsGeom, category: int) -> None:
     geom.solmix = MIX[category]
 
 
+def set_softness(spec: mujoco.MjSpec, contact_s: float, housing_s: float) -> None:
+    """Replace the time constants of `STIFF` and `HOUSING` in every geom; the gel pads keep theirs."""
+    new = {STIFF: (contact_s, STIFF[1]), HOUSING: (housing_s, HOUSING[1])}
+    for geom in spec.geoms:
+        geom.solref = new.get(tuple(geom.solref), geom.solref)
+
+
 def set_friction(geom: mujoco.MjsGeom, sliding: float, priority: int = 0, torsion_m: float = HARD_TORSION_M) -> None:
     """Set friction. Of two geoms the larger priority decides; at equal priority the larger friction."""
     geom.friction = (sliding, torsion_m, ROLLING_M)

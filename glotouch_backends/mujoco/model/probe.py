@@ -6,6 +6,8 @@ lie inside the handle's outline, so that closed fingers pass them; the slot is w
 
 from __future__ import annotations
 
+import math
+
 import mujoco
 import numpy as np
 import trimesh
@@ -22,7 +24,8 @@ from glotouch_backends.mujoco.model.contact import (
     set_category,
     set_friction,
 )
-from glotouch_bt.robot import Holder, ParamError, Pose, Probe
+from glotouch_backends.mujoco.truth import Truth
+from glotouch_bt.robot import Holder, ParamError, Probe
 from glotouch_bt.robot.scene import Mesh
 
 RAIL_HEIGHT_M = 0.003
@@ -31,6 +34,10 @@ MIN_BALL_CLEARANCE_M = 0.001
 """Smallest gap between ball and rail on each side. Source: ours."""
 LEDGE_M = 0.0015
 """Overlap of a rail with the handle. Source: ours."""
+MAX_SHAFT_STIFFNESS_NM_RAD = 170.0
+"""Largest stiffness between handle and shaft, or 1 ms steps become unstable; 0.1 mm/N at the ball. Source: ours."""
+GEL_DAMPING_RATIO = 0.5
+"""Damping ratio of the shaft in the gel. Source: ours; silicone gels damp strongly."""
 HANDLE_COLOUR, STEEL_COLOUR, STAND_COLOUR = (0.15, 0.35, 0.65, 1.0), (0.75, 0.77, 0.80, 1.0), (0.3, 0.32, 0.3, 1.0)
 
 
@@ -40,11 +47,40 @@ def handle_mesh(probe: Probe) -> Mesh:
     return Mesh("handle", np.array(box.vertices), np.array(box.faces, dtype=np.int64), f"handle {probe.handle_m}")
 
 
-def add_probe(spec: mujoco.MjSpec, probe: Probe, holder: Holder, pose_handle_shaft: Pose, pad_friction: float) -> None:
+def _compliant(spec: mujoco.MjSpec, body: mujoco.MjsBody, probe: Probe, truth: Truth) -> mujoco.MjsBody:
+    """Return the body of the shaft: `probe` itself if it is rigid, else a body that turns in the handle's centre.
+
+    The gel's shear layer and the fingers carry the handle; springs between handle and shaft stand for them. The
+    handle's frame is that of the jaws: they close along y, so a rotation about y is a rotation about their axis.
+    """
+    stiffness = truth.probe_stiffness_Nm_rad
+    if all(map(math.isinf, stiffness)):
+        return body
+    # The shaft is a uniform rod, and the handle is as heavy as the probe's centre of mass says. The handle keeps the
+    # inertia of the whole probe: with its own, 4e-6 kg m2, the springs are too stiff for steps of 1 ms.
+    middle_m = 0.5 * (probe.handle_m[2] + probe.length_m)
+    mass = probe.mass_kg * probe.com_below_grasp_m / middle_m
+    body.mass, body.ipos = probe.mass_kg - mass, np.zeros(3)
+    shaft = body.add_body(name="shaft", mass=mass, explicitinertial=True)
+    shaft.ipos = truth.pose_handle_shaft.apply((0.0, 0.0, middle_m))
+    rod = mass * probe.length_m**2 / 12.0
+    shaft.inertia = (rod, rod, 0.5 * mass * (0.5 * probe.shaft_diameter_m) ** 2)
+    inertia = rod + mass * middle_m**2  # about the hinges
+    for name, axis, k in zip("xy", ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), stiffness, strict=True):
+        if math.isfinite(k):
+            k = min(k, MAX_SHAFT_STIFFNESS_NM_RAD)
+            joint = shaft.add_joint(name=f"shaft_{name}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
+            damping = 2.0 * GEL_DAMPING_RATIO * math.sqrt(k * inertia)
+            joint.stiffness, joint.damping = (k, 0.0, 0.0), (damping, 0.0, 0.0)  # linear, of cubic polynomials
+    return shaft
+
+
+def add_probe(spec: mujoco.MjSpec, probe: Probe, holder: Holder, truth: Truth) -> None:
     """Add the stand and, standing in it, the free body `probe` (frame: handle's centre, z to the tip).
 
     Its geoms are `handle`, `shaft` and `ball`; the site `tip` is the ball's centre.
     """
+    pose_handle_shaft, pad_friction = truth.pose_handle_shaft, truth.pad_friction
     pose = holder.pose_B_grasp
     body = spec.worldbody.add_body(name="probe", pos=pose.position_m, quat=pose.quat)
     body.add_freejoint(name="probe")
@@ -53,18 +89,6 @@ def add_probe(spec: mujoco.MjSpec, probe: Probe, holder: Holder, pose_handle_sha
     set_category(handle, PROBE)
     set_friction(handle, HOLDER_FRICTION, priority=1)
 
-    top, ball = pose_handle_shaft.apply([(0.0, 0.0, hz), (0.0, 0.0, probe.grasp_to_tip_m)])
-    shaft = body.add_geom(name="shaft", type=mujoco.mjtGeom.mjGEOM_CYLINDER, rgba=STEEL_COLOUR)
-    shaft.fromto = (*top, *ball)
-    shaft.size = (0.5 * probe.shaft_diameter_m, 0.0, 0.0)
-    tip = body.add_geom(
-        name="ball", type=mujoco.mjtGeom.mjGEOM_SPHERE, pos=ball, size=(probe.tip_radius_m, 0.0, 0.0), rgba=STEEL_COLOUR
-    )
-    for geom in (shaft, tip):
-        set_category(geom, PROBE)
-        set_friction(geom, TIP_FRICTION, priority=1)
-    body.add_site(name="tip", pos=ball, quat=pose_handle_shaft.quat)
-
     body.explicitinertial = True
     body.mass = probe.mass_kg
     body.ipos = pose_handle_shaft.apply((0.0, 0.0, probe.com_below_grasp_m))
@@ -72,6 +96,19 @@ def add_probe(spec: mujoco.MjSpec, probe: Probe, holder: Holder, pose_handle_sha
     whole = probe.handle_m[2] + probe.length_m
     across = probe.mass_kg * (whole**2 + probe.handle_m[0] ** 2) / 12
     body.inertia = (across, across, probe.mass_kg * (probe.handle_m[0] ** 2 + probe.handle_m[1] ** 2) / 12)
+
+    top, ball = pose_handle_shaft.apply([(0.0, 0.0, hz), (0.0, 0.0, probe.grasp_to_tip_m)])
+    lower = _compliant(spec, body, probe, truth)
+    shaft = lower.add_geom(name="shaft", type=mujoco.mjtGeom.mjGEOM_CYLINDER, rgba=STEEL_COLOUR)
+    shaft.fromto = (*top, *ball)
+    shaft.size = (0.5 * probe.shaft_diameter_m, 0.0, 0.0)
+    tip = lower.add_geom(
+        name="ball", type=mujoco.mjtGeom.mjGEOM_SPHERE, pos=ball, size=(probe.tip_radius_m, 0.0, 0.0), rgba=STEEL_COLOUR
+    )
+    for geom in (shaft, tip):
+        set_category(geom, PROBE)
+        set_friction(geom, TIP_FRICTION, priority=1)
+    lower.add_site(name="tip", pos=ball, quat=pose_handle_shaft.quat)
 
     for side in ("left", "right"):
         pair = spec.add_pair(name=f"grip_{side}", geomname1=f"pad_{side}", geomname2="handle", condim=4)

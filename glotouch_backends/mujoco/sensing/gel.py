@@ -103,6 +103,7 @@ class GelSensor:
         shape: (rows, cols) of the map; rows along +z_P, columns along +x_P.
         depth_m: Largest indentation shown; below 1.6 mm.
         stiffness_N_mm3: Winkler modulus.
+        bottom_m: Indentation at which the gel becomes rigid.
         reach_m: If no surface in front of the window is nearer than this, the force acts outside the window and the map
             is empty. Source: hulls bulge by at most 3 mm, 95 % by less than 1 mm.
 
@@ -120,12 +121,14 @@ class GelSensor:
         depth_m: float,
         stiffness_N_mm3: float = STIFFNESS_N_MM3,
         reach_m: float = 0.002,
+        bottom_m: float = BOTTOM_M,
     ) -> None:
         for name, value in (
             ("window_m", min(window_m)),
             ("shape", min(shape)),
             ("stiffness_N_mm3", stiffness_N_mm3),
             ("reach_m", reach_m),
+            ("bottom_m", bottom_m),
         ):
             if not (math.isfinite(value) and value > 0):
                 raise ParamError(f"gel.{name}", value, "finite and positive")
@@ -134,7 +137,7 @@ class GelSensor:
         rows, cols = shape
         self.shape, self.window_m, self.depth_m, self.reach_m = shape, window_m, depth_m, reach_m
         self._area_m2 = window_m[0] * window_m[1] / (rows * cols)
-        self._stiffness_N_m3 = stiffness_N_mm3 * 1e9
+        self._stiffness_N_m3, self._bottom_m = stiffness_N_mm3 * 1e9, bottom_m
         x = (np.arange(cols) + 0.5) / cols * window_m[0] - 0.5 * window_m[0]
         z = (np.arange(rows) + 0.5) / rows * window_m[1] - 0.5 * window_m[1]
         self.taxels_P: Array = np.zeros((rows, cols, 3))
@@ -168,7 +171,7 @@ class GelSensor:
             aside_squared = float(to_centre @ to_centre) - along * along
             if aside_squared > (rays.radius_m + self._half_diagonal_m) ** 2:
                 continue
-            if not -RAY_TRAVEL_M - rays.radius_m < along < self.reach_m + BOTTOM_M + rays.radius_m:
+            if not -RAY_TRAVEL_M - rays.radius_m < along < self.reach_m + self._bottom_m + rays.radius_m:
                 continue
             distance = rays.heights(pose_O_pad.apply(origins_pad), axis)
             np.maximum(overlap, RAY_TRAVEL_M - distance, out=overlap)
@@ -199,6 +202,7 @@ class GelSensor:
         surfaces: Sequence[tuple[SurfaceRays, Pose]],
         distance_m: tuple[float, float],
         force_N: tuple[float, float],
+        shear_m: Array | None = None,
     ) -> PairPress:
         """Press both pads against the same objects.
 
@@ -206,8 +210,12 @@ class GelSensor:
             surfaces: Each object's rays and `pose_O_P`, the hand frame P in that object's mesh frame.
             distance_m: (left, right) distance of each undeformed gel surface from the plane y_P = 0.
             force_N: (left, right) normal force on each pad's face.
+            shear_m: (2, 2) shift of the left and the right gel's surface along x_P and z_P; the imprints shift with it.
         """
         left_P, right_P = pad_pose_P("left", distance_m[0]), pad_pose_P("right", distance_m[1])
+        if shear_m is not None:
+            (lx, lz), (rx, rz) = shear_m.tolist()
+            left_P, right_P = Pose(np.array([-lx, 0.0, -lz])) @ left_P, Pose(np.array([-rx, 0.0, -rz])) @ right_P
         left, left_shift = self.press("left", [(r, p @ left_P) for r, p in surfaces], force_N[0])
         right, right_shift = self.press("right", [(r, p @ right_P) for r, p in surfaces], force_N[1])
         return PairPress(left, right, left_shift, right_shift)
@@ -225,13 +233,14 @@ class GelSensor:
         load = force_N / (self._stiffness_N_m3 * self._area_m2)  # m: sum of x / (1 - (x/X)^2) over the taxels
         top = float(overlap.max())
         # deepest taxel alone: x / (1 - (x/X)^2) = load, a quadratic in x with one positive root
-        ratio = 2.0 * load / BOTTOM_M
-        deepest = BOTTOM_M * ratio / (1.0 + math.sqrt(1.0 + ratio * ratio))
+        bottom = self._bottom_m
+        ratio = 2.0 * load / bottom
+        deepest = bottom * ratio / (1.0 + math.sqrt(1.0 + ratio * ratio))
         below_top = overlap[overlap > top - deepest] - top  # no other taxel can touch
         for _ in range(60):
             x = below_top + deepest
             x = x[x > 0.0]
-            rest = 1.0 - (x / BOTTOM_M) ** 2
+            rest = 1.0 - (x / bottom) ** 2
             excess = float((x / rest).sum()) - load
             slope = float(((2.0 - rest) / (rest * rest)).sum())
             deepest -= excess / slope

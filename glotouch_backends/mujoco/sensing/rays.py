@@ -11,6 +11,7 @@ import numpy as np
 from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
 
+from glotouch_backends.mujoco.printed import Roughness
 from glotouch_bt.robot import Array, ParamError
 from glotouch_bt.robot.scene import Mesh
 
@@ -18,12 +19,17 @@ from glotouch_bt.robot.scene import Mesh
 class SurfaceRays:
     """Ray queries against one mesh; 700 rays take about 0.1 ms.
 
+    Args:
+        mesh: The smooth surface.
+        roughness: Heights above it; a ray meets a hill earlier by its height.
+
     Attributes:
         centre_O_m: (3,) centre of the bounding box, in the mesh frame.
         radius_m: Radius of the ball around that centre that contains every vertex.
     """
 
-    def __init__(self, mesh: Mesh) -> None:
+    def __init__(self, mesh: Mesh, roughness: Roughness | None = None) -> None:
+        self._roughness = roughness
         lower, upper = mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)
         self.centre_O_m: Array = 0.5 * (lower + upper)
         self.radius_m = float(np.linalg.norm(mesh.vertices_m - self.centre_O_m, axis=1).max())
@@ -58,4 +64,6 @@ class SurfaceRays:
         hit = self._scene.run(origins, directions, output=1)
         entered = (hit["primID"] >= 0) & (hit["Ng"] @ directions[0] < 0.0)
         distance = hit["tfar"].astype(np.float64) * self.radius_m
+        if self._roughness is not None and entered.any():
+            distance[entered] -= self._roughness.at(origins_O[entered] + distance[entered, None] * direction_O)
         return np.where(entered, distance, np.inf)

@@ -10,17 +10,31 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from glotouch_backends.mujoco.model import BuiltWorld, Handles, handle_mesh
-from glotouch_backends.mujoco.sensing.gel import GelSensor, PairPress
+from glotouch_backends.mujoco.printed import Roughness
+from glotouch_backends.mujoco.sensing.depth import DepthErrors
+from glotouch_backends.mujoco.sensing.gel import BOTTOM_M, STIFFNESS_N_MM3, GelSensor, PairPress
 from glotouch_backends.mujoco.sensing.rays import SurfaceRays
-from glotouch_bt.robot import Pose, TactileFrame
+from glotouch_bt.robot import Array, Pose, TactileFrame
 from glotouch_bt.robot.scene import stream
 
 MAX_SAME_TRAVEL_M = 1e-5
 """Do not solve the gel again while the jaws have moved less than this. Source: ours."""
 MAX_SAME_FORCE_N = 0.5
 """Do not solve the gel again while the jaws' forces have changed less than this. Source: ours."""
+
+
+def _gel(built: BuiltWorld) -> GelSensor:
+    """Return the gel of both pads, with the stiffness and thickness of the trial."""
+    gripper, c, rng = built.description.gripper, built.conditions, stream(built.seed, "gel material")
+    stiffer, thicker = float(rng.uniform(*c.gel_stiffness_factor)), float(rng.uniform(*c.gel_thickness_factor))
+    built.proof.saw("gel_stiffness_factor", 1.0, stiffer)
+    built.proof.saw("gel_thickness_factor", 1.0, thicker)
+    # A Winkler modulus is the confined modulus over the thickness.
+    stiffness, bottom = STIFFNESS_N_MM3 * stiffer / thicker, BOTTOM_M * thicker
+    return GelSensor(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m, stiffness, bottom_m=bottom)
 
 
 def body_pose(data: mujoco.MjData, body: int) -> Pose:
@@ -35,6 +49,8 @@ class PadContacts:
         self._data, self._geoms = data, handles.pad_geoms
         self._axes = data.site_xmat[handles.pads_site]
         self._body_of = model.geom_bodyid
+        self._force_B: Array = np.zeros((0, 3))
+        self._on_left: npt.NDArray[np.bool_] = np.zeros(0, dtype=bool)
 
     def touch(self) -> tuple[tuple[float, float], set[int]]:
         """Return the normal force on the (left, right) pad, N, and the bodies that touch them.
@@ -44,6 +60,7 @@ class PadContacts:
         contact = self._data.contact
         pairs, address = contact.geom, contact.efc_address
         left, right = self._geoms
+        self._force_B = np.zeros((0, 3))
         if len(pairs) == 0:
             return (0.0, 0.0), set()
         mine = np.flatnonzero(((pairs == left) | (pairs == right)).any(axis=1) & (address >= 0))
@@ -53,12 +70,20 @@ class PadContacts:
         pad_second = (pairs[:, 1] == left) | (pairs[:, 1] == right)
         rows = self._data.efc_force[address[mine][:, None] + np.arange(3)]
         force_B = np.einsum("ni,nij->nj", rows, contact.frame[mine].reshape(-1, 3, 3))
+        force_B[~pad_second] *= -1.0  # force on the pad
         along = force_B @ self._axes[1::3]  # on y_P
-        along[~pad_second] *= -1.0  # force on the pad
         on_left = np.where(pad_second, pairs[:, 1], pairs[:, 0]) == left
         other = np.where(pad_second, pairs[:, 0], pairs[:, 1])[rows[:, 0] > 0.0]
+        self._force_B, self._on_left = force_B, on_left
         forces = (max(float(along[on_left].sum()), 0.0), max(-float(along[~on_left].sum()), 0.0))
         return forces, set(self._body_of[other].tolist())
+
+    def tangential_N(self) -> Array:
+        """Return the tangential forces (2, 2) of the last `touch`: left and right pad, along x_P and z_P."""
+        if len(self._force_B) == 0:
+            return np.zeros((2, 2))
+        aside = self._force_B @ self._axes.reshape(3, 3)[:, [0, 2]]
+        return np.stack([aside[self._on_left].sum(axis=0), aside[~self._on_left].sum(axis=0)])
 
 
 class Tactile:
@@ -67,6 +92,7 @@ class Tactile:
     Attributes:
         shift_m: Sum of both pads' gel shifts at the last sample: the additional closing of jaws with a soft gel; part
             of the reported aperture.
+        depth: Errors of the depth maps.
     """
 
     def __init__(self, built: BuiltWorld) -> None:
@@ -74,9 +100,13 @@ class Tactile:
         self._data = built.data
         self._pads = PadContacts(built.model, built.data, handles)
         self._site = handles.pads_site
-        self._gel = GelSensor(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
+        self._gel = _gel(built)
+        self.depth = DepthErrors(conditions, built.seed, gripper.pad_window_m, gripper.pad_shape, built.proof)
+        self._proof, self._seed = built.proof, built.seed
+        self._jitter = stream(built.seed, "frame jitter")
         self._meshes = dict(zip(handles.object_bodies, (o.mesh for o in built.truth.objects), strict=True))
         self._meshes[handles.probe_body] = handle_mesh(built.world.probe)
+        self._smooth = handles.probe_body
         self._rays: dict[int, SurfaceRays] = {}
         self._c = conditions
         self._rng = stream(built.seed, "tactile")
@@ -111,8 +141,13 @@ class Tactile:
             self._solve(forces, bodies, (jaws[0], jaws[1]))
         else:
             self._press, self.shift_m = None, 0.0
+        maps = self._true_maps()
+        self.depth.feel(maps, now_s)
         if wanted:
-            self._frames.append((now_s + self._c.tactile_latency_s, self._frame(now_s)))
+            late_s = self._c.tactile_latency_s
+            if self._c.latency_jitter_s > 0.0:
+                late_s = max(0.0, late_s + self._c.latency_jitter_s * float(self._jitter.uniform(-1.0, 1.0)))
+            self._frames.append((now_s + late_s, self._frame(now_s, maps)))
 
     def _unchanged(self, jaws: Sequence[float], jaw_forces: Sequence[float]) -> bool:
         left, right, left_N, right_N = self._solved
@@ -134,16 +169,33 @@ class Tactile:
         surfaces = []
         for body in sorted(bodies & self._meshes.keys()):
             if body not in self._rays:
-                self._rays[body] = SurfaceRays(self._meshes[body])
+                self._rays[body] = SurfaceRays(self._meshes[body], self._roughness(body))
             surfaces.append((self._rays[body], body_pose(data, body).inverse() @ pose_B_P))
-        self._press = self._gel.press_pair(surfaces, jaws, forces)
+        shear = None
+        if self._c.tactile_shear_m_per_N > 0.0:
+            shear = self._c.tactile_shear_m_per_N * self._pads.tangential_N()
+            self._proof.saw("tactile_shear_m_per_N", 0.0, shear)
+        self._press = self._gel.press_pair(surfaces, jaws, forces, shear)
         self.shift_m = self._press.left_shift_m + self._press.right_shift_m
 
-    def _frame(self, stamp_s: float) -> TactileFrame:
+    def _roughness(self, body: int) -> Roughness | None:
+        """Return the roughness of an object; the probe's handle is smooth."""
+        mesh = self._meshes[body]
+        if self._c.object_roughness_m == 0.0 or body == self._smooth:
+            return None
+        found = Roughness(self._c.object_roughness_m, stream(self._seed, f"roughness {mesh.name}"))
+        self._proof.saw("object_roughness_m", 0.0, found.at(mesh.vertices_m[:1]))
+        return found
+
+    def _true_maps(self) -> Array:
+        """Return the true indentation (2, rows, cols) of the last sample."""
         p = self._press
-        maps = np.stack([self._zero, self._zero] if p is None else [p.left_m, p.right_m])
+        return np.stack([self._zero, self._zero] if p is None else [p.left_m, p.right_m])
+
+    def _frame(self, stamp_s: float, maps: Array) -> TactileFrame:
+        maps = self.depth.shown(maps)
         if self._c.tactile_noise_sd_m > 0.0:
-            maps += self._c.tactile_noise_sd_m * self._rng.standard_normal(maps.shape)
-        maps += self._offset
+            maps = maps + self._c.tactile_noise_sd_m * self._rng.standard_normal(maps.shape)
+        maps = maps + self._offset
         maps[self._dead] = np.nan
         return TactileFrame(stamp_s, maps[0], maps[1])

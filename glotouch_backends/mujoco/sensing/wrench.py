@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from glotouch_backends.mujoco.axis_proof import AxisProof
 from glotouch_backends.mujoco.model import STEP_S, STEPS
 from glotouch_bt.robot import Array, Conditions, RobotDescription, cross_matrix
 from glotouch_bt.robot.scene import stream
 
 GRAVITY_M_S2 = 9.81
+RANGE_N, RANGE_NM = 130.0, 10.0
+"""Ranges by which cross-talk is scaled. Source: data sheet of the ATI Gamma SI-130-10, an industrial wrist sensor."""
 NOISE_BLOCKS = 128
 """Number of periods for which noise is drawn at once."""
 
@@ -21,6 +26,20 @@ def weight_matrix(mass_kg: float, com_S_m: Array) -> Array:
     return np.asarray(-mass_kg * GRAVITY_M_S2 * np.vstack([np.eye(3), cross_matrix(com_S_m)]))
 
 
+def calibration_errors(conditions: Conditions, seed: int) -> tuple[Array, Array]:
+    """Return the gain errors (6,) and the cross-talk (6, 6, zero diagonal) of the sensor's axes.
+
+    Cross-talk is relative to the axes' ranges. Five independent entries of sd / sqrt(5) make a row: with equal shares
+    of the other ranges applied, the reading has the given sd.
+    """
+    rng = stream(seed, "wrench calibration")
+    gain = conditions.wrench_gain_sd * rng.standard_normal(6)
+    cross = conditions.wrench_cross_talk_sd / math.sqrt(5.0) * rng.standard_normal((6, 6))
+    np.fill_diagonal(cross, 0.0)
+    ranges = np.array([RANGE_N] * 3 + [RANGE_NM] * 3)
+    return gain, cross * ranges[:, None] / ranges[None, :]
+
+
 def up_in(quat_B_S: Array) -> Array:
     """Return B's z axis (3,) in S: the third row of the rotation matrix."""
     w, x, y, z = quat_B_S.tolist()
@@ -30,16 +49,25 @@ def up_in(quat_B_S: Array) -> Array:
 class WristSensor:
     """Turn the true wrench of each step into the controller's report.
 
-    reported(t) = true(t - latency) + white noise + random walk - weight model - tare. Before the first tare the report
-    contains the hand's weight; after it, only the error of the controller's weight model remains when the hand turns.
+    reported(t) = C true(t - latency) + white noise + random walk - weight model - tare, with the calibration error
+    C (6, 6). Before the first tare the report contains the hand's weight; after it, only the error of the controller's
+    weight model, and of the calibration, remains when the hand turns.
 
     Args:
         description, conditions, seed: The robot, the sensor's disturbances, and their seed.
         steps: Samples in a block of `measure`; the noise of a sample does not depend on it.
+        proof: Notes which axes altered a reading; default: one of its own.
     """
 
-    def __init__(self, description: RobotDescription, conditions: Conditions, seed: int, steps: int = STEPS) -> None:
-        self._steps = steps
+    def __init__(
+        self,
+        description: RobotDescription,
+        conditions: Conditions,
+        seed: int,
+        steps: int = STEPS,
+        proof: AxisProof | None = None,
+    ) -> None:
+        self._steps, self._proof = steps, proof or AxisProof(conditions)
         self._rng = stream(seed, "wrench")
         draw = stream(seed, "payload")
         self._mass_factor = 1.0 + conditions.payload_mass_error * float(draw.standard_normal())
@@ -51,11 +79,19 @@ class WristSensor:
         self._bias = np.zeros(6)
         self._up_at_tare: Array | None = None
         self._late = round(conditions.wrench_latency_s / STEP_S)
-        self._line = np.zeros((self._late + steps, 6))
+        self._jitter = round(conditions.latency_jitter_s / STEP_S)
+        self._jitter_rng = stream(seed, "wrench jitter")
+        self._reach = self._late + self._jitter
+        self._line = np.zeros((self._reach + steps, 6))
+        self._gain_error, self._cross_talk = calibration_errors(conditions, seed)
+        self._calibrated = not (self._gain_error.any() or self._cross_talk.any())
         self._sd = np.array([conditions.force_noise_sd_N] * 3 + [conditions.torque_noise_sd_Nm] * 3)
         self._walk_sd = conditions.force_drift_N_per_sqrt_min * float(np.sqrt(STEP_S / 60.0))
         self._walk = np.zeros(3)
-        self._noisy = bool(self._sd.any() or self._walk_sd > 0)
+        self._torque_rng = stream(seed, "torque drift")
+        self._torque_walk_sd = conditions.torque_drift_Nm_per_sqrt_min * float(np.sqrt(STEP_S / 60.0))
+        self._torque_walk = np.zeros(3)
+        self._noisy = bool(self._sd.any() or self._walk_sd > 0 or self._torque_walk_sd > 0)
         self._noise = np.zeros((NOISE_BLOCKS, steps, 6))
         self._block = NOISE_BLOCKS
         self._measured = np.zeros((steps, 6))
@@ -88,27 +124,39 @@ class WristSensor:
         return np.asarray(matrix @ up + constant)
 
     def fill(self, wrench: Array) -> None:
-        """Fill the delay line with `wrench` (6,)."""
-        self._line[:] = wrench
+        """Fill the delay line with a true `wrench` (6,)."""
+        self._line[:] = self._misread(wrench[None])
 
     def measure(self, true: Array, up: Array) -> Array:
         """Return the measured block (n, 6) for a true one, before the tare's bias is subtracted: the input of a tare.
 
         `up` (3,) is `up_in` of the sensor's orientation. The next call overwrites the array.
         """
-        late = self._late
-        if late:
-            self._line[:late] = self._line[self._steps : self._steps + late]
-        self._line[late:] = true
+        reach, steps, line = self._reach, self._steps, self._line
+        if reach:
+            line[:reach] = line[steps : steps + reach]
+        line[reach:] = true if self._calibrated else self._misread(true)
+        start = self._jitter
+        if start:
+            start -= max(int(self._jitter_rng.integers(-start, start + 1)), -self._late)
+            self._proof.saw("latency_jitter_s", line[self._jitter : self._jitter + steps], line[start : start + steps])
         matrix, constant = self._offset
         out = self._measured
-        np.subtract(self._line[: self._steps], matrix @ up + constant, out=out)
+        np.subtract(line[start : start + steps], matrix @ up + constant, out=out)
         if self._noisy:
             if self._block == NOISE_BLOCKS:
                 self._draw()
             out += self._noise[self._block]
             self._block += 1
         return out
+
+    def _misread(self, true: Array) -> Array:
+        """Return the readings (n, 6) of true wrenches."""
+        gained = true + true * self._gain_error
+        self._proof.saw("wrench_gain_sd", true, gained)
+        crossed = np.asarray(gained + true @ self._cross_talk.T)
+        self._proof.saw("wrench_cross_talk_sd", gained, crossed)
+        return crossed
 
     @property
     def bias(self) -> Array:
@@ -122,5 +170,11 @@ class WristSensor:
         self._walk = walk[-1]
         noise[:, :6] *= self._sd
         noise[:, :3] += walk
+        if self._torque_walk_sd > 0.0:
+            steps = self._torque_walk_sd * self._torque_rng.standard_normal((n, 3))
+            torque_walk = self._torque_walk + np.cumsum(steps, axis=0)
+            self._proof.saw("torque_drift_Nm_per_sqrt_min", self._torque_walk, torque_walk[-1])
+            self._torque_walk = torque_walk[-1]
+            noise[:, 3:6] += torque_walk
         self._noise[:] = noise[:, :6].reshape(NOISE_BLOCKS, self._steps, 6)
         self._block = 0

@@ -41,7 +41,8 @@ class MotionClearance:
     def held(self) -> frozenset[int]:
         """Return the bodies that must not be touched: the robot, its probe, and objects that only they carry."""
         touching = self._pairs(self._scratch())
-        own, objects = set(self._arm) | {self._robot.handles.probe_body}, set(self._robot.handles.object_bodies)
+        handles = self._robot.handles
+        own, objects = set(self._arm) | {handles.probe_body, handles.tip_body}, set(handles.object_bodies)
         while new := {b for b in objects - own if touching.get(b) and touching[b] <= own}:
             own |= new
         return frozenset(own)

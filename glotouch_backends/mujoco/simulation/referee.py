@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 from scipy.spatial import ConvexHull
 
+from glotouch_backends.mujoco.axis_proof import AxisProof
 from glotouch_backends.mujoco.sensing import body_pose
 from glotouch_backends.mujoco.simulation.control_trace import ControlTrace
 from glotouch_backends.mujoco.simulation.disturber import Disturbed
@@ -23,6 +24,7 @@ class Simulated(Disturbed, Protocol):
     """The parts of a simulated robot that its referee reads."""
 
     peak_force_N: float
+    proof: AxisProof
     trace: ControlTrace | None
 
 
@@ -56,7 +58,7 @@ class MujocoReferee:
 
     def push_tip(self, force_B_N: Array) -> None:
         """See `Referee`."""
-        r, body = self._robot, self._robot.handles.probe_body
+        r, body = self._robot, self._robot.handles.tip_body
         lever = self.tip_B_m() - r.data.xipos[body]
         r.data.xfrc_applied[body] = np.concatenate([force_B_N, np.cross(lever, force_B_N)])
 
@@ -73,6 +75,10 @@ class MujocoReferee:
     def peak_force_N(self) -> float:
         """See `Referee`."""
         return self._robot.peak_force_N
+
+    def silent_axes(self) -> tuple[str, ...]:
+        """See `Referee`."""
+        return self._robot.proof.silent()
 
     def replay_bare_steps(self) -> BareSteps | None:
         """See `Referee`."""

@@ -30,22 +30,37 @@ from glotouch_backends.mujoco.simulation.snapshot_check import (
 from glotouch_bt.robot import BadInput, SafetyStop, Snapshot
 
 FORMAT = 1
-PARTS = ("_servo", "_jaws", "_wrist", "_guard", "_tactile", "_reports")
+PARTS = ("_servo", "_jaws", "_wrist", "_guard", "_tactile", "_depth", "_reports", "proof")
 FIXED: Mapping[str, frozenset[str]] = {
     "MujocoRobot": frozenset(
         (
             *("description", "limits", "period_s", "world", "truth", "model", "data", "handles", "trace"),
-            *("_s", "_warnings", "_probe_now", "_pads_now", "_keeper", "_failed", "_closed", *PARTS),
+            *("_s", "_warnings", "_probe_now", "_pads_now", "_keeper", "_failed", "_closed", "_poses", *PARTS),
             # views of the arrays that are kept
             *("_rows", "_ctrl_now", "_sensed", "_external_now"),
         )
     ),
     "Servo": frozenset(("_model", "_data", "_dof", "_arm_qpos", "_diagonal", "_names")),
-    "JawServo": frozenset(("_gripper",)),
-    "WristSensor": frozenset(("_P_in_S",)),
+    "JawServo": frozenset(("_gripper", "_proof")),
+    "WristSensor": frozenset(("_P_in_S", "_proof", "_gain_error", "_cross_talk", "_reach", "_jitter", "_calibrated")),
     "HardLimitGuard": frozenset(("_max_N", "_max_Nm", "_quiet", "_rise_s_m", "_samples_ahead", "tripped")),
-    "Tactile": frozenset(("_data", "_pads", "_site", "_gel", "_meshes", "_rays", "_c")),
-    "JawReports": frozenset(("_c",)),
+    "Tactile": frozenset(("_data", "_pads", "_site", "_gel", "_meshes", "_rays", "_c", "depth", "_proof", "_smooth")),
+    "DepthErrors": frozenset(
+        (
+            "_proof",
+            "_pitch",
+            "_blur",
+            "_blur_sd",
+            "_bulge",
+            "_hysteresis",
+            "_smooth_sd",
+            "_bulge_kernel",
+            "_smooth_kernel",
+            "_gain",
+        )
+    ),
+    "JawReports": frozenset(("_c", "_proof")),
+    "AxisProof": frozenset(("_open",)),
 }
 """Attributes, by class, that follow from world, conditions, seed and options alone."""
 

@@ -20,6 +20,7 @@ from glotouch_bt.bench.match.timing import time_matching
 from glotouch_bt.bench.match.trials import PAIR_COLUMNS, TRIAL_COLUMNS, decide, models_of
 from glotouch_bt.escaped_text import finite
 from glotouch_bt.mission import load_mission
+from glotouch_bt.mission.read import conditions_name
 from glotouch_bt.robot.scene import load_folder, stl_files, stream
 from glotouch_bt.runs import Campaign, OnRow, RunRequest, Task, crashed, gather, silent, write_summary, write_table
 
@@ -95,7 +96,7 @@ def layout_task(campaign: MatchCampaign, seed: int, file: Path | None) -> dict[s
 
 def failed_task(campaign: MatchCampaign, seed: int, error: Exception) -> dict[str, Any]:
     """Return the result of a layout that raised or whose process was lost: nothing was touched."""
-    return _decided(campaign, Layout(seed, Path(campaign.conditions).stem, (), (), crashed(error)["cause"]))
+    return _decided(campaign, Layout(seed, conditions_name(campaign.conditions), (), (), crashed(error)["cause"]))
 
 
 def _decided(campaign: MatchCampaign, layout: Layout) -> dict[str, Any]:

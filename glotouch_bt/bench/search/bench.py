@@ -23,6 +23,7 @@ from glotouch_bt.bench.search.trial import (
     sections_of,
 )
 from glotouch_bt.escaped_text import finite
+from glotouch_bt.mission.read import conditions_name
 from glotouch_bt.perception.search import POLICIES
 from glotouch_bt.robot import BadInput
 from glotouch_bt.runs import (
@@ -120,7 +121,7 @@ def run_campaign(campaign: SearchCampaign, executor: Executor, on_row: OnRow = s
 
 def _run(campaign: SearchCampaign, executor: Executor, on_row: OnRow) -> list[dict[str, Any]]:
     """Run missions first, seeds outermost: an interrupted campaign has all policies on the same layouts."""
-    runs = [f for top in campaign.recorded for f in recorded_folders(top, Path(campaign.conditions).stem)]
+    runs = [f for top in campaign.recorded for f in recorded_folders(top, conditions_name(campaign.conditions))]
     plane = tuple(dict.fromkeys((*campaign.seeds, *campaign.planar_seeds)))
     mission, objects, budget = campaign.mission, campaign.objects, campaign.planar_budget_m
     trials = [campaign.trial(policy, seed) for seed in campaign.seeds for policy in campaign.policies]

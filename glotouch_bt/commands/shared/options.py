@@ -29,7 +29,16 @@ AllowPaths = Annotated[
     typer.Option("--allow-path", metavar="DIR", help="further folder that the mission's subtrees may be in"),
 ]
 Backend = Annotated[str, typer.Option(help="a registered backend (see: glotouch backends)")]
-Conditions = Annotated[str, typer.Option(help="disturbances: ideal, nominal, harsh, or a file")]
+Conditions = Annotated[
+    str,
+    typer.Option(help="disturbances: ideal, nominal, harsh, realistic, or a file; NAME+FIELD=VALUE changes a field"),
+]
+SetConditions = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set-condition", metavar="FIELD=VALUE", help="change a field of the conditions; a range as LOW,HIGH"
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="print JSON on stdout, nothing else")]
 
 Trials = Annotated[int, typer.Option(min=1, help="number of seeds")]
@@ -86,8 +95,18 @@ def bench_folder(out: Path | None, name: str) -> Path:
     return folder
 
 
-def read_settings(given: list[str] | None) -> dict[str, str]:
-    """Return NAME=VALUE words as a mapping.
+def changed_conditions(conditions: str, changes: list[str] | None) -> str:
+    """Return a profile with FIELD=VALUE words added to it.
+
+    Raises:
+        BadInput: As `read_settings`.
+    """
+    given = read_settings(changes, "--set-condition")
+    return "+".join([conditions, *(f"{name}={value.strip()}" for name, value in given.items())])
+
+
+def read_settings(given: list[str] | None, option: str = "--set") -> dict[str, str]:
+    """Return the NAME=VALUE words of an option as a mapping.
 
     Raises:
         BadInput: A word without "=", or a name given twice.
@@ -98,8 +117,8 @@ def read_settings(given: list[str] | None) -> dict[str, str]:
     for item in given or []:
         name, equals, value = item.partition("=")
         if not equals or not name.strip():
-            raise BadInput(f"--set {item}: must be NAME=VALUE")
+            raise BadInput(f"{option} {item}: must be NAME=VALUE")
         if name.strip() in settings:
-            raise BadInput(f"--set {name.strip()}: given twice")
+            raise BadInput(f"{option} {name.strip()}: given twice")
         settings[name.strip()] = value
     return settings

@@ -22,5 +22,13 @@ from glotouch_bt.mission.read.parameters import (
 from glotouch_bt.mission.read.parse import parse_tree
 from glotouch_bt.mission.read.scope import Reading, Scope
 from glotouch_bt.mission.read.subtrees import entries_of
-from glotouch_bt.mission.read.worlds import WorldFile, conditions_of, load_conditions, load_world, read_world
+from glotouch_bt.mission.read.worlds import (
+    WorldFile,
+    conditions_name,
+    conditions_of,
+    load_conditions,
+    load_world,
+    read_world,
+    split_conditions,
+)
 from glotouch_bt.mission.read.yaml_source import MAX_BYTES, parse_yaml, read_named_yaml, read_yaml

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from os.path import isdir
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
@@ -16,7 +17,18 @@ from glotouch_bt.mission.read.fields import validate
 from glotouch_bt.mission.read.library import find_shipped, shown
 from glotouch_bt.mission.read.yaml_source import read_yaml
 from glotouch_bt.mission.spec import Findings, Map, MissionFaults, Node, Place, Seq
-from glotouch_bt.robot import BadInput, Conditions, Container, Holder, ObjectSet, ParamError, Pose, Probe, World
+from glotouch_bt.robot import (
+    BadInput,
+    Conditions,
+    Container,
+    Holder,
+    ObjectSet,
+    ParamError,
+    Pose,
+    Probe,
+    UnknownName,
+    World,
+)
 from glotouch_bt.robot.scene import stl_files
 
 T = TypeVar("T")
@@ -71,6 +83,9 @@ class ObjectsSection(_Section):
     )
     min_gap_m: float = Field(default=ObjectSet.min_gap_m, ge=0, le=1.0)
     min_wall_gap_m: float = Field(default=ObjectSet.min_wall_gap_m, ge=0, le=1.0)
+    stance: Literal["upright", "any"] = Field(
+        default=ObjectSet.stance, description="upright as in the file, or each object on any of its stable sides"
+    )
 
 
 class WorldFile(_Section):
@@ -145,11 +160,11 @@ def read_world(node: Node, file: Path, findings: Findings, objects: Path | None 
 def _objects(
     given: ObjectsSection, node: Map, file: Path, findings: Findings, override: Path | None
 ) -> ObjectSet | None:
-    gap, wall_gap = given.min_gap_m, given.min_wall_gap_m
+    placed: dict[str, Any] = given.model_dump(include={"min_gap_m", "min_wall_gap_m", "stance"})
     if override is not None:
         if not _stems(override, Place(f"--objects {override}"), "is not a folder with .stl files in it", findings):
             return None
-        return ObjectSet(folder=override, min_gap_m=gap, min_wall_gap_m=wall_gap)
+        return ObjectSet(folder=override, **placed)
     folder = (file.parent / given.folder).resolve()
     at = node.get("folder") or node
     what = f"objects.folder {given.folder!r} ({folder}) is not a folder with .stl files"
@@ -170,7 +185,7 @@ def _objects(
         findings.add(expected.place, "wrong_value", f"objects.expected = {given.expected}, but {count} are chosen")
     if len(findings) > before:
         return None
-    return ObjectSet(folder=folder, names=given.names, min_gap_m=gap, min_wall_gap_m=wall_gap)
+    return ObjectSet(folder=folder, names=given.names, **placed)
 
 
 def _stems(folder: Path, at: Place, missing: str, findings: Findings) -> list[str]:
@@ -208,26 +223,62 @@ def load_world(given: str, objects: Path | None = None) -> World:
     return world
 
 
+def split_conditions(given: str) -> tuple[str, list[str]]:
+    """Return the profile (a path or shipped name) and the changes of `PROFILE+FIELD=VALUE+FIELD=VALUE`."""
+    profile, *changes = re.split(r"\+(?=\w+=)", given)
+    return profile, changes
+
+
+def conditions_name(given: str) -> str:
+    """Return the profile's name with its changes, without a path."""
+    profile, changes = split_conditions(given)
+    return "+".join([Path(profile).stem, *changes])
+
+
 def load_conditions(given: str) -> Conditions:
     """Load a disturbance profile by path or shipped name; keys are the field names of `robot.Conditions`.
 
+    `PROFILE+FIELD=VALUE` changes a field of the profile. VALUE is a number, or LOW,HIGH for a range.
+
     Raises:
-        BadInput: It is unknown, unreadable or faulty (all faults at once).
+        BadInput: It is unknown, unreadable or faulty (all faults at once), or a change names no field.
     """
-    path = find_shipped("conditions", given, "conditions")
+    profile, changes = split_conditions(given)
+    path = find_shipped("conditions", profile, "conditions")
     findings = Findings()
     node = read_yaml(path, shown(path))
     if isinstance(node, Map):
         made = validate(ConditionsFile, node, "conditions", findings)
         if made is not None:
             try:
-                return Conditions(**made.model_dump())
+                read = Conditions(**made.model_dump())
             except (ParamError, TypeError) as e:
                 at = node.get(getattr(e, "name", "").rsplit(".", 1)[-1]) or node
                 findings.add(at.place, "wrong_value", str(e))
+            else:
+                return _changed(read, changes) if changes else read
     else:
         findings.add(node.place, "wrong_type", "conditions must be a mapping of field: value")
     raise MissionFaults(findings.sorted())
+
+
+def _changed(read: Conditions, changes: list[str]) -> Conditions:
+    valid = [f.name for f in fields(read) if f.name != "name"]
+    values: dict[str, float | tuple[float, ...]] = {}
+    for change in changes:
+        name, _, text = change.partition("=")
+        if name not in valid:
+            raise UnknownName("field of conditions", name, valid)
+        if name in values:
+            raise BadInput(f"conditions.{name}: given twice")
+        try:
+            numbers = tuple(float(word) for word in text.strip("[] ").split(","))
+        except ValueError:
+            numbers = ()
+        if len(numbers) not in (1, 2):
+            raise ParamError(f"conditions.{name}", text, "a number, or LOW,HIGH")
+        values[name] = numbers[0] if len(numbers) == 1 else numbers
+    return replace(read, name="+".join([read.name, *changes]), **values)  # type: ignore[arg-type]
 
 
 def conditions_of(values: Mapping[str, object], shown: str) -> Conditions:

@@ -1,4 +1,4 @@
-"""Random layouts: upright objects in the container at uniform positions and yaws, with gaps to each other and to walls.
+"""Random layouts: objects in the container at uniform positions and yaws, with gaps to each other and to walls.
 
 Rejection sampling of one object after another, largest first. It restarts when the next object does not fit.
 """
@@ -6,7 +6,7 @@ Rejection sampling of one object after another, largest first. It restarts when 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -14,6 +14,7 @@ import scipy
 from glotouch_bt.errors import BadInput
 from glotouch_bt.robot.geometry import Array
 from glotouch_bt.robot.scene.meshes import Mesh
+from glotouch_bt.robot.scene.stances import UPRIGHT, Quat, draw_stance, turned
 from glotouch_bt.robot.scene.streams import stream
 from glotouch_bt.robot.scene.world import World
 
@@ -31,11 +32,18 @@ ROUNDING_M = 1e-9
 
 @dataclass(frozen=True)
 class Placement:
-    """The pose of one object in K: the origin of its mesh frame on the floor, and its yaw about z."""
+    """The place of one object in K.
+
+    Attributes:
+        x_m, y_m: Origin of its mesh frame, seen from above.
+        yaw_rad: Yaw about z, after `quat`.
+        quat: Rotation (w x y z) that puts the mesh on the side on which it stands.
+    """
 
     x_m: float
     y_m: float
     yaw_rad: float
+    quat: Quat = UPRIGHT
 
 
 def outline(mesh: Mesh) -> Array:
@@ -158,11 +166,19 @@ def place_objects(
 def draw_layout(meshes: Sequence[Mesh], world: World, seed: int) -> list[Placement]:
     """Return the layout of a trial. Every simulator places the same objects alike with the same seed.
 
+    Gaps are those between the outlines of the STL files, on the sides on which the objects stand.
+
     Raises:
         BadInput: As `place_objects`.
     """
     objects = world.objects
     interior = world.container.interior_m
-    return place_objects(
+    sides = [UPRIGHT] * len(meshes)
+    if objects.stance == "any":
+        rng = stream(seed, "stances")
+        sides = [draw_stance(m, rng) for m in meshes]
+        meshes = [turned(m, quat) for m, quat in zip(meshes, sides, strict=True)]
+    places = place_objects(
         meshes, (interior[0], interior[1]), objects.min_gap_m, objects.min_wall_gap_m, stream(seed, "layout")
     )
+    return [replace(place, quat=quat) for place, quat in zip(places, sides, strict=True)]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -99,12 +100,14 @@ class ObjectSet:
         names: File stems to use, in order; empty means every STL of the folder, sorted.
         min_gap_m: Least gap between two objects.
         min_wall_gap_m: Least gap between an object and a wall.
+        stance: "upright" as in the file, or "any": each object on a random one of its stable sides.
     """
 
     folder: Path
     names: tuple[str, ...] = ()
     min_gap_m: float = 0.030
     min_wall_gap_m: float = 0.030
+    stance: Literal["upright", "any"] = "upright"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -70,6 +70,10 @@ class Referee(Protocol):
         """Return the largest norm so far of the true contact force on the hand and what it holds."""
         ...
 
+    def silent_axes(self) -> tuple[str, ...]:
+        """Return the axes of the conditions that were set and used, and yet altered nothing so far."""
+        ...
+
     def replay_bare_steps(self) -> BareSteps | None:
         """Repeat the run's solver steps in a copy of the world; None unless the backend was opened with `trace`."""
         ...

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from glotouch_bt.mission.read.library import shipped_root
-from glotouch_bt.mission.read.worlds import load_conditions, load_world
+from glotouch_bt.mission.read.worlds import conditions_name, load_conditions, load_world
 from glotouch_bt.mission.spec.findings import MissionFaults
 from glotouch_bt.robot import BadInput, Conditions
+from glotouch_bt.robot.scene import AXES
 
 WORLD = (shipped_root() / "worlds" / "container_five.yaml").read_text()
 
@@ -96,3 +98,43 @@ def test_faults_of_conditions(text: str, place: str, words: str, tmp_path: Path)
         load_conditions(str(path))
     assert f"{path}:{place}: " in str(e.value)
     assert words in str(e.value)
+
+
+def test_a_profile_with_changed_fields() -> None:
+    found = load_conditions("nominal+gel_blur_m=0.0015+object_scale=0.98+jaw_force_offset_N=-1,1")
+    assert (found.gel_blur_m, found.object_scale, found.jaw_force_offset_N) == (0.0015, (0.98, 0.98), (-1.0, 1.0))
+    assert found.name == "nominal+gel_blur_m=0.0015+object_scale=0.98+jaw_force_offset_N=-1,1"
+    assert found.axes_set() == {"gel_blur_m", "object_scale", "jaw_force_offset_N"}
+    assert replace(found, **{n: getattr(Conditions(), n) for n in found.axes_set()}, name="nominal") == load_conditions(
+        "nominal"
+    )
+    assert conditions_name("some/where/mine.yaml+gel_blur_m=0.0015") == "mine+gel_blur_m=0.0015"
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ("nominal+gel_blur_mm=1.5", "did you mean 'gel_blur_m'"),
+        ("nominal+gel_blur_m=much", "a number, or LOW,HIGH"),
+        ("nominal+gel_blur_m=-1", "finite"),
+        ("nominal+gel_blur_m=0.001,0.002", "one number, not a range"),
+        ("nominal+object_scale=1.01,0.99", "(low, high)"),
+        ("nominal+object_scale=0", "positive"),
+        ("nominal+gel_blur_m=0.001+gel_blur_m=0.002", "given twice"),
+        ("nominl+gel_blur_m=0.001", "nominal"),
+    ],
+)
+def test_faults_of_changed_fields(given: str, words: str) -> None:
+    with pytest.raises(BadInput) as e:
+        load_conditions(given)
+    assert words in str(e.value)
+
+
+def test_the_realistic_profile_is_nominal_with_every_axis() -> None:
+    nominal, realistic = load_conditions("nominal"), load_conditions("realistic")
+    assert realistic.axes_set() == set(AXES)
+    for f in fields(Conditions):
+        if f.name not in (*AXES, "name", "object_mass_kg"):
+            assert getattr(realistic, f.name) == getattr(nominal, f.name)
+    assert not nominal.axes_set()
+    assert not load_conditions("harsh").axes_set()

@@ -1,0 +1,103 @@
+"""The sides on which an object can stand, and a random one of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import scipy
+
+from glotouch_bt.robot.geometry import Array, quat_to_matrix
+from glotouch_bt.robot.scene.meshes import Mesh
+
+Quat = tuple[float, float, float, float]
+UPRIGHT: Quat = (1.0, 0.0, 0.0, 0.0)
+"""Rotation of an object that stands as in its file."""
+BASE_M = 0.0001
+"""Vertices within this height above the floor carry an object. Source: the protrusion of the simulated feet."""
+MIN_MARGIN_M = 0.002
+"""Least distance of the centre of mass from the edge of the support polygon; on less an object rolls on. Source:
+ours."""
+
+
+def turned(mesh: Mesh, quat: Quat) -> Mesh:
+    """Return the mesh rotated about its origin."""
+    if quat == UPRIGHT:
+        return mesh
+    return replace(mesh, vertices_m=np.asarray(mesh.vertices_m @ quat_to_matrix(np.array(quat)).T))
+
+
+def draw_stance(mesh: Mesh, rng: np.random.Generator) -> Quat:
+    """Return the rotation onto a stable side, drawn with its probability; upright if there is none."""
+    sides, shares = _stances(_ByDigest(mesh))
+    number = rng.random()
+    if not sides:
+        return UPRIGHT
+    return sides[min(int(np.searchsorted(np.cumsum(shares), number * sum(shares))), len(sides) - 1)]
+
+
+class _ByDigest:
+    """A mesh as a key."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _ByDigest) and other.mesh.digest == self.mesh.digest
+
+    def __hash__(self) -> int:
+        return hash(self.mesh.digest)
+
+
+@lru_cache(maxsize=64)
+def _stances(key: _ByDigest) -> tuple[tuple[Quat, ...], tuple[float, ...]]:
+    """Return the rotations onto stable sides and the probability of each.
+
+    A side is a plane on which the convex hull rests with its centre of mass above it, by a margin. Its probability is
+    the solid angle of its faces seen from the centre of mass, over that of all sides (Boothroyd et al., "Natural
+    resting aspects of parts", 1972, without the faces from which an object topples onto it).
+    """
+    mesh = key.mesh
+    points, solid = mesh.vertices_m, mesh.as_trimesh()
+    centre = np.asarray(solid.center_mass)
+    hull = scipy.spatial.ConvexHull(points)
+    corners = points[hull.simplices] - centre
+    angle = _solid_angles(corners)
+    sides: dict[bytes, tuple[Array, float]] = {}
+    for (x, y, z, d), share in zip(hull.equations, angle, strict=True):
+        base = hull.vertices[points[hull.vertices] @ (x, y, z) + d >= -BASE_M]
+        if _margin_m(points[base], centre, np.array([x, y, z])) >= MIN_MARGIN_M:
+            normal, total = sides.get(base.tobytes(), (np.array([x, y, z]), 0.0))
+            sides[base.tobytes()] = normal, total + float(share)
+    return tuple(_onto_floor(normal) for normal, _ in sides.values()), tuple(total for _, total in sides.values())
+
+
+def _solid_angles(corners: Array) -> Array:
+    """Return the solid angles (n,) of triangles (n, 3, 3) seen from the origin (Van Oosterom and Strackee 1983)."""
+    a, b, c = (corners[:, i] for i in range(3))
+    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    below = la * lb * lc + (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
+    return np.asarray(2.0 * np.abs(np.arctan2(np.abs((a * np.cross(b, c)).sum(1)), below)))
+
+
+def _onto_floor(normal: Array) -> Quat:
+    """Return the shortest rotation that turns an outward normal down."""
+    x, y, z = normal.tolist()
+    if z < -1.0 + 1e-9:
+        return UPRIGHT
+    if z > 1.0 - 1e-9:
+        return (0.0, 1.0, 0.0, 0.0)
+    quat = np.array([1.0 - z, -y, x, 0.0])  # 1 + normal . down, normal x down
+    w, i, j, k = (quat / np.linalg.norm(quat)).tolist()
+    return (w, i, j, k)
+
+
+def _margin_m(base_m: Array, centre_m: Array, normal: Array) -> float:
+    """Return the distance of the centre of mass from the edge of the support polygon (n, 3), along the plane."""
+    aside = np.linalg.svd(normal[None])[2][1:]
+    try:
+        hull = scipy.spatial.ConvexHull(base_m @ aside.T)
+    except (scipy.spatial.QhullError, ValueError):
+        return 0.0
+    return float(-(hull.equations[:, :2] @ (aside @ centre_m) + hull.equations[:, 2]).max())
