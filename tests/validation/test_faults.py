@@ -95,7 +95,7 @@ def made_up(request: RunRequest, *other: Any) -> Any:
         return GOOD | {"faults": []}
     if specs[0].kind.name == "exception" and specs[0].when.node == "lift":
         raise ZeroDivisionError("a bug")
-    seen = {"by": "squeeze", "code": "off_zero", "text": "the wrist reads 3 N", "stamp_s": 2.0}
+    seen = {"by": "touch_next", "code": "off_zero", "text": "the wrist reads 3 N", "stamp_s": 2.0}
     fault = {
         "fault": specs[0].kind.name,
         "effective": specs[0].when.node != "grasp",
@@ -110,19 +110,19 @@ def made_up(request: RunRequest, *other: Any) -> Any:
         "latency_s": 0.5,
         "recovery": ["tare"],
     }
-    ended = {"status": "failure", "retrieved": None, "correct": False, "reasons": ["squeeze: off_zero"]}
-    ended["reason_chain"] = [{"node": "squeeze", "code": "off_zero", "message": "m", "advice": "a"}]
-    return GOOD | (ended if specs[0].when.node == "squeeze" else {}) | {"faults": [fault]}
+    ended = {"status": "failure", "retrieved": None, "correct": False, "reasons": ["touch_next: off_zero"]}
+    ended["reason_chain"] = [{"node": "touch_next", "code": "off_zero", "message": "m", "advice": "a"}]
+    return GOOD | (ended if specs[0].when.node == "touch_next" else {}) | {"faults": [fault]}
 
 
 def test_a_campaign_counts_every_trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(faults_trial, "_launched", made_up)
-    monkeypatch.setattr(faults_trial, "durations", lambda folder: dict.fromkeys(("squeeze", "grasp", "lift"), 5.0))
+    monkeypatch.setattr(faults_trial, "durations", lambda folder: dict.fromkeys(("touch_next", "grasp", "lift"), 5.0))
     campaign = FaultCampaign(
         mission="retrieve",
         settings={},
         cases=chosen_cases(["wrench_bias", "exception"]),
-        skills=("squeeze", "grasp", "lift", "touch_top"),
+        skills=("touch_next", "grasp", "lift", "touch_top"),
         seeds=(1, 2),
         conditions="nominal",
         objects=None,
@@ -131,7 +131,7 @@ def test_a_campaign_counts_every_trial(tmp_path: Path, monkeypatch: pytest.Monke
     )
     seen: list[tuple[int, int]] = []
     summary = run_campaign(campaign, Here(), lambda row, done, total: seen.append((done, total)))  # type: ignore[arg-type]
-    assert summary["trials"] == 8  # 2 classes x squeeze and lift x 2 seeds; in grasp nothing was altered
+    assert summary["trials"] == 8  # 2 classes x touch_next and lift x 2 seeds; in grasp nothing was altered
     assert len(summary["altered_nothing"]) == 4
     assert summary["not_reached"] == 4
     assert summary["tracebacks"] == 2

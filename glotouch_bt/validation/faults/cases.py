@@ -10,10 +10,10 @@ from glotouch_bt.faults import CATALOGUE, Duration, FaultPlan, FaultSpec, Repeat
 from glotouch_bt.mission.spec import Place
 from glotouch_bt.robot import BadInput, UnknownName
 
-SKILLS = ("tool_pickup", "guarded_sweep", "orbit_probe", "touch_top", "tool_return", "squeeze", "grasp", "lift")
+SKILLS = ("tool_pickup", "guarded_sweep", "orbit_probe", "touch_top", "tool_return", "touch_next", "grasp", "lift")
 _PROBING = ("guarded_sweep", "orbit_probe", "touch_top")
-_JAWS = ("tool_pickup", "tool_return", "squeeze", "grasp")
-_AMONG_OBJECTS = ("guarded_sweep", "orbit_probe", "touch_top", "squeeze", "grasp")
+_JAWS = ("tool_pickup", "tool_return", "touch_next", "grasp")
+_AMONG_OBJECTS = ("guarded_sweep", "orbit_probe", "touch_top", "touch_next", "grasp")
 
 
 @dataclass(frozen=True)
@@ -81,11 +81,11 @@ CASES: tuple[Case, ...] = (
     Case("robot_fault"),
     Case("exception"),
     Case("stale_tare", duration=EVER, skills=("tool_pickup", "tool_return")),
-    Case("touch_dead", duration=EVER, skills=("squeeze",)),
-    Case("touch_frozen", duration=EVER, skills=("squeeze",)),
-    Case("touch_dropped", duration=_s(5.0), skills=("squeeze",)),
-    Case("touch_swapped", duration=EVER, skills=("squeeze",)),
-    Case("gel_offset", duration=EVER, skills=("squeeze",)),
+    Case("touch_dead", duration=EVER, skills=("touch_next",)),
+    Case("touch_frozen", duration=EVER, skills=("touch_next",)),
+    Case("touch_dropped", duration=_s(5.0), skills=("touch_next",)),
+    Case("touch_swapped", duration=EVER, skills=("touch_next",)),
+    Case("gel_offset", duration=EVER, skills=("touch_next",)),
     Case("grip_stall", duration=_NODE, skills=_JAWS),
     Case("grip_short", duration=_NODE, skills=_JAWS),
     Case("grip_slip", duration=EVER, skills=("tool_pickup", "grasp")),

@@ -115,6 +115,16 @@ _CHANGES: tuple[Callable[[Place, list[Place], Rng], None], ...] = (
 )  # fmt: skip
 
 
+def levels_of(document: Any) -> int:
+    """Return how deep lists and mappings are nested."""
+    levels, layer = 0, [document]
+    while layer:
+        parts = [v for v in layer if isinstance(v, dict | list)]
+        layer = [c for v in parts for c in (v.values() if isinstance(v, dict) else v)]
+        levels += bool(parts)
+    return levels
+
+
 def as_text(document: Any, rng: Rng) -> bytes:
     """Serialise the document as YAML in a random style."""
     style = pick(rng, (None, False, False, True))
