@@ -24,6 +24,11 @@ CLEAR_OF_TOUCH_M = 0.015
 long (`TraceParams.farthest_m`)."""
 
 
+HANDLED_M = 0.10
+"""Distance from closing jaws within which an object may have been moved. Source: ours; half of the widest opening, the
+length of an object, and 2 cm."""
+
+
 class FeltSpace:
     """Record of where the held tool was, and where it was touched; in K."""
 
@@ -49,6 +54,11 @@ class FeltSpace:
     def forget(self) -> None:
         """Remove everything: the objects may have been moved, or the tool was not held."""
         self._free_K_m, self._touched_K_m = np.zeros((0, 3)), np.zeros((0, 2))
+
+    def forget_near(self, place_K_m: Array) -> None:
+        """Remove what was felt within `HANDLED_M` of a place (2 or 3,): the jaws move what they close on."""
+        far = np.linalg.norm(self._free_K_m[:, :2] - np.asarray(place_K_m)[:2], axis=1) > HANDLED_M
+        self._free_K_m = self._free_K_m[far]
 
     def columns(self, height_K_m: float) -> Array:
         """Return the places (n, 2) with a free column down to a height of the tool's reference point."""

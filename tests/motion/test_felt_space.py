@@ -53,3 +53,12 @@ def test_the_record_is_kept_and_forgotten() -> None:
     felt.forget()
     assert len(felt.columns(LOW)) == 0
     assert len(other.columns(LOW)) > 0
+
+
+def test_what_the_jaws_handled_is_forgotten() -> None:
+    felt = FeltSpace()
+    felt.add(path(0.0, 0.3))
+    assert felt.covers(np.array([[0.05, 0.0], [0.25, 0.0]]), 0.005)
+    felt.forget_near(np.array([0.0, 0.0, 0.1]))
+    assert not felt.covers(np.array([[0.05, 0.0]]), 0.005)
+    assert felt.covers(np.array([[0.25, 0.0]]), 0.005)

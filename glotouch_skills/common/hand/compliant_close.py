@@ -105,6 +105,7 @@ def close_compliantly(
         MotionRefused: The force on the hand passed `MAX_CLOSING_FORCE_N` while closing, `MAX_REST_FORCE_N` when the
             gentle jaws rested, or the limit of `_max_N` while pressing. The jaws have opened again.
     """
+    arm.felt.forget_near(arm.world.container.pose_B_K.inverse().apply(arm.pose_B_P.position_m))
     closing = _Closing(arm, speed_m_s, tactile, on_observation)
     with arm.pause_signal.finishing():  # pause only at rest: until then the hand must be able to follow
         yield from closing.measure_free_force()

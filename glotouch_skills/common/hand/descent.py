@@ -30,7 +30,7 @@ def descend(context: Context, goal_B_P: Pose, opening_m: float, top_m: float, sl
     """Move the open hand from above an object straight down beside it; return False if the fingers touched something.
 
     Where the held probe has felt free space between object and fingers, or the hand came down before, only the last
-    millimetres are slow. Else the fingers are slow from just above the object's top on.
+    millimetres are slow. Else, and once the jaws have closed there, the fingers are slow from just above the top on.
 
     Args:
         context: The skill's.
@@ -53,6 +53,8 @@ def descend(context: Context, goal_B_P: Pose, opening_m: float, top_m: float, sl
     reached = yield from glide(context, goal_B_P, FREE_M_S, paces)
     if reached:
         arm.felt.add_hand(edges)
+    else:
+        arm.felt.forget_near(at)
     return reached
 
 
