@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 MAX_VAIN_CLOSURES = 4
 """Number of closures without any plateau after which a candidate is skipped: it is not where it was traced."""
 
-MEASURE_S = CHANGE_S + 47.0
+MEASURE_S = CHANGE_S + 34.0
 """Robot time of taking the probe again and measuring one candidate. Source: as of `CHANGE_S` and `next_probe`."""
 STILL_THERE_M = 0.003
 """After a resume, the hand still stands beside its candidate if it moved by less than this."""
