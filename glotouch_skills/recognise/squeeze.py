@@ -54,7 +54,7 @@ class Squeeze(Skill):
 
     candidate = In(Candidate, "object to squeeze")
     known = In(tuple, "all candidates, to keep clear of", key="candidates", element=Candidate, required=False)
-    jaw_zero = In(JawZero, "offset of the reported aperture", required=False)
+    jaw_zero = In(JawZero, "offset of the reported aperture", required=False, expected=False)
     touchset = Out(TouchSet, "the touches")
 
     def run(self) -> SkillRun:

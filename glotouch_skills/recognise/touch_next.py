@@ -80,7 +80,7 @@ class TouchNext(Skill):
     probed = In(
         tuple, "what the probe measured; not given: everything", element=ProbeTouch, required=False, expected=False
     )
-    jaw_zero = In(JawZero, "offset of the reported aperture", required=False)
+    jaw_zero = In(JawZero, "offset of the reported aperture", required=False, expected=False)
     touchsets = Out(tuple, "touches, one TouchSet for each candidate", element=TouchSet)
     decided = Out(bool, "no further closure is needed")
 
