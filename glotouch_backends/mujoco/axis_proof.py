@@ -11,7 +11,7 @@ Value = float | Array
 
 
 class AxisProof:
-    """What the axes that are set have altered so far. An axis counts as used once its model had something to alter.
+    """Record of the axes that are set: which were used, and which altered a value. An axis is used once its model ran.
 
     Args:
         conditions: The disturbances; axes at their defaults are not judged.

@@ -15,18 +15,15 @@ import numpy as np
 from glotouch_bt.robot import Array
 
 FREE_M_S = 0.10
-"""Speed at which the tool or the open fingers move through space that was felt to be free. Source:
-`Limits.stop_ahead_s`: at this speed the robot still stops in time by itself."""
+"""Speed at which the tool or the open fingers move through space that was felt to be free. Source: ours. It relies on
+the record: something rigid that is met at half this speed gave 31 N in spite of the robot's own stop."""
 STEP_M = 0.003
 """Spacing of the recorded places. Source: ours; half of the ball's radius."""
 CLEAR_OF_TOUCH_M = 0.015
 """Distance from every touch within which columns are not trusted: an unobserved motion of an object is at most this
-long (`TraceParams.farthest_m`)."""
-
-
+long. Source: `TraceParams.farthest_m`."""
 HANDLED_M = 0.10
-"""Distance from closing jaws within which an object may have been moved. Source: ours; half of the widest opening, the
-length of an object, and 2 cm."""
+"""Distance from closing jaws within which an object may have been moved. Source: ours."""
 
 
 class FeltSpace:

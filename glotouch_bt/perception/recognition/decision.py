@@ -56,7 +56,7 @@ class Match:
 
 Part = Literal["outline", "top"]
 PARTS: tuple[Part, ...] = ("outline", "top")
-"""What the probe measures of a candidate, in the order of the fixed scheme."""
+"""The measurements of a candidate by the probe, in the order in which they are made."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The section of the scheduled touches: what was touched next, why, and what was believed then."""
+"""The section of the scheduled touches: which touch came next, why, and how probable each candidate was."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ def decisions_section(record: RunRecord) -> str:
     head = ["t, s", "next touch", "why", "gain, nats", "time, s", *(f"P({esc(i)})" for i in indices), "P(none)"]
     lead = (
         "Every touch is the one with the most expected information gain per second. P: the probability, before this "
-        "touch, that a candidate, or none, is the target. A candidate that the STL excludes is not touched."
+        "touch, that a candidate, or none, is the target. A candidate that the STL excludes is left out, unless the "
+        "decision fails."
     )
     return section("Decisions", lead, table(head, rows, numeric_from=3))
 

@@ -119,7 +119,8 @@ class Conditions:
                 object.__setattr__(self, f.name, value)
             lo, hi = value if ranged else (0.0, value)
             if not (math.isfinite(lo) and math.isfinite(hi) and lo <= hi):
-                raise ParamError(f"conditions.{f.name}", value, "finite, and a range must be (low, high)")
+                valid = "finite, and a range is (low, high)" if ranged else "finite and not negative"
+                raise ParamError(f"conditions.{f.name}", value, valid)
         for name in POSITIVE:
             if getattr(self, name)[0] <= 0:
                 raise ParamError(f"conditions.{name}", getattr(self, name), "positive")

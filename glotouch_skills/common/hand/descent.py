@@ -10,11 +10,11 @@ from glotouch_bt.skill import Context
 from glotouch_skills.common.hand.hand import glide
 
 BESIDE_M_S = 0.05
-"""Speed through such space beside the object. Source: ours; that of moving up again beside it."""
+"""Speed of the fingers beside the object where space was felt to be free. Source: ours; that of moving up beside it."""
 ABOVE_RATIO = 3.0
 """Speed above an object, where nothing else is known, over the slow speed. Source: ours."""
 OVER_TOP_M = 0.02
-"""Height above an object's top from which the hand counts as beside it."""
+"""Height above an object's top from which the hand counts as beside it. Source: ours."""
 FOOT_M = 0.015
 """Height of the fingertips above the floor from which they are slow: the probe's ball passes 12 mm above the floor and
 does not feel a foot that is lower. Source: `ExploringSpeeds.height_m` less the ball's radius, and 3 mm."""

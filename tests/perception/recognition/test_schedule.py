@@ -1,4 +1,4 @@
-"""What the probe measures next: what tells most per second, and nothing that the STL excludes."""
+"""The next measurement of the probe has the most expected gain per second, and is on no excluded candidate."""
 
 from __future__ import annotations
 
