@@ -70,7 +70,7 @@ def smooth_noise(seed, sd_m=5e-5):
 def test_noise_that_was_measured_is_no_contact():
     valid = [patch_statistics(smooth_noise(i), noise_m=5e-5).valid for i in range(100)]
     assert sum(valid) <= 20
-    assert sum(patch_statistics(smooth_noise(i)).valid for i in range(100)) > 90
+    assert sum(patch_statistics(smooth_noise(i)).valid for i in range(100)) > 80
 
 
 def test_flat_side_is_felt_through_the_noise():
