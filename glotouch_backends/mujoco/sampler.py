@@ -10,8 +10,14 @@ import numpy as np
 from glotouch_backends.mujoco.axis_proof import AxisProof
 from glotouch_backends.mujoco.control import JawReports, force_errors
 from glotouch_backends.mujoco.printed import Roughness
-from glotouch_backends.mujoco.sensing import DepthErrors, GelSensor, SurfaceRays, TaxelErrors, gel_of_trial
-from glotouch_backends.mujoco.sensing.gel import pad_pose_P
+from glotouch_backends.mujoco.sensing import (
+    DepthErrors,
+    GelSensor,
+    SurfaceRays,
+    TaxelErrors,
+    gel_of_trial,
+    pad_pose_P,
+)
 from glotouch_backends.mujoco.truth import ObjectTruth, draw_truth, rotation_vector
 from glotouch_bt.robot import Array, Conditions, GripperState, Pose, RobotDescription, TactileFrame, World
 from glotouch_bt.robot.scene import Mesh, stream

@@ -29,7 +29,7 @@ from glotouch_backends.mujoco.simulation.snapshot_check import (
 )
 from glotouch_bt.robot import BadInput, SafetyStop, Snapshot
 
-FORMAT = 1
+FORMAT = 2
 PARTS = ("_servo", "_jaws", "_wrist", "_guard", "_tactile", "_depth", "_taxels", "_reports", "proof")
 FIXED: Mapping[str, frozenset[str]] = {
     "MujocoRobot": frozenset(
@@ -61,6 +61,7 @@ FIXED: Mapping[str, frozenset[str]] = {
             "_gain",
         )
     ),
+    "TaxelErrors": frozenset(("_noise_m", "_offset", "_dead")),
     "JawReports": frozenset(("_c", "_proof")),
     "AxisProof": frozenset(("_open",)),
 }

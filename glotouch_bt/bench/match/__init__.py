@@ -1,4 +1,6 @@
 """`bench match`: how well matchers tell the target from other objects, on TouchSets of the real skills."""
 
 from glotouch_bt.bench.match.bench import MatchCampaign, run_campaign
-from glotouch_bt.bench.match.methods import chosen
+from glotouch_bt.bench.match.dataset import Layout, Touched
+from glotouch_bt.bench.match.methods import DEFAULT, chosen
+from glotouch_bt.bench.match.trials import decide

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from glotouch_bt.bench.match.methods import DEFAULT
-from glotouch_bt.bench.match.trials import decide
+from glotouch_bt.bench.match import DEFAULT, decide
 from glotouch_bt.bench.robustness.axes import AXES, with_level
 from glotouch_bt.bench.robustness.plot import plot_axes
 from glotouch_bt.bench.robustness.synthetic import sample_layout

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from glotouch_bt.bench.match.dataset import Layout, Touched
+from glotouch_bt.bench.match import Layout, Touched
 from glotouch_bt.perception.recognition.model import TIP_RADIUS_M, traced_tips
 from glotouch_bt.perception.touch import (
     Candidate,

@@ -120,7 +120,7 @@ def contact_tops(maps_m: list[Array], noise_m: list[float], pad: PadSpec) -> lis
     for shape in shapes:
         where = [i for i, m in enumerate(maps_m) if m.shape == shape]
         stack = np.stack([maps_m[i] for i in where]).astype(np.float64)
-        least_m = np.array([contact_threshold_m(noise_m[i], mean_depth_m(maps_m[i])) for i in where])[:, None, None]
+        threshold_m = np.array([contact_threshold_m(noise_m[i], mean_depth_m(maps_m[i])) for i in where])[:, None, None]
         good = np.isfinite(stack)
         alive = good.mean(axis=(1, 2)) >= 0.5
         middle = [float(np.median(m[g])) if a else 0.0 for m, g, a in zip(stack, good, alive, strict=True)]
@@ -128,7 +128,7 @@ def contact_tops(maps_m: list[Array], noise_m: list[float], pad: PadSpec) -> lis
         smooth = scipy.ndimage.median_filter(filled, size=(1, 3, 3), mode="nearest")
         flat = np.zeros((3, 3, 3))
         flat[1] = [[0, 1, 0], [1, 1, 1], [0, 1, 0]]
-        labels, n = scipy.ndimage.label((smooth > least_m) & alive[:, None, None], structure=flat)
+        labels, n = scipy.ndimage.label((smooth > threshold_m) & alive[:, None, None], structure=flat)
         if n == 0:
             continue
         count = np.bincount(labels.ravel(), minlength=n + 1)

@@ -61,7 +61,8 @@ def test_widths_of_an_ideal_box_are_those_of_its_stl() -> None:
     solid = trimesh.load(mesh)
     for layer in apple.touchset.layers:
         rows, cols = layer.left_m.shape
-        assert layer.stable and (rows, cols) == (35, 20)
+        assert layer.stable
+        assert (rows, cols) == (35, 20)
         width = layer.aperture_m + float(np.nanmax(layer.left_m)) + float(np.nanmax(layer.right_m))
         low, high = layer.height_m - 0.0143, layer.height_m + 0.0143  # the window of the pads
         z = np.linspace(max(low, 1e-3), min(high, float(solid.bounds[1, 2]) - 1e-3), 15)
