@@ -25,6 +25,9 @@ INSET_SHARE = 0.3
 stands at its edge. Source: plans played over the mesh at 50 recorded outlines of `wukong`, which has a part 7 mm wide
 at its edge: 10 mm inside they missed it 6 times, with this share once."""
 
+MIN_REACH_M = 0.003
+"""Least distance of inner places from the passes of a narrow object. Source: ours; as the parameter `reach_m`."""
+
 
 class TouchTopParams(SkillParams):
     """Parameters of `touch_top`."""
@@ -91,7 +94,8 @@ class TouchTop(Skill):
         p, tool = self.params, self.tool
         # Nearer to the outline than its radius, the ball would pass over free space.
         inset_m = min(max(INSET_SHARE * 0.5 * candidate.contour.size_m[1], tool.tip_radius_m), p.inset_m)
-        rule = TopRule(clearance_m=p.clearance_m, inset_m=inset_m, reach_m=p.reach_m)
+        reach_m = p.reach_m - (p.inset_m - inset_m)  # the middle stays as near to the passes
+        rule = TopRule(clearance_m=p.clearance_m, inset_m=inset_m, reach_m=max(reach_m, MIN_REACH_M))
         points = np.array([c.point_K_m for c in candidate.contacts])
         floor = tool.floor_z_K_m
         return top_plan(
