@@ -24,7 +24,6 @@ INSET_SHARE = 0.3
 """Distance of the passes inside the outline over half its width: passes in the middle of a narrow object miss what
 stands at its edge. Source: plans played over the mesh at 50 recorded outlines of `wukong`, which has a part 7 mm wide
 at its edge: 10 mm inside they missed it 6 times, with this share once."""
-
 MIN_REACH_M = 0.003
 """Least distance of inner places from the passes of a narrow object. Source: ours; as the parameter `reach_m`."""
 
