@@ -166,12 +166,12 @@ POST, RADIUS, TOP = (0.02, -0.03), 0.028, 0.055
 
 @pytest.fixture
 def make(bench, things, tool, found):
-    def make_one(things_there, **params):
+    def make_one(things_there, radius=RADIUS, **params):
         b = bench(things=[things.floor(), *things_there])
         b.arm.scene.hold_tool(True)
         above = np.array([POST[0], POST[1] + 0.05, 0.1])
         b.go(b.arm.joints(b.arm.kinematics.ik(tool.pose_B_P(b.world, above), b.arm.q)))
-        return b, b.make(TouchTop, inputs={"tool": tool, "candidate": found.round(POST, RADIUS, 0.02)}, **params)
+        return b, b.make(TouchTop, inputs={"tool": tool, "candidate": found.round(POST, radius, 0.02)}, **params)
 
     return make_one
 
@@ -190,6 +190,15 @@ def test_the_height_of_a_post(make, things) -> None:
 def test_a_chimney_beside_the_middle(make, things) -> None:
     chimney = (POST[0] + 0.014, POST[1] + 0.006)
     b, skill = make([things.post(POST, RADIUS, TOP), things.post(chimney, 0.008, TOP + 0.02)])
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    assert skill.measured.height_m == pytest.approx(TOP + 0.02, abs=1e-3)
+
+
+def test_a_chimney_at_the_edge_of_a_narrow_post(make, things) -> None:
+    """Passes 10 mm inside its outline would miss it."""
+    chimney = (POST[0] + 0.0185, POST[1])
+    b, skill = make([things.post(POST, 0.020, TOP), things.post(chimney, 0.002, TOP + 0.02)], radius=0.020)
     b.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message
     assert skill.measured.height_m == pytest.approx(TOP + 0.02, abs=1e-3)

@@ -38,3 +38,15 @@ def test_motion_of_a_disc_is_detected(shift):
 def test_few_contacts_are_not_split():
     contacts = contacts_on(np.zeros((3, 2)), np.arange(3), np.random.default_rng(0))
     assert split_at_motion(contacts, R) == ((), contacts)
+
+
+def test_limbs_are_no_motion():
+    """A body with three limbs that turns by a degree a contact: where a limb begins, the outline jumps by 14 mm."""
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        bearings = 2.4 * np.arange(12) + rng.uniform(0, 2 * np.pi)
+        limbs = rng.uniform(0, 2 * np.pi) + np.array([0.0, 1.9, 4.1]) + np.deg2rad(1.0) * np.arange(12)[:, None]
+        away = np.abs((bearings[:, None] - limbs + np.pi) % (2 * np.pi) - np.pi).min(axis=1)
+        radius = np.where(away < 0.5, 0.034, 0.020)[:, None]
+        contacts = contacts_on(np.zeros((12, 2)), bearings, rng, radius)
+        assert split_at_motion(contacts, R) == ((), contacts)
