@@ -2,7 +2,7 @@
 
 from glotouch_bt.robot.scene.conditions import AXES, Conditions
 from glotouch_bt.robot.scene.meshes import Mesh, is_sound_stl, load_mesh
-from glotouch_bt.robot.scene.object_files import load_folder, stl_files, twins_of
+from glotouch_bt.robot.scene.object_files import MESH_SUFFIXES, load_folder, stl_files, twins_of
 from glotouch_bt.robot.scene.placement import Placement, draw_layout
 from glotouch_bt.robot.scene.stances import UPRIGHT
 from glotouch_bt.robot.scene.streams import stream
