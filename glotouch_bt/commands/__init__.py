@@ -12,6 +12,7 @@ from glotouch_bt.commands.doctor import doctor
 from glotouch_bt.commands.faults import faults
 from glotouch_bt.commands.missions import missions
 from glotouch_bt.commands.nodes import nodes
+from glotouch_bt.commands.objects import objects
 from glotouch_bt.commands.replay import replay
 from glotouch_bt.commands.report import report
 from glotouch_bt.commands.resume import resume
@@ -32,6 +33,12 @@ COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
         "skills": skills,
         "schema": schema,
     },
-    "Robots and faults": {"backends": backends, "doctor": doctor, "keys": keys, "faults": faults},
+    "Objects, robots and faults": {
+        "objects": objects,
+        "backends": backends,
+        "doctor": doctor,
+        "keys": keys,
+        "faults": faults,
+    },
 }
 """Commands by use, in the order of `glotouch --help`."""

@@ -23,7 +23,8 @@ def check(
 ) -> int:
     """Check missions against every outcome of every skill.
 
-    The objects must fit into the box, and the target between the jaws. Each mistake is shown with its line, the reason and the shortest run that reaches it. Nothing moves.
+    The objects must fit into the box, and the target between the jaws. Each mistake is shown with its line, the
+    reason and the shortest run that reaches it. Nothing moves.
     """
     from glotouch_bt.mission import check_objects, load_mission, split_settings
     from glotouch_bt.mission.nodes import kind_of

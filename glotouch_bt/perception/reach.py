@@ -22,7 +22,9 @@ def model_for(mesh: Mesh, gripper: Gripper) -> TargetModel:
     try:
         return target_model(mesh, pads)
     except ParamError as e:
-        raise TooLow(f"{mesh.name} cannot be felt: it is {mesh.extents_m[2] * 1e3:.1f} mm high and must be {e.rule}") from e
+        raise TooLow(
+            f"{mesh.name} cannot be felt: it is {mesh.extents_m[2] * 1e3:.1f} mm high and must be {e.rule}"
+        ) from e
 
 
 def too_wide(model: TargetModel, gripper: Gripper) -> str:

@@ -148,7 +148,9 @@ def _sound(declared: Declaration, body: Map, findings: Findings) -> bool:
     return True
 
 
-def _valued(name: str, declared: Declaration, given: Scalar, findings: Findings, objects: ObjectSet | None) -> Parameter:
+def _valued(
+    name: str, declared: Declaration, given: Scalar, findings: Findings, objects: ObjectSet | None
+) -> Parameter:
     """Return the parameter with the given value; without a value if that gave findings."""
     lost = Parameter(name, declared, None)
     if given.poisoned:

@@ -1,0 +1,108 @@
+"""Pairs of objects that outline and height would confuse, and the closures that would tell them apart.
+
+An estimate from the tables of the two models alone, without pad images, neighbours or errors of calibration:
+
+- Outline and height confuse two objects if their sides and tops differ by less than `ALIKE_SD` of what the recogniser
+  believes of its measurements (`LikelihoodParams`).
+- A closure on b at some yaw, place and height weighs b against a by half the squared difference of the two widths in
+  standard deviations, at most the log of one over the probability of an outlier, tempered as in the likelihood.
+- a is turned to the yaw at which it is most like b. A mission picks informative closures, so the mean of the best
+  quarter of the places counts.
+- Two equally probable objects are told apart when the summed weights reach the log odds of `CONFIDENCE`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from glotouch_bt.perception.recognition import TargetModel
+from glotouch_bt.perception.recognition.likelihood import LikelihoodParams
+from glotouch_bt.perception.touch.calibration import MEASURED_SD_M
+from glotouch_bt.robot import Array
+
+ALIKE_SD = 3.0
+"""Objects whose outlines and heights differ by less standard deviations than this are look-alikes. Source: ours."""
+CONFIDENCE = 0.95
+"""Probability at which one of two objects counts as known. Source: the default of `retrieve`."""
+MAX_CLOSURES = 40
+"""More closures than this are not worth waiting for: touch cannot tell the two apart. Source: ours."""
+BEST_SHARE = 0.25
+"""Share of the places, best first, at which a mission closes the jaws. Source: ours."""
+MAX_SHIFT_M = 0.008
+"""Places up to this far from the middle of the footprint are compared. Source: half the pads' width."""
+
+
+@dataclass(frozen=True)
+class LookAlike:
+    """Two objects that outline and height would confuse.
+
+    Attributes:
+        first, second: Their names.
+        apart_sd: Difference of outline and height, in standard deviations.
+        closures: Closures that tell them apart; None if more than `MAX_CLOSURES`.
+    """
+
+    first: str
+    second: str
+    apart_sd: float
+    closures: int | None
+
+
+def look_alikes(models: Sequence[TargetModel], p: LikelihoodParams | None = None) -> list[LookAlike]:
+    """Return the look-alikes among objects with different names."""
+    p = p or LikelihoodParams()
+    found: list[LookAlike] = []
+    for a, b in combinations(models, 2):
+        apart = _outlines_apart_sd(a, b, p)
+        if apart < ALIKE_SD:
+            weight = min(_weight_of_closure(a, b, p), _weight_of_closure(b, a, p))
+            needed = math.log(CONFIDENCE / (1 - CONFIDENCE)) / max(weight, 1e-9)
+            found.append(LookAlike(a.name, b.name, apart, None if needed > MAX_CLOSURES else math.ceil(needed)))
+    return found
+
+
+def _outlines_apart_sd(a: TargetModel, b: TargetModel, p: LikelihoodParams) -> float:
+    """Return the difference of the sides and tops, in standard deviations of the measurements; the smaller kind."""
+    top = (a.height_m - b.height_m) / p.height_sd_m
+    apart = []
+    for kind in ("round", "box"):
+        one, other = a.outline.of(kind), b.outline.of(kind)
+        share = min(m.outline.p_box if kind == "box" else 1 - m.outline.p_box for m in (a, b))
+        sides = [
+            (x - y) / math.hypot(p.contour_sd_m, s, t)
+            for x, y, s, t in zip(one.size_m, other.size_m, one.size_sd_m, other.size_sd_m, strict=True)
+        ]
+        used = sides[:1] if kind == "round" else sides
+        apart.append(math.hypot(*used, top, math.sqrt(-2 * math.log(share))))
+    return min(apart)
+
+
+def _weight_of_closure(a: TargetModel, b: TargetModel, p: LikelihoodParams) -> float:
+    """Return the expected evidence (nats) of a closure on b for b against a, at the pose of a that is most like b."""
+    heights = min(len(a.z_m), len(b.z_m))
+    first, second = _middle(a.width_m, a.l_m)[:, :, :heights], _middle(b.width_m, b.l_m)[:, :, :heights]
+    rough = _middle(a.unevenness_m, a.l_m)[:, :, :heights]
+    limit = -math.log(p.width_outlier)
+    weights = []
+    for turn in range(len(a.phi_rad)):
+        width, uneven = np.roll(first, turn, axis=0), np.roll(rough, turn, axis=0)
+        both = np.isfinite(width) & np.isfinite(second)
+        variance = p.width_sd_m**2 + MEASURED_SD_M**2 + (p.width_rough * np.where(both, uneven, 0.0)) ** 2
+        squared = np.where(both, width - second, 0.0) ** 2 / variance
+        evidence = np.where(np.isfinite(width) != np.isfinite(second), limit, np.minimum(0.5 * squared, limit))
+        felt = evidence[np.isfinite(second)]
+        best = np.sort(felt)[-max(1, int(BEST_SHARE * len(felt))) :] if len(felt) else np.zeros(1)
+        weights.append(p.slope * p.temper_width * float(best.mean()))
+    return min(weights)
+
+
+def _middle(table: Array, l_m: Array) -> Array:
+    """Return the table near the middle of the footprint; the grids of two objects agree there."""
+    middle = len(l_m) // 2
+    reach = int(min(MAX_SHIFT_M // (l_m[1] - l_m[0]), middle))
+    return np.asarray(table[:, middle - reach : middle + reach + 1], dtype=np.float64)

@@ -1,0 +1,101 @@
+"""The page of a folder of objects: one self-contained HTML file."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+
+from glotouch_bt.escaped_text import html_text
+from glotouch_bt.objects.alike import LookAlike
+from glotouch_bt.objects.picture import jaw_map
+from glotouch_bt.objects.prepare import DENSITY_KG_M3, Prepared, Refused
+
+_STYLE = """
+:root { color-scheme: light dark; --line: #8884; --bad: #b3261e; }
+body { font: 15px/1.45 system-ui, sans-serif; max-width: 66rem; margin: 1.5rem auto; padding: 0 1rem; }
+h1 { font-size: 1.5rem; } h2 { font-size: 1.1rem; margin: 0 0 .4rem; overflow-wrap: anywhere; }
+section { display: flex; flex-wrap: wrap; gap: 1rem; border-top: 1px solid var(--line); padding: 1rem 0; }
+section > div { flex: 1; min-width: 18rem; }
+img.object { width: 240px; height: 240px; border-radius: 6px; background: #fff; }
+figure { margin: 0; } figcaption { font-size: .8rem; opacity: .75; max-width: 180px; }
+img.map { image-rendering: pixelated; max-width: 100%; }
+dl { display: grid; grid-template-columns: 6rem 1fr; gap: .15rem .6rem; margin: 0; }
+dt { opacity: .7; } dd { margin: 0; } .bad { color: var(--bad); }
+table { border-collapse: collapse; } td, th { text-align: left; padding: .2rem .8rem .2rem 0; vertical-align: top; }
+@media (prefers-color-scheme: dark) { :root { --bad: #ff8a80; } }
+"""
+
+
+def page(title: str, results: Sequence[Prepared | Refused], alike: Sequence[LookAlike]) -> str:
+    """Return the page: every object with its picture, the look-alikes, and the files that were refused."""
+    good = [r for r in results if isinstance(r, Prepared)]
+    refused = [r for r in results if isinstance(r, Refused)]
+    body = [f"<h1>{html_text(title)}</h1>", f"<p>{_counts(len(good), len(refused))}</p>"]
+    body += [_card(made) for made in good]
+    if alike:
+        rows = "".join(
+            f"<tr><td>{html_text(a.first)}, {html_text(a.second)}</td><td>{closures_in_words(a)}</td></tr>"
+            for a in alike
+        )
+        body.append(
+            f"<h2>Look-alikes</h2><p>Outline and height confuse these pairs.</p><table><tr><th>objects</th>"
+            f"<th>to tell them apart (estimate)</th></tr>{rows}</table>"
+        )
+    if refused:
+        rows = "".join(f"<tr><td>{html_text(r.source.name)}</td><td>{html_text(r.reason)}</td></tr>" for r in refused)
+        body.append(f"<h2>Refused</h2><table>{rows}</table>")
+    head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{html_text(title)}</title>'
+    head += f"<style>{_STYLE}</style>"
+    return f'<!doctype html><html lang="en"><head>{head}</head><body>{"".join(body)}</body></html>\n'
+
+
+def size_in_words(made: Prepared) -> str:
+    """Return the size of the bounding box, in millimetres."""
+    return " x ".join(f"{s * 1e3:.0f}" for s in made.mesh.extents_m) + " mm"
+
+
+def sides_in_words(made: Prepared) -> str:
+    """Return the sides on which an object stands, with their probabilities; the chosen one in brackets."""
+    shown = [
+        f"[{i}] {s.share:.0%}" if i - 1 == made.side else f"{i} {s.share:.0%}"
+        for i, s in enumerate(made.sides, start=1)
+    ]
+    return ", ".join(shown) or "none"
+
+
+def closures_in_words(pair: LookAlike) -> str:
+    """Return how many closures tell a pair apart."""
+    if pair.closures is None:
+        return "touch cannot tell them apart"
+    return f"about {pair.closures} closure{'s' * (pair.closures != 1)}"
+
+
+def _counts(good: int, refused: int) -> str:
+    words = f"{good} object{'s' * (good != 1)}"
+    return words + (f", {refused} file{'s' * (refused != 1)} refused" if refused else "")
+
+
+def _card(made: Prepared) -> str:
+    facts = {
+        "size": size_in_words(made),
+        "weight": f"{made.mass_kg * 1e3:.0f} g in solid PLA of {DENSITY_KG_M3:g} kg/m³ ({made.volume_m3 * 1e6:.0f} cm³)",
+        "stands on": f"{sides_in_words(made)} (probability of each side; in brackets: this one)",
+        "jaws": made.fit.in_words() if made.fit is not None else "not judged",
+        "file": f"{made.source.name}, {len(made.mesh.faces)} triangles",
+        "changed": "; ".join(made.notes) or "nothing",
+    }
+    rows = "".join(f"<dt>{html_text(k)}</dt><dd>{html_text(v)}</dd>" for k, v in facts.items())
+    faults = "".join(f'<p class="bad">Not a target: {html_text(fault)}</p>' for fault in made.faults)
+    image = f'<img class="object" alt="{html_text(made.name)}" src="{_inline(made.png)}">' if made.png else ""
+    chart = ""
+    if made.fit is not None and made.fit.opening_m.size:
+        low, high = (f"{z * 1e3:.0f}" for z in made.fit.z_m[[0, -1]])
+        caption = f"Jaws' yaw 0 to 180° to the right, height of the pads {low} to {high} mm upwards. "
+        caption += "Green: fits. Red: too wide. Grey: the pads meet nothing."
+        shown = f'<img class="map" alt="where the jaws fit" src="{_inline(jaw_map(made.fit))}">'
+        chart = f"<figure>{shown}<figcaption>{caption}</figcaption></figure>"
+    return f"<section>{image}<div><h2>{html_text(made.name)}</h2><dl>{rows}</dl>{faults}</div>{chart}</section>"
+
+
+def _inline(png: bytes) -> str:
+    return f"data:image/png;base64,{base64.b64encode(png).decode()}"
