@@ -84,7 +84,8 @@ class MujocoBackend(Backend):
     summary = "MuJoCo: Rizon 4, tactile gripper, free objects in a container; seeded, no display needed"
 
     def __init__(self, description: RobotDescription = RIZON4_XENSE, limits: Limits | None = None) -> None:
-        self.description, self._limits = description, limits or Limits()
+        self.description: RobotDescription = description
+        self._limits = limits or Limits()
 
     def open(self, world: World, conditions: Conditions, seed: int, options: Mapping[str, object]) -> Robot:
         """See `Backend`; options in `MujocoOptions`."""

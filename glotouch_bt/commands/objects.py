@@ -58,5 +58,5 @@ def objects(
         pairs = [{"objects": [a.first, a.second], "closures": a.closures} for a in alike]
         shared.print_json({"objects": [r.as_dict() for r in results], "look_alikes": pairs})
     else:
-        print_objects(results, alike, out if good else None)
+        print_objects(folder, results, alike, out if good else None)
     return 0 if len(good) == len(results) else 2

@@ -26,6 +26,7 @@ def check_objects(mission: Mission, backend: str) -> tuple[Finding, ...]:
     """
     objects, findings = mission.world.objects, Findings()
     description = load_backend(backend).description
+    gripper = None if description is None else description.gripper
     if objects.folder.resolve() == (shipped_root() / "objects").resolve():
         return ()
     meshes = load_folder(objects.folder, objects.names)
@@ -33,9 +34,9 @@ def check_objects(mission: Mission, backend: str) -> tuple[Finding, ...]:
         draw_layout(meshes, mission.world, SEED)
     except BadInput as e:
         findings.add(Place(str(objects.folder)), "no_layout", str(e))
-    for name in mission.stl_parameters if description is not None else ():
+    for name in mission.stl_parameters:
         target = str(mission.parameters.get(name, ""))
-        if target and (fault := _out_of_reach(_loaded(target, objects), description.gripper)):
+        if target and gripper is not None and (fault := _out_of_reach(_loaded(target, objects), gripper)):
             findings.add(Place(f"--set {name}"), "target_out_of_reach", fault)
     return tuple(findings.sorted())
 

@@ -22,6 +22,7 @@ import numpy as np
 
 from glotouch_bt.perception.recognition import TargetModel
 from glotouch_bt.perception.recognition.likelihood import LikelihoodParams
+from glotouch_bt.perception.recognition.model import Array32
 from glotouch_bt.perception.touch.calibration import MEASURED_SD_M
 from glotouch_bt.robot import Array
 
@@ -101,7 +102,7 @@ def _weight_of_closure(a: TargetModel, b: TargetModel, p: LikelihoodParams) -> f
     return min(weights)
 
 
-def _middle(table: Array, l_m: Array) -> Array:
+def _middle(table: Array32, l_m: Array) -> Array:
     """Return the table near the middle of the footprint; the grids of two objects agree there."""
     middle = len(l_m) // 2
     reach = int(min(MAX_SHIFT_M // (l_m[1] - l_m[0]), middle))

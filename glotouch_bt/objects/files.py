@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os.path import isdir, isfile
 from pathlib import Path
@@ -32,6 +32,19 @@ MAX_GLB_VALUES = 50 * MAX_TRIANGLES
 """Largest number of elements that a GLB may declare; a reader fills what it declares with zeros. Source: ours."""
 Y_UP = (".glb",)
 """Formats whose y axis is up. Source: glTF 2.0 specification, 3.4 (also: units are metres)."""
+
+
+class ImplausibleSize(BadInput):
+    """A file measures too little or too much in its unit.
+
+    Args:
+        message: What is wrong.
+        fitting: Units in which its size is plausible.
+    """
+
+    def __init__(self, message: str, fitting: Sequence[str]) -> None:
+        super().__init__(message)
+        self.fitting = tuple(fitting)
 
 
 @dataclass(frozen=True)
@@ -106,7 +119,7 @@ def read_mesh(path: Path, unit: str | None) -> RawMesh:
         said = f"{path}: is not a readable {kind.upper()} file; export it again, as a binary STL for instance"
         raise BadInput(said) from e
     if len(faces) < 4:
-        raise BadInput(f"{path}: holds no solid ({'points only' if not len(faces) else 'fewer than 4 triangles'})")
+        raise BadInput(f"{path}: holds no solid ({_emptiness(scene, len(faces))})")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise BadInput(f"{path}: its triangles name corners that do not exist; export it again")
     if not np.isfinite(vertices[faces]).all():
@@ -118,6 +131,13 @@ def read_mesh(path: Path, unit: str | None) -> RawMesh:
     if len(copies) > 1:
         notes.append(f"joined {len(copies)} parts")
     return RawMesh(_in_metres(path, vertices, faces, unit, notes), faces, tuple(notes))
+
+
+def _emptiness(scene: trimesh.Scene, triangles: int) -> str:
+    """Return why a scene holds no solid."""
+    if triangles:
+        return "fewer than 4 triangles"
+    return "points or lines only" if any(len(g.vertices) for g in scene.geometry.values()) else "nothing"
 
 
 def _joined(copies: list[tuple[Any, trimesh.Trimesh]]) -> tuple[Array, npt.NDArray[np.int64]]:
@@ -158,9 +178,10 @@ def _in_metres(path: Path, vertices: Array, faces: npt.NDArray[np.int64], unit: 
     fitting = [u for u, factor in UNITS_M.items() if _plausible(size * factor)]
     shown = " x ".join(f"{s:.4g}" for s in size)
     hint = "".join(f"; in {u} it is {_millimetres(size * UNITS_M[u])}: give --units {u}" for u in fitting)
-    raise BadInput(
+    raise ImplausibleSize(
         f"{path}: measures {shown} {unit or 'm'}; objects have {MIN_SIZE_M * 1e3:g} to {MAX_SIZE_M * 1e3:g} mm along "
-        f"every axis{hint}"
+        f"every axis{hint}",
+        fitting,
     )
 
 

@@ -37,7 +37,7 @@ class JawFit:
 
     def in_words(self) -> str:
         """Return the yaws and the widths that fit, for a person."""
-        yaws = self.fits.any(axis=1)
+        yaws = np.asarray(self.fits.any(axis=1))
         if not yaws.any():
             if not np.isfinite(self.opening_m).any():
                 return "the pads meet nothing"

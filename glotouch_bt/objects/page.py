@@ -13,11 +13,13 @@ from glotouch_bt.objects.prepare import DENSITY_KG_M3, Prepared, Refused
 _STYLE = """
 :root { color-scheme: light dark; --line: #8884; --bad: #b3261e; }
 body { font: 15px/1.45 system-ui, sans-serif; max-width: 66rem; margin: 1.5rem auto; padding: 0 1rem; }
-h1 { font-size: 1.5rem; } h2 { font-size: 1.1rem; margin: 0 0 .4rem; overflow-wrap: anywhere; }
+h1 { font-size: 1.5rem; } h2 { font-size: 1.1rem; margin: 1.2rem 0 .4rem; overflow-wrap: anywhere; }
 section { display: flex; flex-wrap: wrap; gap: 1rem; border-top: 1px solid var(--line); padding: 1rem 0; }
-section > div { flex: 1; min-width: 18rem; }
+section h2 { margin-top: 0; } section > div { flex: 1; min-width: 18rem; }
 img.object { width: 240px; height: 240px; border-radius: 6px; background: #fff; }
 figure { margin: 0; } figcaption { font-size: .8rem; opacity: .75; max-width: 180px; }
+.sides { display: flex; flex-wrap: wrap; gap: .5rem; } .chosen figcaption { font-weight: bold; opacity: 1; }
+.sides img { border-radius: 4px; background: #fff; }
 img.map { image-rendering: pixelated; max-width: 100%; }
 dl { display: grid; grid-template-columns: 6rem 1fr; gap: .15rem .6rem; margin: 0; }
 dt { opacity: .7; } dd { margin: 0; } .bad { color: var(--bad); }
@@ -54,13 +56,11 @@ def size_in_words(made: Prepared) -> str:
     return " x ".join(f"{s * 1e3:.0f}" for s in made.mesh.extents_m) + " mm"
 
 
-def sides_in_words(made: Prepared) -> str:
-    """Return the sides on which an object stands, with their probabilities; the chosen one in brackets."""
-    shown = [
-        f"[{i}] {s.share:.0%}" if i - 1 == made.side else f"{i} {s.share:.0%}"
-        for i, s in enumerate(made.sides, start=1)
-    ]
-    return ", ".join(shown) or "none"
+def side_in_words(made: Prepared) -> str:
+    """Return the side on which an object stands, and how probable that is."""
+    if made.side is None:
+        return "no firm side"
+    return f"side {made.side + 1} of {len(made.sides)} ({made.sides[made.side].share:.0%})"
 
 
 def closures_in_words(pair: LookAlike) -> str:
@@ -78,8 +78,8 @@ def _counts(good: int, refused: int) -> str:
 def _card(made: Prepared) -> str:
     facts = {
         "size": size_in_words(made),
-        "weight": f"{made.mass_kg * 1e3:.0f} g in solid PLA of {DENSITY_KG_M3:g} kg/m³ ({made.volume_m3 * 1e6:.0f} cm³)",
-        "stands on": f"{sides_in_words(made)} (probability of each side; in brackets: this one)",
+        "weight": f"{made.mass_kg * 1e3:.0f} g ({made.volume_m3 * 1e6:.0f} cm³ of solid PLA, {DENSITY_KG_M3:g} kg/m³)",
+        "stands on": side_in_words(made),
         "jaws": made.fit.in_words() if made.fit is not None else "not judged",
         "file": f"{made.source.name}, {len(made.mesh.faces)} triangles",
         "changed": "; ".join(made.notes) or "nothing",
@@ -88,13 +88,25 @@ def _card(made: Prepared) -> str:
     faults = "".join(f'<p class="bad">Not a target: {html_text(fault)}</p>' for fault in made.faults)
     image = f'<img class="object" alt="{html_text(made.name)}" src="{_inline(made.png)}">' if made.png else ""
     chart = ""
-    if made.fit is not None and made.fit.opening_m.size:
+    if made.fit is not None and made.fit.fits.any() and not made.fit.fits.all():
         low, high = (f"{z * 1e3:.0f}" for z in made.fit.z_m[[0, -1]])
         caption = f"Jaws' yaw 0 to 180° to the right, height of the pads {low} to {high} mm upwards. "
         caption += "Green: fits. Red: too wide. Grey: the pads meet nothing."
         shown = f'<img class="map" alt="where the jaws fit" src="{_inline(jaw_map(made.fit))}">'
         chart = f"<figure>{shown}<figcaption>{caption}</figcaption></figure>"
-    return f"<section>{image}<div><h2>{html_text(made.name)}</h2><dl>{rows}</dl>{faults}</div>{chart}</section>"
+    sides = ""
+    if len(made.side_pngs) > 1:
+        how = f"<code>glotouch objects ... --side {html_text(made.name)}=N</code>"
+        shown = "".join(_side(i, made) for i in range(len(made.side_pngs)))
+        sides = f'<p>Its stable sides; {how} chooses another:</p><div class="sides">{shown}</div>'
+    return f"<section>{image}<div><h2>{html_text(made.name)}</h2><dl>{rows}</dl>{faults}{sides}</div>{chart}</section>"
+
+
+def _side(index: int, made: Prepared) -> str:
+    chosen = ' class="chosen"' if index == made.side else ""
+    text = f"{index + 1} ({made.sides[index].share:.0%})"
+    image = f'<img alt="side {index + 1}" src="{_inline(made.side_pngs[index])}">'
+    return f"<figure{chosen}>{image}<figcaption>{text}</figcaption></figure>"
 
 
 def _inline(png: bytes) -> str:

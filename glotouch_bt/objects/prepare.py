@@ -11,9 +11,9 @@ import numpy as np
 import trimesh
 
 from glotouch_bt.errors import BadInput
-from glotouch_bt.objects.files import read_mesh
+from glotouch_bt.objects.files import ImplausibleSize, read_mesh
 from glotouch_bt.objects.jaws import JawFit, jaw_fit
-from glotouch_bt.objects.picture import picture
+from glotouch_bt.objects.picture import SMALL_PIXELS, picture
 from glotouch_bt.objects.repair import repaired
 from glotouch_bt.objects.sides import Side, choose_side, sides_of
 from glotouch_bt.perception import TooLow, model_for, too_wide
@@ -23,6 +23,9 @@ from glotouch_bt.robot.scene import Mesh, solid_of, turned
 
 DENSITY_KG_M3 = 1240.0
 """Density of solid PLA, the usual plastic of printed objects. Source: data sheets of filaments."""
+
+MAX_SHOWN = 8
+"""Number of sides to show. Source: ours; a box has six."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,7 @@ class Prepared:
         fit: The jaws against it; None as above.
         faults: Why it cannot be a target, or can hardly be one.
         png: Its picture; empty if none can be drawn here.
+        side_pngs: Small pictures of the first `MAX_SHOWN` sides.
     """
 
     name: str
@@ -56,6 +60,7 @@ class Prepared:
     fit: JawFit | None
     faults: tuple[str, ...]
     png: bytes
+    side_pngs: tuple[bytes, ...]
 
     @property
     def mass_kg(self) -> float:
@@ -87,15 +92,23 @@ class Refused:
     Attributes:
         name, source: As in `Prepared`.
         reason: Why, and what to do.
+        unit: The unit in which the file has a plausible size, if its size is the reason; or empty.
     """
 
     name: str
     source: Path
     reason: str
+    unit: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data, for --json."""
-        return {"name": self.name, "source": str(self.source), "usable": False, "reason": self.reason}
+        return {
+            "name": self.name,
+            "source": str(self.source),
+            "usable": False,
+            "reason": self.reason,
+            "unit": self.unit,
+        }
 
 
 def prepare(
@@ -112,17 +125,17 @@ def prepare(
     try:
         return _prepared(path, unit, side, gripper)
     except BadInput as e:
-        return Refused(path.stem, path, str(e).removeprefix(f"{path}: "))
+        fitting = e.fitting[0] if isinstance(e, ImplausibleSize) and e.fitting else ""
+        return Refused(path.stem, path, str(e).removeprefix(f"{path}: "), fitting)
 
 
 def _prepared(path: Path, unit: str | None, number: int | None, gripper: Gripper | None) -> Prepared:
     raw = read_mesh(path, unit)
     vertices, faces, repairs = repaired(raw.vertices_m, raw.faces)
-    mesh = solid_of(path, _stl(vertices, faces))
-    sides = sides_of(mesh)
+    mesh_in_file = solid_of(path, _stl(vertices, faces))
+    sides = sides_of(mesh_in_file)
     chosen, note = choose_side(sides, number)
-    if chosen is not None:
-        mesh = turned(mesh, sides[chosen].quat)
+    mesh = mesh_in_file if chosen is None else turned(mesh_in_file, sides[chosen].quat)
     low, high = mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)
     stl = _stl(mesh.vertices_m - [*(0.5 * (low + high))[:2], low[2]], mesh.faces)
     mesh = solid_of(path, stl)
@@ -132,9 +145,10 @@ def _prepared(path: Path, unit: str | None, number: int | None, gripper: Gripper
     notes = tuple(n for n in (*raw.notes, *repairs, note) if n)
     try:
         png = picture(mesh)
+        shown = tuple(picture(turned(mesh_in_file, s.quat), SMALL_PIXELS) for s in sides[:MAX_SHOWN])
     except Exception as e:  # each platform of the ray tracer fails in its own way
-        png, notes = b"", (*notes, f"no picture can be drawn here ({type(e).__name__})")
-    return Prepared(path.stem, path, mesh, stl, notes, sides, chosen, volume, model, fit, tuple(faults), png)
+        png, shown, notes = b"", (), (*notes, f"no picture can be drawn here ({type(e).__name__})")
+    return Prepared(path.stem, path, mesh, stl, notes, sides, chosen, volume, model, fit, tuple(faults), png, shown)
 
 
 def _judged(mesh: Mesh, gripper: Gripper | None, faults: list[str]) -> tuple[TargetModel | None, JawFit | None]:

@@ -83,7 +83,8 @@ def _closed(vertices: Array, faces: Faces, notes: list[str]) -> tuple[Array, Fac
     if not len(open_edges):
         return vertices, faces
     loops = _loops(open_edges)
-    patches, middles, sizes_m = [faces], [vertices], []
+    patches, middles = [faces], [vertices]
+    sizes_m: list[float] = []
     for loop in loops:
         around, middle = vertices[loop], len(vertices) + len(sizes_m)
         middles.append(around.mean(axis=0)[None])

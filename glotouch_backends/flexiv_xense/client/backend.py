@@ -67,7 +67,8 @@ class FlexivXenseBackend(Backend):
     summary = "Flexiv Rizon 4 and Xense gripper through the vendors' SDKs, or simulated (--set devices=simulated)"
 
     def __init__(self, description: RobotDescription = RIZON4_XENSE, limits: Limits | None = None) -> None:
-        self.description, self._limits = description, limits or Limits()
+        self.description: RobotDescription = description
+        self._limits = limits or Limits()
 
     def open(self, world: World, conditions: Conditions, seed: int, options: Mapping[str, object]) -> Robot:
         """See `Backend`; options in `ClientOptions` and `DeviceSettings`; conditions and seed for simulated devices."""

@@ -14,9 +14,11 @@ if TYPE_CHECKING:
     from glotouch_bt.objects import LookAlike, Prepared, Refused
 
 
-def print_objects(results: Sequence[Prepared | Refused], alike: Sequence[LookAlike], out: Path | None) -> None:
+def print_objects(
+    folder: Path, results: Sequence[Prepared | Refused], alike: Sequence[LookAlike], out: Path | None
+) -> None:
     """Print the objects, what was changed, the look-alikes, the refused files, and what to type next."""
-    from glotouch_bt.objects import Prepared, Refused, closures_in_words, sides_in_words, size_in_words
+    from glotouch_bt.objects import Prepared, Refused, closures_in_words, side_in_words, size_in_words
 
     console = EscapingConsole(soft_wrap=True, highlight=False)
     good = [r for r in results if isinstance(r, Prepared)]
@@ -25,14 +27,19 @@ def print_objects(results: Sequence[Prepared | Refused], alike: Sequence[LookAli
             made.name,
             size_in_words(made),
             f"{made.mass_kg * 1e3:.0f} g",
-            sides_in_words(made),
+            side_in_words(made),
             "not a target" if made.faults else made.fit.in_words() if made.fit is not None else "not judged",
         )
         for made in good
     ]
     if rows:
         print_table("objects", ("name", "size", "weight", "stands on", "jaws"), rows)
-        console.print(Text("weight: in solid PLA. stands on: probability of each side, [this one].", style="dim"))
+        console.print(
+            Text(
+                "weight: in solid PLA. stands on: of its stable sides, with the probability after a random drop.",
+                style="dim",
+            )
+        )
     for made in good:
         for fault in made.faults:
             console.print(Text(f"{made.name}: not a target: {fault}", style="yellow"))
@@ -46,6 +53,11 @@ def print_objects(results: Sequence[Prepared | Refused], alike: Sequence[LookAli
     for refused in results:
         if isinstance(refused, Refused):
             console.print(Text(f"refused: {refused.source.name}: {refused.reason}", style="red"))
+    units = sorted({r.unit for r in results if isinstance(r, Refused) and r.unit})
+    if len(units) == 1:
+        console.print(f"next: glotouch objects {folder} --units {units[0]}", markup=False)
+    elif units:
+        console.print(f"next: sort the files by their unit ({', '.join(units)}) into folders", markup=False)
     if out is not None:
         target = next((m.name for m in good if not m.faults), good[0].name)
         console.print(f"written: {out} ({len(good)} objects); pictures: {out / 'objects.html'}", markup=False)

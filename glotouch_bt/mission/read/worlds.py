@@ -163,11 +163,11 @@ def _objects(
 ) -> ObjectSet | None:
     placed: dict[str, Any] = given.model_dump(include={"min_gap_m", "min_wall_gap_m", "stance"})
     if override is not None:
-        at = Place(f"--objects {override}")
-        files = _files(override, at, f"is not a folder with .stl files in it{_others(override)}", findings)
+        given_at = Place(f"--objects {override}")
+        files = _files(override, given_at, f"is not a folder with .stl files in it{_others(override)}", findings)
         if not files:
             return None
-        _check_solids(files.values(), at, findings)
+        _check_solids(files.values(), given_at, findings)
         return ObjectSet(folder=override, **placed)
     folder = (file.parent / given.folder).resolve()
     at = node.get("folder") or node
