@@ -36,8 +36,8 @@ def check_objects(mission: Mission, backend: str) -> tuple[Finding, ...]:
         findings.add(Place(str(objects.folder)), "no_layout", str(e))
     for name in mission.stl_parameters:
         target = str(mission.parameters.get(name, ""))
-        if target and gripper is not None and (fault := _out_of_reach(_loaded(target, objects), gripper)):
-            findings.add(Place(f"--set {name}"), "target_out_of_reach", fault)
+        if target and gripper is not None and (fault := out_of_reach(_loaded(target, objects), gripper)):
+            findings.add(Place(f"--set {name}"), "targetout_of_reach", fault)
     return tuple(findings.sorted())
 
 
@@ -47,7 +47,7 @@ def _loaded(target: str, objects: ObjectSet) -> Mesh:
     return load_folder(objects.folder, (target,))[0]
 
 
-def _out_of_reach(mesh: Mesh, gripper: Gripper) -> str:
+def out_of_reach(mesh: Mesh, gripper: Gripper) -> str:
     """Return why an object cannot be felt or grasped, or empty."""
     try:
         return too_wide(model_for(mesh, gripper), gripper)

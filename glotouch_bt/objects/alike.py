@@ -2,8 +2,8 @@
 
 An estimate from the tables of the two models alone, without pad images, neighbours or errors of calibration:
 
-- Outline and height confuse two objects if their sides and tops differ by less than `ALIKE_SD` of what the recogniser
-  believes of its measurements (`LikelihoodParams`).
+- Outline and height confuse two objects if those of one fit the other almost as well: twice the log of the ratio of the
+  two densities, with the errors that the recogniser believes in (`LikelihoodParams`), is below `ALIKE_SD` squared.
 - A closure on b at some yaw, place and height weighs b against a by half the squared difference of the two widths in
   standard deviations, at most the log of one over the probability of an outlier, tempered as in the likelihood.
 - a is turned to the yaw at which it is most like b. A mission picks informative closures, so the mean of the best
@@ -23,11 +23,12 @@ import numpy as np
 from glotouch_bt.perception.recognition import TargetModel
 from glotouch_bt.perception.recognition.likelihood import LikelihoodParams
 from glotouch_bt.perception.recognition.model import Array32
+from glotouch_bt.perception.touch import ContourKind
 from glotouch_bt.perception.touch.calibration import MEASURED_SD_M
 from glotouch_bt.robot import Array
 
 ALIKE_SD = 3.0
-"""Objects whose outlines and heights differ by less standard deviations than this are look-alikes. Source: ours."""
+"""Objects whose outlines and heights differ by fewer standard deviations than this are look-alikes. Source: ours."""
 CONFIDENCE = 0.95
 """Probability at which one of two objects counts as known. Source: the default of `retrieve`."""
 MAX_CLOSURES = 40
@@ -59,7 +60,7 @@ def look_alikes(models: Sequence[TargetModel], p: LikelihoodParams | None = None
     p = p or LikelihoodParams()
     found: list[LookAlike] = []
     for a, b in combinations(models, 2):
-        apart = _outlines_apart_sd(a, b, p)
+        apart = min(_outlines_apart_sd(a, b, p), _outlines_apart_sd(b, a, p))
         if apart < ALIKE_SD:
             weight = min(_weight_of_closure(a, b, p), _weight_of_closure(b, a, p))
             needed = math.log(CONFIDENCE / (1 - CONFIDENCE)) / max(weight, 1e-9)
@@ -68,19 +69,15 @@ def look_alikes(models: Sequence[TargetModel], p: LikelihoodParams | None = None
 
 
 def _outlines_apart_sd(a: TargetModel, b: TargetModel, p: LikelihoodParams) -> float:
-    """Return the difference of the sides and tops, in standard deviations of the measurements; the smaller kind."""
-    top = (a.height_m - b.height_m) / p.height_sd_m
-    apart = []
-    for kind in ("round", "box"):
-        one, other = a.outline.of(kind), b.outline.of(kind)
-        share = min(m.outline.p_box if kind == "box" else 1 - m.outline.p_box for m in (a, b))
-        sides = [
-            (x - y) / math.hypot(p.contour_sd_m, s, t)
-            for x, y, s, t in zip(one.size_m, other.size_m, one.size_sd_m, other.size_sd_m, strict=True)
-        ]
-        used = sides[:1] if kind == "round" else sides
-        apart.append(math.hypot(*used, top, math.sqrt(-2 * math.log(share))))
-    return min(apart)
+    """Return by how much the outline and height of b fit b better than a, as the deviations of a Gaussian."""
+    kind: ContourKind = "box" if b.outline.p_box > 0.5 else "round"
+    shares = [m.outline.p_box if kind == "box" else 1 - m.outline.p_box for m in (a, b)]
+    squared = 2 * math.log(shares[1] / shares[0]) + ((a.height_m - b.height_m) / p.height_sd_m) ** 2
+    traced = a.outline.of(kind), b.outline.of(kind)
+    for i in range(1 if kind == "round" else 2):
+        sds = [math.hypot(p.contour_sd_m, t.size_sd_m[i]) for t in traced]
+        squared += ((traced[0].size_m[i] - traced[1].size_m[i]) / sds[0]) ** 2 + 2 * math.log(sds[0] / sds[1])
+    return math.sqrt(max(squared, 0.0))
 
 
 def _weight_of_closure(a: TargetModel, b: TargetModel, p: LikelihoodParams) -> float:

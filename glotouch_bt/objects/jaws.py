@@ -72,9 +72,10 @@ def _runs(yaw_deg: Array, good: npt.NDArray[np.bool_]) -> str:
     """Return the runs of good yaws, around half a turn: `20-70, 110-160`."""
     n, step = len(good), round(float(yaw_deg[1] - yaw_deg[0]))
     starts = [i for i in range(n) if good[i] and not good[i - 1]]
-    runs = []
+    runs: list[str] = []
     for start in starts:
         length = next(k for k in range(1, n + 1) if not good[(start + k) % n])
         first = round(float(yaw_deg[start]))
-        runs.append(f"{first}-{first + (length - 1) * step}" if length > 1 else f"{first}")
+        last = first + (length - 1) * step
+        runs += [f"{first}-{last}"] if last < n * step else [f"{first}-{n * step}", f"0-{last - n * step}"]
     return ", ".join(runs)

@@ -11,7 +11,7 @@ import numpy as np
 import trimesh
 
 from glotouch_bt.errors import BadInput
-from glotouch_bt.objects.files import ImplausibleSize, read_mesh
+from glotouch_bt.objects.files import ImplausibleSize, RawMesh, read_mesh
 from glotouch_bt.objects.jaws import JawFit, jaw_fit
 from glotouch_bt.objects.picture import SMALL_PIXELS, picture
 from glotouch_bt.objects.repair import repaired
@@ -131,8 +131,7 @@ def prepare(
 
 def _prepared(path: Path, unit: str | None, number: int | None, gripper: Gripper | None) -> Prepared:
     raw = read_mesh(path, unit)
-    vertices, faces, repairs = repaired(raw.vertices_m, raw.faces)
-    mesh_in_file = solid_of(path, _stl(vertices, faces))
+    mesh_in_file, repairs = _solid(path, raw)
     sides = sides_of(mesh_in_file)
     chosen, note = choose_side(sides, number)
     mesh = mesh_in_file if chosen is None else turned(mesh_in_file, sides[chosen].quat)
@@ -149,6 +148,15 @@ def _prepared(path: Path, unit: str | None, number: int | None, gripper: Gripper
     except Exception as e:  # each platform of the ray tracer fails in its own way
         png, shown, notes = b"", (), (*notes, f"no picture can be drawn here ({type(e).__name__})")
     return Prepared(path.stem, path, mesh, stl, notes, sides, chosen, volume, model, fit, tuple(faults), png, shown)
+
+
+def _solid(path: Path, raw: RawMesh) -> tuple[Mesh, tuple[str, ...]]:
+    """Return the solid that a run would load from these triangles, repaired only if it would refuse them."""
+    try:
+        return solid_of(path, _stl(raw.vertices_m, raw.faces)), ()
+    except BadInput:
+        vertices, faces, repairs = repaired(raw.vertices_m, raw.faces)
+        return solid_of(path, _stl(vertices, faces)), repairs
 
 
 def _judged(mesh: Mesh, gripper: Gripper | None, faults: list[str]) -> tuple[TargetModel | None, JawFit | None]:

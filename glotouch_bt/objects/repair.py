@@ -12,11 +12,14 @@ from glotouch_bt.errors import BadInput
 from glotouch_bt.robot import Array
 
 Faces = npt.NDArray[np.int64]
-MERGE_M = 1e-6
-"""Corners closer than this are one. Source: rounding of 32 bit floats and of texts with six decimals at 0.3 m."""
+MERGE_M = (1e-6, 1e-5)
+"""Corners closer than this are one; the next is tried if edges stay open. Source: rounding of 32 bit floats and of
+exporters that scale."""
 FRAGMENT_SHARE = 0.005
 """A separate piece with less than this share of the surface is dropped if it is open or lies apart: debris of a scan.
 Source: ours."""
+MAX_DROPPED_SHARE = 0.05
+"""Fragments with more of the surface than this together are no debris, and stay. Source: ours."""
 MAX_HOLE_SHARE = 0.30
 """Largest share of the closed surface that may be holes. Source: ours; a box without its largest face is below, a
 sheet (half of whose closed surface is hole) is above."""
@@ -37,17 +40,39 @@ def repaired(vertices_m: Array, faces: Faces) -> tuple[Array, Faces, tuple[str, 
 
 def _joined(vertices: Array, faces: Faces, notes: list[str]) -> tuple[Array, Faces]:
     """Join corners, then drop collapsed and repeated triangles."""
-    _, first, owner = np.unique(np.round(vertices / MERGE_M), axis=0, return_index=True, return_inverse=True)
-    faces = owner.ravel()[faces]
-    a, b, c = faces.T
-    faces = faces[(a != b) & (b != c) & (c != a)]
-    kept = np.sort(np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1])
-    if len(kept) < len(faces):
-        notes.append(f"dropped {len(faces) - len(kept)} repeated triangles")
-    faces = faces[kept]
-    if len(faces) < 4:
+    corners, joined = vertices, faces
+    for merge_m in MERGE_M:
+        _, first, owner = np.unique(np.round(vertices / merge_m), axis=0, return_index=True, return_inverse=True)
+        corners, joined = vertices[first], owner.ravel()[faces]
+        a, b, c = joined.T
+        joined = joined[(a != b) & (b != c) & (c != a)]
+        kept = _kept(joined)
+        repeated, joined = len(joined) - len(kept), joined[kept]
+        if (_edges(joined)[1] == 2).all():
+            break
+    if len(joined) < 4:
         raise BadInput("holds no solid (its triangles have no area)")
-    return vertices[first], faces
+    if repeated:
+        notes.append(f"dropped {repeated} repeated triangles")
+    return corners, joined
+
+
+def _kept(faces: Faces) -> npt.NDArray[np.intp]:
+    """Return the indices of the triangles to keep of each set on the same corners.
+
+    Where two parts touch face to face, as many look one way as the other: none is kept, and the parts are one. Of
+    others one is kept.
+    """
+    order = np.sort(faces, axis=1)
+    _, first, owner = np.unique(order, axis=0, return_index=True, return_inverse=True)
+    odd = (faces[:, 0] > faces[:, 1]) ^ (faces[:, 1] > faces[:, 2]) ^ (faces[:, 0] > faces[:, 2])
+    net = np.bincount(owner.ravel(), np.where(odd, 1.0, -1.0))
+    return np.sort(first[net != 0.0])
+
+
+def _edges(faces: Faces) -> tuple[Faces, npt.NDArray[np.intp]]:
+    """Return the undirected edges (n, 2), and the number of faces at each."""
+    return np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
 
 
 def _without_fragments(vertices: Array, faces: Faces, notes: list[str]) -> tuple[Array, Faces]:
@@ -64,7 +89,7 @@ def _without_fragments(vertices: Array, faces: Faces, notes: list[str]) -> tuple
     open_edges = trimesh.grouping.group_rows(solid.edges_sorted, require_count=1)
     opened = np.bincount(label[solid.edges_face[open_edges]], minlength=len(area)) > 0
     drop = (area < FRAGMENT_SHARE * area.sum()) & (apart | opened)
-    if not drop.any():
+    if not drop.any() or area[drop].sum() > MAX_DROPPED_SHARE * area.sum():
         return vertices, faces
     notes.append(f"dropped {drop.sum()} fragments")
     return vertices, faces[~drop[label]]
@@ -72,14 +97,13 @@ def _without_fragments(vertices: Array, faces: Faces, notes: list[str]) -> tuple
 
 def _closed(vertices: Array, faces: Faces, notes: list[str]) -> tuple[Array, Faces]:
     """Close each loop of open edges with a fan of triangles about its middle."""
-    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    single, counts = np.unique(edges, axis=0, return_counts=True)
+    edges, counts = _edges(faces)
     if (counts > 2).any():
         raise BadInput(
             f"has {(counts > 2).sum()} edges at which three or more faces meet, so its inside is not defined; "
             "make it a solid in a mesh editor"
         )
-    open_edges = single[counts == 1]
+    open_edges = edges[counts == 1]
     if not len(open_edges):
         return vertices, faces
     loops = _loops(open_edges)
