@@ -11,13 +11,12 @@ from glotouch_bt.commands.check import check
 from glotouch_bt.commands.doctor import doctor
 from glotouch_bt.commands.faults import faults
 from glotouch_bt.commands.missions import missions
-from glotouch_bt.commands.nodes import nodes
+from glotouch_bt.commands.nodes import nodes, schema
 from glotouch_bt.commands.objects import objects
 from glotouch_bt.commands.replay import replay
 from glotouch_bt.commands.report import report
 from glotouch_bt.commands.resume import resume
 from glotouch_bt.commands.run import run
-from glotouch_bt.commands.schema import schema
 from glotouch_bt.commands.skills import skills
 from glotouch_bt.commands.test import run_tests
 from glotouch_bt.commands.tree import tree

@@ -7,4 +7,4 @@ from glotouch_bt.objects.alike import LookAlike, look_alikes
 from glotouch_bt.objects.files import UNITS_M, mesh_files
 from glotouch_bt.objects.folder import check_free, write_clean
 from glotouch_bt.objects.page import closures_in_words, page, side_in_words, size_in_words
-from glotouch_bt.objects.prepare import Prepared, Refused, chosen_sides, prepare
+from glotouch_bt.objects.prepare import Prepared, RefusedFile, chosen_sides, prepare

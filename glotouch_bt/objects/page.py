@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from glotouch_bt.escaped_text import html_text
 from glotouch_bt.objects.alike import LookAlike
 from glotouch_bt.objects.picture import jaw_map
-from glotouch_bt.objects.prepare import DENSITY_KG_M3, Prepared, Refused
+from glotouch_bt.objects.prepare import DENSITY_KG_M3, Prepared, RefusedFile
 
 _STYLE = """
 :root { color-scheme: light dark; --line: #8884; --bad: #b3261e; }
@@ -28,10 +28,10 @@ table { border-collapse: collapse; } td, th { text-align: left; padding: .2rem .
 """
 
 
-def page(title: str, results: Sequence[Prepared | Refused], alike: Sequence[LookAlike]) -> str:
+def page(title: str, results: Sequence[Prepared | RefusedFile], alike: Sequence[LookAlike]) -> str:
     """Return the page: every object with its picture, the look-alikes, and the files that were refused."""
     good = [r for r in results if isinstance(r, Prepared)]
-    refused = [r for r in results if isinstance(r, Refused)]
+    refused = [r for r in results if isinstance(r, RefusedFile)]
     body = [f"<h1>{html_text(title)}</h1>", f"<p>{_counts(len(good), len(refused))}</p>"]
     body += [_card(made) for made in good]
     if alike:
@@ -45,7 +45,7 @@ def page(title: str, results: Sequence[Prepared | Refused], alike: Sequence[Look
         )
     if refused:
         rows = "".join(f"<tr><td>{html_text(r.source.name)}</td><td>{html_text(r.reason)}</td></tr>" for r in refused)
-        body.append(f"<h2>Refused</h2><table>{rows}</table>")
+        body.append(f"<h2>RefusedFile</h2><table>{rows}</table>")
     head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{html_text(title)}</title>'
     head += f"<style>{_STYLE}</style>"
     return f'<!doctype html><html lang="en"><head>{head}</head><body>{"".join(body)}</body></html>\n'

@@ -86,7 +86,7 @@ class Prepared:
 
 
 @dataclass(frozen=True)
-class Refused:
+class RefusedFile:
     """A file that is no object.
 
     Attributes:
@@ -113,7 +113,7 @@ class Refused:
 
 def prepare(
     path: Path, unit: str | None = None, side: int | None = None, gripper: Gripper | None = None
-) -> Prepared | Refused:
+) -> Prepared | RefusedFile:
     """Make one file an object, or say why it cannot be one.
 
     Args:
@@ -126,7 +126,7 @@ def prepare(
         return _prepared(path, unit, side, gripper)
     except BadInput as e:
         fitting = e.fitting[0] if isinstance(e, ImplausibleSize) and e.fitting else ""
-        return Refused(path.stem, path, str(e).removeprefix(f"{path}: "), fitting)
+        return RefusedFile(path.stem, path, str(e).removeprefix(f"{path}: "), fitting)
 
 
 def _prepared(path: Path, unit: str | None, number: int | None, gripper: Gripper | None) -> Prepared:

@@ -11,7 +11,7 @@ import trimesh
 
 from glotouch_bt.mission import feasible
 from glotouch_bt.mission.read import load_world, shipped_root
-from glotouch_bt.objects import Prepared, Refused, look_alikes, prepare
+from glotouch_bt.objects import Prepared, RefusedFile, look_alikes, prepare
 from glotouch_bt.perception.recognition import TargetModel
 from glotouch_bt.robot import Gripper, load_backend
 from glotouch_bt.robot.scene import load_mesh, stl_files
@@ -50,7 +50,7 @@ def test_a_side_can_be_chosen(tmp_path: Path) -> None:
     }
     assert heights == {0.03, 0.05, 0.08}
     refused = prepare(tmp_path / "a.stl", None, 7)
-    assert isinstance(refused, Refused)
+    assert isinstance(refused, RefusedFile)
     assert refused.reason == "has no side 7 (it has 6 sides on which it stands)"
 
 

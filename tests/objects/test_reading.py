@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from glotouch_bt.objects import Prepared, Refused, mesh_files, prepare
+from glotouch_bt.objects import Prepared, RefusedFile, mesh_files, prepare
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene import load_mesh
 
@@ -24,7 +24,7 @@ def box(scale: float = 1.0) -> trimesh.Trimesh:
 
 def reason(path: Path, unit: str | None = None) -> str:
     made = prepare(path, unit)
-    assert isinstance(made, Refused), made
+    assert isinstance(made, RefusedFile), made
     return made.reason
 
 
@@ -53,7 +53,7 @@ def test_formats_and_units_give_the_same_object(suffix: str, unit: str | None, s
 def test_an_implausible_size_names_the_unit_to_type(scale: float, unit: str, tmp_path: Path) -> None:
     box(scale).export(tmp_path / "a.stl")
     made = prepare(tmp_path / "a.stl")
-    assert isinstance(made, Refused)
+    assert isinstance(made, RefusedFile)
     assert f"give --units {unit}" in made.reason
     assert isinstance(prepare(tmp_path / "a.stl", unit), Prepared)
 

@@ -11,14 +11,14 @@ from rich.text import Text
 from glotouch_bt.commands.terminal.console import EscapingConsole, print_table
 
 if TYPE_CHECKING:
-    from glotouch_bt.objects import LookAlike, Prepared, Refused
+    from glotouch_bt.objects import LookAlike, Prepared, RefusedFile
 
 
 def print_objects(
-    folder: Path, results: Sequence[Prepared | Refused], alike: Sequence[LookAlike], out: Path | None
+    folder: Path, results: Sequence[Prepared | RefusedFile], alike: Sequence[LookAlike], out: Path | None
 ) -> None:
     """Print the objects, what was changed, the look-alikes, the refused files, and what to type next."""
-    from glotouch_bt.objects import Prepared, Refused, closures_in_words, side_in_words, size_in_words
+    from glotouch_bt.objects import Prepared, RefusedFile, closures_in_words, side_in_words, size_in_words
 
     console = EscapingConsole(soft_wrap=True, highlight=False)
     good = [r for r in results if isinstance(r, Prepared)]
@@ -51,9 +51,9 @@ def print_objects(
             Text(f"look-alikes: {pair.first}, {pair.second}: {said}", style="" if pair.closures else "yellow")
         )
     for refused in results:
-        if isinstance(refused, Refused):
+        if isinstance(refused, RefusedFile):
             console.print(Text(f"refused: {refused.source.name}: {refused.reason}", style="red"))
-    units = sorted({r.unit for r in results if isinstance(r, Refused) and r.unit})
+    units = sorted({r.unit for r in results if isinstance(r, RefusedFile) and r.unit})
     if len(units) == 1:
         console.print(f"next: glotouch objects {folder} --units {units[0]}", markup=False)
     elif units:
