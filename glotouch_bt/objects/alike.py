@@ -2,8 +2,8 @@
 
 An estimate from the tables of the two models alone, without pad images, neighbours or errors of calibration:
 
-- Outline and height confuse two objects if those of one fit the other almost as well: twice the log of the ratio of the
-  two densities, with the errors that the recogniser believes in (`LikelihoodParams`), is below `ALIKE_SD` squared.
+- Outline and height confuse two objects if those of one fit the other almost as well: the log of the ratio of the two
+  densities, with the errors that the recogniser believes in (`LikelihoodParams`), is below the log odds of `CONFIDENCE`.
 - A closure on b at some yaw, place and height weighs b against a by half the squared difference of the two widths in
   standard deviations, at most the log of one over the probability of an outlier, tempered as in the likelihood.
 - a is turned to the yaw at which it is most like b. A mission picks informative closures, so the mean of the best
@@ -27,8 +27,6 @@ from glotouch_bt.perception.touch import ContourKind
 from glotouch_bt.perception.touch.calibration import MEASURED_SD_M
 from glotouch_bt.robot import Array
 
-ALIKE_SD = 3.0
-"""Objects whose outlines and heights differ by fewer standard deviations than this are look-alikes. Source: ours."""
 CONFIDENCE = 0.95
 """Probability at which one of two objects counts as known. Source: the default of `retrieve`."""
 MAX_CLOSURES = 40
@@ -45,13 +43,13 @@ class LookAlike:
 
     Attributes:
         first, second: Their names.
-        apart_sd: Difference of outline and height, in standard deviations.
+        outline_nats: Log odds of one against the other after outline and height.
         closures: Closures that tell them apart; None if more than `MAX_CLOSURES`.
     """
 
     first: str
     second: str
-    apart_sd: float
+    outline_nats: float
     closures: int | None
 
 
@@ -59,25 +57,26 @@ def look_alikes(models: Sequence[TargetModel], p: LikelihoodParams | None = None
     """Return the look-alikes among objects with different names."""
     p = p or LikelihoodParams()
     found: list[LookAlike] = []
+    needed = math.log(CONFIDENCE / (1 - CONFIDENCE))
     for a, b in combinations(models, 2):
-        apart = min(_outlines_apart_sd(a, b, p), _outlines_apart_sd(b, a, p))
-        if apart < ALIKE_SD:
+        outline = min(_outline_nats(a, b, p), _outline_nats(b, a, p))
+        if outline < needed:
             weight = min(_weight_of_closure(a, b, p), _weight_of_closure(b, a, p))
-            needed = math.log(CONFIDENCE / (1 - CONFIDENCE)) / max(weight, 1e-9)
-            found.append(LookAlike(a.name, b.name, apart, None if needed > MAX_CLOSURES else math.ceil(needed)))
+            closures = needed / max(weight, 1e-9)
+            found.append(LookAlike(a.name, b.name, outline, None if closures > MAX_CLOSURES else math.ceil(closures)))
     return found
 
 
-def _outlines_apart_sd(a: TargetModel, b: TargetModel, p: LikelihoodParams) -> float:
-    """Return by how much the outline and height of b fit b better than a, as the deviations of a Gaussian."""
+def _outline_nats(a: TargetModel, b: TargetModel, p: LikelihoodParams) -> float:
+    """Return the log ratio by which the outline and height of b fit b better than a, with Gaussian errors."""
     kind: ContourKind = "box" if b.outline.p_box > 0.5 else "round"
     shares = [m.outline.p_box if kind == "box" else 1 - m.outline.p_box for m in (a, b)]
-    squared = 2 * math.log(shares[1] / shares[0]) + ((a.height_m - b.height_m) / p.height_sd_m) ** 2
+    twice = 2 * math.log(shares[1] / shares[0]) + ((a.height_m - b.height_m) / p.height_sd_m) ** 2
     traced = a.outline.of(kind), b.outline.of(kind)
     for i in range(1 if kind == "round" else 2):
         sds = [math.hypot(p.contour_sd_m, t.size_sd_m[i]) for t in traced]
-        squared += ((traced[0].size_m[i] - traced[1].size_m[i]) / sds[0]) ** 2 + 2 * math.log(sds[0] / sds[1])
-    return math.sqrt(max(squared, 0.0))
+        twice += ((traced[0].size_m[i] - traced[1].size_m[i]) / sds[0]) ** 2 + 2 * math.log(sds[0] / sds[1])
+    return 0.5 * twice
 
 
 def _weight_of_closure(a: TargetModel, b: TargetModel, p: LikelihoodParams) -> float:

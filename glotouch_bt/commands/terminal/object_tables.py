@@ -43,8 +43,9 @@ def print_objects(
     for made in good:
         for fault in made.faults:
             console.print(Text(f"{made.name}: not a target: {fault}", style="yellow"))
-        if made.notes:
-            console.print(Text(f"{made.name}: {'; '.join(made.notes)}"))
+        notes = [note for note in made.notes if not note.startswith("converted from")]  # as the user asked
+        if notes:
+            console.print(Text(f"{made.name}: {'; '.join(notes)}"))
     for pair in alike:
         said = closures_in_words(pair)
         console.print(
