@@ -1,13 +1,15 @@
 """Pairs of objects that outline and height would confuse, and the closures that would tell them apart.
 
-An estimate from the tables of the two models alone, without pad images, neighbours or errors of calibration:
+An estimate from the tables of the two models alone, without the probe, neighbours or errors of calibration:
 
-- Outline and height confuse two objects if those of one fit the other almost as well: the log of the ratio of the two
-  densities, with the errors that the recogniser believes in (`LikelihoodParams`), is below the log odds of `CONFIDENCE`.
-- A closure on b at some yaw, place and height weighs b against a by half the squared difference of the two widths in
-  standard deviations, at most the log of one over the probability of an outlier, tempered as in the likelihood.
-- a is turned to the yaw at which it is most like b. A mission picks informative closures, so the mean of the best
-  quarter of the places counts.
+- Outline and height confuse two objects if those of one fit the other almost as well: the log ratio of the two
+  densities, with the errors in which the recogniser believes (`LikelihoodParams`), is below the log odds of
+  `CONFIDENCE`.
+- A closure on b at some yaw, place and height weighs b against a by its width and the images of its two pads: half the
+  squared difference of the widths in standard deviations, and the log of the image kernel. Each is at most the log of
+  one over the probability of an outlier, and tempered as in the likelihood.
+- a is turned to the yaw at which it is most like b, and the mean over all places counts. A mission picks better places,
+  but it does not know the pose at first.
 - Two equally probable objects are told apart when the summed weights reach the log odds of `CONFIDENCE`.
 """
 
@@ -31,8 +33,6 @@ CONFIDENCE = 0.95
 """Probability at which one of two objects counts as known. Source: the default of `retrieve`."""
 MAX_CLOSURES = 40
 """More closures than this are not worth waiting for: touch cannot tell the two apart. Source: ours."""
-BEST_SHARE = 0.25
-"""Share of the places, best first, at which a mission closes the jaws. Source: ours."""
 MAX_SHIFT_M = 0.008
 """Places up to this far from the middle of the footprint are compared. Source: half the pads' width."""
 
@@ -81,25 +81,32 @@ def _outline_nats(a: TargetModel, b: TargetModel, p: LikelihoodParams) -> float:
 
 def _weight_of_closure(a: TargetModel, b: TargetModel, p: LikelihoodParams) -> float:
     """Return the expected evidence (nats) of a closure on b for b against a, at the pose of a that is most like b."""
-    heights = min(len(a.z_m), len(b.z_m))
-    first, second = _middle(a.width_m, a.l_m)[:, :, :heights], _middle(b.width_m, b.l_m)[:, :, :heights]
-    rough = _middle(a.unevenness_m, a.l_m)[:, :, :heights]
-    limit = -math.log(p.width_outlier)
+    heights, half_turn = min(len(a.z_m), len(b.z_m)), len(b.phi_rad) // 2
+    width_a, width_b, uneven_a, image_a, image_b = (
+        _middle(table, model.l_m)[:, :, :heights]
+        for table, model in (
+            (a.width_m, a), (b.width_m, b), (a.unevenness_m, a), (a.images, a), (b.images, b),
+        )
+    )  # fmt: skip
+    felt = np.isfinite(width_b)
+    limit, image_limit = -math.log(p.width_outlier), -math.log(p.image_outlier)
     weights = []
     for turn in range(len(a.phi_rad)):
-        width, uneven = np.roll(first, turn, axis=0), np.roll(rough, turn, axis=0)
-        both = np.isfinite(width) & np.isfinite(second)
+        width, uneven = np.roll(width_a, turn, axis=0), np.roll(uneven_a, turn, axis=0)
+        both = np.isfinite(width) & felt
         variance = p.width_sd_m**2 + MEASURED_SD_M**2 + (p.width_rough * np.where(both, uneven, 0.0)) ** 2
-        squared = np.where(both, width - second, 0.0) ** 2 / variance
-        evidence = np.where(np.isfinite(width) != np.isfinite(second), limit, np.minimum(0.5 * squared, limit))
-        felt = evidence[np.isfinite(second)]
-        best = np.sort(felt)[-max(1, int(BEST_SHARE * len(felt))) :] if len(felt) else np.zeros(1)
-        weights.append(p.slope * p.temper_width * float(best.mean()))
+        squared = np.where(both, width - width_b, 0.0) ** 2 / variance
+        by_width = np.where(np.isfinite(width) != felt, limit, np.minimum(0.5 * squared, limit))
+        unlike = ((np.roll(image_a, turn, axis=0) - image_b) ** 2).mean(axis=-1)
+        left = np.minimum(p.image_order * np.log1p(unlike / p.image_scale**2), image_limit)
+        right = np.roll(left[:, ::-1], half_turn, axis=0)
+        evidence = (p.temper_width * by_width + p.temper_image * (left + right))[felt]
+        weights.append(p.slope * float(evidence.mean()) if len(evidence) else 0.0)
     return min(weights)
 
 
-def _middle(table: Array32, l_m: Array) -> Array:
+def _middle(table: Array32, l_m: Array) -> Array32:
     """Return the table near the middle of the footprint; the grids of two objects agree there."""
     middle = len(l_m) // 2
     reach = int(min(MAX_SHIFT_M // (l_m[1] - l_m[0]), middle))
-    return np.asarray(table[:, middle - reach : middle + reach + 1], dtype=np.float64)
+    return np.asarray(table[:, middle - reach : middle + reach + 1])

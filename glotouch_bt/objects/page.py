@@ -66,7 +66,7 @@ def side_in_words(made: Prepared) -> str:
 def closures_in_words(pair: LookAlike) -> str:
     """Return how many closures tell a pair apart."""
     if pair.closures is None:
-        return "touch cannot tell them apart"
+        return "touch hardly tells them apart"
     return f"about {pair.closures} closure{'s' * (pair.closures != 1)}"
 
 
