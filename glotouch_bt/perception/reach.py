@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from glotouch_bt.perception.model_cache import target_model
 from glotouch_bt.perception.recognition.model import PadSpec, TargetModel
 from glotouch_bt.robot import BadInput, Gripper, ParamError
@@ -20,11 +22,12 @@ def model_for(mesh: Mesh, gripper: Gripper) -> TargetModel:
     """
     pads = PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
     try:
-        return target_model(mesh, pads)
+        model = target_model(mesh, pads)
     except ParamError as e:
         raise TooLow(
             f"{mesh.name} cannot be felt: it is {mesh.extents_m[2] * 1e3:.1f} mm high and must be {e.rule}"
         ) from e
+    return model if model.name == mesh.name else replace(model, name=mesh.name)  # the cache knows shapes, not names
 
 
 def too_wide(model: TargetModel, gripper: Gripper) -> str:

@@ -13,6 +13,7 @@ import trimesh
 from glotouch_bt.objects import Prepared, RefusedFile, mesh_files, prepare
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene import load_mesh
+from glotouch_bt.validation.fuzz.corrupt import corrupt_bytes
 
 SIZE_M = np.array([0.05, 0.04, 0.06])
 FORMATS = ("stl", "obj", "ply", "glb", "off")
@@ -125,3 +126,19 @@ def test_the_files_of_a_folder(tmp_path: Path) -> None:
     (tmp_path / "b.ply").touch()
     with pytest.raises(BadInput, match=r"b.obj and b.ply are two files for one object"):
         mesh_files(tmp_path)
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_corrupted_file_is_a_sound_object_or_refused(suffix: str, seed: int, tmp_path: Path) -> None:
+    """Nothing else is raised, and what is accepted loads from the clean folder as it was shown."""
+    rng = np.random.default_rng(seed)
+    exported = trimesh.creation.icosphere(2, 0.03).export(file_type=suffix)
+    data = exported.encode() if isinstance(exported, str) else bytes(exported)
+    made = prepare(written(tmp_path / f"a.{suffix}", corrupt_bytes(data, rng)))
+    if isinstance(made, RefusedFile):
+        assert made.reason
+        return
+    clean = load_mesh(written(tmp_path / "clean.stl", made.stl))
+    assert clean.digest == made.mesh.digest
+    assert clean.as_trimesh().is_watertight
