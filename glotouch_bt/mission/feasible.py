@@ -37,7 +37,7 @@ def check_objects(mission: Mission, backend: str) -> tuple[Finding, ...]:
     for name in mission.stl_parameters:
         target = str(mission.parameters.get(name, ""))
         if target and gripper is not None and (fault := out_of_reach(_loaded(target, objects), gripper)):
-            findings.add(Place(f"--set {name}"), "targetout_of_reach", fault)
+            findings.add(Place(f"--set {name}"), "target_out_of_reach", fault)
     return tuple(findings.sorted())
 
 
