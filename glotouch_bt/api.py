@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from glotouch_bt.faults import FaultPlan
-from glotouch_bt.mission import load_mission
+from glotouch_bt.mission import check_objects, load_mission
 from glotouch_bt.mission.read import Value, load_conditions, load_world
 from glotouch_bt.mission.spec import Finding, MissionFaults
 from glotouch_bt.robot import BadInput, Robot, World, load_backend
@@ -75,14 +75,16 @@ def check(
     *,
     objects: str | Path | None = None,
     allow_paths: Sequence[str | Path] = (),
+    backend: str = "mujoco",
 ) -> tuple[Finding, ...]:
-    """Check a mission against every outcome of every skill, as `glotouch check` does.
+    """Check a mission against every outcome of every skill, and its objects, as `glotouch check` does.
 
     Args:
         mission: Path of a mission file, or the name of a shipped mission.
         settings: Values of the mission's parameters.
         objects: Folder of watertight STL files in metres, instead of the world's.
         allow_paths: Folders in which subtrees may be, besides the mission's own.
+        backend: The robot that must be able to grasp the target.
 
     Returns:
         Every mistake and warning (`Finding.severity`), with its place; empty for a mission without any.
@@ -95,7 +97,7 @@ def check(
         loaded = load_mission(mission, settings, objects=folder, allow_paths=tuple(map(Path, allow_paths)))
     except MissionFaults as e:
         return (*e.findings, *e.warnings)
-    return loaded.warnings
+    return (*loaded.warnings, *check_objects(loaded, backend))
 
 
 def open_robot(

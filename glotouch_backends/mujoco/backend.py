@@ -85,12 +85,13 @@ class MujocoBackend(Backend):
     summary = "MuJoCo: Rizon 4, tactile gripper, free objects in a container; seeded, no display needed"
 
     def __init__(self, description: RobotDescription = RIZON4_XENSE, limits: Limits | None = None) -> None:
-        self._description, self._limits = description, limits or Limits()
+        self.description: RobotDescription = description
+        self._limits = limits or Limits()
 
     def open(self, world: World, conditions: Conditions, seed: int, options: Mapping[str, object]) -> Robot:
         """See `Backend`; options in `MujocoOptions`."""
         chosen = MujocoOptions(**convert_options(self.name, options, MujocoOptions))
-        built = build_world(self._description, world, conditions, seed, chosen)
+        built = build_world(self.description, world, conditions, seed, chosen)
         return MujocoRobot(built, self._limits, chosen.trace)
 
     def is_portable(self, option: str, value: object) -> bool:

@@ -11,12 +11,12 @@ from glotouch_bt.commands.check import check
 from glotouch_bt.commands.doctor import doctor
 from glotouch_bt.commands.faults import faults
 from glotouch_bt.commands.missions import missions
-from glotouch_bt.commands.nodes import nodes
+from glotouch_bt.commands.nodes import nodes, schema
+from glotouch_bt.commands.objects import objects
 from glotouch_bt.commands.replay import replay
 from glotouch_bt.commands.report import report
 from glotouch_bt.commands.resume import resume
 from glotouch_bt.commands.run import run
-from glotouch_bt.commands.schema import schema
 from glotouch_bt.commands.skills import skills
 from glotouch_bt.commands.test import run_tests
 from glotouch_bt.commands.tree import tree
@@ -32,6 +32,12 @@ COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
         "skills": skills,
         "schema": schema,
     },
-    "Robots and faults": {"backends": backends, "doctor": doctor, "keys": keys, "faults": faults},
+    "Objects, robots and faults": {
+        "objects": objects,
+        "backends": backends,
+        "doctor": doctor,
+        "keys": keys,
+        "faults": faults,
+    },
 }
 """Commands by use, in the order of `glotouch --help`."""

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.shared import AllowPaths, Json, Objects, Settings, guarded, print_json, read_settings
+from glotouch_bt.commands.shared import AllowPaths, Backend, Json, Objects, Settings, guarded, print_json, read_settings
 
 
 @guarded
@@ -17,14 +17,16 @@ def check(
     set_: Settings = None,
     objects: Objects = None,
     allow_path: AllowPaths = None,
+    backend: Backend = "mujoco",
     strict: Annotated[bool, typer.Option("--strict", help="treat warnings as errors")] = False,
     json_: Json = False,
 ) -> int:
     """Check missions against every outcome of every skill.
 
-    Each mistake is shown with its line, the reason and the shortest run that reaches it. Nothing moves.
+    The objects must fit into the box, and the target between the jaws. Each mistake is shown with its line, the
+    reason and the shortest run that reaches it. Nothing moves.
     """
-    from glotouch_bt.mission import load_mission, split_settings
+    from glotouch_bt.mission import check_objects, load_mission, split_settings
     from glotouch_bt.mission.nodes import kind_of
     from glotouch_bt.mission.spec import Finding, Findings, MissionFaults, Place
     from glotouch_bt.robot import BadInput
@@ -46,7 +48,7 @@ def check(
                 sys.stderr.write(f"{e}\n")
             continue
         else:
-            found = list(mission.warnings)
+            found = [*mission.warnings, *check_objects(mission, backend)]
             left = ", ".join(
                 f"{name}; did you mean {near!r}?" if (near := Findings.nearest(name, mission.parameters)) else name
                 for name in split_settings(mission, settings)

@@ -1,4 +1,4 @@
-"""`glotouch nodes`: the nodes of the mission language."""
+"""`glotouch nodes`: the nodes of the mission language. `glotouch schema`: the JSON Schema of mission files."""
 
 from __future__ import annotations
 
@@ -35,3 +35,12 @@ def nodes(
     d = known[name]
     sys.stdout.write(f"{name}: {d['description']}\nchildren: {d['children']}\n")
     print_settings("settings", d["settings"])
+
+
+@guarded
+def schema() -> None:
+    """Print the JSON Schema of mission files, for editors."""
+    from glotouch_bt.mission.export import mission_schema
+    from glotouch_bt.mission.read import SkillRegistry
+
+    print_json(mission_schema(SkillRegistry()))

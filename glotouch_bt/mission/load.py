@@ -170,17 +170,17 @@ def _read(
     name = _text(source, "mission", findings, required=True)
     description = _text(source, "description", findings, required=False)
     world, world_document = _world(source, path, objects, findings)
-    folder = world.objects.folder if world else None
+    chosen = world.objects if world else None
     section = source.get("parameters")
     given = {n: from_command_line(n, v, section) for n, v in settings.items()}
-    parameters = read_parameters(section, given, findings, folder)
+    parameters = read_parameters(section, given, findings, chosen)
     timeout_s = _timeout(source, findings)
     tree_node = source.get("tree")
     if tree_node is None:
         findings.add(source.place, "missing_key", "a mission needs 'tree'")
         return None
     reading = Reading(carried=_carried(source, findings))
-    scope = Scope(skills, findings, path, roots, folder, reading=reading)
+    scope = Scope(skills, findings, path, roots, chosen, reading=reading)
     tree = parse_tree(substitute(tree_node, parameters, findings), scope)
     number_names(tree)
     check_used(source.get("parameters"), tree_node, findings)

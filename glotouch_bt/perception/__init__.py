@@ -6,5 +6,8 @@ from glotouch_bt.lazy import lazy_door
 
 if TYPE_CHECKING:
     from glotouch_bt.perception.model_cache import target_model
+    from glotouch_bt.perception.reach import TooLow, model_for, too_wide
 
-__getattr__ = lazy_door(__name__, target_model="model_cache")
+__getattr__ = lazy_door(
+    __name__, target_model="model_cache", **dict.fromkeys(("TooLow", "model_for", "too_wide"), "reach")
+)

@@ -94,6 +94,8 @@ class Backend(ABC):
 
     name: str
     summary: str
+    description: RobotDescription | None = None
+    """The robot that it opens, apart from what the device itself reports; None if only an open robot can tell."""
 
     @abstractmethod
     def open(self, world: World, conditions: Conditions, seed: int, options: Mapping[str, object]) -> Robot:

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from typing import ClassVar, Literal
 
+from glotouch_bt import perception
 from glotouch_bt.perception import recognition
 from glotouch_bt.perception.recognition import Ranking
 from glotouch_bt.perception.touch import Candidate, TouchSet
@@ -77,12 +78,8 @@ class MatchTarget(Skill):
             felt = {t.candidate.index for t in touchsets} | set(rejected)
             missed = [str(c.index) for c in self.known or () if c.index not in felt]
             why = "; ".join(ranking.reasons) + (f"; not squeezed: candidate {', '.join(missed)}" if missed else "")
-            if model.narrowest_m > gripper.stroke_m:
-                raise self.TOO_WIDE(
-                    f"{mesh.name} is {model.narrowest_m * 1e3:.0f} mm across at its narrowest and the jaws open "
-                    f"{gripper.stroke_m * 1e3:.0f} mm ({why})",
-                    narrowest_m=model.narrowest_m,
-                )
+            if fault := perception.too_wide(model, gripper):
+                raise self.TOO_WIDE(f"{fault} ({why})", narrowest_m=model.narrowest_m)
             raise self.NOT_RECOGNISED(
                 f"no candidate is surely {mesh.name}: {why}", advice=_advice(ranking), margin=ranking.margin
             )

@@ -37,7 +37,7 @@ def test_help_groups_the_commands_by_use(command: CliRunner) -> None:
     done = command.invoke(cli.app, ["--help"])
     assert done.exit_code == 0
     assert [use for use in re.findall(r"^(\S.*):$", done.output, re.MULTILINE) if use != "Options"] == [
-        "Run missions", "Write missions", "Robots and faults", "Measure"
+        "Run missions", "Write missions", "Objects, robots and faults", "Measure"
     ]  # fmt: skip
     listed = re.findall(r"^  (\w+)  ", done.output, re.MULTILINE)
     assert listed[0] == "run"

@@ -57,7 +57,7 @@ def test_a_finished_trial_is_kept(request_: RunRequest) -> None:
 def change_objects(request: RunRequest) -> RunRequest:
     assert request.objects is not None
     first = next(iter(request.objects.iterdir()))
-    first.write_bytes(first.read_bytes() + b" ")
+    first.write_bytes(b"another header" + first.read_bytes()[14:])
     return request
 
 

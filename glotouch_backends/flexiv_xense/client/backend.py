@@ -67,7 +67,8 @@ class FlexivXenseBackend(Backend):
     summary = "Flexiv Rizon 4 and Xense gripper through the vendors' SDKs, or simulated (--set devices=simulated)"
 
     def __init__(self, description: RobotDescription = RIZON4_XENSE, limits: Limits | None = None) -> None:
-        self._description, self._limits = description, limits or Limits()
+        self.description: RobotDescription = description
+        self._limits = limits or Limits()
 
     def open(self, world: World, conditions: Conditions, seed: int, options: Mapping[str, object]) -> Robot:
         """See `Backend`; options in `ClientOptions` and `DeviceSettings`; conditions and seed for simulated devices."""
@@ -114,7 +115,7 @@ class FlexivXenseBackend(Backend):
             if process is not None:
                 process.end()
             raise
-        description = _within(self._description, opened)
+        description = _within(self.description, opened)
         robot = FlexivXenseRobot(description, self._limits, PERIOD_S, link, process, opened.info, first)
         robot.paced = not options.lockstep
         return robot
@@ -122,13 +123,13 @@ class FlexivXenseBackend(Backend):
     def _request(
         self, options: ClientOptions, settings: messages.DeviceSettings, world: bytes, number: int, move: bool
     ) -> messages.Open:
-        hand = self._description.gripper
+        hand = self.description.gripper
         return messages.Open(
             number=number,
             protocol=messages.PROTOCOL,
             devices=messages.Devices(kind=options.devices, settings=settings, world=world),
-            tool=_tool(self._description),
-            arm=_arm_limits(self._description, self._limits),
+            tool=_tool(self.description),
+            arm=_arm_limits(self.description, self._limits),
             hand=messages.HandLimits(
                 stroke_m=hand.stroke_m,
                 speed_m_s=hand.speed_m_s,
@@ -136,7 +137,7 @@ class FlexivXenseBackend(Backend):
                 pad_shape=hand.pad_shape,
                 pad_depth_m=hand.pad_depth_m,
             ),
-            posture=self._description.home_q,
+            posture=self.description.home_q,
             period_s=PERIOD_S,
             lockstep=options.lockstep,
             move=move,

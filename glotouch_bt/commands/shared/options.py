@@ -22,7 +22,8 @@ Settings = Annotated[
 MissionSettings = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="a mission parameter")]
 BackendSettings = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="a backend option")]
 Objects = Annotated[
-    Path | None, typer.Option("--objects", metavar="DIR", help="folder of watertight STL files in metres")
+    Path | None,
+    typer.Option("--objects", metavar="DIR", help="folder of watertight STL files in metres (see: glotouch objects)"),
 ]
 AllowPaths = Annotated[
     list[Path] | None,

@@ -22,4 +22,5 @@ from glotouch_bt.commands.terminal.console import (
 from glotouch_bt.commands.terminal.fault_tables import print_exhaustive, print_faults
 from glotouch_bt.commands.terminal.findings import print_findings, texts_of
 from glotouch_bt.commands.terminal.force_tables import print_forces
+from glotouch_bt.commands.terminal.object_tables import print_objects
 from glotouch_bt.commands.terminal.run_end import print_end

@@ -30,7 +30,7 @@ from glotouch_bt.mission.spec import (
     units_for,
     walk,
 )
-from glotouch_bt.robot import BadInput
+from glotouch_bt.robot import BadInput, ObjectSet
 from glotouch_bt.robot.scene import is_sound_stl, load_mesh, stl_files
 
 Value = bool | int | float | str
@@ -41,6 +41,7 @@ _KINDS: dict[str, tuple[Any, str]] = {
     "str": (str, "text"),
     "bool": (bool, "true or false"),
     "stl": (str, "text"),
+    "count": (int, "a whole number"),
 }
 """Type of each kind of parameter, and its name in messages."""
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
@@ -51,7 +52,9 @@ class Declaration(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    type: Literal["int", "float", "str", "bool", "stl"] = Field(description="int, float, str, bool or stl (an object)")
+    type: Literal["int", "float", "str", "bool", "stl", "count"] = Field(
+        description="int, float, str, bool, stl (an object) or count (of objects; default: those of the world)"
+    )
     default: bool | int | float | str | None = Field(
         default=None, description="value unless --set gives one; none: required"
     )
@@ -81,7 +84,7 @@ def read_parameters(
     node: Node | None,
     overrides: Mapping[str, Scalar],
     findings: Findings,
-    folder: Path | None,
+    objects: ObjectSet | None,
     user: Place | None = None,
 ) -> dict[str, Parameter]:
     """Read all parameters of a mission or a subtree.
@@ -90,7 +93,7 @@ def read_parameters(
         node: Its `parameters` section, or None.
         overrides: Values given from outside, with their places; undeclared names are ignored.
         findings: Where faults go.
-        folder: The world's folder of STL files; None leaves stl parameters unchecked.
+        objects: The world's objects; None (the world is faulty) leaves parameters of type stl and count unchecked.
         user: The node that uses the subtree; None: a mission, whose user is on the command line.
     """
     if node is None or (isinstance(node, Scalar) and node.value is None):
@@ -115,6 +118,11 @@ def read_parameters(
             continue
         default = body.get("default")
         given = overrides.get(name, default if isinstance(default, Scalar) else None)
+        if given is None and declared.type == "count":
+            if objects is None:
+                parameters[name] = Parameter(name, declared, None)
+                continue
+            given = Scalar(count_objects(objects), Place(f"{objects.folder}"))
         if given is None or given.value is None:
             at, how = key.place, f"give it with --set {name}=..."
             if user is not None:
@@ -122,7 +130,7 @@ def read_parameters(
             findings.add(at, "missing_parameter", f"parameter {name!r} has no default: {how}")
             parameters[name] = Parameter(name, declared, None)
             continue
-        parameters[name] = _valued(name, declared, given, findings, folder)
+        parameters[name] = _valued(name, declared, given, findings, objects)
     return parameters
 
 
@@ -140,13 +148,15 @@ def _sound(declared: Declaration, body: Map, findings: Findings) -> bool:
     return True
 
 
-def _valued(name: str, declared: Declaration, given: Scalar, findings: Findings, folder: Path | None) -> Parameter:
+def _valued(
+    name: str, declared: Declaration, given: Scalar, findings: Findings, objects: ObjectSet | None
+) -> Parameter:
     """Return the parameter with the given value; without a value if that gave findings."""
     lost = Parameter(name, declared, None)
     if given.poisoned:
         return lost
     value, place, unit = given.value, given.place, declared.unit
-    if declared.type in ("int", "float"):
+    if declared.type in ("int", "float", "count"):
         found = measured(given)
         if found.unit and found.unit not in UNITS:
             findings.unknown(place, "wrong_unit", "unit", found.unit, UNITS)
@@ -166,7 +176,7 @@ def _valued(name: str, declared: Declaration, given: Scalar, findings: Findings,
     if declared.type == "float":
         value = float(value)
     named = declared.type == "stl" and not (value == "" and declared.default == "")  # empty: no object
-    if named and not stl_usable(str(value), folder, place, findings):
+    if named and not stl_usable(str(value), objects, place, findings):
         return lost
     _check_span(name, given, declared, unit, findings)
     return Parameter(name, declared, value, unit)
@@ -182,7 +192,7 @@ def _converted(given: Scalar, unit: str, declared: Declaration) -> Value | None:
     if not given.unit or isinstance(value, bool) or not isinstance(value, (int, float)):
         return value
     made = convert(value, given.unit, unit)
-    return int(made) if declared.type == "int" and float(made).is_integer() else made
+    return int(made) if declared.type in ("int", "count") and float(made).is_integer() else made
 
 
 def _check_span(name: str, given: Scalar, declared: Declaration, unit: str, findings: Findings) -> None:
@@ -213,9 +223,9 @@ def _from_text(given: str | Value, kind: str) -> Value:
     if kind == "bool":
         return True if text.lower() in _TRUE else False if text.lower() in _FALSE else given
     number = number_of(text)
-    if number is None or kind not in ("int", "float") or (kind == "int" and isinstance(number, float)):
+    if number is None or kind not in ("int", "float", "count") or (kind != "float" and isinstance(number, float)):
         return given
-    return number if kind == "int" else float(number)
+    return float(number) if kind == "float" else number
 
 
 def _fault(value: Value, declared: Declaration) -> str:
@@ -223,7 +233,7 @@ def _fault(value: Value, declared: Declaration) -> str:
     kind, words = _KINDS[declared.type]
     if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
         return f"must be {words}"
-    if isinstance(value, (int, float)) and declared.type in ("int", "float"):
+    if isinstance(value, (int, float)) and declared.type in ("int", "float", "count"):
         if value != value or value in (float("inf"), float("-inf")):
             return "must be finite"
         if declared.range and not declared.range[0] <= value <= declared.range[1]:
@@ -233,26 +243,36 @@ def _fault(value: Value, declared: Declaration) -> str:
 
 
 def _valid(declared: Declaration) -> str:
-    words = declared.type + (f" in {declared.unit}" if declared.unit else "")
+    words = ("int" if declared.type == "count" else declared.type) + (f" in {declared.unit}" if declared.unit else "")
     return words + (f", {declared.range[0]:g} to {declared.range[1]:g}" if declared.range else "")
 
 
-def stl_usable(name: str, folder: Path | None, place: Place, findings: Findings) -> bool:
+def stl_usable(name: str, objects: ObjectSet | None, place: Place, findings: Findings) -> bool:
     """Check an object: the name of a file in the objects' folder, or a path; the file must be a valid solid."""
-    if folder is None:
+    if objects is None:
         return True
-    path = Path(name)
+    path, folder = Path(name), objects.folder
     if path.suffix.lower() != ".stl":
         files = stl_files(folder) if isdir(folder) else {}
         if name not in files:
             findings.unknown(place, "no_such_stl", f"object (in {shown(folder)})", name, files)
             return False
         path = files[name]
-    found = path.stat() if isfile(path) else None
-    fault = _fault_of_solid(path, (found.st_mtime_ns, found.st_size) if found else None)
-    if fault:
+    fault = fault_of_solid(path)
+    if fault and not any(f.what == fault for f in findings.errors):  # of the world's folder, it is reported already
         findings.add(place, "unusable_stl", fault)
     return not fault
+
+
+def fault_of_solid(path: Path) -> str:
+    """Return why a file is not a valid solid, or empty; a file that has not changed is read once."""
+    found = path.stat() if isfile(path) else None
+    return _fault_of_solid(path, (found.st_mtime_ns, found.st_size) if found else None)
+
+
+def count_objects(objects: ObjectSet) -> int:
+    """Return the number of objects of a set whose folder can be read."""
+    return len(objects.names or stl_files(objects.folder))
 
 
 @lru_cache(maxsize=256)

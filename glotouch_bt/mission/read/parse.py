@@ -176,12 +176,12 @@ def _skill(name: str, skill: type[Skill], place: Place, body: Node, scope: Scope
     taken, rest = _take(_settings_map(name, place, body, scope), "name", "in", "out")
     ports = {p: "out" for p in skill.OUTPUT_PORTS} | {p: "in" for p in skill.INPUT_PORTS} | {"in": "", "out": ""}
     params = validate(skill.Params, rest, f"skill {name!r}", scope.findings, where=place, beside=TITLE | ports)
-    for key, value in rest.entries if scope.stl_folder is not None else ():
+    for key, value in rest.entries if scope.objects is not None else ():
         field = skill.Params.model_fields.get(str(key.value))
         if field is not None and named_by(field) == "stl" and isinstance(value, Scalar) and not value.poisoned:
             if value.value == "" and field.default == "":
                 continue  # no object
-            stl_usable(str(value.value), scope.stl_folder, value.place, scope.findings)
+            stl_usable(str(value.value), scope.objects, value.place, scope.findings)
     keys = skill.default_keys()
     reads = {p: Wire(p, scope.key(keys[p]), place) for p in skill.INPUT_PORTS}
     writes = {p: Wire(p, scope.key(keys[p]), place) for p in skill.OUTPUT_PORTS}

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from glotouch_bt.mission.spec import Findings, Node, Place, Wire
+from glotouch_bt.robot import ObjectSet
 from glotouch_bt.skill import Skill
 
 KEY = re.compile(r"[a-z][A-Za-z0-9_]*")
@@ -54,7 +55,7 @@ class Scope:
         findings: Where faults go.
         file: The file being read; subtrees are found relative to it.
         roots: Folders in which the files of subtrees may be, besides the shipped one.
-        stl_folder: The world's objects, for stl parameters of subtrees.
+        objects: The world's objects, for parameters of type stl and count; None: the world is faulty.
         prefix: Prefix of private keys ("" in the mission itself).
         ports: Subtree key -> absolute key; None in the mission itself, where a key is its own name.
         trail: Files (or names of carried subtrees) being read, outermost first.
@@ -65,7 +66,7 @@ class Scope:
     findings: Findings
     file: Path
     roots: tuple[Path, ...] = ()
-    stl_folder: Path | None = None
+    objects: ObjectSet | None = None
     prefix: str = ""
     ports: Mapping[str, str] = field(default_factory=dict)
     trail: tuple[str, ...] = ()

@@ -87,7 +87,7 @@ def open_subtree(
         if key.value not in SUBTREE_KEYS:
             scope.findings.unknown(key.place, "unknown_key", "key of a subtree file:", str(key.value), SUBTREE_KEYS)
     given = {str(key.value): value for key, value in values.items()}
-    parameters = read_parameters(source.get("parameters"), given, scope.findings, scope.stl_folder, at)
+    parameters = read_parameters(source.get("parameters"), given, scope.findings, scope.objects, at)
     for key in values:
         if key.value not in parameters:
             scope.findings.unknown(

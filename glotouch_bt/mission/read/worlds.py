@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, replace
 from os.path import isdir
 from pathlib import Path
@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, create_model
 from glotouch_bt.escaped_text import fault_of_name
 from glotouch_bt.mission.read.fields import validate
 from glotouch_bt.mission.read.library import find_shipped, shown
+from glotouch_bt.mission.read.parameters import fault_of_solid
 from glotouch_bt.mission.read.yaml_source import read_yaml
 from glotouch_bt.mission.spec import Findings, Map, MissionFaults, Node, Place, Seq
 from glotouch_bt.robot import (
@@ -29,7 +30,7 @@ from glotouch_bt.robot import (
     UnknownName,
     World,
 )
-from glotouch_bt.robot.scene import stl_files
+from glotouch_bt.robot.scene import MESH_SUFFIXES, stl_files
 
 T = TypeVar("T")
 Vec3 = tuple[float, float, float]
@@ -162,13 +163,16 @@ def _objects(
 ) -> ObjectSet | None:
     placed: dict[str, Any] = given.model_dump(include={"min_gap_m", "min_wall_gap_m", "stance"})
     if override is not None:
-        if not _stems(override, Place(f"--objects {override}"), "is not a folder with .stl files in it", findings):
+        given_at = Place(f"--objects {override}")
+        files = _files(override, given_at, f"is not a folder with .stl files in it{_others(override)}", findings)
+        if not files:
             return None
+        _check_solids(files.values(), given_at, findings)
         return ObjectSet(folder=override, **placed)
     folder = (file.parent / given.folder).resolve()
     at = node.get("folder") or node
-    what = f"objects.folder {given.folder!r} ({folder}) is not a folder with .stl files"
-    stems = _stems(folder, at.place, what, findings)
+    what = f"objects.folder {given.folder!r} ({folder}) is not a folder with .stl files{_others(folder)}"
+    stems = _files(folder, at.place, what, findings)
     if not stems:
         return None
     before = len(findings)
@@ -185,19 +189,32 @@ def _objects(
         findings.add(expected.place, "wrong_value", f"objects.expected = {given.expected}, but {count} are chosen")
     if len(findings) > before:
         return None
+    _check_solids([stems[name] for name in given.names or stems], at.place, findings)
     return ObjectSet(folder=folder, names=given.names, **placed)
 
 
-def _stems(folder: Path, at: Place, missing: str, findings: Findings) -> list[str]:
-    """Return the names of the objects of a folder; none if that gave a finding (`missing`: what it says)."""
+def _check_solids(files: Iterable[Path], at: Place, findings: Findings) -> None:
+    """Report every file that is not a valid solid, because a simulator refuses them all, not only the target."""
+    for fault in filter(None, map(fault_of_solid, files)):
+        findings.add(at, "unusable_stl", fault)
+
+
+def _others(folder: Path) -> str:
+    """Return what to do with a folder that has meshes of other formats, or empty."""
+    convertible = isdir(folder) and any(p.suffix.lower() in MESH_SUFFIXES for p in folder.iterdir())
+    return f" (`glotouch objects {folder} --out DIR` converts its meshes of other formats)" if convertible else ""
+
+
+def _files(folder: Path, at: Place, missing: str, findings: Findings) -> dict[str, Path]:
+    """Return the files of a folder by object; none if that gave a finding (`missing`: what it says)."""
     try:
         files = stl_files(folder) if isdir(folder) else {}
     except BadInput as e:
         findings.add(at, "unusable_stl", str(e))
-        return []
+        return {}
     if not files:
         findings.add(at, "no_objects", missing)
-    return list(files)
+    return files
 
 
 def _section_place(node: Map, section: str, dotted: str) -> Place:

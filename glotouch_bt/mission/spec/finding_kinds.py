@@ -31,6 +31,8 @@ class FindingKind:
 
 _Error, _Warning = FindingKind, partial(FindingKind, severity="warning")
 
+_CONVERT = "`glotouch objects DIR --out CLEAN` shows what is wrong and repairs what can be repaired"
+
 _KINDS = (
     # the file and its keys
     _Error("unreadable", "the file cannot be read as YAML"),
@@ -47,9 +49,21 @@ _KINDS = (
     _Error("missing_parameter", "a required parameter has no value"),
     _Error("unknown_world", "the world file does not exist"),
     _Error("unusable_world", "the world file cannot be read"),
-    _Error("no_objects", "the folder of objects has no STL file"),
+    _Error("no_objects", "the folder of objects has no STL file", advice=_CONVERT),
     _Error("no_such_stl", "no object of this name exists"),
-    _Error("unusable_stl", "the STL file is not a solid of a plausible size"),
+    _Error("unusable_stl", "the STL file is not a solid of a plausible size", advice=_CONVERT),
+    _Error(
+        "no_layout",
+        "the objects do not fit into the container",
+        "a simulated run places them at random and cannot start",
+        "use fewer or smaller objects, or a larger container",
+    ),
+    _Error(
+        "target_out_of_reach",
+        "the target is too low to be felt, or too wide for the jaws",
+        "the mission can only fail",
+        "choose another target; `glotouch objects DIR` shows which of them can be grasped",
+    ),
     _Error("unknown_fault", "no such fault exists"),
     _Error("unknown_node", "the mission has no node of this name"),
     # the tree

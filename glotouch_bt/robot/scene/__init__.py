@@ -1,9 +1,19 @@
 """The nominal world, its objects (STL files) and random layouts, and the disturbances of a trial. Values only."""
 
 from glotouch_bt.robot.scene.conditions import AXES, Conditions
-from glotouch_bt.robot.scene.meshes import Mesh, is_sound_stl, load_mesh
-from glotouch_bt.robot.scene.object_files import load_folder, stl_files, twins_of
+from glotouch_bt.robot.scene.meshes import (
+    MAX_SIZE_M,
+    MAX_STL_BYTES,
+    MAX_TRIANGLES,
+    MIN_SIZE_M,
+    Mesh,
+    bounded_stl,
+    is_sound_stl,
+    load_mesh,
+    solid_of,
+)
+from glotouch_bt.robot.scene.object_files import MESH_SUFFIXES, load_folder, stl_files, twins_of
 from glotouch_bt.robot.scene.placement import Placement, draw_layout
-from glotouch_bt.robot.scene.stances import UPRIGHT
+from glotouch_bt.robot.scene.stances import UPRIGHT, Quat, stances, turned
 from glotouch_bt.robot.scene.streams import stream
 from glotouch_bt.robot.scene.world import Container, Holder, ObjectSet, Probe, World

@@ -146,7 +146,12 @@ def load_mesh(path: Path) -> Mesh:
     """
     if not isfile(path):
         raise BadInput(f"{path}: no such STL file")
-    data = _bounded(path, read_stl(path))
+    return solid_of(path, read_stl(path))
+
+
+def solid_of(path: Path, data: bytes) -> Mesh:
+    """Return the solid in the content of an STL file; errors as for `load_mesh`, under the name `path`."""
+    data = bounded_stl(path, data)
     try:
         mesh = trimesh.load_mesh(io.BytesIO(data), file_type="stl", process=True)
     except Exception as e:  # trimesh raises many kinds on a broken file; their texts may quote it
@@ -172,7 +177,7 @@ def load_mesh(path: Path) -> Mesh:
 UNREADABLE = "is not a readable STL file; export it again as a binary STL in metres"
 
 
-def _bounded(path: Path, data: bytes) -> bytes:
+def bounded_stl(path: Path, data: bytes) -> bytes:
     """Return a file of bounded length as a reader may take it: a binary STL as it is, a text without odd characters.
 
     Raises:

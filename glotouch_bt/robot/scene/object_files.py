@@ -11,6 +11,9 @@ from glotouch_bt.escaped_text import fault_of_name
 from glotouch_bt.robot.scene.meshes import Mesh, load_mesh, read_stl, triangles_of
 from glotouch_bt.robot.scene.world import ObjectSet
 
+MESH_SUFFIXES = (".obj", ".ply", ".glb", ".off")
+"""Formats of meshes besides STL that `glotouch objects` reads."""
+
 
 def stl_files(folder: Path) -> dict[str, Path]:
     """Return the STL files of a folder by the name of their object, sorted.

@@ -28,6 +28,11 @@ def turned(mesh: Mesh, quat: Quat) -> Mesh:
     return replace(mesh, vertices_m=np.asarray(mesh.vertices_m @ quat_to_matrix(np.array(quat)).T))
 
 
+def stances(mesh: Mesh) -> list[tuple[Quat, float]]:
+    """Return the rotations onto stable sides, each with a number in proportion to its probability."""
+    return list(zip(*_stances(_ByDigest(mesh)), strict=True))
+
+
 def draw_stance(mesh: Mesh, rng: np.random.Generator) -> Quat:
     """Return the rotation onto a stable side, drawn with its probability; upright if there is none."""
     sides, shares = _stances(_ByDigest(mesh))

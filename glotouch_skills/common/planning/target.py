@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from glotouch_bt import perception
-from glotouch_bt.perception import recognition
-from glotouch_bt.robot import BadInput, Gripper, ParamError
+from glotouch_bt.robot import BadInput, Gripper
 from glotouch_bt.robot.scene import Mesh, load_folder, load_mesh
 from glotouch_bt.skill import Failure
 
@@ -36,8 +35,7 @@ def load_target_model(mesh: Mesh, gripper: Gripper) -> TargetModel:
     Raises:
         SkillFailed: `too_low`.
     """
-    pads = recognition.PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
     try:
-        return perception.target_model(mesh, pads)
-    except ParamError as e:
-        raise TOO_LOW(f"{mesh.name} cannot be felt: {e}") from e
+        return perception.model_for(mesh, gripper)
+    except perception.TooLow as e:
+        raise TOO_LOW(str(e)) from e

@@ -53,7 +53,7 @@ def open_robot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Open
         )
         link.beat()
         first = link.wait(0, Block)
-        robot = FlexivXenseRobot(backend._description, backend._limits, PERIOD_S, link, None, opened.info, first)
+        robot = FlexivXenseRobot(backend.description, backend._limits, PERIOD_S, link, None, opened.info, first)
         return robot
 
     yield start

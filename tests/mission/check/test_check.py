@@ -153,8 +153,10 @@ def test_objects_folder_replaces_the_world_s(tmp_path: Path, registry: dict[str,
     (folder / "flat.stl").write_bytes(b"solid\nendsolid\n")
     with pytest.raises(BadInput, match=r"unknown object .*wukong.*valid: cup"):
         load_mission(path, skills=registry, objects=folder)
-    with pytest.raises(BadInput, match=r"--set t: .*flat.stl: "):
-        load_mission(path, {"t": "flat"}, skills=registry, objects=folder)
+    for target in ("flat", "cup"):
+        with pytest.raises(BadInput, match=r"--objects .*flat.stl: "):
+            load_mission(path, {"t": target}, skills=registry, objects=folder)
+    (folder / "flat.stl").unlink()
     mission = load_mission(path, {"t": "cup"}, skills=registry, objects=folder)
     assert mission.world.objects.folder == folder
 

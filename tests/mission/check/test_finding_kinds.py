@@ -11,6 +11,7 @@ import pytest
 import trimesh
 from typer.testing import CliRunner
 
+from glotouch_bt import check
 from glotouch_bt.cli import app
 from glotouch_bt.faults import read_plan
 from glotouch_bt.mission import load_mission
@@ -55,7 +56,7 @@ EXAMPLES = {
     "unused_subtree": HEAD + "tree: [bare_hand]\nsubtrees:\n  other: {tree: bare_hand}\n",
     "practically_endless": HEAD + "tree: {retry: {attempts: 10000, do: {retry: {attempts: 10000, do: bare_hand}}}}\n",
 }
-ELSEWHERE = {"unreadable", "unusable_skill", "unknown_fault", "unknown_node"}
+ELSEWHERE = {"unreadable", "unusable_skill", "unknown_fault", "unknown_node", "no_layout", "target_out_of_reach"}
 """Kinds that no mission text alone can raise; the tests at the end of this file raise them."""
 
 
@@ -78,7 +79,8 @@ def raised_codes() -> Iterator[str]:
     """Yield every code that stands as the second argument of a call that adds a finding."""
     folders = [ROOT / "glotouch_bt" / "mission" / name for name in ("spec", "read", "nodes", "check")]
     files = [p for folder in folders for p in folder.rglob("*.py")]
-    files += [ROOT / "glotouch_bt" / "mission" / "load.py", ROOT / "glotouch_bt" / "faults" / "plan.py"]
+    files += [ROOT / "glotouch_bt" / "mission" / f"{name}.py" for name in ("load", "feasible")]
+    files += [ROOT / "glotouch_bt" / "faults" / "plan.py"]
     for node in (n for path in files for n in ast.walk(ast.parse(path.read_text()))):
         if not isinstance(node, ast.Call) or len(node.args) < 3:
             continue
@@ -133,3 +135,28 @@ def test_findings_of_fault_plans(code: str, fault: str, tmp_path: Path) -> None:
     with pytest.raises(MissionFaults) as caught:
         read_plan(tmp_path / "plan.yaml", mission.spec, mission.name)
     assert code in {f.code for f in caught.value.findings}
+
+
+@pytest.mark.parametrize(
+    ("code", "size_m", "count", "said"),
+    [
+        ("no_layout", (0.08, 0.08, 0.05), 12, "12 objects do not fit into the container: no place found for"),
+        ("target_out_of_reach", (0.05, 0.05, 0.009), 1, "it is 9.0 mm high and must be high enough to be traced"),
+        ("target_out_of_reach", (0.12, 0.11, 0.05), 1, "is 110 mm across at its narrowest and the jaws open 85 mm"),
+    ],
+)
+def test_faults_of_objects(code: str, size_m: tuple[float, ...], count: int, said: str, tmp_path: Path) -> None:
+    for i in range(count):
+        trimesh.creation.box(size_m).export(tmp_path / f"o{i}.stl")
+    found = check("retrieve", {"target": "o0"}, objects=tmp_path)
+    assert [f.what for f in found if f.code == code and said in f.what], found
+
+
+@pytest.mark.parametrize("count", [1, 3, 8])
+def test_objects_are_counted(count: int, tmp_path: Path) -> None:
+    for i in range(count):
+        trimesh.creation.box((0.03, 0.03, 0.04 + 0.002 * i)).export(tmp_path / f"o{i}.stl")
+    assert load_mission("retrieve", {"target": "o0"}, objects=tmp_path).parameters["expected_objects"] == count
+    told = load_mission("retrieve", {"target": "o0", "expected_objects": "2"}, objects=tmp_path)
+    assert told.parameters["expected_objects"] == 2
+    assert not [f for f in check("retrieve", {"target": "o0"}, objects=tmp_path) if f.severity == "error"]

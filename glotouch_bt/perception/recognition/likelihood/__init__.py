@@ -7,3 +7,4 @@ from glotouch_bt.perception.recognition.likelihood.belief import (
     infer_belief,
     ranked,
 )
+from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
