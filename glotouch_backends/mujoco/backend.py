@@ -108,4 +108,4 @@ class MujocoBackend(Backend):
 
     def touch_sampler(self, world: World, conditions: Conditions, seed: int) -> TouchSampler:
         """See `Backend`."""
-        return MujocoTouchSampler(self._description, world, conditions, seed)
+        return MujocoTouchSampler(self.description, world, conditions, seed)
