@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
 MAX_VAIN_CLOSURES = 4
 """Number of closures without any plateau after which a candidate is skipped: it is not where it was traced."""
+MAX_VAIN_DESCENTS = 6
+"""Number of closures that could not be made, mostly because the fingers met something, after which a candidate is
+skipped. Source: ours."""
 
 MEASURE_S = CHANGE_S + 34.0
 """Robot time of taking the probe again and measuring one candidate. Source: as of `CHANGE_S` and `next_probe`."""
@@ -89,6 +92,7 @@ class TouchNext(Skill):
         self._model: TargetModel | None = None
         self._down: Squeezing | None = None
         self._refused: set[tuple[int, int, int, int]] = set()
+        self._vain: dict[int, int] = {}
         self._hopeless: frozenset[int] = frozenset()
         self._stood_B_m: Array | None = None
 
@@ -97,11 +101,11 @@ class TouchNext(Skill):
         down = None
         if self._down is not None:
             down = (self._down.candidate, self._down.at, self.context.arm.pose_B_P.position_m)
-        return {"refused": tuple(sorted(self._refused)), "down": down}
+        return {"refused": tuple(sorted(self._refused)), "vain": tuple(sorted(self._vain.items())), "down": down}
 
     def recall(self, remembered: Any) -> None:
         """See `Skill`. The hand counts as lowered only if it has not moved when the skill begins."""
-        self._refused = set(remembered["refused"])
+        self._refused, self._vain = set(remembered["refused"]), dict(remembered["vain"])
         if remembered["down"] is not None:
             candidate, at, self._stood_B_m = remembered["down"]
             self._down = Squeezing(self.context, candidate, at, self.params, self.jaw_zero)
@@ -117,6 +121,7 @@ class TouchNext(Skill):
             made = {t.candidate.index: t.sequences for t in touchsets}
             touchsets = tuple(TouchSet(c, made.get(c.index, ())) for c in wanted)
             self._refused.clear()
+            self._vain.clear()
             self._down = None
         down, self._down = self._down, None  # after a preemption the hand's place is unknown
         stood, self._stood_B_m = self._stood_B_m, None
@@ -126,7 +131,8 @@ class TouchNext(Skill):
         yield HOLD  # the computation takes longer than a control period; on hardware the arm holds meanwhile
         belief = recognition.infer_belief(self._target_model(), touchsets)
         vain = (t for t in touchsets if not any(layer.stable for layer in t.layers))
-        self._hopeless = frozenset(t.candidate.index for t in vain if len(t.layers) >= MAX_VAIN_CLOSURES)
+        unfelt = {t.candidate.index for t in vain if len(t.layers) >= MAX_VAIN_CLOSURES}
+        self._hopeless = frozenset(unfelt | {i for i, n in self._vain.items() if n >= MAX_VAIN_DESCENTS})
         why = recognition.enough(belief, self.params.confidence, self._hopeless)
         chosen = None if why else self._choose(belief, down)
         if chosen is not None and chosen.closure.candidate in self._unmeasured(belief):
@@ -138,6 +144,7 @@ class TouchNext(Skill):
             down, layer = yield from self._touch(candidates, chosen, down)
         except MotionRefused as refusal:
             self._refused.add(_key(chosen))
+            self._vain[chosen.closure.candidate] = self._vain.get(chosen.closure.candidate, 0) + 1
             self.event("note", text=f"a closure on candidate {chosen.closure.candidate} was not made: {refusal}")
             return
         self._down = down

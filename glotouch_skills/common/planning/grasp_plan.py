@@ -116,10 +116,12 @@ def misfit_m(touchset: TouchSet, match: Match, model: TargetModel) -> float:
     theta = match.pose_K_O[2]
     middle = _placed(np.array([*model.centre_m, 0.0]), match)[:2]
     off = []
-    for layer in touchset.layers:
+    slid = touchset.slid_K_m
+    for layer, was in zip(touchset.layers, slid[:-1], strict=True):
         if evidence_weight(layer) < 1.0:
             continue
-        along = float(np.array([np.cos(layer.yaw_rad), np.sin(layer.yaw_rad)]) @ (layer.position_K_m - middle))
+        x = np.array([np.cos(layer.yaw_rad), np.sin(layer.yaw_rad)])
+        along = float(x @ (layer.position_K_m - (middle + was - slid[-1])))
         off.append(layer.aperture_m - model.width_at(along, layer.height_m, layer.yaw_rad - theta))
     off = [d for d in off if math.isfinite(d)]
     if len(off) < MIN_LAYERS:

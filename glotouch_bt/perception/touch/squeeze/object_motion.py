@@ -103,7 +103,10 @@ def estimate_object_motion(
     both = both[both >= BASELINE_PERIODS]
     if len(both):
         compliance = max(float(np.interp(stamp[both[0]], stamp, aperture) - aperture[-1] - last.sum()), 0.0)
-    turn = _turn(frames, dents, np.array([np.interp(f.stamp_s, stamp, aperture) for f in frames]), pad_width_m)
+    # Before both jaws press, errors of a depth map look like contacts, and the jaws close by centimetres.
+    pressed = [i for i, f in enumerate(frames) if len(both) and f.stamp_s >= stamp[both[0]]]
+    width = np.array([np.interp(frames[i].stamp_s, stamp, aperture) for i in pressed])
+    turn = _turn([frames[i] for i in pressed], dents[pressed], width, pad_width_m)
     turn -= slide * middle_x_m / ((FRICTION_RADIUS * half_diagonal_m) ** 2 + middle_x_m**2)
     turn = min(max(turn, -MAX_TURN_RAD), MAX_TURN_RAD)
     return ObjectMotion(slide, float(turn * rotation[2, 2]), compliance, bool(len(pushed) or len(both)))
