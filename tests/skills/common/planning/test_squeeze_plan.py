@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -66,3 +68,25 @@ def test_three_stances_in_the_open_and_none_between_walls_of_neighbours(found, b
         stances, refusals = b.go(plan_stances(candidate, b.arm, b.world.container, 0.021, (0.01, 0.005)))
     assert stances == []
     assert any("candidate" in r for r in refusals)
+
+
+def test_the_jaws_fit_over_a_limb_of_what_is_too_wide_as_a_whole(found) -> None:
+    """An L of 90 x 90 mm with limbs of 25 mm: no stance over its middle at yaw 0, but one over each limb's end."""
+    corners = np.array([(0, 0), (90, 0), (90, 25), (25, 25), (25, 90), (0, 90)]) * 1e-3 - 0.045
+    outline = np.concatenate([np.linspace(p, q, 12, endpoint=False)
+                              for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True)])  # fmt: skip
+    traced = found.traced(0, outline, 0.05)
+    contour = replace(traced.contour, family="free", kind="round", boundary_K_m=outline, centre_K_m=np.zeros(2))
+    candidate = replace(traced, contour=contour)
+    assert candidate.strip_span_m(0.0, 0.030, 0.010) == pytest.approx((-0.045, -0.020), abs=1e-9)
+    assert candidate.strip_span_m(0.0, 0.060, 0.010) is None
+    assert stance(candidate, -0.035, 0.0, 0.01, XENSE_GRIPPER) is None
+    at = stance(candidate, 0.030, 0.0, 0.01, XENSE_GRIPPER)
+    np.testing.assert_allclose(at.position_K_m, [0.030, -0.0325], atol=1e-9)
+    assert at.opening_m == pytest.approx(0.025 + 0.02)
+
+
+def test_no_stance_beside_the_centre_where_the_side_is_steep(found) -> None:
+    ball = found.round((0.0, 0.0), 0.025)
+    assert stance(ball, 0.008, 0.0, 0.01, XENSE_GRIPPER) is not None
+    assert stance(ball, 0.022, 0.0, 0.01, XENSE_GRIPPER) is None
