@@ -264,7 +264,7 @@ def usable(mesh: trimesh.Trimesh) -> bool:
     a = np.linspace(0.0, np.pi, 36)
     narrow = np.ptp(v[:, :2] @ np.stack([np.cos(a), np.sin(a)]), axis=0).min()
     stands = (foot[:, :2] @ mesh.center_mass[:2] + foot[:, 2]).max() < -MIN_FOOT_M
-    return bool(stands and narrow < NARROWEST_M and 0.015 <= top and 0.02 < mesh.extents.max() < 0.115)
+    return bool(stands and narrow < NARROWEST_M and top >= 0.015 and 0.02 < mesh.extents.max() < 0.115)
 
 
 def drawn(rng: Draw, kind: Callable[[Draw], trimesh.Trimesh] | None = None) -> trimesh.Trimesh:

@@ -1,4 +1,4 @@
-"""Recognition and planning on synthetic touches of generated solids: `python tests/support/touched_shapes.py --shapes 1000`.
+"""Recognition and planning on touches of generated solids: `python tests/support/touched_shapes.py --shapes 1000`.
 
 Each shape is loaded as a file, traced, squeezed where the skills would squeeze it, compared with its own STL beside one
 other object, and its grasp is planned. An exception is a failure. The command prints the counts and each traceback.
@@ -102,7 +102,16 @@ def try_shape(seed: int, number: int, disturbance: Disturbance | None = None) ->
         index = chosen.closure.candidate
         at, height = chosen.at, chosen.closure.height_m
         layer, poses[index] = squeeze(
-            solids[index].as_trimesh(), poses[index], at.position_K_m, at.yaw_K_rad, height, datum, bias, noise, gel, rng
+            solids[index].as_trimesh(),
+            poses[index],
+            at.position_K_m,
+            at.yaw_K_rad,
+            height,
+            datum,
+            bias,
+            noise,
+            gel,
+            rng,
         )
         more = TouchSequence(at.position_K_m, at.yaw_K_rad, (layer,))
         touchsets = tuple(replace(t, sequences=(*t.sequences, more)) if t.candidate.index == index else t

@@ -1,4 +1,4 @@
-"""Run CoACD once, as a script in a process of its own: `python -P coacd_worker.py IN.npz OUT.npz PARAMETERS_JSON LIMIT_S`.
+"""Run CoACD once, in a process of its own: `python -P coacd_worker.py IN.npz OUT.npz PARAMETERS_JSON LIMIT_S`.
 
 CoACD needs its own process: Python can neither interrupt it nor limit its time, and a failed assertion in it ends the
 process (seen in its self-intersection test on a finely tessellated mesh). The script imports nothing of this project,

@@ -121,7 +121,7 @@ class Candidate:
         return float(along.min()), float(along.max())
 
     def strip_span_m(self, yaw_rad: float, middle_m: float, half_m: float) -> tuple[float, float] | None:
-        """Return (minimum, maximum) coordinate across a strip of the object along `yaw_rad`; None if none of it is there.
+        """Return (minimum, maximum) coordinate across a strip of the object; None if none of it is there.
 
         Args:
             yaw_rad: Direction x in K along which the strip is cut out.

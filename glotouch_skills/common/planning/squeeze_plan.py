@@ -27,8 +27,8 @@ STRIP_MARGIN_M = 0.003
 deviation of a sequence's shift in `recognition`."""
 
 MAX_SLOPE = 0.1
-"""Largest slope of the outline under the end of a pad beside the centre. On a steeper side the end of the gel alone carries
-the force: the widths of a ring were 1 to 3 mm too small 12 to 22 mm beside its centre. Source: simulation, realistic."""
+"""Largest slope of the outline under the end of a pad beside the centre. On a steeper side the end of the gel carries
+all force: 12 to 22 mm beside the centre of a ring, widths were 1 to 3 mm too small. Source: simulation, realistic."""
 SLOPE_OVER_M = 0.003
 """Length over which that slope is taken."""
 

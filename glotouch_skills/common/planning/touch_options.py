@@ -26,7 +26,7 @@ CLOSURE_S = 1.6
 TURN_S = 1.5
 """Robot time of turning the hand over a candidate."""
 ASIDE_S = 2.0
-"""Robot time charged for a stance beside the centre: the jaw that touches first turns the object, so that other closures
+"""Robot time charged for a stance beside the centre: the jaw that touches first turns the object, and other closures
 tell less. Source: ours."""
 STOP_S = 0.6
 """Robot time of each start and stop."""

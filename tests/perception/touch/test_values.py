@@ -33,6 +33,7 @@ def test_slides_add_up_along_y_P() -> None:
 
 def test_a_closure_is_placed_against_the_object_where_the_slides_before_it_left_it() -> None:
     """Closed at yaw 0 it slides by 10 mm along y_P = -y; the next closure, along y, is that much off the middle."""
-    first, second = read_evidence(touched(layer(0.0, 0.010, (0.01, 0.02)), layer(math.pi / 2, 0.0, (0.01, 0.02))), PadSpec()).layers
+    closures = layer(0.0, 0.010, (0.01, 0.02)), layer(math.pi / 2, 0.0, (0.01, 0.02))
+    first, second = read_evidence(touched(*closures), PadSpec()).layers
     assert abs(first.along_m) < 1e-12
     assert abs(second.along_m - 0.010) < 1e-12

@@ -85,8 +85,10 @@ def predict(model: TargetModel, reading: TouchSetReading, pair: Pair, p: Likelih
     before = np.cumsum([0, *(len(s.layers) for s in sequences)])
     places = [(sequences[e.sequence].layers[e.index], slid[before[e.sequence] + e.index]) for e in layers]
     felt = np.array([[*(q.position_K_m + slid[-1] - was), q.height_m, q.yaw_rad] for q, was in places]).reshape(-1, 4)
+    centre = candidate.contour.centre_K_m + slid[-1]
+    yaw_index, z0_index = np.divmod(best, log_pose.shape[1])
     return Prediction(
-        candidate, candidate.contour.centre_K_m + slid[-1], best // log_pose.shape[1], z0[best % log_pose.shape[1]], weight / weight.sum(), pair.first_rad,
+        candidate, centre, yaw_index, z0[z0_index], weight / weight.sum(), pair.first_rad,
         felt, np.array([e.width_m for e in layers]),
     )  # fmt: skip
 
@@ -181,8 +183,10 @@ def entropy_decrease(there: Array, weight: Array, not_there: Array, share: float
     return np.asarray(np.maximum(entropy - mean, 0.0))
 
 
-def _at(model: TargetModel, q: Prediction, closures: Sequence[Closure]) -> tuple[Array, Array, tuple[Array32, Array32], Array]:
-    """Return predicted widths and their unevenness (n, s), (left, right) features (n, s, 35), and novelties (n,), 0..1."""
+def _at(
+    model: TargetModel, q: Prediction, closures: Sequence[Closure]
+) -> tuple[Array, Array, tuple[Array32, Array32], Array]:
+    """Return widths and their unevenness (n, s), (left, right) features (n, s, 35), and novelties (n,), 0..1."""
     n = len(model.phi_rad)
     yaw = np.array([c.yaw_K_rad for c in closures])
     height = np.array([c.height_m for c in closures])
