@@ -26,7 +26,7 @@ STRIP_MARGIN_M = 0.003
 """What of the object is within this of a finger along x_P counts as between the jaws. Source: ours; the standard
 deviation of a sequence's shift in `recognition`."""
 
-MAX_SLOPE = 0.1
+MAX_SLOPE = 0.2
 """Largest slope of the outline under the end of a pad beside the centre. On a steeper side the end of the gel carries
 all force: 12 to 22 mm beside the centre of a ring, widths were 1 to 3 mm too small. Source: simulation, realistic."""
 SLOPE_OVER_M = 0.003

@@ -67,9 +67,10 @@ class Standing:
 
 
 def stances_over(candidate: Candidate, gripper: Gripper, side_gap_m: float) -> list[Stance]:
-    """Return the stances to consider: half a circle of yaws, each over the centre and on both sides of it.
+    """Return the stances to consider: half a circle of yaws, each over the centre and two places on both sides of it.
 
-    A side is half way to the end of the candidate along x_P, but the pads stay whole on it.
+    The outer one is half way to the end of the candidate along x_P, but the pads stay whole on it; the inner one is
+    half way to that.
     """
     contour = candidate.contour
     found: list[Stance | None] = []
@@ -77,7 +78,8 @@ def stances_over(candidate: Candidate, gripper: Gripper, side_gap_m: float) -> l
         low, high = candidate.span_m(yaw)
         centre = float(contour.centre_K_m @ [np.cos(yaw), np.sin(yaw)])
         reach = [min(0.5 * end, end - 0.5 * gripper.pad_window_m[0]) for end in (centre - low, high - centre)]
-        places = [0.0, *(sign * r for sign, r in zip((-1.0, 1.0), reach, strict=True) if r > SAME_M)]
+        sides = [sign * part * r for sign, r in zip((-1.0, 1.0), reach, strict=True) for part in (0.5, 1.0)]
+        places = [0.0, *(s for s in sides if abs(s) > SAME_M)]
         found += [stance(candidate, along, yaw, side_gap_m, gripper) for along in places]
     return [s for s in found if s is not None]
 
