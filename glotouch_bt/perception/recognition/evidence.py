@@ -9,11 +9,9 @@ import numpy as np
 import scipy
 
 from glotouch_bt.perception.recognition.model import PadSpec, hand_axes, image_feature, pool
-from glotouch_bt.perception.touch import Layer, TouchSet
+from glotouch_bt.perception.touch import Layer, TouchSet, contact_threshold_m, mean_depth_m
 from glotouch_bt.robot import Array
 
-THRESHOLD_M = 6e-5
-"""Minimum indentation of a contact: three standard deviations of a nominal taxel."""
 MIN_AREA_M2 = 6e-6
 """Minimum area of a connected contact patch."""
 ONE_SIDED = 0.35
@@ -77,7 +75,10 @@ def read_evidence(touchset: TouchSet, pad: PadSpec) -> Evidence:
         for (k, h, layer), slid in zip(numbered, touchset.slid_K_m[:-1], strict=True)
         if _usable(layer)
     ]
-    tops = contact_tops([d for *_, layer, _ in used for d in (layer.left_m, layer.right_m)], pad)
+    maps = [d for *_, layer, _ in used for d in (layer.left_m, layer.right_m)]
+    noises = zip(*(layer.noise_m for *_, layer, _ in used), strict=True)
+    noise_m = [math.sqrt(float(np.mean(np.square(n)))) for n in noises]
+    tops = contact_tops(maps, noise_m * len(used), pad)
     layers = []
     for i, (k, h, layer, middle) in enumerate(used):
         sunk = (tops[2 * i], tops[2 * i + 1])
@@ -103,16 +104,22 @@ def _usable(layer: Layer) -> bool:
     return bool(layer.stable and flat and np.shape(layer.position_K_m) == (2,) and all(map(math.isfinite, numbers)))
 
 
-def contact_tops(maps_m: list[Array], pad: PadSpec) -> list[float]:
+def contact_tops(maps_m: list[Array], noise_m: list[float], pad: PadSpec) -> list[float]:
     """Return the maximum indentation in each map's largest patch, 0 without contact; map shapes may differ.
 
     A 3 x 3 median removes single outliers. A map with more than half of its taxels dead counts as no contact.
+
+    Args:
+        maps_m: Depth maps (rows, cols), m.
+        noise_m: RMS of each map's pad when untouched.
+        pad: The pad.
     """
     out = [0.0] * len(maps_m)
     shapes = {m.shape for m in maps_m}
     for shape in shapes:
         where = [i for i, m in enumerate(maps_m) if m.shape == shape]
         stack = np.stack([maps_m[i] for i in where]).astype(np.float64)
+        least_m = np.array([contact_threshold_m(noise_m[i], mean_depth_m(maps_m[i])) for i in where])[:, None, None]
         good = np.isfinite(stack)
         alive = good.mean(axis=(1, 2)) >= 0.5
         middle = [float(np.median(m[g])) if a else 0.0 for m, g, a in zip(stack, good, alive, strict=True)]
@@ -120,7 +127,7 @@ def contact_tops(maps_m: list[Array], pad: PadSpec) -> list[float]:
         smooth = scipy.ndimage.median_filter(filled, size=(1, 3, 3), mode="nearest")
         flat = np.zeros((3, 3, 3))
         flat[1] = [[0, 1, 0], [1, 1, 1], [0, 1, 0]]
-        labels, n = scipy.ndimage.label((smooth > THRESHOLD_M) & alive[:, None, None], structure=flat)
+        labels, n = scipy.ndimage.label((smooth > least_m) & alive[:, None, None], structure=flat)
         if n == 0:
             continue
         count = np.bincount(labels.ravel(), minlength=n + 1)

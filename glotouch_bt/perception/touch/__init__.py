@@ -32,10 +32,14 @@ from glotouch_bt.perception.touch.outline import (
 )
 from glotouch_bt.perception.touch.squeeze import (
     ObjectMotion,
+    contact_threshold_m,
     estimate_object_motion,
     evidence_weight,
     find_plateau,
+    layer_patches,
     make_layer,
+    mean_depth_m,
+    pad_noise_m,
     patch_statistics,
     relative_nonplanarity,
     temporal_median,

@@ -19,6 +19,9 @@ ContourFamily = Literal["circle", "rectangle", "free"]
 ZERO_SD_M = 0.3e-3
 """Standard deviation of an uncalibrated jaw zero. Source: CONDITIONS, nominal 0.23 mm, harsh 0.58 mm."""
 
+PAD_NOISE_M = 2e-5
+"""Standard deviation of an untouched pad's taxel. Source: CONDITIONS, nominal."""
+
 
 @dataclass(frozen=True)
 class Contact:
@@ -164,6 +167,7 @@ class Layer:
         slide_m, turn_rad, compliance_m: Estimated motion of the object (`ObjectMotion`): displacement along +y_P, turn
             about +z_K, closing after both pads touched; NaN if not estimated.
         zero_sd_m: Standard deviation of the aperture error common to all layers.
+        noise_m: RMS of the (left, right) map before the closure, when the pads were untouched.
     """
 
     height_m: float
@@ -179,6 +183,7 @@ class Layer:
     turn_rad: float = math.nan
     compliance_m: float = math.nan
     zero_sd_m: float = ZERO_SD_M
+    noise_m: tuple[float, float] = (PAD_NOISE_M, PAD_NOISE_M)
 
 
 @dataclass(frozen=True)

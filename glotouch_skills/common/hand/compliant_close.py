@@ -126,8 +126,10 @@ class _Closing:
         self._free_N = self._force_N = np.zeros(3)
 
     def measure_free_force(self) -> Motion[None]:
-        """Measure the force on the free hand, so that the wrist need not be tared."""
-        blocks = yield from self._arm.hold(BASELINE_S)
+        """Measure the force on the free hand, so that the wrist need not be tared. The pads are untouched meanwhile."""
+        blocks = yield from self._arm.hold(BASELINE_S, tactile=self._tactile)
+        for seen in blocks:
+            self._seen_by(seen)
         self._free_N = np.mean([_force_P(b) for b in blocks], axis=0)
 
     @property

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from glotouch_bt.perception.recognition import Match
-from glotouch_bt.perception.touch import Candidate, Layer, TouchSet, evidence_weight, patch_statistics
+from glotouch_bt.perception.touch import Candidate, Layer, TouchSet, evidence_weight, layer_patches
 from glotouch_bt.robot import Array, Gripper, ParamError
 from glotouch_bt.robot.scene import Mesh
 from glotouch_skills.common.planning.grasp_holds import AREA_SCALE, LEVER_SCALE_M, Holds, holds_of
@@ -176,7 +176,7 @@ def _felt(touchset: TouchSet, com_K: Array, gripper: Gripper, side_gap_m: float)
     """Return the closures as grasps, best first: large two-sided contact, near the centre of mass, recent."""
 
     def worth(layer: Layer, later: int) -> float:
-        areas = [patch_statistics(d).area_fraction for d in (layer.left_m, layer.right_m)]
+        areas = [p.area_fraction for p in layer_patches(layer)]
         hold = math.prod([a / (a + AREA_SCALE) for a in areas])
         across = np.array([np.cos(layer.yaw_rad), np.sin(layer.yaw_rad)])
         lever = math.hypot(across @ (com_K[:2] - layer.position_K_m), 0.5 * (com_K[2] - layer.height_m))

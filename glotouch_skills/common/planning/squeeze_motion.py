@@ -7,9 +7,16 @@ from dataclasses import replace
 import numpy as np
 
 from glotouch_bt.motion import Motion, hand_pose_B
-from glotouch_bt.perception.touch import Candidate, Layer, ObjectMotion, estimate_object_motion, make_layer
+from glotouch_bt.perception.touch import (
+    Candidate,
+    Layer,
+    ObjectMotion,
+    estimate_object_motion,
+    make_layer,
+    pad_noise_m,
+)
 from glotouch_bt.perception.touch.calibration import JawZero
-from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose
+from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose, TactileFrame
 from glotouch_bt.skill import Context, SkillParams, param
 from glotouch_skills.common.hand import close_compliantly, descend, glide, release
 from glotouch_skills.common.planning.squeeze_plan import Stance
@@ -21,6 +28,8 @@ MIN_GAP_M = 0.003
 FAST_RISE_RATIO = 5.0
 """Speed of moving up beside the object over the slow speed: the open fingers have just come down that way. Source:
 ours; 50 mm/s by default."""
+UNTOUCHED_M = 0.002
+"""The jaws touch nothing until they have closed by this. Source: ours, half of the smallest gap beside an object."""
 OPENING_M_S = 0.2
 """Speed at which the empty jaws open."""
 
@@ -141,7 +150,10 @@ class Squeezing:
         x_P = np.array([np.cos(self.yaw_K_rad), np.sin(self.yaw_K_rad)])
         middle = float(x_P @ (contour.centre_K_m - self.at.position_K_m))
         half_diagonal = 0.5 * float(np.hypot(*contour.size_m)) if contour.family != "circle" else contour.radius_m
-        object_motion = estimate_object_motion([*closing, *blocks], gripper.pad_window_m[0], middle, half_diagonal)
+        noise_m = pad_noise_m(_untouched(closing))
+        object_motion = estimate_object_motion(
+            [*closing, *blocks], gripper.pad_window_m[0], middle, half_diagonal, noise_m
+        )
         measured = self._context.world.container.pose_B_K.inverse().apply(blocks[-1].pose_B_P.position_m)
         layer = make_layer(
             blocks,
@@ -151,6 +163,7 @@ class Squeezing:
             force_N=p.force_N,
             pad_shape=gripper.pad_shape,
             object_motion=object_motion,
+            noise_m=noise_m,
         )
         yield from release(arm, self.at.opening_m)
         true_m = layer.aperture_m - self._zero.error_m
@@ -165,6 +178,13 @@ class Squeezing:
     def _pose(self, height_m: float) -> Pose:
         position = np.array([*self.at.position_K_m, height_m])
         return hand_pose_B(self._context.arm, self._context.world.container, position, self.yaw_K_rad)
+
+
+def _untouched(closing: list[Observation]) -> list[TactileFrame]:
+    """Return the frames that were taken while the jaws had hardly moved."""
+    opening_m = closing[0].gripper.aperture_m
+    moved_s = next((b.now_s for b in closing if b.gripper.aperture_m < opening_m - UNTOUCHED_M), closing[-1].now_s)
+    return [b.tactile for b in closing if b.tactile is not None and b.tactile.stamp_s <= moved_s]
 
 
 def disturbance(candidate: Candidate, layer: Layer, object_motion: ObjectMotion) -> dict[str, object] | None:

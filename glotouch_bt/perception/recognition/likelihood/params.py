@@ -47,7 +47,7 @@ class LikelihoodParams:
     """
 
     width_sd_m: float = 0.3e-3
-    width_rough: float = 0.6
+    width_rough: float = 1.5
     width_outlier: float = 0.01
     width_range_m: float = 0.060
     bias_span: float = 1.5

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glotouch_bt.perception.touch.squeeze.patches import THRESHOLD_M
+from glotouch_bt.perception.touch.squeeze.patches import contact_threshold_m, mean_depth_m
+from glotouch_bt.perception.touch.values import PAD_NOISE_M
 from glotouch_bt.robot import Array, Observation, TactileFrame
 
 PUSH_N = 0.3
@@ -68,7 +69,11 @@ class ObjectMotion:
 
 
 def estimate_object_motion(
-    blocks: Sequence[Observation], pad_width_m: float, middle_x_m: float = 0.0, half_diagonal_m: float = 0.03
+    blocks: Sequence[Observation],
+    pad_width_m: float,
+    middle_x_m: float = 0.0,
+    half_diagonal_m: float = 0.03,
+    noise_m: tuple[float, float] = (PAD_NOISE_M, PAD_NOISE_M),
 ) -> ObjectMotion:
     """Estimate the object's motion during a whole closure.
 
@@ -77,6 +82,7 @@ def estimate_object_motion(
         pad_width_m: Width of the gel window along x_P.
         middle_x_m: Centre of the object's outline along x_P, from the pads.
         half_diagonal_m: Half diagonal of the outline.
+        noise_m: As in `Layer`.
     """
     if len(blocks) <= BASELINE_PERIODS:
         return ObjectMotion(0.0, 0.0, 0.0, False)
@@ -89,7 +95,7 @@ def estimate_object_motion(
     side_N -= side_N[:BASELINE_PERIODS].mean()
     hand = np.array([b.position_B_P[-1] for b in blocks]) @ rotation[:, 1]
     frames = [b.tactile for b in blocks if b.tactile is not None]
-    dents = np.array([_dents(f) for f in frames]).reshape(-1, 2)
+    dents = np.array([_dents(f, noise_m) for f in frames]).reshape(-1, 2)
     last = dents[-1] if len(dents) else np.zeros(2)
 
     slide = compliance = 0.0
@@ -105,17 +111,19 @@ def estimate_object_motion(
         compliance = max(float(np.interp(stamp[both[0]], stamp, aperture) - aperture[-1] - last.sum()), 0.0)
     # Before both jaws press, errors of a depth map look like contacts, and the jaws close by centimetres.
     pressed = [i for i, f in enumerate(frames) if len(both) and f.stamp_s >= stamp[both[0]]]
-    width = np.array([np.interp(frames[i].stamp_s, stamp, aperture) for i in pressed])
-    turn = _turn([frames[i] for i in pressed], dents[pressed], width, pad_width_m)
+    apart = np.array([np.interp(frames[i].stamp_s, stamp, aperture) for i in pressed])
+    turn = _turn([frames[i] for i in pressed], dents[pressed], apart, pad_width_m, noise_m)
     turn -= slide * middle_x_m / ((FRICTION_RADIUS * half_diagonal_m) ** 2 + middle_x_m**2)
     turn = min(max(turn, -MAX_TURN_RAD), MAX_TURN_RAD)
     return ObjectMotion(slide, float(turn * rotation[2, 2]), compliance, bool(len(pushed) or len(both)))
 
 
-def _turn(frames: Sequence[TactileFrame], dents: Array, aperture: Array, width_m: float) -> float:
+def _turn(
+    frames: Sequence[TactileFrame], dents: Array, aperture: Array, width_m: float, noise_m: tuple[float, float]
+) -> float:
     """Return the turn about +z_P: approach of the touched surfaces over the lever between the contacts."""
-    left = np.array([_middle_m(f.left_m, width_m) for f in frames])
-    right = np.array([_middle_m(f.right_m, width_m) for f in frames])
+    left = np.array([_middle_m(f.left_m, width_m, noise_m[0]) for f in frames])
+    right = np.array([_middle_m(f.right_m, width_m, noise_m[1]) for f in frames])
     lever = right - left
     seen = np.flatnonzero(np.isfinite(lever))
     if len(seen) < 2:
@@ -126,19 +134,20 @@ def _turn(frames: Sequence[TactileFrame], dents: Array, aperture: Array, width_m
     return float(np.sum(-np.diff(between)[use] / arm[use]))
 
 
-def _dents(frame: TactileFrame) -> tuple[float, float]:
+def _dents(frame: TactileFrame, noise_m: tuple[float, float]) -> tuple[float, float]:
     """Return the indentation of each gel: the depth reached by DEEP_TAXELS taxels; 0 without contact."""
     depths = []
-    for depth in (frame.left_m, frame.right_m):
+    for depth, noise in zip((frame.left_m, frame.right_m), noise_m, strict=True):
         known = depth[np.isfinite(depth)]
         deep = float(np.partition(known, -DEEP_TAXELS)[-DEEP_TAXELS]) if len(known) >= DEEP_TAXELS else 0.0
-        depths.append(deep if deep > THRESHOLD_M else 0.0)
+        depths.append(deep if deep > contact_threshold_m(noise, mean_depth_m(depth)) else 0.0)
     return depths[0], depths[1]
 
 
-def _middle_m(depth: Array, width_m: float) -> float:
+def _middle_m(depth: Array, width_m: float, noise_m: float) -> float:
     """Return the depth-weighted centre of a contact along x_P; NaN without contact."""
-    touched = np.where(np.nan_to_num(depth) > THRESHOLD_M, np.nan_to_num(depth), 0.0)
+    threshold_m = contact_threshold_m(noise_m, mean_depth_m(depth))
+    touched = np.where(np.nan_to_num(depth) > threshold_m, np.nan_to_num(depth), 0.0)
     if np.count_nonzero(touched) < MIN_CONTACT_TAXELS:
         return float("nan")
     across = (np.arange(depth.shape[1]) + 0.5) / depth.shape[1] - 0.5

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from glotouch_bt.perception.touch.squeeze.object_motion import ObjectMotion
-from glotouch_bt.perception.touch.values import Layer
-from glotouch_bt.robot import Array, Observation, ParamError, TactileFrame
+from glotouch_bt.perception.touch.squeeze.patches import temporal_median
+from glotouch_bt.perception.touch.values import PAD_NOISE_M, Layer
+from glotouch_bt.robot import Array, Observation, ParamError
 
 DURATION_S = 0.1
 """Minimum duration of a plateau. Source: six periods of a 60 Hz tactile sensor."""
@@ -83,25 +83,6 @@ def find_plateau(blocks: Sequence[Observation], force_N: float) -> Plateau:
     return Plateau(not why, opening, felt, start, why)
 
 
-def temporal_median(frames: Sequence[TactileFrame], shape: tuple[int, int]) -> tuple[Array, Array]:
-    """Return the taxel-wise median over time of left and right maps, (rows, cols), m; NaN for taxels without data.
-
-    Raises:
-        ParamError: A frame of another shape.
-    """
-    for f in frames:
-        if f.left_m.shape != shape or f.right_m.shape != shape:
-            raise ParamError("frames", (f.left_m.shape, f.right_m.shape), f"maps of shape {shape}")
-    if not frames:
-        return np.full(shape, np.nan), np.full(shape, np.nan)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # an all-NaN taxel stays NaN by design
-        left, right = (
-            np.nanmedian(np.stack(m), axis=0) for m in zip(*((f.left_m, f.right_m) for f in frames), strict=True)
-        )
-    return np.asarray(left), np.asarray(right)
-
-
 def make_layer(
     blocks: Sequence[Observation],
     *,
@@ -111,6 +92,7 @@ def make_layer(
     force_N: float,
     pad_shape: tuple[int, int],
     object_motion: ObjectMotion | None = None,
+    noise_m: tuple[float, float] = (PAD_NOISE_M, PAD_NOISE_M),
 ) -> Layer:
     """Build a `Layer` from one closure: aperture and force on the plateau, median maps of the frames TAKEN during it.
 
@@ -122,6 +104,7 @@ def make_layer(
         force_N: Commanded jaw force.
         pad_shape: (rows, cols) of the maps.
         object_motion: Motion of the object during the closure, if estimated.
+        noise_m: As in `Layer`.
 
     Raises:
         ParamError: No blocks, or maps of another shape.
@@ -144,4 +127,5 @@ def make_layer(
         slide_m=math.nan if object_motion is None else object_motion.slide_m,
         turn_rad=math.nan if object_motion is None else object_motion.turn_rad,
         compliance_m=math.nan if object_motion is None else object_motion.compliance_m,
+        noise_m=noise_m,
     )

@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
+import scipy
 
-from glotouch_bt.perception.touch import patch_statistics, relative_nonplanarity
+from glotouch_bt.perception.touch import pad_noise_m, patch_statistics, relative_nonplanarity
+from glotouch_bt.robot import TactileFrame
 
 ROWS, COLS = np.meshgrid(np.arange(35.0), np.arange(20.0), indexing="ij")
 
@@ -23,7 +25,7 @@ def test_nonplanarity_of_a_sphere():
     depth = 1e-3 * (1 - x**2 - y**2)
     assert relative_nonplanarity(depth, depth > 0) == pytest.approx(1 / np.sqrt(12) / 0.9, rel=0.01)
     coarse = 1e-3 * (1 - ((ROWS - 17) / 12) ** 2 - ((COLS - 9.5) / 9) ** 2)
-    assert patch_statistics(np.maximum(coarse, 0), threshold_m=1e-6).rho == pytest.approx(0.3208, rel=0.05)
+    assert patch_statistics(np.maximum(coarse, 0)).rho == pytest.approx(0.3208, rel=0.05)
 
 
 def test_nonplanarity_of_a_cylinder():
@@ -56,3 +58,33 @@ def test_no_contact(depth):
     assert stats.area_fraction == 0.0
     noise = np.random.default_rng(0).normal(0, 2e-5, (35, 20))
     assert not patch_statistics(noise).valid
+
+
+def smooth_noise(seed, sd_m=5e-5):
+    """Correlated over 5 mm, as the error of a reconstructed map."""
+    white = np.random.default_rng(seed).standard_normal((35, 20))
+    field = scipy.ndimage.gaussian_filter(white, (4.3, 4.1), mode="wrap")
+    return sd_m * field / field.std()
+
+
+def test_noise_that_was_measured_is_no_contact():
+    valid = [patch_statistics(smooth_noise(i), noise_m=5e-5).valid for i in range(100)]
+    assert sum(valid) <= 20
+    assert sum(patch_statistics(smooth_noise(i)).valid for i in range(100)) > 80
+
+
+def test_flat_side_is_felt_through_the_noise():
+    """10 N on a whole pad indent a nominal gel by 0.1 mm, less than the noise's peaks."""
+    maps = [1e-4 + smooth_noise(i) for i in range(100)]
+    assert sum(patch_statistics(m, noise_m=5e-5).valid for m in maps) >= 90
+
+
+def test_noise_of_untouched_pads():
+    rng = np.random.default_rng(0)
+    smooth = smooth_noise(0)
+    frames = [TactileFrame(0.01 * k, smooth + rng.normal(0, 2e-5, (35, 20)), np.zeros((35, 20))) for k in range(9)]
+    left, right = pad_noise_m(frames)
+    # White noise averages out, smooth noise does not.
+    assert left == pytest.approx(np.sqrt(np.mean(smooth**2)), rel=0.05)
+    assert right == 0.0
+    assert pad_noise_m([]) == (2e-5, 2e-5)
