@@ -91,7 +91,7 @@ class TouchNext(Skill):
         super().__init__(name, params, context)
         self._model: TargetModel | None = None
         self._down: Squeezing | None = None
-        self._refused: set[tuple[int, int, int, int]] = set()
+        self._refused: set[tuple[int, ...]] = set()
         self._vain: dict[int, int] = {}
         self._hopeless: frozenset[int] = frozenset()
         self._stood_B_m: Array | None = None
@@ -118,8 +118,8 @@ class TouchNext(Skill):
             raise self.NO_CANDIDATES("there is no candidate to touch", candidates=len(candidates))
         touchsets: tuple[TouchSet, ...] = self.felt or ()
         if [_state(t.candidate) for t in touchsets] != [_state(c) for c in wanted]:  # found, rejected, or measured anew
-            made = {t.candidate.index: t.sequences for t in touchsets}
-            touchsets = tuple(TouchSet(c, made.get(c.index, ())) for c in wanted)
+            made = {t.candidate.index: t for t in touchsets}
+            touchsets = tuple(made.get(c.index, TouchSet(c, ())).measured(c) for c in wanted)
             self._refused.clear()
             self._vain.clear()
             self._down = None
@@ -141,7 +141,7 @@ class TouchNext(Skill):
             yield from self._end(belief, down, why or "no closure is expected to tell more")
             return
         try:
-            down, layer = yield from self._touch(candidates, chosen, down)
+            down, layer = yield from self._touch(tuple(t.now for t in touchsets), chosen, down)
         except MotionRefused as refusal:
             self._refused.add(_key(chosen))
             self._vain[chosen.closure.candidate] = self._vain.get(chosen.closure.candidate, 0) + 1
@@ -182,7 +182,7 @@ class TouchNext(Skill):
         standing = None
         if down is not None:
             standing = Standing(down.candidate.index, down.at, float(pose_K_P.position_m[2]))
-        found = options(belief.touchsets, standing, pose_K_P.position_m, arm.description.gripper, p)
+        found = options(belief.touchsets, standing, pose_K_P.position_m, arm.description.gripper, p, self._vain)
         found = [o for o in found if _key(o) not in self._refused and o.closure.candidate not in self._hopeless]
         later = self._unmeasured(belief)
         found = [replace(o, seconds=o.seconds + MEASURE_S) if o.closure.candidate in later else o for o in found]
@@ -236,7 +236,7 @@ class TouchNext(Skill):
         pose = hand_pose_B(
             arm, self.context.world.container, np.array([*option.at.position_K_m, z]), option.at.yaw_K_rad
         )
-        others = [t.candidate for t in belief.touchsets if t.candidate.index != option.closure.candidate]
+        others = [t.now for t in belief.touchsets if t.candidate.index != option.closure.candidate]
         with keeping_clear_of(arm, others):
             try:
                 require_clear(arm, pose, option.at.opening_m, CLEARANCE_M)
@@ -313,9 +313,9 @@ def _state(candidate: Candidate) -> tuple[int, float, int]:
     return candidate.index, candidate.height_m, len(candidate.contacts)
 
 
-def _key(option: Option) -> tuple[int, int, int, int]:
-    """Return the key of a refused option: candidate, yaw in degrees, height and place along x_P in mm."""
+def _key(option: Option) -> tuple[int, ...]:
+    """Return the key of a refused option: candidate, yaw in degrees; height, place along x_P and opening in mm."""
     at = option.at
     along = float(at.position_K_m @ [np.cos(at.yaw_K_rad), np.sin(at.yaw_K_rad)])
     c = option.closure
-    return c.candidate, round(np.rad2deg(at.yaw_K_rad)), round(1e3 * c.height_m), round(1e3 * along)
+    return c.candidate, round(np.rad2deg(at.yaw_K_rad)), *(round(1e3 * m) for m in (c.height_m, along, at.opening_m))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,7 +85,12 @@ def stances_over(candidate: Candidate, gripper: Gripper, side_gap_m: float) -> l
 
 
 def options(
-    touchsets: Sequence[TouchSet], standing: Standing | None, hand_K_m: Array, gripper: Gripper, p: ClosureParams
+    touchsets: Sequence[TouchSet],
+    standing: Standing | None,
+    hand_K_m: Array,
+    gripper: Gripper,
+    p: ClosureParams,
+    overhanging: Collection[int] = (),
 ) -> list[Option]:
     """Return all closures that could come next and were not made yet.
 
@@ -98,17 +103,19 @@ def options(
         hand_K_m: (3,) pads' mid-point.
         gripper: The robot's gripper.
         p: Parameters of the closures.
+        overhanging: Indices of candidates that are wider above than where they were traced; the jaws open fully.
     """
     out: list[Option] = []
     for touchset in touchsets:
-        candidate = touchset.candidate
+        candidate = touchset.now
         heights = layer_heights(candidate, gripper, p)
         here = standing if standing is not None and standing.candidate == candidate.index else None
         if here is not None:
             for z in heights[heights > here.height_m + SAME_M]:
                 seconds = CLOSURE_S + STOP_S + (z - here.height_m) / (FAST_RISE_RATIO * p.descent_speed_m_s)
                 out.append(Option(here.at, _closure(candidate, here.at, float(z)), float(seconds)))
-        for at in stances_over(candidate, gripper, p.side_gap_m):
+        gap_m = gripper.stroke_m if candidate.index in overhanging else p.side_gap_m
+        for at in stances_over(candidate, gripper, gap_m):
             if _used(touchset, at):
                 continue
             lowest, *higher = (_closure(candidate, at, float(z)) for z in heights)
@@ -139,10 +146,14 @@ def _closure(candidate: Candidate, at: Stance, height_m: float) -> Closure:
 
 
 def _used(touchset: TouchSet, at: Stance) -> bool:
-    """Return True if a sequence was taken at this stance or half a turn from it."""
+    """Return True if a sequence was taken at this stance of the object where it is now, or half a turn from it."""
+    slid = touchset.slid_K_m
+    before = 0
     for s in touchset.sequences:
         turn = (s.yaw_rad - at.yaw_K_rad + 0.5 * np.pi) % np.pi - 0.5 * np.pi
-        if abs(turn) < SAME_RAD and float(np.linalg.norm(s.position_K_m - at.position_K_m)) < SAME_M:
+        place = s.position_K_m + slid[-1] - slid[before]
+        before += len(s.layers)
+        if abs(turn) < SAME_RAD and float(np.linalg.norm(place - at.position_K_m)) < SAME_M:
             return True
     return False
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from glotouch_bt.perception.recognition.evidence import read_evidence
 from glotouch_bt.perception.recognition.model import PadSpec, hand_axes
-from glotouch_bt.perception.touch import Candidate, Contour, Layer, TouchSequence, TouchSet
+from glotouch_bt.perception.touch import Candidate, Contact, Contour, Layer, TouchSequence, TouchSet
 
 GEL = np.full((35, 20), 4e-4)
 
@@ -37,3 +38,14 @@ def test_a_closure_is_placed_against_the_object_where_the_slides_before_it_left_
     first, second = read_evidence(touched(*closures), PadSpec()).layers
     assert abs(first.along_m) < 1e-12
     assert abs(second.along_m - 0.010) < 1e-12
+
+
+def test_a_candidate_is_now_where_its_slides_left_it_since_it_was_traced() -> None:
+    felt = touched(layer(0.0, 0.010), layer(math.pi / 2, 0.004))
+    np.testing.assert_allclose(felt.now.contour.centre_K_m, [0.01 + 0.004, 0.02 - 0.010], atol=1e-12)
+    contact = Contact(0.0, np.zeros(3), np.zeros(3), np.zeros(3), np.array([0.035, 0.02]), 1.0)
+    again = felt.measured(replace(felt.candidate, contacts=(contact,)))
+    np.testing.assert_allclose(again.now.contour.centre_K_m, again.candidate.contour.centre_K_m, atol=1e-12)
+    np.testing.assert_allclose(again.slid_K_m[0], [-0.004, 0.010], atol=1e-12)
+    higher = felt.measured(replace(felt.candidate, height_m=0.06))
+    np.testing.assert_allclose(higher.slid_K_m, felt.slid_K_m)
