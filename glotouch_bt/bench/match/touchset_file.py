@@ -28,7 +28,7 @@ SHAPES: Mapping[str, tuple[int | None, ...]] = {
     "contour.covariance": (None, None), "contour.boundary_K_m": (None, 2),
     "contact.tip_K_m": (3,), "contact.approach_K": (3,), "contact.reaction_K": (3,), "contact.point_K_m": (2,),
     "contact.pushed_K_m": (2,), "sequence.position_K_m": (2,), "layer.position_K_m": (2,),
-    "layer.left_m": (None, None), "layer.right_m": (None, None),
+    "layer.left_m": (None, None), "layer.right_m": (None, None), "layer.noise_m": (2,),
 }  # fmt: skip
 """Shape of one row of an array field; None is any length. Other fields are scalars, strings, or arrays of any shape."""
 

@@ -47,21 +47,21 @@ class LikelihoodParams:
     """
 
     width_sd_m: float = 0.3e-3
-    width_rough: float = 1.5
+    width_rough: float = 0.8
     width_outlier: float = 0.01
     width_range_m: float = 0.060
     bias_span: float = 1.5
     bias_steps: int = 3
-    shift_sd_m: float = 3e-3
-    shift_limit_m: float = 7.5e-3
-    shift_steps: int = 7
-    slide_sd_m: float = 1.5e-3
+    shift_sd_m: float = 5e-3
+    shift_limit_m: float = 12.5e-3
+    shift_steps: int = 11
+    slide_sd_m: float = 3e-3
     z0_sd_m: float = 1.5e-3
     z0_limit_m: float = 2.5e-3
     z0_steps: int = 3
-    turn_sd_rad: float = math.radians(4.0)
+    turn_sd_rad: float = math.radians(6.0)
     slip: float = 0.02
-    image_scale: float = 0.12
+    image_scale: float = 0.2
     image_order: float = 3.0
     image_outlier: float = 0.05
     image_alike: float = 0.6
@@ -73,7 +73,7 @@ class LikelihoodParams:
     temper_width: float = 0.5
     temper_image: float = 0.35
     slope: float = 0.8
-    offset: float = -3.2
+    offset: float = -2.6
     outline_offset: float = -1.0
     prior_absent: float = 0.2
     twin: float = 0.12
