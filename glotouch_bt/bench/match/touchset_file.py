@@ -2,8 +2,8 @@
 
 A file holds columns, `<part>.<field>`: `candidate`, `contour`, `contact`, `sequence` and `layer` rows, in the order of
 the TouchSet, plus `sequence.layers` (how many layers each sequence has), `traced_after` and `version`. Floats are
-stored as float64, bit for bit; nothing is pickled. A field added by a later release becomes a new column; a file without it is read with
-the field's default.
+stored as float64, bit for bit; nothing is pickled. A field added by a later release becomes a new column; a file
+without it is read with the field's default.
 """
 
 from __future__ import annotations
