@@ -12,12 +12,13 @@ from glotouch_backends.mujoco.axis_proof import AxisProof
 from glotouch_backends.mujoco.control import check_sane, silence_mujoco
 from glotouch_backends.mujoco.model import BuiltWorld, Handles, compile_world
 from glotouch_backends.mujoco.robot import MujocoRobot
+from glotouch_backends.mujoco.sampler import MujocoTouchSampler
 from glotouch_backends.mujoco.simulation import MujocoDisturber, MujocoReferee
 from glotouch_backends.mujoco.truth import draw_truth
 from glotouch_backends.options import WorldOptions, convert_options
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import Backend, BackendError, Conditions, Limits, Robot, RobotDescription, World
-from glotouch_bt.robot.simulation import Disturber, Referee
+from glotouch_bt.robot.simulation import Disturber, Referee, TouchSampler
 
 SETTLE_S = 0.6
 """Simulated time in which the world comes to rest. Source: ours."""
@@ -103,3 +104,7 @@ class MujocoBackend(Backend):
     def disturber(self, robot: Robot) -> Disturber | None:
         """See `Backend`."""
         return MujocoDisturber(robot) if isinstance(robot, MujocoRobot) else None
+
+    def touch_sampler(self, world: World, conditions: Conditions, seed: int) -> TouchSampler:
+        """See `Backend`."""
+        return MujocoTouchSampler(self._description, world, conditions, seed)

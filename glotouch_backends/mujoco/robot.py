@@ -63,7 +63,7 @@ class MujocoRobot(Robot):
         self._wrist = WristSensor(description, conditions, seed, proof=built.proof)
         self._guard = HardLimitGuard(limits)
         self._tactile = Tactile(built)
-        self._depth, self.proof = self._tactile.depth, built.proof
+        self._depth, self._taxels, self.proof = self._tactile.depth, self._tactile.taxels, built.proof
         self._poses = PoseReports(built)
         self._ctrl = np.zeros((STEPS, model.nu))
         self._arm_ctrl, self._jaw_ctrl = self._ctrl[:, handles.arm_ctrl], self._ctrl[:, handles.jaw_ctrl]

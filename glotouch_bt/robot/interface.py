@@ -12,7 +12,7 @@ from glotouch_bt.robot.description import RobotDescription
 from glotouch_bt.robot.limits import Limits
 from glotouch_bt.robot.observation import Observation
 from glotouch_bt.robot.scene import Conditions, World
-from glotouch_bt.robot.simulation import Disturber, Referee
+from glotouch_bt.robot.simulation import Disturber, Referee, TouchSampler
 
 Snapshot = Mapping[str, object]
 """Plain values, arrays, tuples, mappings, random generators and dataclasses, as a checkpoint can encode them."""
@@ -124,4 +124,12 @@ class Backend(ABC):
 
     def disturber(self, robot: Robot) -> Disturber | None:
         """Return the interface through which faults change `robot`'s world; None on hardware."""
+        return None
+
+    def touch_sampler(self, world: World, conditions: Conditions, seed: int) -> TouchSampler | None:
+        """Return touches of standing objects without a robot, for experiments; None if the backend offers none.
+
+        Raises:
+            BadInput: As `open`.
+        """
         return None

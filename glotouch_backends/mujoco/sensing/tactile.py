@@ -12,12 +12,13 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from glotouch_backends.mujoco.axis_proof import AxisProof
 from glotouch_backends.mujoco.model import BuiltWorld, Handles, handle_mesh
 from glotouch_backends.mujoco.printed import Roughness
 from glotouch_backends.mujoco.sensing.depth import DepthErrors
 from glotouch_backends.mujoco.sensing.gel import BOTTOM_M, STIFFNESS_N_MM3, GelSensor, PairPress
 from glotouch_backends.mujoco.sensing.rays import SurfaceRays
-from glotouch_bt.robot import Array, Pose, TactileFrame
+from glotouch_bt.robot import Array, Conditions, Gripper, Pose, TactileFrame
 from glotouch_bt.robot.scene import stream
 
 MAX_SAME_TRAVEL_M = 1e-5
@@ -26,15 +27,38 @@ MAX_SAME_FORCE_N = 0.5
 """Do not solve the gel again while the jaws' forces have changed less than this. Source: ours."""
 
 
-def _gel(built: BuiltWorld) -> GelSensor:
+def gel_of_trial(gripper: Gripper, conditions: Conditions, seed: int, proof: AxisProof) -> GelSensor:
     """Return the gel of both pads, with the stiffness and thickness of the trial."""
-    gripper, c, rng = built.description.gripper, built.conditions, stream(built.seed, "gel material")
+    c, rng = conditions, stream(seed, "gel material")
     stiffer, thicker = float(rng.uniform(*c.gel_stiffness_factor)), float(rng.uniform(*c.gel_thickness_factor))
-    built.proof.saw("gel_stiffness_factor", 1.0, stiffer)
-    built.proof.saw("gel_thickness_factor", 1.0, thicker)
+    proof.saw("gel_stiffness_factor", 1.0, stiffer)
+    proof.saw("gel_thickness_factor", 1.0, thicker)
     # A Winkler modulus is the confined modulus over the thickness.
     stiffness, bottom = STIFFNESS_N_MM3 * stiffer / thicker, BOTTOM_M * thicker
     return GelSensor(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m, stiffness, bottom_m=bottom)
+
+
+class TaxelErrors:
+    """Errors of single taxels: constant offsets, white noise, dead ones.
+
+    Args:
+        conditions, seed: Sizes of the errors, and the source of their draws.
+        shape: (rows, cols) of a map.
+    """
+
+    def __init__(self, conditions: Conditions, seed: int, shape: tuple[int, int]) -> None:
+        self._noise_m, self._rng = conditions.tactile_noise_sd_m, stream(seed, "tactile")
+        fixed = stream(seed, "gel")
+        self._offset = fixed.uniform(*conditions.tactile_offset_m, (2, *shape))
+        self._dead = fixed.random((2, *shape)) < conditions.tactile_dead_fraction
+
+    def spoil(self, maps_m: Array) -> Array:
+        """Return the maps (2, rows, cols) with these errors; NaN for a dead taxel."""
+        if self._noise_m > 0.0:
+            maps_m = maps_m + self._noise_m * self._rng.standard_normal(maps_m.shape)
+        maps_m = maps_m + self._offset
+        maps_m[self._dead] = np.nan
+        return maps_m
 
 
 def body_pose(data: mujoco.MjData, body: int) -> Pose:
@@ -93,6 +117,7 @@ class Tactile:
         shift_m: Sum of both pads' gel shifts at the last sample: the additional closing of jaws with a soft gel; part
             of the reported aperture.
         depth: Errors of the depth maps.
+        taxels: Errors of single taxels.
     """
 
     def __init__(self, built: BuiltWorld) -> None:
@@ -100,7 +125,7 @@ class Tactile:
         self._data = built.data
         self._pads = PadContacts(built.model, built.data, handles)
         self._site = handles.pads_site
-        self._gel = _gel(built)
+        self._gel = gel_of_trial(gripper, conditions, built.seed, built.proof)
         self.depth = DepthErrors(conditions, built.seed, gripper.pad_window_m, gripper.pad_shape, built.proof)
         self._proof, self._seed = built.proof, built.seed
         self._jitter = stream(built.seed, "frame jitter")
@@ -109,11 +134,7 @@ class Tactile:
         self._smooth = handles.probe_body
         self._rays: dict[int, SurfaceRays] = {}
         self._c = conditions
-        self._rng = stream(built.seed, "tactile")
-        fixed = stream(built.seed, "gel")
-        shape = (2, *gripper.pad_shape)
-        self._offset = fixed.uniform(*conditions.tactile_offset_m, shape)
-        self._dead = fixed.random(shape) < conditions.tactile_dead_fraction
+        self.taxels = TaxelErrors(conditions, built.seed, gripper.pad_shape)
         self._frames: deque[tuple[float, TactileFrame]] = deque()
         self._tick = -1
         self._solved = (np.inf, np.inf, 0.0, 0.0)
@@ -193,9 +214,5 @@ class Tactile:
         return np.stack([self._zero, self._zero] if p is None else [p.left_m, p.right_m])
 
     def _frame(self, stamp_s: float, maps: Array) -> TactileFrame:
-        maps = self.depth.shown(maps)
-        if self._c.tactile_noise_sd_m > 0.0:
-            maps = maps + self._c.tactile_noise_sd_m * self._rng.standard_normal(maps.shape)
-        maps = maps + self._offset
-        maps[self._dead] = np.nan
+        maps = self.taxels.spoil(self.depth.shown(maps))
         return TactileFrame(stamp_s, maps[0], maps[1])

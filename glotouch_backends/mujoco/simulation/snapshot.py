@@ -30,7 +30,7 @@ from glotouch_backends.mujoco.simulation.snapshot_check import (
 from glotouch_bt.robot import BadInput, SafetyStop, Snapshot
 
 FORMAT = 1
-PARTS = ("_servo", "_jaws", "_wrist", "_guard", "_tactile", "_depth", "_reports", "proof")
+PARTS = ("_servo", "_jaws", "_wrist", "_guard", "_tactile", "_depth", "_taxels", "_reports", "proof")
 FIXED: Mapping[str, frozenset[str]] = {
     "MujocoRobot": frozenset(
         (
@@ -44,7 +44,9 @@ FIXED: Mapping[str, frozenset[str]] = {
     "JawServo": frozenset(("_gripper", "_proof")),
     "WristSensor": frozenset(("_P_in_S", "_proof", "_gain_error", "_cross_talk", "_reach", "_jitter", "_calibrated")),
     "HardLimitGuard": frozenset(("_max_N", "_max_Nm", "_quiet", "_rise_s_m", "_samples_ahead", "tripped")),
-    "Tactile": frozenset(("_data", "_pads", "_site", "_gel", "_meshes", "_rays", "_c", "depth", "_proof", "_smooth")),
+    "Tactile": frozenset(
+        ("_data", "_pads", "_site", "_gel", "_meshes", "_rays", "_c", "depth", "taxels", "_proof", "_smooth")
+    ),
     "DepthErrors": frozenset(
         (
             "_proof",

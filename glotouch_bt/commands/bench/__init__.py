@@ -15,6 +15,7 @@ from glotouch_bt.commands.bench.match import match
 from glotouch_bt.commands.bench.pause import pause
 from glotouch_bt.commands.bench.resume import resume
 from glotouch_bt.commands.bench.retrieve import retrieve
+from glotouch_bt.commands.bench.robustness import robustness
 from glotouch_bt.commands.bench.search import search
 from glotouch_bt.commands.bench.speed import speed
 
@@ -28,6 +29,7 @@ for _experiment in (
     retrieve,
     search,
     match,
+    robustness,
     contact,
     detection,
     speed,

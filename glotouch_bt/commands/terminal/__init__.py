@@ -7,6 +7,7 @@ from glotouch_bt.commands.terminal.bench_tables import (
     print_contact,
     print_match,
     print_retrieve,
+    print_robustness,
     print_search,
     print_speed,
 )

@@ -34,6 +34,28 @@ def print_retrieve(summary: dict[str, Any], folder: Path) -> None:
     )
 
 
+def print_robustness(summary: dict[str, Any], folder: Path) -> None:
+    """Print a sweep of the axes: right and accepted, wrong and absent taken, for each level."""
+    from glotouch_bt.bench.robustness import AXES
+
+    rows = []
+    for name, points in summary["axes"].items():
+        for p in points:
+            label = f"{AXES[name].label}: {p['level'] * AXES[name].shown:g}" if name in AXES else summary["conditions"]
+            taken = [f"{100 * p[key]['mean']:.0f} %" for key in ("wrong", "absent_taken")]
+            accepted = p["accepted"]
+            shown = f"{100 * accepted['mean']:.0f} % [{100 * accepted['lo']:.0f}, {100 * accepted['hi']:.0f}]"
+            rows.append((label, shown, *taken))
+    n = len(summary["seeds"])
+    print_table(
+        f"recognition with one axis varied, {summary['conditions']} otherwise, {n} boxes a point",
+        ("axis and level", "right and accepted [95 %]", "wrong", "absent taken"),
+        rows,
+    )
+    where = f"{folder / 'robustness.png'}\n{folder / 'summary.json'}"
+    EscapingConsole().print(where, markup=False, highlight=False, soft_wrap=True)
+
+
 def print_speed(summary: dict[str, Any], folder: Path) -> None:
     """Print a speed study: factors with their range, cycle times, breakdown of the wall time."""
 

@@ -1,0 +1,4 @@
+"""`bench robustness`: how much each property of objects, gel, gripper and arm matters to recognition."""
+
+from glotouch_bt.bench.robustness.axes import AXES
+from glotouch_bt.bench.robustness.bench import RobustnessCampaign, run_campaign

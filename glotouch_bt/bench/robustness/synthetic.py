@@ -1,0 +1,94 @@
+"""TouchSets of standing objects: traced, touched on top and squeezed in the fixed scheme, without a robot."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from glotouch_bt.bench.match.dataset import Layout, Touched
+from glotouch_bt.perception.recognition.model import TIP_RADIUS_M, traced_tips
+from glotouch_bt.perception.touch import (
+    Candidate,
+    Contour,
+    Layer,
+    TouchSequence,
+    TouchSet,
+    fit_contour,
+    pad_noise_m,
+)
+from glotouch_bt.robot import Array
+from glotouch_bt.robot.scene import stream
+from glotouch_bt.robot.simulation import Place, TouchSampler
+
+FORCE_N = 10.0
+"""Closing force. Source: `ClosureParams`."""
+LOWEST_M, TOP_OVERLAP_M, LAYERS = 0.021, 0.008, 4
+"""Least height of the pads, distance of the highest below the top, closures a sequence. Source: `ClosureParams`."""
+CONTACTS = 12
+"""Contacts of a trace. Source: `refine_outline`, 8 to 14 in missions."""
+CONTACT_SD_M, HEIGHT_SD_M = 3e-4, 5e-4
+"""Errors of a contact and of a top besides those of the conditions. Source: `bench contact`, nominal."""
+DRIFT_M, DRIFT_RAD = 1.5e-3, math.radians(3.0)
+"""Motion of the object between two sequences. Source: `LikelihoodParams`, as measured."""
+
+
+def sample_layout(sampler: TouchSampler, seed: int, conditions: str) -> Layout:
+    """Touch every object once; equal seeds draw equal stances whatever the conditions."""
+    touched = []
+    for index, name in enumerate(sampler.names):
+        rng = stream(seed, f"stances {name}")
+        touchset, place = _touch(sampler, name, index, rng)
+        touched.append(Touched(touchset, name, place, 0.0))
+    return Layout(seed, conditions, sampler.names, tuple(touched))
+
+
+def _touch(sampler: TouchSampler, name: str, index: int, rng: np.random.Generator) -> tuple[TouchSet, Place]:
+    solid = sampler.solid(name).as_trimesh()
+    place: Place = (*rng.uniform(-0.05, 0.05, 2).tolist(), float(rng.uniform(-math.pi, math.pi)))
+    top_m = float(np.asarray(solid.vertices)[:, 2].max()) + HEIGHT_SD_M * float(rng.standard_normal())
+    aim = np.asarray(solid.bounds)[:, :2].mean(axis=0) + 3e-3 * rng.standard_normal(2)
+    tips = traced_tips(solid, aim, CONTACTS, float(rng.uniform(0.0, 2 * math.pi)))
+    approach = (aim - tips) / np.linalg.norm(aim - tips, axis=1, keepdims=True)
+    c, s = math.cos(place[2]), math.sin(place[2])
+    turn = np.array([[c, -s], [s, c]])
+    tips_K = tips @ turn.T + np.array(place[:2]) + CONTACT_SD_M * rng.standard_normal(tips.shape)
+    contour = fit_contour(tips_K + sampler.probe_errors_m(approach @ turn.T), TIP_RADIUS_M)
+    candidate = Candidate(index, contour, top_m, 1.0, ())
+    heights = np.linspace(LOWEST_M, max(top_m - TOP_OVERLAP_M, LOWEST_M), LAYERS)
+    if heights[-1] - heights[0] < 0.003:
+        heights = heights[:1]
+    sequences = []
+    for stance in _stances(contour, rng):
+        drift = rng.standard_normal(3) * [DRIFT_M, DRIFT_M, DRIFT_RAD]
+        place = (place[0] + drift[0], place[1] + drift[1], place[2] + drift[2])
+        layers = []
+        for height in heights:
+            layer, place = _close(sampler, name, place, stance, float(height))
+            layers.append(layer)
+        sequences.append(TouchSequence(np.array(stance[:2]), stance[2], tuple(layers)))
+    return TouchSet(candidate, tuple(sequences)), place
+
+
+def _stances(contour: Contour, rng: np.random.Generator) -> list[Place]:
+    """Return the hand's places of the fixed scheme: three directions of a round object, three tracks of a box."""
+    x, y = contour.centre_K_m.tolist()
+    if contour.kind == "round":
+        first = float(rng.uniform(0.0, math.pi))
+        return [(x, y, first + k * math.pi / 3) for k in range(3)]
+    along = np.array([math.cos(contour.yaw_rad), math.sin(contour.yaw_rad)])
+    return [
+        (x + k * contour.size_m[0] * along[0], y + k * contour.size_m[0] * along[1], contour.yaw_rad)
+        for k in (-0.25, 0.0, 0.25)
+    ]
+
+
+def _close(sampler: TouchSampler, name: str, place: Place, hand: Place, height_m: float) -> tuple[Layer, Place]:
+    free = sampler.untouched()
+    done = sampler.close(name, place, hand, height_m, FORCE_N)
+    position: Array = np.array(hand[:2])
+    if done is None:
+        empty = np.zeros_like(free.left_m)
+        return Layer(height_m, 0.0, position, hand[2], empty, empty, 0.0, False, "jaws met"), place
+    left, right, noise = done.frame.left_m, done.frame.right_m, pad_noise_m([free])
+    return Layer(height_m, done.aperture_m, position, hand[2], left, right, FORCE_N, True, noise_m=noise), done.place

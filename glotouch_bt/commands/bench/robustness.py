@@ -1,0 +1,46 @@
+"""`glotouch bench robustness`: recognition against each axis of the conditions alone."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from glotouch_bt.commands import shared
+
+
+@shared.guarded
+def robustness(
+    boxes: Annotated[int, typer.Option(min=1, help="boxes a point; every target of a box is one decision")] = 10,
+    seed: shared.FirstSeed = 0,
+    axis: Annotated[list[str] | None, typer.Option(help="only these axes (default: all)")] = None,
+    conditions: shared.Conditions = "nominal",
+    objects: shared.Objects = None,
+    backend: shared.Backend = "mujoco",
+    workers: shared.Workers = 2,
+    out: shared.BenchFolder = None,
+    json_: shared.SummaryJson = False,
+) -> None:
+    """Robustness: recognition with one property of gel, gripper, arm or objects varied at a time.
+
+    On touches of standing objects, computed without a robot in about a second a box.
+    """
+    from glotouch_bt.bench.robustness import AXES, RobustnessCampaign, run_campaign
+    from glotouch_bt.commands.terminal import print_robustness
+
+    shared.check_names(conditions, backend)
+    campaign = RobustnessCampaign(
+        seeds=tuple(range(seed, seed + boxes)),
+        axes=tuple(axis or AXES),
+        conditions=conditions,
+        objects=objects,
+        backend=backend,
+        out=shared.bench_folder(out, "robustness"),
+    )
+
+    def told(row: dict[str, Any]) -> str:
+        where = f"{row['axis']} {row['level']:g}" if row["axis"] else conditions
+        return f"{where} seed {row['seed']}: {row['accepted']} of {row['decisions']} right and accepted{row['cause']}"
+
+    summary = shared.run_in_pool(run_campaign, campaign, workers, told)
+    shared.print_summary(summary, campaign.out, print_robustness, json_)
