@@ -97,11 +97,8 @@ def acquire(
     """
     pad = pad or PadSpec()
     solid = mesh.as_trimesh()
-    gel = PadSpec(
-        pad.window_m, pad.shape, pad.depth_m,
-        pad.stiffness_N_m3 * float(np.exp(rng.normal(0, disturbance.stiffness_sd))), pad.limit_m, FORCE_N,
-    )  # fmt: skip
-    candidate = _trace(solid, np.array(pose_K_O), disturbance, rng, index)
+    gel = true_gel(pad, disturbance, rng)
+    candidate = traced(solid, np.array(pose_K_O), disturbance, rng, index)
     pose = np.array(pose_K_O, dtype=np.float64)
     contour = candidate.contour
     if contour.kind == "round":
@@ -121,13 +118,20 @@ def acquire(
         layers = []
         for h in heights:
             pose[2] += rng.normal(0, disturbance.turn_rad)
-            layer, pose = _squeeze(solid, pose, position, float(yaw), float(h), datum, bias, disturbance, gel, rng)
+            layer, pose = squeeze(solid, pose, position, float(yaw), float(h), datum, bias, disturbance, gel, rng)
             layers.append(layer)
         sequences.append(TouchSequence(np.asarray(position), float(yaw), tuple(layers)))
     return TouchSet(candidate, tuple(sequences)), (float(pose[0]), float(pose[1]), float(pose[2]))
 
 
-def _trace(solid: trimesh.Trimesh, pose: Array, d: Disturbance, rng: np.random.Generator, index: int) -> Candidate:
+def true_gel(pad: PadSpec, d: Disturbance, rng: np.random.Generator) -> PadSpec:
+    """Return the pad with the gel that is really there."""
+    stiffness = pad.stiffness_N_m3 * float(np.exp(rng.normal(0, d.stiffness_sd)))
+    return PadSpec(pad.window_m, pad.shape, pad.depth_m, stiffness, pad.limit_m, FORCE_N)
+
+
+def traced(solid: trimesh.Trimesh, pose: Array, d: Disturbance, rng: np.random.Generator, index: int) -> Candidate:
+    """Return the candidate that the probe would trace."""
     middle = minimum_rectangle(np.asarray(solid.vertices)[:, :2])[3]
     tips = traced_tips(solid, middle + rng.normal(0, 4e-3, 2), int(rng.integers(8, 13)), rng.uniform(0, 2 * np.pi))
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -138,7 +142,7 @@ def _trace(solid: trimesh.Trimesh, pose: Array, d: Disturbance, rng: np.random.G
     return Candidate(index, contour, height, 1.0, ())
 
 
-def _squeeze(
+def squeeze(
     solid: trimesh.Trimesh, pose: Array, position: Array, yaw: float, height: float, datum: float, bias: float,
     d: Disturbance, gel: PadSpec, rng: np.random.Generator,
 ) -> tuple[Layer, Array]:  # fmt: skip

@@ -56,6 +56,10 @@ TOLERANCE_M = 0.0001
 """Vertices that protrude less than this from the trimmed hull are dropped. Source: ours."""
 MAX_GAP_M = 0.002
 """Refuse a decomposition if a vertex of the mesh lies further outside every hull. Source: ours."""
+MAX_WAIT_RATIO = 8.0
+"""See `Attempt`; the process is a nice one, and others may use the machine. Source: ours."""
+TOO_LONG = 75
+"""Exit code of `coacd_worker` after its processor time."""
 _POLL_S = 10.0
 """Interval between two progress messages."""
 
@@ -66,7 +70,7 @@ class Attempt:
 
     Attributes:
         parameters: Keyword arguments of `coacd.run_coacd`.
-        limit_s: Wall time after which it is killed.
+        limit_s: Processor time after which it ends; `MAX_WAIT_RATIO` times as much wall time is the longest wait.
     """
 
     parameters: dict[str, float | int | str | bool]
@@ -218,25 +222,27 @@ def _run_coacd(mesh: Mesh, attempt: Attempt, say: Progress) -> list[Array]:
         np.savez(source, vertices=vertices, faces=faces, shells=shell_labels(vertices, faces))
         process = subprocess.Popen(
             # -P: keep the worker's folder off sys.path, where its files would shadow installed modules
-            [sys.executable, "-P", str(worker), str(source), str(target), json.dumps(attempt.parameters)],
+            [sys.executable, "-P", worker, source, target, json.dumps(attempt.parameters), str(attempt.limit_s)],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             env={**os.environ, "OMP_NUM_THREADS": "1"},
         )
         try:
-            waited_s = 0.0
+            waited_s, longest_s = 0.0, MAX_WAIT_RATIO * attempt.limit_s
             while True:
                 try:
-                    code = process.wait(timeout=min(_POLL_S, attempt.limit_s - waited_s))
+                    code = process.wait(timeout=min(_POLL_S, longest_s - waited_s))
                     break
                 except subprocess.TimeoutExpired:
-                    waited_s += min(_POLL_S, attempt.limit_s - waited_s)
-                    if waited_s >= attempt.limit_s:
-                        raise _CutFailed(f"not finished after {attempt.limit_s:.0f} s") from None
+                    waited_s += min(_POLL_S, longest_s - waited_s)
+                    if waited_s >= longest_s:
+                        raise _CutFailed(f"not finished after {longest_s:.0f} s") from None
                     say(f"{mesh.name}: still cutting, {waited_s:.0f} s")
         finally:
             process.kill()
             process.wait()
+        if code == TOO_LONG:
+            raise _CutFailed(f"not finished after {attempt.limit_s:.0f} s of processor time")
         if code != 0 or not target.is_file():
             raise _CutFailed(f"CoACD ended with code {code}")
         with np.load(target) as data:

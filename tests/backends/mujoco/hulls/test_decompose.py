@@ -215,6 +215,14 @@ def test_too_slow_cutting_falls_back_to_the_convex_hull(tmp_path: Path, monkeypa
     assert all(p.poll() is not None for p in started)  # killed, not left running
 
 
+def test_a_run_of_coacd_is_limited_by_its_processor_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy machine must not change the collision shape: it would be cached for good."""
+    monkeypatch.setattr(room, "MAX_WAIT_RATIO", 1000.0)
+    mesh = as_mesh(trimesh.creation.torus(0.03, 0.012, major_sections=128, minor_sections=64), tmp_path, "ring")
+    with pytest.raises(room._CutFailed, match="of processor time"):
+        room._run_coacd(mesh, room.Attempt({**room.FINE.parameters, "mcts_iterations": 2000}, 0.2), print)
+
+
 def test_parts_that_do_not_cover_the_mesh_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = as_mesh(l_shape(), tmp_path, "shape")
     stump = mesh.vertices_m[mesh.vertices_m[:, 0] < 0.021]
@@ -343,7 +351,7 @@ def test_the_worker_ends_when_its_parent_is_killed(tmp_path: Path) -> None:
     np.savez(source, vertices=solid.vertices, faces=solid.faces, shells=np.zeros(len(solid.faces), dtype=int))
     worker = Path(room.__file__).with_name("coacd_worker.py")
     parameters = json.dumps({**room.FINE.parameters, "mcts_iterations": 2000})
-    command = [sys.executable, "-P", str(worker), str(source), str(tmp_path / "out.npz"), parameters]
+    command = [sys.executable, "-P", str(worker), str(source), str(tmp_path / "out.npz"), parameters, "60"]
     parent = subprocess.Popen(
         [
             sys.executable,
