@@ -78,8 +78,8 @@ class NextProbe(Skill):
     def _by_target(self, candidates: tuple[Candidate, ...], left: list[ProbeTouch]) -> ProbeTouch | None:
         mesh = load_target(self.params.target, self.context.world.objects.folder)
         model = load_target_model(mesh, self.context.arm.description.gripper)
-        felt = {t.candidate.index: t for t in self.felt or ()}
-        touchsets = tuple(felt.get(c.index, TouchSet(c, ())).measured(c) for c in candidates)
+        felt = {t.candidate.index: t.sequences for t in self.felt or ()}
+        touchsets = tuple(TouchSet(c, felt.get(c.index, ())) for c in candidates)
         belief = recognition.infer_belief(model, touchsets)
         chosen = next_probe_touch(belief, [self._option(c, left) for c in candidates if c.index in _indices(left)])
         out = excluded(belief)

@@ -118,8 +118,8 @@ class TouchNext(Skill):
             raise self.NO_CANDIDATES("there is no candidate to touch", candidates=len(candidates))
         touchsets: tuple[TouchSet, ...] = self.felt or ()
         if [_state(t.candidate) for t in touchsets] != [_state(c) for c in wanted]:  # found, rejected, or measured anew
-            made = {t.candidate.index: t for t in touchsets}
-            touchsets = tuple(made.get(c.index, TouchSet(c, ())).measured(c) for c in wanted)
+            made = {t.candidate.index: t.sequences for t in touchsets}
+            touchsets = tuple(TouchSet(c, made.get(c.index, ())) for c in wanted)
             self._refused.clear()
             self._vain.clear()
             self._down = None
@@ -141,7 +141,7 @@ class TouchNext(Skill):
             yield from self._end(belief, down, why or "no closure is expected to tell more")
             return
         try:
-            down, layer = yield from self._touch(tuple(t.now for t in touchsets), chosen, down)
+            down, layer = yield from self._touch(candidates, chosen, down)
         except MotionRefused as refusal:
             self._refused.add(_key(chosen))
             self._vain[chosen.closure.candidate] = self._vain.get(chosen.closure.candidate, 0) + 1
@@ -236,7 +236,7 @@ class TouchNext(Skill):
         pose = hand_pose_B(
             arm, self.context.world.container, np.array([*option.at.position_K_m, z]), option.at.yaw_K_rad
         )
-        others = [t.now for t in belief.touchsets if t.candidate.index != option.closure.candidate]
+        others = [t.candidate for t in belief.touchsets if t.candidate.index != option.closure.candidate]
         with keeping_clear_of(arm, others):
             try:
                 require_clear(arm, pose, option.at.opening_m, CLEARANCE_M)

@@ -1,9 +1,9 @@
 """A TouchSet as one npz file.
 
 A file holds columns, `<part>.<field>`: `candidate`, `contour`, `contact`, `sequence` and `layer` rows, in the order of
-the TouchSet, plus `sequence.layers` (how many layers each sequence has), `traced_after` and `version`. Floats are
-stored as float64, bit for bit; nothing is pickled. A field added by a later release becomes a new column; a file
-without it is read with the field's default.
+the TouchSet, plus `sequence.layers` (how many layers each sequence has) and `version`. Floats are stored as float64,
+bit for bit; nothing is pickled. A field added by a later release becomes a new column; a file without it is read with
+the field's default.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def save_touchset(path: Path, touchset: TouchSet) -> None:
     Raises:
         BadInput: Rows of one field differ in shape (depth maps of two sensors), or the file cannot be written.
     """
-    columns: dict[str, Column] = {"version": np.array(VERSION), "traced_after": np.array(touchset.traced_after)}
+    columns: dict[str, Column] = {"version": np.array(VERSION)}
     columns |= _columns("candidate", [touchset.candidate])
     columns |= _columns("contour", [touchset.candidate.contour])
     columns |= _columns("contact", touchset.candidate.contacts)
@@ -84,9 +84,6 @@ def _touchset(columns: Columns) -> TouchSet:
     count = columns.get("sequence.layers")
     if count is None or count.ndim != 1 or count.dtype.kind != "i" or (count < 0).any():
         raise BadInput("sequence.layers: must be one count a sequence")
-    traced_after = columns.get("traced_after", np.array(0))
-    if traced_after.shape != () or traced_after.dtype.kind != "i" or traced_after < 0:
-        raise BadInput("traced_after: must be a number of layers")
     (contour,) = _rows(Contour, "contour", columns, 1)
     contacts = _rows(Contact, "contact", columns)
     (candidate,) = _rows(Candidate, "candidate", columns, 1, contour=contour, contacts=contacts)
@@ -94,8 +91,7 @@ def _touchset(columns: Columns) -> TouchSet:
     ends = np.cumsum(count)
     parts = [layers[end - n : end] for end, n in zip(ends.tolist(), count.tolist(), strict=True)]
     references = _rows(TouchSequence, "sequence", columns, len(count), layers=())
-    sequences = tuple(replace(s, layers=mine) for s, mine in zip(references, parts, strict=True))
-    return TouchSet(candidate, sequences, int(traced_after))
+    return TouchSet(candidate, tuple(replace(s, layers=mine) for s, mine in zip(references, parts, strict=True)))
 
 
 def _plain(cls: type[Any]) -> list[tuple[Field[Any], Any]]:

@@ -29,7 +29,7 @@ class LayerEvidence:
         weight: 1 with both pads in contact, `ONE_SIDED` with one.
         upper_only: Only one pad in contact: `width_m` is an upper bound of the width in the window.
         yaw_rad: Yaw of the hand in K.
-        along_m: x_P coordinate of the hand's middle, from the contour's centre, which moves with the object's slides.
+        along_m: x_P coordinate of the hand's middle, from the contour's centre.
         height_m: Height of the pads' mid-point.
         images: (left, right) features (35,); None for a pad without contact.
         sunk_m: (left, right) indentation of the highest point.
@@ -69,18 +69,18 @@ def read_evidence(touchset: TouchSet, pad: PadSpec) -> Evidence:
         ParamError: A depth map has fewer than 7 x 5 taxels.
     """
     centre = touchset.candidate.contour.centre_K_m
-    numbered = [(k, h, layer) for k, s in enumerate(touchset.sequences) for h, layer in enumerate(s.layers)]
     used = [
-        (k, h, layer, centre + slid)
-        for (k, h, layer), slid in zip(numbered, touchset.slid_K_m[:-1], strict=True)
+        (k, h, layer)
+        for k, sequence in enumerate(touchset.sequences)
+        for h, layer in enumerate(sequence.layers)
         if _usable(layer)
     ]
-    maps = [d for *_, layer, _ in used for d in (layer.left_m, layer.right_m)]
-    noises = zip(*(layer.noise_m for *_, layer, _ in used), strict=True)
+    maps = [d for *_, layer in used for d in (layer.left_m, layer.right_m)]
+    noises = zip(*(layer.noise_m for *_, layer in used), strict=True)
     noise_m = [math.sqrt(float(np.mean(np.square(n)))) for n in noises]
     tops = contact_tops(maps, noise_m * len(used), pad)
     layers = []
-    for i, (k, h, layer, middle) in enumerate(used):
+    for i, (k, h, layer) in enumerate(used):
         sunk = (tops[2 * i], tops[2 * i + 1])
         felt = sum(s > 0 for s in sunk)
         if felt == 0:
@@ -90,7 +90,7 @@ def read_evidence(touchset: TouchSet, pad: PadSpec) -> Evidence:
             for d, s in zip((layer.left_m, layer.right_m), sunk, strict=True)
         )
         yaw, z, width = float(layer.yaw_rad), layer.height_m, layer.aperture_m + sum(sunk)
-        along = float(hand_axes(np.asarray(layer.yaw_rad))[0] @ (np.asarray(layer.position_K_m) - middle))
+        along = float(hand_axes(np.asarray(layer.yaw_rad))[0] @ (np.asarray(layer.position_K_m) - centre))
         weight = 1.0 if felt == 2 else ONE_SIDED
         layers.append(LayerEvidence(k, h, width, weight, felt < 2, yaw, along, z, (left, right), sunk))
     both = sum(e.weight for e in layers if not e.upper_only)

@@ -57,9 +57,7 @@ def fitted_pose(
     first = float(e.yaw_rad[min(layer.sequence for layer in e.layers)])
     phi0 = yaw_index * step
     theta = math.remainder(first - phi0, 2 * math.pi)
-    slid = touchset.slid_K_m
-    centre = np.asarray(touchset.candidate.contour.centre_K_m, dtype=np.float64) + slid[-1]
-    before = np.cumsum([0, *(len(s.layers) for s in touchset.sequences)])
+    centre = np.asarray(touchset.candidate.contour.centre_K_m, dtype=np.float64)
     last = max(layer.sequence for layer in e.layers)
     normal = np.eye(2) / CENTRE_SD_M**2
     right = centre / CENTRE_SD_M**2
@@ -81,8 +79,7 @@ def fitted_pose(
         middle = scale * float(model.middle_m[i, j, k])
         if math.isfinite(middle):
             w = age / ACROSS_SD_M**2
-            since = slid[-1] - slid[before[layer.sequence] + layer.index + 1]
-            place = y @ (np.asarray(raw.position_K_m) + since) - middle + 0.5 * (layer.sunk_m[0] - layer.sunk_m[1])
+            place = y @ np.asarray(raw.position_K_m) - middle + 0.5 * (layer.sunk_m[0] - layer.sunk_m[1])
             normal += w * np.outer(y, y)
             right += w * y * place
     middle_K = np.linalg.solve(normal, right)

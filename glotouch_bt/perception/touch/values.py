@@ -6,7 +6,7 @@ K: origin at the centre of the container's floor, z up. Planar quantities are (x
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -123,16 +123,6 @@ class Candidate:
         along = self.extent_K_m @ np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
         return float(along.min()), float(along.max())
 
-    def moved_by(self, step_K_m: Array) -> Candidate:
-        """Return the candidate with its outline and contacts displaced by (2,) in K."""
-        outline = self.contour
-        contour = replace(
-            outline, centre_K_m=outline.centre_K_m + step_K_m, boundary_K_m=outline.boundary_K_m + step_K_m
-        )
-        flat = np.array([*step_K_m, 0.0])
-        contacts = (replace(c, tip_K_m=c.tip_K_m + flat, point_K_m=c.point_K_m + step_K_m) for c in self.contacts)
-        return replace(self, contour=contour, contacts=tuple(contacts))
-
     def strip_span_m(self, yaw_rad: float, middle_m: float, half_m: float) -> tuple[float, float] | None:
         """Return (minimum, maximum) coordinate across a strip of the object; None if none of it is there.
 
@@ -218,36 +208,12 @@ class TouchSet:
     Attributes:
         candidate: The squeezed object.
         sequences: Usually three: three yaws if round, three parallel tracks if box-like.
-        traced_after: Number of layers that were made before the candidate's outline was traced.
     """
 
     candidate: Candidate
     sequences: tuple[TouchSequence, ...]
-    traced_after: int = 0
 
     @property
     def layers(self) -> tuple[Layer, ...]:
         """All layers of all sequences."""
         return tuple(layer for s in self.sequences for layer in s.layers)
-
-    @property
-    def slid_K_m(self) -> Array:
-        """(n + 1, 2) place of the object against its traced outline: before each of the n layers, and after the last.
-
-        The sum of the layers' slides, which are along +y_P; one that was not estimated counts as 0.
-        """
-        steps = [layer.slide_m * np.array([math.sin(layer.yaw_rad), -math.cos(layer.yaw_rad)])
-                 if math.isfinite(layer.slide_m) and math.isfinite(layer.yaw_rad) else np.zeros(2)
-                 for layer in self.layers]  # fmt: skip
-        slid = np.cumsum([np.zeros(2), *steps], axis=0)
-        return np.asarray(slid - slid[min(self.traced_after, len(steps))])
-
-    def measured(self, candidate: Candidate) -> TouchSet:
-        """Return the touches with the candidate as measured last; new contacts trace it where it is now."""
-        anew = len(candidate.contacts) != len(self.candidate.contacts)
-        return replace(self, candidate=candidate, traced_after=len(self.layers) if anew else self.traced_after)
-
-    @property
-    def now(self) -> Candidate:
-        """The candidate where the slides left it."""
-        return self.candidate.moved_by(self.slid_K_m[-1])

@@ -117,12 +117,11 @@ def misfit_m(touchset: TouchSet, match: Match, model: TargetModel) -> float:
     theta = match.pose_K_O[2]
     middle = _placed(np.array([*model.centre_m, 0.0]), match)[:2]
     off = []
-    slid = touchset.slid_K_m
-    for layer, was in zip(touchset.layers, slid[:-1], strict=True):
+    for layer in touchset.layers:
         if evidence_weight(layer) < 1.0:
             continue
         x = np.array([np.cos(layer.yaw_rad), np.sin(layer.yaw_rad)])
-        along = float(x @ (layer.position_K_m - (middle + was - slid[-1])))
+        along = float(x @ (layer.position_K_m - middle))
         off.append(layer.aperture_m - model.width_at(along, layer.height_m, layer.yaw_rad - theta))
     off = [d for d in off if math.isfinite(d)]
     if len(off) < MIN_LAYERS:
@@ -184,8 +183,7 @@ def _felt(touchset: TouchSet, com_K: Array, gripper: Gripper, side_gap_m: float)
 
     count = len(touchset.sequences)
     later = [count - 1 - k for k, q in enumerate(touchset.sequences) for _ in q.layers]
-    slid = touchset.slid_K_m[:-1]
-    rated = [(worth(l, n), l, s) for l, n, s in zip(touchset.layers, later, slid, strict=True)]
+    rated = [(worth(layer, n), layer) for layer, n in zip(touchset.layers, later, strict=True)]
     rated.sort(key=lambda r: -r[0])
     return [
         GraspPlan(
@@ -193,14 +191,14 @@ def _felt(touchset: TouchSet, com_K: Array, gripper: Gripper, side_gap_m: float)
             position_K_m=np.array([*layer.position_K_m, layer.height_m]),
             yaw_rad=layer.yaw_rad,
             aperture_m=layer.aperture_m,
-            opening_m=_extent(touchset.candidate, layer, was, gripper) + 2 * side_gap_m,
+            opening_m=_extent(touchset.candidate, layer, gripper) + 2 * side_gap_m,
         )
-        for _, layer, was in rated[: 1 + ALTERNATIVES]
+        for _, layer in rated[: 1 + ALTERNATIVES]
     ]
 
 
-def _extent(candidate: Candidate, layer: Layer, slid_K_m: Array, gripper: Gripper) -> float:
+def _extent(candidate: Candidate, layer: Layer, gripper: Gripper) -> float:
     """Return what was traced between the fingers of a closure, or the measured aperture if that is larger."""
-    along = float(np.array([np.cos(layer.yaw_rad), np.sin(layer.yaw_rad)]) @ (layer.position_K_m - slid_K_m))
+    along = float(np.array([np.cos(layer.yaw_rad), np.sin(layer.yaw_rad)]) @ layer.position_K_m)
     span = candidate.strip_span_m(layer.yaw_rad, along, gripper.finger.half_m[0] + STRIP_MARGIN_M)
     return max(span[1] - span[0] if span else 0.0, layer.aperture_m)

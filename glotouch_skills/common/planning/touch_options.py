@@ -107,7 +107,7 @@ def options(
     """
     out: list[Option] = []
     for touchset in touchsets:
-        candidate = touchset.now
+        candidate = touchset.candidate
         heights = layer_heights(candidate, gripper, p)
         here = standing if standing is not None and standing.candidate == candidate.index else None
         if here is not None:
@@ -146,14 +146,10 @@ def _closure(candidate: Candidate, at: Stance, height_m: float) -> Closure:
 
 
 def _used(touchset: TouchSet, at: Stance) -> bool:
-    """Return True if a sequence was taken at this stance of the object where it is now, or half a turn from it."""
-    slid = touchset.slid_K_m
-    before = 0
+    """Return True if a sequence was taken at this stance, or half a turn from it."""
     for s in touchset.sequences:
         turn = (s.yaw_rad - at.yaw_K_rad + 0.5 * np.pi) % np.pi - 0.5 * np.pi
-        place = s.position_K_m + slid[-1] - slid[before]
-        before += len(s.layers)
-        if abs(turn) < SAME_RAD and float(np.linalg.norm(place - at.position_K_m)) < SAME_M:
+        if abs(turn) < SAME_RAD and float(np.linalg.norm(s.position_K_m - at.position_K_m)) < SAME_M:
             return True
     return False
 

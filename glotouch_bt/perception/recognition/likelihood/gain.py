@@ -81,11 +81,9 @@ def predict(model: TargetModel, reading: TouchSetReading, pair: Pair, p: Likelih
     best = order[:POSES]
     weight = np.exp(flat[best] - flat[best].max())
     layers = [o.layer for s in reading.sequences for o in s]
-    sequences, slid = reading.touchset.sequences, reading.touchset.slid_K_m
-    before = np.cumsum([0, *(len(s.layers) for s in sequences)])
-    places = [(sequences[e.sequence].layers[e.index], slid[before[e.sequence] + e.index]) for e in layers]
-    felt = np.array([[*(q.position_K_m + slid[-1] - was), q.height_m, q.yaw_rad] for q, was in places]).reshape(-1, 4)
-    centre = candidate.contour.centre_K_m + slid[-1]
+    places = [reading.touchset.sequences[e.sequence].layers[e.index] for e in layers]
+    felt = np.array([[*q.position_K_m, q.height_m, q.yaw_rad] for q in places]).reshape(-1, 4)
+    centre = candidate.contour.centre_K_m
     yaw_index, z0_index = np.divmod(best, log_pose.shape[1])
     return Prediction(
         candidate, centre, yaw_index, z0[z0_index], weight / weight.sum(), pair.first_rad,
