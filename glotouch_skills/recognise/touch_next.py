@@ -34,9 +34,6 @@ if TYPE_CHECKING:
 
 MAX_VAIN_CLOSURES = 4
 """Number of closures without any plateau after which a candidate is skipped: it is not where it was traced."""
-MAX_VAIN_DESCENTS = 6
-"""Number of closures that could not be made, mostly because the fingers met something, after which a candidate is
-skipped. Source: ours."""
 
 MEASURE_S = CHANGE_S + 34.0
 """Robot time of taking the probe again and measuring one candidate. Source: as of `CHANGE_S` and `next_probe`."""
@@ -91,8 +88,7 @@ class TouchNext(Skill):
         super().__init__(name, params, context)
         self._model: TargetModel | None = None
         self._down: Squeezing | None = None
-        self._refused: set[tuple[int, ...]] = set()
-        self._vain: dict[int, int] = {}
+        self._refused: set[tuple[int, int, int, int]] = set()
         self._hopeless: frozenset[int] = frozenset()
         self._stood_B_m: Array | None = None
 
@@ -101,11 +97,11 @@ class TouchNext(Skill):
         down = None
         if self._down is not None:
             down = (self._down.candidate, self._down.at, self.context.arm.pose_B_P.position_m)
-        return {"refused": tuple(sorted(self._refused)), "vain": tuple(sorted(self._vain.items())), "down": down}
+        return {"refused": tuple(sorted(self._refused)), "down": down}
 
     def recall(self, remembered: Any) -> None:
         """See `Skill`. The hand counts as lowered only if it has not moved when the skill begins."""
-        self._refused, self._vain = set(remembered["refused"]), dict(remembered["vain"])
+        self._refused = set(remembered["refused"])
         if remembered["down"] is not None:
             candidate, at, self._stood_B_m = remembered["down"]
             self._down = Squeezing(self.context, candidate, at, self.params, self.jaw_zero)
@@ -121,7 +117,6 @@ class TouchNext(Skill):
             made = {t.candidate.index: t.sequences for t in touchsets}
             touchsets = tuple(TouchSet(c, made.get(c.index, ())) for c in wanted)
             self._refused.clear()
-            self._vain.clear()
             self._down = None
         down, self._down = self._down, None  # after a preemption the hand's place is unknown
         stood, self._stood_B_m = self._stood_B_m, None
@@ -131,8 +126,7 @@ class TouchNext(Skill):
         yield HOLD  # the computation takes longer than a control period; on hardware the arm holds meanwhile
         belief = recognition.infer_belief(self._target_model(), touchsets)
         vain = (t for t in touchsets if not any(layer.stable for layer in t.layers))
-        unfelt = {t.candidate.index for t in vain if len(t.layers) >= MAX_VAIN_CLOSURES}
-        self._hopeless = frozenset(unfelt | {i for i, n in self._vain.items() if n >= MAX_VAIN_DESCENTS})
+        self._hopeless = frozenset(t.candidate.index for t in vain if len(t.layers) >= MAX_VAIN_CLOSURES)
         why = recognition.enough(belief, self.params.confidence, self._hopeless)
         chosen = None if why else self._choose(belief, down)
         if chosen is not None and chosen.closure.candidate in self._unmeasured(belief):
@@ -144,7 +138,6 @@ class TouchNext(Skill):
             down, layer = yield from self._touch(candidates, chosen, down)
         except MotionRefused as refusal:
             self._refused.add(_key(chosen))
-            self._vain[chosen.closure.candidate] = self._vain.get(chosen.closure.candidate, 0) + 1
             self.event("note", text=f"a closure on candidate {chosen.closure.candidate} was not made: {refusal}")
             return
         self._down = down
@@ -182,7 +175,7 @@ class TouchNext(Skill):
         standing = None
         if down is not None:
             standing = Standing(down.candidate.index, down.at, float(pose_K_P.position_m[2]))
-        found = options(belief.touchsets, standing, pose_K_P.position_m, arm.description.gripper, p, self._vain)
+        found = options(belief.touchsets, standing, pose_K_P.position_m, arm.description.gripper, p)
         found = [o for o in found if _key(o) not in self._refused and o.closure.candidate not in self._hopeless]
         later = self._unmeasured(belief)
         found = [replace(o, seconds=o.seconds + MEASURE_S) if o.closure.candidate in later else o for o in found]
@@ -313,9 +306,9 @@ def _state(candidate: Candidate) -> tuple[int, float, int]:
     return candidate.index, candidate.height_m, len(candidate.contacts)
 
 
-def _key(option: Option) -> tuple[int, ...]:
-    """Return the key of a refused option: candidate, yaw in degrees; height, place along x_P and opening in mm."""
+def _key(option: Option) -> tuple[int, int, int, int]:
+    """Return the key of a refused option: candidate, yaw in degrees, height and place along x_P in mm."""
     at = option.at
     along = float(at.position_K_m @ [np.cos(at.yaw_K_rad), np.sin(at.yaw_K_rad)])
     c = option.closure
-    return c.candidate, round(np.rad2deg(at.yaw_K_rad)), *(round(1e3 * m) for m in (c.height_m, along, at.opening_m))
+    return c.candidate, round(np.rad2deg(at.yaw_K_rad)), round(1e3 * c.height_m), round(1e3 * along)

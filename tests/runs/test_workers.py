@@ -70,7 +70,7 @@ from functools import partial
 from glotouch_bt.runs import Task, WorkerPool, gather
 
 def work(number):
-    print(f"worker {os.getpid()}", flush=True)
+    os.write(1, f"worker {os.getpid()}\\n".encode())  # whole, beside the other worker's
     threading.Event().wait(60)
 
 if __name__ == "__main__":

@@ -76,8 +76,9 @@ def read_evidence(touchset: TouchSet, pad: PadSpec) -> Evidence:
         if _usable(layer)
     ]
     maps = [d for *_, layer in used for d in (layer.left_m, layer.right_m)]
-    noises = zip(*(layer.noise_m for *_, layer in used), strict=True)
-    noise_m = [math.sqrt(float(np.mean(np.square(n)))) for n in noises]
+    noise_m = [
+        math.sqrt(float(np.mean(np.square(n)))) for n in zip(*(layer.noise_m for *_, layer in used), strict=True)
+    ]
     tops = contact_tops(maps, noise_m * len(used), pad)
     layers = []
     for i, (k, h, layer) in enumerate(used):

@@ -38,7 +38,7 @@ def fitted_pose(
     scale: float,
     bias_m: float,
 ) -> tuple[Fit, tuple[float, float, float]]:
-    """Return Fit and pose_K_O (x, y, yaw), after the last layer, by weighted least squares over the layers.
+    """Return Fit and pose_K_O (x, y, yaw) by weighted least squares over the layers.
 
     Each layer gives the position along x_P (fitted shift) and, more precisely, along y_P: the jaws centre the point
     halfway between the two supports, corrected for unequal indentations.

@@ -123,27 +123,6 @@ class Candidate:
         along = self.extent_K_m @ np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
         return float(along.min()), float(along.max())
 
-    def strip_span_m(self, yaw_rad: float, middle_m: float, half_m: float) -> tuple[float, float] | None:
-        """Return (minimum, maximum) coordinate across a strip of the object; None if none of it is there.
-
-        Args:
-            yaw_rad: Direction x in K along which the strip is cut out.
-            middle_m: Coordinate of its middle along x, from K's origin.
-            half_m: Half its length along x; the returned coordinates are along y, a quarter turn from x.
-        """
-        x = np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
-        frame = np.column_stack([x, [-x[1], x[0]]])
-        outline = self.contour.outline_K_m(180) @ frame
-        points = np.array([c.point_K_m for c in self.contacts]).reshape(-1, 2) @ frame
-        found = [p[np.abs(p[:, 0] - middle_m) <= half_m, 1] for p in (outline, points)]
-        a, b = outline[:-1], outline[1:]
-        for edge in (middle_m - half_m, middle_m + half_m):
-            cut = (a[:, 0] - edge) * (b[:, 0] - edge) < 0.0
-            share = (edge - a[cut, 0]) / (b[cut, 0] - a[cut, 0])
-            found.append(a[cut, 1] + share * (b[cut, 1] - a[cut, 1]))
-        across = np.concatenate(found)
-        return (float(across.min()), float(across.max())) if across.size else None
-
     @property
     def extent_K_m(self) -> Array:
         """(n, 2) contact points and outline vertices, in K. Protruding parts are only in the contacts."""

@@ -17,7 +17,6 @@ from glotouch_bt.robot import Array, Gripper, ParamError
 from glotouch_bt.robot.scene import Mesh
 from glotouch_skills.common.planning.grasp_holds import AREA_SCALE, LEVER_SCALE_M, Holds, holds_of
 from glotouch_skills.common.planning.squeeze_motion import lowest_pads_m
-from glotouch_skills.common.planning.squeeze_plan import STRIP_MARGIN_M
 
 if TYPE_CHECKING:
     from glotouch_bt.perception.recognition import TargetModel
@@ -107,7 +106,7 @@ def plan_grasp(
     if match.fit is not None and misfit_m(touchset, match, model) <= MAX_MISFIT_M:
         holds = holds_of(model, com, gripper, lowest_pads_m(model.height_m, gripper), FORCE_N)
         fitted = _fitted(touchset.candidate.index, match, model, holds, side_gap_m)
-    felt = _felt(touchset, _placed(com, match), gripper, side_gap_m)
+    felt = _felt(touchset, _placed(com, match), side_gap_m)
     plans = [*fitted, *felt][: 1 + ALTERNATIVES]
     return replace(plans[0], alternatives=tuple(plans[1:]))
 
@@ -120,8 +119,7 @@ def misfit_m(touchset: TouchSet, match: Match, model: TargetModel) -> float:
     for layer in touchset.layers:
         if evidence_weight(layer) < 1.0:
             continue
-        x = np.array([np.cos(layer.yaw_rad), np.sin(layer.yaw_rad)])
-        along = float(x @ (layer.position_K_m - middle))
+        along = float(np.array([np.cos(layer.yaw_rad), np.sin(layer.yaw_rad)]) @ (layer.position_K_m - middle))
         off.append(layer.aperture_m - model.width_at(along, layer.height_m, layer.yaw_rad - theta))
     off = [d for d in off if math.isfinite(d)]
     if len(off) < MIN_LAYERS:
@@ -171,7 +169,7 @@ def _near(place_K_m: Array, yaw_rad: float, other: GraspPlan) -> bool:
     return turned < APART_RAD and float(np.linalg.norm(place_K_m - other.position_K_m)) < APART_M
 
 
-def _felt(touchset: TouchSet, com_K: Array, gripper: Gripper, side_gap_m: float) -> list[GraspPlan]:
+def _felt(touchset: TouchSet, com_K: Array, side_gap_m: float) -> list[GraspPlan]:
     """Return the closures as grasps, best first: large two-sided contact, near the centre of mass, recent."""
 
     def worth(layer: Layer, later: int) -> float:
@@ -182,8 +180,7 @@ def _felt(touchset: TouchSet, com_K: Array, gripper: Gripper, side_gap_m: float)
         return float(layer.stable) * hold * STALENESS**later / (1.0 + (lever / LEVER_SCALE_M) ** 2)
 
     count = len(touchset.sequences)
-    later = [count - 1 - k for k, q in enumerate(touchset.sequences) for _ in q.layers]
-    rated = [(worth(layer, n), layer) for layer, n in zip(touchset.layers, later, strict=True)]
+    rated = [(worth(layer, count - 1 - k), layer) for k, q in enumerate(touchset.sequences) for layer in q.layers]
     rated.sort(key=lambda r: -r[0])
     return [
         GraspPlan(
@@ -191,14 +188,13 @@ def _felt(touchset: TouchSet, com_K: Array, gripper: Gripper, side_gap_m: float)
             position_K_m=np.array([*layer.position_K_m, layer.height_m]),
             yaw_rad=layer.yaw_rad,
             aperture_m=layer.aperture_m,
-            opening_m=_extent(touchset.candidate, layer, gripper) + 2 * side_gap_m,
+            opening_m=_extent(touchset.candidate, layer) + 2 * side_gap_m,
         )
         for _, layer in rated[: 1 + ALTERNATIVES]
     ]
 
 
-def _extent(candidate: Candidate, layer: Layer, gripper: Gripper) -> float:
-    """Return what was traced between the fingers of a closure, or the measured aperture if that is larger."""
-    along = float(np.array([np.cos(layer.yaw_rad), np.sin(layer.yaw_rad)]) @ layer.position_K_m)
-    span = candidate.strip_span_m(layer.yaw_rad, along, gripper.finger.half_m[0] + STRIP_MARGIN_M)
-    return max(span[1] - span[0] if span else 0.0, layer.aperture_m)
+def _extent(candidate: Candidate, layer: Layer) -> float:
+    """Return the traced extent along the layer's closing direction, or the measured aperture if that is larger."""
+    low, high = candidate.span_m(layer.yaw_rad + 0.5 * np.pi)
+    return max(high - low, layer.aperture_m)

@@ -22,15 +22,6 @@ ROUND_DEVIATIONS_RAD = np.deg2rad([0.0, 8.0, -8.0])
 """Deviations from each of the three yaws to try where the hand would collide."""
 TRACK_DEVIATIONS_RAD = np.deg2rad([0.0, 6.0, -6.0])
 """Deviations from a box's long side to try where a track would collide."""
-STRIP_MARGIN_M = 0.003
-"""What of the object is within this of a finger along x_P counts as between the jaws. Source: ours; the standard
-deviation of a sequence's shift in `recognition`."""
-
-MAX_SLOPE = 0.2
-"""Largest slope of the outline under the end of a pad beside the centre. On a steeper side the end of the gel carries
-all force: 12 to 22 mm beside the centre of a ring, widths were 1 to 3 mm too small. Source: simulation, realistic."""
-SLOPE_OVER_M = 0.003
-"""Length over which that slope is taken."""
 
 
 @dataclass(frozen=True)
@@ -48,33 +39,18 @@ class Stance:
     opening_m: float
 
 
-def stance(
-    candidate: Candidate, along_m: float, yaw_K_rad: float, side_gap_m: float, gripper: Gripper
-) -> Stance | None:
-    """Return the stance `along_m` from the candidate's centre along `yaw_K_rad`, in the middle of what is across there.
+def stance(candidate: Candidate, along_m: float, yaw_K_rad: float, side_gap_m: float, stroke_m: float) -> Stance | None:
+    """Return the stance `along_m` from the candidate's centre along `yaw_K_rad`, in the middle of its extent across.
 
-    Only what stands between the fingers counts, so the jaws also fit over a limb, or one side of a ring. None if the
-    candidate is not there, does not fit between the jaws, or is steep there.
+    None if the candidate does not fit between the jaws there.
     """
     x = np.array([np.cos(yaw_K_rad), np.sin(yaw_K_rad)])
     y = np.array([-x[1], x[0]])
-    place = float(candidate.contour.centre_K_m @ x) + along_m
-    span = candidate.strip_span_m(yaw_K_rad, place, gripper.finger.half_m[0] + STRIP_MARGIN_M)
-    if span is None or span[1] - span[0] > gripper.stroke_m - 2 * MIN_SIDE_GAP_M:
+    low, high = candidate.span_m(yaw_K_rad + 0.5 * np.pi)
+    if high - low > stroke_m - 2 * MIN_SIDE_GAP_M:
         return None
-    if along_m != 0.0 and _is_steep(candidate, place, yaw_K_rad, 0.5 * gripper.pad_window_m[0]):
-        return None
-    low, high = span
-    position = place * x + 0.5 * (low + high) * y
-    return Stance(position, yaw_K_rad, min(high - low + 2 * side_gap_m, gripper.stroke_m))
-
-
-def _is_steep(candidate: Candidate, place_m: float, yaw_K_rad: float, half_pad_m: float) -> bool:
-    """Return True if a pad would touch with one end only, where the outline is steep."""
-    whole, inner = (candidate.strip_span_m(yaw_K_rad, place_m, half_pad_m - d) for d in (0.0, SLOPE_OVER_M))
-    if whole is None or inner is None:
-        return True
-    return max(inner[0] - whole[0], whole[1] - inner[1]) > MAX_SLOPE * SLOPE_OVER_M
+    position = (candidate.contour.centre_K_m @ x + along_m) * x + 0.5 * (low + high) * y
+    return Stance(position, yaw_K_rad, min(high - low + 2 * side_gap_m, stroke_m))
 
 
 def schemes(candidate: Candidate, gripper: Gripper) -> list[list[list[tuple[float, float]]]]:
@@ -140,9 +116,9 @@ def _first_free(
 ) -> Motion[Stance | None]:
     for along, yaw in alternatives:
         for gap in side_gaps_m:
-            at = stance(candidate, along, yaw, gap, arm.description.gripper)
+            at = stance(candidate, along, yaw, gap, arm.description.gripper.stroke_m)
             if at is None:
-                refusals.append(f"wider than the jaws open, or steep, at yaw {np.rad2deg(yaw):.0f} deg")
+                refusals.append(f"wider than the jaws open at yaw {np.rad2deg(yaw):.0f} deg")
                 break
             pose = hand_pose_B(arm, container, np.array([*at.position_K_m, pads_height_m]), yaw)
             yield HOLD

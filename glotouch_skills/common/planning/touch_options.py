@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,11 +12,10 @@ from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import Array, Gripper
 from glotouch_skills.common.hand import ABOVE_RATIO, OVER_TOP_M
 from glotouch_skills.common.planning.squeeze_motion import FAST_RISE_RATIO, ClosureParams, layer_heights
-from glotouch_skills.common.planning.squeeze_plan import Stance, stance
+from glotouch_skills.common.planning.squeeze_plan import Stance, schemes, stance
 
-YAWS_RAD = np.deg2rad(np.arange(0.0, 180.0, 15.0))
-"""Jaw yaws over a candidate, from its long side; half a turn suffices for parallel jaws. Source: ours; at each, the
-fitting of the jaws and the expected gain decide."""
+YAWS_RAD = np.deg2rad(np.arange(0.0, 180.0, 30.0))
+"""Jaw yaws over a candidate without tracks; half a turn suffices for parallel jaws."""
 SAME_M = 0.004
 """A closure within this distance of an earlier one gives no new information ..."""
 SAME_RAD = np.deg2rad(8.0)
@@ -25,9 +24,6 @@ CLOSURE_S = 1.6
 """Robot time of closing and opening once."""
 TURN_S = 1.5
 """Robot time of turning the hand over a candidate."""
-ASIDE_S = 2.0
-"""Robot time charged for a stance beside the centre: the jaw that touches first turns the object, and other closures
-tell less. Source: ours."""
 STOP_S = 0.6
 """Robot time of each start and stop."""
 
@@ -67,30 +63,18 @@ class Standing:
 
 
 def stances_over(candidate: Candidate, gripper: Gripper, side_gap_m: float) -> list[Stance]:
-    """Return the stances to consider: half a circle of yaws, each over the centre and two places on both sides of it.
-
-    The outer one is half way to the end of the candidate along x_P, but the pads stay whole on it; the inner one is
-    half way to that.
-    """
+    """Return the stances to consider: half a circle of yaws and, for a box-like candidate, its tracks."""
     contour = candidate.contour
-    found: list[Stance | None] = []
-    for yaw in (contour.yaw_rad + YAWS_RAD).tolist():
-        low, high = candidate.span_m(yaw)
-        centre = float(contour.centre_K_m @ [np.cos(yaw), np.sin(yaw)])
-        reach = [min(0.5 * end, end - 0.5 * gripper.pad_window_m[0]) for end in (centre - low, high - centre)]
-        sides = [sign * part * r for sign, r in zip((-1.0, 1.0), reach, strict=True) for part in (0.5, 1.0)]
-        places = [0.0, *(s for s in sides if abs(s) > SAME_M)]
-        found += [stance(candidate, along, yaw, side_gap_m, gripper) for along in places]
+    places = [(0.0, float(contour.yaw_rad + y)) for y in YAWS_RAD]
+    if contour.kind == "box":
+        tracks, *_ = schemes(candidate, gripper)
+        places += [alternatives[0] for alternatives in tracks if abs(alternatives[0][0]) > SAME_M]
+    found = (stance(candidate, along, yaw, side_gap_m, gripper.stroke_m) for along, yaw in places)
     return [s for s in found if s is not None]
 
 
 def options(
-    touchsets: Sequence[TouchSet],
-    standing: Standing | None,
-    hand_K_m: Array,
-    gripper: Gripper,
-    p: ClosureParams,
-    overhanging: Collection[int] = (),
+    touchsets: Sequence[TouchSet], standing: Standing | None, hand_K_m: Array, gripper: Gripper, p: ClosureParams
 ) -> list[Option]:
     """Return all closures that could come next and were not made yet.
 
@@ -103,7 +87,6 @@ def options(
         hand_K_m: (3,) pads' mid-point.
         gripper: The robot's gripper.
         p: Parameters of the closures.
-        overhanging: Indices of candidates that are wider above than where they were traced; the jaws open fully.
     """
     out: list[Option] = []
     for touchset in touchsets:
@@ -114,8 +97,7 @@ def options(
             for z in heights[heights > here.height_m + SAME_M]:
                 seconds = CLOSURE_S + STOP_S + (z - here.height_m) / (FAST_RISE_RATIO * p.descent_speed_m_s)
                 out.append(Option(here.at, _closure(candidate, here.at, float(z)), float(seconds)))
-        gap_m = gripper.stroke_m if candidate.index in overhanging else p.side_gap_m
-        for at in stances_over(candidate, gripper, gap_m):
+        for at in stances_over(candidate, gripper, p.side_gap_m):
             if _used(touchset, at):
                 continue
             lowest, *higher = (_closure(candidate, at, float(z)) for z in heights)
@@ -146,7 +128,7 @@ def _closure(candidate: Candidate, at: Stance, height_m: float) -> Closure:
 
 
 def _used(touchset: TouchSet, at: Stance) -> bool:
-    """Return True if a sequence was taken at this stance, or half a turn from it."""
+    """Return True if a sequence was taken at this stance or half a turn from it."""
     for s in touchset.sequences:
         turn = (s.yaw_rad - at.yaw_K_rad + 0.5 * np.pi) % np.pi - 0.5 * np.pi
         if abs(turn) < SAME_RAD and float(np.linalg.norm(s.position_K_m - at.position_K_m)) < SAME_M:
@@ -155,7 +137,7 @@ def _used(touchset: TouchSet, at: Stance) -> bool:
 
 
 def _travel_s(candidate: Candidate, at: Stance, height_m: float, hand_K_m: Array, p: ClosureParams) -> float:
-    """Return the time of moving up, across and down to `height_m` beside the candidate, and `ASIDE_S`."""
+    """Return the time of moving up, across and down to `height_m` beside the candidate."""
     high = p.headroom_m
     across = float(np.linalg.norm(at.position_K_m - hand_K_m[:2]))
     up = max(high - float(hand_K_m[2]), 0.0)
@@ -164,6 +146,4 @@ def _travel_s(candidate: Candidate, at: Stance, height_m: float, hand_K_m: Array
     way = (
         (up + across) / p.travel_speed_m_s + quick / (ABOVE_RATIO * p.descent_speed_m_s) + careful / p.descent_speed_m_s
     )
-    x = np.array([np.cos(at.yaw_K_rad), np.sin(at.yaw_K_rad)])
-    aside = abs(float(x @ (at.position_K_m - candidate.contour.centre_K_m))) > SAME_M
-    return way + TURN_S + 4 * STOP_S + ASIDE_S * aside
+    return way + TURN_S + 4 * STOP_S

@@ -18,7 +18,7 @@ from glotouch_bt.perception.recognition.model import TargetModel
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.robot import Array, ParamError
 
-OPTION_YAWS = 12
+OPTION_YAWS = 6
 """Number of yaws over half a turn among the options for `Ranking.next_touch`."""
 OPTION_HEIGHTS = 3
 """Number of heights among the options for `Ranking.next_touch`."""
@@ -127,9 +127,12 @@ def ranked(belief: Belief) -> Ranking:
 
 
 def closure_options(touchset: TouchSet) -> list[Closure]:
-    """Return closures through the contour's centre, at all yaws."""
+    """Return closures through the contour's centre: across the sides of a box, from all sides of a round object."""
     c = touchset.candidate.contour
     top = max(touchset.candidate.height_m - TOP_OVERLAP_M, LOWEST_M)
     heights = np.linspace(LOWEST_M, top, OPTION_HEIGHTS if top > LOWEST_M + 0.01 else 1)
-    yaws = [c.yaw_rad + i * math.pi / OPTION_YAWS for i in range(OPTION_YAWS)]
+    if c.kind == "box":
+        yaws = [c.yaw_rad, c.yaw_rad + 0.5 * math.pi]
+    else:
+        yaws = [c.yaw_rad + i * math.pi / OPTION_YAWS for i in range(OPTION_YAWS)]
     return [Closure(touchset.candidate.index, yaw, float(h), np.asarray(c.centre_K_m)) for yaw in yaws for h in heights]

@@ -36,6 +36,8 @@ OTHERS = 16
 """Number of other objects."""
 SURFACES = 96
 """Number of background surfaces."""
+UNEVEN_M = 4e-4
+"""Typical difference of neighbouring cells of the width table."""
 NEAR_M = 0.008
 """Position scale within which a closure repeats an earlier one."""
 NEAR_RAD = math.radians(20.0)
@@ -48,15 +50,13 @@ class Prediction:
 
     Attributes:
         candidate: The candidate.
-        centre_K_m: (2,) centre of its contour, moved with its slides.
         yaw_index, z0_m, weight: (s,) poses: relative yaw at `first_rad` in table steps, height offset, weight.
         first_rad: Yaw of that hand.
-        felt: (n, 4) closures so far: x_K, y_K, height, yaw, at the places of the object where it is now.
+        felt: (n, 4) closures so far: x_K, y_K, height, yaw.
         widths_m: (n,) their widths.
     """
 
     candidate: Candidate
-    centre_K_m: Array
     yaw_index: Array
     z0_m: Array
     weight: Array
@@ -83,10 +83,8 @@ def predict(model: TargetModel, reading: TouchSetReading, pair: Pair, p: Likelih
     layers = [o.layer for s in reading.sequences for o in s]
     places = [reading.touchset.sequences[e.sequence].layers[e.index] for e in layers]
     felt = np.array([[*q.position_K_m, q.height_m, q.yaw_rad] for q in places]).reshape(-1, 4)
-    centre = candidate.contour.centre_K_m
-    yaw_index, z0_index = np.divmod(best, log_pose.shape[1])
     return Prediction(
-        candidate, centre, yaw_index, z0[z0_index], weight / weight.sum(), pair.first_rad,
+        candidate, best // log_pose.shape[1], z0[best % log_pose.shape[1]], weight / weight.sum(), pair.first_rad,
         felt, np.array([e.width_m for e in layers]),
     )  # fmt: skip
 
@@ -115,9 +113,9 @@ def expected_gains(
         q = predictions[candidate]
         where = [i for i, c in enumerate(closures) if c.candidate == candidate]
         mine = [closures[i] for i in where]
-        width, uneven, sides, novelty = _at(model, q, mine)
+        width, sides, novelty = _at(model, q, mine)
         # Ratios for the target (one per pose), then for other objects (one per surface and quantile).
-        ratio = _width_ratios(width, uneven, np.array([_guess(q, c) for c in mine]), quantile, q.weight, p)
+        ratio = _width_ratios(width, np.array([_guess(q, c) for c in mine]), quantile, q.weight, p)
         for side in sides:
             ratio += _image_ratios(side, library, others, generic_other, q.weight, p)
         ratio *= p.slope * novelty[:, None]
@@ -126,18 +124,16 @@ def expected_gains(
     return out
 
 
-def _width_ratios(
-    width: Array, uneven: Array, guess: Array, quantile: Array, weight: Array, p: LikelihoodParams
-) -> Array:
+def _width_ratios(width: Array, guess: Array, quantile: Array, weight: Array, p: LikelihoodParams) -> Array:
     """Return tempered log ratios (n, s + o) of widths: of the target's poses, then of other objects."""
     middle, scale = guess[:, :1], guess[:, 1:]
     felt = np.isfinite(width)
     w = np.where(felt, width, 1.0)
     seen = np.concatenate([w, middle + scale * quantile], axis=1)
     generic = scale / math.pi / (scale**2 + (seen - middle) ** 2)
-    sd = np.sqrt(p.width_sd_m**2 + MEASURED_SD_M**2 + (p.width_rough * np.where(felt, uneven, 0.0)) ** 2)
-    near = width_kernel((seen[:, :, None] - w[:, None, :]) / sd[:, None, :]) * (felt / sd)[:, None, :]
-    target = (near @ weight) * T_PEAK
+    sd = math.hypot(p.width_sd_m, MEASURED_SD_M, p.width_rough * UNEVEN_M)
+    near = width_kernel((seen[:, :, None] - w[:, None, :]) / sd) * felt[:, None, :]
+    target = (near @ weight) * (T_PEAK / sd)
     log_ratio = np.log((1 - p.width_outlier) * target / generic + p.width_outlier)
     return np.asarray(p.temper_width * log_ratio, dtype=np.float64)
 
@@ -181,10 +177,8 @@ def entropy_decrease(there: Array, weight: Array, not_there: Array, share: float
     return np.asarray(np.maximum(entropy - mean, 0.0))
 
 
-def _at(
-    model: TargetModel, q: Prediction, closures: Sequence[Closure]
-) -> tuple[Array, Array, tuple[Array32, Array32], Array]:
-    """Return widths and their unevenness (n, s), (left, right) features (n, s, 35), and novelties (n,), 0..1."""
+def _at(model: TargetModel, q: Prediction, closures: Sequence[Closure]) -> tuple[Array, tuple[Array32, Array32], Array]:
+    """Return predicted widths (n, s), (left, right) features (n, s, 35), and novelty of each closure (n,), 0..1."""
     n = len(model.phi_rad)
     yaw = np.array([c.yaw_K_rad for c in closures])
     height = np.array([c.height_m for c in closures])
@@ -194,7 +188,7 @@ def _at(
     x, _ = hand_axes(model.phi_rad[i])
     centre = model.outline.of(q.candidate.contour.kind).centre_m
     x_K, _ = hand_axes(yaw)
-    along = ((place - q.centre_K_m) * x_K).sum(axis=1)[:, None] + x @ centre
+    along = ((place - q.candidate.contour.centre_K_m) * x_K).sum(axis=1)[:, None] + x @ centre
     j = _nearest(model.l_m, along)
     k = _nearest(model.z_m, height[:, None] + q.z0_m[None, :])
     table = model.images_by_height
@@ -206,8 +200,7 @@ def _at(
         d2 = ((q.felt[None, :, :2] - place[:, None]) ** 2).sum(axis=2) + (q.felt[None, :, 2] - height[:, None]) ** 2
         turned = (q.felt[None, :, 3] - yaw[:, None] + np.pi / 2) % np.pi - np.pi / 2
         novelty -= np.exp(-0.5 * d2 / NEAR_M**2 - 0.5 * (turned / NEAR_RAD) ** 2).max(axis=1)
-    width, uneven = (table[i, j, k].astype(np.float64) for table in (model.width_m, model.unevenness_m))
-    return width, uneven, (left, right), novelty
+    return model.width_m[i, j, k].astype(np.float64), (left, right), novelty
 
 
 def _guess(q: Prediction, c: Closure) -> tuple[float, float]:
