@@ -21,9 +21,10 @@ def plot_axes(path: Path, summary: Mapping[str, Any]) -> None:
     names = [n for n in summary["axes"] if n in AXES]
     if not names:
         return
-    rows = math.ceil(len(names) / COLUMNS)
-    figure = Figure(figsize=(3.1 * COLUMNS, 2.3 * rows), layout="constrained")
-    panels = figure.subplots(rows, COLUMNS, sharey=True, squeeze=False).ravel()
+    columns = min(COLUMNS, len(names))
+    rows = math.ceil(len(names) / columns)
+    figure = Figure(figsize=(3.1 * columns, 2.3 * rows + 0.3), layout="constrained")
+    panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
     for name, axes in zip(names, panels, strict=False):
         points, axis = summary["axes"][name], AXES[name]
         x = [p["level"] * axis.shown for p in points]
