@@ -17,7 +17,9 @@ class ToolCheckParams(SkillParams):
     """Parameters of `tool_check`."""
 
     light: float = param("Largest share of its weight that may be missing", default=0.5, gt=0.0, lt=1.0)
-    askew: float = param("Sine of the largest tilt, from its moment", default=0.25, gt=0.0, lt=1.0)
+    askew: float = param(
+        "Sine of a tilt, from its moment, from which the floor is touched", default=0.25, gt=0.0, lt=1.0
+    )
     slip_m: float = param("Largest change of the floor's height", unit="m", default=0.002, gt=0.0, le=0.005)
     touch: bool = param("Touch the floor even if jaws and weight agree", default=False)
     speed_m_s: float = param("Speed with the probe in the hand", unit="m/s", default=0.25, gt=0.0, le=0.25)
@@ -31,7 +33,8 @@ class ToolCheck(Skill):
 
     If both agree, the probe is held; if both disagree, it is lost. If one disagrees (a drifted tare looks like a
     weight, and a frozen jaw report hides a loss), touch the floor in a free corner: without a probe nothing is touched
-    there. A probe that turned in the jaws weighs the same, but its moment shows the tilt; then nothing more is touched.
+    there. A probe that turned in the jaws weighs the same, but gives a moment. So does a drifted torque: the floor
+    decides, which the ball of a turned probe meets too high.
 
     No check is needed after the probe was released on purpose (`tool_return`, `stow`).
 
@@ -84,12 +87,12 @@ class ToolCheck(Skill):
         apart = arm.aperture_m
         light = not missing_N < p.light * weight_N
         other = not abs(apart - tool.aperture_m) <= HELD_TOLERANCE_M
-        if not light:
-            self._refuse_askew(felt.moment_Nm, weight_N * self.context.world.probe.com_below_grasp_m)
+        level_Nm = weight_N * self.context.world.probe.com_below_grasp_m  # its weight's moment if it were held level
+        askew = not light and not felt.moment_Nm <= p.askew * level_Nm
         floor_m: float | None = tool.floor_z_K_m
         if light and other:
             floor_m = None
-        elif light or other or p.touch:
+        elif light or other or askew or p.touch:
             floor_m = yield from feel_floor(self.context, tool, p.corner_gap_m, p.speed_m_s)
         self.event("tool_check", missing_N=missing_N, aperture_m=apart, floor_z_K_m=floor_m)
         if floor_m is None:
@@ -107,17 +110,11 @@ class ToolCheck(Skill):
         off = floor_m - tool.floor_z_K_m
         if not np.abs(off) <= p.slip_m:
             raise self.TOOL_SLIPPED(
-                f"the floor was felt {off * 1e3:.1f} mm from where it was: the probe slipped in the jaws",
+                f"the floor was felt {off * 1e3:.1f} mm from where it was: the probe slipped"
+                + (" and hangs askew" if askew else "")
+                + " in the jaws",
                 off_m=float(off),
-            )
-        self.tool = replace(tool, aperture_m=apart)
-
-    def _refuse_askew(self, moment_Nm: float, level_Nm: float) -> None:
-        """Refuse a probe that turned in the jaws; held horizontally, its weight would give a moment of `level_Nm`."""
-        if not moment_Nm <= self.params.askew * level_Nm:
-            raise self.TOOL_SLIPPED(
-                f"the probe hangs askew: its weight turns the hand with {moment_Nm * 1e3:.1f} mNm, hanging straight it "
-                f"would not, and level with {level_Nm * 1e3:.1f}",
-                moment_Nm=moment_Nm,
+                moment_Nm=felt.moment_Nm,
                 level_Nm=level_Nm,
             )
+        self.tool = replace(tool, aperture_m=apart)
