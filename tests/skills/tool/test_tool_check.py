@@ -106,7 +106,7 @@ def turned(make, tilt_deg: float, about: float, floor_m: float):
 
 @pytest.mark.parametrize("about", [0.0, 1.0, 2.5])
 def test_tool_check__tool_slipped__tilted_in_the_jaws(make, about: float) -> None:
-    """It weighs as before and fills the jaws, but its weight hangs aside, and its ball is 0.13 m (1 - cos 20 deg) up."""
+    """It weighs as before, but its weight hangs aside, and its ball is 0.13 m (1 - cos 20 deg) higher."""
     skill, moment, touched = turned(make, 20.0, about, floor_m=0.0078)
     assert (skill.status, touched) == (Status.FAILURE, True)
     assert skill.reason.code == "tool_slipped"
@@ -115,7 +115,7 @@ def test_tool_check__tool_slipped__tilted_in_the_jaws(make, about: float) -> Non
 
 
 def test_a_torque_that_drifted_is_no_tilt(make) -> None:
-    """5 mNm in a minute, as in the realistic conditions: the floor is where it was. A spin about the axis is no tilt."""
+    """5 mNm in a minute, as in the realistic conditions: the floor is where it was."""
     skill, _, touched = turned(make, 20.0, 0.0, floor_m=0.0)
     assert (skill.status, touched) == (Status.SUCCESS, True)
     skill, _, touched = turned(make, 10.0, 1.0, floor_m=0.0)

@@ -47,7 +47,7 @@ class ObjectMotion:
     """Motion of the object during one closure.
 
     Attributes:
-        slide_m: Displacement of the middle of the outline along +y_P; 0 if both sides were touched at once.
+        slide_m: Displacement along +y_P at the first contact; 0 if both sides were touched at once.
         turn_rad: Turn about +z_B, at most `MAX_TURN_RAD` in magnitude; 0 without a lever.
         compliance_m: Closing of the jaws after both contacts, without the indentation of the gels.
         detected: A contact was detected.
@@ -109,14 +109,9 @@ def estimate_object_motion(
     both = both[both >= BASELINE_PERIODS]
     if len(both):
         compliance = max(float(np.interp(stamp[both[0]], stamp, aperture) - aperture[-1] - last.sum()), 0.0)
-    # Before both jaws press, errors of a depth map look like contacts, and the jaws close by centimetres.
-    pressed = [i for i, f in enumerate(frames) if len(both) and f.stamp_s >= stamp[both[0]]]
-    apart = np.array([np.interp(frames[i].stamp_s, stamp, aperture) for i in pressed])
-    turn = _turn([frames[i] for i in pressed], dents[pressed], apart, pad_width_m, noise_m)
-    # A push beside the middle turns the object about a point beyond it: the middle moves less than the place pushed.
-    radius2 = (FRICTION_RADIUS * half_diagonal_m) ** 2
-    turn -= slide * middle_x_m / (radius2 + middle_x_m**2)
-    slide *= radius2 / (radius2 + middle_x_m**2)
+    apart = np.array([np.interp(f.stamp_s, stamp, aperture) for f in frames])
+    turn = _turn(frames, dents, apart, pad_width_m, noise_m)
+    turn -= slide * middle_x_m / ((FRICTION_RADIUS * half_diagonal_m) ** 2 + middle_x_m**2)
     turn = min(max(turn, -MAX_TURN_RAD), MAX_TURN_RAD)
     return ObjectMotion(slide, float(turn * rotation[2, 2]), compliance, bool(len(pushed) or len(both)))
 
