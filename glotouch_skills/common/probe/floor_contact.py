@@ -58,7 +58,7 @@ def feel_floor(context: Context, tool: HeldTool, corner_gap_m: float, speed_m_s:
         (high - floor - GUARDED_FROM_M, GUARDED_M_S),
         (high - floor - SLOW_FROM_M, SLOW_M_S),
     )
-    with may_touch(arm, "tool", "floor"):
+    with may_touch(arm, "tool", "floor", "table"):  # the table is under the floor: nothing reaches it
         lowest = np.array([*corner, floor + tool.tip_radius_m - FLOOR_SEARCH_M])
         probed = yield from prober.move(lowest, speed_m_s, paces=paces)
         if probed.contact is None:
