@@ -24,7 +24,7 @@ from glotouch_bt.robot.scene import Mesh, stream
 from glotouch_bt.robot.simulation import Place, SampledClosure, TouchSampler
 
 CLOSURE_S = 4.0
-"""Robot time between two closures, in which the gel recovers. Source: measured, 2 to 20 s in missions."""
+"""Robot time between two closures, in which the gel recovers. Source: ours."""
 FRAMES = 6
 """Frames on a plateau of 0.1 s. Source: `find_plateau`, 60 Hz."""
 ONSET_N = 0.2
@@ -34,7 +34,7 @@ ALIGN_STEP_RAD = math.radians(2.5)
 ALIGN_STEPS = 4
 """Largest number of them: floor friction and the pads' edges stop larger turns. Source: ours."""
 INSIDE_M = 0.002
-"""The pads start this far inside the object's bounding sphere, so that rays of its surface are in reach."""
+"""The pads start this far inside the object's bounding sphere, so that its surface is in reach. Source: ours."""
 
 
 class MujocoTouchSampler(TouchSampler):

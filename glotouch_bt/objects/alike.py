@@ -26,7 +26,7 @@ from glotouch_bt.perception.recognition import TargetModel
 from glotouch_bt.perception.recognition.likelihood import LikelihoodParams
 from glotouch_bt.perception.recognition.model import Array32
 from glotouch_bt.perception.touch import ContourKind
-from glotouch_bt.perception.touch.calibration import MEASURED_SD_M
+from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import Array
 
 CONFIDENCE = 0.95
@@ -94,7 +94,7 @@ def _weight_of_closure(a: TargetModel, b: TargetModel, p: LikelihoodParams) -> f
     for turn in range(len(a.phi_rad)):
         width, uneven = np.roll(width_a, turn, axis=0), np.roll(uneven_a, turn, axis=0)
         both = np.isfinite(width) & felt
-        variance = p.width_sd_m**2 + MEASURED_SD_M**2 + (p.width_rough * np.where(both, uneven, 0.0)) ** 2
+        variance = p.width_sd_m**2 + JawZero().sd_m ** 2 + (p.width_rough * np.where(both, uneven, 0.0)) ** 2
         squared = np.where(both, width - width_b, 0.0) ** 2 / variance
         by_width = np.where(np.isfinite(width) != felt, limit, np.minimum(0.5 * squared, limit))
         unlike = ((np.roll(image_a, turn, axis=0) - image_b) ** 2).mean(axis=-1)

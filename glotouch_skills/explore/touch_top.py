@@ -22,8 +22,7 @@ RIM_INSET_M = 0.003
 """Distance of these places inside the rim."""
 INSET_SHARE = 0.3
 """Distance of the passes inside the outline over half its width: passes in the middle of a narrow object miss what
-stands at its edge. Source: plans played over the mesh at 50 recorded outlines of `wukong`, which has a part 7 mm wide
-at its edge: 10 mm inside they missed it 6 times, with this share once."""
+stands at its edge. Source: ours."""
 MIN_REACH_M = 0.003
 """Least distance of inner places from the passes of a narrow object. Source: ours; as the parameter `reach_m`."""
 

@@ -34,7 +34,7 @@ class ToolCheck(Skill):
     If both agree, the probe is held; if both disagree, it is lost. If one disagrees (a drifted tare looks like a
     weight, and a frozen jaw report hides a loss), touch the floor in a free corner: without a probe nothing is touched
     there. A probe that turned in the jaws weighs the same, but gives a moment. So does a drifted torque: the floor
-    decides, which the ball of a turned probe meets too high.
+    decides: a turned probe's ball meets it too high. The way down is slow then.
 
     No check is needed after the probe was released on purpose (`tool_return`, `stow`).
 
@@ -93,7 +93,7 @@ class ToolCheck(Skill):
         if light and other:
             floor_m = None
         elif light or other or askew or p.touch:
-            floor_m = yield from feel_floor(self.context, tool, p.corner_gap_m, p.speed_m_s)
+            floor_m = yield from feel_floor(self.context, tool, p.corner_gap_m, p.speed_m_s, askew)
         self.event("tool_check", missing_N=missing_N, aperture_m=apart, floor_z_K_m=floor_m)
         if floor_m is None:
             self.tool_lost = True

@@ -57,7 +57,7 @@ TOLERANCE_M = 0.0001
 MAX_GAP_M = 0.002
 """Refuse a decomposition if a vertex of the mesh lies further outside every hull. Source: ours."""
 MAX_WAIT_RATIO = 8.0
-"""See `Attempt`; the process is a nice one, and others may use the machine. Source: ours."""
+"""Longest wait for CoACD in wall time over its limit of processor time; others may use the machine. Source: ours."""
 TOO_LONG = 75
 """Exit code of `coacd_worker` after its processor time."""
 _POLL_S = 10.0

@@ -47,7 +47,7 @@ AXES: Mapping[str, Axis] = {
     ),
     "kinematic_error": Axis("position error, mm", ("kinematic_error_sd_m",), (0.0, 3e-4, 1e-3), 1e3),
 }  # fmt: skip
-"""Levels of REALISM's sweep. Axes that act on motions alone need missions and are not among them."""
+"""The axes by name, with levels around and beyond those of `realistic`; none that acts on motions alone."""
 
 
 def with_level(base: Conditions, axis: str, level: float) -> Conditions:

@@ -13,7 +13,7 @@ from glotouch_bt.bench.robustness.axes import AXES
 
 COLUMNS = 4
 WANTED = 0.9
-"""Acceptance drawn as a line: the goal of REALISM for a single axis."""
+"""Acceptance drawn as a line: an axis at this level counts as tolerated. Source: ours."""
 
 
 def plot_axes(path: Path, summary: Mapping[str, Any]) -> None:

@@ -26,11 +26,11 @@ FORCE_N = 10.0
 LOWEST_M, TOP_OVERLAP_M, LAYERS = 0.021, 0.008, 4
 """Least height of the pads, distance of the highest below the top, closures a sequence. Source: `ClosureParams`."""
 CONTACTS = 12
-"""Contacts of a trace. Source: `refine_outline`, 8 to 14 in missions."""
+"""Contacts of a trace. Source: ours."""
 CONTACT_SD_M, HEIGHT_SD_M = 3e-4, 5e-4
-"""Errors of a contact and of a top besides those of the conditions. Source: `bench contact`, nominal."""
+"""Errors of a contact and of a top besides those of the conditions. Source: ours."""
 DRIFT_M, DRIFT_RAD = 1.5e-3, math.radians(3.0)
-"""Motion of the object between two sequences. Source: `LikelihoodParams`, as measured."""
+"""Motion of the object between two sequences. Source: ours."""
 
 
 def sample_layout(sampler: TouchSampler, seed: int, conditions: str) -> Layout:

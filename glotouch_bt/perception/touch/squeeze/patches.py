@@ -12,7 +12,7 @@ import scipy
 from glotouch_bt.perception.touch.values import PAD_NOISE_M, Layer
 from glotouch_bt.robot import Array, ParamError, TactileFrame
 
-NOISES = 3.0
+MIN_NOISE_RATIO = 3.0
 """Minimum indentation of a local contact over the noise of the untouched pad. Source: ours."""
 MIN_TAXELS = 12
 """Minimum number of taxels of a patch: enough for a plane (three parameters) despite dead taxels."""
@@ -54,7 +54,7 @@ def contact_threshold_m(noise_m: float, mean_m: float) -> float:
         mean_m: Mean of the map.
     """
     noise_m = max(noise_m, PAD_NOISE_M)
-    return noise_m if mean_m > noise_m else NOISES * noise_m
+    return noise_m if mean_m > noise_m else MIN_NOISE_RATIO * noise_m
 
 
 def mean_depth_m(depth_m: Array) -> float:

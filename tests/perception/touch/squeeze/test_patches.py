@@ -61,22 +61,22 @@ def test_no_contact(depth):
 
 
 def smooth_noise(seed, sd_m=5e-5):
-    """Correlated over 5 mm, as the error of a reconstructed map."""
-    white = np.random.default_rng(seed).standard_normal((35, 20))
-    field = scipy.ndimage.gaussian_filter(white, (4.3, 4.1), mode="wrap")
-    return sd_m * field / field.std()
+    """Correlated over 5 mm, as the error of a reconstructed map: a part of a larger field of this deviation."""
+    white = np.random.default_rng(seed).standard_normal((95, 80))
+    field = scipy.ndimage.gaussian_filter(white, (4.3, 4.1))[20:-20, 20:-20]
+    return sd_m * (field / field.std())[10:45, 10:30]
 
 
 def test_noise_that_was_measured_is_no_contact():
     valid = [patch_statistics(smooth_noise(i), noise_m=5e-5).valid for i in range(100)]
-    assert sum(valid) <= 20
-    assert sum(patch_statistics(smooth_noise(i)).valid for i in range(100)) > 80
+    assert sum(valid) <= 10
+    assert sum(patch_statistics(smooth_noise(i)).valid for i in range(100)) > 75
 
 
 def test_flat_side_is_felt_through_the_noise():
     """10 N on a whole pad indent a nominal gel by 0.1 mm, less than the noise's peaks."""
     maps = [1e-4 + smooth_noise(i) for i in range(100)]
-    assert sum(patch_statistics(m, noise_m=5e-5).valid for m in maps) >= 90
+    assert sum(patch_statistics(m, noise_m=5e-5).valid for m in maps) >= 95
 
 
 def test_noise_of_untouched_pads():
