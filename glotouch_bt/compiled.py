@@ -13,8 +13,13 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numba
+from numba import types
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+READ_ONLY = {f"given{n}": types.Array(types.float64, n, "A", readonly=True) for n in (1, 2)}
+"""Names of arrays of one and two axes that a function only reads; they need not be contiguous or writeable."""
 
 
 def compiled(signature: str) -> Callable[[F], F]:
@@ -24,7 +29,9 @@ def compiled(signature: str) -> Callable[[F], F]:
     processor. A division by zero gives an infinity or NaN, as in NumPy.
 
     Args:
-        signature: Types in Numba's notation, for example `f8(f8[::1], f8[:, :])`. `::1` requires a contiguous axis.
-            Arguments of other types are refused and never compiled for, so no control period waits for the compiler.
+        signature: Types in Numba's notation, or of `READ_ONLY`: `f8(f8[::1], given2)`. `::1` requires a contiguous
+            axis. Arguments of other types are refused and never compiled for, so no control period waits for the
+            compiler.
     """
-    return cast("Callable[[F], F]", numba.njit(signature, cache=True, error_model="numpy"))
+    exact = eval(signature, {"__builtins__": {}}, {**vars(types), **READ_ONLY})  # as Numba itself reads a signature
+    return cast("Callable[[F], F]", numba.njit(exact, cache=True, error_model="numpy"))

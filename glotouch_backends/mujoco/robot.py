@@ -203,8 +203,7 @@ class MujocoRobot(Robot):
         model, data, step, guard = self.model, self.data, mujoco.mj_step, self._guard
         ctrl_now, sensed, external_now = self._ctrl_now, self._sensed, self._external_now
         reading, expected, quiet_2, state = self._wrench_now, self._expected, guard.quiet_2, guard.state
-        speed_rad_s = float(np.abs(data.qvel[self.handles.arm_dof]).max())
-        stands = guard.tripped is not None and speed_rad_s < REST_RAD_S
+        stands = guard.tripped is not None and float(np.abs(data.qvel[self.handles.arm_dof]).max()) < REST_RAD_S
         for i, (ctrl, sample, external) in enumerate(self._rows):
             if guard.tripped is not None and not stands:
                 self._servo.brake(self._arm_ctrl[i])
