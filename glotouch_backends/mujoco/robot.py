@@ -18,7 +18,7 @@ from glotouch_backends.mujoco.control import (
 )
 from glotouch_backends.mujoco.model import STEP_S, STEPS, BuiltWorld
 from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, PoseReports, Tactile, WristSensor, up_in
-from glotouch_backends.mujoco.simulation import ControlTrace, SnapshotStore
+from glotouch_backends.mujoco.simulation import ControlTrace, RestingObjects, SnapshotStore
 from glotouch_bt.compiled import compiled
 from glotouch_bt.robot import (
     Array,
@@ -113,6 +113,7 @@ class MujocoRobot(Robot):
 
         self.trace = ControlTrace(model, data) if traced else None
         self._keeper = SnapshotStore(model, data)
+        self._resting = RestingObjects(model, data, handles)
 
         self._samples[:] = data.sensordata
         self._wrist.fill(-self._samples[0, s.force.start : s.torque.stop])
@@ -149,7 +150,8 @@ class MujocoRobot(Robot):
         self._servo.plan(target, self._arm_ctrl)
         self._jaws.plan(self._aperture, self.period_s, self._jaw_ctrl)
         try:
-            self._advance()
+            with self._resting:
+                self._advance()
             check_sane(self._warnings, self._samples, self.data.time)
         except mujoco.FatalError as e:
             self._failed = BackendError(f"MuJoCo failed at t={self.data.time:.3f} s: {e}")
