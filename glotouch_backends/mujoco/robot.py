@@ -14,7 +14,6 @@ from glotouch_backends.mujoco.control import (
     PendingTare,
     Servo,
     check_sane,
-    is_quiet,
 )
 from glotouch_backends.mujoco.model import STEP_S, STEPS, BuiltWorld
 from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, PoseReports, Tactile, WristSensor, up_in
@@ -204,7 +203,7 @@ class MujocoRobot(Robot):
         """Do the period's solver steps; check the wrench after each, and brake once its limit has tripped."""
         model, data, step, guard = self.model, self.data, mujoco.mj_step, self._guard
         ctrl_now, sensed, external_now = self._ctrl_now, self._sensed, self._external_now
-        reading, expected, quiet_2, state = self._wrench_now, self._expected, guard.quiet_2, guard.state
+        reading, expected = self._wrench_now, self._expected
         stands = guard.tripped is not None and float(np.abs(data.qvel[self.handles.arm_dof]).max()) < REST_RAD_S
         for i, (ctrl, sample, external) in enumerate(self._rows):
             if guard.tripped is not None and not stands:
@@ -213,7 +212,7 @@ class MujocoRobot(Robot):
             step(model, data)
             sample[:] = sensed
             external[:] = external_now
-            if not is_quiet(reading, expected, quiet_2, state) and guard.tripped is None:
+            if guard.tripped is None and not guard.is_quiet(reading, expected):
                 # The sensor reads the force of the hand on the arm; the hand feels its opposite.
                 guard.check(-reading - expected, self._twists_S, data.time)
         if guard.tripped is not None and not stands:

@@ -41,12 +41,8 @@ FORCE_2, TORQUE_2, OVER, PRESSING = range(4)
 
 
 @compiled("b1(f8[::1], f8[::1], f8[::1], f8[::1])")
-def is_quiet(reading: Array, expected: Array, quiet_2: Array, state: Array) -> bool:
-    """Return True, and note the sample in `state`, if it is too small to be judged; else it must be given to `check`.
-
-    The wrenches (6,) are the sensor's reading and what it reads without contact, the latter with opposite sign.
-    `quiet_2` and `state` are those of a `HardLimitGuard`.
-    """
+def _is_quiet(reading: Array, expected: Array, quiet_2: Array, state: Array) -> bool:
+    """See `HardLimitGuard.is_quiet`; a quiet sample is noted in the guard's `state`."""
     x, y, z = reading[0] + expected[0], reading[1] + expected[1], reading[2] + expected[2]
     a, b, c = reading[3] + expected[3], reading[4] + expected[4], reading[5] + expected[5]
     force_2, torque_2 = x * x + y * y + z * z, a * a + b * b + c * c
@@ -75,7 +71,6 @@ class HardLimitGuard:
     measured motion, and of the setpoint's, which alone moves on when something rigid blocks the hand.
 
     Attributes:
-        quiet_2, state: See `is_quiet`.
         tripped: The stop, or None.
     """
 
@@ -83,9 +78,16 @@ class HardLimitGuard:
         self._max_N, self._max_Nm = limits.stop_force_N, limits.stop_torque_Nm
         self._rise_s_m = CONTACT_STIFFNESS_N_M * limits.stop_ahead_s / self._max_N
         self._samples_ahead = limits.stop_ahead_s / STEP_S
-        self.quiet_2: Array = np.array([(QUIET_SHARE * self._max_N) ** 2, (QUIET_SHARE * self._max_Nm) ** 2])
-        self.state: Array = np.zeros(4)
+        self._quiet_2: Array = np.array([(QUIET_SHARE * self._max_N) ** 2, (QUIET_SHARE * self._max_Nm) ** 2])
+        self._state: Array = np.zeros(4)
         self.tripped: SafetyStop | None = None
+
+    def is_quiet(self, reading: Array, expected: Array) -> bool:
+        """Return True if a sample is too small to be judged; else it must be given to `check`.
+
+        The wrenches (6,) are the sensor's reading and what it reads without contact, the latter with opposite sign.
+        """
+        return _is_quiet(reading, expected, self._quiet_2, self._state)
 
     def _share(self, force_2: float, torque_2: float) -> tuple[float, float, float]:
         """Return force N, torque Nm, and the larger share of its limit."""
@@ -100,7 +102,7 @@ class HardLimitGuard:
         x, y, z, a, b, c = contact
         squares = x * x + y * y + z * z, a * a + b * b + c * c
         force, torque, share = self._share(*squares)
-        state = self.state
+        state = self._state
         rise = share - self._share(state[FORCE_2], state[TORQUE_2])[2]
         state[FORCE_2], state[TORQUE_2] = squares
         if share < MIN_PRESSING_SHARE:

@@ -43,7 +43,7 @@ FIXED: Mapping[str, frozenset[str]] = {
     "Servo": frozenset(("_model", "_data", "_dof", "_arm_qpos", "_diagonal", "_names")),
     "JawServo": frozenset(("_gripper", "_proof")),
     "WristSensor": frozenset(("_P_in_S", "_proof", "_gain_error", "_cross_talk", "_reach", "_jitter", "_calibrated")),
-    "HardLimitGuard": frozenset(("_max_N", "_max_Nm", "quiet_2", "_rise_s_m", "_samples_ahead", "tripped")),
+    "HardLimitGuard": frozenset(("_max_N", "_max_Nm", "_quiet_2", "_rise_s_m", "_samples_ahead", "tripped")),
     "Tactile": frozenset(
         ("_data", "_pads", "_site", "_gel", "_meshes", "_rays", "_c", "depth", "taxels", "_proof", "_smooth")
     ),

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from glotouch_backends.mujoco.control import HardLimitGuard, is_quiet
+from glotouch_backends.mujoco.control import HardLimitGuard
 from glotouch_bt.robot import Limits
 
 STOP_N = Limits().stop_force_N
@@ -108,7 +108,7 @@ def test_samples_that_are_passed_as_quiet_change_nothing() -> None:
             twists[:, :3] = -0.05 * ALONG
             for i, force in enumerate(forces):
                 contact = [*(force * ALONG), 0.0, 0.0, 0.0]
-                if not (shortcut and is_quiet(-np.array(contact), np.zeros(6), guard.quiet_2, guard.state)):
+                if not (shortcut and guard.is_quiet(-np.array(contact), np.zeros(6))):
                     guard.check(contact, lambda twists=twists: twists, 0.001 * i)
                 if guard.tripped is not None:
                     break
