@@ -40,7 +40,7 @@ MAX_HELD_DISTANCE_M = 0.02
 """The probe counts as held while its handle is within this distance of P. Source: ours."""
 
 
-@compiled("f8(f8[:, :, ::1], f8[::1], f8[:], i8)")
+@compiled("f8[:, :, ::1]", "f8[::1]", "f8[:]", "i8")
 def largest_force_2(external: Array, probe: Array, pads: Array, hand: int) -> float:
     """Return the largest square of the contact force in a period, N^2, on the hand, and on the probe while it is held.
 

@@ -9,6 +9,7 @@ A compiled function calls no compiled function: Numba renews its code on disk on
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
@@ -16,13 +17,14 @@ from typing import Any, TypeVar, cast
 from glotouch_bt.lazy import on_load_all
 
 F = TypeVar("F", bound=Callable[..., Any])
+_TYPE = re.compile(r"(given )?(\w+)(?:\[(.*)\])?")
 
 
 class _Uncompiled:
     """Stands in for a function until the first call or `load_all`, so that `glotouch check` does not load Numba."""
 
-    def __init__(self, function: Callable[..., Any], signature: str) -> None:
-        self._function, self._signature = function, signature
+    def __init__(self, function: Callable[..., Any], arguments: tuple[str, ...]) -> None:
+        self._function, self._arguments = function, arguments
         self._compiled: Callable[..., Any] | None = None
         on_load_all(self.load)
 
@@ -30,11 +32,9 @@ class _Uncompiled:
         """Compile the function, or load its code, and put it into its module in place of this object."""
         if self._compiled is None:
             import numba
-            from numba import types
 
-            given = {f"given{n}": types.Array(types.float64, n, "A", readonly=True) for n in (1, 2)}
-            exact = eval(self._signature, {"__builtins__": {}}, vars(types) | given)  # as Numba itself reads one
-            self._compiled = numba.njit(exact, cache=True, error_model="numpy")(self._function)
+            signature = tuple(_type(a, numba.types) for a in self._arguments)
+            self._compiled = numba.njit(signature, cache=True, error_model="numpy")(self._function)
             vars(sys.modules[self._function.__module__])[self._function.__name__] = self._compiled
         return self._compiled
 
@@ -42,19 +42,30 @@ class _Uncompiled:
         return self.load()(*args)
 
 
-def compiled(signature: str) -> Callable[[F], F]:
-    """Compile a function of a module for one signature.
+def _type(text: str, types: Any) -> object:
+    """Return Numba's type of an argument; see `compiled`."""
+    found = _TYPE.fullmatch(text)
+    assert found is not None, text
+    given, kind, axes = found.groups()
+    if axes is None:
+        return getattr(types, kind)
+    layout = "C" if axes.endswith("::1") else "A"
+    return types.Array(getattr(types, kind), axes.count(",") + 1, layout, readonly=bool(given))
+
+
+def compiled(*arguments: str) -> Callable[[F], F]:
+    """Compile a function of a module.
 
     The arithmetic is that of IEEE 754 in the written order, without contraction, so results do not depend on the
     processor. A division by zero gives an infinity or NaN, as in NumPy.
 
     Args:
-        signature: Types in Numba's notation: `f8(f8[::1], i8)`; `::1` requires a contiguous axis. `given1` and `given2`
-            are arrays of one and two axes that the function only reads; they need not be contiguous or writeable.
-            Arguments of other types raise a TypeError; no control period waits for the compiler.
+        arguments: Type of each argument in Numba's notation: `f8`, `i8`, `f8[:, ::1]`; `::1` requires contiguous rows.
+            `given f8[:, :]` is an array that the function only reads, and that need not be writeable. Arguments of
+            other types raise a TypeError; no control period waits for the compiler.
     """
 
     def replace(function: F) -> F:
-        return cast("F", _Uncompiled(function, signature))
+        return cast("F", _Uncompiled(function, arguments))
 
     return replace

@@ -40,7 +40,7 @@ FORCE_2, TORQUE_2, OVER, PRESSING = range(4)
 """Entries of the guard's state: squares of the last force and torque, and the samples counted so far."""
 
 
-@compiled("b1(f8[::1], f8[::1], f8[::1], f8[::1])")
+@compiled("f8[::1]", "f8[::1]", "f8[::1]", "f8[::1]")
 def _is_quiet(reading: Array, expected: Array, quiet_2: Array, state: Array) -> bool:
     """See `HardLimitGuard.is_quiet`; a quiet sample is noted in the guard's `state`."""
     x, y, z = reading[0] + expected[0], reading[1] + expected[1], reading[2] + expected[2]
@@ -52,7 +52,7 @@ def _is_quiet(reading: Array, expected: Array, quiet_2: Array, state: Array) -> 
     return True
 
 
-@compiled("b1(i4[:], f8[:, ::1])")
+@compiled("i4[:]", "f8[:, ::1]")
 def _is_sane(warnings: npt.NDArray[np.int32], samples: Array) -> bool:
     """Return True if nothing warned and no square of a sample overflows."""
     total = 0.0

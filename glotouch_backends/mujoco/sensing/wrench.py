@@ -47,7 +47,7 @@ def up_in(quat_B_S: Array) -> Array:
     return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
 
 
-@compiled("void(f8[:, ::1], i8, i8, f8[:, :], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1])")
+@compiled("f8[:, ::1]", "i8", "i8", "f8[:, :]", "f8[:, ::1]", "f8[::1]", "f8[:, ::1]", "f8[:, ::1]")
 def _read(line: Array, reach: int, start: int, new: Array, offset: Array, up: Array, noise: Array, out: Array) -> None:
     """Move `new` (n, 6) into the delay line (reach + n, 6); fill `out` (n, 6) from row `start` of the line on.
 
@@ -62,6 +62,15 @@ def _read(line: Array, reach: int, start: int, new: Array, offset: Array, up: Ar
         subtracted = offset[j, 0] * up[0] + offset[j, 1] * up[1] + offset[j, 2] * up[2] + offset[j, 3]
         for i in range(len(out)):
             out[i, j] = line[start + i, j] - subtracted + noise[i, j]
+
+
+@compiled("f8[:, ::1]", "f8[::1]")
+def _affine(matrix: Array, at: Array) -> Array:
+    """Return the wrench (6,) of a matrix (6, 4), a linear map and a constant, at a vector (3,)."""
+    out = np.zeros(6)
+    for i in range(6):
+        out[i] = matrix[i, 0] * at[0] + matrix[i, 1] * at[1] + matrix[i, 2] * at[2] + matrix[i, 3]
+    return out
 
 
 class WristSensor:
@@ -139,7 +148,7 @@ class WristSensor:
 
     def expected(self, up: Array) -> Array:
         """Return the reading (6,) without contact at the orientation `up`; the hard limit is measured from it."""
-        return np.asarray(self._expected[:, :3] @ up + self._expected[:, 3])
+        return _affine(self._expected, up)
 
     def fill(self, wrench: Array) -> None:
         """Fill the delay line with a true `wrench` (6,)."""

@@ -22,8 +22,21 @@ REACH_M = 0.02
 ours; the hand moves at 0.5 m/s at most, and an object that falls into the container at 2 m/s."""
 
 
-@compiled("void(i4[::1], i4[::1], i4[:, ::1], i4[::1], i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
-          "f8[::1], f8[::1], f8[:, ::1], i8)")  # fmt: skip
+@compiled(
+    "i4[::1]",
+    "i4[::1]",
+    "i4[:, ::1]",
+    "i4[::1]",
+    "i8[:, ::1]",
+    "f8[:, ::1]",
+    "f8[:, ::1]",
+    "f8[:, ::1]",
+    "f8[:, ::1]",
+    "f8[::1]",
+    "f8[::1]",
+    "f8[:, ::1]",
+    "i8",
+)
 def _leave_out(
     contype: Ints,
     conaffinity: Ints,
@@ -86,7 +99,7 @@ def _leave_out(
         conaffinity[body] = categories[b, 1] if near[b] else 0
 
 
-@compiled("void(i4[::1], i4[::1], i4[:, ::1], i8[:, ::1])")
+@compiled("i4[::1]", "i4[::1]", "i4[:, ::1]", "i8[:, ::1]")
 def _take_in(contype: Ints, conaffinity: Ints, categories: Ints, bodies: npt.NDArray[np.int64]) -> None:
     """Set the objects' bodies to their `categories`; arguments as of `_leave_out`."""
     for b in range(len(categories)):

@@ -35,7 +35,20 @@ FIXED: Mapping[str, frozenset[str]] = {
     "MujocoRobot": frozenset(
         (
             *("description", "limits", "period_s", "world", "truth", "model", "data", "handles", "trace"),
-            *("_s", "_warnings", "_wrench_now", "_probe_now", "_pads_now", "_keeper", "_failed", "_closed", "_poses", "_hand", "_resting", *PARTS),
+            *(
+                "_s",
+                "_warnings",
+                "_wrench_now",
+                "_probe_now",
+                "_pads_now",
+                "_keeper",
+                "_failed",
+                "_closed",
+                "_poses",
+                "_hand",
+                "_resting",
+                *PARTS,
+            ),
             # views of the arrays that are kept
             *("_rows", "_ctrl_now", "_sensed", "_external_now"),
         )

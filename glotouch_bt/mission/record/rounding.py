@@ -29,7 +29,15 @@ def to_step(values: Array, step: float) -> Array:
     return rounded
 
 
-@compiled("f8[:, ::1](given1, given2, given2, given2, given2, given2, f8[:, ::1])")
+@compiled(
+    "given f8[:]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "f8[:, ::1]",
+)
 def _rounded(stamp: Array, q: Array, dq: Array, position: Array, quat: Array, wrench: Array, steps: Array) -> Array:
     """Return the samples side by side, rounded to steps (2, columns): each step's inverse and the step."""
     n, dof = q.shape

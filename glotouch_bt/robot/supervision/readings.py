@@ -37,7 +37,16 @@ NOWHERE: Array = np.zeros(0)
 """A target that is not known."""
 
 
-@compiled("f8(given2, given2, given2, given2, given2, given2, given1, f8)")
+@compiled(
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:]",
+    "f8",
+)
 def way_to_target(
     q: Array, dq: Array, position: Array, quat: Array, wrench: Array, limits: Array, target: Array, min_dot: float
 ) -> float:

@@ -26,7 +26,17 @@ MAX_GAP_PERIODS = 1.5
 """Start again after a longer gap between two blocks."""
 
 
-@compiled("f8(f8[:, ::1], f8[:, ::1], f8[::1], i8, given1, given2, given2, given2, f8[::1])")
+@compiled(
+    "f8[:, ::1]",
+    "f8[:, ::1]",
+    "f8[::1]",
+    "i8",
+    "given f8[:]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "f8[::1]",
+)
 def accelerating(
     track: Array,
     forces: Array,

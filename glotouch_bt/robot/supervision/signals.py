@@ -23,7 +23,7 @@ MAX_UNTOUCHED_N = 0.5
 """Below this jaw force nothing touches the pads. Source: ours."""
 
 
-@compiled("Tuple((b1, f8))(given2)")
+@compiled("given f8[:, :]")
 def _repeats(w: Array) -> tuple[bool, float]:
     """Return True if the last of several samples repeats a component of the first; and the force's last step along x."""
     n = len(w)

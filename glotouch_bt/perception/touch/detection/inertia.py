@@ -68,7 +68,7 @@ class Payload:
         return _inertial(a.reshape(-1, 3), self.mass_kg, self.com_S_m).reshape(*a.shape[:-1], 6)
 
 
-@compiled("f8[:, ::1](given2, f8, given1)")
+@compiled("given f8[:, :]", "f8", "given f8[:]")
 def _inertial(acceleration: Array, mass_kg: float, com: Array) -> Array:
     """Return force and torque (n, 6) of accelerations (n, 3); `com` (3,)."""
     out = np.zeros((len(acceleration), 6))
@@ -79,7 +79,7 @@ def _inertial(acceleration: Array, mass_kg: float, com: Array) -> Array:
     return out
 
 
-@compiled("i8(f8[::1], f8[:, ::1], i8, f8, given1, f8[:, ::1])")
+@compiled("f8[::1]", "f8[:, ::1]", "i8", "f8", "given f8[:]", "f8[:, ::1]")
 def _even_bends(stamps: Array, places: Array, n: int, lag_s: float, evenly: Array, out: Array) -> int:
     """Fill `out` (n, 3) with the accelerations `lag_s` before the last n samples; return the last window's start.
 
