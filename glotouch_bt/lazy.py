@@ -5,6 +5,7 @@ scipy loads its own subpackages on first use, so `import scipy` needs no help.
 
 from __future__ import annotations
 
+import gc
 import importlib
 import importlib.util
 import sys
@@ -64,3 +65,4 @@ def load_all() -> None:
         importlib.import_module(f"scipy.{name}")
     for load in _LOADERS:
         load()
+    gc.freeze()  # a collection while the arm moves looks at what is made from now on only

@@ -125,7 +125,7 @@ class WristSensor:
         self._renew()
 
     def _renew(self) -> None:
-        """Combine payload, tare and hand into two affine maps (6, 4) of `up`: the subtracted and the expected wrench."""
+        """Combine payload, tare and hand into affine maps (6, 4) of `up`: the subtracted and the expected wrench."""
         if self._up_at_tare is None:
             self._offset = np.column_stack([self._payload, np.zeros(6)])
             self._expected = np.column_stack([self._payload + self._hand, np.zeros(6)])

@@ -90,7 +90,7 @@ def _values(planes: npt.NDArray[np.uint8], order: int, step: float) -> Array:
     steps = np.zeros(rows, dtype=np.int32)
     for j in range(width):
         for i in range(rows):
-            number = 0
+            number = np.int64(0)
             for byte in range(4):
                 number |= np.int64(planes[j, byte, i]) << (8 * byte)
             steps[i] = np.int32(number)

@@ -85,7 +85,8 @@ def accelerating(
     for axis in range(1, 4):
         after, before = track[last, axis] - track[HALF, axis], track[HALF, axis] - track[0, axis]
         bend_2 += (after / after_s - before / before_s) ** 2
-    return 2.0 * math.sqrt(bend_2) / (before_s + after_s)
+    acceleration: float = 2.0 * math.sqrt(bend_2) / (before_s + after_s)
+    return acceleration
 
 
 class WristResponseGuard:

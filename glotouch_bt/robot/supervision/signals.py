@@ -25,7 +25,7 @@ MAX_UNTOUCHED_N = 0.5
 
 @compiled("given f8[:, :]")
 def _repeats(w: Array) -> tuple[bool, float]:
-    """Return True if the last of several samples repeats a component of the first; and the force's last step along x."""
+    """Return True if the last of several samples repeats a component of the first, and the last step of the force."""
     n = len(w)
     if n < 2:
         return False, 0.0
