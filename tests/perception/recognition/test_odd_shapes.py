@@ -37,7 +37,9 @@ def test_a_top_that_was_not_felt_says_only_how_high_it_is_at_least(meshes) -> No
     cup = TargetModel.from_mesh(meshes["cup"])
     assert height_ratio(cup, low, params) == 0.0
     # A lower place may have been taken for the top; a higher one cannot.
-    lower, higher = (height_ratio(cup, replace(touched.candidate, height_m=cup.height_m + d), params) for d in (-0.02, 0.02))
+    lower, higher = (
+        height_ratio(cup, replace(touched.candidate, height_m=cup.height_m + d), params) for d in (-0.02, 0.02)
+    )
     assert higher < lower < height_ratio(cup, replace(touched.candidate, height_m=cup.height_m), params)
 
 

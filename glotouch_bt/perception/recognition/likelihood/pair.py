@@ -189,7 +189,7 @@ def observed_turns(touchset: TouchSet) -> list[float]:
 
 
 def _bias_sd_m(reading: TouchSetReading, p: LikelihoodParams) -> float:
-    """Return the standard deviation of the error that all widths share: aperture's zero, scale, offset on both sides."""
+    """Return the standard deviation of the error of all widths: zero of the aperture, scale, offset of both sides."""
     zero_sd = max(layer.zero_sd_m for layer in reading.touchset.layers)
     width = float(np.median([o.layer.width_m for seen in reading.sequences for o in seen]))
     return math.hypot(zero_sd, p.scale_sd * width, 2 * p.offset_sd_m)
