@@ -53,8 +53,8 @@ RELEASE_SPEED_M_S = 0.02
 RELEASE_FORCE_N = 2.0
 """Jaw force meanwhile: an object that a fingertip stands on is dragged with at most twice this force."""
 RELEASED_BY_M = 0.006
-"""The object is released once the jaws are this much farther apart: one that was tilted stands again. Source: ours, more
-than `GIVES_WAY_M`."""
+"""The object is released once the jaws are this much farther apart: one that was tilted stands again. Source: ours,
+more than `GIVES_WAY_M`."""
 GIVES_WAY_M = 0.005
 """Farther than this, jaws that both touch do not close on an object that stands: it tilts or turns. Source: ours; soft
 gels give way by 2 mm at 3 N. Closures that toppled a nailong (traced, realistic, seeds 25002 and 25004) gave 10 mm and
@@ -117,8 +117,9 @@ def close_compliantly(
         The last jaw state.
 
     Raises:
-        MotionRefused: The object gave way by more than `max_giving_m`, or the force on the hand passed `MAX_CLOSING_FORCE_N` while closing, `MAX_REST_FORCE_N` when the
-            gentle jaws rested, or the limit of `_max_N` while pressing. The jaws have opened again.
+        MotionRefused: The object gave way by more than `max_giving_m`, or the force on the hand passed
+            `MAX_CLOSING_FORCE_N` while closing, `MAX_REST_FORCE_N` when the gentle jaws rested, or the limit of
+            `_max_N` while pressing. The jaws have opened again.
     """
     arm.felt.forget_near(arm.world.container.pose_B_K.inverse().apply(arm.pose_B_P.position_m))
     closing = _Closing(arm, speed_m_s, max_giving_m, tactile, on_observation)

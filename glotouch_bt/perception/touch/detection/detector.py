@@ -1,8 +1,9 @@
 """Contact guard: the soft rule that ends a guarded move (paper III-A). `hard_stop` is independent of it.
 
 Signal: LPF(wrench - baseline - payload inertia), fused to a force at the tip. Rule: the opposing force AND the total
-force (or the moment) exceed their thresholds for N consecutive samples. The rule is applied twice: to a fast filter, and
-to a slow one with lower thresholds, since a light object gives way to less force than the fast one can tell from noise.
+force (or the moment) exceed their thresholds for N consecutive samples. The rule is applied twice: to a fast filter,
+and to a slow one with lower thresholds, since a light object gives way to less force than the fast one can tell from
+noise.
 """
 
 from __future__ import annotations
