@@ -20,9 +20,10 @@ from glotouch_bt.commands.run import run
 from glotouch_bt.commands.skills import skills
 from glotouch_bt.commands.test import run_tests
 from glotouch_bt.commands.tree import tree
+from glotouch_bt.commands.view import view
 
 COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
-    "Run missions": {"run": run, "resume": resume, "replay": replay, "report": report},
+    "Run missions": {"run": run, "resume": resume, "replay": replay, "report": report, "view": view},
     "Write missions": {
         "check": check,
         "test": run_tests,

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from glotouch_bt.commands import shared
+
+if TYPE_CHECKING:
+    from glotouch_bt.mission import Mission
+
+INTERRUPTED = 130
+"""Exit code of a run that Ctrl-C ended."""
 
 
 @shared.guarded
@@ -23,11 +29,14 @@ def run(
     faults: Annotated[str | None, typer.Option(metavar="FILE", help="a fault plan (see: glotouch faults)")] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="the run's folder (default: runs/...)")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the run that --out holds")] = False,
+    live: Annotated[bool, typer.Option("--live", help="show the mission in the browser while it runs")] = False,
+    port: shared.Port = None,
+    no_browser: shared.NoBrowser = False,
     json_: shared.Json = False,
 ) -> int:
     """Run a mission; write its record, result and report.
 
-    `p` or SIGUSR1 pauses and continues it, SIGTERM ends it safely.
+    `p` or SIGUSR1 pauses and continues it, SIGTERM ends it safely. With --live, so does the page in the browser.
     """
     from glotouch_bt.commands.terminal import RunProgress, print_end
     from glotouch_bt.runs import Operator, RunRequest, launch, operated
@@ -45,6 +54,17 @@ def run(
         overwrite=overwrite,
         allow_paths=tuple(allow_path or ()),
     )
-    with RunProgress(quiet=json_) as progress, operated(Operator()) as control:
-        done = launch(request, on_start=progress.start, on_progress=progress.update, control=control)
-    return print_end(done, json_)
+    control = Operator()
+    with shared.live_page(live, control, port, no_browser, objects) as page:
+        with RunProgress(quiet=json_) as progress, operated(control):
+
+            def start(loaded: Mission, folder: Path) -> None:
+                progress.start(loaded, folder)
+                if page is not None:
+                    page.show(folder)
+
+            done = launch(request, on_start=start, on_progress=progress.update, control=control)
+        code = print_end(done, json_)
+        if page is not None and done.exit_code != INTERRUPTED:
+            shared.wait_for_viewers(page)
+    return code

@@ -2,6 +2,7 @@
 
 from glotouch_bt.commands.shared.errors import guarded, set_debug, showing_tracebacks
 from glotouch_bt.commands.shared.experiments import print_summary, progress, put_few_in_box, run_in_pool
+from glotouch_bt.commands.shared.live import live_page, wait_for_viewers
 from glotouch_bt.commands.shared.options import (
     AllowPaths,
     Backend,
@@ -14,7 +15,9 @@ from glotouch_bt.commands.shared.options import (
     KeepTrials,
     MissionName,
     MissionSettings,
+    NoBrowser,
     Objects,
+    Port,
     RunFolderArgument,
     SetConditions,
     Settings,

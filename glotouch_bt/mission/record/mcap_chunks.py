@@ -89,9 +89,7 @@ def record_items(file: IO[bytes], *, skip_magic: bool = False) -> Iterator[McapR
         BadInput: An item states too large a length.
     """
     bounded = cast("IO[bytes]", _BoundedReads(file))
-    yield from _ItemReader(
-        bounded, skip_magic=skip_magic, emit_chunks=True, record_size_limit=MAX_ITEM_BYTES
-    ).records
+    yield from _ItemReader(bounded, skip_magic=skip_magic, emit_chunks=True, record_size_limit=MAX_ITEM_BYTES).records
 
 
 class ChunkUnpacker:

@@ -1,0 +1,125 @@
+"""`glotouch run --live`: the page of the run that this program starts.
+
+The page lives in a process of its own, which reads the record that the run writes. So it cannot delay a control period,
+and nothing that it does reaches the run, except three words through a pipe: pause, resume, stop. The run treats them as
+those of its keyboard (`Control`). A page that crashes is gone; the run goes on.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from glotouch_bt.mission.execution import Control
+from glotouch_bt.robot import BadInput
+from glotouch_bt.view.server import require_viser
+
+READY, FAULT, LEFT = "ready", "fault", "left"
+"""First words of the lines that the page's process sends, besides the requests."""
+PAUSE, RESUME, STOP = "pause", "resume", "stop"
+"""Requests that the page sends."""
+START_S = 60.0
+"""Time in which the page's process must answer. Source: ours; its imports take 2 s on an idle machine."""
+END_S = 5.0
+"""Time in which the page's process must end after its input was closed."""
+
+
+class LiveView:
+    """The page of a run, in a process of its own. Use it in a `with` block around the run.
+
+    Args:
+        control: The run's control; the page's requests go there.
+        port: Port of the loopback interface; None for the next free one.
+        browser: Open the page in the browser.
+        objects: Folder of STL files for the true objects of a simulation.
+
+    Attributes:
+        address: The page's address.
+
+    Raises:
+        BadInput: The port is in use, or viser is not installed.
+    """
+
+    def __init__(
+        self, control: Control, *, port: int | None = None, browser: bool = True, objects: Path | None = None
+    ) -> None:
+        require_viser()
+        self._control = control
+        module = [sys.executable, "-P", "-m", "glotouch_bt.view"]  # -P: no module of the working folder
+        given = ["" if port is None else str(port), "yes" if browser else "", str(objects.resolve()) if objects else ""]
+        # a session of its own: Ctrl-C ends the run first, and the page shows its end
+        self._process = subprocess.Popen(
+            [*module, *given], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+        )
+        self._answered, self._left = threading.Event(), threading.Event()
+        self._fault = ""
+        self.address = ""
+        self._thread = threading.Thread(target=self._listen, name="live view", daemon=True)
+        self._thread.start()
+        if not self._answered.wait(START_S) or not self.address:
+            self.close()
+            raise BadInput(self._fault or "the page's process did not start")
+
+    def show(self, folder: Path) -> None:
+        """Show the run of this folder, whose record may not exist yet."""
+        self._tell(json.dumps(str(folder.resolve())))
+
+    def wait(self) -> None:
+        """Wait until nobody has the page open any more, for example after the run."""
+        self._tell("")
+        self._left.wait()
+
+    def close(self) -> None:
+        """End the page; idempotent."""
+        try:
+            if self._process.stdin is not None:
+                self._process.stdin.close()
+        except OSError:
+            pass
+        try:
+            self._process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._thread.join(END_S)
+        if self._process.stdout is not None:
+            self._process.stdout.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def _tell(self, line: str) -> None:
+        try:
+            if self._process.stdin is not None:
+                self._process.stdin.write(f"{line}\n")
+                self._process.stdin.flush()
+        except (OSError, ValueError):
+            self._left.set()  # the page is gone; the run is not its business
+
+    def _listen(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            word, _, rest = line.strip().partition(" ")
+            if word == READY:
+                self.address = rest
+            elif word == FAULT:
+                self._fault = rest
+            elif word == PAUSE:
+                self._control.pause()
+            elif word == RESUME:
+                self._control.resume()
+            elif word == STOP:
+                self._control.stop("stopped on the page of --live")
+            elif word == LEFT:
+                self._left.set()
+            self._answered.set()
+        self._answered.set()
+        self._left.set()
