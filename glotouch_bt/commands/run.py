@@ -63,7 +63,8 @@ def run(
                 if page is not None:
                     page.show(folder)
 
-            done = launch(request, on_start=start, on_progress=progress.update, control=control)
+            truth = None if page is None else page.show_truth
+            done = launch(request, on_start=start, on_truth=truth, on_progress=progress.update, control=control)
         code = print_end(done, json_)
         if page is not None and done.exit_code != INTERRUPTED:
             shared.wait_for_viewers(page)

@@ -1,6 +1,6 @@
 """The process of the page of `run --live`: a folder comes in on stdin, requests go out on stdout.
 
-Lines in: the run's folder as JSON, then an empty line when the run is over. It ends when stdin is closed.
+Lines in, as JSON objects: the run's `folder`; the `truth` of a simulation; `over` after the run. It ends with stdin.
 """
 
 from __future__ import annotations
@@ -11,12 +11,13 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from glotouch_bt.robot import GlotouchError
 from glotouch_bt.view.live import FAULT, LEFT, PAUSE, READY, RESUME, STOP
 from glotouch_bt.view.page import MissionControls
 from glotouch_bt.view.serve import page_server
-from glotouch_bt.view.watch import Watch
+from glotouch_bt.view.watch import RunWatch
 
 NICENESS = 10
 """The control loop goes before the page when both want a core."""
@@ -42,16 +43,13 @@ def main() -> int:
     def end_with_run() -> None:
         """Read stdin until it is closed."""
         for line in sys.stdin:
-            if line.strip():
-                folders.append(Path(json.loads(line)))
-                named.set()
-            else:
-                finished.set()
+            told.update(json.loads(line))
+            (finished if "over" in told else named).set()
         over.set()
         named.set()
 
     over, named, finished = threading.Event(), threading.Event(), threading.Event()
-    folders: list[Path] = []
+    told: dict[str, Any] = {}
     try:
         with page_server(int(port) if port else None, bool(browser)) as (server, address):
             threading.Thread(target=end_with_run, daemon=True).start()
@@ -60,7 +58,7 @@ def main() -> int:
             if over.is_set():
                 return 0
             controls = MissionControls(lambda: tell(PAUSE), lambda: tell(RESUME), lambda: tell(STOP))
-            watch = Watch(server, folders[0], controls, Path(objects) if objects else None)
+            watch = RunWatch(server, Path(told["folder"]), controls, Path(objects) if objects else None, told)
             threading.Thread(target=_tell_when_left, args=(watch, finished, over, tell), daemon=True).start()
             watch.run(over)
     except GlotouchError as e:
@@ -70,7 +68,7 @@ def main() -> int:
 
 
 def _tell_when_left(
-    watch: Watch, finished: threading.Event, over: threading.Event, tell: Callable[[str], None]
+    watch: RunWatch, finished: threading.Event, over: threading.Event, tell: Callable[[str], None]
 ) -> None:
     """Say when the run is over and nobody has had the page open for `GRACE_S`, or nobody ever had."""
     finished.wait()

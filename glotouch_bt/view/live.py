@@ -16,7 +16,9 @@ from types import TracebackType
 from typing import Self
 
 from glotouch_bt.mission.execution import Control
+from glotouch_bt.mission.record import to_json
 from glotouch_bt.robot import BadInput
+from glotouch_bt.robot.simulation import TrueObject
 from glotouch_bt.view.server import require_viser
 
 READY, FAULT, LEFT = "ready", "fault", "left"
@@ -67,11 +69,15 @@ class LiveView:
 
     def show(self, folder: Path) -> None:
         """Show the run of this folder, whose record may not exist yet."""
-        self._tell(json.dumps(str(folder.resolve())))
+        self._tell(json.dumps({"folder": str(folder.resolve())}))
+
+    def show_truth(self, objects: list[TrueObject]) -> None:
+        """Offer the true objects of a simulation, as they stand at the start."""
+        self._tell(json.dumps({"truth": to_json(objects)}))
 
     def wait(self) -> None:
         """Wait until nobody has the page open any more, for example after the run."""
-        self._tell("")
+        self._tell(json.dumps({"over": True}))
         self._left.wait()
 
     def close(self) -> None:

@@ -42,7 +42,7 @@ def view_run(
         BadInput: There is no run, it cannot be read, the port is in use, or viser is not installed.
     """
     from glotouch_bt.report import RecordReader
-    from glotouch_bt.view.watch import Watch
+    from glotouch_bt.view.watch import RunWatch
 
     require_viser()
     with RecordReader(folder, growing=True) as reader:  # a broken record is an error here, and a sentence later
@@ -52,7 +52,7 @@ def view_run(
     with page_server(port, browser) as (server, shown):
         if on_ready is not None:
             on_ready(shown)
-        Watch(server, folder, objects=objects).run(over or threading.Event())
+        RunWatch(server, folder, objects=objects).run(over or threading.Event())
 
 
 @contextmanager

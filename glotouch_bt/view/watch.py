@@ -1,12 +1,13 @@
-"""Watch one run: read its record as it grows, and draw it until someone ends the view."""
+"""RunWatch one run: read its record as it grows, and draw it until someone ends the view."""
 
 from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from glotouch_bt.report import RECORD_NAME, TRUTH_NAME, RecordReader
 from glotouch_bt.robot import BadInput
@@ -17,7 +18,7 @@ from glotouch_bt.view.state import Player, RunModel, read_setup, true_bodies
 if TYPE_CHECKING:
     import viser
 
-    from glotouch_bt.view.state import TrueBody
+    from glotouch_bt.view.state import GhostObject
 
 FRAME_S = 0.1
 """Wall time between two drawings. Source: ours; ten a second look fluid, and cost a tenth of a core."""
@@ -28,7 +29,7 @@ ENDS = {"success": ("succeeded", "good"), "failure": ("failed", "bad"), "aborted
 """Words and tone of each end of a mission."""
 
 
-class Watch:
+class RunWatch:
     """A page that shows a run's folder.
 
     Args:
@@ -36,6 +37,7 @@ class Watch:
         folder: The run's folder; the record may not exist yet.
         controls: Requests to the mission, if it is this program's own.
         objects: Folder of STL files for the true objects, instead of the shipped ones.
+        told: Its `truth`, once there is one, is the list of true objects at the start of a run under way.
 
     Attributes:
         viewers: Number of browsers that show the page; -1 before the first drawing.
@@ -48,8 +50,10 @@ class Watch:
         folder: Path,
         controls: MissionControls | None = None,
         objects: Path | None = None,
+        told: Mapping[str, Any] | None = None,
     ) -> None:
         self._server, self._folder, self._objects = server, folder, objects
+        self._told = told or {}
         self._player = Player(live=True)
         self._page = Page(server, self._player, controls)
         self._model = RunModel()
@@ -57,7 +61,7 @@ class Watch:
         self._inode = 0
         self._begun = False
         self._grown_s = time.perf_counter()
-        self._truth_stamp = 0.0
+        self._truth_stamp = -1.0
         self._fault = ""
         self.viewers = -1
         self.was_viewed = False
@@ -115,12 +119,12 @@ class Watch:
         try:
             stamp = path.stat().st_mtime
         except OSError:
-            return
+            stamp = 0.0 if "truth" in self._told else -1.0
         if stamp == self._truth_stamp:
             return
         self._truth_stamp = stamp
-        truth = read_json(path)
-        found: dict[str, tuple[TrueBody, ...]] = {}
+        truth = read_json(path) if stamp > 0.0 else {"start": self._told.get("truth")}
+        found: dict[str, tuple[GhostObject, ...]] = {}
         for word, key in ((AT_START, "start"), (AT_END, "end")):
             bodies = tuple(true_bodies(truth.get(key))) if isinstance(truth, dict) else ()
             if bodies:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from glotouch_bt.view.page import charts, panels
 from glotouch_bt.view.page.scene import SceneDrawing
-from glotouch_bt.view.state import Player, RunModel, SceneState, TrueBody
+from glotouch_bt.view.state import GhostObject, Player, RunModel, SceneState
 
 if TYPE_CHECKING:
     import viser
@@ -46,7 +46,7 @@ class Page:
         self._server, self._player, self._controls = server, player, controls
         self._model = RunModel()
         self._scene: SceneDrawing | None = None
-        self._truth: dict[str, tuple[TrueBody, ...]] = {}
+        self._truth: dict[str, tuple[GhostObject, ...]] = {}
         self._texts: dict[str, str] = {}
         self._facts: list[str] = []
         self._target = "the target"
@@ -95,7 +95,7 @@ class Page:
         self._facts = [" &nbsp; ".join(shown[:2]), " &nbsp; ".join(shown[2:])]
         self._server.gui.set_panel_label(str(run.get("mission") or "GLoTouch"))
 
-    def set_truth(self, truth: dict[str, tuple[TrueBody, ...]]) -> None:
+    def set_truth(self, truth: dict[str, tuple[GhostObject, ...]]) -> None:
         """Offer the true objects of a simulation, by the words of their switch."""
         if self._truth.keys() != truth.keys():
             self._ghost.options = (HIDDEN, *truth)
@@ -109,6 +109,8 @@ class Page:
         if self._scene is not None:
             self._scene.draw(state)
             self._scene.ghost(self._truth.get(self._ghost.value, ()))
+        if self._controls is not None and self._buttons.visible is (state.phase == "ended"):
+            self._buttons.visible = state.phase != "ended"
         self._set("status", panels.status(state, facts, note, tone))
         self._set("tree", panels.tree(state, whole=self._whole.value))
         self._set("posterior", panels.posterior(state, self._target))
@@ -129,7 +131,7 @@ class Page:
 
     def _mission_controls(self, controls: MissionControls) -> None:
         gui = self._server.gui
-        buttons = gui.add_button_group("mission", ("pause", "go on", "stop"))
+        self._buttons = buttons = gui.add_button_group("mission", ("pause", "go on", "stop"))
 
         @buttons.on_click
         def _(event: viser.GuiEvent[Any]) -> None:

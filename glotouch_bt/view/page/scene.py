@@ -12,10 +12,10 @@ from glotouch_bt.view.page import robot_shapes as shapes
 from glotouch_bt.view.state import (
     CandidateOutline,
     FeltPatch,
+    GhostObject,
     OutlineState,
     PlannedGrasp,
     SceneState,
-    TrueBody,
     felt_points_P,
 )
 
@@ -71,7 +71,7 @@ class SceneDrawing:
         self._joints: list[Any] = []
         self._fingers: dict[str, Any] = {}
         self._probe: list[Any] = []
-        self._ghost_bodies: tuple[TrueBody, ...] = ()
+        self._ghost_bodies: tuple[GhostObject, ...] = ()
         self.shown = {"touches": True, "outlines": True, "patches": True, "grasp": True}
         scene = self._scene
         scene.set_up_direction("+z")
@@ -94,7 +94,7 @@ class SceneDrawing:
         for handle in self._handles.get(layer, ()):
             handle.visible = visible
 
-    def ghost(self, bodies: tuple[TrueBody, ...]) -> None:
+    def ghost(self, bodies: tuple[GhostObject, ...]) -> None:
         """Draw the true objects of a simulation, or none."""
         if bodies == self._ghost_bodies:
             return

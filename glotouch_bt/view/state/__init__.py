@@ -8,11 +8,11 @@ from glotouch_bt.view.state.tree import TreeRow, tree_rows
 from glotouch_bt.view.state.values import (
     CandidateOutline,
     FeltPatch,
+    GhostObject,
     LogLine,
     OutlineState,
     PlannedGrasp,
-    ProbeTouch,
     SceneState,
     Share,
-    TrueBody,
+    TouchPoint,
 )

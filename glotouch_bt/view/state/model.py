@@ -20,9 +20,9 @@ from glotouch_bt.view.state.values import (
     OutlineState,
     Phase,
     PlannedGrasp,
-    ProbeTouch,
     SceneState,
     Share,
+    TouchPoint,
 )
 
 T = TypeVar("T")
@@ -118,7 +118,7 @@ class RunModel:
         self.log: Stamped[LogLine] = Stamped()
         self.marks: Stamped[LogLine] = Stamped()
         self._pads: Stamped[tuple[Array, Array]] = Stamped()
-        self._touches: Stamped[ProbeTouch] = Stamped()
+        self._touches: Stamped[TouchPoint] = Stamped()
         self._outlines: Stamped[CandidateOutline] = Stamped()
         self._patches: Stamped[FeltPatch] = Stamped()
         self._states: Stamped[dict[int, OutlineState]] = Stamped()

@@ -14,11 +14,11 @@ from glotouch_bt.robot import Array, Pose
 from glotouch_bt.view.state.values import (
     CandidateOutline,
     FeltPatch,
+    GhostObject,
     LogLine,
     PlannedGrasp,
-    ProbeTouch,
     Share,
-    TrueBody,
+    TouchPoint,
 )
 
 MALFORMED = (AttributeError, IndexError, KeyError, TypeError, ValueError)
@@ -43,13 +43,13 @@ def vector(value: Any, n: int) -> Array:
     return a
 
 
-def touch_of(event: RecordedEvent) -> ProbeTouch | None:
+def touch_of(event: RecordedEvent) -> TouchPoint | None:
     """Return the touch of a contact event."""
     try:
         c = event.data["contact"]
         tip, point = vector(c["tip_K_m"], 3), vector(c["point_K_m"], 2)
         outward = vector(c.get("reaction_K") or (0.0, 0.0, 0.0), 3)
-        return ProbeTouch(float(c["stamp_s"]), np.array([*point, tip[2]]), outward, float(c.get("force_N") or 0.0))
+        return TouchPoint(float(c["stamp_s"]), np.array([*point, tip[2]]), outward, float(c.get("force_N") or 0.0))
     except MALFORMED:
         return None
 
@@ -174,13 +174,13 @@ def shares_of(event: RecordedEvent) -> tuple[Share, ...]:
     return tuple(sorted((s for s in shares if math.isfinite(s.probability)), key=lambda s: -s.probability))
 
 
-def true_bodies(listed: Any) -> Iterator[TrueBody]:
+def true_bodies(listed: Any) -> Iterator[GhostObject]:
     """Yield the objects of one list of truth.json."""
     for o in listed if isinstance(listed, list) else ():
         try:
             outline = np.asarray(o["outline_B_m"], dtype=np.float64)[:, :2]
             pose = o["pose_B_O"]
-            yield TrueBody(str(o["name"]), vector(pose["position_m"], 3), vector(pose["quat"], 4), outline)
+            yield GhostObject(str(o["name"]), vector(pose["position_m"], 3), vector(pose["quat"], 4), outline)
         except MALFORMED:
             continue
 

@@ -17,7 +17,7 @@ Phase = Literal["waiting", "running", "pausing", "paused", "ended"]
 
 
 @dataclass(frozen=True)
-class ProbeTouch:
+class TouchPoint:
     """A contact of the probe.
 
     Attributes:
@@ -85,7 +85,7 @@ class FeltPatch:
 
 
 @dataclass(frozen=True)
-class TrueBody:
+class GhostObject:
     """A true object of a simulation.
 
     Attributes:
@@ -146,7 +146,7 @@ class SceneState:
     jaw_force_N: float = 0.0
     force_N: float = 0.0
     tip_m: float | None = None
-    touches: tuple[ProbeTouch, ...] = ()
+    touches: tuple[TouchPoint, ...] = ()
     patches: tuple[FeltPatch, ...] = ()
     outlines: tuple[CandidateOutline, ...] = ()
     states: dict[int, OutlineState] = field(default_factory=dict)
