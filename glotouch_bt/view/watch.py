@@ -140,7 +140,8 @@ class RunWatch:
             result = model.record.result
             words, tone = ENDS.get(str(result.get("status")), ("has no result", "bad"))
             reasons = result.get("reasons")
-            why = f": {reasons[-1]}" if isinstance(reasons, list) and reasons else ""
+            node, colon, text = str(reasons[-1] if isinstance(reasons, list) and reasons else "").partition(": ")
+            why = f": {node.rsplit('/', 1)[-1]}{colon}{text}" if node else ""
             here = self._player.t_s >= model.span_s[1] - 0.01
             return f"{'the mission' if here else 'in the end the mission'} {words}{why}", tone
         silent_s = time.perf_counter() - self._grown_s

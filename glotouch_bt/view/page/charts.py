@@ -86,7 +86,7 @@ def strip(model: RunModel, t_s: float, width: float = 290.0) -> str:
     out += [_mark(x.at(m.stamp_s), m) for m in model.marks.values]
     px = x.at(t_s)
     out.append(f'<path d="M{px:.1f} 0v30" stroke="#14181f" stroke-width="1.6"/>')
-    return _svg(30.0, "".join(out), "the whole run", width)
+    return f'<div style="padding-bottom:6px">{_svg(30.0, "".join(out), "the whole run", width)}</div>'
 
 
 def _mark(px: float, mark: LogLine) -> str:

@@ -21,7 +21,7 @@ PHASES = {
     "running": ("running", "#2567c9"),
     "pausing": ("pausing", "#a86400"),
     "paused": ("paused", "#a86400"),
-    "ended": ("ended", "#16834a"),
+    "ended": ("ended", "#5a6472"),
 }
 DEEP_M = 8e-4
 """Indentation with the brightest colour. Source: ours; a squeeze with 10 N indents the shipped gel by 0.7 mm."""

@@ -134,14 +134,11 @@ def prism(outline_m: Array, height_m: float) -> tuple[Array, npt.NDArray[np.int6
     return vertices, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
-def band(outline_m: Array, width_m: Array, height_m: float) -> tuple[Array, npt.NDArray[np.int64]]:
-    """Return a flat ring around a closed polyline (n, 2): `width_m` (n,) to each side, at a height."""
+def band(outline_m: Array, across_m: Array, height_m: float) -> tuple[Array, npt.NDArray[np.int64]]:
+    """Return a flat ring around a closed polyline (n, 2): `across_m` (n, 2) to each side, at a height."""
     n = len(outline_m)
-    centre = outline_m[:-1].mean(axis=0)
-    radial = outline_m - centre
-    radial /= np.maximum(np.linalg.norm(radial, axis=1, keepdims=True), 1e-9)
     z = np.full((n, 1), height_m)
-    inner, outer = outline_m - radial * width_m[:, None], outline_m + radial * width_m[:, None]
+    inner, outer = outline_m - across_m, outline_m + across_m
     vertices = np.concatenate([np.hstack([inner, z]), np.hstack([outer, z])])
     i = np.arange(n - 1)
     quads = np.stack([i, i + 1, n + i + 1, n + i], axis=1)

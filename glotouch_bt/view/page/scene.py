@@ -35,7 +35,7 @@ STATE_COLOURS: dict[OutlineState, Colour] = {
 """Colour of a candidate by its state; the page's words have the same colours."""
 TOUCH: Colour = (206, 30, 12)
 PLAN: Colour = (200, 20, 140)
-GHOST: Colour = (40, 170, 100)
+GHOST: Colour = (0, 158, 190)
 FLOOR: Colour = (222, 210, 190)
 WALL: Colour = (200, 184, 158)
 TABLE: Colour = (243, 244, 246)
@@ -113,8 +113,8 @@ class SceneDrawing:
                 handle = self._scene.add_mesh_simple(f"/ghost/{i}", vertices, faces, **style, position=(0, 0, floor))
             centre = body.outline_B_m.mean(axis=0)
             label = self._scene.add_label(
-                f"/ghost/label{i}", f"true: {body.name}", position=(*centre, body.position_B_m[2] + 0.1),
-                anchor="bottom-center", font_screen_scale=0.8,
+                f"/ghost/label{i}", f"true: {body.name}", position=(*centre, body.position_B_m[2]),
+                anchor="top-center", font_screen_scale=0.8,
             )  # fmt: skip
             self._handles.setdefault("ghost", []).extend([handle, label])
 
@@ -272,7 +272,7 @@ class SceneDrawing:
             cast_shadow=False, receive_shadow=False,
         ))  # fmt: skip
         width = np.maximum(SDS * o.sd_m, MIN_BAND_M)
-        vertices, faces = shapes.band(o.outline_K_m, width, height)
+        vertices, faces = shapes.band(o.outline_K_m, width[:, None] * o.normal_K, height)
         self._add("outlines", self._scene.add_mesh_simple(
             f"{name}/band", vertices, faces, color=colour, opacity=0.5 if faded else 0.85, side="double",
             cast_shadow=False, receive_shadow=False,

@@ -63,16 +63,29 @@ def outline_of(event: RecordedEvent) -> CandidateOutline | None:
         if contour is None:
             return None
         outline = contour.outline_K_m(64)
-        sd = outline_sd_m(contour, outline, candidate["contour"].get("covariance"))
+        normal = outward_normals(outline)
+        sd = outline_sd_m(contour, outline, normal, candidate["contour"].get("covariance"))
         height = float(candidate["height_m"])
         if not (np.isfinite(outline).all() and math.isfinite(height)):
             return None
-        return CandidateOutline(int(candidate["index"]), outline, sd, height, str(contour.family))
+        return CandidateOutline(int(candidate["index"]), outline, normal, sd, height, str(contour.family))
     except MALFORMED:
         return None
 
 
-def outline_sd_m(contour: Contour, outline_K_m: Array, covariance: Any) -> Array:
+def outward_normals(outline_m: Array) -> Array:
+    """Return the outward unit normal (n, 2) at each corner of a closed polyline (n, 2): the mean of its two edges."""
+    edges = np.diff(outline_m, axis=0)
+    edges /= np.maximum(np.linalg.norm(edges, axis=1, keepdims=True), 1e-12)
+    along = edges + np.roll(edges, 1, axis=0)
+    along = np.concatenate([along, along[:1]])
+    x, y = outline_m.T
+    anticlockwise = np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]) >= 0.0
+    normal = np.column_stack([along[:, 1], -along[:, 0]]) * (1.0 if anticlockwise else -1.0)
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12))
+
+
+def outline_sd_m(contour: Contour, outline_K_m: Array, normal: Array, covariance: Any) -> Array:
     """Return the standard deviation (n,) of each corner of an outline along its normal, to first order.
 
     The gradient g of the normal displacement by the parameters is (normal, 1) for a circle, (normal, lever, end, side)
@@ -86,7 +99,6 @@ def outline_sd_m(contour: Contour, outline_K_m: Array, covariance: Any) -> Array
     except (TypeError, ValueError):
         return np.zeros(len(outline_K_m))
     radial = outline_K_m - contour.centre_K_m
-    normal = radial / np.maximum(np.linalg.norm(radial, axis=1, keepdims=True), 1e-9)
     if k == 3:
         gradient = np.column_stack([normal, np.ones(len(normal))])
     elif k == 5:

@@ -40,6 +40,7 @@ class CandidateOutline:
     Attributes:
         index: Order of discovery.
         outline_K_m: (n, 2) closed polyline.
+        normal_K: (n, 2) outward normal at each corner.
         sd_m: (n,) standard deviation of the outline along its normal, zero if unknown.
         height_m: Top above the floor; the sensing height until it was measured.
         kind: Fitted shape: circle, rectangle or free.
@@ -47,6 +48,7 @@ class CandidateOutline:
 
     index: int
     outline_K_m: Array
+    normal_K: Array
     sd_m: Array
     height_m: float
     kind: str
