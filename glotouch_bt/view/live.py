@@ -11,7 +11,9 @@ import json
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 from pathlib import Path
+from queue import SimpleQueue
 from types import TracebackType
 from typing import Self
 
@@ -21,6 +23,8 @@ from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.simulation import TrueObject
 from glotouch_bt.view.server import require_viser
 
+PAGE = (sys.executable, "-P", "-m", "glotouch_bt.view")
+"""The page's program; -P: it takes no module from the working folder."""
 READY, FAULT, LEFT = "ready", "fault", "left"
 """First words of the lines that the page's process sends, besides the requests."""
 PAUSE, RESUME, STOP = "pause", "resume", "stop"
@@ -52,17 +56,18 @@ class LiveView:
     ) -> None:
         require_viser()
         self._control = control
-        module = [sys.executable, "-P", "-m", "glotouch_bt.view"]  # -P: no module of the working folder
         given = ["" if port is None else str(port), "yes" if browser else "", str(objects.resolve()) if objects else ""]
         # a session of its own: Ctrl-C ends the run first, and the page shows its end
         self._process = subprocess.Popen(
-            [*module, *given], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+            [*PAGE, *given], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
         )
         self._answered, self._left = threading.Event(), threading.Event()
         self._fault = ""
         self.address = ""
-        self._thread = threading.Thread(target=self._listen, name="live view", daemon=True)
-        self._thread.start()
+        self._lines: SimpleQueue[str | None] = SimpleQueue()
+        self._threads = [threading.Thread(target=f, daemon=True) for f in (self._listen, self._write)]
+        for thread in self._threads:
+            thread.start()
         if not self._answered.wait(START_S) or not self.address:
             self.close()
             raise BadInput(self._fault or "the page's process did not start")
@@ -82,17 +87,14 @@ class LiveView:
 
     def close(self) -> None:
         """End the page; idempotent."""
-        try:
-            if self._process.stdin is not None:
-                self._process.stdin.close()
-        except OSError:
-            pass
+        self._lines.put(None)
         try:
             self._process.wait(END_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        self._thread.join(END_S)
+        for thread in self._threads:
+            thread.join(END_S)
         if self._process.stdout is not None:
             self._process.stdout.close()
 
@@ -103,12 +105,17 @@ class LiveView:
         self.close()
 
     def _tell(self, line: str) -> None:
-        try:
-            if self._process.stdin is not None:
+        self._lines.put(line)
+
+    def _write(self) -> None:
+        """Write lines; a page that does not read them delays this thread, never the run."""
+        assert self._process.stdin is not None
+        with suppress(OSError, ValueError):  # the page is gone, and the run goes on
+            while (line := self._lines.get()) is not None:
                 self._process.stdin.write(f"{line}\n")
                 self._process.stdin.flush()
-        except (OSError, ValueError):
-            self._left.set()  # the page is gone; the run is not its business
+        with suppress(OSError):
+            self._process.stdin.close()
 
     def _listen(self) -> None:
         assert self._process.stdout is not None

@@ -40,6 +40,7 @@ class RunWatch:
         told: Its `truth`, once there is one, is the list of true objects at the start of a run under way.
 
     Attributes:
+        page: The page.
         viewers: Number of browsers that show the page; -1 before the first drawing.
         was_viewed: A browser has shown it.
     """
@@ -55,7 +56,7 @@ class RunWatch:
         self._server, self._folder, self._objects = server, folder, objects
         self._told = told or {}
         self._player = Player(live=True)
-        self._page = Page(server, self._player, controls)
+        self.page = Page(server, self._player, controls)
         self._model = RunModel()
         self._reader: RecordReader | None = None
         self._inode = 0
@@ -92,7 +93,7 @@ class RunWatch:
         viewers = len(self._server.get_clients())
         t_s = self._player.advance(wall_s, model.span_s, growing=not model.ended)
         if viewers or self.viewers != viewers:  # without a viewer only the record is read
-            self._page.draw(model.state_at(t_s), *self._note())
+            self.page.draw(model.state_at(t_s), *self._note())
         self.viewers, self.was_viewed = viewers, self.was_viewed or viewers > 0
 
     def _read(self) -> None:
@@ -105,13 +106,14 @@ class RunWatch:
             self.close()
             self._reader, self._inode = RecordReader(self._folder, growing=True), inode
             self._model, self._begun = RunModel(), False
+            self._player.begin()
         assert self._reader is not None
         if self._reader.read():
             self._grown_s = time.perf_counter()
             self._model.feed(self._reader)
             if not self._begun and self._reader.record.run:
                 self._begun = True
-                self._page.begin(self._model, read_setup(self._reader.record, self._objects))
+                self.page.begin(self._model, read_setup(self._reader.record, self._objects))
         self._read_truth()
 
     def _read_truth(self) -> None:
@@ -129,7 +131,7 @@ class RunWatch:
             bodies = tuple(true_bodies(truth.get(key))) if isinstance(truth, dict) else ()
             if bodies:
                 found[word] = bodies
-        self._page.set_truth(found)
+        self.page.set_truth(found)
 
     def _note(self) -> tuple[str, str]:
         """Return the sentence below the head, and its tone."""

@@ -40,10 +40,15 @@ class Page:
         server: An empty page.
         player: Its clock.
         controls: Requests to the mission, or None if it can only be watched.
+
+    Attributes:
+        html: The panels, by name.
+        ghost_switch: Switch of the true objects; hidden while there are none.
+        mission_buttons: Buttons of the requests, or None.
     """
 
     def __init__(self, server: viser.ViserServer, player: Player, controls: MissionControls | None) -> None:
-        self._server, self._player, self._controls = server, player, controls
+        self._server, self._player = server, player
         self._model = RunModel()
         self._scene: SceneDrawing | None = None
         self._truth: dict[str, tuple[GhostObject, ...]] = {}
@@ -55,12 +60,11 @@ class Page:
         gui.set_panel_label("GLoTouch")
         gui.main_panel.dock_left()
         gui.main_panel.set_width(LEFT_PX)
-        self._html: dict[str, Any] = {"status": gui.add_html("")}
-        if controls is not None:
-            self._mission_controls(controls)
+        self.html: dict[str, Any] = {"status": gui.add_html("")}
+        self.mission_buttons = None if controls is None else self._mission_controls(controls)
         self._time_line()
         with gui.add_folder("Behavior tree"):
-            self._html["tree"] = gui.add_html("")
+            self.html["tree"] = gui.add_html("")
         self._switches()
         right = gui.add_panel()
         with right.add_tab("Mission"):
@@ -71,7 +75,7 @@ class Page:
                 ("log", "Events"),
             ):
                 with gui.add_folder(title):
-                    self._html[name] = gui.add_html("")
+                    self.html[name] = gui.add_html("")
         right.dock_right()
         right.set_width(RIGHT_PX)
 
@@ -98,8 +102,8 @@ class Page:
     def set_truth(self, truth: dict[str, tuple[GhostObject, ...]]) -> None:
         """Offer the true objects of a simulation, by the words of their switch."""
         if self._truth.keys() != truth.keys():
-            self._ghost.options = (HIDDEN, *truth)
-            self._ghost.visible = bool(truth)
+            self.ghost_switch.options = (HIDDEN, *truth)
+            self.ghost_switch.visible = bool(truth)
         self._truth = truth
 
     def draw(self, state: SceneState, note: str = "", tone: str = "") -> None:
@@ -108,9 +112,9 @@ class Page:
         facts = [*self._facts, panels.fact("skill", running[-1])] if running else self._facts
         if self._scene is not None:
             self._scene.draw(state)
-            self._scene.ghost(self._truth.get(self._ghost.value, ()))
-        if self._controls is not None and self._buttons.visible is (state.phase == "ended"):
-            self._buttons.visible = state.phase != "ended"
+            self._scene.ghost(self._truth.get(self.ghost_switch.value, ()))
+        if self.mission_buttons is not None:
+            self.mission_buttons.visible = not self._model.ended
         self._set("status", panels.status(state, facts, note, tone))
         self._set("tree", panels.tree(state, whole=self._whole.value))
         self._set("posterior", panels.posterior(state, self._target))
@@ -127,11 +131,11 @@ class Page:
     def _set(self, name: str, text: str) -> None:
         if self._texts.get(name) != text:
             self._texts[name] = text
-            self._html[name].content = text
+            self.html[name].content = text
 
-    def _mission_controls(self, controls: MissionControls) -> None:
+    def _mission_controls(self, controls: MissionControls) -> viser.GuiButtonGroupHandle:
         gui = self._server.gui
-        self._buttons = buttons = gui.add_button_group("mission", ("pause", "go on", "stop"))
+        buttons = gui.add_button_group("mission", ("pause", "go on", "stop"))
 
         @buttons.on_click
         def _(event: viser.GuiEvent[Any]) -> None:
@@ -141,6 +145,8 @@ class Page:
                 controls.go_on()
             else:
                 self._confirm_stop(controls)
+
+        return buttons
 
     def _confirm_stop(self, controls: MissionControls) -> None:
         gui = self._server.gui
@@ -163,7 +169,7 @@ class Page:
         with gui.add_folder("Show", expand_by_default=False):
             self._boxes = {name: gui.add_checkbox(title, True) for name, title in LAYERS.items()}
             self._whole = gui.add_checkbox("whole tree", False)
-            self._ghost = gui.add_dropdown("true objects", (HIDDEN,), visible=False)
+            self.ghost_switch = gui.add_dropdown("true objects", (HIDDEN,), visible=False)
         for box in self._boxes.values():
             box.on_update(lambda _: self._show_layers())
 
@@ -175,7 +181,7 @@ class Page:
     def _time_line(self) -> None:
         gui, player = self._server.gui, self._player
         with gui.add_folder("Time"):
-            self._html["strip"] = gui.add_html("")
+            self.html["strip"] = gui.add_html("")
             self._slider = gui.add_slider("t, s", 0.0, 1.0, SLIDER_STEP_S, 0.0)
             moves = gui.add_button_group("go to", (BACK, ON, LIVE, FAILED_BEFORE, FAILED_NEXT))
             speeds = gui.add_button_group("speed", SPEEDS)

@@ -22,7 +22,7 @@ class Player:
 
     def __init__(self, *, live: bool) -> None:
         self._lock = threading.Lock()
-        self.t_s = 0.0
+        self.t_s = -math.inf  # the first step goes to the start, or to the newest entry
         self.live, self.playing, self.speed = live, False, 1.0
 
     def advance(self, wall_s: float, span_s: tuple[float, float], *, growing: bool) -> float:
@@ -56,6 +56,11 @@ class Player:
         """Move by a time, and go on as before; a live view stands."""
         with self._lock:
             self.t_s, self.live = self.t_s + by_s, False
+
+    def begin(self) -> None:
+        """Go to the newest entry of another record, and follow it."""
+        with self._lock:
+            self.t_s, self.live, self.playing = -math.inf, True, False
 
     def follow(self) -> None:
         """Follow the newest entry."""
