@@ -12,6 +12,7 @@ import pytest
 
 pytest.importorskip("viser")
 
+from glotouch_bt.mission.record.recorder import Recorder
 from glotouch_bt.view.page import MissionControls
 from glotouch_bt.view.serve import page_server
 from glotouch_bt.view.watch import RunWatch
@@ -91,6 +92,30 @@ def test_a_resumed_run_replaces_the_record(watch: Callable[..., RunWatch], whole
 def test_a_record_that_is_no_record_is_said_so(watch: Callable[..., RunWatch], tmp_path: Path) -> None:
     (tmp_path / "run.mcap").write_bytes(b"some text that is long enough to have no magic")
     assert "is not an MCAP record" in told(watch(tmp_path))["status"]
+
+
+def test_a_description_that_makes_no_sense_costs_the_scene_only(watch: Callable[..., RunWatch], tmp_path: Path) -> None:
+    joint = {"name": "j", "origin_m": [0, 0, 0], "origin_rpy_rad": [0, 0, 0], "axis": [0, 0, 0], "lower_rad": 0}
+    joint |= {"upper_rad": 0, "velocity_rad_s": 0, "torque_Nm": 0, "armature_kgm2": 0}
+    link = {"name": "l", "mass_kg": 0, "com_m": [0, 0, 0], "inertia_kgm2": [0] * 6, "capsules": []}
+    pose = {"position_m": [0, 0, 0], "quat": [1, 0, 0, 0]}
+    box = {"centre_m": [0, 0, 0], "half_m": [0, 0, 0]}
+    hand = {"pose_E_P": pose, "mass_kg": 0, "com_E_m": [0, 0, 0], "finger_mass_kg": 0, "stroke_m": 0, "force_N": 0}
+    hand |= {
+        "speed_m_s": 0,
+        "body": [box],
+        "finger": box,
+        "pad_window_m": [0, 0],
+        "pad_shape": [1, 1],
+        "pad_depth_m": 0,
+    }
+    robot = {"name": "r", "base": link, "joints": [{**joint, "link": link}], "pose_last_E": pose, "home_q": [1e308]}
+    run = {"mission": "m", "robot": {"description": {**robot, "gripper": hand}}}
+    with Recorder(tmp_path / "run.mcap", run) as record:
+        record.event("note", 1.0, {"text": "still there"})
+    texts = told(watch(tmp_path))
+    assert "the scene cannot be drawn" in texts["status"]
+    assert "still there" in texts["log"]
 
 
 def test_true_objects_are_shown_only_when_asked_for(

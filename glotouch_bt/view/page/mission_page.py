@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from glotouch_bt.robot import GlotouchError
 from glotouch_bt.view.page import charts, panels
 from glotouch_bt.view.page.scene import SceneDrawing
 from glotouch_bt.view.state import GhostObject, Player, RunModel, SceneState
@@ -22,6 +23,8 @@ BACK, ON, LIVE, FAILED_BEFORE, FAILED_NEXT = "−5 s", "+5 s", "end", "◀ failu
 LAYERS = {"touches": "contacts", "outlines": "candidates", "patches": "felt patches", "grasp": "planned grasp"}
 HIDDEN, AT_START, AT_END = "hidden", "at the start", "at the end"
 SLIDER_STEP_S = 0.01
+UNDRAWABLE = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, GlotouchError)
+"""Errors of data of another version, which cost only the scene."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,7 @@ class Page:
         self._texts: dict[str, str] = {}
         self._facts: list[str] = []
         self._target = "the target"
+        self._undrawn = ""
         gui = server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(37, 103, 201))
         gui.set_panel_label("GLoTouch")
@@ -83,7 +87,10 @@ class Page:
         """Start with the content of a record."""
         self._model = model
         self._server.scene.reset()
-        self._scene = SceneDrawing(self._server, setup)
+        try:
+            self._scene = SceneDrawing(self._server, setup)
+        except UNDRAWABLE as e:
+            self._scene, self._undrawn = None, f"the scene cannot be drawn ({type(e).__name__}: {e})"
         self._show_layers()
         run = {} if model.record is None else model.record.run
         parameters = run.get("parameters")
@@ -110,9 +117,14 @@ class Page:
         """Show a state, and a note below the head."""
         running = [n.rsplit("/", 1)[-1] for n, s in state.nodes.items() if s == "RUNNING"]
         facts = [*self._facts, panels.fact("skill", running[-1])] if running else self._facts
-        if self._scene is not None:
-            self._scene.draw(state)
-            self._scene.ghost(self._truth.get(self.ghost_switch.value, ()))
+        try:
+            if self._scene is not None:
+                self._scene.draw(state)
+                self._scene.ghost(self._truth.get(self.ghost_switch.value, ()))
+        except UNDRAWABLE as e:
+            self._scene, self._undrawn = None, f"the scene cannot be drawn any more ({type(e).__name__}: {e})"
+        if self._undrawn:
+            note, tone = self._undrawn, "bad"
         if self.mission_buttons is not None:
             self.mission_buttons.visible = not self._model.ended
         self._set("status", panels.status(state, facts, note, tone))
@@ -122,6 +134,10 @@ class Page:
         self._set("log", panels.log(state.log))
         self._set("signals", charts.signals(self._model, state.t_s))
         self._set("strip", charts.strip(self._model, state.t_s))
+        word = "stand still" if self._player.playing or self._player.live else "play"
+        label = f"{word} ({self._player.speed:g}×)" if word == "play" else word
+        if self._play.label != label:
+            self._play.label = label
         start, end = self._model.span_s
         if self._slider.max != max(end, start + 1.0):
             self._slider.max = max(end, start + 1.0)
@@ -185,8 +201,8 @@ class Page:
             self._slider = gui.add_slider("t, s", 0.0, 1.0, SLIDER_STEP_S, 0.0)
             moves = gui.add_button_group("go to", (BACK, ON, LIVE, FAILED_BEFORE, FAILED_NEXT))
             speeds = gui.add_button_group("speed", SPEEDS)
-            play = gui.add_button("play / stand")
-        play.on_click(lambda _: player.toggle(self._model.span_s))
+            self._play = gui.add_button("play")
+        self._play.on_click(lambda _: player.toggle(self._model.span_s))
 
         @self._slider.on_update
         def _(event: viser.GuiEvent[Any]) -> None:

@@ -25,6 +25,8 @@ PHASES = {
 }
 DEEP_M = 8e-4
 """Indentation with the brightest colour. Source: ours; a squeeze with 10 N indents the shipped gel by 0.7 mm."""
+MAX_ROWS = 300
+"""Lines of the tree, and candidates, that are shown."""
 _BOX = f"font:12.5px/1.45 system-ui,sans-serif;color:{INK};padding:2px 12px 4px"
 
 
@@ -50,7 +52,7 @@ def fact(name: str, value: object) -> str:
 def tree(state: SceneState, *, whole: bool = False) -> str:
     """Return the behavior tree: what runs unfolded, the rest folded."""
     out = []
-    for row in tree_rows(state.nodes, whole=whole):
+    for row in tree_rows(state.nodes, whole=whole)[:MAX_ROWS]:
         sign, colour = STATUS.get(row.status, ("·", "#98a1ad"))
         weight = 600 if row.status == "RUNNING" else 400
         ink = SOFT if row.status in ("SUCCESS", "INVALID") else colour if row.status == "FAILURE" else INK
@@ -67,7 +69,7 @@ def posterior(state: SceneState, target: str) -> str:
     """Return one bar for each candidate, and one for none of them."""
     rows = []
     shares = {s.index: s.probability for s in state.shares}
-    known = sorted({o.index for o in state.outlines} | {i for i in shares if i is not None})
+    known = sorted({o.index for o in state.outlines} | {i for i in shares if i is not None})[:MAX_ROWS]
     for index in known:
         word = state.states.get(index, "found")
         colour = "rgb({},{},{})".format(*STATE_COLOURS[word])

@@ -187,11 +187,12 @@ class RunModel:
         """Return the state of the mission at a robot clock."""
         row = self.motion.at(t_s) if self.motion is not None else None
         jaw = self.jaws.at(t_s)
+        q = None if row is None or not np.isfinite(row[2:]).all() else row[2:]
         shares = self._shares.last(t_s) or ()
         return SceneState(
             t_s=t_s,
             phase=self._phase(t_s, row is not None),
-            q=None if row is None else row[2:],
+            q=q,
             force_N=0.0 if row is None else float(row[1]),
             aperture_m=0.0 if jaw is None else float(jaw[1]),
             jaw_force_N=0.0 if jaw is None else float(jaw[2]),
