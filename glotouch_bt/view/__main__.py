@@ -5,7 +5,6 @@ Lines in, as JSON objects: the run's `folder`; the `truth` of a simulation; `ove
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import threading
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from glotouch_bt.robot import GlotouchError
+from glotouch_bt.untrusted import parse_json
 from glotouch_bt.view.live import FAULT, LEFT, PAUSE, READY, RESUME, STOP
 from glotouch_bt.view.page import MissionControls
 from glotouch_bt.view.serve import page_server
@@ -43,7 +43,7 @@ def main() -> int:
     def end_with_run() -> None:
         """Read stdin until it is closed."""
         for line in sys.stdin:
-            told.update(json.loads(line))
+            told.update(parse_json(line.encode(), "the run"))
             (finished if "over" in told else named).set()
         over.set()
         named.set()

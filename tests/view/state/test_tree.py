@@ -5,20 +5,20 @@ from __future__ import annotations
 from glotouch_bt.view.state import TreeRow, tree_rows
 
 NODES = {
-    "m/root": "RUNNING",
-    "m/root/find": "SUCCESS",
-    "m/root/find/sweep": "SUCCESS",
-    "m/root/find/orbit": "FAILURE",
-    "m/root/take": "RUNNING",
-    "m/root/take/retry": "RUNNING",
-    "m/root/take/retry/grasp": "RUNNING",
-    "m/root/take/retry/old": "INVALID",
+    "m/top": "RUNNING",
+    "m/top/find": "SUCCESS",
+    "m/top/find/sweep": "SUCCESS",
+    "m/top/find/orbit": "FAILURE",
+    "m/top/take": "RUNNING",
+    "m/top/take/retry": "RUNNING",
+    "m/top/take/retry/grasp": "RUNNING",
+    "m/top/take/retry/old": "INVALID",
 }
 
 
 def test_the_running_branch_is_unfolded() -> None:
     assert tree_rows(NODES) == [
-        TreeRow("root", "root", 0, "RUNNING"),
+        TreeRow("top", "top", 0, "RUNNING"),
         TreeRow("find", "find", 1, "SUCCESS", folded=2),
         TreeRow("take › retry", "take › retry", 1, "RUNNING"),
         TreeRow("grasp", "grasp", 2, "RUNNING"),
@@ -29,14 +29,14 @@ def test_the_running_branch_is_unfolded() -> None:
 def test_a_failed_tree_shows_where() -> None:
     ended = {n: "FAILURE" if s == "RUNNING" else s for n, s in NODES.items()}
     assert [(r.label, r.folded) for r in tree_rows(ended)] == [
-        ("root", 0), ("find", 0), ("sweep", 0), ("orbit", 0), ("take › retry", 0), ("grasp", 0), ("old", 0),
+        ("top", 0), ("find", 0), ("sweep", 0), ("orbit", 0), ("take › retry", 0), ("grasp", 0), ("old", 0),
     ]  # fmt: skip
 
 
 def test_everything_can_be_unfolded() -> None:
     assert sum(r.folded for r in tree_rows(NODES, whole=True)) == 0
     assert [r.label for r in tree_rows(NODES, whole=True)] == [
-        "root", "find", "sweep", "orbit", "take › retry", "grasp", "old",
+        "top", "find", "sweep", "orbit", "take › retry", "grasp", "old",
     ]  # fmt: skip
 
 
