@@ -31,7 +31,8 @@ def main() -> int:
     """Serve until stdin is closed; return the exit code."""
     port, browser, objects = sys.argv[1:4]
     os.nice(NICENESS)
-    out, sys.stdout = sys.stdout, sys.stderr  # nothing but our lines goes to the run
+    out = os.fdopen(os.dup(1), "w")  # nothing but our lines goes to the run, also not what a browser writes
+    os.dup2(2, 1)
 
     def tell(line: str) -> None:
         try:
@@ -64,6 +65,9 @@ def main() -> int:
     except GlotouchError as e:
         tell(f"{FAULT} {e}")
         return 2
+    except Exception as e:  # the run goes on without its page
+        sys.stderr.write(f"glotouch: the live view ended: {type(e).__name__}: {e}\n")
+        return 3
     return 0
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
+import sys
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator
@@ -33,7 +35,7 @@ def view_run(
     Args:
         folder: The run's folder.
         port: Port of the loopback interface; None for the next free one.
-        browser: Open the page in the browser.
+        browser: Open the page in the browser, if this machine has a display.
         objects: Folder of STL files for the true objects of a simulation.
         on_ready: Called with the page's address.
         over: Ends the view.
@@ -68,9 +70,14 @@ def page_server(port: int | None, browser: bool) -> Iterator[tuple[viser.ViserSe
     number = free_port(port)
     server = open_server(number)
     try:
-        if browser:
+        if browser and _has_display():
             threading.Thread(target=webbrowser.open, args=(address(number),), daemon=True).start()
         yield server, address(number)
     finally:
         with contextlib.redirect_stdout(io.StringIO()):  # viser prints a farewell
             server.stop()
+
+
+def _has_display() -> bool:
+    """Return False on a machine without a display: a browser in the terminal would hide the command."""
+    return sys.platform == "darwin" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
