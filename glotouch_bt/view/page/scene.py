@@ -130,8 +130,8 @@ class SceneDrawing:
                 for name, side in (("left", 1.0), ("right", -1.0)):
                     if name in self._fingers:
                         self._fingers[name].position = shapes.finger_shift_m(state.aperture_m, side)
-            if self._changed("tip", state.tip_m):
-                self._place_probe(state.tip_m)
+            if self._changed("tip", (state.tip_m, state.probe_lost)):
+                self._place_probe(state.tip_m, lost=state.probe_lost)
             if self._changed("touches", len(state.touches)):
                 self._touches(state)
             looks = tuple(
@@ -226,12 +226,13 @@ class SceneDrawing:
         for solid in shapes.robot_solids(description):
             self._solids(above.get(solid.frame, f"/{solid.frame}"), [solid])
 
-    def _place_probe(self, tip_m: float | None) -> None:
-        """Draw the probe in the hand, or in its stand."""
+    def _place_probe(self, tip_m: float | None, *, lost: bool) -> None:
+        """Draw the probe in the hand, in its stand, or not at all if it is lost."""
         for handle in self._probe:
             handle.remove()
+        self._probe = []
         probe, holder = self._setup.probe, self._setup.holder
-        if probe is None or (tip_m is None and holder is None):
+        if lost or probe is None or (tip_m is None and holder is None):
             return
         if tip_m is None and holder is not None:
             pose, above = holder.pose_B_grasp, "/probe"

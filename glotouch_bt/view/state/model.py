@@ -40,6 +40,8 @@ NO_WINDOW_M = (0.017, 0.028)
 HIDDEN_EVENTS = frozenset({"sweep", "request", "request_done"})
 """Events that the log leaves out: many a second, or without a meaning for a person."""
 _PHASES: dict[str, Phase] = {"pause": "pausing", "paused": "paused", "resumed": "running"}
+LOST = frozenset({"tool_lost", "no_probe"})
+"""Codes of failures that say that the probe is neither in the jaws nor in its holder."""
 MARKS = frozenset({"failure", "guard", "fault", "stuck", "ending"})
 """Events that a person jumps to."""
 
@@ -125,6 +127,7 @@ class RunModel:
         self._shares: Stamped[tuple[Share, ...]] = Stamped()
         self._grasps: Stamped[PlannedGrasp | None] = Stamped()
         self._tips: Stamped[float | None] = Stamped()
+        self._lost: Stamped[bool] = Stamped()
         self._phases: Stamped[Phase] = Stamped()
         self._order: list[str] = []
         self._events_read = self._ticks_read = 0
@@ -197,6 +200,7 @@ class RunModel:
             aperture_m=0.0 if jaw is None else float(jaw[1]),
             jaw_force_N=0.0 if jaw is None else float(jaw[2]),
             tip_m=self._tips.last(t_s),
+            probe_lost=self._lost.last(t_s) or False,
             touches=tuple(self._touches.until(t_s)),
             patches=tuple(self._patches.until(t_s)),
             outlines=tuple({o.index: o for o in self._outlines.until(t_s)}.values()),
@@ -270,6 +274,9 @@ class RunModel:
         if kind == "tool":
             length = data.get("grasp_to_tip_m") if data.get("held") else None
             self._tips.add(stamp_s, float(length) if isinstance(length, int | float) else None)
+            self._lost.add(stamp_s, False)
+        if kind == "failure" and data.get("code") in LOST:
+            self._lost.add(stamp_s, True)
         if phase := _PHASES.get(kind):
             self._phases.add(stamp_s, phase)
         self._judge(event)

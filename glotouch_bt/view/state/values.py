@@ -131,7 +131,8 @@ class SceneState:
         q: (dof,) joint positions, rad; None before the first observation.
         aperture_m, jaw_force_N: Last report of the gripper.
         force_N: Norm of the wrist force.
-        tip_m: Distance from P to the ball of the probe in the jaws, or None.
+        tip_m: Distance from P to the ball of the probe in the jaws; None if it stands in its holder.
+        probe_lost: The probe is neither in the jaws nor in its holder, so nobody knows where it is.
         touches, patches, outlines: Everything found until then.
         states: State of each candidate.
         shares: The posterior, most probable first; empty before the first decision.
@@ -148,6 +149,7 @@ class SceneState:
     jaw_force_N: float = 0.0
     force_N: float = 0.0
     tip_m: float | None = None
+    probe_lost: bool = False
     touches: tuple[TouchPoint, ...] = ()
     patches: tuple[FeltPatch, ...] = ()
     outlines: tuple[CandidateOutline, ...] = ()
