@@ -3,17 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from glotouch_bt.commands import shared
-
-if TYPE_CHECKING:
-    from glotouch_bt.mission import Mission
-
-INTERRUPTED = 130
-"""Exit code of a run that Ctrl-C ended."""
 
 
 @shared.guarded
@@ -29,7 +23,7 @@ def run(
     faults: Annotated[str | None, typer.Option(metavar="FILE", help="a fault plan (see: glotouch faults)")] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="the run's folder (default: runs/...)")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the run that --out holds")] = False,
-    live: Annotated[bool, typer.Option("--live", help="show the mission in the browser while it runs")] = False,
+    live: shared.Live = False,
     port: shared.Port = None,
     no_browser: shared.NoBrowser = False,
     json_: shared.Json = False,
@@ -57,15 +51,8 @@ def run(
     control = Operator()
     with shared.live_page(live, control, port, no_browser, objects) as page:
         with RunProgress(quiet=json_) as progress, operated(control):
-
-            def start(loaded: Mission, folder: Path) -> None:
-                progress.start(loaded, folder)
-                if page is not None:
-                    page.show(folder)
-
-            truth = None if page is None else page.show_truth
+            start, truth = shared.shown_on(page, progress.start)
             done = launch(request, on_start=start, on_truth=truth, on_progress=progress.update, control=control)
         code = print_end(done, json_)
-        if page is not None and done.exit_code != INTERRUPTED:
-            shared.wait_for_viewers(page)
+        shared.wait_for_viewers(page, done)
     return code
