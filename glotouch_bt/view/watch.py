@@ -13,7 +13,7 @@ from glotouch_bt.report import RECORD_NAME, TRUTH_NAME, RecordReader
 from glotouch_bt.robot import BadInput
 from glotouch_bt.untrusted import read_json
 from glotouch_bt.view.page import AT_END, AT_START, MissionControls, Page
-from glotouch_bt.view.state import Player, RunModel, read_setup, true_bodies
+from glotouch_bt.view.state import Player, RunModel, planned_nodes, read_setup, true_bodies
 
 if TYPE_CHECKING:
     import viser
@@ -105,7 +105,7 @@ class RunWatch:
         if inode != self._inode:  # the first record, or that of a resumed run
             self.close()
             self._reader, self._inode = RecordReader(self._folder, growing=True), inode
-            self._model, self._begun = RunModel(), False
+            self._model, self._begun = RunModel(planned_nodes(self._folder)), False
             self._player.begin()
         assert self._reader is not None
         if self._reader.read():

@@ -13,7 +13,7 @@ from glotouch_bt.robot import Array
 from glotouch_bt.view.page.scene import STATE_COLOURS
 from glotouch_bt.view.state import LogLine, SceneState, tree_rows
 
-INK, SOFT, LINE = "#14181f", "#5a6472", "#dfe3e8"
+INK, SOFT, IDLE, LINE = "#14181f", "#5a6472", "#98a1ad", "#dfe3e8"
 TONES = {"": INK, "good": "#16834a", "warn": "#a86400", "bad": "#c5352b"}
 STATUS = {"RUNNING": ("▶", "#2567c9"), "SUCCESS": ("✓", "#16834a"), "FAILURE": ("✕", "#c5352b")}
 PHASES = {
@@ -53,10 +53,10 @@ def tree(state: SceneState, *, whole: bool = False) -> str:
     """Return the behavior tree: what runs unfolded, the rest folded."""
     out = []
     for row in tree_rows(state.nodes, whole=whole)[:MAX_ROWS]:
-        sign, colour = STATUS.get(row.status, ("·", "#98a1ad"))
+        sign, colour = STATUS.get(row.status, ("·", IDLE))
         weight = 600 if row.status == "RUNNING" else 400
-        ink = SOFT if row.status in ("SUCCESS", "INVALID") else colour if row.status == "FAILURE" else INK
-        more = f' <span style="color:#98a1ad">+{row.folded}</span>' if row.folded else ""
+        ink = {"": IDLE, "FAILURE": colour, "RUNNING": INK}.get(row.status, SOFT)
+        more = f' <span style="color:{IDLE}">+{row.folded}</span>' if row.folded else ""
         out.append(
             f'<div title="{esc(row.path)}" style="display:flex;padding-left:{10 * row.depth}px;color:{ink};'
             f'font-weight:{weight};line-height:1.35"><span style="color:{colour};flex:0 0 16px">{sign}</span>'
@@ -75,7 +75,7 @@ def posterior(state: SceneState, target: str) -> str:
         colour = "rgb({},{},{})".format(*STATE_COLOURS[word])
         rows.append(_bar(f"candidate {index}", shares.get(index), colour, "" if word == "found" else word))
     if None in shares:
-        rows.append(_bar("none of them", shares[None], "#98a1ad", ""))
+        rows.append(_bar("none of them", shares[None], IDLE, ""))
     if not rows:
         return f'<div style="{_BOX}">{_nothing("no candidate found yet")}</div>'
     title = f'<div style="color:{SOFT};margin-bottom:3px">Which one is <b style="color:{INK}">{esc(target)}</b>?</div>'
@@ -129,4 +129,4 @@ def log(lines: Sequence[LogLine], limit: int = 60) -> str:
 
 
 def _nothing(words: str) -> str:
-    return f'<span style="color:#98a1ad">{esc(words)}</span>'
+    return f'<span style="color:{IDLE}">{esc(words)}</span>'

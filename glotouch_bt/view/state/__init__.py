@@ -3,7 +3,7 @@
 from glotouch_bt.view.state.model import NO_WINDOW_M, RunModel
 from glotouch_bt.view.state.parse import felt_points_P, true_bodies
 from glotouch_bt.view.state.player import Player
-from glotouch_bt.view.state.setup import RunSetup, read_setup
+from glotouch_bt.view.state.setup import RunSetup, planned_nodes, read_setup
 from glotouch_bt.view.state.tree import TreeRow, tree_rows
 from glotouch_bt.view.state.values import (
     CandidateOutline,

@@ -6,6 +6,7 @@ Pure: it reads messages of a record and returns `SceneState`; it knows no page a
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -104,6 +105,9 @@ class Stamped(Generic[T]):
 class RunModel:
     """A record, read as far as it was written.
 
+    Args:
+        planned: Paths of all nodes of its mission, parents first, if they are known.
+
     Attributes:
         record: Its description, result, events and ticks.
         motion: Rows (stamp_s, wrist force N, q ...), one for each control period; the force is the largest norm of the
@@ -113,7 +117,7 @@ class RunModel:
         marks: The events that a person jumps to.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, planned: Sequence[str] = ()) -> None:
         self.record: RunRecord | None = None
         self.motion: GrowingRows | None = None
         self.jaws = GrowingRows(3)
@@ -129,7 +133,8 @@ class RunModel:
         self._tips: Stamped[float | None] = Stamped()
         self._lost: Stamped[bool] = Stamped()
         self._phases: Stamped[Phase] = Stamped()
-        self._order: list[str] = []
+        self._planned = set(planned)
+        self._order: list[str] = list(planned)
         self._events_read = self._ticks_read = 0
         self._start_s, self._end_s = np.inf, -np.inf
 
@@ -234,7 +239,7 @@ class RunModel:
             if tick.stamp_s > t_s + EPSILON_S:
                 break
             now[tick.node] = tick.new
-        return {node: now[node] for node in self._order if node in now}
+        return {node: now.get(node, "") for node in self._order if node in now or node in self._planned}
 
     def _saw(self, stamp_s: float) -> None:
         self._start_s, self._end_s = min(self._start_s, stamp_s), max(self._end_s, stamp_s)

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import msgspec
 import numpy as np
 
+from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read import shipped_root
 from glotouch_bt.report import RunRecord
 from glotouch_bt.robot import Array, BadInput, Container, Holder, Pose, Probe, RobotDescription
@@ -69,6 +70,16 @@ def read_setup(record: RunRecord, objects: Path | None = None) -> RunSetup:
         window_m=NO_WINDOW_M if description is None else description.gripper.pad_window_m,
         objects=objects or _shipped(record.of_run("objects", "folder")),
     )
+
+
+def planned_nodes(folder: Path) -> list[str]:
+    """Return the paths of all nodes of a run's mission, parents first; none if its mission.yaml cannot be loaded."""
+    file = folder / "mission.yaml"
+    try:
+        mission = load_mission(file)
+    except BadInput:
+        return []
+    return list(mission.spec.paths(mission.name))
 
 
 def _part(value: Any, kind: type[T]) -> T | None:

@@ -16,7 +16,7 @@ class TreeRow:
         label: Name of the node; a chain of only children has the names of its ends.
         path: Names of the whole chain.
         depth: Indentation.
-        status: RUNNING, SUCCESS, FAILURE or INVALID (not running).
+        status: RUNNING, SUCCESS, FAILURE, INVALID (not running any more) or "" (not run yet).
         folded: Number of nodes below that are not shown.
     """
 

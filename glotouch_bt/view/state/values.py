@@ -138,7 +138,7 @@ class SceneState:
         shares: The posterior, most probable first; empty before the first decision.
         grasp: The planned grasp, until the object is lifted or put back.
         pads: Newest depth maps (left, right), each (rows, cols), or None if older than `PADS_S`.
-        nodes: Status of each node that has run, by its path, in the order of the tree.
+        nodes: Status of each node by its path, in the order of the tree; "" for one that has not run yet.
         log: Events until then, oldest first.
     """
 

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.record.recorder import Recorder
 from glotouch_bt.report import RecordReader
-from glotouch_bt.view.state import RunModel, SceneState
+from glotouch_bt.view.state import RunModel, SceneState, planned_nodes
 from tests.support.made_run import OBJECTS, TIP_M, WANTED, Made
 
 
@@ -85,6 +86,30 @@ def test_the_tree_is_that_of_the_time(model: RunModel) -> None:
     assert list(end)[:3] == ["retrieve", "retrieve/tool_pickup", "retrieve/explore"]
     assert end["retrieve"] == "SUCCESS"
     assert "RUNNING" not in {s for n, s in end.items() if n != "retrieve/lift"}
+
+
+def test_planned_nodes_are_there_before_they_run(whole: Made) -> None:
+    planned = ["retrieve", "retrieve/tool_pickup", "retrieve/explore", "retrieve/never"]
+    model = RunModel(planned)
+    assert set(model.state_at(0.0).nodes.values()) == {""}
+    with RecordReader(whole.folder) as reader:
+        reader.read()
+        model.feed(reader)
+    assert model.state_at(0.0).nodes == dict(zip(planned, ("RUNNING", "RUNNING", "", ""), strict=True))
+    end = model.state_at(model.span_s[1]).nodes
+    assert end["retrieve/never"] == ""
+    assert end["retrieve/match"] == "SUCCESS"  # a node that was not planned is shown as well
+
+
+def test_the_plan_is_that_of_the_runs_mission(tmp_path: Path) -> None:
+    assert planned_nodes(tmp_path) == []
+    mission = load_mission("calibrate")
+    (tmp_path / "mission.yaml").write_text(mission.resolved_yaml())
+    assert planned_nodes(tmp_path) == [
+        "calibrate/sequence", "calibrate/sequence/tool_pickup", "calibrate/sequence/tool_calibrate",
+    ]  # fmt: skip
+    (tmp_path / "mission.yaml").write_text("mission: [broken")
+    assert planned_nodes(tmp_path) == []
 
 
 def test_depth_maps_vanish_when_they_are_old(model: RunModel, whole: Made) -> None:
