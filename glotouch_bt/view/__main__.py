@@ -9,6 +9,7 @@ import os
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -31,15 +32,12 @@ def main() -> int:
     """Serve until stdin is closed; return the exit code."""
     port, browser, objects = sys.argv[1:4]
     os.nice(NICENESS)
-    out = os.fdopen(os.dup(1), "w")  # nothing but our lines goes to the run, also not what a browser writes
+    out = os.dup(1)  # nothing but our lines goes to the run, also not what a browser writes
     os.dup2(2, 1)
 
     def tell(line: str) -> None:
-        try:
-            out.write(f"{line}\n")
-            out.flush()
-        except (OSError, ValueError):
-            pass  # the run is gone
+        with suppress(OSError):  # the run is gone
+            os.write(out, f"{line}\n".encode())
 
     def end_with_run() -> None:
         """Read stdin until it is closed."""
