@@ -56,6 +56,26 @@ def test_every_panel_shows_the_run(watch: Callable[..., RunWatch], whole: Made) 
     assert "tool_pickup" in texts["tree"]
 
 
+def test_nothing_is_drawn_while_nothing_changes(
+    server: Any, watch: Callable[..., RunWatch], whole: Made, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown = watch(whole.folder)
+    shown.step(0.1)
+    drawn: list[float] = []
+    draw = shown.page.draw
+    monkeypatch.setattr(shown.page, "draw", lambda state, *note: (drawn.append(state.t_s), draw(state, *note)))
+    shown.step(0.1)
+    assert drawn == []  # nobody looks
+    monkeypatch.setattr(server, "get_clients", lambda: {0: None})
+    for _ in range(5):
+        shown.step(0.1)
+    assert len(drawn) == 1  # somebody has come
+    shown.player.seek(1.0)
+    for _ in range(5):
+        shown.step(0.1)
+    assert drawn[1:] == [1.0]
+
+
 def test_what_a_record_says_is_never_markup(watch: Callable[..., RunWatch], whole: Made) -> None:
     """The target of the made-up run is named `<b>wukong & co</b>`."""
     texts = told(watch(whole.folder))

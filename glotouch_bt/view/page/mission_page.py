@@ -83,6 +83,11 @@ class Page:
         right.dock_right()
         right.set_width(RIGHT_PX)
 
+    @property
+    def switches(self) -> tuple[object, ...]:
+        """The switches that `draw` obeys."""
+        return self._whole.value, self.ghost_switch.value
+
     def begin(self, model: RunModel, setup: RunSetup) -> None:
         """Start with the content of a record."""
         self._model = model
@@ -134,7 +139,7 @@ class Page:
         self._set("log", panels.log(state.log))
         self._set("signals", charts.signals(self._model, state.t_s))
         self._set("strip", charts.strip(self._model, state.t_s))
-        word = "stand still" if self._player.playing or self._player.live else "play"
+        word = "stand still" if self._player.moving else "play"
         label = f"{word} ({self._player.speed:g}×)" if word == "play" else word
         if self._play.label != label:
             self._play.label = label

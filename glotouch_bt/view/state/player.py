@@ -25,6 +25,11 @@ class Player:
         self.t_s = -math.inf  # the first step goes to the start, or to the newest entry
         self.live, self.playing, self.speed = live, False, 1.0
 
+    @property
+    def moving(self) -> bool:
+        """It plays or follows."""
+        return self.playing or self.live
+
     def advance(self, wall_s: float, span_s: tuple[float, float], *, growing: bool) -> float:
         """Move on by `wall_s` of wall time inside `span_s`; return the robot clock to show.
 
