@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from glotouch_bt.view.state import GhostObject
 
 FRAME_S = 0.05
-"""Wall time between two drawings. Source: ours; 20 a second look fluid, and cost 4 ms each, only while something moves."""
+"""Wall time between two drawings. Source: ours; 20 a second look fluid; one costs 4 ms, while something moves."""
 SILENT_S = 8.0
 """Wall time without a new entry after which the page says so. Source: ours; a record grows by 0.5 s."""
 
@@ -95,16 +95,8 @@ class RunWatch:
         viewers = len(self._server.get_clients())
         t_s = self.player.advance(wall_s, model.span_s, growing=not model.ended)
         note = self._note()
-        shown = (
-            t_s,
-            model,
-            model.span_s,
-            note,
-            self.page.switches,
-            self._truth_stamp,
-            self.player.speed,
-            self.player.moving,
-        )
+        clock = (t_s, model.span_s, self.player.speed, self.player.moving)
+        shown = (clock, model, note, self.page.switches, self._truth_stamp)
         if viewers != self.viewers or (viewers and shown != self._shown):  # without a viewer only the record is read
             self.page.draw(model.state_at(t_s), *note)
             self._shown = shown
