@@ -25,6 +25,10 @@ MALFORMED = (AttributeError, IndexError, KeyError, TypeError, ValueError)
 """Errors of data of another shape."""
 MIN_FELT_M = 5e-5
 """Smallest indentation that is drawn as felt. Source: ours, three times the noise of a taxel."""
+EDGE_M = 0.004
+"""Longest edge of a drawn outline: along a side of a rectangle, the uncertainty is that of the side. Source: ours."""
+MAX_DIVISIONS = 100
+"""Most parts of one edge."""
 MAX_TEXT = 160
 """Characters of one line of the log."""
 _BAD, _WARN, _GOOD = ("failure", "guard", "stuck"), ("fault", "ending", "reject", "put_back", "pause"), ("lift",)
@@ -62,7 +66,7 @@ def outline_of(event: RecordedEvent) -> CandidateOutline | None:
         contour = contour_of(candidate)
         if contour is None:
             return None
-        outline = contour.outline_K_m(64)
+        outline = densified(contour.outline_K_m(64), EDGE_M)
         normal = outward_normals(outline)
         sd = outline_sd_m(contour, outline, normal, candidate["contour"].get("covariance"))
         height = float(candidate["height_m"])
@@ -71,6 +75,17 @@ def outline_of(event: RecordedEvent) -> CandidateOutline | None:
         return CandidateOutline(int(candidate["index"]), outline, normal, sd, height, str(contour.family))
     except MALFORMED:
         return None
+
+
+def densified(outline_m: Array, edge_m: float) -> Array:
+    """Return a closed polyline (n, 2) with its edges divided, so that none is longer than `edge_m`."""
+    lengths = np.linalg.norm(np.diff(outline_m, axis=0), axis=1)
+    counts = np.clip(np.ceil(lengths / edge_m), 1, MAX_DIVISIONS).astype(int)
+    parts = [
+        a + np.arange(n)[:, None] / n * (b - a)
+        for a, b, n in zip(outline_m[:-1], outline_m[1:], counts.tolist(), strict=True)
+    ]
+    return np.concatenate([*parts, outline_m[-1:]])
 
 
 def outward_normals(outline_m: Array) -> Array:

@@ -10,7 +10,7 @@ import pytest
 from glotouch_bt.perception.touch import Contour
 from glotouch_bt.robot import Pose
 from glotouch_bt.view.state import felt_points_P
-from glotouch_bt.view.state.parse import outline_sd_m, outward_normals
+from glotouch_bt.view.state.parse import densified, outline_sd_m, outward_normals
 
 RECTANGLE = Contour("box", np.array([0.03, -0.02]), (0.08, 0.04), 0.6, 0.0, np.zeros(0))
 
@@ -57,6 +57,17 @@ def test_an_unknown_covariance_is_no_uncertainty() -> None:
     outline = RECTANGLE.outline_K_m()
     for covariance in (None, [], [[1.0]], "x", np.full((5, 5), np.nan).tolist()):
         assert not outline_sd_m(RECTANGLE, outline, outward_normals(outline), covariance).any()
+
+
+def test_a_dense_outline_is_the_same_outline() -> None:
+    outline = RECTANGLE.outline_K_m()
+    dense = densified(outline, 0.003)
+    steps = np.linalg.norm(np.diff(dense, axis=0), axis=1)
+    assert steps.max() <= 0.003 + 1e-12
+    assert steps.sum() == pytest.approx(2 * (0.08 + 0.04))
+    for corner in outline:
+        assert np.linalg.norm(dense - corner, axis=1).min() < 1e-12
+    np.testing.assert_array_equal(dense[0], dense[-1])
 
 
 @pytest.mark.parametrize("order", [1, -1])
