@@ -5,6 +5,7 @@ scipy loads its own subpackages on first use, so `import scipy` needs no help.
 
 from __future__ import annotations
 
+import gc
 import importlib
 import importlib.util
 import sys
@@ -14,6 +15,7 @@ from typing import Any
 
 _MODULES: list[str] = []
 _DOORS: list[tuple[str, str]] = []
+_LOADERS: list[Callable[[], object]] = []
 _SCIPY = ("interpolate", "linalg.lapack", "ndimage", "sparse.csgraph", "spatial", "special")
 
 
@@ -48,6 +50,11 @@ def lazy_door(package: str, **files: str) -> Callable[[str], Any]:
     return load
 
 
+def on_load_all(load: Callable[[], object]) -> None:
+    """Have `load_all` call a function; it may be called several times."""
+    _LOADERS.append(load)
+
+
 def load_all() -> None:
     """Load every lazy module now. A run does so before it starts, so that no import delays a control period."""
     for package, file in _DOORS:
@@ -56,3 +63,6 @@ def load_all() -> None:
         dir(sys.modules[name])  # any access to an attribute loads it
     for name in _SCIPY:
         importlib.import_module(f"scipy.{name}")
+    for load in _LOADERS:
+        load()
+    gc.freeze()  # a collection while the arm moves looks at what is made from now on only

@@ -15,6 +15,7 @@ HEAVY = (
     "mcap",
     "mujoco",
     "matplotlib",
+    "numba",
 )
 LOADED = "[m for m in HEAVY if m in sys.modules and type(sys.modules[m]).__name__ != '_LazyModule']"
 

@@ -49,7 +49,7 @@ def _settle(model: mujoco.MjModel, data: mujoco.MjData, handles: Handles, descri
     data.qpos[handles.arm_qpos] = home
     data.time = 0.0
     mujoco.mj_forward(model, data)
-    check_sane(data.warning.number, data.sensordata, data.time)
+    check_sane(data.warning.number, data.sensordata[None], data.time)
 
 
 def build_world(

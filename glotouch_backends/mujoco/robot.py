@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import struct
-
 import mujoco
 import numpy as np
 
@@ -19,7 +17,8 @@ from glotouch_backends.mujoco.control import (
 )
 from glotouch_backends.mujoco.model import STEP_S, STEPS, BuiltWorld
 from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, PoseReports, Tactile, WristSensor, up_in
-from glotouch_backends.mujoco.simulation import ControlTrace, SnapshotStore
+from glotouch_backends.mujoco.simulation import ControlTrace, RestingObjects, SnapshotStore
+from glotouch_bt.compiled import compiled
 from glotouch_bt.robot import (
     Array,
     BackendError,
@@ -37,10 +36,30 @@ from glotouch_bt.robot import (
 
 REST_RAD_S = 1e-3
 """A stopped arm stands still below this speed of every joint. Source: ours."""
-READ_WRENCH = struct.Struct("6d").unpack_from
-"""Reads the wrist's force and torque from the bytes of sensordata."""
 MAX_HELD_DISTANCE_M = 0.02
 """The probe counts as held while its handle is within this distance of P. Source: ours."""
+
+
+@compiled("f8[:, :, ::1]", "f8[::1]", "f8[:]", "i8")
+def largest_force_2(external: Array, probe: Array, pads: Array, hand: int) -> float:
+    """Return the largest square of the contact force in a period, N^2, on the hand, and on the probe while it is held.
+
+    Args:
+        external: (steps, bodies, 6) torque and force on the hand's bodies, and from the body `hand` on on the probe's.
+        probe, pads: (3,) the probe's handle and the pads' mid-point in B at the end of the period.
+        hand: Number of the hand's bodies.
+    """
+    x, y, z = probe[0] - pads[0], probe[1] - pads[1], probe[2] - pads[2]
+    bodies = external.shape[1] if x * x + y * y + z * z < MAX_HELD_DISTANCE_M**2 else hand
+    largest = 0.0
+    for step in range(len(external)):
+        x = y = z = 0.0
+        for body in range(bodies):
+            x += external[step, body, 3]
+            y += external[step, body, 4]
+            z += external[step, body, 5]
+        largest = max(largest, x * x + y * y + z * z)
+    return largest
 
 
 class MujocoRobot(Robot):
@@ -77,8 +96,8 @@ class MujocoRobot(Robot):
         ]
         self._ctrl_now, self._sensed = memoryview(data.ctrl), memoryview(data.sensordata)
         self._external_now = memoryview(data.cfrc_ext[handles.held_bodies].reshape(-1))
-        self._counted = np.ones(held)  # the probe's bodies, from 3 on, count while it is held
-        self._warnings = data.warning.number
+        self._hand = handles.hand_bodies.stop - handles.hand_bodies.start
+        self._warnings, self._wrench_now = data.warning.number, data.sensordata[s.force.start : s.torque.stop]
         self._probe_now = data.xpos[handles.probe_body]
         self._pads_now = data.site_xpos[handles.pads_site], data.site_xmat[handles.pads_site].reshape(3, 3)
         self._ago_s = (np.arange(1, STEPS + 1, dtype=np.float64) - STEPS) * STEP_S
@@ -93,6 +112,7 @@ class MujocoRobot(Robot):
 
         self.trace = ControlTrace(model, data) if traced else None
         self._keeper = SnapshotStore(model, data)
+        self._resting = RestingObjects(model, data, handles)
 
         self._samples[:] = data.sensordata
         self._wrist.fill(-self._samples[0, s.force.start : s.torque.stop])
@@ -129,7 +149,8 @@ class MujocoRobot(Robot):
         self._servo.plan(target, self._arm_ctrl)
         self._jaws.plan(self._aperture, self.period_s, self._jaw_ctrl)
         try:
-            self._advance()
+            with self._resting:
+                self._advance()
             check_sane(self._warnings, self._samples, self.data.time)
         except mujoco.FatalError as e:
             self._failed = BackendError(f"MuJoCo failed at t={self.data.time:.3f} s: {e}")
@@ -182,9 +203,8 @@ class MujocoRobot(Robot):
         """Do the period's solver steps; check the wrench after each, and brake once its limit has tripped."""
         model, data, step, guard = self.model, self.data, mujoco.mj_step, self._guard
         ctrl_now, sensed, external_now = self._ctrl_now, self._sensed, self._external_now
-        is_quiet, read, at, expected = guard.is_quiet, READ_WRENCH, 8 * self._s.force.start, self._expected.tolist()
-        speed_rad_s = float(np.abs(data.qvel[self.handles.arm_dof]).max())
-        stands = guard.tripped is not None and speed_rad_s < REST_RAD_S
+        reading, expected = self._wrench_now, self._expected
+        stands = guard.tripped is not None and float(np.abs(data.qvel[self.handles.arm_dof]).max()) < REST_RAD_S
         for i, (ctrl, sample, external) in enumerate(self._rows):
             if guard.tripped is not None and not stands:
                 self._servo.brake(self._arm_ctrl[i])
@@ -192,11 +212,9 @@ class MujocoRobot(Robot):
             step(model, data)
             sample[:] = sensed
             external[:] = external_now
-            reading = read(sensed, at)
-            if guard.tripped is None and not is_quiet(reading, expected):
+            if guard.tripped is None and not guard.is_quiet(reading, expected):
                 # The sensor reads the force of the hand on the arm; the hand feels its opposite.
-                contact = [-w - e for w, e in zip(reading, expected, strict=True)]
-                guard.check(contact, self._twists_S, data.time)
+                guard.check(-reading - expected, self._twists_S, data.time)
         if guard.tripped is not None and not stands:
             self._servo.reset(np.array(data.qpos[self.handles.arm_qpos]))
         if self.trace is not None:
@@ -222,11 +240,10 @@ class MujocoRobot(Robot):
         s, rows = self._s, self._samples.copy()
         now_s = self._cycles * self.period_s
         self._poses.correct(rows, s)
-        wrench, quat = rows[:, s.force.start : s.torque.stop], rows[:, s.quat]
-        np.negative(wrench, out=wrench)
+        quat = rows[:, s.quat]
         self._set_payload()
         up = up_in(quat[-1])
-        wrench = self._wrist.measure(wrench, up)
+        wrench = self._wrist.measure(-rows[:, s.force.start : s.torque.stop], up)
         self._add_to_tare(wrench, up)
         self._expected = self._wrist.expected(up)
         self._note_peak()
@@ -253,12 +270,9 @@ class MujocoRobot(Robot):
 
     def _note_peak(self) -> None:
         """Update the largest true contact force on the hand, and on the probe while it is held."""
-        x, y, z = (self._probe_now - self._samples[-1, self._s.position]).tolist()
-        self._counted[3:] = x * x + y * y + z * z < MAX_HELD_DISTANCE_M**2
-        force = (self._counted @ self._external)[:, 3:]
-        flat = force.ravel()
-        if flat @ flat > self.peak_force_N**2:  # otherwise no sample can be a new peak
-            self.peak_force_N = max(self.peak_force_N, float((force * force).sum(axis=1).max()) ** 0.5)
+        pads = self._samples[-1, self._s.position]
+        largest_2 = largest_force_2(self._external, self._probe_now, pads, self._hand)
+        self.peak_force_N = max(self.peak_force_N, largest_2**0.5)
 
     def _set_payload(self) -> None:
         """Advance a payload request by one period; the block of its last period is compensated already."""

@@ -168,10 +168,10 @@ def run_trial(study: Campaign, seed: int) -> SpeedTrial:
     """
     folder = RunFolder(study.out / f"s{seed}")
     opening = time.perf_counter()
-    load_all()  # as a run does before it starts
     mission = load_mission(study.mission, study.settings, objects=study.objects)
     conditions = load_conditions(study.conditions)
     backend = load_backend(study.backend)
+    load_all()  # as a run does before it starts
     described: dict[str, object] = {
         "mission": study.mission, "backend": study.backend, "seed": seed, "conditions": study.conditions,
         "container": mission.world.container, "parameters": dict(study.settings),

@@ -64,8 +64,8 @@ def launch(
     mission = _mission(request) if resumable is None else resumable.mission
     conditions = load_conditions(request.conditions) if resumable is None else resumable.conditions
     plan = _fault_plan(request, mission)
-    load_all()
     backend = load_backend(request.backend)
+    load_all()
     options = split_settings(mission, request.settings)
     if resumable is not None:
         options = resumable.options(backend, options)

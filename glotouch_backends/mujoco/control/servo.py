@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from glotouch_backends.mujoco.model import DAMPING_PER_STIFFNESS_S, JOINT_DAMPING, STEPS, STIFFNESS_NM_RAD, Handles
+from glotouch_bt.compiled import compiled
 from glotouch_bt.robot import Array, JointSetpoint, ParamError, RobotDescription
 
 BRAKE_REACH_M = 0.8
@@ -33,6 +34,20 @@ def hermite(period_s: float, steps: int) -> tuple[Array, Array]:
     return position, velocity
 
 
+@compiled("f8[:, ::1]", "f8[::1]", "f8", "f8[:, ::1]", "f8[:, ::1]")
+def _in_range(asked: Array, last: Array, period_s: float, middle: Array, half: Array) -> bool:
+    """Fill the last row of `asked` (4, dof), the velocity from `last` (dof,); return True if no value is too far out.
+
+    Rows of all tables: q, dq, ddq, implied velocity. A value may be `half` away from `middle`; NaN may not.
+    """
+    good = True
+    for j in range(asked.shape[1]):
+        asked[3, j] = (asked[0, j] - last[j]) / period_s
+        for i in range(4):
+            good = good and abs(asked[i, j] - middle[i, j]) <= half[i, j]
+    return good
+
+
 class Servo:
     """Interpolate from the last setpoint to the next one, with one servo command a step.
 
@@ -58,7 +73,6 @@ class Servo:
         n = description.dof
         lower, upper = np.array([j.lower_rad for j in joints]), np.array([j.upper_rad for j in joints])
         fastest = np.array([j.velocity_rad_s for j in joints])
-        # Rows: q, dq, ddq, implied velocity. The test |value - middle| <= half is False for NaN.
         self._middle = np.stack([0.5 * (lower + upper), np.zeros(n), np.zeros(n), np.zeros(n)])
         self._half = np.stack(
             [0.5 * (upper - lower) + 1e-9, fastest, np.full(n, MAX_ACCELERATION_RAD_S2), VELOCITY_SLACK * fastest]
@@ -117,11 +131,8 @@ class Servo:
             asked[0], asked[1], asked[2] = setpoint.q, setpoint.dq, setpoint.ddq
         except (ValueError, TypeError) as e:
             raise ParamError("setpoint", setpoint, f"arrays of shape {self.q.shape}") from e
-        np.subtract(asked[0], self.q, out=asked[3])
-        asked[3] /= self._period
-        good = np.abs(asked - self._middle) <= self._half
-        if np.count_nonzero(good) < good.size:
-            row, i = (int(v[0]) for v in np.nonzero(~good))
+        if not _in_range(asked, self._knots[2], self._period, self._middle, self._half):
+            row, i = (int(v[0]) for v in np.nonzero(~(np.abs(asked - self._middle) <= self._half)))
             middle, half = self._middle[row, i], self._half[row, i]
             what, unit = (("q", "rad"), ("dq", "rad/s"), ("ddq", "rad/s2"), ("(q - last q) / period", "rad/s"))[row]
             rule = f"finite and within {middle - half:.4f} .. {middle + half:.4f} {unit}"

@@ -8,6 +8,7 @@ import numpy as np
 
 from glotouch_backends.mujoco.axis_proof import AxisProof
 from glotouch_backends.mujoco.model import STEP_S, STEPS
+from glotouch_bt.compiled import compiled
 from glotouch_bt.robot import Array, Conditions, RobotDescription, cross_matrix
 from glotouch_bt.robot.scene import stream
 
@@ -44,6 +45,32 @@ def up_in(quat_B_S: Array) -> Array:
     """Return B's z axis (3,) in S: the third row of the rotation matrix."""
     w, x, y, z = quat_B_S.tolist()
     return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
+
+
+@compiled("f8[:, ::1]", "i8", "i8", "f8[:, :]", "f8[:, ::1]", "f8[::1]", "f8[:, ::1]", "f8[:, ::1]")
+def _read(line: Array, reach: int, start: int, new: Array, offset: Array, up: Array, noise: Array, out: Array) -> None:
+    """Move `new` (n, 6) into the delay line (reach + n, 6); fill `out` (n, 6) from row `start` of the line on.
+
+    The line's rows are reduced by `offset` (6, 4), a matrix and a constant, applied to `up` (3,). `noise` (n, 6) is
+    added.
+    """
+    for i in range(reach):
+        line[i] = line[len(new) + i]
+    for i in range(len(new)):
+        line[reach + i] = new[i]
+    for j in range(6):
+        subtracted = offset[j, 0] * up[0] + offset[j, 1] * up[1] + offset[j, 2] * up[2] + offset[j, 3]
+        for i in range(len(out)):
+            out[i, j] = line[start + i, j] - subtracted + noise[i, j]
+
+
+@compiled("f8[:, ::1]", "f8[::1]")
+def _affine(matrix: Array, at: Array) -> Array:
+    """Return the wrench (6,) of a matrix (6, 4), a linear map and a constant, at a vector (3,)."""
+    out = np.zeros(6)
+    for i in range(6):
+        out[i] = matrix[i, 0] * at[0] + matrix[i, 1] * at[1] + matrix[i, 2] * at[2] + matrix[i, 3]
+    return out
 
 
 class WristSensor:
@@ -98,13 +125,14 @@ class WristSensor:
         self._renew()
 
     def _renew(self) -> None:
-        """Combine payload, tare and hand into two affine maps of `up`: the subtracted and the expected wrench."""
+        """Combine payload, tare and hand into affine maps (6, 4) of `up`: the subtracted and the expected wrench."""
         if self._up_at_tare is None:
-            self._offset = (self._payload, np.zeros(6))
-            self._expected = (self._payload + self._hand, np.zeros(6))
+            self._offset = np.column_stack([self._payload, np.zeros(6)])
+            self._expected = np.column_stack([self._payload + self._hand, np.zeros(6)])
         else:
-            self._offset = (self._payload + self._hand, -self._hand @ self._up_at_tare)
-            self._expected = (self._offset[0], self._offset[1] + self._bias)
+            constant = -self._hand @ self._up_at_tare
+            self._offset = np.column_stack([self._payload + self._hand, constant])
+            self._expected = np.column_stack([self._payload + self._hand, constant + self._bias])
 
     def set_payload(self, mass_kg: float, com_P_m: Array) -> None:
         """Set the payload that the controller subtracts, with the errors of the conditions."""
@@ -120,8 +148,7 @@ class WristSensor:
 
     def expected(self, up: Array) -> Array:
         """Return the reading (6,) without contact at the orientation `up`; the hard limit is measured from it."""
-        matrix, constant = self._expected
-        return np.asarray(matrix @ up + constant)
+        return _affine(self._expected, up)
 
     def fill(self, wrench: Array) -> None:
         """Fill the delay line with a true `wrench` (6,)."""
@@ -132,23 +159,18 @@ class WristSensor:
 
         `up` (3,) is `up_in` of the sensor's orientation. The next call overwrites the array.
         """
-        reach, steps, line = self._reach, self._steps, self._line
-        if reach:
-            line[:reach] = line[steps : steps + reach]
-        line[reach:] = true if self._calibrated else self._misread(true)
-        start = self._jitter
+        steps, line, start = self._steps, self._line, self._jitter
+        new = true if self._calibrated else self._misread(true)
         if start:
             start -= max(int(self._jitter_rng.integers(-start, start + 1)), -self._late)
+        if self._noisy and self._block == NOISE_BLOCKS:
+            self._draw()
+        _read(line, self._reach, start, new, self._offset, up, self._noise[self._block % NOISE_BLOCKS], self._measured)
+        if self._jitter:
             self._proof.saw("latency_jitter_s", line[self._jitter : self._jitter + steps], line[start : start + steps])
-        matrix, constant = self._offset
-        out = self._measured
-        np.subtract(line[start : start + steps], matrix @ up + constant, out=out)
         if self._noisy:
-            if self._block == NOISE_BLOCKS:
-                self._draw()
-            out += self._noise[self._block]
             self._block += 1
-        return out
+        return self._measured
 
     def _misread(self, true: Array) -> Array:
         """Return the readings (n, 6) of true wrenches."""

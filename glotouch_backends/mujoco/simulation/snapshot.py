@@ -29,13 +29,26 @@ from glotouch_backends.mujoco.simulation.snapshot_check import (
 )
 from glotouch_bt.robot import BadInput, SafetyStop, Snapshot
 
-FORMAT = 2
+FORMAT = 3
 PARTS = ("_servo", "_jaws", "_wrist", "_guard", "_tactile", "_depth", "_taxels", "_reports", "proof")
 FIXED: Mapping[str, frozenset[str]] = {
     "MujocoRobot": frozenset(
         (
             *("description", "limits", "period_s", "world", "truth", "model", "data", "handles", "trace"),
-            *("_s", "_warnings", "_probe_now", "_pads_now", "_keeper", "_failed", "_closed", "_poses", *PARTS),
+            *(
+                "_s",
+                "_warnings",
+                "_wrench_now",
+                "_probe_now",
+                "_pads_now",
+                "_keeper",
+                "_failed",
+                "_closed",
+                "_poses",
+                "_hand",
+                "_resting",
+                *PARTS,
+            ),
             # views of the arrays that are kept
             *("_rows", "_ctrl_now", "_sensed", "_external_now"),
         )
@@ -43,7 +56,7 @@ FIXED: Mapping[str, frozenset[str]] = {
     "Servo": frozenset(("_model", "_data", "_dof", "_arm_qpos", "_diagonal", "_names")),
     "JawServo": frozenset(("_gripper", "_proof")),
     "WristSensor": frozenset(("_P_in_S", "_proof", "_gain_error", "_cross_talk", "_reach", "_jitter", "_calibrated")),
-    "HardLimitGuard": frozenset(("_max_N", "_max_Nm", "_quiet", "_rise_s_m", "_samples_ahead", "tripped")),
+    "HardLimitGuard": frozenset(("_max_N", "_max_Nm", "_quiet_2", "_rise_s_m", "_samples_ahead", "tripped")),
     "Tactile": frozenset(
         ("_data", "_pads", "_site", "_gel", "_meshes", "_rays", "_c", "depth", "taxels", "_proof", "_smooth")
     ),

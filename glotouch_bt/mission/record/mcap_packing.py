@@ -15,10 +15,12 @@ from functools import cached_property, lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from glotouch_bt.compiled import compiled
 from glotouch_bt.robot import Array, GlotouchError
 
 PACKED_NAME = "glotouch.Packed"
 _NAN = -(2**31)
+"""Steps that stand for a number that is not finite."""
 MAX_ORDER, MAX_COLUMNS, MAX_DIMENSIONS = 2, 64, 4
 """Largest layout that is read: differences along time, columns, dimensions of a row."""
 
@@ -62,6 +64,44 @@ class Column:
         return column
 
 
+@compiled("given f8[:, :]", "f8", "i8")
+def _steps(values: Array, per_step: float, order: int) -> npt.NDArray[np.int32]:
+    """Return values (rows, width) in steps, differenced `order` times along time, as (width, rows)."""
+    rows, width = values.shape
+    out = np.zeros((width, rows), dtype=np.int32)
+    for j in range(width):
+        for i in range(rows):
+            scaled = np.rint(values[i, j] * per_step)
+            if np.isfinite(scaled):
+                out[j, i] = np.int32(min(max(scaled, _NAN + 1.0), -_NAN - 1.0))
+            else:
+                out[j, i] = _NAN
+        for _ in range(order):
+            for i in range(rows - 1, 0, -1):
+                out[j, i] -= out[j, i - 1]  # may wrap modulo 2^32; the sum wraps back
+    return out
+
+
+@compiled("given u1[:, :, :]", "i8", "f8")
+def _values(planes: npt.NDArray[np.uint8], order: int, step: float) -> Array:
+    """Return the values (rows, width) of byte planes (width, 4, rows): the inverse of `_steps`."""
+    width, _, rows = planes.shape
+    out = np.zeros((rows, width))
+    steps = np.zeros(rows, dtype=np.int32)
+    for j in range(width):
+        for i in range(rows):
+            number = np.int64(0)
+            for byte in range(4):
+                number |= np.int64(planes[j, byte, i]) << (8 * byte)
+            steps[i] = np.int32(number)
+        for _ in range(order):
+            for i in range(1, rows):
+                steps[i] += steps[i - 1]
+        for i in range(rows):
+            out[i, j] = np.nan if steps[i] == _NAN else steps[i] * step
+    return out
+
+
 def pack(start_ns: int, columns: Sequence[Column], values: Sequence[npt.ArrayLike]) -> bytes:
     """Return one packed message.
 
@@ -76,17 +116,9 @@ def pack(start_ns: int, columns: Sequence[Column], values: Sequence[npt.ArrayLik
         a = np.asarray(value, dtype=np.float64)
         rows = len(a)
         a = a.reshape(rows, column.width)
-        scaled = np.rint(a * (1.0 / column.step))
-        finite = np.isfinite(scaled)
-        if finite.all():
-            steps = np.clip(scaled, _NAN + 1, 2**31 - 1).astype(np.int32)
-        else:
-            steps = np.clip(np.where(finite, scaled, 0.0), _NAN + 1, 2**31 - 1).astype(np.int32)
-            steps[~finite] = _NAN
-        for _ in range(column.order):
-            steps[1:] -= steps[:-1].copy()  # may wrap modulo 2^32; the sum wraps back
-        planes = np.ascontiguousarray(steps.astype("<i4")).view(np.uint8).reshape(rows, column.width, 4)
-        blocks.append(planes.transpose(1, 2, 0).tobytes())
+        steps = _steps(a, 1.0 / column.step, column.order)
+        planes = steps.astype("<i4", copy=False).view(np.uint8).reshape(column.width, rows, 4)
+        blocks.append(planes.transpose(0, 2, 1).tobytes())
     layout = " ".join(map(str, columns)).encode()
     data = b"".join(blocks)
     head = _tag(1, 0) + _varint(start_ns & (2**64 - 1)) + _tag(2, 0) + _varint(rows)
@@ -124,14 +156,7 @@ def unpack(message: bytes | memoryview) -> tuple[int, dict[str, Array]]:
         size = 4 * rows * c.width
         planes = np.frombuffer(data, np.uint8, size, at).reshape(c.width, 4, rows)
         at += size
-        steps = planes.transpose(0, 2, 1).copy().view("<i4").reshape(c.width, rows)
-        for _ in range(c.order):
-            np.add.accumulate(steps, axis=1, dtype=np.int32, out=steps)
-        values = steps * c.step
-        missing = steps == _NAN
-        if np.count_nonzero(missing):
-            values[missing] = np.nan
-        out[c.name] = values.T.reshape(rows, *c.shape)
+        out[c.name] = _values(planes, c.order, c.step).reshape(rows, *c.shape)
     return start_ns - 2**64 if start_ns >= 2**63 else start_ns, out
 
 

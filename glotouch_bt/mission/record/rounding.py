@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from glotouch_bt.compiled import compiled
 from glotouch_bt.robot import Array, GripperState, Observation, TactileFrame
 
 # Rounding step of each quantity, in the unit of its name.
@@ -28,6 +29,31 @@ def to_step(values: Array, step: float) -> Array:
     return rounded
 
 
+@compiled(
+    "given f8[:]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "f8[:, ::1]",
+)
+def _rounded(stamp: Array, q: Array, dq: Array, position: Array, quat: Array, wrench: Array, steps: Array) -> Array:
+    """Return the samples side by side, rounded to steps (2, columns): each step's inverse and the step."""
+    n, dof = q.shape
+    block = np.zeros((n, steps.shape[1]))
+    block[:, 0] = stamp
+    block[:, 1 : 1 + dof] = q
+    block[:, 1 + dof : 1 + 2 * dof] = dq
+    block[:, 1 + 2 * dof : 4 + 2 * dof] = position
+    block[:, 4 + 2 * dof : 8 + 2 * dof] = quat
+    block[:, 8 + 2 * dof :] = wrench
+    for i in range(n):
+        for j in range(steps.shape[1]):
+            block[i, j] = np.rint(block[i, j] * steps[0, j]) * steps[1, j]
+    return block
+
+
 class Rounding:
     """Rounds the observations of one robot.
 
@@ -38,18 +64,13 @@ class Rounding:
     def __init__(self, dof: int) -> None:
         widths = (1, dof, dof, 3, 4, 3, 3)
         steps = (STAMP_S, JOINT_RAD, JOINT_RAD_S, POSITION_M, QUATERNION, FORCE_N, TORQUE_NM)
-        self._step = np.repeat(np.array(steps), widths)
-        self._inverse = np.repeat(np.array([1.0 / s for s in steps]), widths)
+        self._steps: Array = np.repeat(np.array([[1.0 / s for s in steps], steps]), widths, axis=1)
         a = 1 + dof
         self._dq, self._p, self._w, self._f = a, a + dof, a + dof + 3, a + dof + 7
 
     def __call__(self, o: Observation) -> Observation:
         """Return the observation as the record will hold it."""
-        parts = (o.stamp_s[:, None], o.q, o.dq, o.position_B_P, o.quat_B_P, o.wrench_S)
-        block = np.concatenate(parts, axis=1)  # a copy, rounded in place
-        block *= self._inverse
-        np.rint(block, out=block)
-        block *= self._step
+        block = _rounded(o.stamp_s, o.q, o.dq, o.position_B_P, o.quat_B_P, o.wrench_S, self._steps)
         g = o.gripper
         gripper = GripperState(
             _number(g.stamp_s, STAMP_S), _number(g.aperture_m, APERTURE_M), _number(g.force_N, FORCE_N), g.moving

@@ -34,6 +34,8 @@ MAX_SHELLS = 1000
 """Largest number of closed surfaces that make up an object."""
 MAX_ROUNDS = 100
 """Rounds of label propagation, which halve the distances; more are given to the thorough check."""
+KEPT_SOLIDS = 64
+"""Number of solids kept in memory. Source: ours, twice the objects of a large set."""
 SIZE_DECIMALS = 6
 """Decimals of a metre to which sizes are compared and shown, because files of 32 bit floats are no more exact."""
 MIN_SIZE_M = 0.005
@@ -134,6 +136,10 @@ def _in_one_piece(start: npt.NDArray[np.intp], end: npt.NDArray[np.intp]) -> boo
     return False
 
 
+_loaded: dict[tuple[Path, bytes], Mesh] = {}
+"""Solids read before, by path and content: world and skills of a mission load the same files, 0.1 s each."""
+
+
 def load_mesh(path: Path) -> Mesh:
     """Read one STL.
 
@@ -146,7 +152,13 @@ def load_mesh(path: Path) -> Mesh:
     """
     if not isfile(path):
         raise BadInput(f"{path}: no such STL file")
-    return solid_of(path, read_stl(path))
+    data = read_stl(path)
+    key = path, hashlib.sha256(data).digest()
+    if key not in _loaded:
+        if len(_loaded) == KEPT_SOLIDS:
+            _loaded.pop(next(iter(_loaded)))
+        _loaded[key] = solid_of(path, data)
+    return _loaded[key]
 
 
 def solid_of(path: Path, data: bytes) -> Mesh:

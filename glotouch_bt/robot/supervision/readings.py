@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from glotouch_bt.compiled import compiled
 from glotouch_bt.robot.command import Command
 from glotouch_bt.robot.geometry import Array
 from glotouch_bt.robot.interface import Robot
@@ -32,6 +33,60 @@ MIN_SAMPLE_SHARE = 0.25
 millisecond by a soft real-time loop gives 0.7-0.9 of them, on a loaded machine 0.5."""
 
 
+NOWHERE: Array = np.zeros(0)
+"""A target that is not known."""
+
+
+@compiled(
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:]",
+    "f8",
+)
+def way_to_target(
+    q: Array, dq: Array, position: Array, quat: Array, wrench: Array, limits: Array, target: Array, min_dot: float
+) -> float:
+    """Return the distance of the hand's newest position from its target, or -1 if any reading is out of its range.
+
+    Args:
+        q, dq, position, quat, wrench: The samples of an `Observation`.
+        limits: (4, dof) least and greatest angle, greatest speed; and reach, stop force, stop torque.
+        target: (7,) position and quaternion of P in B, or `NOWHERE`.
+        min_dot: Least inner product of the newest quaternion with that of the target.
+    """
+    n, dof = q.shape
+    reach, stop_N, stop_Nm = limits[3, 0], limits[3, 1], limits[3, 2]
+    for i in range(n):
+        force_2 = torque_2 = norm_2 = 0.0
+        for j in range(dof):
+            if not (math.isfinite(q[i, j]) and abs(dq[i, j]) <= limits[2, j]):
+                return -1.0
+        for j in range(3):
+            if not abs(position[i, j]) <= reach:
+                return -1.0
+            force_2 += wrench[i, j] ** 2
+            torque_2 += wrench[i, j + 3] ** 2
+        for j in range(4):
+            norm_2 += quat[i, j] ** 2
+        if not (force_2 < stop_N**2 and torque_2 < stop_Nm**2 and abs(norm_2 - 1.0) <= MAX_NORM_ERROR):
+            return -1.0
+    for j in range(dof):
+        if not limits[0, j] <= q[n - 1, j] <= limits[1, j]:
+            return -1.0
+    if len(target) == 0:
+        return 0.0
+    dot = away_2 = 0.0
+    for j in range(3):
+        away_2 += (position[n - 1, j] - target[j]) ** 2
+    for j in range(4):
+        dot += quat[n - 1, j] * target[3 + j]
+    return math.sqrt(away_2) if abs(dot) >= min_dot else -1.0
+
+
 class ReadingsGuard:
     """Check every block of readings.
 
@@ -50,15 +105,16 @@ class ReadingsGuard:
         self._last_s = float(first.stamp_s[-1])
         self._late_s = (1.0 + LATE_PERIODS) * period_s
         slack = rules.joint_slack_rad
-        self._ranges = [(j.lower_rad - slack, j.upper_rad + slack) for j in self._joints]
-        self._max_speeds = rules.speed_slack * np.array([j.velocity_rad_s for j in self._joints])
-        # The fast test compares sums of squares over a block: below the limit no sample can exceed it or be NaN.
-        self._per_limit = np.array([1.0 / limits.stop_force_N] * 3 + [1.0 / limits.stop_torque_Nm] * 3)
-        self._max_speed_2, self._max_reach_2 = float(self._max_speeds.min()) ** 2, rules.reach_m**2
+        # Columns are joints; the last row has the limits that are not of a joint.
+        self._fast_limits: Array = np.zeros((4, max(3, len(self._joints))))
+        for i, j in enumerate(self._joints):
+            speed = rules.speed_slack * j.velocity_rad_s
+            self._fast_limits[:3, i] = j.lower_rad - slack, j.upper_rad + slack, speed
+        self._fast_limits[3, :3] = rules.reach_m, limits.stop_force_N, limits.stop_torque_Nm
         self._min_dot, self._min_pressing_force_2 = math.cos(0.5 * rules.following_rad), rules.touching_N**2
         # Recently commanded positions and quaternions of P in B, newest last; empty while the arm brakes to an unknown
         # place.
-        self._targets: deque[list[float]] = deque(maxlen=max(1, round(rules.lag_s / period_s)))
+        self._targets: deque[Array] = deque(maxlen=max(1, round(rules.lag_s / period_s)))
         self._has_velocity = False
         self._moving = False
         self._was_moving = False  # by the command before the newest: a late cycle waited with that one
@@ -85,7 +141,7 @@ class ReadingsGuard:
         motion = command.motion
         if motion is not None:
             pose = motion.pose_B_P
-            self._targets.append([*pose.position_m.tolist(), *pose.quat.tolist()])
+            self._targets.append(np.concatenate((pose.position_m, pose.quat)))
             self._moving, self._has_velocity = True, bool(np.count_nonzero(motion.dq))
         elif self._moving and self._has_velocity:
             self._targets.clear()
@@ -129,34 +185,19 @@ class ReadingsGuard:
         return round(self._period_s * (len(o.stamp_s) - 1) / span_s) if len(o.stamp_s) > 1 and span_s > 0.0 else 0
 
     def _in_order(self, o: Observation) -> bool:
-        """Return True if nothing is wrong: sums of squares over the block, range and pose of its newest sample."""
-        wrench = o.wrench_S * self._per_limit
-        scaled = wrench.ravel()
-        q, dq, position, quat = o.q.ravel(), o.dq.ravel(), o.position_B_P.ravel(), o.quat_B_P.ravel()
-        if not (
-            (scaled @ scaled < 1.0 or _within_limits(wrench))
-            and math.isfinite(q @ q)
-            and (dq @ dq <= self._max_speed_2 or bool((np.abs(o.dq).max(axis=0) <= self._max_speeds).all()))
-            and position @ position <= self._max_reach_2
-            and abs(quat @ quat - len(o.quat_B_P)) <= MAX_NORM_ERROR
-        ):
+        """Return True if nothing is wrong: every sample in its range, and the newest pose at the newest target."""
+        target = self._targets[-1] if self._targets else NOWHERE
+        away_m = way_to_target(
+            o.q, o.dq, o.position_B_P, o.quat_B_P, o.wrench_S, self._fast_limits, target, self._min_dot
+        )
+        if not 0.0 <= away_m <= MAX_LAG_M:
             return False
         self._samples_over = 0
-        for value, (low, high) in zip(o.q[-1].tolist(), self._ranges, strict=True):
-            if not low <= value <= high:
-                return False
-        x, y, z = o.position_B_P[-1].tolist()
-        w, i, j, k = o.quat_B_P[-1].tolist()
-        if not self._targets:
-            if not self._moving and np.abs(o.dq[-1]).max() < MAX_REST_SPEED_RAD_S:
-                self._targets.append([x, y, z, w, i, j, k])
-            return True
-        a, b, c, d, e, f, g = self._targets[-1]
-        away_2 = (x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2
-        if away_2 > MAX_LAG_M**2:
-            return False
-        self._away_m = math.sqrt(away_2)
-        return bool(abs(w * d + i * e + j * f + k * g) >= self._min_dot)
+        if self._targets:
+            self._away_m = away_m
+        elif not self._moving and np.abs(o.dq[-1]).max() < MAX_REST_SPEED_RAD_S:
+            self._targets.append(np.concatenate((o.position_B_P[-1], o.quat_B_P[-1])))
+        return True
 
     def _pressing(self, o: Observation) -> bool:
         """Return True if the newest sample shows more force than a servo without error may press with."""
@@ -252,7 +293,8 @@ class ReadingsGuard:
         if not self._targets:
             return
         rules, p, q = self._rules, o.position_B_P[-1].tolist(), o.quat_B_P[-1].tolist()
-        away_m, before_m = distance_to_path(p, [t[:3] for t in self._targets]), self._away_m
+        targets = [t.tolist() for t in self._targets]
+        away_m, before_m = distance_to_path(p, [t[:3] for t in targets]), self._away_m
         self._away_m = away_m
         touches = self._pressing(o)
         max_m = min(rules.touching_m, rules.following_m) if touches else rules.following_m
@@ -266,7 +308,7 @@ class ReadingsGuard:
             if touches:
                 what += f" while it presses with {float(np.linalg.norm(o.wrench_S[-1, :3])):.0f} N"
             findings.append(GuardFinding("following", what, soon_m, max_m, stamp_s))
-        rad = min(_angle_rad(q, t[3:]) for t in self._targets)
+        rad = min(_angle_rad(q, t[3:]) for t in targets)
         if rad > rules.following_rad:
             what = (
                 f"the hand is turned by {rad:.3f} rad from how it was {told}; {rules.following_rad:.3f} rad are allowed"
@@ -306,12 +348,6 @@ def _select(o: Observation, good: np.ndarray[tuple[int], np.dtype[np.bool_]]) ->
     """Return the block with the chosen samples only."""
     chosen: dict[str, Any] = {name: getattr(o, name)[good] for name in SAMPLED}
     return replace(o, **chosen)
-
-
-def _within_limits(wrench: Array) -> bool:
-    """Return True if no sample of a block (n, 6), scaled by the limits, exceeds 1."""
-    squares = (wrench * wrench).reshape(-1, 2, 3).sum(axis=2)
-    return bool(squares.max() < 1.0)
 
 
 def distance_to_path(point: list[float], path: list[list[float]]) -> float:

@@ -6,10 +6,12 @@ learn. The first motion of a mission does, long before the hand meets anything.
 
 from __future__ import annotations
 
-from collections import deque
+import math
 
 import numpy as np
 
+from glotouch_bt.compiled import compiled
+from glotouch_bt.robot.geometry import Array
 from glotouch_bt.robot.interface import Robot
 from glotouch_bt.robot.observation import Observation
 from glotouch_bt.robot.supervision.limits import GuardFinding, SupervisionLimits
@@ -22,6 +24,69 @@ MIN_INERTIA_N = 0.15
 """Count only a larger inertial force; uniform motion with irregular stamps stays below. Source: ours."""
 MAX_GAP_PERIODS = 1.5
 """Start again after a longer gap between two blocks."""
+
+
+@compiled(
+    "f8[:, ::1]",
+    "f8[:, ::1]",
+    "f8[::1]",
+    "i8",
+    "given f8[:]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "f8[::1]",
+)
+def accelerating(
+    track: Array,
+    forces: Array,
+    mean: Array,
+    known: int,
+    stamps: Array,
+    position: Array,
+    quat: Array,
+    wrench: Array,
+    com: Array,
+) -> float:
+    """Add a block to the motion of the last 2 `HALF` + 1 blocks; return its mean acceleration, -1 if it is too short.
+
+    The acceleration is a second difference at the true times. A force averaged with `WEIGHTS` belongs to it.
+
+    Args:
+        track, forces: (2 HALF + 1, 4) stamps and centres of the hand's mass in B, and (2 HALF, 3) mean forces, newest
+            last.
+        mean: (3,) filled with the weighted mean of the forces.
+        known: Number of blocks before this one.
+        stamps, position, quat, wrench: The samples of an `Observation`.
+        com: (3,) centre of the hand's mass in P.
+    """
+    last, n = len(track) - 1, len(stamps)
+    track[:last] = track[1:].copy()
+    forces[: last - 1] = forces[1:].copy()
+    w, i, j, k = quat[n - 1, 0], quat[n - 1, 1], quat[n - 1, 2], quat[n - 1, 3]
+    x, y, z = com[0], com[1], com[2]
+    a, b, c = 2 * (j * z - k * y), 2 * (k * x - i * z), 2 * (i * y - j * x)
+    track[last, 0] = stamps[n - 1]
+    track[last, 1] = position[n - 1, 0] + x + w * a + j * c - k * b
+    track[last, 2] = position[n - 1, 1] + y + w * b + k * a - i * c
+    track[last, 3] = position[n - 1, 2] + z + w * c + i * b - j * a
+    for axis in range(3):
+        total = 0.0
+        for row in range(n):
+            total += wrench[row, axis]
+        forces[last - 1, axis] = total / n
+        mean[axis] = 0.0
+        for row in range(last):
+            mean[axis] += WEIGHTS[row] * forces[row, axis]
+    if known < last:
+        return -1.0
+    before_s, after_s = track[HALF, 0] - track[0, 0], track[last, 0] - track[HALF, 0]
+    bend_2 = 0.0
+    for axis in range(1, 4):
+        after, before = track[last, axis] - track[HALF, axis], track[HALF, axis] - track[0, axis]
+        bend_2 += (after / after_s - before / before_s) ** 2
+    acceleration: float = 2.0 * math.sqrt(bend_2) / (before_s + after_s)
+    return acceleration
 
 
 class WristResponseGuard:
@@ -38,52 +103,42 @@ class WristResponseGuard:
     def __init__(self, robot: Robot, rules: SupervisionLimits) -> None:
         gripper = robot.description.gripper
         self._mass_kg, com_E = gripper.mass_and_com_E()
-        self._com_P = gripper.pose_E_P.inverse().apply(com_E).tolist()
+        self._com_P = gripper.pose_E_P.inverse().apply(com_E)
         self._rules, self._max_gap_s = rules, MAX_GAP_PERIODS * robot.period_s
         self.reset()
 
     def reset(self) -> None:
         """Forget the motion so far."""
-        self._track: deque[tuple[float, float, float, float]] = deque(maxlen=2 * HALF + 1)
-        self._forces: deque[list[float]] = deque(maxlen=2 * HALF)
-        self._rest: list[float] | None = None  # mean force when the hand last did not accelerate
+        self._track: Array = np.zeros((2 * HALF + 1, 4))
+        self._forces: Array = np.zeros((2 * HALF, 3))
+        self._force: Array = np.zeros(3)
+        self._known = 0  # blocks in the track
+        self._rest: Array | None = None  # mean force when the hand last did not accelerate
         self._due = self._felt = 0.0
 
     def check(self, o: Observation, findings: list[GuardFinding]) -> None:
         """Check one block."""
         stamp_s = float(o.stamp_s[-1])
-        if self._track and stamp_s - self._track[-1][0] > self._max_gap_s:
-            self._track.clear()
-            self._rest = None
-        self._track.append((stamp_s, *self._centre_B_m(o)))
-        self._forces.append((o.wrench_S[:, :3].sum(axis=0) / len(o.stamp_s)).tolist())
-        if len(self._track) <= 2 * HALF:
+        if self._known and stamp_s - self._track.item(-1, 0) > self._max_gap_s:
+            self._known, self._rest = 0, None
+        acceleration_m_s2 = accelerating(
+            self._track, self._forces, self._force, self._known, o.stamp_s, o.position_B_P, o.quat_B_P, o.wrench_S,
+            self._com_P,
+        )  # fmt: skip
+        self._known += 1
+        if acceleration_m_s2 < 0.0:
             return
-        inertia_N = self._mass_kg * self._acceleration_m_s2()
-        force = (WEIGHTS @ np.array(self._forces)).tolist()
+        inertia_N = self._mass_kg * acceleration_m_s2
         if inertia_N < MIN_INERTIA_N or self._rest is None:
-            self._rest = force if inertia_N < MIN_INERTIA_N else None
+            self._rest = self._force.copy() if inertia_N < MIN_INERTIA_N else None
             return
+        change = self._force - self._rest
         self._due += inertia_N**2
-        self._felt += sum((f - r) ** 2 for f, r in zip(force, self._rest, strict=True))
+        self._felt += float(change @ change)
         if self._due >= self._rules.proof_N2:
             if self._felt < self._rules.silent_share * self._due:
                 self._report(stamp_s, findings)
             self._due = self._felt = 0.0
-
-    def _centre_B_m(self, o: Observation) -> tuple[float, float, float]:
-        """Return the centre of the hand's mass in B."""
-        w, i, j, k = o.quat_B_P[-1].tolist()
-        x, y, z = self._com_P
-        a, b, c = 2 * (j * z - k * y), 2 * (k * x - i * z), 2 * (i * y - j * x)
-        px, py, pz = o.position_B_P[-1].tolist()
-        return px + x + w * a + j * c - k * b, py + y + w * b + k * a - i * c, pz + z + w * c + i * b - j * a
-
-    def _acceleration_m_s2(self) -> float:
-        """Return the mean acceleration over the last 2 `HALF` periods, a second difference at their true times."""
-        (t0, *first), (t1, *middle), (t2, *last) = self._track[0], self._track[HALF], self._track[-1]
-        bends = [(c - b) / (t2 - t1) - (b - a) / (t1 - t0) for a, b, c in zip(first, middle, last, strict=True)]
-        return float(2.0 * sum(v * v for v in bends) ** 0.5 / (t2 - t0))
 
     def _report(self, stamp_s: float, findings: list[GuardFinding]) -> None:
         share = (self._felt / self._due) ** 0.5

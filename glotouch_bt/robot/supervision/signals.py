@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from glotouch_bt.compiled import compiled
 from glotouch_bt.robot.geometry import Array
 from glotouch_bt.robot.observation import Observation, TactileFrame
 from glotouch_bt.robot.supervision.limits import GuardFinding, SupervisionLimits, TransientCounter
@@ -20,6 +21,18 @@ MAX_EQUAL_FRAMES = 3
 """Noisy pads that repeat a pair this many times are frozen. Source: ours."""
 MAX_UNTOUCHED_N = 0.5
 """Below this jaw force nothing touches the pads. Source: ours."""
+
+
+@compiled("given f8[:, :]")
+def _repeats(w: Array) -> tuple[bool, float]:
+    """Return True if the last of several samples repeats a component of the first, and the last step of the force."""
+    n = len(w)
+    if n < 2:
+        return False, 0.0
+    repeated = False
+    for i in range(w.shape[1]):
+        repeated |= w[0, i] == w[n - 1, i]
+    return repeated, abs(w[n - 1, 0] - w[n - 2, 0])
 
 
 class WrenchSignalGuard:
@@ -39,14 +52,13 @@ class WrenchSignalGuard:
     def check(self, o: Observation, findings: list[GuardFinding]) -> None:
         """Check one block: a noisy sensor never repeats a component, except within its resolution."""
         w = o.wrench_S
-        first, newest = w[0], w[-1]
-        if np.count_nonzero(first == newest) and len(w) > 1:
+        repeated, step = _repeats(w)
+        if repeated:
             self._check_stuck(w, o.now_s, findings)
         else:
             self._same_periods = 0
             if not self._noisy:
                 self._noisy_periods = self._noisy_periods + 1 if self._restless(w) else 0
-        step = abs(newest.item(0) - w[-2].item(0)) if len(w) > 1 else 0.0
         self._noise_N += self._share * (step - self._noise_N)
         if self._noise_N > self._rules.max_noise_N:
             self._record_noise(o.now_s, findings)

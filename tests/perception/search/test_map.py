@@ -4,7 +4,7 @@ import pytest
 from glotouch_bt.perception.search import SearchMap
 from glotouch_bt.perception.touch import Contact, Contour
 from glotouch_bt.robot import ParamError
-from tests.support.coverage import covered_fraction
+from tests.support.swept_area import covered_fraction
 
 DISC = Contour("round", np.array([0.05, 0.0]), (0.06, 0.06), 0.0, 0.0, np.zeros(0))
 

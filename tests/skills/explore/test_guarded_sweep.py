@@ -12,7 +12,7 @@ from glotouch_bt.perception.search import SearchMap
 from glotouch_bt.perception.touch import Contact, GuardParams
 from glotouch_bt.skill.probing.guarded_probe import Prober
 from glotouch_skills.explore.guarded_sweep import GuardedSweep
-from tests.support.coverage import covered_fraction
+from tests.support.swept_area import covered_fraction
 
 POST, RADIUS, TOP = (0.03, -0.04), 0.03, 0.06
 BALL = 0.006

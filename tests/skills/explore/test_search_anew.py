@@ -8,7 +8,7 @@ from py_trees.common import Status
 from glotouch_bt.perception.search import SearchMap
 from glotouch_bt.perception.touch.outline import envelope
 from glotouch_skills.explore.search_anew import SearchAnew
-from tests.support.coverage import covered_fraction
+from tests.support.swept_area import covered_fraction
 
 
 def test_objects_are_kept_and_ways_forgotten(bench, found) -> None:

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glotouch_bt.compiled import compiled
 from glotouch_bt.perception.touch.detection.baseline import Baseline
 from glotouch_bt.perception.touch.detection.guard_params import GuardParams
-from glotouch_bt.robot import Observation
+from glotouch_bt.robot import Array, Observation
 
 
 @dataclass(frozen=True)
@@ -19,6 +20,23 @@ class HardTrip:
     value: float
     limit: float
     stamp_s: float
+
+
+@compiled("given f8[:, :]", "given f8[:]", "f8[::1]")
+def _within(wrench: Array, median: Array, limits: Array) -> bool:
+    """Return True if every sample is within the limits (4,): force and torque, and those of the residual."""
+    for i in range(len(wrench)):
+        force_2 = torque_2 = rest_force_2 = rest_torque_2 = 0.0
+        for j in range(3):
+            force_2 += wrench[i, j] ** 2
+            torque_2 += wrench[i, j + 3] ** 2
+            rest_force_2 += (wrench[i, j] - median[j]) ** 2
+            rest_torque_2 += (wrench[i, j + 3] - median[j + 3]) ** 2
+        if not (force_2 < limits[0] ** 2 and torque_2 < limits[1] ** 2):
+            return False
+        if not (rest_force_2 < limits[2] ** 2 and rest_torque_2 < limits[3] ** 2):
+            return False
+    return True
 
 
 class HardStop:
@@ -37,17 +55,14 @@ class HardStop:
             ("residual_force_N", params.hard_residual_N),
             ("residual_torque_Nm", params.hard_residual_Nm),
         )
-        force, torque, residual_force, residual_torque = (1.0 / limit for _, limit in self._limits)
-        self._scale = np.array([force] * 3 + [torque] * 3)
-        self._residual_scale = np.array([residual_force] * 3 + [residual_torque] * 3)
+        self._fast_limits: Array = np.array([limit for _, limit in self._limits])
 
     def __call__(self, observation: Observation) -> HardTrip | None:
         """Return the earliest violation in a block, or None."""
         w = observation.wrench_S
-        r = w - self._median
-        whole, rest = (w * self._scale).ravel(), (r * self._residual_scale).ravel()
-        if whole @ whole < 1.0 and rest @ rest < 1.0:  # early exit: no violation and no NaN is possible
+        if _within(w, self._median, self._fast_limits):
             return None
+        r = w - self._median
         norms = [np.linalg.norm(v, axis=1) for v in (w[:, :3], w[:, 3:], r[:, :3], r[:, 3:])]
         trips = []
         for (quantity, limit), norm in zip(self._limits, norms, strict=True):

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from glotouch_bt.robot import Array, Gripper, Observation, ParamError, Pose, Probe, cross, frozen_array, quat_to_matrix
+from glotouch_bt.compiled import compiled
+from glotouch_bt.robot import Array, Gripper, Observation, ParamError, Pose, Probe, frozen_array, quat_to_matrix
 
 NEAREST = 9
 """Number of samples per acceleration: 4 ms to either side at 1 kHz, a usual wrist latency. Position noise of 1 um gives
@@ -63,8 +64,47 @@ class Payload:
 
     def wrench_S(self, acceleration_S_m_s2: Array) -> Array:
         """Return the inertial wrench (..., 6) N and Nm in S at S for accelerations (..., 3) of a translation."""
-        force = -self.mass_kg * np.asarray(acceleration_S_m_s2, dtype=np.float64)
-        return np.concatenate([force, cross(self.com_S_m, force)], axis=-1)
+        a = np.asarray(acceleration_S_m_s2, dtype=np.float64)
+        return _inertial(a.reshape(-1, 3), self.mass_kg, self.com_S_m).reshape(*a.shape[:-1], 6)
+
+
+@compiled("given f8[:, :]", "f8", "given f8[:]")
+def _inertial(acceleration: Array, mass_kg: float, com: Array) -> Array:
+    """Return force and torque (n, 6) of accelerations (n, 3); `com` (3,)."""
+    out = np.zeros((len(acceleration), 6))
+    for i in range(len(out)):
+        x, y, z = -mass_kg * acceleration[i, 0], -mass_kg * acceleration[i, 1], -mass_kg * acceleration[i, 2]
+        out[i, 0], out[i, 1], out[i, 2] = x, y, z
+        out[i, 3], out[i, 4], out[i, 5] = com[1] * z - com[2] * y, com[2] * x - com[0] * z, com[0] * y - com[1] * x
+    return out
+
+
+@compiled("f8[::1]", "f8[:, ::1]", "i8", "f8", "given f8[:]", "f8[:, ::1]")
+def _even_bends(stamps: Array, places: Array, n: int, lag_s: float, evenly: Array, out: Array) -> int:
+    """Fill `out` (n, 3) with the accelerations `lag_s` before the last n samples; return the last window's start.
+
+    Return -1 if the samples are not on a uniform grid, or their windows not inside it, or the delayed samples lie
+    half-way between two others, where rounding chooses one.
+    """
+    least = greatest = stamps[1] - stamps[0]
+    for i in range(1, len(stamps) - 1):
+        step = stamps[i + 1] - stamps[i]
+        least, greatest = min(least, step), max(greatest, step)
+    if not greatest - least < EVEN_S:
+        return -1
+    where = (stamps[len(stamps) - n] - lag_s - stamps[0]) / (stamps[1] - stamps[0])
+    nearest = int(np.rint(where))
+    at = nearest - NEAREST // 2
+    if abs(where - nearest) > MAX_OFF_GRID or not 0 <= at <= len(stamps) - n - NEAREST + 1:
+        return -1
+    step_2 = (stamps[at + 1] - stamps[at]) ** 2
+    for i in range(n):
+        for axis in range(3):
+            total = 0.0
+            for k in range(NEAREST):
+                total += evenly[k] / step_2 * places[at + i + k, axis]
+            out[i, axis] = total
+    return at + n - 1
 
 
 class MeasuredInertia:
@@ -93,14 +133,10 @@ class MeasuredInertia:
             self._position_m = np.repeat(o.position_B_P[:1], before, axis=0)
         stamps = np.concatenate([self._stamp_s, o.stamp_s])
         places = np.concatenate([self._position_m, o.position_B_P])
-        steps, n = stamps[1:] - stamps[:-1], len(o.stamp_s)
-        at = self._even_start(stamps, n, steps.item(0)) if steps.max() - steps.min() < EVEN_S else None
-        if at is not None:  # the usual case, without a search: bit for bit what follows
-            row, column = places.strides
-            windows: Array = np.ndarray((n, NEAREST, 3), np.float64, places, at * row, (row, row, column))
-            acceleration = np.einsum("k,nkc->nc", EVENLY / steps[at] ** 2, windows)
-            last = at + n - 1
-        else:
+        n = len(o.stamp_s)
+        acceleration: Array = np.zeros((n, 3))
+        last = _even_bends(stamps, places, n, self._lag_s, EVENLY, acceleration)
+        if last < 0:
             nearest = np.searchsorted(0.5 * (stamps[1:] + stamps[:-1]), o.stamp_s - self._lag_s)
             first = np.clip(nearest - NEAREST // 2, 0, len(stamps) - NEAREST)
             last = int(first[-1])
@@ -113,18 +149,6 @@ class MeasuredInertia:
         kept = max(0, last - NEAREST)
         self._stamp_s, self._position_m = stamps[kept:], places[kept:]
         return self._carried.wrench_S(acceleration @ (quat_to_matrix(o.quat_B_P[-1]) @ self._R_P_E))
-
-    def _even_start(self, stamps: Array, n: int, step_s: float) -> int | None:
-        """Return the first sample of the first window on a uniform grid, if the windows of n samples lie inside it.
-
-        None also if the delayed samples lie half-way between two others, where rounding chooses one.
-        """
-        where = (stamps.item(-n) - self._lag_s - stamps.item(0)) / step_s
-        nearest = round(where)
-        if abs(where - nearest) > MAX_OFF_GRID:
-            return None
-        at = nearest - NEAREST // 2
-        return at if 0 <= at <= len(stamps) - n - NEAREST + 1 else None
 
 
 def _bend(stamp_s: Array) -> Array:

@@ -108,7 +108,7 @@ def test_samples_that_are_passed_as_quiet_change_nothing() -> None:
             twists[:, :3] = -0.05 * ALONG
             for i, force in enumerate(forces):
                 contact = [*(force * ALONG), 0.0, 0.0, 0.0]
-                if not (shortcut and guard.is_quiet([-c for c in contact], [0.0] * 6)):
+                if not (shortcut and guard.is_quiet(-np.array(contact), np.zeros(6))):
                     guard.check(contact, lambda twists=twists: twists, 0.001 * i)
                 if guard.tripped is not None:
                     break

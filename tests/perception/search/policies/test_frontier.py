@@ -9,7 +9,7 @@ from glotouch_bt.perception.search import NearestFrontier, Routes, SearchMap, se
 from glotouch_bt.perception.search.policies.frontier import PAPER_PASSES
 from glotouch_bt.perception.touch import Contour
 from glotouch_bt.robot import ParamError
-from tests.support.coverage import covered_fraction
+from tests.support.swept_area import covered_fraction
 
 HALF = np.array([0.188, 0.138])
 CORNER = np.array([-0.18, -0.13])
