@@ -90,7 +90,7 @@ def _failed(head: Row, error: Exception) -> Row:
 
 def score(record: RunRecord, traced: TracedSquare) -> dict[str, Any]:
     """Return the paper's five errors and ours, in mm and degrees."""
-    before, true = true_square(record, "start"), true_square(record)
+    before, true = (true_square(record, traced.height_B_m, when) for when in ("start", "end"))
     contact = polygon_distance(true.corners_B_m, traced.points_B_m)
     ball = polygon_distance(true.corners_B_m, traced.tips_B_m) - traced.tip_radius_m
     calibration = record.of_kind("calibration")
