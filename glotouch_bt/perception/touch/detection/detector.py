@@ -130,6 +130,11 @@ class ContactGuard:
             self._zero = self._zero + share * self._history[-1][1].mean(axis=0)
         return onset
 
+    def force_B_N(self, observation: Observation) -> Array:
+        """Return the mean force (3,) on the tip in B over a block at rest, unfiltered."""
+        rotation = quat_to_matrix(observation.quat_B_P[-1]) @ self._R_P_E
+        return np.asarray(rotation @ (self._gain @ (observation.wrench_S.mean(axis=0) - self._zero)))
+
     def _soft_rule(self, force_S: Array, moment_S: Array) -> npt.NDArray[np.int64] | None:
         """Return (n,) 1 where a sample satisfies the soft rule; None if no sample does (early exit)."""
         p, opposing = self.params, None

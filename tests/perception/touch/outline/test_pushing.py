@@ -4,7 +4,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glotouch_bt.perception.touch import estimate_push
-from glotouch_bt.perception.touch.outline.pushing import COMPLIANCE_M
 
 
 @given(st.floats(-0.005, 0.005), st.floats(-0.005, 0.005), st.floats(0, 6.3), st.floats(0.1, 9.0))
@@ -13,7 +12,7 @@ def test_push_is_the_travel_along_the_force(x, y, angle, size):
     way = np.array([x, y])
     got = estimate_push(way, reaction)
     along = -way @ reaction / size
-    assert np.linalg.norm(got) == pytest.approx(max(along - COMPLIANCE_M, 0.0), abs=1e-12)
+    assert np.linalg.norm(got) == pytest.approx(max(along, 0.0), abs=1e-12)
     assert np.linalg.norm(got) <= np.linalg.norm(way) + 1e-12
     assert got @ reaction <= 1e-12
 
