@@ -46,7 +46,7 @@ def plot_errors(rows: Sequence[Mapping[str, Any]], paper: Mapping[str, Mapping[s
         axes.set_yscale("log")
         axes.set_xticks(range(len(LABELS)), list(LABELS.values()))
         axes.set_ylabel("error, mm")
-        axes.set_title("square bolted to the floor" if square == "fixed" else "square free (0.15-0.40 kg)")
+        axes.set_title("square bolted to the floor" if square == "fixed" else "square free")
         axes.grid(axis="y", which="both", alpha=0.25)
         axes.legend(fontsize=8, ncols=2)
     figure.savefig(path, dpi=130)

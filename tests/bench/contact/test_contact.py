@@ -81,3 +81,9 @@ def test_every_mode_is_tried_on_every_seed(tmp_path: Path) -> None:
     asked = [(r.out, r.mission, r.seed, r.settings["contacts"]) for r in (t.memory.request for t in campaign.trials())]
     assert len(asked) == len(set(asked)) == 8
     assert {a[3] for a in asked} == {"20"}
+
+
+def test_settings_are_those_of_the_probes_mission(tmp_path: Path) -> None:
+    campaign = contact.ContactCampaign(seeds=(3,), per_side=4, out=tmp_path, settings={"press": "0"})
+    for request in (t.memory.request for t in campaign.trials()):
+        assert request.settings.get("press") == ("0" if request.mission == "contact_probe" else None)
