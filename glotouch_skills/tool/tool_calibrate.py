@@ -1,4 +1,4 @@
-"""Measure the ball's place in the hand, the probe's compliance and the wrist sensor's latency at the container's walls."""
+"""Measure the ball's place in the hand, the probe's compliance and the wrist sensor's latency at two walls."""
 
 from __future__ import annotations
 

@@ -54,4 +54,4 @@ def solve_compliance(presses: Sequence[Press]) -> Array:
     if np.linalg.matrix_rank(rows, tol=0.1) < 2:
         raise ParamError("presses.direction_P", rows.tolist(), "two directions between which the axes differ")
     found, *_ = np.linalg.lstsq(rows, np.array([p.advance_m / p.force_N for p in presses]), rcond=None)
-    return np.maximum(found, 0.0)
+    return np.asarray(np.maximum(found, 0.0))
