@@ -209,8 +209,8 @@ class ToolCalibrate(Skill):
         p = self.params
         with self.context.arm.pause_signal.finishing():
             before = yield from prober.stand(STAND_S)
-            most_N = p.press_N - float(before.force_K_N @ out)
-            yield from prober.press(out, PRESS_M, min(p.speed_m_s, PRESS_M_S), most_N)
+            max_N = p.press_N - float(before.force_K_N @ out)
+            yield from prober.press(out, PRESS_M, min(p.speed_m_s, PRESS_M_S), max_N)
             after = yield from prober.stand(STAND_S)
         advance_m = float((after.hand_K_m - before.hand_K_m) @ out)
         force_N = float((before.force_K_N - after.force_K_N) @ out)

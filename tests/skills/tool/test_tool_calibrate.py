@@ -14,7 +14,7 @@ from glotouch_skills.tool.tool_calibrate import ToolCalibrate
 STIFFNESS_N_M = 20_000.0
 
 
-def walls(shift_m=(0.0, 0.0), stiffness_N_m=(STIFFNESS_N_M, STIFFNESS_N_M), most_N=np.inf):
+def walls(shift_m=(0.0, 0.0), stiffness_N_m=(STIFFNESS_N_M, STIFFNESS_N_M), max_N=np.inf):
     """The two walls of the corner nearest to the holder (-x, -y), `shift_m` from where they should be.
 
     A wall of stiffness k against a rigid probe is the same to the hand as a rigid wall against a probe that gives 1/k.
@@ -24,7 +24,7 @@ def walls(shift_m=(0.0, 0.0), stiffness_N_m=(STIFFNESS_N_M, STIFFNESS_N_M), most
         out = np.zeros_like(ball)
         for axis, half in enumerate((0.15, 0.20)):
             inside = (-half + shift_m[axis]) - (ball[:, axis] - radius)
-            out[:, axis] = np.clip(stiffness_N_m[axis] * inside, 0.0, most_N)
+            out[:, axis] = np.clip(stiffness_N_m[axis] * inside, 0.0, max_N)
         return out
 
     return force
@@ -105,7 +105,7 @@ def test_the_compliance_is_left_unmeasured(make) -> None:
 
 
 def test_a_ball_that_gives_way_has_slipped(make) -> None:
-    b, skill = make(things=[walls(most_N=0.4)])
+    b, skill = make(things=[walls(max_N=0.4)])
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "slipped")
     assert "gave way" in skill.feedback_message
