@@ -84,7 +84,7 @@ class TouchTop(Skill):
                 sides_m=touched_m,
             )
         height = float(top.ball_K_m[2]) - tool.tip_radius_m - tool.floor_z_K_m
-        self.measured = replace(candidate, height_m=height)
+        self.measured = replace(candidate, height_m=height, top_touched=True)
         self.event("candidate", candidate=self.measured)  # the final record of this candidate, with its height
         self.event("top", candidate=candidate.index, height_m=height, touches=top.touches, passed=top.passed)
 

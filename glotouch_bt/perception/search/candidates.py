@@ -94,7 +94,7 @@ def admit(
         if more is not None:
             belief = belief.with_exclusion(envelope(more), exclusion_m, new=False)
             return Admitted(belief, tuple(more if c.index == old.index else c for c in known), old.index)
-    candidate = Candidate(len(known), traced.outline.contour, height_m, quality(traced.outline), traced.contacts)
+    candidate = Candidate(len(known), traced.outline.contour, height_m, quality(traced.outline), traced.contacts, False)
     return Admitted(belief.with_exclusion(envelope(candidate), exclusion_m), (*known, candidate), candidate.index)
 
 

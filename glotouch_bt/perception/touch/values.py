@@ -107,9 +107,10 @@ class Candidate:
     Attributes:
         index: Order of discovery, from 0.
         contour: Its outline at the sensing height.
-        height_m: Top above the container floor.
+        height_m: Top above the container floor; a lower bound until the top was touched.
         quality: 0..1, certainty of the centre: 1/2 at a standard deviation of 5 mm (`search.candidates.quality`).
         contacts: Contacts with the object.
+        top_touched: The top was touched.
     """
 
     index: int
@@ -117,6 +118,7 @@ class Candidate:
     height_m: float
     quality: float
     contacts: tuple[Contact, ...]
+    top_touched: bool = True
 
     def span_m(self, yaw_rad: float) -> tuple[float, float]:
         """Return (minimum, maximum) coordinate of contact points and outline along the direction `yaw_rad` in K."""

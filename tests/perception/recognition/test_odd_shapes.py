@@ -32,13 +32,15 @@ def meshes(tmp_path_factory: pytest.TempPathFactory):
 
 def test_a_top_that_was_not_felt_says_only_how_high_it_is_at_least(meshes) -> None:
     touched, _ = acquire(meshes["cup"], POSE, IDEAL, np.random.default_rng(0))
-    low = replace(touched.candidate, height_m=0.018)
+    low = replace(touched.candidate, height_m=0.018, top_touched=False)
     params = LikelihoodParams()
     cup = TargetModel.from_mesh(meshes["cup"])
     assert height_ratio(cup, low, params) == 0.0
     # A lower place may have been taken for the top; a higher one cannot.
-    lower, higher = (height_ratio(cup, replace(low, height_m=cup.height_m + d), params) for d in (-0.02, 0.02))
-    assert higher < lower < height_ratio(cup, replace(low, height_m=cup.height_m), params)
+    lower, higher = (
+        height_ratio(cup, replace(touched.candidate, height_m=cup.height_m + d), params) for d in (-0.02, 0.02)
+    )
+    assert higher < lower < height_ratio(cup, replace(touched.candidate, height_m=cup.height_m), params)
 
 
 def test_the_narrowest_way_through(meshes) -> None:

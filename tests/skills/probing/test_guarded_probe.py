@@ -10,7 +10,7 @@ import pytest
 from glotouch_bt.perception.touch import GuardParams
 from glotouch_bt.robot import MotionRefused
 from glotouch_bt.skill import SkillFailed
-from glotouch_bt.skill.probing.guarded_probe import MAX_REST_S, REST_S, Prober
+from glotouch_bt.skill.probing.guarded_probe import MAX_REST_S, REST_S, SAME_REST_S, Prober
 
 START = np.array([-0.05, 0.1, 0.06])
 
@@ -87,6 +87,20 @@ def test_a_rest_lasts_until_the_wrench_is_steady_and_no_longer_than_allowed(make
         b.go(prober.rest())
         assert b.context.observation.now_s - begin <= max_delay_s + 1e-9
         assert b.context.observation.now_s - begin > REST_S + 0.05
+
+
+@pytest.mark.parametrize(("stays_N", "rest_s"), [(0.0, SAME_REST_S), (0.02, SAME_REST_S), (0.2, REST_S)])
+def test_a_rest_is_short_where_the_wrench_is_that_of_the_last_one(make, stays_N, rest_s) -> None:
+    """The second rest sees a force that has come to stay: as large as a contact, it needs a whole rest of its own."""
+    force_N = [0.0]
+    b, prober = make(lambda ball, radius: np.tile([force_N[0], 0.0, 0.0], (len(ball), 1)))
+    first = b.go(prober.rest())
+    force_N[0] = stays_N
+    b.go(b.arm.hold(0.2))
+    begin = b.context.observation.now_s
+    again = b.go(prober.rest())
+    assert b.context.observation.now_s - begin == pytest.approx(rest_s, abs=0.011)
+    assert (again is first) == (rest_s == SAME_REST_S)
 
 
 def swinging(ends_s):

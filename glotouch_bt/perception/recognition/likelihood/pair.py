@@ -116,8 +116,8 @@ def compare(model: TargetModel, reading: TouchSetReading, p: LikelihoodParams) -
     if not reading.sequences:
         ratio = p.outline_offset + p.slope * sum(terms.values())
         return Pair(candidate.index, ratio, 0.0, terms, None, 0.0, 0.0, None, contour_pose(touchset), 0.0)
-    zero_sd = max(layer.zero_sd_m for layer in touchset.layers)
-    grid = Grid.of(p, zero_sd)
+    bias_sd = _bias_sd_m(reading, p)
+    grid = Grid.of(p, bias_sd)
     first = reading.sequences[0][0].layer.yaw_rad
     turns = np.array([seen[0].layer.yaw_rad - first for seen in reading.sequences])
     parallel = bool(np.abs((turns + np.pi / 2) % np.pi - np.pi / 2).max() < PARALLEL_RAD)
@@ -125,7 +125,7 @@ def compare(model: TargetModel, reading: TouchSetReading, p: LikelihoodParams) -
     if parallel:  # parallel tracks share one shift along x_P; each may slide
         common = common + shift_prior(model, candidate, 0.0, grid.shift_m, p)[None, :, :, None]
     twin = common.astype(np.float32)
-    log_bias = _log_normal(grid.bias_m, zero_sd)
+    log_bias = _log_normal(grid.bias_m, bias_sd)
     joint = (common + log_bias[:, None, None, None]).astype(np.float32)
     slide = slide_matrix(grid, p)
     moved = observed_turns(touchset)
@@ -186,6 +186,13 @@ def observed_turns(touchset: TouchSet) -> list[float]:
             total += abs(layer.turn_rad) if math.isfinite(layer.turn_rad) else 0.0
         out.append(total)
     return out
+
+
+def _bias_sd_m(reading: TouchSetReading, p: LikelihoodParams) -> float:
+    """Return the standard deviation of the error of all widths: zero of the aperture, scale, offset of both sides."""
+    zero_sd = max(layer.zero_sd_m for layer in reading.touchset.layers)
+    width = float(np.median([o.layer.width_m for seen in reading.sequences for o in seen]))
+    return math.hypot(zero_sd, p.scale_sd * width, 2 * p.offset_sd_m)
 
 
 def _log_normal(x: Array, sd: float) -> Array:

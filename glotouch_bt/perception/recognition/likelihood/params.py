@@ -17,7 +17,11 @@ class LikelihoodParams:
         width_rough: Fraction of the table's unevenness added to this scale, for poses between the cells.
         width_outlier: Probability of an outlier width.
         width_range_m: Range of the uniform density of outlier widths.
-        bias_span, bias_steps: Grid of the aperture bias, one per TouchSet: limit in standard deviations, number.
+        scale_sd: Standard deviation of the object's scale against its STL. Source: uniform within 1 %; shrinkage of
+            printed parts is .1 to 1.5 %.
+        offset_sd_m: Standard deviation of the offset of its surface. Source: tolerances of printed parts, .2 mm.
+        bias_span, bias_steps: Grid of the bias of widths, one per TouchSet: limit in standard deviations, number. The
+            aperture's zero, scale and offset add up.
         shift_sd_m, shift_limit_m, shift_steps: Object's centre along x_P about the contour's: prior and grid; one for
             all parallel tracks, else one per sequence.
         slide_sd_m: Standard deviation of the slide along x_P between parallel tracks.
@@ -50,8 +54,10 @@ class LikelihoodParams:
     width_rough: float = 0.8
     width_outlier: float = 0.01
     width_range_m: float = 0.060
-    bias_span: float = 1.5
-    bias_steps: int = 3
+    scale_sd: float = 0.006
+    offset_sd_m: float = 0.2e-3
+    bias_span: float = 2.0
+    bias_steps: int = 5
     shift_sd_m: float = 5e-3
     shift_limit_m: float = 12.5e-3
     shift_steps: int = 11
@@ -72,15 +78,15 @@ class LikelihoodParams:
     yaw_sd_rad: float = math.radians(6.0)
     temper_width: float = 0.5
     temper_image: float = 0.35
-    slope: float = 0.8
-    offset: float = -2.6
+    slope: float = 0.75
+    offset: float = -1.5
     outline_offset: float = -1.0
     prior_absent: float = 0.2
-    twin: float = 0.12
+    twin: float = 0.02
     twin_width: float = 0.5
     twin_width_sd_m: float = 3e-3
-    twin_slope: float = 2.3
-    twin_fit: float = 0.6
+    twin_slope: float = 2.4
+    twin_fit: float = 1.0
     accept: float = 0.8
     evidence: float = 2.0
 

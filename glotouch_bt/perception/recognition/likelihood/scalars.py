@@ -15,8 +15,6 @@ SIZES_M = (0.020, 0.110)
 """Range of the uniform background density of a side (objects of 4-11 cm)."""
 HEIGHTS_M = (0.018, 0.115)
 """Range of the uniform background density of a height."""
-UNMEASURED_TOP_M = 0.003
-"""Height above the sensing plane below which a candidate's top was not measured."""
 TAIL = 3.0
 """Degrees of freedom of the Student's t of a contour's side."""
 
@@ -28,9 +26,9 @@ def mode_ratio(model: TargetModel, candidate: Candidate) -> float:
 
 
 def height_ratio(model: TargetModel, candidate: Candidate, p: LikelihoodParams) -> float:
-    """Return the log ratio of the measured top: the model's top, or a lower point of it; 0 if not measured."""
+    """Return the log ratio of the measured top: the model's top, or a lower point of it; 0 if not touched."""
     low, high = HEIGHTS_M
-    if candidate.height_m < SENSING_M + UNMEASURED_TOP_M:
+    if not candidate.top_touched:
         return 0.0
     z = (candidate.height_m - model.height_m) / p.height_sd_m
     top = _student(z) / p.height_sd_m

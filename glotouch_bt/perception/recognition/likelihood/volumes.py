@@ -34,10 +34,10 @@ class Grid:
     z0_m: Array
 
     @classmethod
-    def of(cls, p: LikelihoodParams, zero_sd_m: float) -> Grid:
-        """Build the grid; `zero_sd_m` is the standard deviation of the aperture bias."""
+    def of(cls, p: LikelihoodParams, bias_sd_m: float) -> Grid:
+        """Build the grid; `bias_sd_m` is the standard deviation of the bias of widths."""
         return cls(
-            span(p.bias_span * zero_sd_m, p.bias_steps),
+            span(p.bias_span * bias_sd_m, p.bias_steps),
             span(p.shift_limit_m, p.shift_steps),
             span(p.z0_limit_m, p.z0_steps),
         )
