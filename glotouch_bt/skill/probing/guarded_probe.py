@@ -36,7 +36,7 @@ MAX_REST_S = 0.6
 SAME_REST_S = 0.03
 """Time for which the wrench must be steady and equal to that of an earlier rest, which then still holds. Source: ours;
 three control periods at 100 Hz."""
-SAME_SHARE = 1.0 / 3.0
+SAME_SHARE = 1.0 / 6.0
 """Largest force or torque by which it may differ, over the threshold of a contact. Source: ours."""
 SAME_SIGMAS = 3.0
 """The same in standard deviations of the difference, for noisy sensors. Source: ours."""
