@@ -126,6 +126,11 @@ class ContactGuard:
             self._zero = self._zero + share * self._history[-1][1].mean(axis=0)
         return onset
 
+    def force_B_N(self, observation: Observation) -> Array:
+        """Return the mean force (3,) on the tip in B over a block at rest, unfiltered."""
+        rotation = quat_to_matrix(observation.quat_B_P[-1]) @ self._R_P_E
+        return np.asarray(rotation @ (self._fusion.gain @ (observation.wrench_S.mean(axis=0) - self._zero)))
+
     def _date(self, o: Observation, trip: int, force_S: Array) -> Onset:
         stamps = np.concatenate([b.stamp_s for b, _ in self._history])
         positions = np.concatenate([b.position_B_P for b, _ in self._history])
