@@ -126,6 +126,7 @@ def make_run(folder: Path, *, until: str = "end", seed: int = 5) -> Made:
     clock.line_K(np.array([-0.25, -0.1, 0.1]))
     clock.aperture = 0.016
     record.event("tool", clock.now_s, {"node": "tool_pickup", "held": True, "grasp_to_tip_m": TIP_M})
+    record.event("calibration", clock.now_s, {"node": "tool_calibrate", "compliance_P_m_N": [0.00163, 0.00073]})
     tick("retrieve/tool_pickup", "SUCCESS")
     tick("retrieve/explore", "RUNNING")
     z = 0.030
