@@ -58,7 +58,7 @@ results-page: $(VENV)/.dev
 # Renew the pinned, hashed requirements (no registry address is written).
 PIP_COMPILE = $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras --no-emit-options --no-header
 pins: $(VENV)/.dev
-	$(PIP_COMPILE) --build-deps-for editable --extra test -o requirements.txt pyproject.toml
+	$(PIP_COMPILE) --build-deps-for editable --extra test --extra view -o requirements.txt pyproject.toml
 	$(PIP_COMPILE) --build-deps-for editable --extra dev -c requirements.txt -o requirements-dev.txt pyproject.toml
 
 clean:

@@ -14,7 +14,7 @@ from glotouch_bt.commands.missions import missions
 from glotouch_bt.commands.nodes import nodes, schema
 from glotouch_bt.commands.objects import objects
 from glotouch_bt.commands.replay import replay
-from glotouch_bt.commands.report import report
+from glotouch_bt.commands.report import report, view
 from glotouch_bt.commands.resume import resume
 from glotouch_bt.commands.run import run
 from glotouch_bt.commands.skills import skills
@@ -22,7 +22,7 @@ from glotouch_bt.commands.test import run_tests
 from glotouch_bt.commands.tree import tree
 
 COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
-    "Run missions": {"run": run, "resume": resume, "replay": replay, "report": report},
+    "Run missions": {"run": run, "resume": resume, "replay": replay, "report": report, "view": view},
     "Write missions": {
         "check": check,
         "test": run_tests,

@@ -1,10 +1,15 @@
-"""`glotouch report`: the report of a finished run."""
+"""`glotouch report` and `glotouch view`: a run as a file, and as a page in the browser."""
 
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated
 
-from glotouch_bt.commands.shared import Json, RunFolderArgument, guarded, print_json
+import typer
+
+from glotouch_bt.commands.shared import Json, NoBrowser, Port, RunFolderArgument, guarded, print_json
 
 
 @guarded
@@ -17,3 +22,26 @@ def report(folder: RunFolderArgument, json_: Json = False) -> None:
         print_json({"report": str(made)})
     else:
         sys.stdout.write(f"{made}\n")
+
+
+@guarded
+def view(
+    folder: RunFolderArgument,
+    port: Port = None,
+    no_browser: NoBrowser = False,
+    objects: Annotated[
+        Path | None, typer.Option("--objects", metavar="DIR", help="folder of the STL files, to show the true objects")
+    ] = None,
+) -> None:
+    """Show a run in the browser: scene, tree, signals and a time line.
+
+    A run under way is followed. Only this machine can open the page. Ctrl-C ends it. Nothing is written.
+    """
+    from glotouch_bt.view import view_run
+
+    def ready(address: str) -> None:
+        sys.stdout.write(f"{address}   (Ctrl-C ends the page)\n")
+        sys.stdout.flush()
+
+    with suppress(KeyboardInterrupt):
+        view_run(folder, port=port, browser=not no_browser, objects=objects, on_ready=ready)

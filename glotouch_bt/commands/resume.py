@@ -8,7 +8,20 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.shared import BackendSettings, Json, Objects, guarded, print_json, read_settings
+from glotouch_bt.commands.shared import (
+    BackendSettings,
+    Json,
+    Live,
+    NoBrowser,
+    Objects,
+    Port,
+    guarded,
+    live_page,
+    print_json,
+    read_settings,
+    shown_on,
+    wait_for_viewers,
+)
 
 
 @guarded
@@ -22,6 +35,9 @@ def resume(
     ] = None,
     set_: BackendSettings = None,
     objects: Objects = None,
+    live: Live = False,
+    port: Port = None,
+    no_browser: NoBrowser = False,
     list_: Annotated[bool, typer.Option("--list", help="only show the checkpoints")] = False,
     json_: Json = False,
 ) -> int:
@@ -51,22 +67,28 @@ def resume(
         for note in found.notes:
             sys.stderr.write(f"note: {note}\n")
 
-    with RunProgress(quiet=json_) as progress, operated(Operator()) as control:
-        done = resume_run(
-            folder,
-            start=from_,
-            out=out,
-            settings=read_settings(set_),
-            objects=objects,
-            on_found=show,
-            on_start=progress.start,
-            on_progress=progress.update,
-            control=control,
-        )
-    for note in done.result["resumed"][-1]["notes"] if not json_ else ():
-        if note not in shown:  # found while the record was copied
-            sys.stderr.write(f"note: {note}\n")
-    return print_end(done, json_)
+    control = Operator()
+    with live_page(live, control, port, no_browser, objects) as page:
+        with RunProgress(quiet=json_) as progress, operated(control):
+            on_start, truth = shown_on(page, progress.start)
+            done = resume_run(
+                folder,
+                start=from_,
+                out=out,
+                settings=read_settings(set_),
+                objects=objects,
+                on_found=show,
+                on_start=on_start,
+                on_truth=truth,
+                on_progress=progress.update,
+                control=control,
+            )
+        for note in done.result["resumed"][-1]["notes"] if not json_ else ():
+            if note not in shown:  # found while the record was copied
+                sys.stderr.write(f"note: {note}\n")
+        code = print_end(done, json_)
+        wait_for_viewers(page, done)
+    return code
 
 
 def _list(folder: Path, json_: bool) -> None:

@@ -23,11 +23,14 @@ def run(
     faults: Annotated[str | None, typer.Option(metavar="FILE", help="a fault plan (see: glotouch faults)")] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="the run's folder (default: runs/...)")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the run that --out holds")] = False,
+    live: shared.Live = False,
+    port: shared.Port = None,
+    no_browser: shared.NoBrowser = False,
     json_: shared.Json = False,
 ) -> int:
     """Run a mission; write its record, result and report.
 
-    `p` or SIGUSR1 pauses and continues it, SIGTERM ends it safely.
+    `p` or SIGUSR1 pauses and continues it, SIGTERM ends it safely. With --live, so does the page in the browser.
     """
     from glotouch_bt.commands.terminal import RunProgress, print_end
     from glotouch_bt.runs import Operator, RunRequest, launch, operated
@@ -45,6 +48,11 @@ def run(
         overwrite=overwrite,
         allow_paths=tuple(allow_path or ()),
     )
-    with RunProgress(quiet=json_) as progress, operated(Operator()) as control:
-        done = launch(request, on_start=progress.start, on_progress=progress.update, control=control)
-    return print_end(done, json_)
+    control = Operator()
+    with shared.live_page(live, control, port, no_browser, objects) as page:
+        with RunProgress(quiet=json_) as progress, operated(control):
+            start, truth = shared.shown_on(page, progress.start)
+            done = launch(request, on_start=start, on_truth=truth, on_progress=progress.update, control=control)
+        code = print_end(done, json_)
+        shared.wait_for_viewers(page, done)
+    return code

@@ -1,4 +1,7 @@
 """The report of a run: `read_run` returns its arrays and events, `write_report` writes report.html."""
 
-from glotouch_bt.report.run_record import RecordedEvent, RunRecord, read_run
+from glotouch_bt.report.page import short_text
+from glotouch_bt.report.run_record import RECORD_NAME, TRUTH_NAME, RecordedEvent, RecordReader, RunRecord, read_run
+from glotouch_bt.report.sections import contour_of, depth_png, palette, tree_order
+from glotouch_bt.report.svg import AxisScale, points, tick_text
 from glotouch_bt.report.write import write_report

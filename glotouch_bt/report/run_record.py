@@ -9,15 +9,17 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from mcap.exceptions import InvalidMagic
-from mcap.records import Attachment, Chunk, Footer
+from mcap.records import Attachment, Chunk, Footer, McapRecord
 
 from glotouch_bt.mission.record import (
     BROKEN,
     EVENT_PREFIX,
+    MAX_RECORD_BYTES,
     RESULT_ATTACHMENT,
     RUN_ATTACHMENT,
     STAMP_S,
@@ -161,38 +163,85 @@ def read_run(path: str | Path) -> RunRecord:
         BadInput: There is no record, it is not an MCAP file at all, it unpacks to more than is allowed, or the folder
             holds links.
     """
-    path = Path(path)
-    folder = path if path.is_dir() else path.parent
-    file = path / RECORD_NAME if path.is_dir() else path
-    if path.is_dir():
-        require_plain(folder, (RECORD_NAME, RESULT_NAME, TRUTH_NAME))
-    if not file.is_file():
-        raise BadInput(f"{path}: no run here ({RECORD_NAME} is missing)")
-    record = RunRecord(file)
-    packed: dict[str, list[dict[str, Array]]] = {name: [] for name in _PACKED.values()}
-    with open_record(file, links=not path.is_dir()) as opened:
-        try:
-            for topic, log_ns, data in _messages(opened, record):
-                _store(record, packed, topic, log_ns, data)
-        except InvalidMagic as e:
-            raise BadInput(f"{file}: is not an MCAP record") from e
-        except TooLarge:
-            raise
-        except (*BROKEN, GlotouchError):
-            record.complete = False  # a cut or damaged tail; what came before is valid
-    record.samples, record.cycles, record.tactile = (join(packed[n]) for n in ("samples", "cycles", "tactile"))
+    with RecordReader(path) as reader:
+        reader.read()
+        record = reader.record
+        record.samples, record.cycles, record.tactile = (join(reader.packed[n]) for n in _PACKED.values())
+    folder = record.path.parent
     result = _json_file(folder / RESULT_NAME)
     record.result = result if isinstance(result, dict) and result else record.result
     record.truth = _json_file(folder / TRUTH_NAME)
     return record
 
 
-def _messages(file: IO[bytes], record: RunRecord) -> Iterator[tuple[str, int, memoryview]]:
-    """Yield topic, log time in ns and bytes of every message except plots (the packed channels hold their data)."""
-    wanted = (EVENT_PREFIX, "/packed/", "/tree/")
-    unpacker = ChunkUnpacker(os.fstat(file.fileno()).st_size, str(record.path), wanted)
-    text_bytes = 0
-    for item in record_items(file):
+class RecordReader:
+    """Reads a record from its first byte to its last complete chunk, and on as it grows. Use it in a `with` block.
+
+    Args:
+        path: A run's folder, or a record file.
+        growing: The file is being written; it may unpack to the largest size that is allowed for any record.
+
+    Attributes:
+        record: What was read: description, events, ticks and ports. Its arrays are left empty.
+        packed: The parts of the arrays, by the names of `RunRecord` (samples, cycles, tactile), in the order of the
+            file. The caller may take parts out.
+
+    Raises:
+        BadInput: There is no record, or the folder holds links.
+    """
+
+    def __init__(self, path: str | Path, *, growing: bool = False) -> None:
+        path = Path(path)
+        if path.is_dir():
+            require_plain(path, (RECORD_NAME, RESULT_NAME, TRUTH_NAME))
+        file = path / RECORD_NAME if path.is_dir() else path
+        if not file.is_file():
+            raise BadInput(f"{path}: no run here ({RECORD_NAME} is missing)")
+        self.record = RunRecord(file)
+        self.packed: dict[str, list[dict[str, Array]]] = {name: [] for name in _PACKED.values()}
+        self._file = open_record(file, links=not path.is_dir())
+        self._at = self._text_bytes = 0
+        self._shapes: dict[str, dict[str, tuple[int, ...]]] = {}
+        size = MAX_RECORD_BYTES if growing else os.fstat(self._file.fileno()).st_size
+        self._unpacker = ChunkUnpacker(size, str(file), (EVENT_PREFIX, "/packed/", "/tree/"))
+
+    def read(self) -> bool:
+        """Read every item that has been completed since the last call; return True if there was one.
+
+        Raises:
+            BadInput: It is not an MCAP file, or unpacks to more than is allowed.
+        """
+        if self.record.complete:
+            return False
+        before = self._at
+        self._file.seek(self._at)
+        try:
+            for item in record_items(self._file, skip_magic=self._at > 0):
+                self._at = self._file.tell()
+                for topic, log_ns, data in self._messages(item):
+                    self._store(topic, log_ns, data)
+        except InvalidMagic as e:
+            if not self.record.complete:  # else the last bytes of a complete record are cut off
+                raise BadInput(f"{self.record.path}: is not an MCAP record") from e
+        except TooLarge:
+            raise
+        except (*BROKEN, GlotouchError):
+            pass  # a cut or damaged tail; what came before is valid
+        return self._at > before
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def _messages(self, item: McapRecord) -> Iterator[tuple[str, int, memoryview]]:
+        """Yield topic, log time in ns and bytes of the messages except plots (the packed channels hold their data)."""
+        record = self.record
         if isinstance(item, Attachment):
             content = parse_json(item.data, f"{record.path}: {item.name}")
             if item.name == RUN_ATTACHMENT and isinstance(content, dict):
@@ -202,41 +251,40 @@ def _messages(file: IO[bytes], record: RunRecord) -> Iterator[tuple[str, int, me
         elif isinstance(item, Footer):
             record.complete = True
         elif isinstance(item, Chunk):
-            for topic, log_ns, data in unpacker.items(item):
+            for topic, log_ns, data in self._unpacker.items(item):
                 if data is None:
                     continue
-                text_bytes += 0 if topic in _PACKED else len(data)
-                if text_bytes > MAX_JSON_BYTES:
+                self._text_bytes += 0 if topic in _PACKED else len(data)
+                if self._text_bytes > MAX_JSON_BYTES:
                     raise TooLarge(f"{record.path}: its events are larger than {MAX_JSON_BYTES} bytes")
                 yield topic, log_ns, data
 
+    def _store(self, topic: str, log_ns: int, data: memoryview) -> None:
+        """Store one message.
 
-def _store(
-    record: RunRecord, packed: dict[str, list[dict[str, Array]]], topic: str, log_ns: int, data: memoryview
-) -> None:
-    """Store one message.
-
-    Raises:
-        ValueError, LookupError, TypeError, GlotouchError: It is damaged.
-    """
-    if topic in _PACKED:
-        start_ns, columns = unpack(data)
-        for name in ("stamp_s", "gripper_stamp_s", "arrived_s"):
-            if name in columns:
-                columns[name] = to_step(columns[name] + start_ns * 1e-9, STAMP_S)
-        before = packed[_PACKED[topic]]
-        if before and {n: c.shape[1:] for n, c in columns.items()} != {n: c.shape[1:] for n, c in before[0].items()}:
-            raise ValueError(f"{topic}: other columns than before")
-        before.append(columns)
-        return
-    content = parse_json(bytes(data), topic)
-    stamp_s = log_ns * 1e-9
-    if topic == "/tree/ticks":
-        record.ticks.append(Tick(stamp_s, str(content["node"]), str(content["old"]), str(content["new"])))
-    elif topic == "/tree/ports":
-        record.ports.append(PortWrite(stamp_s, str(content["key"]), content["value"]))
-    elif isinstance(content.get("data"), dict):
-        record.events.append(RecordedEvent(stamp_s, str(content["kind"]), content["data"]))
+        Raises:
+            ValueError, LookupError, TypeError, GlotouchError: It is damaged.
+        """
+        record = self.record
+        if topic in _PACKED:
+            start_ns, columns = unpack(data)
+            for name in ("stamp_s", "gripper_stamp_s", "arrived_s"):
+                if name in columns:
+                    columns[name] = to_step(columns[name] + start_ns * 1e-9, STAMP_S)
+            name = _PACKED[topic]
+            shapes = {n: c.shape[1:] for n, c in columns.items()}
+            if self._shapes.setdefault(name, shapes) != shapes:
+                raise ValueError(f"{topic}: other columns than before")
+            self.packed[name].append(columns)
+            return
+        content = parse_json(bytes(data), topic)
+        stamp_s = log_ns * 1e-9
+        if topic == "/tree/ticks":
+            record.ticks.append(Tick(stamp_s, str(content["node"]), str(content["old"]), str(content["new"])))
+        elif topic == "/tree/ports":
+            record.ports.append(PortWrite(stamp_s, str(content["key"]), content["value"]))
+        elif isinstance(content.get("data"), dict):
+            record.events.append(RecordedEvent(stamp_s, str(content["kind"]), content["data"]))
 
 
 def _json_file(path: Path) -> Any:

@@ -1,6 +1,6 @@
 """Launch a run: check the request, open the backend, run the mission, and write the run's folder.
 
-The truth of a simulated world is read only here and in the report, after the run, for scoring.
+The truth of a simulated world is read only here, in the report and in views: for scoring, and for a person to look at.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ def launch(
     request: RunRequest,
     *,
     on_start: Callable[[Mission, Path], None] | None = None,
+    on_truth: Callable[[list[TrueObject]], None] | None = None,
     on_progress: Callable[[float, RunSummary], None] | None = None,
     control: Control | None = None,
     resumable: ResumableRun | None = None,
@@ -47,6 +48,7 @@ def launch(
     Args:
         request: The requested run.
         on_start: Called with the mission and its folder once the backend is open.
+        on_truth: Called after `on_start` with the true objects of a simulated world, for a person to look at.
         on_progress: As in `run_mission`.
         control: Source of pause and stop requests.
         resumable: An interrupted run to resume, in its own folder (`resume`).
@@ -101,6 +103,8 @@ def launch(
                 folder.clear()
             if on_start is not None:
                 on_start(mission, folder.path)
+            if on_truth is not None:
+                on_truth(objects_at_start)
             resume_point = None if resumable is None else resumable.resume_point(same_world=world is not None)
             run = _Run(
                 request, mission, conditions, robot, referee, folder, objects_at_start, began, resumable, resume_point

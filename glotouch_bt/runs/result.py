@@ -97,6 +97,7 @@ def score(request: RunRequest, mission: Mission, outcome: Outcome, seen: FinalTr
         "retrieved": retrieved,
         "correct": correct,
         "ranking": found.ranking,
+        "calibration": found.calibration,
         "candidates": found.candidates,
         "contacts": found.contacts,
         "sim_time_s": round(outcome.end_s - outcome.start_s, 6),

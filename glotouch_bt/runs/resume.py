@@ -8,6 +8,7 @@ from pathlib import Path
 from glotouch_bt.mission import Mission
 from glotouch_bt.mission.execution import Control
 from glotouch_bt.mission.record import RunSummary
+from glotouch_bt.robot.simulation import TrueObject
 from glotouch_bt.runs.folder import locked
 from glotouch_bt.runs.launch import RunRequest, RunResult, launch
 from glotouch_bt.runs.result import installed_versions
@@ -23,6 +24,7 @@ def resume(
     objects: Path | None = None,
     on_found: Callable[[ResumableRun], None] | None = None,
     on_start: Callable[[Mission, Path], None] | None = None,
+    on_truth: Callable[[list[TrueObject]], None] | None = None,
     on_progress: Callable[[float, RunSummary], None] | None = None,
     control: Control | None = None,
     report: bool = True,
@@ -41,7 +43,7 @@ def resume(
         settings: Backend options.
         objects: Folder of STL files, if the run was made with one.
         on_found: Called with the resumable run before anything is opened.
-        on_start, on_progress, control: As for `launch`.
+        on_start, on_truth, on_progress, control: As for `launch`.
         report: Make report.html at the end.
 
     Raises:
@@ -68,6 +70,13 @@ def resume(
             out=folder,
             report=report,
         )
-        return launch(request, on_start=on_start, on_progress=on_progress, control=control, resumable=resumable)
+        return launch(
+            request,
+            on_start=on_start,
+            on_truth=on_truth,
+            on_progress=on_progress,
+            control=control,
+            resumable=resumable,
+        )
     finally:
         resumable.file.close()

@@ -47,7 +47,7 @@ class TouchNextParams(ClosureParams):
     target: str = param("The object to find: an STL file, or the name of one in the world's object folder", names="stl")
     confidence: float = param("Sufficient probability", default=0.95, gt=0.5, lt=1.0)
     unmeasured: bool = param("Touch candidates that the probe did not measure, too", default=False)
-    min_gain_nats: float = param("Least expected gain of a closure", default=0.005, ge=0.0, formerly="least_gain_nats")
+    min_gain_nats: float = param("Least expected gain of a closure", default=0.02, ge=0.0, formerly="least_gain_nats")
 
 
 class TouchNext(Skill):
@@ -80,30 +80,31 @@ class TouchNext(Skill):
     probed = In(
         tuple, "what the probe measured; not given: everything", element=ProbeTouch, required=False, expected=False
     )
+    refused_before = In(
+        tuple, "closures that could not be made", key="refused", element=tuple, required=False, expected=False
+    )
     jaw_zero = In(JawZero, "offset of the reported aperture", required=False, expected=False)
     touchsets = Out(tuple, "touches, one TouchSet for each candidate", element=TouchSet)
+    refused = Out(tuple, "closures that could not be made: candidate, yaw in degrees, height and place in mm")
     decided = Out(bool, "no further closure is needed")
 
     def __init__(self, name: str, params: SkillParams, context: Context) -> None:
         super().__init__(name, params, context)
         self._model: TargetModel | None = None
         self._down: Squeezing | None = None
-        self._refused: set[tuple[int, int, int, int]] = set()
         self._hopeless: frozenset[int] = frozenset()
         self._stood_B_m: Array | None = None
 
     def remember(self) -> object:
-        """See `Skill`: the refused options, and the stance of a lowered hand."""
-        down = None
-        if self._down is not None:
-            down = (self._down.candidate, self._down.at, self.context.arm.pose_B_P.position_m)
-        return {"refused": tuple(sorted(self._refused)), "down": down}
+        """See `Skill`: the stance of a lowered hand."""
+        if self._down is None:
+            return None
+        return self._down.candidate, self._down.at, self.context.arm.pose_B_P.position_m
 
     def recall(self, remembered: Any) -> None:
         """See `Skill`. The hand counts as lowered only if it has not moved when the skill begins."""
-        self._refused = set(remembered["refused"])
-        if remembered["down"] is not None:
-            candidate, at, self._stood_B_m = remembered["down"]
+        if remembered is not None:
+            candidate, at, self._stood_B_m = remembered
             self._down = Squeezing(self.context, candidate, at, self.params, self.jaw_zero)
 
     def run(self) -> SkillRun:
@@ -113,10 +114,13 @@ class TouchNext(Skill):
         if not wanted:
             raise self.NO_CANDIDATES("there is no candidate to touch", candidates=len(candidates))
         touchsets: tuple[TouchSet, ...] = self.felt or ()
-        if [_state(t.candidate) for t in touchsets] != [_state(c) for c in wanted]:  # found, rejected, or measured anew
+        self.refused = refused = self.refused_before or ()
+        before = [_state(t.candidate) for t in touchsets]
+        if before != [_state(c) for c in wanted]:  # found, rejected, or measured anew
             made = {t.candidate.index: t.sequences for t in touchsets}
             touchsets = tuple(TouchSet(c, made.get(c.index, ())) for c in wanted)
-            self._refused.clear()
+            same = {c.index for c in wanted if _state(c) in before}
+            self.refused = tuple(key for key in refused if key[0] in same)
             self._down = None
         down, self._down = self._down, None  # after a preemption the hand's place is unknown
         stood, self._stood_B_m = self._stood_B_m, None
@@ -137,7 +141,7 @@ class TouchNext(Skill):
         try:
             down, layer = yield from self._touch(candidates, chosen, down)
         except MotionRefused as refusal:
-            self._refused.add(_key(chosen))
+            self._refuse(chosen)
             self.event("note", text=f"a closure on candidate {chosen.closure.candidate} was not made: {refusal}")
             return
         self._down = down
@@ -176,7 +180,7 @@ class TouchNext(Skill):
         if down is not None:
             standing = Standing(down.candidate.index, down.at, float(pose_K_P.position_m[2]))
         found = options(belief.touchsets, standing, pose_K_P.position_m, arm.description.gripper, p)
-        found = [o for o in found if _key(o) not in self._refused and o.closure.candidate not in self._hopeless]
+        found = [o for o in found if _key(o) not in self.refused and o.closure.candidate not in self._hopeless]
         later = self._unmeasured(belief)
         found = [replace(o, seconds=o.seconds + MEASURE_S) if o.closure.candidate in later else o for o in found]
         if not found:
@@ -213,12 +217,16 @@ class TouchNext(Skill):
             if score[i] <= 0.0:
                 break
             option: Option = found[i]
-            if _key(option) in self._refused:
+            if _key(option) in self.refused:
                 continue
             if self._fits(belief, option, down):
                 return replace(option, closure=replace(option.closure, gain_nats=float(gains[i][0])))
-            self._refused.add(_key(option))
+            self._refuse(option)
         return None
+
+    def _refuse(self, option: Option) -> None:
+        """Record that a closure could not be made, for this skill and for later ones."""
+        self.refused = (*self.refused, _key(option))
 
     def _fits(self, belief: Belief, option: Option, down: Squeezing | None) -> bool:
         """Return True if the open hand fits beside the neighbours, as it does where it already stands."""

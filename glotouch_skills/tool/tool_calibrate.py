@@ -1,4 +1,4 @@
-"""Measure the ball's place in the hand and the wrist sensor's latency by touching the container's walls."""
+"""Measure the ball's place in the hand, the probe's compliance and the wrist sensor's latency at two walls."""
 
 from __future__ import annotations
 
@@ -10,7 +10,14 @@ import numpy as np
 
 from glotouch_bt.motion import FREE_M_S, Motion
 from glotouch_bt.perception.touch import GuardParams
-from glotouch_bt.perception.touch.calibration import TipCalibration, WallTouch, solve_tip, wrench_delay
+from glotouch_bt.perception.touch.calibration import (
+    Press,
+    TipCalibration,
+    WallTouch,
+    solve_compliance,
+    solve_tip,
+    wrench_delay,
+)
 from glotouch_bt.robot import Array, MotionRefused, Observation
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool, Prober
@@ -29,6 +36,14 @@ RISE_ACCELERATION_M_S2 = 1.0
 """Acceleration of the rise that excites the wrist sensor: the robot-wide limit."""
 RISE_JERK_M_S3 = 20.0
 """Jerk of that rise: the robot-wide limit."""
+PRESS_M = 0.004
+"""Longest press. Source: ours; 1.3 N at 3 mm/N, the softest probe of `realistic`."""
+PRESS_M_S = 0.005
+"""Speed of a press. Source: ours; a stiff probe's force rises by 25 N/s, so that it overshoots by less than 1 N."""
+STAND_S = 0.1
+"""Rest before and after a press; its second half is averaged. Source: ours."""
+MAX_COMPLIANCE_M_N = 0.01
+"""Largest compliance of a probe that is held. Source: ours, three times the softest of `realistic`."""
 RATE_HZ = 1000.0
 """Interpolate the samples to this rate, since some may be missing."""
 
@@ -49,6 +64,10 @@ class ToolCalibrateParams(SkillParams):
     speed_m_s: float = param("Speed towards the walls", unit="m/s", default=0.015, gt=0.0, le=0.03)
     travel_speed_m_s: float = param("Speed above the walls, and of a turn 0.1 m from its axis", unit="m/s",
                                     default=0.25, gt=0.0, le=0.25)  # fmt: skip
+    press_N: float = param(
+        "Increase of the force in the presses that measure the compliance; 0: it is not measured", unit="N",
+        default=3.0, ge=0.0, le=6.0,
+    )  # fmt: skip
     search_m: float = param("Search for the walls this far past their nominal place", unit="m", default=0.010, ge=0.001,
                             le=0.02)  # fmt: skip
 
@@ -58,9 +77,11 @@ class ToolCalibrate(Skill):
 
     Touches of the same wall at different yaws give the ball's offset from its nominal place in the hand; the errors of
     the walls cancel. The rise to the touching height accelerates the hand: the delay of the wrist's force behind the
-    acceleration is the sensor's latency.
+    acceleration is the sensor's latency. With the jaws' axis along one wall, each wall is pressed harder: the hand's
+    advance over the increase of the force is the probe's compliance in that direction, if the wall is rigid. The
+    wrist's gain is not observable from a press; it cancels in the deflection, compliance times measured force.
 
-    SUCCESS: `tool` has the ball's place in the hand, its standard deviation, and the sensor's latency.
+    SUCCESS: `tool` has the ball's place in the hand, its standard deviation, the compliance, and the sensor's latency.
     """
 
     PAUSE = "retreat"
@@ -77,7 +98,7 @@ class ToolCalibrate(Skill):
     )
     SLIPPED = Failure(
         "slipped",
-        "no single place of the ball in the hand explains the touches",
+        "no single place of the ball in the hand explains the touches, or the ball gives way to a press",
         advice="raise grip_N of tool_pickup, or lower speed_m_s",
     )
     FAILURES: ClassVar = (
@@ -97,22 +118,24 @@ class ToolCalibrate(Skill):
         latency, latency_sd = yield from self._rise(given, place)
         listening = dataclasses.replace(given, latency_s=latency)
         touches: list[WallTouch] = []
-        turned = 0
+        presses: list[Press] = []
+        turned, turn = 0, np.deg2rad(self.params.turn_deg)
+        straight = given.yaw_B_rad - math.remainder(given.yaw_B_rad - world.container.pose_B_K.yaw_rad, 0.5 * math.pi)
         with may_touch(self.context.arm, "tool", *corner_walls(world)):
-            for share in (0.0, 1.0, -1.0):
-                yaw = given.yaw_B_rad + share * np.deg2rad(self.params.turn_deg)
+            for yaw in (straight, given.yaw_B_rad + turn, given.yaw_B_rad - turn):
                 try:
                     yield from self._turn(listening, place, yaw)
                 except MotionRefused as refusal:
                     self.event("note", text=f"the hand is not turned there: {refusal}")
                     continue
                 turned += 1
-                touches += yield from self._touch_walls(dataclasses.replace(listening, yaw_B_rad=yaw), place)
+                turned_tool = dataclasses.replace(listening, yaw_B_rad=yaw)
+                touches += yield from self._touch_walls(turned_tool, place, presses if yaw == straight else None)
             yield from self._turn(listening, place, given.yaw_B_rad)
         if turned < 2:
             raise MotionRefused("calibration", "the hand cannot be turned at that corner")
         found = solve_tip(touches, given.tip_radius_m, touch_sd_m=TOUCH_SD_M, late_sd_s=latency_sd)
-        self.tool = self._measured(listening, found)
+        self.tool = self._measured(listening, found, presses)
 
     def _enter(self, tool: HeldTool, place: Array) -> Motion[None]:
         """Move to just above the floor of the corner, from anywhere."""
@@ -152,8 +175,8 @@ class ToolCalibrate(Skill):
             if abs(math.remainder(self.context.arm.pose_B_P.yaw_rad - yaw, 2 * math.pi)) > 1e-3:
                 yield from self.context.arm.line(goal, self.params.travel_speed_m_s)
 
-    def _touch_walls(self, tool: HeldTool, place: Array) -> Motion[list[WallTouch]]:
-        """Touch each wall once, from `place` and back."""
+    def _touch_walls(self, tool: HeldTool, place: Array, presses: list[Press] | None) -> Motion[list[WallTouch]]:
+        """Touch each wall once, from `place` and back; append a press of each to `presses`."""
         p, arm = self.params, self.context.arm
         prober = Prober(self.context, tool, GuardParams(latency_s=tool.latency_s))
         sides = quiet_corner(self.context.world)
@@ -175,11 +198,31 @@ class ToolCalibrate(Skill):
                     speed_m_s=p.speed_m_s,
                 )
             )
+            if presses is not None and p.press_N > 0.0:
+                presses.append((yield from self._press(prober, out, found[-1])))
             back = float((prober.tip_K_m - place) @ out)
             yield from prober.retreat(-out, back, min(p.travel_speed_m_s, FREE_M_S))
         return found
 
-    def _measured(self, tool: HeldTool, found: TipCalibration) -> HeldTool:
+    def _press(self, prober: Prober, out: Array, touch: WallTouch) -> Motion[Press]:
+        """Press the wall harder, from rest to rest, without a pause between."""
+        p = self.params
+        with self.context.arm.pause_signal.finishing():
+            before = yield from prober.stand(STAND_S)
+            max_N = p.press_N - float(before.force_K_N @ out)
+            yield from prober.press(out, PRESS_M, min(p.speed_m_s, PRESS_M_S), max_N)
+            after = yield from prober.stand(STAND_S)
+        advance_m = float((after.hand_K_m - before.hand_K_m) @ out)
+        force_N = float((before.force_K_N - after.force_K_N) @ out)
+        if not advance_m <= MAX_COMPLIANCE_M_N * force_N:
+            raise self.SLIPPED(
+                f"a press of {advance_m * 1e3:.1f} mm raised the force by {force_N:.2f} N only: the ball gave way",
+                advance_m=advance_m,
+                force_N=force_N,
+            )
+        return Press(touch.approach_P, advance_m, force_N)
+
+    def _measured(self, tool: HeldTool, found: TipCalibration, presses: list[Press]) -> HeldTool:
         """Return the tool with the measured values, if the touches agree."""
         worst = float(np.abs(found.residuals_m).max())
         if worst > MAX_RESIDUAL_M:
@@ -191,6 +234,7 @@ class ToolCalibrate(Skill):
             latency_s=latency,
             tip_sd_m=found.tip_sd_m,
             corner_K_m=quiet_corner(self.context.world) * found.walls_m,
+            compliance_P_m_N=solve_compliance(presses) if presses else None,
         )
         self.event(
             "calibration",
@@ -200,5 +244,7 @@ class ToolCalibrate(Skill):
             latency_sd_s=found.late_sd_s,
             corner_K_m=measured.corner_K_m,
             residuals_m=found.residuals_m,
+            compliance_P_m_N=measured.compliance_P_m_N,
+            pressed_N=[press.force_N for press in presses],
         )
         return measured

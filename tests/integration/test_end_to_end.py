@@ -21,7 +21,8 @@ SCHEMA = {
     "mission": str, "backend": str, "seed": int, "conditions": str, "status": str, "reasons": list,
     "reason_chain": list, "target": (str, type(None)), "retrieved": (str, type(None)), "correct": (bool, type(None)),
     "ranking": (dict, list, type(None)), "candidates": list, "contacts": int, "sim_time_s": float, "ticks": int,
-    "probe_path_m": float, "peak_force_N": float, "parameters": dict, "versions": dict, "wall_time_s": float,
+    "calibration": (dict, type(None)), "probe_path_m": float, "peak_force_N": float, "parameters": dict,
+    "versions": dict, "wall_time_s": float,
 }  # fmt: skip
 
 

@@ -59,7 +59,8 @@ def page(whole: SimpleNamespace) -> str:
 
 def test_the_page_says_what_the_run_says(page: str, whole: SimpleNamespace) -> None:
     text = " ".join(parsed(page).text)
-    for said in ("Retrieved <b>wukong & co</b>", "12.3 N", "6.28 m", "5 of 5", "0.432", "0.479", "nominal"):
+    numbers = ("12.3 N", "6.28 m", "5 of 5", "0.432", "0.479", "1.63, 0.73 mm/N")
+    for said in ("Retrieved <b>wukong & co</b>", "nominal", *numbers):
         assert said in text, said
     assert f"contact stop ({len(whole.contacts)})" in text
     for title in ("Map", "Force", "Squeezes", "Recognition", "Timeline of the tree", "Log", "About this run"):

@@ -30,7 +30,9 @@ class RemoteReferee:
     def objects(self) -> list[TrueObject]:
         """See `Referee`."""
         return [
-            TrueObject(o.name, pose_of(o.pose_B_O), o.mass_kg, np.array(o.outline_B_m), o.in_gripper)
+            TrueObject(
+                o.name, pose_of(o.pose_B_O), o.mass_kg, np.array(o.outline_B_m), o.in_gripper, np.array(o.size_m)
+            )
             for o in self._ask("objects").objects
         ]
 

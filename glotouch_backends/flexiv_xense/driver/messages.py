@@ -329,6 +329,7 @@ class TrueBody(msgspec.Struct, frozen=True, array_like=True):
     mass_kg: float
     outline_B_m: tuple[tuple[float, float], ...]
     in_gripper: bool
+    size_m: tuple[float, float, float]
 
 
 class RefereeAnswer(_Numbered, frozen=True, kw_only=True):

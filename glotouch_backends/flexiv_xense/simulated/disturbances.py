@@ -37,7 +37,8 @@ class DisturbingReferee(MujocoReferee):
             case "objects":
                 for o in self.objects():
                     pose, outline = pose_numbers(o.pose_B_O), tuple((x, y) for x, y in o.outline_B_m.tolist())
-                    bodies.append(messages.TrueBody(o.name, pose, o.mass_kg, outline, o.in_gripper))
+                    x, y, z = o.size_m.tolist()
+                    bodies.append(messages.TrueBody(o.name, pose, o.mass_kg, outline, o.in_gripper, (x, y, z)))
             case "pose_B_K":
                 numbers = pose_numbers(self.pose_B_K())
             case "tip_B_m":

@@ -45,7 +45,8 @@ class MujocoReferee:
             pose = body_pose(r.data, body)
             seen = pose.apply(item.mesh.vertices_m)[:, :2]
             held = all(body in p for p in pads) and not self._on(body, r.handles.container_body)
-            result.append(TrueObject(item.mesh.name, pose, item.mass_kg, seen[ConvexHull(seen).vertices], held))
+            outline = seen[ConvexHull(seen).vertices]
+            result.append(TrueObject(item.mesh.name, pose, item.mass_kg, outline, held, np.array(item.mesh.extents_m)))
         return result
 
     def pose_B_K(self) -> Pose:

@@ -42,7 +42,10 @@ PAPER = {
     "probe": dict(zip(METRICS, (0.37, 0.84, 0.87, 1.58, 0.95), strict=True)),
     "gripper": dict(zip(METRICS, (3.15, 4.81, 5.08, 6.93, 5.67), strict=True)),
 }
-MORE = ("yaw_error_deg", "displacement_mm", "turned_deg", "ball_rms_mm", "tip_before_mm", "tip_after_mm")
+MORE = (
+    "yaw_error_deg", "displacement_mm", "turned_deg", "ball_rms_mm", "tip_before_mm", "tip_after_mm",
+    "compliance_x_mm_N", "compliance_y_mm_N", "calibration_s",
+)  # fmt: skip
 COLUMNS = (
     "tool", "square", "seed", "exit_code", "status", "cause", "contacts", *METRICS, *MORE, "latency_ms",
     "peak_force_N", "sim_time_s", "wall_time_s", "folder",
@@ -52,6 +55,8 @@ COLUMNS = (
 @dataclass(frozen=True, kw_only=True)
 class ContactCampaign(Campaign):
     """Settings of the campaign; the tool's name completes the mission's, and the backend knows the option `fixed`.
+
+    The `settings` are those of the probe's mission.
 
     Attributes:
         per_side: Contacts made for each side of the square.
@@ -65,7 +70,8 @@ class ContactCampaign(Campaign):
         return [self._trial(seed, t, fixed) for seed in self.seeds for fixed in (True, False) for t in TOOLS]
 
     def _trial(self, seed: int, tool: Tool, fixed: bool) -> Trial:
-        settings = {"contacts": str(4 * self.per_side), "fixed": str(fixed).lower()}
+        own = self.settings if tool == "probe" else {}
+        settings = {**own, "contacts": str(4 * self.per_side), "fixed": str(fixed).lower()}
         square = "fixed" if fixed else "free"
         name = f"{tool}-{square}-s{seed}"
         request = replace(self.request(seed, name, settings=settings), mission=f"{self.mission}_{tool}")
@@ -90,7 +96,7 @@ def _failed(head: Row, error: Exception) -> Row:
 
 def score(record: RunRecord, traced: TracedSquare) -> dict[str, Any]:
     """Return the paper's five errors and ours, in mm and degrees."""
-    before, true = true_square(record, "start"), true_square(record)
+    before, true = (true_square(record, traced.height_B_m, when) for when in ("start", "end"))
     contact = polygon_distance(true.corners_B_m, traced.points_B_m)
     ball = polygon_distance(true.corners_B_m, traced.tips_B_m) - traced.tip_radius_m
     calibration = record.of_kind("calibration")
@@ -113,6 +119,11 @@ def score(record: RunRecord, traced: TracedSquare) -> dict[str, Any]:
         row["tip_before_mm"] = 1e3 * float(np.linalg.norm((nominal - really)[:2]))
         row["tip_after_mm"] = 1e3 * float(np.linalg.norm((tip - really)[:2]))
         row["latency_ms"] = 1e3 * float(calibration[-1].data["latency_s"])
+        begun = [t.stamp_s for t in record.ticks if t.node.endswith("tool_calibrate") and t.new == "RUNNING"]
+        row["calibration_s"] = calibration[-1].stamp_s - begun[-1]
+        measured = calibration[-1].data["compliance_P_m_N"]
+        if measured is not None:
+            row["compliance_x_mm_N"], row["compliance_y_mm_N"] = (1e3 * float(c) for c in measured)
     return row
 
 
@@ -127,7 +138,12 @@ def run_campaign(campaign: ContactCampaign, executor: Executor, on_row: OnRow = 
     rows = run_trials(executor, campaign.trials(), campaign.resume, on_row)
     rows.sort(key=lambda r: (r["square"], r["tool"], r["seed"]))
     write_table(campaign.out, "trials.csv", COLUMNS, rows)
-    more = {"paper": PAPER, "contacts_per_side": campaign.per_side, "backend": campaign.backend}
+    more = {
+        "paper": PAPER,
+        "contacts_per_side": campaign.per_side,
+        "settings": dict(campaign.settings),
+        "backend": campaign.backend,
+    }
     summary = summarise(rows) | campaign.described() | more
     write_summary(campaign.out, summary)
     plot_errors(rows, PAPER, campaign.out / "errors.png")

@@ -46,7 +46,7 @@ def plot_errors(rows: Sequence[Mapping[str, Any]], paper: Mapping[str, Mapping[s
         axes.set_yscale("log")
         axes.set_xticks(range(len(LABELS)), list(LABELS.values()))
         axes.set_ylabel("error, mm")
-        axes.set_title("square bolted to the floor" if square == "fixed" else "square free (0.15-0.40 kg)")
+        axes.set_title("square bolted to the floor" if square == "fixed" else "square free")
         axes.grid(axis="y", which="both", alpha=0.25)
         axes.legend(fontsize=8, ncols=2)
     figure.savefig(path, dpi=130)
@@ -60,7 +60,8 @@ def plot_traces(rows: Sequence[Mapping[str, Any]], out: Path) -> None:
         for column, row in enumerate(good):
             axes = figure.add_subplot(len(TOOLS), SHOWN, line * SHOWN + column + 1)
             record = read_run(out / row["folder"])
-            traced, true = traced_square(record, tool, True), true_square(record)
+            traced = traced_square(record, tool, True)
+            true = true_square(record, traced.height_B_m)
             origin, fitted = true.centre_B_m, rectangle(traced.centre_B_m, traced.side_m, traced.yaw_rad)
             axes.plot(*_closed(1e3 * (true.corners_B_m - origin)).T, color="#16834a", lw=2.5, label="truth")
             axes.plot(*_closed(1e3 * (fitted - origin)).T, "--", color="#d2452c", lw=1.2, label="fit")

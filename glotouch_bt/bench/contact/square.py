@@ -7,43 +7,55 @@ from typing import Literal
 
 import numpy as np
 
-from glotouch_bt.mission.read import load_world
 from glotouch_bt.perception.touch import fit_kind
 from glotouch_bt.report import RunRecord
 from glotouch_bt.robot import Array, BadInput, Pose
-from glotouch_bt.robot.scene import load_folder
 
 Tool = Literal["probe", "gripper"]
-WORLD = "calibration_square"
 TOOLS: tuple[Tool, ...] = ("probe", "gripper")
 
 
 @dataclass(frozen=True)
 class TrueSquare:
-    """True pose and size of the upright block.
+    """Horizontal section of the true block at the height of the contacts.
+
+    The block may lean: its outline at the height of the ball is not the one of its base.
 
     Attributes:
-        pose_B: Its frame in B, the origin at its middle.
-        sides_m: (2,) its sides along its own x and y.
+        corners_B_m: (4, 2) counter-clockwise.
     """
 
-    pose_B: Pose
-    sides_m: Array
+    corners_B_m: Array
+
+    @classmethod
+    def section(cls, pose_B: Pose, sides_m: Array, height_B_m: float) -> TrueSquare:
+        """Intersect the block's upright edges with a horizontal plane.
+
+        Args:
+            pose_B: The block's frame in B, the origin in the middle of its base.
+            sides_m: (2,) its sides along its own x and y.
+            height_B_m: Height of the plane in B.
+        """
+        base = pose_B.apply(np.column_stack([rectangle(np.zeros(2), sides_m, 0.0), np.zeros(4)]))
+        edge = pose_B.rotation[:, 2]
+        along = (height_B_m - base[:, 2]) / edge[2]
+        return cls((base + along[:, None] * edge)[:, :2])
 
     @property
     def centre_B_m(self) -> Array:
         """(2,)."""
-        return self.pose_B.position_m[:2]
+        return np.asarray(self.corners_B_m.mean(axis=0))
+
+    @property
+    def sides_m(self) -> Array:
+        """(2,) lengths of the first two sides."""
+        return np.asarray(np.linalg.norm(np.diff(self.corners_B_m[:3], axis=0), axis=1))
 
     @property
     def yaw_rad(self) -> float:
         """Direction of its x axis."""
-        return self.pose_B.yaw_rad
-
-    @property
-    def corners_B_m(self) -> Array:
-        """(4, 2) counter-clockwise."""
-        return rectangle(self.centre_B_m, self.sides_m, self.yaw_rad)
+        x, y = self.corners_B_m[0] - self.corners_B_m[1]
+        return float(np.arctan2(y, x))
 
 
 @dataclass(frozen=True)
@@ -53,12 +65,14 @@ class TracedSquare:
     Attributes:
         points_B_m: (k, 2) contact points.
         tips_B_m: (k, 2) positions of the tool's reference point.
+        height_B_m: Mean height of the reference point.
         centre_B_m, side_m, yaw_rad: The fitted square: centre (2,), sides (2,) longer first, direction of the longer.
         tip_radius_m: Radius of the ball; 0 for the fingers.
     """
 
     points_B_m: Array
     tips_B_m: Array
+    height_B_m: float
     centre_B_m: Array
     side_m: Array
     yaw_rad: float
@@ -89,13 +103,15 @@ def traced_square(record: RunRecord, tool: Tool, fixed: bool) -> TracedSquare:
     if fixed:
         felt = {c["stamp_s"]: c for e in record.of_kind("contact") for c in (e.data["contact"],)}
         contacts = [felt[c["stamp_s"]] for c in contacts]
-    tips = np.array([c["tip_K_m"][:2] for c in contacts], dtype=np.float64)
+    places = np.array([c["tip_K_m"] for c in contacts], dtype=np.float64)
+    tips = places[:, :2]
     points = np.array([c["point_K_m"] for c in contacts], dtype=np.float64)
     radius = float(record.of_run("probe", "tip_radius_m")) if tool == "probe" else 0.0
     fit = fit_kind(tips if radius else points, radius, "box")
     return TracedSquare(
         _planar(pose_B_K, points),
         _planar(pose_B_K, tips),
+        float(pose_B_K.apply(places)[:, 2].mean()),
         _planar(pose_B_K, fit.centre_K_m[None])[0],
         np.array(fit.size_m),
         fit.yaw_rad + pose_B_K.yaw_rad,
@@ -103,13 +119,11 @@ def traced_square(record: RunRecord, tool: Tool, fixed: bool) -> TracedSquare:
     )
 
 
-def true_square(record: RunRecord, when: Literal["start", "end"] = "end") -> TrueSquare:
-    """Return the true square at the start or the end of a run."""
+def true_square(record: RunRecord, height_B_m: float, when: Literal["start", "end"] = "end") -> TrueSquare:
+    """Return the true square at the start or the end of a run, as large as it is, at a height in B."""
     item = record.truth[when][0]
     pose = Pose(np.array(item["pose_B_O"]["position_m"], float), np.array(item["pose_B_O"]["quat"], float))
-    world = load_world(WORLD)
-    (block,) = load_folder(world.objects.folder, world.objects.names)
-    return TrueSquare(pose, block.extents_m[:2])
+    return TrueSquare.section(pose, np.array(item["size_m"][:2], float), height_B_m)
 
 
 def _planar(pose_B_K: Pose, points_K_m: Array) -> Array:

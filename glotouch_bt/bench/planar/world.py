@@ -242,7 +242,7 @@ class PlanarWorld:
         felt = onset + m.localisation_sd_m * self._rng.normal(size=2)
         direction = _turned(reaction, m.direction_sd_rad * float(self._rng.normal()))
         point = contact_point(felt, self.tip_radius_m, u, direction)
-        way = estimate_push(way, direction)
+        way = estimate_push(way + m.give_m * direction, direction)
         tip = np.array([*felt, SENSING_HEIGHT_M])
         return Contact(
             0.0, tip, np.array([*u, 0.0]), np.array([*direction, 0.0]), point, m.touch_force_N, pushed_K_m=way

@@ -14,19 +14,27 @@ def contact(
     trials: shared.Trials = 20,
     seed: shared.FirstSeed = 100,
     conditions: shared.Conditions = "nominal",
+    set_: shared.MissionSettings = None,
     per_side: Annotated[int, typer.Option(min=1, max=15, help="contacts per side")] = 4,
     workers: shared.Workers = 2,
     out: shared.BenchFolder = None,
     json_: shared.SummaryJson = False,
 ) -> None:
-    """Contact: errors of a calibration square traced by probe and by bare gripper, fixed and free."""
+    """Contact: errors of a calibration square traced by probe and by bare gripper, fixed and free.
+
+    `--set` gives parameters of the mission `contact_probe`.
+    """
     from glotouch_bt.bench.contact import ContactCampaign, run_campaign
     from glotouch_bt.commands.terminal import print_contact
+    from glotouch_bt.mission import load_mission
 
     shared.check_names(conditions, "mujoco")
+    settings = shared.read_settings(set_)
+    load_mission("contact_probe", settings)  # refuses what is no parameter of it
     campaign = ContactCampaign(
         seeds=tuple(range(seed, seed + trials)),
         conditions=conditions,
+        settings=settings,
         per_side=per_side,
         out=shared.bench_folder(out, "contact"),
     )

@@ -2,6 +2,7 @@
 
 from glotouch_bt.commands.shared.errors import guarded, set_debug, showing_tracebacks
 from glotouch_bt.commands.shared.experiments import print_summary, progress, put_few_in_box, run_in_pool
+from glotouch_bt.commands.shared.live import live_page, shown_on, wait_for_viewers
 from glotouch_bt.commands.shared.options import (
     AllowPaths,
     Backend,
@@ -12,9 +13,12 @@ from glotouch_bt.commands.shared.options import (
     FirstSeed,
     Json,
     KeepTrials,
+    Live,
     MissionName,
     MissionSettings,
+    NoBrowser,
     Objects,
+    Port,
     RunFolderArgument,
     SetConditions,
     Settings,

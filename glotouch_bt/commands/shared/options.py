@@ -40,6 +40,11 @@ SetConditions = Annotated[
         "--set-condition", metavar="FIELD=VALUE", help="change a field of the conditions; a range as LOW,HIGH"
     ),
 ]
+Live = Annotated[bool, typer.Option("--live", help="show the mission in the browser while it runs")]
+Port = Annotated[
+    int | None, typer.Option(min=1, max=65535, help="port of the page on 127.0.0.1 (default: the next free one)")
+]
+NoBrowser = Annotated[bool, typer.Option("--no-browser", help="do not open the page in the browser")]
 Json = Annotated[bool, typer.Option("--json", help="print JSON on stdout, nothing else")]
 
 Trials = Annotated[int, typer.Option(min=1, help="number of seeds")]

@@ -78,14 +78,18 @@ class _ItemReader(StreamReader):
         return None
 
 
-def record_items(file: IO[bytes]) -> Iterator[McapRecord]:
+def record_items(file: IO[bytes], *, skip_magic: bool = False) -> Iterator[McapRecord]:
     """Yield the items of a record: chunks as they are, attachments, and the footer.
+
+    Args:
+        file: The record, at its beginning, or at the end of an item.
+        skip_magic: The file does not stand at its beginning.
 
     Raises:
         BadInput: An item states too large a length.
     """
-    reader = _ItemReader(cast("IO[bytes]", _BoundedReads(file)), emit_chunks=True, record_size_limit=MAX_ITEM_BYTES)
-    yield from reader.records
+    bounded = cast("IO[bytes]", _BoundedReads(file))
+    yield from _ItemReader(bounded, skip_magic=skip_magic, emit_chunks=True, record_size_limit=MAX_ITEM_BYTES).records
 
 
 class ChunkUnpacker:

@@ -45,6 +45,8 @@ class NullRecord:
 
 
 _NOT_SAVED = ("_record", "_pending")
+CALIBRATED = ("tip_P_m", "tip_sd_m", "latency_s", "compliance_P_m_N")
+"""What the result repeats of a calibration."""
 BATCH = 200
 """Control cycles measured at a time."""
 
@@ -56,6 +58,7 @@ class RunSummary:
         contacts: Contact events so far.
         candidates: Data of each candidate, without its contacts.
         ranking: Data of the last ranking event, or None.
+        calibration: Data of the last calibration of the probe, or None.
         last_event: (robot time, kind) of the last event.
         node: Path of the last leaf that started.
         peak_force_N: Largest norm of the sensed wrist force.
@@ -67,6 +70,7 @@ class RunSummary:
         self.contacts = 0
         self.candidates: list[Json] = []
         self.ranking: Json = None
+        self.calibration: Json = None
         self.last_event: tuple[float, str] = (0.0, "")
         self.node = ""
         self.peak_force_N = 0.0
@@ -108,7 +112,7 @@ class RunSummary:
             BadInput: A value is of another type.
         """
         for name, value in state.items():
-            if name in vars(self) and name not in ("ranking", "_last_P_m"):
+            if name in vars(self) and name not in ("ranking", "calibration", "_last_P_m"):
                 require_type(value, type(vars(self)[name]), f"summary.{name}")
         vars(self).update({name: value for name, value in state.items() if name in vars(self)})
 
@@ -130,6 +134,8 @@ class RunSummary:
             self._store(_candidate(to_json(data.get("candidate", data))))
         elif kind == "ranking":
             self.ranking = to_json(data.get("ranking", data), summarise=True)
+        elif kind == "calibration":
+            self.calibration = to_json({k: v for k, v in data.items() if k in CALIBRATED})
         elif kind == "tool":
             self.flush()
             self._probe_held = bool(data.get("held", False))

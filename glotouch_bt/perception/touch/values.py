@@ -34,7 +34,7 @@ class Contact:
         reaction_K: (3,) unit direction of the force on the tip.
         point_K_m: (2,) contact point: the support-plane intercept (paper III-B).
         force_N: Norm of the filtered contact force when the guard tripped.
-        pushed_K_m: (2,) estimated displacement of the object from the onset to rest, an upper bound (`estimate_push`).
+        pushed_K_m: (2,) estimated displacement of the object from the onset to rest (`estimate_push`).
     """
 
     stamp_s: float

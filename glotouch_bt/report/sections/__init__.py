@@ -12,11 +12,11 @@ from glotouch_bt.report.sections.faults import faults_section
 from glotouch_bt.report.sections.force import force_section
 from glotouch_bt.report.sections.header import header_section, verdict
 from glotouch_bt.report.sections.log import log_section
-from glotouch_bt.report.sections.map import map_section
+from glotouch_bt.report.sections.map import contour_of, map_section
 from glotouch_bt.report.sections.reasons import reasons_section
 from glotouch_bt.report.sections.recognition import recognition_section
-from glotouch_bt.report.sections.squeezes import squeezes_section
-from glotouch_bt.report.sections.timeline import timeline_section
+from glotouch_bt.report.sections.squeezes import depth_png, palette, squeezes_section
+from glotouch_bt.report.sections.timeline import timeline_section, tree_order
 
 SECTIONS: tuple[tuple[str, Callable[[RunRecord], str]], ...] = (
     ("Verdict", header_section),

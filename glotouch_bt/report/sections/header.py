@@ -69,7 +69,19 @@ def _numbers(record: RunRecord) -> list[tuple[str, str]]:
     out.append(("peak force", number(peak, 1, "N")))
     if _real(r.get("probe_path_m")):
         out.append(("probe path", number(r["probe_path_m"], 2, "m")))
+    if any("grasp_to_tip_m" in e.data for e in record.of_kind("tool")):
+        out.append(("compliance of the probe along x_P, y_P", _compliance(record)))
     return [(k, v) for k, v in out if v != "–"]
+
+
+def _compliance(record: RunRecord) -> str:
+    """Return the last measured compliance of the probe."""
+    found = record.of_kind("calibration")
+    measured = found[-1].data.get("compliance_P_m_N") if found else None
+    if not (isinstance(measured, list) and len(measured) == 2 and all(map(_real, measured))):
+        return "not measured"
+    x, y = (number(1e3 * value, 2) for value in measured)
+    return f"{x}, {y} mm/N"
 
 
 def _real(value: object) -> bool:

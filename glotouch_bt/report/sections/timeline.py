@@ -44,7 +44,7 @@ def timeline_section(record: RunRecord) -> str:
     found = spans(record)
     if not found:
         return ""
-    nodes = _ordered([s.node for s in found])
+    nodes = tree_order([s.node for s in found])
     total = len(nodes)
     if total > MAX_ROWS:  # show the upper levels
         depth = max(d for d in range(1, 40) if sum(n.count("/") < d for n in nodes) <= MAX_ROWS or d == 1)
@@ -88,7 +88,7 @@ def timeline_section(record: RunRecord) -> str:
     return section("Timeline of the tree", lead, chart + legend(keys))
 
 
-def _ordered(nodes: list[str]) -> list[str]:
+def tree_order(nodes: list[str]) -> list[str]:
     """Return each node once, parents before children, siblings in the order of their first run."""
     first: dict[str, int] = {}
     for i, n in enumerate(nodes):

@@ -18,6 +18,7 @@ class TrueObject:
         mass_kg: Mass.
         outline_B_m: (n, 2) convex outline of the mesh in its present pose, in the xy plane of B.
         in_gripper: True if both pads touch it and it does not touch the container.
+        size_m: (3,) its true size along the axes of the mesh frame.
     """
 
     name: str
@@ -25,6 +26,7 @@ class TrueObject:
     mass_kg: float
     outline_B_m: Array
     in_gripper: bool
+    size_m: Array
 
 
 @dataclass(frozen=True)

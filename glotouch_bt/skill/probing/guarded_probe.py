@@ -26,7 +26,7 @@ from glotouch_bt.perception.touch import (
 )
 from glotouch_bt.robot import Array, MotionRefused, Observation, Pose
 from glotouch_bt.skill.context import Context
-from glotouch_bt.skill.failures import Failure
+from glotouch_bt.skill.failures import Failure, SkillFailed
 from glotouch_bt.skill.probing.held_tool import HeldTool
 
 REST_S = 0.12
@@ -36,13 +36,16 @@ MAX_REST_S = 0.6
 SAME_REST_S = 0.03
 """Time for which the wrench must be steady and equal to that of an earlier rest, which then still holds. Source: ours;
 three control periods at 100 Hz."""
-SAME_SHARE = 1.0 / 3.0
+SAME_SHARE = 1.0 / 6.0
 """Largest force or torque by which it may differ, over the threshold of a contact. Source: ours."""
 SAME_SIGMAS = 3.0
 """The same in standard deviations of the difference, for noisy sensors. Source: ours."""
 FIXTURE_M = 0.003
 """A contact within this distance of the floor or a wall is one with the container, which cannot be pushed. Source:
 ours; twice the registration's error (harsh CONDITIONS)."""
+SETTLE_S = 0.02
+"""Rest after a contact before the force on the bent probe is read. Source: ours; the sensor's latency, and the ringing
+of a compliant probe (40 Hz, damped by the gel)."""
 GUARDED_ACCELERATION_M_S2 = 0.5
 """Acceleration limit of a guarded move. With the hand's inertia compensated, less than 0.05 N of it remain at the tip
 (simulation)."""
@@ -54,6 +57,19 @@ HARD_CONTACT = Failure(
     "the wrench passed a hard limit during a guarded move",
     advice="something hard or heavy is in the way; go slower",
 )
+
+
+@dataclass(frozen=True)
+class Stood:
+    """The ball as it is believed to be while the hand rests in contact.
+
+    Attributes:
+        hand_K_m: (3,) measured position of the unloaded ball's centre, which the hand carries.
+        force_K_N: (3,) force on the ball.
+    """
+
+    hand_K_m: Array
+    force_K_N: Array
 
 
 @dataclass(frozen=True)
@@ -92,6 +108,7 @@ class Prober:
         probe = context.world.probe if context.arm.scene.holding_tool else None
         self._carried = carried or Payload.hand(context.arm.description.gripper, probe)
         self._rested: tuple[float, Baseline] | None = None
+        self._last_guard: _TwoGuards | None = None
         self.resting_up_N: list[float] = []
 
     @property
@@ -162,9 +179,39 @@ class Prober:
             paces=paces,
             guard=guard,
         )
-        probed = self._outcome(result, step / length)
+        self._last_guard = guard
+        probed = yield from self._outcome(result, step / length)
         self._remember(probed)
         return probed
+
+    def stand(self, duration_s: float) -> Motion[Stood]:
+        """Rest in contact after a `move`; return the means of the hand's place and of the force over the last half.
+
+        The force is measured from the baseline of that move.
+        """
+        guard = self._last_guard
+        if guard is None:
+            raise MotionRefused("stand", "no guarded move came before")
+        blocks = yield from self._context.arm.hold(duration_s)
+        rest = blocks[len(blocks) // 2 :]
+        tips = [self._tool.tip_K_m(self._world, Pose(o.position_B_P.mean(axis=0), o.quat_B_P[-1])) for o in rest]
+        force_B = np.mean([guard.soft.force_B_N(o) for o in rest], axis=0)
+        return Stood(np.mean(tips, axis=0), self._pose_K_B.rotation @ force_B)
+
+    def press(self, direction_K: Array, distance_m: float, speed_m_s: float, force_N: float) -> Motion[None]:
+        """Move on along `direction_K` (3,) after a contact, at most until `force_N` opposes the motion.
+
+        Raises:
+            SkillFailed: `hard_contact`; the arm has stopped.
+        """
+        guard = self._last_guard
+        if guard is None:
+            raise MotionRefused("press", "no guarded move came before")
+        step_B = self._world.container.pose_B_K.rotation @ (np.asarray(direction_K) * distance_m)
+        limit = _ForceLimit(guard, -step_B / distance_m, force_N)
+        result = yield from self._context.arm.shift(step_B, speed_m_s, guard=limit)
+        if isinstance(result.stop, HardTrip):
+            raise _hard_contact(result.stop)
 
     def _remember(self, probed: Probed) -> None:
         """Record where the tool was free, and where it touched anything but the container."""
@@ -208,31 +255,29 @@ class Prober:
         gripper = self._context.arm.description.gripper
         return MeasuredInertia(self._carried, gripper.pose_E_P, self._guard.latency_s)
 
-    def _outcome(self, result: MoveResult, approach_K: Array) -> Probed:
+    def _outcome(self, result: MoveResult, approach_K: Array) -> Motion[Probed]:
         poses = result.path_B_m + self._context.arm.pose_B_P.rotation @ self._tool.tip_P_m
         path_K = self._pose_K_B.apply(poses)
         stop = result.stop
         if stop is None:
             return Probed(None, path_K)
         if isinstance(stop, HardTrip):
-            raise HARD_CONTACT(
-                f"{stop.quantity} {stop.value:.1f} passed its limit {stop.limit:.1f} during a guarded move",
-                quantity=stop.quantity,
-                value=stop.value,
-                limit=stop.limit,
-            )
+            raise _hard_contact(stop)
         if not isinstance(stop, Onset):
             raise MotionRefused("guarded move", f"the guard answered {stop!r}, not an onset")
-        return Probed(self._contact(stop, approach_K, path_K[-1]), path_K)
+        stood = yield from self.stand(SETTLE_S)
+        return Probed(self._contact(stop, approach_K, stood), path_K)
 
-    def _contact(self, onset: Onset, approach_K: Array, end_K_m: Array) -> Contact:
+    def _contact(self, onset: Onset, approach_K: Array, stood: Stood) -> Contact:
+        """Return the contact. At its onset nothing presses yet; at rest the probe is bent by the force."""
         pose = Pose(onset.position_B_P, onset.quat_B_P)
         tip_K = self._tool.tip_K_m(self._world, pose)
         force_K = self._pose_K_B.rotation @ onset.force_B
         norm = float(np.linalg.norm(force_K))
         reaction = force_K / norm if norm > 1e-6 else -approach_K
         point = self._tool.contact_point_K_m(self._world, pose, approach_K, reaction)
-        push = estimate_push(end_K_m[:2] - tip_K[:2], reaction[:2])
+        ball_K_m = stood.hand_K_m + self._tool.deflection_K_m(self._world, pose, stood.force_K_N)
+        push = estimate_push((ball_K_m - tip_K)[:2], reaction[:2])
         return Contact(onset.stamp_s, tip_K, approach_K, reaction, point, norm, push)
 
 
@@ -240,11 +285,31 @@ class _TwoGuards:
     """Apply the hard and the soft rule to the same samples; a hard stop takes precedence."""
 
     def __init__(self, hard: HardStop, soft: ContactGuard) -> None:
-        self._hard, self._soft = hard, soft
+        self.hard, self.soft = hard, soft
 
     def __call__(self, observation: Observation) -> HardTrip | Onset | None:
-        return self._hard(observation) or self._soft(observation)
+        return self.hard(observation) or self.soft(observation)
 
     def standing(self, observation: Observation) -> HardTrip | Onset | None:
         """Check while a paused motion stands still."""
-        return self._hard(observation) or self._soft.standing(observation)
+        return self.hard(observation) or self.soft.standing(observation)
+
+
+class _ForceLimit:
+    """Trip on the hard rule, or on a mean force of a period along `against_B` (3,) of `max_N` and more."""
+
+    def __init__(self, guards: _TwoGuards, against_B: Array, max_N: float) -> None:
+        self._guards, self._against_B, self._max_N = guards, against_B, max_N
+
+    def __call__(self, observation: Observation) -> HardTrip | float | None:
+        force_N = float(self._guards.soft.force_B_N(observation) @ self._against_B)
+        return self._guards.hard(observation) or (force_N if force_N >= self._max_N else None)
+
+
+def _hard_contact(trip: HardTrip) -> SkillFailed:
+    return HARD_CONTACT(
+        f"{trip.quantity} {trip.value:.1f} passed its limit {trip.limit:.1f} during a guarded move",
+        quantity=trip.quantity,
+        value=trip.value,
+        limit=trip.limit,
+    )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glotouch_bt.perception.touch import GuardParams
+from glotouch_bt.perception.touch.calibration import UNMEASURED_M_N
 from glotouch_bt.perception.touch.detection import Disc, Section, section_point
 from glotouch_bt.robot import Array, Pose, World
 
@@ -27,6 +28,8 @@ class HeldTool:
         latency_s: Estimated age of a wrench sample when it arrives.
         tip_sd_m: Standard deviation of the reference point in P, per planar axis; None if not calibrated.
         corner_K_m: (2,) position of the container's corner found by the calibration, in K; None if not calibrated.
+        compliance_P_m_N: (2,) displacement of the reference point per force along x_P and y_P; None if not measured,
+            which counts as `UNMEASURED_M_N`.
     """
 
     tip_P_m: Array
@@ -39,6 +42,7 @@ class HeldTool:
     latency_s: float = GuardParams().latency_s
     tip_sd_m: float | None = None
     corner_K_m: Array | None = None
+    compliance_P_m_N: Array | None = None
 
     @property
     def round(self) -> bool:
@@ -48,6 +52,13 @@ class HeldTool:
     def tip_K_m(self, world: World, pose_B_P: Pose) -> Array:
         """Return the reference point (3,) in K for a pose of the pads' mid-point in B."""
         return world.container.pose_B_K.inverse().apply(pose_B_P.apply(self.tip_P_m))
+
+    def deflection_K_m(self, world: World, pose_B_P: Pose, force_K_N: Array) -> Array:
+        """Return the displacement (3,) in K of the reference point by a force (3,) in K on it; none along z_P."""
+        measured = self.compliance_P_m_N
+        x, y = (UNMEASURED_M_N, UNMEASURED_M_N) if measured is None else measured.tolist()
+        turn = world.container.pose_B_K.rotation.T @ pose_B_P.rotation
+        return np.asarray(turn @ (np.array([x, y, 0.0]) * (turn.T @ np.asarray(force_K_N))))
 
     def contact_point_K_m(self, world: World, pose_B_P: Pose, approach_K: Array, reaction_K: Array | None) -> Array:
         """Return the contact point (2,) in K: the support-plane intercept of the tool's section (paper III-B).

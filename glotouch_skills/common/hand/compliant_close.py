@@ -8,6 +8,7 @@ open as weakly as they close: an object they drag stalls them, and the hand move
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -51,8 +52,15 @@ RELEASE_SPEED_M_S = 0.02
 """Opening speed until the jaws have moved apart by `RELEASED_BY_M`: an object held askew springs back."""
 RELEASE_FORCE_N = 2.0
 """Jaw force meanwhile: an object that a fingertip stands on is dragged with at most twice this force."""
-RELEASED_BY_M = 0.003
-"""The object is released once the jaws are this much farther apart."""
+RELEASED_BY_M = 0.006
+"""The object is released once the jaws are this much farther apart: one that was tilted stands again. Source: ours,
+more than `GIVES_WAY_M`."""
+GIVES_WAY_M = 0.005
+"""Farther than this, jaws that both touch do not close on an object that stands: it tilts or turns. Source: ours; soft
+gels give way by 2 mm at 3 N. Closures that toppled a nailong (traced, realistic, seeds 25002 and 25004) gave 10 mm and
+more."""
+BOTH_TOUCH_N = 0.75
+"""Least force of each jaw on an object that both touch. Source: ours; half of `GENTLE_FORCE_N` slides most objects."""
 RELEASE_STALL_S = 0.5
 """Longest wait for jaws that do not move while they open weakly."""
 OPEN_SPEED_M_S = 0.2
@@ -82,7 +90,13 @@ def _ignore(seen: Observation) -> None:
 
 
 def close_compliantly(
-    arm: Arm, speed_m_s: float, force_N: float, *, tactile: bool = False, on_observation: Observer = _ignore
+    arm: Arm,
+    speed_m_s: float,
+    force_N: float,
+    *,
+    max_giving_m: float = math.inf,
+    tactile: bool = False,
+    on_observation: Observer = _ignore,
 ) -> Motion[GripperState]:
     """Close with little force until the jaws rest, then press; while only one jaw touches, follow its push.
 
@@ -95,6 +109,7 @@ def close_compliantly(
         arm: At rest, jaws open, hand pointing down.
         speed_m_s: Rate of the aperture.
         force_N: Largest force of one jaw.
+        max_giving_m: Longest way on which jaws that both touch may go on closing.
         tactile: Request depth maps.
         on_observation: Called with every observation.
 
@@ -102,11 +117,12 @@ def close_compliantly(
         The last jaw state.
 
     Raises:
-        MotionRefused: The force on the hand passed `MAX_CLOSING_FORCE_N` while closing, `MAX_REST_FORCE_N` when the
-            gentle jaws rested, or the limit of `_max_N` while pressing. The jaws have opened again.
+        MotionRefused: The object gave way by more than `max_giving_m`, or the force on the hand passed
+            `MAX_CLOSING_FORCE_N` while closing, `MAX_REST_FORCE_N` when the gentle jaws rested, or the limit of
+            `_max_N` while pressing. The jaws have opened again.
     """
     arm.felt.forget_near(arm.world.container.pose_B_K.inverse().apply(arm.pose_B_P.position_m))
-    closing = _Closing(arm, speed_m_s, tactile, on_observation)
+    closing = _Closing(arm, speed_m_s, max_giving_m, tactile, on_observation)
     with arm.pause_signal.finishing():  # pause only at rest: until then the hand must be able to follow
         yield from closing.measure_free_force()
         state = yield from closing.until_rest([min(GENTLE_FORCE_N, force_N)])
@@ -120,8 +136,11 @@ def close_compliantly(
 class _Closing:
     """State of one closure."""
 
-    def __init__(self, arm: Arm, speed_m_s: float, tactile: bool, on_observation: Observer) -> None:
+    def __init__(
+        self, arm: Arm, speed_m_s: float, max_giving_m: float, tactile: bool, on_observation: Observer
+    ) -> None:
         self._arm, self._speed_m_s, self._tactile, self._seen_by = arm, speed_m_s, tactile, on_observation
+        self._max_giving_m, self._touched_m = max_giving_m, math.nan
         self._opening_m, self._start_B = arm.aperture_m, arm.pose_B_P.position_m
         self._free_N = self._force_N = np.zeros(3)
 
@@ -143,6 +162,19 @@ class _Closing:
             yield from release(self._arm, self._opening_m)
             raise MotionRefused("closing", f"the hand was pressed with {pressed_N:.0f} N while the jaws closed")
 
+    def _refuse_giving(self, seen: Observation) -> Motion[None]:
+        """Open the jaws and refuse if the object gives way although both jaws touch it.
+
+        The reported force is the mean of both jaws', the hand feels their difference.
+        """
+        weaker_N = seen.gripper.force_N - 0.5 * abs(float(_force_P(seen)[1]))
+        if math.isnan(self._touched_m) and weaker_N > BOTH_TOUCH_N:
+            self._touched_m = seen.gripper.aperture_m
+        given_m = self._touched_m - seen.gripper.aperture_m
+        if given_m > self._max_giving_m:
+            yield from release(self._arm, self._opening_m)
+            raise MotionRefused("closing", f"the object gave way by {given_m * 1e3:.0f} mm: it tilts or turns")
+
     def until_rest(self, forces_N: Sequence[float]) -> Motion[GripperState]:
         """Close under each force for one period, then under the last one until the jaws rest."""
         arm = self._arm
@@ -152,6 +184,7 @@ class _Closing:
             seen = yield from self._one_period(force_N if k < len(forces_N) else None)
             self._force_N = _force_P(seen)
             yield from self.refuse_above(_max_N(force_N), float(np.linalg.norm(self._force_N)))
+            yield from self._refuse_giving(seen)
             if k >= len(forces_N) and watch.still(seen.now_s, seen.gripper):
                 break
             yield from self._follow(seen)

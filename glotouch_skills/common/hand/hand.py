@@ -57,7 +57,7 @@ def glide(context: Context, pose_B_P: Pose, speed_m_s: float, paces: Paces = ())
         step / length,
         np.array([0.0, 0.0, gripper.fingertip_below_P_m]),
         gripper.pose_E_P,
-        replace(GuardParams(), directional_N=BUMP_N, total_N=BUMP_N, cutoff_Hz=BUMP_CUTOFF_HZ),
+        replace(GuardParams(), directional_N=BUMP_N, total_N=BUMP_N, sustained_N=BUMP_N, cutoff_Hz=BUMP_CUTOFF_HZ),
     )
     result = yield from arm.line(
         pose_B_P,

@@ -49,10 +49,19 @@ def test_a_square_is_fitted_to_what_touched_it(radius: float) -> None:
 
 
 def test_the_true_square_stands_as_its_pose_says() -> None:
-    square = TrueSquare(Pose.planar((0.6, 0.1, -0.2), 0.4), SIDES)
-    np.testing.assert_allclose(square.corners_B_m.mean(axis=0), square.centre_B_m)
-    edge = square.corners_B_m[3] - square.corners_B_m[2]
-    assert np.arctan2(edge[1], edge[0]) == pytest.approx(0.4)
+    square = TrueSquare.section(Pose.planar((0.6, 0.1, -0.2), 0.4), SIDES, -0.18)
+    np.testing.assert_allclose(square.corners_B_m, rectangle(np.array([0.6, 0.1]), SIDES, 0.4), atol=1e-12)
+    np.testing.assert_allclose(square.sides_m, SIDES)
+    assert square.yaw_rad == pytest.approx(0.4)
+
+
+def test_a_leaning_square_is_compared_at_the_height_of_the_contacts() -> None:
+    """Leaning by a about y, its section at height h is displaced by h tan(a), and longer by 1 / cos(a) along x."""
+    lean, height = np.radians(3.0), 0.018
+    pose = Pose(np.array([0.6, 0.1, -0.2]), np.array([np.cos(0.5 * lean), 0.0, np.sin(0.5 * lean), 0.0]))
+    square = TrueSquare.section(pose, SIDES, -0.2 + height)
+    np.testing.assert_allclose(square.centre_B_m, [0.6 + height * np.tan(lean), 0.1], atol=1e-12)
+    np.testing.assert_allclose(square.sides_m, [0.06 / np.cos(lean), 0.06], rtol=1e-12)
 
 
 def row(tool: str, square: str, seed: int, value: float, cause: str = "") -> dict[str, Any]:
@@ -72,3 +81,9 @@ def test_every_mode_is_tried_on_every_seed(tmp_path: Path) -> None:
     asked = [(r.out, r.mission, r.seed, r.settings["contacts"]) for r in (t.memory.request for t in campaign.trials())]
     assert len(asked) == len(set(asked)) == 8
     assert {a[3] for a in asked} == {"20"}
+
+
+def test_settings_are_those_of_the_probes_mission(tmp_path: Path) -> None:
+    campaign = contact.ContactCampaign(seeds=(3,), per_side=4, out=tmp_path, settings={"press": "0"})
+    for request in (t.memory.request for t in campaign.trials()):
+        assert request.settings.get("press") == ("0" if request.mission == "contact_probe" else None)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from glotouch_bt.perception.touch import GuardParams
+from glotouch_bt.robot import MotionRefused
 from glotouch_bt.skill import SkillFailed
 from glotouch_bt.skill.probing.guarded_probe import MAX_REST_S, REST_S, SAME_REST_S, Prober
 
@@ -118,6 +119,53 @@ def test_the_latency_is_the_tools(make, tool) -> None:
     b, _ = make()
     late = dataclasses.replace(tool, latency_s=0.008)
     assert Prober(b.context, late, GuardParams())._guard.latency_s == 0.008
+
+
+@pytest.mark.parametrize("bearing", [0.0, 1.0, 2.5])
+def test_a_bent_probe_is_no_push(make, tool, bearing) -> None:
+    """A spring of 2 mm/N that stands still is the same to the hand as a rigid wall and a probe that gives as much."""
+    yields_m_N, there = 2e-3, START[:2] + 0.03 * np.array([np.cos(bearing), np.sin(bearing)])
+    u = np.array([np.cos(bearing), np.sin(bearing), 0.0])
+
+    def spring(ball, radius):
+        return -np.outer(np.maximum((ball[:, :2] - there) @ u[:2], 0.0) / yields_m_N, u)
+
+    pushed = {}
+    for measured in (None, np.full(2, yields_m_N)):
+        b, _ = make(spring)
+        known = dataclasses.replace(tool, compliance_P_m_N=measured, latency_s=0.0)  # the fake wrist reports at once
+        contact = b.go(Prober(b.context, known, GuardParams()).move(START + 0.06 * u, 0.03)).contact
+        pushed[measured is None] = np.linalg.norm(contact.pushed_K_m)
+    assert pushed[False] < 1e-4 < 5e-4 < pushed[True]
+
+
+def test_a_press_ends_at_its_force(make, things) -> None:
+    b, prober = make(things.post((0.03, 0.1), 0.03, 0.2))
+    b.go(prober.move(START + np.array([0.08, 0, 0]), 0.02))
+    before = b.go(prober.stand(0.1))
+    b.go(prober.press(np.array([1.0, 0.0, 0.0]), 0.004, 0.005, 3.0 - before.force_K_N[0]))
+    after = b.go(prober.stand(0.1))
+    assert 3.0 <= before.force_K_N[0] - after.force_K_N[0] < 5.0
+    assert b.robot.peak_force_N < 12.0
+
+
+def test_guarded_probe__hard_contact_in_a_press(make) -> None:
+    """A force that grows out of bounds in a direction other than the press's."""
+    b, prober = make(lambda ball, radius: np.outer(np.where(ball[:, 0] > -0.03, 1.0, 0.0), [-0.5, 0.0, 0.0])
+                     + np.outer(np.where(ball[:, 0] > -0.027, 1.0, 0.0), [0.0, 0.0, 24.0]))  # fmt: skip
+    probed = b.go(prober.move(START + np.array([0.04, 0, 0]), 0.01))
+    assert probed.contact is not None
+    with pytest.raises(SkillFailed) as failed:
+        b.go(prober.press(np.array([1.0, 0.0, 0.0]), 0.004, 0.005, 3.0))
+    assert failed.value.reason.code == "hard_contact"
+
+
+def test_nothing_is_pressed_before_a_contact(make) -> None:
+    b, prober = make()
+    with pytest.raises(MotionRefused):
+        b.go(prober.press(np.array([1.0, 0.0, 0.0]), 0.004, 0.005, 3.0))
+    with pytest.raises(MotionRefused):
+        b.go(prober.stand(0.1))
 
 
 def test_a_post_that_does_not_yield_is_pushed_at_most_by_the_overrun(make, things, tool) -> None:

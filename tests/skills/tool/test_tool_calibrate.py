@@ -14,14 +14,17 @@ from glotouch_skills.tool.tool_calibrate import ToolCalibrate
 STIFFNESS_N_M = 20_000.0
 
 
-def walls(shift_m=(0.0, 0.0)):
-    """The two walls of the corner nearest to the holder (-x, -y), `shift_m` from where they should be."""
+def walls(shift_m=(0.0, 0.0), stiffness_N_m=(STIFFNESS_N_M, STIFFNESS_N_M), max_N=np.inf):
+    """The two walls of the corner nearest to the holder (-x, -y), `shift_m` from where they should be.
+
+    A wall of stiffness k against a rigid probe is the same to the hand as a rigid wall against a probe that gives 1/k.
+    """
 
     def force(ball, radius):
         out = np.zeros_like(ball)
         for axis, half in enumerate((0.15, 0.20)):
             inside = (-half + shift_m[axis]) - (ball[:, axis] - radius)
-            out[:, axis] = STIFFNESS_N_M * np.maximum(inside, 0.0)
+            out[:, axis] = np.clip(stiffness_N_m[axis] * inside, 0.0, max_N)
         return out
 
     return force
@@ -29,12 +32,16 @@ def walls(shift_m=(0.0, 0.0)):
 
 @pytest.fixture
 def make(bench, tool):
-    """A bench whose ball hangs straight, while the tool is believed to be `believed_m` off."""
+    """A bench whose ball hangs straight, while the tool is believed to be `believed_m` off.
 
-    def make_one(believed_m=(0.0, 0.0), things=None, **params):
+    It was grasped `askew_rad` from the hand's yaw at home.
+    """
+
+    def make_one(believed_m=(0.0, 0.0), things=None, askew_rad=0.0, **params):
         b = bench(things=[walls()] if things is None else things)
         b.arm.scene.hold_tool(True)
-        believed = dataclasses.replace(tool, tip_P_m=tool.tip_P_m + np.array([*believed_m, 0.0]))
+        believed = dataclasses.replace(tool, tip_P_m=tool.tip_P_m + np.array([*believed_m, 0.0]),
+                                       yaw_B_rad=tool.yaw_B_rad + askew_rad)  # fmt: skip
         return b, b.make(ToolCalibrate, inputs={"before": believed}, **params)
 
     return make_one
@@ -73,6 +80,35 @@ def test_the_fake_wrist_reports_at_once(make) -> None:
     b, skill = make()
     b.run(skill)
     assert skill.tool.latency_s == pytest.approx(0.0, abs=6e-3), "the fake's inertia comes a period at a time"
+
+
+@pytest.mark.parametrize("gives_m_N", [(2e-3, 3e-4), (2e-4, 3e-3), (5e-5, 5e-5)])
+@pytest.mark.parametrize("askew_rad", [0.0, 0.3, -0.7])
+def test_the_compliance_is_measured_along_the_axes_of_the_hand(make, gives_m_N, askew_rad) -> None:
+    """The wall x_P points at gives as its spring does, whatever the yaw at which the probe was grasped."""
+    b, skill = make(things=[walls(stiffness_N_m=1.0 / np.array(gives_m_N))], askew_rad=askew_rad, turn_deg=45.0)
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    x_P_in_K = np.cos(skill.tool.yaw_B_rad)  # the container stands straight in B
+    expected = gives_m_N if abs(x_P_in_K) > 0.7 else gives_m_N[::-1]
+    assert skill.tool.compliance_P_m_N == pytest.approx(expected, rel=0.02, abs=5e-6)
+    assert b.of_kind("calibration")[-1]["compliance_P_m_N"] == pytest.approx(expected, rel=0.02, abs=5e-6)
+    assert b.robot.peak_force_N < 12.0
+
+
+def test_the_compliance_is_left_unmeasured(make) -> None:
+    b, skill = make(press_N=0.0)
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    assert skill.tool.compliance_P_m_N is None
+    assert b.of_kind("calibration")[-1]["compliance_P_m_N"] is None
+
+
+def test_a_ball_that_gives_way_has_slipped(make) -> None:
+    b, skill = make(things=[walls(max_N=0.4)])
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "slipped")
+    assert "gave way" in skill.feedback_message
 
 
 def test_tool_calibrate__no_wall(make) -> None:

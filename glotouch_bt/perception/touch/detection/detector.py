@@ -1,7 +1,9 @@
 """Contact guard: the soft rule that ends a guarded move (paper III-A). `hard_stop` is independent of it.
 
 Signal: LPF(wrench - baseline - payload inertia), fused to a force at the tip. Rule: the opposing force AND the total
-force (or the moment) exceed their thresholds for N consecutive samples.
+force (or the moment) exceed their thresholds for N consecutive samples. The rule is applied twice: to a fast filter,
+and to a slow one with lower thresholds, since a light object gives way to less force than the fast one can tell from
+noise.
 """
 
 from __future__ import annotations
@@ -9,7 +11,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -77,13 +79,9 @@ class ContactGuard:
     ) -> None:
         self.params = params
         self._inertial = inertial
-        self._baseline = baseline
         self._zero = baseline.median
         self._fusion = TipFusion.for_tip(tip_P_m, pose_E_P, baseline.sd)
         self._R_P_E = pose_E_P.rotation.T
-        self._low_pass = LowPass(6, params.cutoff_Hz, params.rate_Hz)
-        self._gain = self._fusion.gain
-        self._sigmas = params.sigmas * math.sqrt(self._low_pass.noise_gain**2 + baseline.median_variance)
         self._R_B_S: Array = np.eye(3)
         self._history: deque[tuple[Observation, Array]] = deque(maxlen=HISTORY_BLOCKS)
         self._approach_B: Array | None = None
@@ -93,33 +91,31 @@ class ContactGuard:
             if norm < 1e-9:
                 raise ParamError("approach_B", a.tolist(), "a direction of some length, or None")
             self._approach_B = a / norm
-        self._above = np.zeros(params.consecutive - 1, dtype=np.int64)
+        slow = replace(
+            params,
+            directional_N=params.sustained_N,
+            total_N=params.sustained_N,
+            moment_Nm=params.moment_Nm * params.sustained_N / params.total_N,
+            cutoff_Hz=params.sustained_Hz,
+        )
+        self._rules = tuple(_SoftRule(p, baseline, self._fusion) for p in (params, slow))
         self._onset: Onset | None = None
 
     def __call__(self, observation: Observation) -> Onset | None:
-        """Return the onset once the soft rule has tripped (always the same one), else None."""
+        """Return the onset once one of the rules has tripped (always the same one), else None."""
         if self._onset is not None:
             return self._onset
         residual = observation.wrench_S - self._zero
         if self._inertial is not None:
             residual -= self._inertial(observation)
-        smooth = self._low_pass(residual)
         self._history.append((observation, residual))
-        force = smooth @ self._gain.T
         self._R_B_S = quat_to_matrix(observation.quat_B_P[-1]) @ self._R_P_E
-        above = self._soft_rule(force, smooth[:, 3:])
-        if above is None:
-            if not np.count_nonzero(self._above):
-                return None
-            above = np.zeros(len(force), dtype=np.int64)
-        carried = np.concatenate([self._above, above])
-        n = self.params.consecutive
-        self._above = carried[len(carried) - n + 1 :]
-        if not above.any():
-            return None
-        tripped = np.nonzero(np.convolve(carried, np.ones(n, np.int64), "valid") == n)[0]
-        if len(tripped):
-            self._onset = self._date(observation, int(tripped[0]), force[tripped[0]])
+        approach_S = None if self._approach_B is None else self._approach_B @ self._R_B_S
+        for rule in self._rules:
+            tripped = rule.trip(residual, approach_S)
+            if tripped is not None:
+                self._onset = self._date(observation, *tripped)
+                break
         return self._onset
 
     def standing(self, observation: Observation) -> Onset | None:
@@ -130,27 +126,10 @@ class ContactGuard:
             self._zero = self._zero + share * self._history[-1][1].mean(axis=0)
         return onset
 
-    def _soft_rule(self, force_S: Array, moment_S: Array) -> npt.NDArray[np.int64] | None:
-        """Return (n,) 1 where a sample satisfies the soft rule; None if no sample does (early exit)."""
-        p, opposing = self.params, None
-        if self._approach_B is not None:
-            approach_S = self._approach_B @ self._R_B_S
-            against = force_S @ approach_S
-            if not np.count_nonzero(against < -p.directional_N):
-                return None
-            opposing = against < -max(p.directional_N, self._sigmas * self._fusion.sd_along(approach_S))
-            if not np.count_nonzero(opposing):
-                return None
-        square = (force_S * force_S).sum(axis=1)
-        if opposing is None and not np.count_nonzero(square > p.total_N**2):
-            return None
-        # Multiplying both sides of the threshold by the norm avoids a division by a norm that may be zero.
-        variance = ((force_S @ self._fusion.covariance) * force_S).sum(axis=1)
-        strong = (square > p.total_N**2) & (square * square > self._sigmas**2 * variance)
-        if opposing is None:
-            return np.asarray(strong, dtype=np.int64)
-        moment = (moment_S * moment_S).sum(axis=1) > p.moment_Nm**2
-        return np.asarray(opposing & (strong | moment), dtype=np.int64)
+    def force_B_N(self, observation: Observation) -> Array:
+        """Return the mean force (3,) on the tip in B over a block at rest, unfiltered."""
+        rotation = quat_to_matrix(observation.quat_B_P[-1]) @ self._R_P_E
+        return np.asarray(rotation @ (self._fusion.gain @ (observation.wrench_S.mean(axis=0) - self._zero)))
 
     def _date(self, o: Observation, trip: int, force_S: Array) -> Onset:
         stamps = np.concatenate([b.stamp_s for b, _ in self._history])
@@ -172,3 +151,51 @@ class ContactGuard:
             peak_N=float(np.sqrt(np.max(np.sum(raw**2, axis=1)))),
             detected_s=float(o.stamp_s[trip]),
         )
+
+
+class _SoftRule:
+    """The rule for one filter and its thresholds, over one move."""
+
+    def __init__(self, params: GuardParams, baseline: Baseline, fusion: TipFusion) -> None:
+        self._params, self._fusion, self._gain = params, fusion, fusion.gain
+        self._low_pass = LowPass(6, params.cutoff_Hz, params.rate_Hz)
+        self._sigmas = params.sigmas * math.sqrt(self._low_pass.noise_gain**2 + baseline.median_variance)
+        self._above = np.zeros(params.consecutive - 1, dtype=np.int64)
+
+    def trip(self, residual_S: Array, approach_S: Array | None) -> tuple[int, Array] | None:
+        """Return the sample of this block (n, 6) at which the rule trips and the filtered force (3,) there, or None."""
+        smooth = self._low_pass(residual_S)
+        force = smooth @ self._gain.T
+        above = self._evaluate(force, smooth[:, 3:], approach_S)
+        if above is None:
+            if not np.count_nonzero(self._above):
+                return None
+            above = np.zeros(len(force), dtype=np.int64)
+        carried = np.concatenate([self._above, above])
+        n = self._params.consecutive
+        self._above = carried[len(carried) - n + 1 :]
+        if not above.any():
+            return None
+        tripped = np.nonzero(np.convolve(carried, np.ones(n, np.int64), "valid") == n)[0]
+        return (int(tripped[0]), force[tripped[0]]) if len(tripped) else None
+
+    def _evaluate(self, force_S: Array, moment_S: Array, approach_S: Array | None) -> npt.NDArray[np.int64] | None:
+        """Return (n,) 1 where a sample satisfies the rule; None if no sample does (early exit)."""
+        p, opposing = self._params, None
+        if approach_S is not None:
+            against = force_S @ approach_S
+            if not np.count_nonzero(against < -p.directional_N):
+                return None
+            opposing = against < -max(p.directional_N, self._sigmas * self._fusion.sd_along(approach_S))
+            if not np.count_nonzero(opposing):
+                return None
+        square = (force_S * force_S).sum(axis=1)
+        if opposing is None and not np.count_nonzero(square > p.total_N**2):
+            return None
+        # Multiplying both sides of the threshold by the norm avoids a division by a norm that may be zero.
+        variance = ((force_S @ self._fusion.covariance) * force_S).sum(axis=1)
+        strong = (square > p.total_N**2) & (square * square > self._sigmas**2 * variance)
+        if opposing is None:
+            return np.asarray(strong, dtype=np.int64)
+        moment = (moment_S * moment_S).sum(axis=1) > p.moment_Nm**2
+        return np.asarray(opposing & (strong | moment), dtype=np.int64)

@@ -16,12 +16,15 @@ class GuardParams:
         directional_N: Minimum tip force opposing the motion. Source: three times the residual of free motion at
             0.5 m/s2 after inertia compensation (0.05 N in simulation); see `bench detection`.
         total_N: Minimum norm of the tip force. Source: as above.
+        sustained_N: The same two thresholds for a force that lasts. Source: a light object topples under 0.12 N on the
+            shaft; at 0.06 N the nominal simulation had 3 false contacts in 10 minutes.
         moment_Nm: Moment at the sensor that may replace the total force: `total_N` on a 0.34 m lever.
         consecutive: Number of consecutive samples. Source: 3 at 1 kHz, a tenth of the filter's rise time.
         sigmas: Minimum of every threshold, in standard deviations of the filtered estimate in its direction. Source:
             `bench detection`, harsh, downward moves with a latency error of 5 ms: 12 false alarms an hour at 5.5, a few
             at 6.5; none elsewhere in two hours each.
         cutoff_Hz, rate_Hz: Low-pass and sampling rate. Source: 15-60 Hz change the result by < 0.2 mm.
+        sustained_Hz: Low-pass of the force that lasts. Source: ours; 45 ms of delay, 1.5 mm at 30 mm/s.
         latency_s: Age of a wrench sample on arrival. Source: the wrist sensor's declared latency.
         hard_force_N, hard_torque_Nm: Absolute limits of the tared wrench. Source: `robot.Limits`.
         hard_residual_N, hard_residual_Nm: Limits of the wrench minus its baseline. Source: slip of the grasped probe
@@ -30,10 +33,12 @@ class GuardParams:
 
     directional_N: float = 0.15
     total_N: float = 0.15
+    sustained_N: float = 0.09
     moment_Nm: float = 0.05
     consecutive: int = 3
     sigmas: float = 6.5
     cutoff_Hz: float = 30.0
+    sustained_Hz: float = 5.0
     rate_Hz: float = 1000.0
     latency_s: float = 0.003
     hard_force_N: float = 30.0

@@ -1,0 +1,83 @@
+"""`glotouch view`: serve the page of a run's folder until Ctrl-C."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import sys
+import threading
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from glotouch_bt.report import RECORD_NAME
+from glotouch_bt.robot import BadInput
+from glotouch_bt.view.server import address, free_port, open_server, require_viser
+
+if TYPE_CHECKING:
+    import viser
+
+
+def view_run(
+    folder: Path,
+    *,
+    port: int | None = None,
+    browser: bool = True,
+    objects: Path | None = None,
+    on_ready: Callable[[str], None] | None = None,
+    over: threading.Event | None = None,
+) -> None:
+    """Serve the page of a run, which may be under way, until `over` is set or KeyboardInterrupt.
+
+    Args:
+        folder: The run's folder.
+        port: Port of the loopback interface; None for the next free one.
+        browser: Open the page in the browser, if this machine has a display.
+        objects: Folder of STL files for the true objects of a simulation.
+        on_ready: Called with the page's address.
+        over: Ends the view.
+
+    Raises:
+        BadInput: There is no run, it cannot be read, the port is in use, or viser is not installed.
+    """
+    from glotouch_bt.report import RecordReader
+    from glotouch_bt.view.watch import RunWatch
+
+    require_viser()
+    if folder.is_file():
+        raise BadInput(f"{folder}: give the run's folder, not a file in it")
+    with RecordReader(folder, growing=True) as reader:  # a broken record is an error here, and a sentence later
+        reader.read()
+        if not reader.record.run:
+            raise BadInput(f"{folder / RECORD_NAME}: is empty or cut off in its first bytes; there is nothing to show")
+    with page_server(port, browser) as (server, shown):
+        if on_ready is not None:
+            on_ready(shown)
+        RunWatch(server, folder, objects=objects).run(over or threading.Event())
+
+
+@contextmanager
+def page_server(port: int | None, browser: bool) -> Iterator[tuple[viser.ViserServer, str]]:
+    """Serve an empty page while the block runs; yield the server and the page's address.
+
+    Raises:
+        BadInput: The port is in use, or viser is not installed.
+    """
+    require_viser()
+    number = free_port(port)
+    server = open_server(number)
+    try:
+        if browser and _has_display():
+            threading.Thread(target=webbrowser.open, args=(address(number),), daemon=True).start()
+        yield server, address(number)
+    finally:
+        with contextlib.redirect_stdout(io.StringIO()):  # viser prints a farewell
+            server.stop()
+
+
+def _has_display() -> bool:
+    """Return False on a machine without a display: a browser in the terminal would hide the command."""
+    return sys.platform == "darwin" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))

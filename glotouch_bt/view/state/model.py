@@ -1,0 +1,307 @@
+"""The content of a record as it grows, and the state of its mission at any time: the one source of all views.
+
+Pure: it reads messages of a record and returns `SceneState`; it knows no page and no robot.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from glotouch_bt.report import RecordedEvent, RecordReader, RunRecord, tree_order
+from glotouch_bt.robot import Array, Pose
+from glotouch_bt.view.state import parse
+from glotouch_bt.view.state.values import (
+    CandidateOutline,
+    FeltPatch,
+    LogLine,
+    OutlineState,
+    Phase,
+    PlannedGrasp,
+    SceneState,
+    Share,
+    TouchPoint,
+)
+
+T = TypeVar("T")
+
+PADS_S = 0.5
+"""Age at which depth maps are no longer shown. Source: ours; pads send 60 maps a second while a skill asks for them."""
+EPSILON_S = 1e-9
+"""Tolerance of a comparison of stamps."""
+SAMPLES_A_PERIOD = 10
+"""Samples in a control period of 10 ms."""
+LOG_LINES = 200
+"""Events in the log of a state."""
+NO_WINDOW_M = (0.017, 0.028)
+"""Size of a pad along x_P and z_P if the record has none. Source: the shipped gripper, rounded."""
+HIDDEN_EVENTS = frozenset({"sweep", "request", "request_done"})
+"""Events that the log leaves out: many a second, or without a meaning for a person."""
+_PHASES: dict[str, Phase] = {"pause": "pausing", "paused": "paused", "resumed": "running"}
+LOST = frozenset({"tool_lost", "no_probe"})
+"""Codes of failures that say that the probe is neither in the jaws nor in its holder."""
+MARKS = frozenset({"failure", "guard", "fault", "stuck", "ending"})
+"""Events that a person jumps to."""
+
+
+class GrowingRows:
+    """Rows of numbers that are appended; memory doubles when it is full.
+
+    Args:
+        width: Numbers in a row.
+    """
+
+    def __init__(self, width: int) -> None:
+        self._data = np.zeros((256, width))
+        self._count = 0
+
+    def append(self, rows: Array) -> None:
+        """Append rows (n, width)."""
+        needed = self._count + len(rows)
+        if needed > len(self._data):
+            bigger = np.zeros((max(needed, 2 * len(self._data)), self._data.shape[1]))
+            bigger[: self._count] = self.rows
+            self._data = bigger
+        self._data[self._count : needed] = rows
+        self._count = needed
+
+    @property
+    def rows(self) -> Array:
+        """The rows (n, width) so far; a view."""
+        return self._data[: self._count]
+
+    def at(self, t_s: float) -> Array | None:
+        """Return the last row whose first number is not after `t_s`, or None."""
+        i = int(np.searchsorted(self.rows[:, 0], t_s + EPSILON_S, side="right")) - 1
+        return self.rows[i] if i >= 0 else None
+
+
+class Stamped(Generic[T]):
+    """Values in the order of their stamps."""
+
+    def __init__(self) -> None:
+        self.stamps: list[float] = []
+        self.values: list[T] = []
+
+    def add(self, stamp_s: float, value: T) -> None:
+        """Add a value behind those that are not later."""
+        at = bisect_right(self.stamps, stamp_s)
+        self.stamps.insert(at, stamp_s)
+        self.values.insert(at, value)
+
+    def until(self, t_s: float) -> list[T]:
+        """Return all values not after `t_s`."""
+        return self.values[: bisect_right(self.stamps, t_s + EPSILON_S)]
+
+    def last(self, t_s: float) -> T | None:
+        """Return the last value not after `t_s`, or None."""
+        found = bisect_right(self.stamps, t_s + EPSILON_S)
+        return self.values[found - 1] if found else None
+
+
+class RunModel:
+    """A record, read as far as it was written.
+
+    Args:
+        planned: Paths of all nodes of its mission, parents first, if they are known.
+
+    Attributes:
+        record: Its description, result, events and ticks.
+        motion: Rows (stamp_s, wrist force N, q ...), one for each control period; the force is the largest norm of the
+            period. None before the first.
+        jaws: Rows (stamp_s, aperture m, force N), one for each control period.
+        log: All events in words.
+        marks: The events that a person jumps to.
+    """
+
+    def __init__(self, planned: Sequence[str] = ()) -> None:
+        self.record: RunRecord | None = None
+        self.motion: GrowingRows | None = None
+        self.jaws = GrowingRows(3)
+        self.log: Stamped[LogLine] = Stamped()
+        self.marks: Stamped[LogLine] = Stamped()
+        self._pads: Stamped[tuple[Array, Array]] = Stamped()
+        self._touches: Stamped[TouchPoint] = Stamped()
+        self._outlines: Stamped[CandidateOutline] = Stamped()
+        self._patches: Stamped[FeltPatch] = Stamped()
+        self._states: Stamped[dict[int, OutlineState]] = Stamped()
+        self._shares: Stamped[tuple[Share, ...]] = Stamped()
+        self._grasps: Stamped[PlannedGrasp | None] = Stamped()
+        self._tips: Stamped[float | None] = Stamped()
+        self._lost: Stamped[bool] = Stamped()
+        self._phases: Stamped[Phase] = Stamped()
+        self._planned = set(planned)
+        self._order: list[str] = list(planned)
+        self._events_read = self._ticks_read = 0
+        self._start_s, self._end_s = np.inf, -np.inf
+
+    @property
+    def span_s(self) -> tuple[float, float]:
+        """Robot clock of the first and the last entry; (0, 0) if there is none."""
+        return (float(self._start_s), float(self._end_s)) if self._start_s <= self._end_s else (0.0, 0.0)
+
+    @property
+    def ended(self) -> bool:
+        """True if the record is complete."""
+        return self.record is not None and self.record.complete
+
+    @property
+    def touch_stamps_s(self) -> list[float]:
+        """Robot clock of each contact event."""
+        return self._touches.stamps
+
+    @property
+    def pose_B_K(self) -> Pose:
+        """The registered container frame in B; the identity if the record has none."""
+        return (self.record.pose_B_K if self.record else None) or Pose(np.zeros(3))
+
+    @property
+    def window_m(self) -> tuple[float, float]:
+        """Size of a pad along x_P and z_P."""
+        try:
+            window = self.record.of_run("robot", "description", "gripper", "pad_window_m") if self.record else None
+            x, z = parse.vector(window, 2).tolist()
+        except parse.MALFORMED:
+            return NO_WINDOW_M
+        return x, z
+
+    def feed(self, reader: RecordReader) -> None:
+        """Take over what a reader has read since the last call; its packed parts are taken out."""
+        record = self.record = reader.record
+        for parts, take in ((reader.packed["samples"], self._samples), (reader.packed["cycles"], self._cycles)):
+            while parts:
+                take(parts.pop(0))
+        while reader.packed["tactile"]:
+            part = reader.packed["tactile"].pop(0)
+            for stamp_s, left, right in zip(part["arrived_s"], part["left_m"], part["right_m"], strict=True):
+                self._pads.add(float(stamp_s), (left.astype(np.float32), right.astype(np.float32)))
+        for event in record.events[self._events_read :]:
+            self._saw(event.stamp_s)
+            self._event(event)
+        self._events_read = len(record.events)
+        ticks = record.ticks[self._ticks_read :]
+        self._ticks_read = len(record.ticks)
+        for tick in ticks:
+            self._saw(tick.stamp_s)
+        known = set(self._order)
+        new = dict.fromkeys(t.node for t in ticks if t.node not in known)
+        if new:
+            self._order = tree_order([*self._order, *new])
+
+    def state_at(self, t_s: float) -> SceneState:
+        """Return the state of the mission at a robot clock."""
+        row = self.motion.at(t_s) if self.motion is not None else None
+        jaw = self.jaws.at(t_s)
+        q = None if row is None or not np.isfinite(row[2:]).all() else row[2:]
+        shares = self._shares.last(t_s) or ()
+        return SceneState(
+            t_s=t_s,
+            phase=self._phase(t_s, row is not None),
+            q=q,
+            force_N=0.0 if row is None else float(row[1]),
+            aperture_m=0.0 if jaw is None else float(jaw[1]),
+            jaw_force_N=0.0 if jaw is None else float(jaw[2]),
+            tip_m=self._tips.last(t_s),
+            probe_lost=self._lost.last(t_s) or False,
+            touches=tuple(self._touches.until(t_s)),
+            patches=tuple(self._patches.until(t_s)),
+            outlines=tuple({o.index: o for o in self._outlines.until(t_s)}.values()),
+            states=self._candidate_states(t_s, shares),
+            shares=shares,
+            grasp=self._grasps.last(t_s),
+            pads=self._pads_at(t_s),
+            nodes=self._nodes(t_s),
+            log=tuple(self.log.until(t_s)[-LOG_LINES:]),
+        )
+
+    def _phase(self, t_s: float, begun: bool) -> Phase:
+        if self.ended and t_s >= self.span_s[1] - EPSILON_S:
+            return "ended"
+        return self._phases.last(t_s) or ("running" if begun else "waiting")
+
+    def _candidate_states(self, t_s: float, shares: tuple[Share, ...]) -> dict[int, OutlineState]:
+        states: dict[int, OutlineState] = {o.index: "found" for o in self._outlines.until(t_s)}
+        best = next((s.index for s in shares if s.index is not None), None)
+        if best is not None:
+            states[best] = "best"
+        return states | (self._states.last(t_s) or {})
+
+    def _pads_at(self, t_s: float) -> tuple[Array, Array] | None:
+        at = bisect_right(self._pads.stamps, t_s + EPSILON_S) - 1
+        return self._pads.values[at] if at >= 0 and t_s - self._pads.stamps[at] <= PADS_S else None
+
+    def _nodes(self, t_s: float) -> dict[str, str]:
+        now: dict[str, str] = {}
+        for tick in self.record.ticks if self.record is not None else ():
+            if tick.stamp_s > t_s + EPSILON_S:
+                break
+            now[tick.node] = tick.new
+        return {node: now.get(node, "") for node in self._order if node in now or node in self._planned}
+
+    def _saw(self, stamp_s: float) -> None:
+        self._start_s, self._end_s = min(self._start_s, stamp_s), max(self._end_s, stamp_s)
+
+    def _samples(self, part: dict[str, Array]) -> None:
+        """Keep the newest sample of each control period, and the largest force in it."""
+        last = np.arange(len(part["stamp_s"]) - 1, -1, -SAMPLES_A_PERIOD)[::-1]
+        first = np.maximum(last - SAMPLES_A_PERIOD + 1, 0)
+        force = np.maximum.reduceat(np.nan_to_num(np.linalg.norm(part["force_S_N"], axis=1)), first)
+        if self.motion is None:
+            self.motion = GrowingRows(2 + part["q"].shape[1])
+        self.motion.append(np.column_stack([part["stamp_s"][last], force, part["q"][last]]))
+        self._saw(float(part["stamp_s"][0]))
+        self._saw(float(part["stamp_s"][-1]))
+
+    def _cycles(self, part: dict[str, Array]) -> None:
+        names = ("stamp_s", "gripper_aperture_m", "gripper_force_N")
+        self.jaws.append(np.nan_to_num(np.column_stack([part[n] for n in names])))
+
+    def _event(self, event: RecordedEvent) -> None:
+        kind, stamp_s, data = event.kind, event.stamp_s, event.data
+        if kind not in HIDDEN_EVENTS:
+            self.log.add(stamp_s, parse.log_line(event))
+        if kind in MARKS:
+            self.marks.add(stamp_s, parse.log_line(event))
+        if kind == "contact" and (touch := parse.touch_of(event)):
+            self._touches.add(stamp_s, touch)
+        if kind in ("candidate", "touchset") and (outline := parse.outline_of(event)):
+            self._outlines.add(stamp_s, outline)
+        if kind == "touchset":
+            for patch in parse.patches_of(event, self.window_m):
+                self._patches.add(stamp_s, patch)
+        if shares := parse.shares_of(event):
+            self._shares.add(stamp_s, shares)
+        if kind == "plan" and (grasp := parse.grasp_of(event)):
+            self._grasps.add(stamp_s, grasp)
+        if kind == "tool":
+            length = data.get("grasp_to_tip_m") if data.get("held") else None
+            self._tips.add(stamp_s, float(length) if isinstance(length, int | float) else None)
+            self._lost.add(stamp_s, False)
+        if kind == "failure" and data.get("code") in LOST:
+            self._lost.add(stamp_s, True)
+        if phase := _PHASES.get(kind):
+            self._phases.add(stamp_s, phase)
+        self._judge(event)
+
+    def _judge(self, event: RecordedEvent) -> None:
+        """Note which candidates an event excludes, rejects, lifts or puts back."""
+        before = self._states.last(event.stamp_s) or {}
+        states = dict(before)
+        if isinstance(excluded := event.data.get("excluded"), list):
+            states = {i: s for i, s in states.items() if s != "excluded"}
+            states |= {i: "excluded" for i in excluded if isinstance(i, int) and i not in states}
+        candidate = event.data.get("candidate")
+        if event.kind == "reject" and isinstance(candidate, int):
+            states[candidate] = "rejected"
+        elif event.kind in ("lift", "put_back"):
+            grasp = self._grasps.last(event.stamp_s)
+            if event.kind == "lift" and grasp is not None:
+                states[grasp.candidate] = "taken"
+            elif event.kind == "put_back":
+                states = {i: s for i, s in states.items() if s != "taken"}
+            self._grasps.add(event.stamp_s, None)
+        if states != before:
+            self._states.add(event.stamp_s, states)
