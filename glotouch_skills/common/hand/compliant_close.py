@@ -52,13 +52,12 @@ RELEASE_SPEED_M_S = 0.02
 """Opening speed until the jaws have moved apart by `RELEASED_BY_M`: an object held askew springs back."""
 RELEASE_FORCE_N = 2.0
 """Jaw force meanwhile: an object that a fingertip stands on is dragged with at most twice this force."""
-RELEASED_BY_M = 0.006
-"""The object is released once the jaws are this much farther apart: one that was tilted stands again. Source: ours,
-more than `GIVES_WAY_M`."""
-GIVES_WAY_M = 0.005
-"""Farther than this, jaws that both touch do not close on an object that stands: it tilts or turns. Source: ours; soft
-gels give way by 2 mm at 3 N. Closures that toppled a nailong (traced, realistic, seeds 25002 and 25004) gave 10 mm and
-more."""
+RELEASED_BY_M = 0.003
+"""The object is released once the jaws are this much farther apart than they held it, or than they first touched it
+both: one that they tilted stands again."""
+GIVES_WAY_M = 0.015
+"""Farther than this, jaws that both touch do not close on an object that stands: it tilts. Source: a closure that
+toppled a nailong (traced, realistic, seed 25002) gave 26 mm; objects that turned flush gave up to 19, mostly below 12."""
 BOTH_TOUCH_N = 0.75
 """Least force of each jaw on an object that both touch. Source: ours; half of `GENTLE_FORCE_N` slides most objects."""
 RELEASE_STALL_S = 0.5
@@ -163,16 +162,12 @@ class _Closing:
             raise MotionRefused("closing", f"the hand was pressed with {pressed_N:.0f} N while the jaws closed")
 
     def _refuse_giving(self, seen: Observation) -> Motion[None]:
-        """Open the jaws and refuse if the object gives way although both jaws touch it.
-
-        The reported force is the mean of both jaws', the hand feels their difference.
-        """
-        weaker_N = seen.gripper.force_N - 0.5 * abs(float(_force_P(seen)[1]))
-        if math.isnan(self._touched_m) and weaker_N > BOTH_TOUCH_N:
+        """Open the jaws and refuse if the object gives way although both jaws touch it."""
+        if math.isnan(self._touched_m) and both_touch(seen):
             self._touched_m = seen.gripper.aperture_m
         given_m = self._touched_m - seen.gripper.aperture_m
         if given_m > self._max_giving_m:
-            yield from release(self._arm, self._opening_m)
+            yield from release(self._arm, self._opening_m, self._touched_m)
             raise MotionRefused("closing", f"the object gave way by {given_m * 1e3:.0f} mm: it tilts or turns")
 
     def until_rest(self, forces_N: Sequence[float]) -> Motion[GripperState]:
@@ -236,8 +231,18 @@ def _max_N(jaw_N: float) -> float:
     )
 
 
-def release(arm: Arm, opening_m: float) -> Motion[None]:
+def both_touch(seen: Observation) -> bool:
+    """Return True if both jaws press on something.
+
+    The reported force is the mean of both jaws', the hand feels their difference.
+    """
+    return seen.gripper.force_N - 0.5 * abs(float(_force_P(seen)[1])) > BOTH_TOUCH_N
+
+
+def release(arm: Arm, opening_m: float, touched_m: float = 0.0) -> Motion[None]:
     """Open the jaws to `opening_m`, slowly and weakly until they have released the object.
+
+    `touched_m` is the aperture at which both jaws first touched it: up to there, it may lean on them.
 
     A force on the hand although the jaws hold nothing means that a fingertip stands on the object, or is caught under
     it or in a hollow of its side. Then the jaws stop, the hand moves along the force until it is free, and the jaws
@@ -245,10 +250,10 @@ def release(arm: Arm, opening_m: float) -> Motion[None]:
     open. A pause waits until then.
     """
     with arm.pause_signal.finishing():
-        yield from _release(arm, opening_m)
+        yield from _release(arm, opening_m, touched_m)
 
 
-def _release(arm: Arm, opening_m: float) -> Motion[None]:
+def _release(arm: Arm, opening_m: float, touched_m: float) -> Motion[None]:
     held, given, weak, since = arm.aperture_m, 0.0, True, 0
     watch = JawRestDetector(arm.period_s)
     yield from _drive_jaws(arm, opening_m, weak)
@@ -261,7 +266,7 @@ def _release(arm: Arm, opening_m: float) -> Motion[None]:
             yield from _drive_jaws(arm, arm.aperture_m, True)
             given += yield from _move_free(arm, force, MAX_FREEING_M - given)
             held, weak, since = arm.aperture_m, True, k
-        elif weak and not pressed and arm.aperture_m > held + RELEASED_BY_M:
+        elif weak and not pressed and arm.aperture_m > max(held, touched_m) + RELEASED_BY_M:
             weak = False
         elif still and not (weak and k < since + round(RELEASE_STALL_S / arm.period_s)):
             break
