@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
@@ -9,6 +10,8 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from glotouch_bt.bench.statistics import bootstrap_mean, wilson
 from glotouch_bt.robot.scene import load_folder
@@ -38,14 +41,22 @@ class RetrieveCampaign(Campaign):
     """Settings of the campaign; its mission takes a parameter `target`.
 
     Attributes:
-        targets: Names of objects in the folder; every target is tried on every seed.
+        targets: Names of objects in the folder.
+        per_seed: How many of them are tried on each seed, in turn; None: all.
     """
 
     targets: tuple[str, ...]
+    per_seed: int | None = None
 
     def trials(self) -> list[Trial]:
         """Return every trial, seeds outermost: an interrupted campaign covers all targets."""
-        return [self._trial(target, seed) for seed in self.seeds for target in self.targets]
+        n = len(self.targets)
+        count = n if self.per_seed is None else min(self.per_seed, n)
+        return [
+            self._trial(self.targets[(i * count + k) % n], seed)
+            for i, seed in enumerate(self.seeds)
+            for k in range(count)
+        ]
 
     def _trial(self, target: str, seed: int) -> Trial:
         request = self.request(seed, f"{target}-s{seed}", settings={**self.settings, "target": target})
@@ -108,17 +119,25 @@ def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     wrong = sum(bool(r.get("retrieved")) and not r.get("correct") for r in rows)
     targets = sorted({r["target"] for r in rows})
     by_target = {t: [r for r in rows if r["target"] == t] for t in targets}
+    by_seed: dict[Any, list[bool]] = {}
+    for row in rows:
+        by_seed.setdefault(row.get("seed"), []).append(succeeded(row))
+    times = [r["sim_time_s"] for r in rows if r.get("sim_time_s") is not None]
+    walls = [r["wall_time_s"] for r in rows if r.get("wall_time_s") is not None]
     causes = Counter(r["cause"] or "unknown" for r in rows if not succeeded(r))
     return {
         "success": wilson(sum(map(succeeded, rows)), n),
+        "success_over_worlds": bootstrap_mean([float(np.mean(v)) for v in by_seed.values()]),
         "wrong_object": wilson(wrong, n),
         "safety_stops": wilson(sum(r.get("exit_code") == 3 for r in rows), n),
         "tracebacks": wilson(sum(r.get("status") == "traceback" for r in rows), n),
         "lost": sum(r.get("status") == "lost" for r in rows),
         "by_target": {t: wilson(sum(map(succeeded, group)), len(group)) for t, group in by_target.items()},
         "causes": dict(causes.most_common()),
-        "wall_s": bootstrap_mean([r["wall_time_s"] for r in rows if r.get("wall_time_s") is not None]),
-        "sim_s": bootstrap_mean([r["sim_time_s"] for r in rows if r.get("sim_time_s") is not None]),
+        "wall_s": bootstrap_mean(walls),
+        "sim_s": bootstrap_mean(times),
+        "median_sim_s": float(np.median(times)) if times else math.nan,
+        "median_wall_s": float(np.median(walls)) if walls else math.nan,
         "peak_force_N": bootstrap_mean([r["peak_force_N"] for r in rows if r.get("peak_force_N") is not None]),
         "largest_peak_force_N": max((float(r.get("peak_force_N") or 0.0) for r in rows), default=0.0),
     }

@@ -88,3 +88,11 @@ def test_a_resumed_campaign_keeps_what_was_run_and_passes_settings_on(
     assert len(asked) == before + 2, "only the new seed"
     assert summary["success"]["n"] == 6
     assert summary["safety_stops"]["rate"] == pytest.approx(2 / 6)
+
+
+def test_targets_take_turns_over_the_seeds(campaign: retrieve.RetrieveCampaign) -> None:
+    """Three objects, two for each seed: every object is tried as often, and each world twice."""
+    turns = replace(campaign, targets=("apple", "train", "truck"), per_seed=2, seeds=range(3))
+    requests = [trial.memory.request for trial in turns.trials()]
+    tried = [(r.settings["target"], r.seed) for r in requests]
+    assert tried == [("apple", 0), ("train", 0), ("truck", 1), ("apple", 1), ("train", 2), ("truck", 2)]

@@ -13,6 +13,7 @@ from glotouch_bt.commands import shared
 def retrieve(
     mission: Annotated[str, typer.Option(help="mission with the parameter target")] = "retrieve",
     target: Annotated[list[str] | None, typer.Option(help="only these targets (default: every object)")] = None,
+    per_seed: Annotated[int | None, typer.Option(help="targets for each seed, in turn (default: all)", min=1)] = None,
     trials: shared.Trials = 10,
     seed: shared.FirstSeed = 0,
     conditions: shared.Conditions = "nominal",
@@ -41,6 +42,7 @@ def retrieve(
     campaign = RetrieveCampaign(
         mission=mission,
         targets=names or targets_of(loaded.world.objects.folder),
+        per_seed=per_seed,
         seeds=tuple(range(seed, seed + trials)),
         conditions=shared.changed_conditions(conditions, set_condition),
         objects=objects,

@@ -28,7 +28,7 @@ def print_retrieve(summary: dict[str, Any], folder: Path) -> None:
     if summary["causes"]:
         print_table("causes of failure", ("cause", "trials"), [(c, str(n)) for c, n in summary["causes"].items()])
     EscapingConsole().print(
-        f"robot time {summary['sim_s']['mean']:.0f} s, wall time {summary['wall_s']['mean']:.0f} s for each mission; "
+        f"robot time {summary['median_sim_s']:.0f} s, wall time {summary['median_wall_s']:.0f} s in the median; "
         f"largest peak force {summary['largest_peak_force_N']:.1f} N\n{folder / 'summary.json'}",
         markup=False,
     )

@@ -57,7 +57,7 @@ RELEASED_BY_M = 0.003
 both: one that they tilted stands again."""
 GIVES_WAY_M = 0.015
 """Farther than this, jaws that both touch do not close on an object that stands: it tilts. Source: a closure that
-toppled a nailong (traced, realistic, seed 25002) gave 26 mm; objects that turned flush gave up to 19, mostly below 12."""
+toppled a nailong (traced, realistic, seed 25002) gave 26 mm; what turned flush gave up to 19, mostly below 12."""
 BOTH_TOUCH_N = 0.75
 """Least force of each jaw on an object that both touch. Source: ours; half of `GENTLE_FORCE_N` slides most objects."""
 RELEASE_STALL_S = 0.5

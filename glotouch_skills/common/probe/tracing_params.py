@@ -22,7 +22,7 @@ class TracingParams(SkillParams):
     )
     max_contacts: int = param("Most contacts in all", default=14, ge=3, le=60, formerly="most_contacts")
     orbit_speed_m_s: float = param("Speed beside the object", unit="m/s", default=0.05, gt=0.0, le=0.08)
-    probe_speed_m_s: float = param("Probing speed", unit="m/s", default=0.03, gt=0.0, le=0.06)
+    probe_speed_m_s: float = param("Probing speed", unit="m/s", default=0.02, gt=0.0, le=0.06)
     lower_speed_m_s: float = param("Speed down beside it", unit="m/s", default=0.02, gt=0.0, le=0.06)
     height_m: float = param("Ball centre above the floor while tracing", unit="m", default=0.018, ge=0.009, le=0.06)
 
