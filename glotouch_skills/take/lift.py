@@ -35,6 +35,7 @@ class Lift(Skill):
     """Raise the hand and check the hold at the top: by weight, by the jaws (aperture and force), and by the gels.
 
     No single witness is believed: a wrist may be off zero, and jaws may report what they were told. All must agree.
+    Jaws that closed farther, with the object on both gels, hold one that turned between them: `grip_m` is written anew.
 
     SUCCESS: an object with weight hangs in the jaws, and the arm holds it up.
     """
@@ -55,6 +56,7 @@ class Lift(Skill):
     FAILURES: ClassVar = (MOTION_REFUSED.with_meaning("the arm cannot be raised so far"),)
 
     grip_m = In(float, "aperture of the closed jaws")
+    held_m = Out(float, "aperture at the top", key="grip_m")
     weight_N = Out(float, "weight in the hand, N", key="weight")
 
     def run(self) -> SkillRun:
@@ -63,7 +65,7 @@ class Lift(Skill):
         yield from arm.shift(np.array([0.0, 0.0, p.height_m]), p.speed_m_s, check=False)
         hold = yield from feel_hold(arm, self.grip_m, p.look_s)
         self.event("lift", **hold.as_dict())
-        doubts = hold.doubts(p.min_weight_N, p.slip_m, p.min_aperture_m)
+        doubts = hold.doubts(p.min_weight_N, p.slip_m, p.min_aperture_m, may_turn=True)
         if doubts:
             raise self.LOST("; ".join(doubts), **hold.as_dict())
-        self.weight_N = hold.weight_N
+        self.held_m, self.weight_N = hold.aperture_m, hold.weight_N

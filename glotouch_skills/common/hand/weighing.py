@@ -51,6 +51,10 @@ def weigh_N(arm: Arm) -> Motion[float]:
     return (yield from weigh(arm)).weight_N
 
 
+BOTH_GELS = 2
+"""Number of gels that feel an object between the jaws."""
+
+
 @dataclass(frozen=True)
 class Hold:
     """Hold of an object as wrist, jaws and gels show it.
@@ -69,12 +73,19 @@ class Hold:
     jaw_N: float
     gels_touched: int | None
 
-    def doubts(self, min_weight_N: float, slip_m: float, min_aperture_m: float = MIN_GRIP_M) -> list[str]:
-        """Return what each witness (wrist, jaws, gels) has against the hold."""
+    def doubts(
+        self, min_weight_N: float, slip_m: float, min_aperture_m: float = MIN_GRIP_M, *, may_turn: bool = False
+    ) -> list[str]:
+        """Return what each witness (wrist, jaws, gels) has against the hold.
+
+        With `may_turn`, jaws that closed farther still hold what both gels feel: it turned between them.
+        """
         found = []
+        turned = may_turn and self.gels_touched == BOTH_GELS and self.moved_m < 0.0
         if not self.weight_N >= min_weight_N:
             found.append(f"{self.weight_N:.2f} N hang in the hand, at least {min_weight_N:.2f} N are expected")
-        if not (abs(self.moved_m) <= slip_m and self.aperture_m >= min_aperture_m and self.jaw_N >= MIN_GRIP_N):
+        stayed = turned or abs(self.moved_m) <= slip_m
+        if not (stayed and self.aperture_m >= min_aperture_m and self.jaw_N >= MIN_GRIP_N):
             moved, apart = self.moved_m * 1e3, self.aperture_m * 1e3
             found.append(f"the jaws moved by {moved:.1f} mm to {apart:.1f} mm and press with {self.jaw_N:.1f} N")
         if self.gels_touched == 0:

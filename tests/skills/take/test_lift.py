@@ -70,6 +70,14 @@ def test_lift__lost_if_any_witness_says_so(make, against) -> None:
     assert set(skill.reason.evidence) == {"weight_N", "aperture_m", "moved_m", "jaw_N", "gels_touched"}
 
 
+def test_an_object_that_turned_between_the_jaws_is_held(make) -> None:
+    """The jaws closed from 40 to 26 mm on the way up; both gels, the force and the weight still show it."""
+    b, skill = make(jaws={"aperture_m": 0.026})
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    assert skill.held_m == pytest.approx(0.026)
+
+
 def test_broken_off_anywhere(make, preempt_all_along) -> None:
     def still_gripping(b) -> None:
         assert b.arm.aperture_m == pytest.approx(0.04)
