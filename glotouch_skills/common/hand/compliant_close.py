@@ -8,7 +8,6 @@ open as weakly as they close: an object they drag stalls them, and the hand move
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -53,13 +52,7 @@ RELEASE_SPEED_M_S = 0.02
 RELEASE_FORCE_N = 2.0
 """Jaw force meanwhile: an object that a fingertip stands on is dragged with at most twice this force."""
 RELEASED_BY_M = 0.003
-"""The object is released once the jaws are this much farther apart than they held it, or than they first touched it
-both: one that they tilted stands again."""
-GIVES_WAY_M = 0.015
-"""Farther than this, jaws that both touch do not close on an object that stands: it tilts. Source: a closure that
-toppled a nailong (traced, realistic, seed 25002) gave 26 mm; what turned flush gave up to 19, mostly below 12."""
-BOTH_TOUCH_N = 0.75
-"""Least force of each jaw on an object that both touch. Source: ours; half of `GENTLE_FORCE_N` slides most objects."""
+"""The object is released once the jaws are this much farther apart."""
 RELEASE_STALL_S = 0.5
 """Longest wait for jaws that do not move while they open weakly."""
 OPEN_SPEED_M_S = 0.2
@@ -89,13 +82,7 @@ def _ignore(seen: Observation) -> None:
 
 
 def close_compliantly(
-    arm: Arm,
-    speed_m_s: float,
-    force_N: float,
-    *,
-    max_giving_m: float = math.inf,
-    tactile: bool = False,
-    on_observation: Observer = _ignore,
+    arm: Arm, speed_m_s: float, force_N: float, *, tactile: bool = False, on_observation: Observer = _ignore
 ) -> Motion[GripperState]:
     """Close with little force until the jaws rest, then press; while only one jaw touches, follow its push.
 
@@ -108,7 +95,6 @@ def close_compliantly(
         arm: At rest, jaws open, hand pointing down.
         speed_m_s: Rate of the aperture.
         force_N: Largest force of one jaw.
-        max_giving_m: Longest way on which jaws that both touch may go on closing.
         tactile: Request depth maps.
         on_observation: Called with every observation.
 
@@ -116,12 +102,11 @@ def close_compliantly(
         The last jaw state.
 
     Raises:
-        MotionRefused: The object gave way by more than `max_giving_m`, or the force on the hand passed
-            `MAX_CLOSING_FORCE_N` while closing, `MAX_REST_FORCE_N` when the gentle jaws rested, or the limit of
-            `_max_N` while pressing. The jaws have opened again.
+        MotionRefused: The force on the hand passed `MAX_CLOSING_FORCE_N` while closing, `MAX_REST_FORCE_N` when the
+            gentle jaws rested, or the limit of `_max_N` while pressing. The jaws have opened again.
     """
     arm.felt.forget_near(arm.world.container.pose_B_K.inverse().apply(arm.pose_B_P.position_m))
-    closing = _Closing(arm, speed_m_s, max_giving_m, tactile, on_observation)
+    closing = _Closing(arm, speed_m_s, tactile, on_observation)
     with arm.pause_signal.finishing():  # pause only at rest: until then the hand must be able to follow
         yield from closing.measure_free_force()
         state = yield from closing.until_rest([min(GENTLE_FORCE_N, force_N)])
@@ -135,11 +120,8 @@ def close_compliantly(
 class _Closing:
     """State of one closure."""
 
-    def __init__(
-        self, arm: Arm, speed_m_s: float, max_giving_m: float, tactile: bool, on_observation: Observer
-    ) -> None:
+    def __init__(self, arm: Arm, speed_m_s: float, tactile: bool, on_observation: Observer) -> None:
         self._arm, self._speed_m_s, self._tactile, self._seen_by = arm, speed_m_s, tactile, on_observation
-        self._max_giving_m, self._touched_m = max_giving_m, math.nan
         self._opening_m, self._start_B = arm.aperture_m, arm.pose_B_P.position_m
         self._free_N = self._force_N = np.zeros(3)
 
@@ -161,15 +143,6 @@ class _Closing:
             yield from release(self._arm, self._opening_m)
             raise MotionRefused("closing", f"the hand was pressed with {pressed_N:.0f} N while the jaws closed")
 
-    def _refuse_giving(self, seen: Observation) -> Motion[None]:
-        """Open the jaws and refuse if the object gives way although both jaws touch it."""
-        if math.isnan(self._touched_m) and both_touch(seen):
-            self._touched_m = seen.gripper.aperture_m
-        given_m = self._touched_m - seen.gripper.aperture_m
-        if given_m > self._max_giving_m:
-            yield from release(self._arm, self._opening_m, self._touched_m)
-            raise MotionRefused("closing", f"the object gave way by {given_m * 1e3:.0f} mm: it tilts or turns")
-
     def until_rest(self, forces_N: Sequence[float]) -> Motion[GripperState]:
         """Close under each force for one period, then under the last one until the jaws rest."""
         arm = self._arm
@@ -179,7 +152,6 @@ class _Closing:
             seen = yield from self._one_period(force_N if k < len(forces_N) else None)
             self._force_N = _force_P(seen)
             yield from self.refuse_above(_max_N(force_N), float(np.linalg.norm(self._force_N)))
-            yield from self._refuse_giving(seen)
             if k >= len(forces_N) and watch.still(seen.now_s, seen.gripper):
                 break
             yield from self._follow(seen)
@@ -231,18 +203,8 @@ def _max_N(jaw_N: float) -> float:
     )
 
 
-def both_touch(seen: Observation) -> bool:
-    """Return True if both jaws press on something.
-
-    The reported force is the mean of both jaws', the hand feels their difference.
-    """
-    return seen.gripper.force_N - 0.5 * abs(float(_force_P(seen)[1])) > BOTH_TOUCH_N
-
-
-def release(arm: Arm, opening_m: float, touched_m: float = 0.0) -> Motion[None]:
+def release(arm: Arm, opening_m: float) -> Motion[None]:
     """Open the jaws to `opening_m`, slowly and weakly until they have released the object.
-
-    `touched_m` is the aperture at which both jaws first touched it: up to there, it may lean on them.
 
     A force on the hand although the jaws hold nothing means that a fingertip stands on the object, or is caught under
     it or in a hollow of its side. Then the jaws stop, the hand moves along the force until it is free, and the jaws
@@ -250,10 +212,10 @@ def release(arm: Arm, opening_m: float, touched_m: float = 0.0) -> Motion[None]:
     open. A pause waits until then.
     """
     with arm.pause_signal.finishing():
-        yield from _release(arm, opening_m, touched_m)
+        yield from _release(arm, opening_m)
 
 
-def _release(arm: Arm, opening_m: float, touched_m: float) -> Motion[None]:
+def _release(arm: Arm, opening_m: float) -> Motion[None]:
     held, given, weak, since = arm.aperture_m, 0.0, True, 0
     watch = JawRestDetector(arm.period_s)
     yield from _drive_jaws(arm, opening_m, weak)
@@ -266,7 +228,7 @@ def _release(arm: Arm, opening_m: float, touched_m: float) -> Motion[None]:
             yield from _drive_jaws(arm, arm.aperture_m, True)
             given += yield from _move_free(arm, force, MAX_FREEING_M - given)
             held, weak, since = arm.aperture_m, True, k
-        elif weak and not pressed and arm.aperture_m > max(held, touched_m) + RELEASED_BY_M:
+        elif weak and not pressed and arm.aperture_m > held + RELEASED_BY_M:
             weak = False
         elif still and not (weak and k < since + round(RELEASE_STALL_S / arm.period_s)):
             break

@@ -18,7 +18,7 @@ from glotouch_bt.perception.touch import (
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose, TactileFrame
 from glotouch_bt.skill import Context, SkillParams, param
-from glotouch_skills.common.hand import GIVES_WAY_M, both_touch, close_compliantly, descend, glide, release
+from glotouch_skills.common.hand import close_compliantly, descend, glide, release
 from glotouch_skills.common.planning.squeeze_plan import Stance
 
 HAND_CLEARANCE_M = 0.005
@@ -141,14 +141,7 @@ class Squeezing:
         p, arm = self._p, self._context.arm
         gripper = arm.description.gripper
         closing: list[Observation] = []
-        yield from close_compliantly(
-            arm,
-            p.closing_speed_m_s,
-            p.force_N,
-            max_giving_m=GIVES_WAY_M,
-            tactile=True,
-            on_observation=closing.append,
-        )
+        yield from close_compliantly(arm, p.closing_speed_m_s, p.force_N, tactile=True, on_observation=closing.append)
         command = Command(gripper=GripperTarget(0.0, p.closing_speed_m_s, p.force_N), tactile=True)
         blocks: list[Observation] = []
         for _ in range(round(p.settle_s / arm.period_s)):
@@ -172,8 +165,7 @@ class Squeezing:
             object_motion=object_motion,
             noise_m=noise_m,
         )
-        touched_m = next((b.gripper.aperture_m for b in closing if both_touch(b)), 0.0)
-        yield from release(arm, self.at.opening_m, touched_m)
+        yield from release(arm, self.at.opening_m)
         true_m = layer.aperture_m - self._zero.error_m
         return replace(layer, aperture_m=true_m, zero_sd_m=self._zero.sd_m), object_motion
 

@@ -41,7 +41,7 @@ def test_free_motion_is_silent_because_the_inertia_is_taken_out(condition):
 def test_what_force_is_found(kind, push):
     """Below the threshold never, above it always; along the probe under harsh noise from 0.4 N."""
     nominal, harsh = load_conditions("nominal"), load_conditions("harsh")
-    assert found_share(HAND, nominal, kind, push, 0.08, SEEDS)["rate"] == 0.0
+    assert found_share(HAND, nominal, kind, push, 0.04, SEEDS)["rate"] == 0.0
     assert found_share(HAND, nominal, kind, push, 0.2, SEEDS)["rate"] == 1.0
     assert found_share(HAND, harsh, kind, push, 0.4 if kind == "down" else 0.2, SEEDS)["rate"] == 1.0
     assert found_share(HAND, harsh, kind, push, 0.6, SEEDS)["rate"] == 1.0
