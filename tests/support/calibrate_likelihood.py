@@ -157,6 +157,9 @@ def main() -> None:
     parser.add_argument("--objects", type=Path, action="append", default=[])
     parser.add_argument("--runs", type=Path, action="append", default=[], help="a folder of recorded runs")
     args = parser.parse_args()
+    for folder in (*args.objects, *args.runs):
+        if not folder.is_dir():
+            parser.error(f"{folder}: no such folder")
     sets: dict[str, list[Problem]] = {}
     with ProcessPoolExecutor(os.cpu_count()) as executor:
         jobs = [
@@ -168,6 +171,8 @@ def main() -> None:
         for job in jobs:
             for name, found in job.result().items():
                 sets.setdefault(name, []).extend(found)
+    if not any(sets.values()):
+        parser.error("no decision to learn from: give --boxes or --runs")
     now = LikelihoodParams()
     start = np.array([getattr(now, name) for name in FITTED])
     best = minimize(cost, start, args=(sets,), method="Nelder-Mead", options={"maxiter": 300}).x
