@@ -167,8 +167,9 @@ class TouchNext(Skill):
             SkillFailed: `too_low`.
         """
         if self._model is None:
-            mesh = load_target(self.params.target, self.context.world.objects.folder)
-            self._model = load_target_model(mesh, self.context.arm.description.gripper)
+            objects = self.context.world.objects
+            mesh = load_target(self.params.target, objects.folder)
+            self._model = load_target_model(mesh, self.context.arm.description.gripper, objects.stance)
         return self._model
 
     def _choose(self, belief: Belief, down: Squeezing | None) -> Option | None:
