@@ -19,8 +19,8 @@ def model_for(mesh: Mesh, gripper: Gripper, stance: str | None = None) -> Target
     Args:
         mesh: The object.
         gripper: The gripper.
-        stance: How the objects stand in the box, as in `ObjectSet`: the model then has a hypothesis for each side; None:
-            as in its file only.
+        stance: How the objects stand in the box, as in `ObjectSet`; the model then has a hypothesis for each side.
+            None: as in its file only.
 
     Raises:
         TooLow: The object is lower than the probe and the pads reach.

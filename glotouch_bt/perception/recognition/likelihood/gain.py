@@ -86,8 +86,8 @@ def predict(reading: TouchSetReading, pair: Pair, p: LikelihoodParams) -> Predic
     places = [reading.touchset.sequences[e.sequence].layers[e.index] for e in layers]
     felt = np.array([[*q.position_K_m, q.height_m, q.yaw_rad] for q in places]).reshape(-1, 4)
     return Prediction(
-        candidate, model, best // log_pose.shape[1], z0[best % log_pose.shape[1]], weight / weight.sum(), pair.first_rad,
-        felt, np.array([e.width_m for e in layers]),
+        candidate, model, best // log_pose.shape[1], z0[best % log_pose.shape[1]], weight / weight.sum(),
+        pair.first_rad, felt, np.array([e.width_m for e in layers]),
     )  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """Parts of a solid that the probe feels as separate objects: the legs of a table, the walls of an open channel.
 
-The probe's ball cannot tell them apart from objects of their own, so each part is traced by itself. Parts are found on a
-grid: a place is blocked if the ball, or the shaft above it, would meet the solid there. Blocked places that do not hang
+The probe cannot tell them apart from objects of their own, so each part is traced by itself. Parts are found on a grid:
+a place is blocked if the ball, or the shaft above it, would meet the solid there. Blocked places that do not hang
 together are separate parts.
 """
 

@@ -62,7 +62,8 @@ def from_parts(name: str, facts: Mapping[str, Any], arrays: Mapping[str, Array32
         lazy = {"images": arrays["images"], "image_norms": arrays["image_norms"]}
         return TargetModel(
             name=name, digest=str(facts["digest"]), pad=pad, phi_rad=phi, l_m=l, z_m=z, reach_m=arrays["reach_m"],
-            fine_m=arrays["fine_m"], outline=outline, feet=tuple(feet), centre_m=np.array(facts["centre_m"], dtype=np.float64),
+            fine_m=arrays["fine_m"], outline=outline, feet=tuple(feet),
+            centre_m=np.array(facts["centre_m"], dtype=np.float64),
             sides=(), **numbers, _lazy=lazy,
         )  # fmt: skip
     except (KeyError, TypeError, ValueError) as e:
