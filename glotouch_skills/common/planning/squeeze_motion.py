@@ -32,6 +32,8 @@ OFF_LEDGE_M = 0.003
 """Height of the fingertips above a ledge that they met, so that they do not drag the object. Source: ours."""
 MAX_LEDGE_RATIO = 0.6
 """Greatest height of the pads then, as part of the object's: jaws that close higher topple it. Source: ours."""
+LOW_M = 0.03
+"""Below this height of the pads no object topples. Source: ours."""
 UNTOUCHED_M = 0.002
 """The jaws touch nothing until they have closed by this. Source: ours, half of the smallest gap beside an object."""
 OPENING_M_S = 0.2
@@ -126,7 +128,10 @@ class Squeezing:
         top_m, slow_m_s = self.candidate.height_m, p.descent_speed_m_s
         if not (yield from descend(self._context, goal, self.at.opening_m, top_m, slow_m_s)):
             height = pads_height_m(self._context)
-            if height + OFF_LEDGE_M <= MAX_LEDGE_RATIO * top_m and (yield from self.move_to(height + OFF_LEDGE_M)):
+            above_m = height + OFF_LEDGE_M
+            highest_m = max(MAX_LEDGE_RATIO * top_m, min(LOW_M, top_m - p.top_overlap_m))
+            if above_m <= highest_m:
+                yield from arm.line(self._pose(above_m), p.descent_speed_m_s, check=False)
                 return
             yield from self.rise()
             raise MotionRefused("squeeze", f"the fingers met something {height * 1e3:.0f} mm above the floor")

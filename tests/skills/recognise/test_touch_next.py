@@ -183,6 +183,15 @@ def test_fingers_on_something_cost_a_choice_not_the_mission(make, things) -> Non
     assert pads_height(b) > 0.13
 
 
+def test_fingers_on_a_low_ledge_close_above_it(make, things) -> None:
+    """The ledge stops the pads at 32 mm, 11 mm above the lowest closure of a can of 60 mm."""
+    b, skill = make(Oracle(right=1, enough=1), stuff=[things.floor(0.005)], tip_P_m=0.022)
+    repeat(b, skill)
+    assert [len(t.layers) for t in skill.touchsets] == [0, 1]
+    assert skill.touchsets[1].layers[0].height_m == pytest.approx(0.035, abs=1e-3)
+    assert not skill.refused
+
+
 def test_a_refused_closure_is_not_tried_again_by_a_later_node(make, things) -> None:
     """The mission's other ways have a `touch_next` of their own, which reads what the first one could not do."""
     floor = things.floor(0.045)
