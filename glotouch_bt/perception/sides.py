@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from glotouch_bt.perception.model_cache import target_model
-from glotouch_bt.perception.recognition.model import Hypothesis, PadSpec, TargetModel
+from glotouch_bt.perception.recognition.model import PadSpec, TargetHypothesis, TargetModel
 from glotouch_bt.robot import Array, ParamError
 from glotouch_bt.robot.scene import UPRIGHT, ByDigest, Mesh, Quat, stances, standing
 
@@ -45,7 +45,7 @@ def model_with_sides(mesh: Mesh, pad: PadSpec, stance: str) -> TargetModel:
 
 
 @lru_cache(maxsize=32)
-def _sides(key: ByDigest, pad: PadSpec, stance: str) -> tuple[Hypothesis, ...]:
+def _sides(key: ByDigest, pad: PadSpec, stance: str) -> tuple[TargetHypothesis, ...]:
     mesh = key.mesh
     shares = _distinct_sides(mesh)
     if stance == "any":
@@ -56,7 +56,7 @@ def _sides(key: ByDigest, pad: PadSpec, stance: str) -> tuple[Hypothesis, ...]:
     found = []
     for quat, weight in sorted(weights.items(), key=lambda w: (w[0] != UPRIGHT, -w[1]))[: 1 + MAX_SIDES]:
         try:
-            found.append(Hypothesis(target_model(standing(mesh, quat), pad), quat, weight))
+            found.append(TargetHypothesis(target_model(standing(mesh, quat), pad), quat, weight))
         except ParamError:  # lower than the probe's ball on this side: it cannot be traced there
             continue
     total = sum(h.weight for h in found)

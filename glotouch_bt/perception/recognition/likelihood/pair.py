@@ -30,7 +30,7 @@ from glotouch_bt.perception.recognition.likelihood.volumes import (
     slide_matrix,
     width_ratios,
 )
-from glotouch_bt.perception.recognition.model import Array32, Hypothesis, PadSpec, TargetModel
+from glotouch_bt.perception.recognition.model import Array32, PadSpec, TargetHypothesis, TargetModel
 from glotouch_bt.perception.recognition.placement import contour_pose, fitted_pose
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import Array
@@ -86,7 +86,7 @@ class Pair:
     fit: Fit | None
     pose_K_O: tuple[float, float, float]
     evidence: float
-    hypothesis: Hypothesis
+    hypothesis: TargetHypothesis
 
 
 def read_touchset(touchset: TouchSet, pad: PadSpec, p: LikelihoodParams) -> TouchSetReading:
@@ -137,7 +137,9 @@ def _scalar_terms(model: TargetModel, candidate: Candidate, p: LikelihoodParams)
     }
 
 
-def _compare(hypothesis: Hypothesis, reading: TouchSetReading, terms: dict[str, float], p: LikelihoodParams) -> Pair:
+def _compare(
+    hypothesis: TargetHypothesis, reading: TouchSetReading, terms: dict[str, float], p: LikelihoodParams
+) -> Pair:
     """Compute the evidence for one hypothesis, marginalised over bias, yaw, height, and each sequence's shift and turn.
 
     Args:

@@ -32,7 +32,7 @@ _cache: dict[tuple[str, PadSpec], TargetModel] = {}
 
 
 @dataclass(frozen=True, eq=False)
-class Hypothesis:
+class TargetHypothesis:
     """One way in which the object may stand and be traced.
 
     Attributes:
@@ -86,7 +86,7 @@ class TargetModel:
     normal_dispersion: float
     anisotropy: float
     feet: tuple[Outline, ...] = ()
-    sides: tuple[Hypothesis, ...] = ()
+    sides: tuple[TargetHypothesis, ...] = ()
     _lazy: dict[str, Array32] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -101,16 +101,16 @@ class TargetModel:
         return _cache[key]
 
     @cached_property
-    def hypotheses(self) -> tuple[Hypothesis, ...]:
+    def hypotheses(self) -> tuple[TargetHypothesis, ...]:
         """How the object may stand and what the probe may have traced of it; the weights sum to 1."""
-        found: list[Hypothesis] = []
-        for side in self.sides or (Hypothesis(self, UPRIGHT, 1.0),):
+        found: list[TargetHypothesis] = []
+        for side in self.sides or (TargetHypothesis(self, UPRIGHT, 1.0),):
             model, feet = side.model, side.model.feet
             whole = WHOLE if feet else 1.0
             found.append(replace(side, weight=side.weight * whole))
             for foot in feet:
                 share = side.weight * (1.0 - whole) / len(feet)
-                found.append(Hypothesis(replace(model, outline=foot, feet=()), side.quat, share))
+                found.append(TargetHypothesis(replace(model, outline=foot, feet=()), side.quat, share))
         return tuple(found)
 
     def standing(self, quat: Quat) -> TargetModel:
