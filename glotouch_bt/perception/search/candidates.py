@@ -36,8 +36,6 @@ WELL_TRACED_QUALITY = 0.5
 """Minimum `contour_quality` of a candidate that is traced on all sides."""
 CLOSED_QUALITY = 0.75
 """Minimum `quality` of a candidate that is traced on all sides: the centre's standard deviation is below 3 mm."""
-PUSHED_M = 0.008
-"""Maximum distance from such a candidate's envelope at which a contact may be on it: it was pushed. Source: ours."""
 ON_M = 0.004
 """Maximum distance from such a candidate's envelope at which a contact belongs to it."""
 HALF_QUALITY_SD_M = 0.005
@@ -187,13 +185,8 @@ def _outline(contacts: tuple[Contact, ...], radius_m: float) -> OutlineBelief:
 def _merged(old: Candidate, traced: OutlineTrace, radius_m: float, height_m: float) -> Candidate | None:
     """Return the union of candidate and trace, or None if they are two objects."""
     points = np.array([c.point_K_m for c in traced.contacts])
-    if not _overlaps(old, points):
+    if not _overlaps(old, points) and not (_is_closed(old) and _is_inside(old, traced)):
         return None
-    if _is_closed(old) and traced.outline is not None:
-        middle = traced.outline.contour.centre_K_m[None]
-        on = float(np.median(signed_distance(envelope(old), points))) <= ON_M
-        if not on and float(signed_distance(envelope(old), middle)[0]) > 0.0:
-            return None  # a close neighbour; an object that was pushed would still lie over its old place
     shift = np.array([*traced.displaced_K_m, 0.0])
     before = (replace(c, tip_K_m=c.tip_K_m + shift, point_K_m=c.point_K_m + shift[:2]) for c in old.contacts)
     everything = tuple(replace(c, pushed_K_m=np.zeros(2)) for c in (*before, *traced.contacts))
@@ -210,10 +203,17 @@ def _merged(old: Candidate, traced: OutlineTrace, radius_m: float, height_m: flo
 
 def _overlaps(old: Candidate, points: Array) -> bool:
     """Return True if contact points (n, 2) are near enough to a candidate to be the same object."""
-    outside_m = float(signed_distance(envelope(old), points).min())
+    outside_m = signed_distance(envelope(old), points)
     if _is_closed(old):
-        return outside_m <= PUSHED_M
-    return outside_m <= SAME_M or _apart_m(old.contacts, points) <= BETWEEN_M
+        return float(np.median(outside_m)) <= ON_M
+    return float(outside_m.min()) <= SAME_M or _apart_m(old.contacts, points) <= BETWEEN_M
+
+
+def _is_inside(old: Candidate, traced: OutlineTrace) -> bool:
+    """Return True if the middle of a trace lies in a candidate: an object that was pushed lies over its old place."""
+    if traced.outline is None:
+        return False
+    return float(signed_distance(envelope(old), traced.outline.contour.centre_K_m[None])[0]) <= 0.0
 
 
 def _apart_m(contacts: tuple[Contact, ...], points: Array) -> float:
