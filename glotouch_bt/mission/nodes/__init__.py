@@ -9,6 +9,7 @@ from glotouch_bt.mission.nodes.base import (
     NODES,
     START,
     UNSET,
+    BtcppForm,
     BuildContext,
     ConditionSettings,
     ExitStates,

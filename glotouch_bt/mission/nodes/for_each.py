@@ -30,6 +30,7 @@ from glotouch_bt.mission.nodes.base import (
     ValueKind,
     Values,
     btcpp_key,
+    btcpp_name,
     port_requirement,
     wire_setting,
 )
@@ -354,10 +355,13 @@ class ForEachKind(NodeKind):
         assert isinstance(node.settings, ForEachSettings)
         items, item = node.reads["items"].key, node.writes["item"].key
         attributes = {"items": btcpp_key(items), "item": btcpp_key(item)}
-        pairs = [f"{btcpp_key(s)}:{btcpp_key(t)}" for s, t in self.gathers(node).values()]
-        if pairs:
-            attributes["collect"] = ";".join(pairs)
-        return BtcppForm(self.btcpp, {**attributes, "on_failure": node.settings.on_failure}, custom=True)
+        gathered = self.gathers(node).values()
+        if gathered:
+            attributes["collect"] = ";".join(f"{btcpp_name(s)}:{btcpp_name(t)}" for s, t in gathered)
+        if node.settings.order_by is not None:
+            attributes["order_by"] = node.settings.order_by
+        attributes["on_failure"] = node.settings.on_failure
+        return BtcppForm(self.btcpp, attributes, ForEachSettings.model_fields)
 
 
 def _empty_tuples(variables: StateVariables, pairs: Pairs) -> Iterator[tuple[int, int]]:
