@@ -22,6 +22,7 @@ from glotouch_bt.mission.nodes.base import (
     StateVariables,
     ValueKind,
     Values,
+    btcpp_name,
     btcpp_value,
     holds,
     kind_of,

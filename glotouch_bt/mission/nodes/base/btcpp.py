@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from pydantic.fields import FieldInfo
 
+_PREFIX = re.compile("@([0-9]+)/")
 _INNER_UNDERSCORE = re.compile("_(?=_)")
 
 
@@ -31,11 +32,12 @@ class BtcppForm:
 def btcpp_name(key: str) -> str:
     """Return a key as an identifier of BehaviorTree.CPP's scripts: letters, digits and underscores.
 
-    A private key `part@2/key` becomes `part_2__key`. So that two keys never get the same name, a key's own `Z` is
+    A private key `part@2/key` becomes `part_2__key`. So that no other key gets the same name, a `Z` of its own is
     doubled, and its own `__` becomes `_Z_`.
     """
     own = _INNER_UNDERSCORE.sub("_Z", key.replace("Z", "ZZ"))
-    return own.replace("@", "_").replace("/", "__")
+    name = _PREFIX.sub(r"_\1__", own).replace("@", "_Z")
+    return f"Z{name}" if name[0].isdigit() else name
 
 
 def btcpp_key(key: str) -> str:
