@@ -63,10 +63,10 @@ class Groot2Publisher:
         self.state: MissionState | None = None
         self._tree_id = uuid.uuid4().bytes
         self._context = zmq.Context()
-        self._server, notices = self._context.socket(zmq.REP), self._context.socket(zmq.PUB)
+        self._server, self._notices = self._context.socket(zmq.REP), self._context.socket(zmq.PUB)
         self._server.setsockopt(zmq.MAXMSGSIZE, _MAX_REQUEST_BYTES)
         self._server.setsockopt(zmq.SNDTIMEO, _SEND_MS)
-        for socket, number in ((self._server, port), (notices, port + 1)):
+        for socket, number in ((self._server, port), (self._notices, port + 1)):
             try:
                 socket.bind(f"tcp://{HOST}:{number}")
             except zmq.ZMQError as e:
@@ -77,7 +77,7 @@ class Groot2Publisher:
 
     def serve(self, over: threading.Event) -> None:
         """Answer requests until `over` is set. Call it in one thread; no request ends it."""
-        while not over.is_set():
+        while not (over.is_set() or self._server.closed):
             if self.state is not None:
                 with suppress(GlotouchError):  # a broken record: its last state stays
                     self.state.update()
