@@ -28,6 +28,8 @@ class Groot2Client:
         self._context = zmq.Context()
         self.socket = self._context.socket(zmq.REQ)
         self.socket.setsockopt(zmq.RCVTIMEO, PATIENCE_MS)
+        for option in (zmq.REQ_RELAXED, zmq.REQ_CORRELATE):  # ask again although there was no reply
+            self.socket.setsockopt(option, 1)
         self.socket.connect(f"tcp://127.0.0.1:{port}")
         self._number = 0
         self.tree_id = b""
