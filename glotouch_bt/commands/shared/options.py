@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterable
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -77,7 +78,7 @@ FewObjects = Annotated[int, typer.Option(min=1, help="put only the first N objec
 def with_bare_values(words: list[str]) -> list[str]:
     """Return a command line in which every option of `BARE_VALUES` has a value; its own value must be a number."""
     end = words.index("--") if "--" in words else len(words)
-    followed = zip(words[:end], [*words[1:end], ""], strict=True)
+    followed = zip_longest(words[:end], words[1:end], fillvalue="")
     made = [f"{w}={BARE_VALUES[w]}" if w in BARE_VALUES and not _NUMBER.fullmatch(n) else w for w, n in followed]
     return [*made, *words[end:]]
 

@@ -352,16 +352,12 @@ class ForEachKind(NodeKind):
 
     def btcpp_form(self, node: NodeSpec) -> BtcppForm:
         """Return it as this project's decorator."""
-        assert isinstance(node.settings, ForEachSettings)
-        items, item = node.reads["items"].key, node.writes["item"].key
-        attributes = {"items": btcpp_key(items), "item": btcpp_key(item)}
-        gathered = self.gathers(node).values()
-        if gathered:
-            attributes["collect"] = ";".join(f"{btcpp_name(s)}:{btcpp_name(t)}" for s, t in gathered)
-        if node.settings.order_by is not None:
-            attributes["order_by"] = node.settings.order_by
-        attributes["on_failure"] = node.settings.on_failure
-        return BtcppForm(self.btcpp, attributes, ForEachSettings.model_fields)
+        settings = node.settings
+        assert isinstance(settings, ForEachSettings)
+        keys = {"items": btcpp_key(node.reads["items"].key), "item": btcpp_key(node.writes["item"].key)}
+        collect = ";".join(f"{btcpp_name(s)}:{btcpp_name(t)}" for s, t in self.gathers(node).values())
+        rest = {"collect": collect, "order_by": settings.order_by or "", "on_failure": settings.on_failure}
+        return BtcppForm(self.btcpp, keys | {k: v for k, v in rest.items() if v}, ForEachSettings.model_fields)
 
 
 def _empty_tuples(variables: StateVariables, pairs: Pairs) -> Iterator[tuple[int, int]]:
