@@ -60,6 +60,7 @@ PIP_COMPILE = $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --stri
 pins: $(VENV)/.dev
 	$(PIP_COMPILE) --build-deps-for editable --extra test --extra view -o requirements.txt pyproject.toml
 	$(PIP_COMPILE) --build-deps-for editable --extra dev -c requirements.txt -o requirements-dev.txt pyproject.toml
+	$(PIP_COMPILE) -o tests/support/btcpp/requirements.txt tests/support/btcpp/requirements.in
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info

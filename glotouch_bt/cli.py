@@ -11,11 +11,11 @@ import sys
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from glotouch_bt import __version__
 from glotouch_bt.commands import COMMANDS, bench
-from glotouch_bt.commands.shared import set_debug
+from glotouch_bt.commands.shared import set_debug, with_bare_values
 
 
 class GroupedHelp(TyperGroup):
@@ -30,6 +30,14 @@ class GroupedHelp(TyperGroup):
                 formatter.write_dl(rows)
 
 
+class BareOptions(TyperCommand):
+    """A command in which some options may stand without their value."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the words after the command's name."""
+        return super().parse_args(ctx, with_bare_values(args))
+
+
 app = typer.Typer(
     name="glotouch",
     help="Missions for robots that work by touch.",
@@ -40,7 +48,7 @@ app = typer.Typer(
 )
 for _commands in COMMANDS.values():
     for _name, _command in _commands.items():
-        app.command(_name)(_command)
+        app.command(_name, cls=BareOptions)(_command)
 app.add_typer(bench)
 
 

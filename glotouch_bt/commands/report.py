@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.shared import Json, NoBrowser, Port, RunFolderArgument, guarded, print_json
+from glotouch_bt.commands.shared import Groot2, Json, NoBrowser, Port, RunFolderArgument, guarded, print_json
 
 
 @guarded
@@ -32,6 +32,7 @@ def view(
     objects: Annotated[
         Path | None, typer.Option("--objects", metavar="DIR", help="folder of the STL files, to show the true objects")
     ] = None,
+    groot2: Groot2 = None,
 ) -> None:
     """Show a run in the browser: scene, tree, signals and a time line.
 
@@ -41,7 +42,9 @@ def view(
 
     def ready(address: str) -> None:
         sys.stdout.write(f"{address}   (Ctrl-C ends the page)\n")
+        if groot2 is not None:
+            sys.stdout.write(f"for Groot2: 127.0.0.1:{groot2}\n")
         sys.stdout.flush()
 
     with suppress(KeyboardInterrupt):
-        view_run(folder, port=port, browser=not no_browser, objects=objects, on_ready=ready)
+        view_run(folder, port=port, browser=not no_browser, objects=objects, groot2=groot2, on_ready=ready)

@@ -10,6 +10,7 @@ import typer
 
 from glotouch_bt.commands.shared import (
     BackendSettings,
+    Groot2,
     Json,
     Live,
     NoBrowser,
@@ -17,6 +18,7 @@ from glotouch_bt.commands.shared import (
     Port,
     guarded,
     live_page,
+    live_tree,
     print_json,
     read_settings,
     shown_on,
@@ -38,6 +40,7 @@ def resume(
     live: Live = False,
     port: Port = None,
     no_browser: NoBrowser = False,
+    groot2: Groot2 = None,
     list_: Annotated[bool, typer.Option("--list", help="only show the checkpoints")] = False,
     json_: Json = False,
 ) -> int:
@@ -68,9 +71,9 @@ def resume(
             sys.stderr.write(f"note: {note}\n")
 
     control = Operator()
-    with live_page(live, control, port, no_browser, objects) as page:
+    with live_page(live, control, port, no_browser, objects) as page, live_tree(groot2) as tree:
         with RunProgress(quiet=json_) as progress, operated(control):
-            on_start, truth = shown_on(page, progress.start)
+            on_start, truth = shown_on(page, tree, progress.start)
             done = resume_run(
                 folder,
                 start=from_,

@@ -26,6 +26,7 @@ def run(
     live: shared.Live = False,
     port: shared.Port = None,
     no_browser: shared.NoBrowser = False,
+    groot2: shared.Groot2 = None,
     json_: shared.Json = False,
 ) -> int:
     """Run a mission; write its record, result and report.
@@ -49,9 +50,9 @@ def run(
         allow_paths=tuple(allow_path or ()),
     )
     control = Operator()
-    with shared.live_page(live, control, port, no_browser, objects) as page:
+    with shared.live_page(live, control, port, no_browser, objects) as page, shared.live_tree(groot2) as tree:
         with RunProgress(quiet=json_) as progress, operated(control):
-            start, truth = shared.shown_on(page, progress.start)
+            start, truth = shared.shown_on(page, tree, progress.start)
             done = launch(request, on_start=start, on_truth=truth, on_progress=progress.update, control=control)
         code = print_end(done, json_)
         shared.wait_for_viewers(page, done)

@@ -1,7 +1,18 @@
 """The report of a run: `read_run` returns its arrays and events, `write_report` writes report.html."""
 
 from glotouch_bt.report.page import short_text
-from glotouch_bt.report.run_record import RECORD_NAME, TRUTH_NAME, RecordedEvent, RecordReader, RunRecord, read_run
+from glotouch_bt.report.run_record import (
+    ALL_TOPICS,
+    RECORD_NAME,
+    TREE_TOPICS,
+    TRUTH_NAME,
+    PortWrite,
+    RecordedEvent,
+    RecordReader,
+    RunRecord,
+    Tick,
+    read_run,
+)
 from glotouch_bt.report.sections import contour_of, depth_png, palette, tree_order
 from glotouch_bt.report.svg import AxisScale, points, tick_text
 from glotouch_bt.report.write import write_report

@@ -36,7 +36,11 @@ from glotouch_bt.untrusted import MAX_JSON_BYTES, TooLarge, parse_json, read_jso
 if TYPE_CHECKING:
     import pandas as pd
 
+TREE_TOPICS = "/tree/"
+"""Beginning of the topics of status changes and blackboard writes."""
 RECORD_NAME, RESULT_NAME, TRUTH_NAME = "run.mcap", "result.json", "truth.json"
+ALL_TOPICS = (EVENT_PREFIX, "/packed/", TREE_TOPICS)
+"""Beginnings of the topics that a reader needs for everything that a record holds; the others are drawings of it."""
 _PACKED = {"/packed/samples": "samples", "/packed/cycles": "cycles", "/packed/tactile": "tactile"}
 
 
@@ -180,6 +184,7 @@ class RecordReader:
     Args:
         path: A run's folder, or a record file.
         growing: The file is being written; it may unpack to the largest size that is allowed for any record.
+        topics: Beginnings of the topics to read.
 
     Attributes:
         record: What was read: description, events, ticks and ports. Its arrays are left empty.
@@ -190,7 +195,7 @@ class RecordReader:
         BadInput: There is no record, or the folder holds links.
     """
 
-    def __init__(self, path: str | Path, *, growing: bool = False) -> None:
+    def __init__(self, path: str | Path, *, growing: bool = False, topics: tuple[str, ...] = ALL_TOPICS) -> None:
         path = Path(path)
         if path.is_dir():
             require_plain(path, (RECORD_NAME, RESULT_NAME, TRUTH_NAME))
@@ -203,7 +208,7 @@ class RecordReader:
         self._at = self._text_bytes = 0
         self._shapes: dict[str, dict[str, tuple[int, ...]]] = {}
         size = MAX_RECORD_BYTES if growing else os.fstat(self._file.fileno()).st_size
-        self._unpacker = ChunkUnpacker(size, str(file), (EVENT_PREFIX, "/packed/", "/tree/"))
+        self._unpacker = ChunkUnpacker(size, str(file), topics)
 
     def read(self) -> bool:
         """Read every item that has been completed since the last call; return True if there was one.

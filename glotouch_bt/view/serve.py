@@ -9,7 +9,7 @@ import sys
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,6 +27,7 @@ def view_run(
     port: int | None = None,
     browser: bool = True,
     objects: Path | None = None,
+    groot2: int | None = None,
     on_ready: Callable[[str], None] | None = None,
     over: threading.Event | None = None,
 ) -> None:
@@ -37,13 +38,17 @@ def view_run(
         port: Port of the loopback interface; None for the next free one.
         browser: Open the page in the browser, if this machine has a display.
         objects: Folder of STL files for the true objects of a simulation.
+        groot2: Port on which Groot2 is served the tree at the time that the page shows; None: none.
         on_ready: Called with the page's address.
         over: Ends the view.
 
     Raises:
         BadInput: There is no run, it cannot be read, the port is in use, or viser is not installed.
     """
+    from glotouch_bt.mission import load_mission
+    from glotouch_bt.mission.export import as_monitored
     from glotouch_bt.report import RecordReader
+    from glotouch_bt.view.groot2 import MissionState, published
     from glotouch_bt.view.watch import RunWatch
 
     require_viser()
@@ -53,10 +58,14 @@ def view_run(
         reader.read()
         if not reader.record.run:
             raise BadInput(f"{folder / RECORD_NAME}: is empty or cut off in its first bytes; there is nothing to show")
-    with page_server(port, browser) as (server, shown):
+    tree = None if groot2 is None else as_monitored(load_mission(folder / "mission.yaml"))
+    with page_server(port, browser) as (server, shown), ExitStack() as stack:
+        watch = RunWatch(server, folder, objects=objects)
+        if groot2 is not None and tree is not None:
+            stack.enter_context(published(groot2, MissionState(folder, tree, lambda: watch.player.t_s)))
         if on_ready is not None:
             on_ready(shown)
-        RunWatch(server, folder, objects=objects).run(over or threading.Event())
+        watch.run(over or threading.Event())
 
 
 @contextmanager

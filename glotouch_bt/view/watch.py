@@ -9,9 +9,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from glotouch_bt.report import RECORD_NAME, TRUTH_NAME, RecordReader
+from glotouch_bt.report import TRUTH_NAME
 from glotouch_bt.robot import BadInput
 from glotouch_bt.untrusted import read_json
+from glotouch_bt.view.follow import RecordFollower
 from glotouch_bt.view.page import AT_END, AT_START, MissionControls, Page
 from glotouch_bt.view.state import Player, RunModel, planned_nodes, read_setup, true_bodies
 
@@ -59,8 +60,8 @@ class RunWatch:
         self.player = Player(live=True)
         self.page = Page(server, self.player, controls)
         self._model = RunModel()
-        self._reader: RecordReader | None = None
-        self._inode = 0
+        self._follower = RecordFollower(folder)
+        self._records = 0
         self._begun = False
         self._grown_s = time.perf_counter()
         self._truth_stamp = -1.0
@@ -81,8 +82,7 @@ class RunWatch:
 
     def close(self) -> None:
         """Close the record."""
-        if self._reader is not None:
-            self._reader.close()
+        self._follower.close()
 
     def step(self, wall_s: float) -> None:
         """Read what is new, and draw the state after `wall_s` of wall time."""
@@ -103,23 +103,20 @@ class RunWatch:
         self.viewers, self.was_viewed = viewers, self.was_viewed or viewers > 0
 
     def _read(self) -> None:
-        path = self._folder / RECORD_NAME
-        try:
-            inode = path.stat().st_ino
-        except OSError:
-            return  # not yet
-        if inode != self._inode:  # the first record, or that of a resumed run
-            self.close()
-            self._reader, self._inode = RecordReader(self._folder, growing=True), inode
+        follower = self._follower
+        grown = follower.read()
+        if follower.records != self._records:  # the first record, or that of a resumed run
+            self._records = follower.records
             self._model, self._begun = RunModel(planned_nodes(self._folder)), False
             self.player.begin()
-        assert self._reader is not None
-        if self._reader.read():
+        if follower.reader is None:
+            return
+        if grown:
             self._grown_s = time.perf_counter()
-            self._model.feed(self._reader)
-            if not self._begun and self._reader.record.run:
+            self._model.feed(follower.reader)
+            if not self._begun and follower.reader.record.run:
                 self._begun = True
-                self.page.begin(self._model, read_setup(self._reader.record, self._objects))
+                self.page.begin(self._model, read_setup(follower.reader.record, self._objects))
         self._read_truth()
 
     def _read_truth(self) -> None:

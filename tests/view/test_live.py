@@ -20,6 +20,7 @@ from glotouch_bt.mission.execution import Control
 from glotouch_bt.robot import BadInput
 from glotouch_bt.view import LiveView
 from glotouch_bt.view import live as live_file
+from glotouch_bt.view import process as process_file
 
 FAKE_CLI = Path(__file__).parents[1] / "support" / "fake_cli.py"
 NAP = """
@@ -127,7 +128,7 @@ def test_a_page_that_dies_leaves_the_mission_alone(monkeypatch: pytest.MonkeyPat
 
 def test_a_page_that_does_not_read_does_not_block_the_mission(monkeypatch: pytest.MonkeyPatch) -> None:
     stub(monkeypatch, "import time\nprint('ready http://here', flush=True)\ntime.sleep(600)")
-    monkeypatch.setattr(live_file, "END_S", 0.2)
+    monkeypatch.setattr(process_file, "END_S", 0.2)
     began = time.perf_counter()
     with LiveView(Control(), browser=False) as page:
         for _ in range(200):  # more than a pipe without a reader takes

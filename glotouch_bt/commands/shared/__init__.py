@@ -2,7 +2,7 @@
 
 from glotouch_bt.commands.shared.errors import guarded, set_debug, showing_tracebacks
 from glotouch_bt.commands.shared.experiments import print_summary, progress, put_few_in_box, run_in_pool
-from glotouch_bt.commands.shared.live import live_page, shown_on, wait_for_viewers
+from glotouch_bt.commands.shared.live import live_page, live_tree, shown_on, wait_for_viewers
 from glotouch_bt.commands.shared.options import (
     AllowPaths,
     Backend,
@@ -11,6 +11,7 @@ from glotouch_bt.commands.shared.options import (
     Conditions,
     FewObjects,
     FirstSeed,
+    Groot2,
     Json,
     KeepTrials,
     Live,
@@ -30,5 +31,6 @@ from glotouch_bt.commands.shared.options import (
     check_names,
     check_parameters,
     read_settings,
+    with_bare_values,
 )
 from glotouch_bt.commands.shared.output import print_json, styled_streams

@@ -1,4 +1,4 @@
-"""Shared by the commands that show a mission in the browser while it runs."""
+"""Shared by the commands that show a mission while it runs: in the browser, in Groot2."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from glotouch_bt.robot.simulation import TrueObject
     from glotouch_bt.runs import RunResult
     from glotouch_bt.view import LiveView
+    from glotouch_bt.view.groot2 import LiveTree
 
 INTERRUPTED = 130
 """Exit code of a run that Ctrl-C ended."""
@@ -42,18 +43,36 @@ def live_page(
         yield page
 
 
+@contextmanager
+def live_tree(port: int | None) -> Iterator[LiveTree | None]:
+    """Publish the tree of a run for Groot2 while the block runs, and print its address; yield None without a port.
+
+    Raises:
+        BadInput: The port is in use.
+    """
+    if port is None:
+        yield None
+        return
+    from glotouch_bt.view.groot2 import LiveTree
+
+    with LiveTree(port) as tree:
+        sys.stderr.write(f"for Groot2: {tree.address}\n")
+        yield tree
+
+
 def shown_on(
-    page: LiveView | None, start: Callable[[Mission, Path], None]
+    page: LiveView | None, tree: LiveTree | None, start: Callable[[Mission, Path], None]
 ) -> tuple[Callable[[Mission, Path], None], Callable[[list[TrueObject]], None] | None]:
-    """Return `on_start` and `on_truth` of a run that is shown on a page; `start` is called first."""
-    if page is None:
-        return start, None
+    """Return `on_start` and `on_truth` of a run that is shown on a page and in Groot2; `start` is called first."""
 
     def begin(mission: Mission, folder: Path) -> None:
         start(mission, folder)
-        page.show(folder)
+        if page is not None:
+            page.show(folder)
+        if tree is not None:
+            tree.show(mission, folder)
 
-    return begin, page.show_truth
+    return begin, None if page is None else page.show_truth
 
 
 def wait_for_viewers(page: LiveView | None, done: RunResult) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Iterable
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +14,7 @@ import typer
 if TYPE_CHECKING:
     from glotouch_bt.mission import Mission
 
+_NUMBER = re.compile("[-+]?[0-9.]+")
 MissionName = Annotated[
     str, typer.Argument(metavar="MISSION", help="path of a mission file, or the name of a shipped mission")
 ]
@@ -45,6 +48,20 @@ Port = Annotated[
     int | None, typer.Option(min=1, max=65535, help="port of the page on 127.0.0.1 (default: the next free one)")
 ]
 NoBrowser = Annotated[bool, typer.Option("--no-browser", help="do not open the page in the browser")]
+GROOT2_PORT = 1667
+"""Port that Groot2 connects to first. Source: BehaviorTree.CPP 4.10, `Groot2Publisher`."""
+Groot2 = Annotated[
+    int | None,
+    typer.Option(
+        "--groot2",
+        metavar="[PORT]",
+        min=1,
+        max=65534,
+        help=f"show the tree in Groot2, on this port of 127.0.0.1 and the next (default: {GROOT2_PORT})",
+    ),
+]
+BARE_VALUES = {"--groot2": str(GROOT2_PORT)}
+"""Value of an option that may stand without one."""
 Json = Annotated[bool, typer.Option("--json", help="print JSON on stdout, nothing else")]
 
 Trials = Annotated[int, typer.Option(min=1, help="number of seeds")]
@@ -56,6 +73,14 @@ BenchFolder = Annotated[
 SummaryJson = Annotated[bool, typer.Option("--json", help="print summary.json on stdout, nothing else")]
 KeepTrials = Annotated[bool, typer.Option("--resume", help="keep the trials that --out already holds")]
 FewObjects = Annotated[int, typer.Option(min=1, help="put only the first N objects into the box, which is faster")]
+
+
+def with_bare_values(words: list[str]) -> list[str]:
+    """Return a command line in which every option of `BARE_VALUES` has a value; its own value must be a number."""
+    end = words.index("--") if "--" in words else len(words)
+    followed = zip_longest(words[:end], words[1:end], fillvalue="")
+    made = [f"{w}={BARE_VALUES[w]}" if w in BARE_VALUES and not _NUMBER.fullmatch(n) else w for w, n in followed]
+    return [*made, *words[end:]]
 
 
 def check_names(conditions: str, backend: str) -> None:

@@ -23,6 +23,7 @@ from glotouch_bt.mission.nodes.base import (
     Stack,
     Values,
     btcpp_name,
+    comparison_ports,
     holds,
     in_code,
     in_words,
@@ -104,6 +105,10 @@ class ConditionKind(NodeKind):
         return PortCondition(node.name, made.keys(node.name, key), key, node.settings)
 
     def btcpp_form(self, node: NodeSpec) -> BtcppForm:
-        """Return it as a script."""
-        assert isinstance(node.settings, ConditionSettings)
-        return BtcppForm("ScriptCondition", {"code": in_code(node.settings, btcpp_name(node.reads["port"].key))})
+        """Return it as a script, or as this project's `PortCondition` if no script can express it."""
+        settings, key = node.settings, node.reads["port"].key
+        assert isinstance(settings, ConditionSettings)
+        code = in_code(settings, btcpp_name(key))
+        if code is not None:
+            return BtcppForm("ScriptCondition", {"code": code})
+        return BtcppForm("PortCondition", comparison_ports(settings, key), ConditionSettings.model_fields)

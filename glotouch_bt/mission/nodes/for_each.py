@@ -30,6 +30,7 @@ from glotouch_bt.mission.nodes.base import (
     ValueKind,
     Values,
     btcpp_key,
+    btcpp_name,
     port_requirement,
     wire_setting,
 )
@@ -351,13 +352,12 @@ class ForEachKind(NodeKind):
 
     def btcpp_form(self, node: NodeSpec) -> BtcppForm:
         """Return it as this project's decorator."""
-        assert isinstance(node.settings, ForEachSettings)
-        items, item = node.reads["items"].key, node.writes["item"].key
-        attributes = {"items": btcpp_key(items), "item": btcpp_key(item)}
-        pairs = [f"{btcpp_key(s)}:{btcpp_key(t)}" for s, t in self.gathers(node).values()]
-        if pairs:
-            attributes["collect"] = ";".join(pairs)
-        return BtcppForm(self.btcpp, {**attributes, "on_failure": node.settings.on_failure}, custom=True)
+        settings = node.settings
+        assert isinstance(settings, ForEachSettings)
+        keys = {"items": btcpp_key(node.reads["items"].key), "item": btcpp_key(node.writes["item"].key)}
+        collect = ";".join(f"{btcpp_name(s)}:{btcpp_name(t)}" for s, t in self.gathers(node).values())
+        rest = {"collect": collect, "order_by": settings.order_by or "", "on_failure": settings.on_failure}
+        return BtcppForm(self.btcpp, keys | {k: v for k, v in rest.items() if v}, ForEachSettings.model_fields)
 
 
 def _empty_tuples(variables: StateVariables, pairs: Pairs) -> Iterator[tuple[int, int]]:

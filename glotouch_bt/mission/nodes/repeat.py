@@ -26,9 +26,8 @@ from glotouch_bt.mission.nodes.base import (
     RunCount,
     Stack,
     Values,
-    btcpp_name,
+    comparison_ports,
     holds,
-    in_code,
     in_words,
     wire_setting,
 )
@@ -197,7 +196,8 @@ class RepeatKind(LoopKind):
         assert isinstance(settings, RepeatSettings)
         if settings.until is None:
             return BtcppForm(self.btcpp, {"num_cycles": str(settings.times)})
-        code = btcpp_name(node.reads["until"].key)
-        if isinstance(settings.until, ConditionSettings):
-            code = in_code(settings.until, code)
-        return BtcppForm("RepeatUntil", {"code": code, "limit": str(settings.limit)}, custom=True)
+        condition = settings.condition
+        assert condition is not None
+        ports = comparison_ports(condition, node.reads["until"].key)
+        fields = {**ConditionSettings.model_fields, "limit": RepeatSettings.model_fields["limit"]}
+        return BtcppForm("RepeatUntil", {**ports, "limit": str(settings.limit)}, fields)

@@ -169,10 +169,12 @@ class SkillKind(NodeKind):
 
     def btcpp_form(self, node: NodeSpec) -> BtcppForm:
         """Return it as an action with its ports and parameters."""
-        reads = {p: str(node.constants[p]) if p in node.constants else btcpp_key(w.key) for p, w in node.reads.items()}
+        constant = node.constants
+        reads = {p: btcpp_value(constant[p]) if p in constant else btcpp_key(w.key) for p, w in node.reads.items()}
         writes = {p: btcpp_key(w.key) for p, w in node.writes.items()}
         values = node.params.model_dump(exclude_defaults=True) if node.params is not None else {}
-        return BtcppForm(node.skill, {**reads, **writes, **{n: btcpp_value(v) for n, v in values.items()}}, custom=True)
+        given = {**reads, **writes, **{n: btcpp_value(v) for n, v in values.items()}}
+        return BtcppForm(node.skill, given, _skill_of(node).Params.model_fields)
 
 
 def _skill_of(node: NodeSpec) -> type[Skill]:

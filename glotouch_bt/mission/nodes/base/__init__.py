@@ -10,16 +10,13 @@ from glotouch_bt.mission.nodes.base.analysis import (
     Values,
 )
 from glotouch_bt.mission.nodes.base.behaviours import BuildContext, CountedLoop, Keys, MissionDecorator
-from glotouch_bt.mission.nodes.base.comparison import ConditionSettings, holds, in_code, in_words
+from glotouch_bt.mission.nodes.base.btcpp import BtcppForm, btcpp_key, btcpp_name, btcpp_value
+from glotouch_bt.mission.nodes.base.comparison import ConditionSettings, comparison_ports, holds, in_code, in_words
 from glotouch_bt.mission.nodes.base.kind import (
     NODES,
-    BtcppForm,
     NodeKind,
     NodeReader,
     NoSettings,
-    btcpp_key,
-    btcpp_name,
-    btcpp_value,
     kind_of,
     register,
     set_values,

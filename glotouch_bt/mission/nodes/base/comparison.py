@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 from pydantic import Field
 from pydantic.config import JsonDict
 
+from glotouch_bt.mission.nodes.base.btcpp import btcpp_key, btcpp_value
 from glotouch_bt.mission.spec import Findings, Place, Settings
 
 ANY_UNIT: JsonDict = {"any_unit": True}
 """Marks a number that may be written in any unit; it is compared in the unit of the key."""
+_SCRIPT_TEXT = re.compile("[ -&(-~]*")
+"""Text that a script may quote. Source: BehaviorTree.CPP 4.8, `StringLiteral` of its script grammar."""
 _SIGNS = (("equals", "=="), ("at_least", ">="), ("at_most", "<="))
 
 
@@ -59,14 +63,24 @@ def in_words(comparison: ConditionSettings) -> str:
     return comparison.port
 
 
-def in_code(comparison: ConditionSettings, key: str) -> str:
-    """Return the comparison in BehaviorTree.CPP's script language; `is_set(key)` is ours."""
+def in_code(comparison: ConditionSettings, key: str) -> str | None:
+    """Return the comparison in BehaviorTree.CPP's script language; None if that language cannot express it.
+
+    It knows no test for a key that is not set, and takes only printable ASCII without `'` as text.
+    """
     for word, sign in _SIGNS:
         wanted = getattr(comparison, word)
+        if isinstance(wanted, str):
+            return f"{key} {sign} '{wanted}'" if _SCRIPT_TEXT.fullmatch(wanted) else None
         if wanted is not None:
-            shown = f"'{wanted}'" if isinstance(wanted, str) else json.dumps(wanted)
-            return f"{key} {sign} {shown}"
-    return f"{'' if comparison.is_set else '!'}is_set({key})"
+            return f"{key} {sign} {json.dumps(wanted)}"
+    return None
+
+
+def comparison_ports(comparison: ConditionSettings, key: str) -> dict[str, str]:
+    """Return the comparison as the ports of a node that BehaviorTree.CPP lacks."""
+    given = comparison.model_dump(exclude_none=True, exclude={"port"})
+    return {"port": btcpp_key(key), **{name: btcpp_value(value) for name, value in given.items()}}
 
 
 def compared_type(comparison: ConditionSettings) -> Any:

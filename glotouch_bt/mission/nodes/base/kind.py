@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, Protocol
 
 from py_trees.behaviour import Behaviour
@@ -20,6 +18,7 @@ from glotouch_bt.mission.nodes.base.analysis import (
     Values,
 )
 from glotouch_bt.mission.nodes.base.behaviours import BuildContext, OutcomeDecorator
+from glotouch_bt.mission.nodes.base.btcpp import BtcppForm, btcpp_value
 from glotouch_bt.mission.nodes.base.comparison import ConditionSettings
 from glotouch_bt.mission.nodes.base.requirements import comparison_requirement
 from glotouch_bt.mission.nodes.base.run_count import RunCount
@@ -30,21 +29,6 @@ from glotouch_bt.mission.spec import Findings, Map, Node, NodeSpec, Place, Scala
 
 class NoSettings(Settings):
     """Nothing to set."""
-
-
-@dataclass(frozen=True)
-class BtcppForm:
-    """A node in BehaviorTree.CPP's XML.
-
-    Attributes:
-        tag: Name of the element.
-        attributes: Its attributes.
-        custom: BehaviorTree.CPP has no such node; it is declared as ours.
-    """
-
-    tag: str
-    attributes: dict[str, str] = field(default_factory=dict)
-    custom: bool = False
 
 
 class NodeReader(Protocol):
@@ -235,7 +219,7 @@ class NodeKind:
             return BtcppForm(self.btcpp)
         given = {} if node.settings is None else node.settings.model_dump(exclude_none=True)
         tag = "".join(word.capitalize() for word in self.name.split("_"))
-        return BtcppForm(tag, {n: str(v) for n, v in given.items()}, custom=True)
+        return BtcppForm(tag, {n: btcpp_value(v) for n, v in given.items()}, self.Settings.model_fields)
 
 
 class _UnknownKind(NodeKind):
@@ -273,21 +257,6 @@ def wire_setting(port: str, given: Map, reader: NodeReader, *path: str) -> Wire 
     if not isinstance(node, Scalar) or not isinstance(node.value, str) or node.poisoned:
         return None
     return reader.wire(port, node.value, node.place)
-
-
-def btcpp_name(key: str) -> str:
-    """Return a key as BehaviorTree.CPP's scripts write it; private keys keep their prefix, in letters it takes."""
-    return key.replace("/", ".").replace("@", "_")
-
-
-def btcpp_key(key: str) -> str:
-    """Return a key as the value of a port in BehaviorTree.CPP."""
-    return f"{{{btcpp_name(key)}}}"
-
-
-def btcpp_value(value: object) -> str:
-    """Return a constant as the value of a port in BehaviorTree.CPP."""
-    return value if isinstance(value, str) else json.dumps(value, default=str)
 
 
 def set_values(model: BaseModel | None) -> list[str]:
