@@ -20,16 +20,16 @@ GROUP_VISUAL, GROUP_COLLISION = 2, 3
 
 # Contacts: (time constant s, damping ratio). MuJoCo scales the stiffness with the masses in contact. 4 ms suits light
 # objects, but the hand (15 kg with the motors' inertia) then hits the floor with 120 N at 20 mm/s. The housing is
-# therefore softer: 50 ms against fixed bodies, 4.5 ms against free ones, whose contacts yield more (solmix weighs the
-# average), about 2 N/mm a contact point, like slender fingers. The pads have their own constant. Source: ours.
+# therefore softer: 50 ms against fixed bodies, 10 ms against free ones (solmix weighs the average), about 2 N/mm a
+# contact point, like slender fingers. The pads have their own constant. Source: ours.
 STIFF = (0.004, 1.0)
 HOUSING = (0.050, 1.0)
-MIX = {ENVIRONMENT: 0.05, OBJECT: 1000.0, HAND: 10.0, PROBE: 1000.0}
+MIX = {ENVIRONMENT: 1.0, OBJECT: 1000.0, HAND: 150.0, PROBE: 1000.0}
 OBJECT_IMPEDANCE = 0.5
-"""How much of a contact's acceleration is imposed on free objects (MuJoCo's solimp; 1: rigid). Rigid contacts stop in
-one step whatever hangs on them: at MuJoCo's own 0.9, an object that rocked on its feet between the jaws, at 0.03 m/s,
-stopped the hand's 15 kg with it, and pads carried 12 N while they parted from it. At 0.5 the contact is a spring, 16
-N/mm a foot. Source: traced closures; halving the step had a similar effect on their peaks."""
+"""Share of its acceleration that a contact imposes on a free object (MuJoCo's solimp; 1: rigid). A contact that is
+nearly rigid stops an object within a step, whatever holds it. With MuJoCo's own 0.9, an object that rocked between the
+jaws and met the floor at 0.03 m/s stopped the hand's 15 kg with it: 30 to 50 N for a millisecond, on pads that were
+parting from it. Source: traced closures; half a step's length had a similar effect on their peaks."""
 PAD = (0.005, 1.0)  # gel skin; the gel model adds the gel's compliance
 PAD_HANDLE_FRICTION = (0.002, 1.0)  # pads on the probe's handle: stiffer, or the probe drifts during transfers
 
