@@ -7,7 +7,11 @@ from glotouch_bt.lazy import lazy_door
 if TYPE_CHECKING:
     from glotouch_bt.perception.model_cache import target_model
     from glotouch_bt.perception.reach import TooLow, model_for, too_wide
+    from glotouch_bt.perception.sides import model_with_sides
 
 __getattr__ = lazy_door(
-    __name__, target_model="model_cache", **dict.fromkeys(("TooLow", "model_for", "too_wide"), "reach")
+    __name__,
+    target_model="model_cache",
+    model_with_sides="sides",
+    **dict.fromkeys(("TooLow", "model_for", "too_wide"), "reach"),
 )

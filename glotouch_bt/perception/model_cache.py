@@ -15,7 +15,7 @@ import tempfile
 import zlib
 from collections import OrderedDict
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -71,15 +71,16 @@ def target_model(mesh: Mesh, pad: PadSpec | None = None, folder: Path | None = N
     path = (folder or cache_folder()) / f"{model_key(mesh, pad)}.model"
     if path in _mapped:
         _mapped.move_to_end(path)
-        return _mapped[path]
-    model = _read(path, mesh.name)
-    if model is None or not _is_of(model, mesh, pad):
-        model = TargetModel.from_mesh(mesh, pad)
-        _write(path, model)
-    _mapped[path] = model
+    else:
+        model = _read(path, mesh.name)
+        if model is None or not _is_of(model, mesh, pad):
+            model = TargetModel.from_mesh(mesh, pad)
+            _write(path, model)
+        _mapped[path] = model
     while len(_mapped) > MAX_MAPPED:
         _mapped.popitem(last=False)
-    return model
+    model = _mapped[path]
+    return model if model.name == mesh.name else replace(model, name=mesh.name)  # the cache knows shapes, not names
 
 
 def model_key(mesh: Mesh, pad: PadSpec) -> str:
@@ -178,8 +179,9 @@ def _is_of(model: TargetModel, mesh: Mesh, pad: PadSpec) -> bool:
 
 def _is_within(model: TargetModel, largest_m: float) -> bool:
     """Return True if the numbers of a model are finite, and the lengths of its outline at most `largest_m`."""
-    outline, fits = model.outline, (model.outline.as_round, model.outline.as_box)
+    outlines = (model.outline, *model.feet)
+    fits = [f for o in outlines for f in (o.as_round, o.as_box)]
     lengths = [v for f in fits for v in (*f.centre_m, *f.size_m, *f.size_sd_m, f.centre_sd_m)]
     others = [model.rho, model.rho_sd, model.normal_dispersion, *(v for f in fits for v in (f.yaw_rad, f.yaw_sd_rad))]
     finite = bool(np.isfinite([*lengths, *others]).all())
-    return finite and max(map(abs, lengths)) <= largest_m and 0.0 <= outline.p_box <= 1.0
+    return finite and max(map(abs, lengths)) <= largest_m and all(0.0 <= o.p_box <= 1.0 for o in outlines)

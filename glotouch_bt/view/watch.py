@@ -1,4 +1,4 @@
-"""RunWatch one run: read its record as it grows, and draw it until someone ends the view."""
+"""Watch one run: read its record as it grows, and draw it until someone ends the view."""
 
 from __future__ import annotations
 

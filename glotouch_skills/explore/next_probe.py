@@ -76,8 +76,9 @@ class NextProbe(Skill):
         self.candidate = next(c for c in candidates if touch is None or c.index == touch.candidate)
 
     def _by_target(self, candidates: tuple[Candidate, ...], left: list[ProbeTouch]) -> ProbeTouch | None:
-        mesh = load_target(self.params.target, self.context.world.objects.folder)
-        model = load_target_model(mesh, self.context.arm.description.gripper)
+        objects = self.context.world.objects
+        mesh = load_target(self.params.target, objects.folder)
+        model = load_target_model(mesh, self.context.arm.description.gripper, objects.stance)
         felt = {t.candidate.index: t.sequences for t in self.felt or ()}
         touchsets = tuple(TouchSet(c, felt.get(c.index, ())) for c in candidates)
         belief = recognition.infer_belief(model, touchsets)

@@ -1,4 +1,4 @@
-"""Clear the searched area: without a sound probe, a place passed without contact may not be free."""
+"""Search again: what was searched without a sound probe, or for one object more than was expected."""
 
 from __future__ import annotations
 
@@ -8,25 +8,45 @@ import numpy as np
 
 from glotouch_bt.perception.search import SearchMap
 from glotouch_bt.robot import HOLD
-from glotouch_bt.skill import Failure, In, Out, Skill, SkillRun
+from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
+
+
+class SearchAnewParams(SkillParams):
+    """Parameters of `search_anew`."""
+
+    more_objects: int = param(
+        "Look for so many objects beyond those traced, and keep what was searched; 0: forget what was searched",
+        default=0,
+        ge=0,
+        le=20,
+    )
 
 
 class SearchAnew(Skill):
     """Keep the traced objects and clear the rest of the map, after a search with a slipped or lost probe.
 
-    SUCCESS: `map` has the traced objects, but no searched or dropped place.
+    A place that such a probe passed without contact may not be free. With `more_objects` the map is kept, and expects
+    more objects: what was traced as two may be one, and the search ended too soon.
+
+    SUCCESS: `map` has the traced objects.
     """
+
+    Params = SearchAnewParams
+    params: SearchAnewParams
 
     NOTHING_SEARCHED = Failure("nothing_searched", "there is no map yet", advice="sweep first, with guarded_sweep")
 
     before = In(SearchMap, "what has been explored so far", key="map", required=False)
-    map = Out(SearchMap, "the traced objects only")
+    map = Out(SearchMap, "where to search now")
 
     def run(self) -> SkillRun:
         """See the class."""
         yield HOLD
         if self.before is None:
             raise self.NOTHING_SEARCHED("there is no map yet")
+        if self.params.more_objects:
+            self.map = replace(self.before, expected=self.before.found + self.params.more_objects)
+            return
         nowhere = np.zeros((0, 2))
         nowhere.setflags(write=False)
         self.map = replace(self.before, path_K_m=nowhere, dropped=nowhere)

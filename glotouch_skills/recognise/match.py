@@ -11,7 +11,7 @@ from glotouch_bt.perception import recognition
 from glotouch_bt.perception.recognition import Ranking
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import HOLD
-from glotouch_bt.robot.scene import twins_of
+from glotouch_bt.robot.scene import standing, twins_of
 from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.planning import TOO_LOW, GraspPlan, load_target, load_target_model, plan_grasp
 
@@ -69,8 +69,9 @@ class MatchTarget(Skill):
             )
         yield HOLD  # matching takes longer than a control period; on hardware the arm holds meanwhile
         gripper = self.context.arm.description.gripper
-        mesh = load_target(self.params.target, self.context.world.objects.folder)
-        model = load_target_model(mesh, gripper)
+        objects = self.context.world.objects
+        mesh = load_target(self.params.target, objects.folder)
+        model = load_target_model(mesh, gripper, objects.stance)
         ranking = self._told_of_twins(recognition.MATCHERS[self.params.matcher](model, touchsets))
         self.ranking = ranking
         self.event("ranking", target=mesh.name, ranking=ranking, gates=ranking.gates, matcher=self.params.matcher)
@@ -84,7 +85,8 @@ class MatchTarget(Skill):
                 f"no candidate is surely {mesh.name}: {why}", advice=_advice(ranking), margin=ranking.margin
             )
         best = next(t for t in touchsets if t.candidate.index == ranking.best.index)
-        self.plan = plan_grasp(best, ranking.best, mesh, model, gripper)
+        quat = ranking.best.quat
+        self.plan = plan_grasp(best, ranking.best, standing(mesh, quat), model.standing(quat), gripper)
         self.event("plan", plan=self.plan)
 
     def _told_of_twins(self, ranking: Ranking) -> Ranking:

@@ -47,7 +47,9 @@ class TouchNextParams(ClosureParams):
     target: str = param("The object to find: an STL file, or the name of one in the world's object folder", names="stl")
     confidence: float = param("Sufficient probability", default=0.9, gt=0.5, lt=1.0)
     unmeasured: bool = param("Touch candidates that the probe did not measure, too", default=False)
-    min_gain_nats: float = param("Least expected gain of a closure", default=0.02, ge=0.0, formerly="least_gain_nats")
+    min_gain_nats: float = param(
+        "Smallest expected gain of a closure", default=0.02, ge=0.0, formerly="least_gain_nats"
+    )
 
 
 class TouchNext(Skill):
@@ -165,8 +167,9 @@ class TouchNext(Skill):
             SkillFailed: `too_low`.
         """
         if self._model is None:
-            mesh = load_target(self.params.target, self.context.world.objects.folder)
-            self._model = load_target_model(mesh, self.context.arm.description.gripper)
+            objects = self.context.world.objects
+            mesh = load_target(self.params.target, objects.folder)
+            self._model = load_target_model(mesh, self.context.arm.description.gripper, objects.stance)
         return self._model
 
     def _choose(self, belief: Belief, down: Squeezing | None) -> Option | None:

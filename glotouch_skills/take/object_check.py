@@ -87,8 +87,8 @@ class ObjectCheck(Skill):
         if off <= p.width_m:
             self.fits = True
             return
-        model = load_target_model(mesh, gripper)
-        widths = widths_m(model, float(made.position_K_m[2]))
+        model = load_target_model(mesh, gripper, self.context.world.objects.stance)
+        widths = widths_m(model.standing(made.quat), float(made.position_K_m[2]))
         least = float(misfit_m(widths, self.grip_m, give).min(initial=gripper.stroke_m))
         if least <= p.width_m:
             raise self.NOT_AS_FELT(

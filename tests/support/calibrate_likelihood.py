@@ -28,7 +28,7 @@ from glotouch_bt.bench.match.acquire import layout_of
 from glotouch_bt.bench.robustness.synthetic import sample_layout
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read import load_conditions
-from glotouch_bt.perception import target_model
+from glotouch_bt.perception import model_for
 from glotouch_bt.perception.recognition import PadSpec, TargetModel
 from glotouch_bt.perception.recognition.likelihood import LikelihoodParams
 from glotouch_bt.perception.recognition.likelihood.pair import Pair, compare, read_touchset
@@ -55,9 +55,9 @@ class Problem:
 
 
 @lru_cache(maxsize=256)
-def model_of(folder: Path, name: str) -> TargetModel:
-    """Return the model of an object of a folder."""
-    return target_model(load_mesh(folder / f"{name}.stl"), PAD)
+def model_of(folder: Path, name: str, stance: str) -> TargetModel:
+    """Return the model of an object of a folder, with the sides on which it may stand."""
+    return model_for(load_mesh(folder / f"{name}.stl"), XENSE_GRIPPER, stance)
 
 
 def first_closures(touchset: TouchSet, count: int) -> TouchSet:
@@ -70,13 +70,13 @@ def first_closures(touchset: TouchSet, count: int) -> TouchSet:
     return replace(touchset, sequences=tuple(s for s in kept if s.layers))
 
 
-def problems(layout: Layout, folder: Path, count: int | None) -> Iterator[Problem]:
+def problems(layout: Layout, folder: Path, count: int | None, stance: str) -> Iterator[Problem]:
     """Yield every decision on a box, with the target present and removed."""
     p = LikelihoodParams()
     felt = [t for t in layout.touched if t.name and any(layer.stable for layer in t.touchset.layers)]
     sets = [t.touchset if count is None else first_closures(t.touchset, count) for t in felt]
     for k, touched in enumerate(felt):
-        model = model_of(folder, str(touched.name))
+        model = model_of(folder, str(touched.name), stance)
         pairs = tuple(
             compare(model, read_touchset(replace(s, candidate=replace(s.candidate, index=i)), PAD, p), p)
             for i, s in enumerate(sets)
@@ -93,13 +93,17 @@ def sampled(folder: Path | None, seed: int, conditions: str) -> dict[str, list[P
     assert sampler is not None
     layout = sample_layout(sampler, seed, conditions)
     name = folder.name if folder else "five"
-    return {f"{name}, {n or 'all'} closures": list(problems(layout, world.objects.folder, n)) for n in (FEW, None)}
+    return {
+        f"{name}, {n or 'all'} closures": list(problems(layout, world.objects.folder, n, world.objects.stance))
+        for n in (FEW, None)
+    }
 
 
 def recorded(run: Path) -> dict[str, list[Problem]]:
     """Return the decisions on a recorded mission."""
-    folder = load_mission("touch_all", {}).world.objects.folder
-    return {f"runs {run.parent.name}": list(problems(layout_of(read_run(run)), folder, None))}
+    record = read_run(run)
+    folder, stance = Path(record.of_run("objects", "folder")), str(record.of_run("objects", "stance"))
+    return {f"runs {run.parent.name}": list(problems(layout_of(record), folder, None, stance))}
 
 
 def posterior(problem: Problem, p: LikelihoodParams) -> tuple[np.ndarray, float]:
@@ -157,6 +161,9 @@ def main() -> None:
     parser.add_argument("--objects", type=Path, action="append", default=[])
     parser.add_argument("--runs", type=Path, action="append", default=[], help="a folder of recorded runs")
     args = parser.parse_args()
+    for folder in (*args.objects, *args.runs):
+        if not folder.is_dir():
+            parser.error(f"{folder}: no such folder")
     sets: dict[str, list[Problem]] = {}
     with ProcessPoolExecutor(os.cpu_count()) as executor:
         jobs = [
@@ -168,6 +175,8 @@ def main() -> None:
         for job in jobs:
             for name, found in job.result().items():
                 sets.setdefault(name, []).extend(found)
+    if not any(sets.values()):
+        parser.error("no decision to learn from: give --boxes or --runs")
     now = LikelihoodParams()
     start = np.array([getattr(now, name) for name in FITTED])
     best = minimize(cost, start, args=(sets,), method="Nelder-Mead", options={"maxiter": 300}).x

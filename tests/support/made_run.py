@@ -29,7 +29,7 @@ WANTED = 3
 
 @dataclass
 class Made:
-    """What went into a run, for comparison."""
+    """Contents of a made run, which tests compare with what is read back."""
 
     folder: Path
     contacts: list[Contact]

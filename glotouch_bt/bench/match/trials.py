@@ -14,7 +14,7 @@ import numpy as np
 
 from glotouch_bt.bench.match.dataset import Layout, Planar, Touched
 from glotouch_bt.bench.match.methods import Method, methods
-from glotouch_bt.perception import target_model
+from glotouch_bt.perception import model_with_sides
 from glotouch_bt.perception.recognition import Match, PadSpec, Ranking, TargetModel
 from glotouch_bt.robot import Array, BadInput
 from glotouch_bt.robot.scene import Mesh, load_folder
@@ -64,7 +64,7 @@ def models_of(layout: Layout, folder: Path, names: Sequence[str] = ()) -> dict[s
     missing = [n for n in names or layout.objects if n not in meshes]
     if missing:
         raise BadInput(f"{folder}: has no {', '.join(missing)} (it has {', '.join(meshes)})")
-    return {n: target_model(meshes[n], pad_of(layout)) for n in names or layout.objects}
+    return {n: model_with_sides(meshes[n], pad_of(layout), "upright") for n in names or layout.objects}
 
 
 def pad_of(layout: Layout) -> PadSpec:

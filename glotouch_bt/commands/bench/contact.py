@@ -27,9 +27,13 @@ def contact(
     from glotouch_bt.bench.contact import ContactCampaign, run_campaign
     from glotouch_bt.commands.terminal import print_contact
     from glotouch_bt.mission import load_mission
+    from glotouch_bt.robot import BadInput
 
     shared.check_names(conditions, "mujoco")
     settings = shared.read_settings(set_)
+    for name, instead in (("contacts", "use --per-side"), ("fixed", "every seed has a bolted and a free square")):
+        if name in settings:
+            raise BadInput(f"--set {name}: {instead}")
     load_mission("contact_probe", settings)  # refuses what is no parameter of it
     campaign = ContactCampaign(
         seeds=tuple(range(seed, seed + trials)),

@@ -46,7 +46,7 @@ class NullRecord:
 
 _NOT_SAVED = ("_record", "_pending")
 CALIBRATED = ("tip_P_m", "tip_sd_m", "latency_s", "compliance_P_m_N")
-"""What the result repeats of a calibration."""
+"""Keys of a calibration that the result repeats."""
 BATCH = 200
 """Control cycles measured at a time."""
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from glotouch_bt.robot import Array, ParamError
+from glotouch_bt.robot.scene import UPRIGHT, Quat
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,8 @@ class Match:
         pose_K_O: (x, y, yaw) of the mesh's frame O in K, m and rad; the contour's centre and yaw without contact.
         evidence: Number of two-sided layers; all one-sided layers together add at most 1.
         probability: Posterior probability that this candidate is the target; NaN outside a ranking.
+        quat: Rotation (w, x, y, z) of the mesh onto the side on which it stands; `pose_K_O` is then that of the turned
+            mesh, whose bounding box has its middle at x = y = 0.
     """
 
     index: int
@@ -52,6 +55,7 @@ class Match:
     pose_K_O: tuple[float, float, float]
     evidence: float
     probability: float = math.nan
+    quat: Quat = UPRIGHT
 
 
 Part = Literal["outline", "top"]

@@ -24,8 +24,8 @@ MIN_CONTACTS = 3
 SAME_M = 0.010
 """Maximum distance from a candidate's envelope at which a contact belongs to it; objects stand farther apart."""
 BETWEEN_M = 0.018
-"""Maximum distance from the hull of a candidate's contacts at which a contact belongs to it. Source: objects stand
-30 mm apart and are pushed by a few millimetres."""
+"""Maximum distance from the hull of the contacts of a half-traced candidate at which a contact belongs to it. Source:
+objects stand 30 mm apart and are pushed by a few millimetres."""
 PART_M = 0.030
 """Maximum distance from a candidate's envelope at which a contact is tested for belonging to it."""
 OTHER_OBJECT_ODDS = 0.02
@@ -34,6 +34,8 @@ FLAT_M = 1e-4
 """Width across their line below which contacts count as collinear."""
 WELL_TRACED_QUALITY = 0.5
 """Minimum `contour_quality` of a candidate that is traced on all sides."""
+CLOSED_QUALITY = 0.75
+"""Minimum `quality` of a candidate that is traced on all sides: the centre's standard deviation is below 3 mm."""
 ON_M = 0.004
 """Maximum distance from such a candidate's envelope at which a contact belongs to it."""
 HALF_QUALITY_SD_M = 0.005
@@ -135,7 +137,7 @@ def part_of(known: tuple[Candidate, ...], first: Contact, radius_m: float) -> Ca
         off = first.tip_K_m[:2] - old.contour.centre_K_m
         if float(first.reaction_K[:2] @ off) < FACING * float(np.hypot(off[0], off[1])):
             continue
-        if _apart_m(old.contacts, first.point_K_m[None]) < BETWEEN_M:
+        if _overlaps(old, first.point_K_m[None]):
             return old
         one = _outline((*old.contacts, first), radius_m)
         two = _outline(old.contacts, radius_m).log_evidence + _outline((first,), radius_m).log_evidence
@@ -154,10 +156,21 @@ def joins(known: tuple[Candidate, ...], contacts: tuple[Contact, ...], radius_m:
 def of_another(known: tuple[Candidate, ...], contact: Contact) -> bool:
     """Return True if a contact made during a trace belongs to another, well-traced candidate."""
     return any(
-        float(signed_distance(envelope(c), contact.point_K_m[None])[0]) < ON_M
-        and contour_quality(np.array([k.tip_K_m[:2] for k in c.contacts]), c.contour) >= WELL_TRACED_QUALITY
-        for c in known
+        float(signed_distance(envelope(c), contact.point_K_m[None])[0]) < ON_M and _is_well_traced(c) for c in known
     )
+
+
+def _is_well_traced(candidate: Candidate) -> bool:
+    tips = np.array([c.tip_K_m[:2] for c in candidate.contacts])
+    return contour_quality(tips, candidate.contour) >= WELL_TRACED_QUALITY
+
+
+def _is_closed(candidate: Candidate) -> bool:
+    """Return True if the outline is known on all sides, so that what lies outside it is something else.
+
+    The end of something long has contacts on all sides, too, but its centre is uncertain.
+    """
+    return candidate.quality >= CLOSED_QUALITY and _is_well_traced(candidate)
 
 
 def _outline(contacts: tuple[Contact, ...], radius_m: float) -> OutlineBelief:
@@ -172,7 +185,7 @@ def _outline(contacts: tuple[Contact, ...], radius_m: float) -> OutlineBelief:
 def _merged(old: Candidate, traced: OutlineTrace, radius_m: float, height_m: float) -> Candidate | None:
     """Return the union of candidate and trace, or None if they are two objects."""
     points = np.array([c.point_K_m for c in traced.contacts])
-    if not _overlaps(old, points):
+    if not _overlaps(old, points) and not (_is_closed(old) and _is_inside(old, traced)):
         return None
     shift = np.array([*traced.displaced_K_m, 0.0])
     before = (replace(c, tip_K_m=c.tip_K_m + shift, point_K_m=c.point_K_m + shift[:2]) for c in old.contacts)
@@ -190,7 +203,17 @@ def _merged(old: Candidate, traced: OutlineTrace, radius_m: float, height_m: flo
 
 def _overlaps(old: Candidate, points: Array) -> bool:
     """Return True if contact points (n, 2) are near enough to a candidate to be the same object."""
-    return float(signed_distance(envelope(old), points).min()) <= SAME_M or _apart_m(old.contacts, points) <= BETWEEN_M
+    outside_m = signed_distance(envelope(old), points)
+    if _is_closed(old):
+        return float(np.median(outside_m)) <= ON_M
+    return float(outside_m.min()) <= SAME_M or _apart_m(old.contacts, points) <= BETWEEN_M
+
+
+def _is_inside(old: Candidate, traced: OutlineTrace) -> bool:
+    """Return True if the middle of a trace lies in a candidate: an object that was pushed lies over its old place."""
+    if traced.outline is None:
+        return False
+    return float(signed_distance(envelope(old), traced.outline.contour.centre_K_m[None])[0]) <= 0.0
 
 
 def _apart_m(contacts: tuple[Contact, ...], points: Array) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import replace
 from functools import lru_cache
 
@@ -28,35 +29,46 @@ def turned(mesh: Mesh, quat: Quat) -> Mesh:
     return replace(mesh, vertices_m=np.asarray(mesh.vertices_m @ quat_to_matrix(np.array(quat)).T))
 
 
+def standing(mesh: Mesh, quat: Quat) -> Mesh:
+    """Return the mesh as it stands when turned: lowest vertex at z = 0, middle of the bounding box at x = y = 0."""
+    if quat == UPRIGHT:
+        return mesh
+    vertices = turned(mesh, quat).vertices_m
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    vertices = vertices - [*(0.5 * (low + high))[:2], low[2]]
+    key = f"{mesh.digest} {' '.join(f'{q:.6f}' for q in quat)}"
+    return replace(mesh, vertices_m=vertices, digest=hashlib.sha256(key.encode()).hexdigest())
+
+
 def stances(mesh: Mesh) -> list[tuple[Quat, float]]:
     """Return the rotations onto stable sides, each with a number in proportion to its probability."""
-    return list(zip(*_stances(_ByDigest(mesh)), strict=True))
+    return list(zip(*_stances(ByDigest(mesh)), strict=True))
 
 
 def draw_stance(mesh: Mesh, rng: np.random.Generator) -> Quat:
     """Return the rotation onto a stable side, drawn with its probability; upright if there is none."""
-    sides, shares = _stances(_ByDigest(mesh))
+    sides, shares = _stances(ByDigest(mesh))
     number = rng.random()
     if not sides:
         return UPRIGHT
     return sides[min(int(np.searchsorted(np.cumsum(shares), number * sum(shares))), len(sides) - 1)]
 
 
-class _ByDigest:
-    """A mesh as a key."""
+class ByDigest:
+    """A mesh as a key: two of the same geometry are equal."""
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _ByDigest) and other.mesh.digest == self.mesh.digest
+        return isinstance(other, ByDigest) and other.mesh.digest == self.mesh.digest
 
     def __hash__(self) -> int:
         return hash(self.mesh.digest)
 
 
 @lru_cache(maxsize=64)
-def _stances(key: _ByDigest) -> tuple[tuple[Quat, ...], tuple[float, ...]]:
+def _stances(key: ByDigest) -> tuple[tuple[Quat, ...], tuple[float, ...]]:
     """Return the rotations onto stable sides and the probability of each.
 
     A side is a plane on which the convex hull rests with its centre of mass above it, by a margin. Its probability is

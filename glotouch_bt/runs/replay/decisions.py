@@ -14,11 +14,11 @@ import msgspec
 import numpy as np
 
 from glotouch_bt.mission import Mission, load_mission
-from glotouch_bt.perception import target_model
-from glotouch_bt.perception.recognition import MATCHERS, PadSpec, Ranking
+from glotouch_bt.perception import model_for
+from glotouch_bt.perception.recognition import MATCHERS, Ranking
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.report import RunRecord, read_run
-from glotouch_bt.robot import BadInput, GlotouchError
+from glotouch_bt.robot import BadInput, GlotouchError, Gripper
 from glotouch_bt.robot.scene import load_folder
 from glotouch_bt.runs.folder import require_run_folder
 from glotouch_bt.runs.replay.run import replayed_robot, unfit_as_bad_input
@@ -71,12 +71,11 @@ def replay_decisions(folder: Path, *, objects: Path | None = None) -> list[Decis
     record = read_run(folder)
     mission = load_mission(record.path.parent / "mission.yaml", objects=objects)
     gripper = replayed_robot(record).description.gripper
-    pads = PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
     with unfit_as_bad_input(record):
-        return list(_decisions(record, mission, pads))
+        return list(_decisions(record, mission, gripper))
 
 
-def _decisions(record: RunRecord, mission: Mission, pads: PadSpec) -> Iterator[Decision]:
+def _decisions(record: RunRecord, mission: Mission, gripper: Gripper) -> Iterator[Decision]:
     felt: dict[int, TouchSet] = {}
     for event in record.events:
         if event.kind == "touchset":
@@ -89,7 +88,8 @@ def _decisions(record: RunRecord, mission: Mission, pads: PadSpec) -> Iterator[D
             given = tuple(felt[i] for i in felt if i in known)
             if not given or matcher not in MATCHERS:
                 continue
-            model = target_model(load_folder(mission.world.objects.folder, (target,))[0], pads)
+            objects = mission.world.objects
+            model = model_for(load_folder(objects.folder, (target,))[0], gripper, objects.stance)
             yield Decision(event.stamp_s, target, matcher, then, MATCHERS[matcher](model, given))
 
 

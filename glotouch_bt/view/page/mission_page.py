@@ -139,7 +139,7 @@ class Page:
         self._set("log", panels.log(state.log))
         self._set("signals", charts.signals(self._model, state.t_s))
         self._set("strip", charts.strip(self._model, state.t_s))
-        word = "stand still" if self._player.moving else "play"
+        word = "freeze view" if self._player.moving else "play"
         label = f"{word} ({self._player.speed:g}×)" if word == "play" else word
         if self._play.label != label:
             self._play.label = label

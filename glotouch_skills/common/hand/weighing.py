@@ -21,6 +21,8 @@ MIN_GRIP_N = 1.0
 """Minimum force of jaws that hold something. Source: ours; jaws at their target report none."""
 MIN_GRIP_M = 0.003
 """Default minimum aperture of jaws that hold something. Source: ours."""
+BOTH_GELS = 2
+"""Number of gels that feel an object between the jaws."""
 
 
 @dataclass(frozen=True)
@@ -49,10 +51,6 @@ def weigh(arm: Arm) -> Motion[Weighed]:
 def weigh_N(arm: Arm) -> Motion[float]:
     """Return the weight in the hand, N; the tare was taken with the hand empty and upright."""
     return (yield from weigh(arm)).weight_N
-
-
-BOTH_GELS = 2
-"""Number of gels that feel an object between the jaws."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 from glotouch_bt.perception.recognition import Match
 from glotouch_bt.perception.touch import Candidate, Layer, TouchSet, evidence_weight, layer_patches
 from glotouch_bt.robot import Array, Gripper, ParamError
-from glotouch_bt.robot.scene import Mesh
+from glotouch_bt.robot.scene import UPRIGHT, Mesh, Quat
 from glotouch_skills.common.planning.grasp_holds import AREA_SCALE, LEVER_SCALE_M, Holds, holds_of
 from glotouch_skills.common.planning.squeeze_motion import lowest_pads_m
 
@@ -67,6 +67,7 @@ class GraspPlan:
         opening_m: Aperture during the descent.
         alternatives: Other grasps of the same object, best first.
         source: `fitted` (from the mesh) or `felt` (from a closure).
+        quat: Rotation (w, x, y, z) of the mesh onto the side on which the object is taken to stand.
     """
 
     candidate: int
@@ -76,6 +77,7 @@ class GraspPlan:
     opening_m: float
     alternatives: tuple[GraspPlan, ...] = ()
     source: str = "felt"
+    quat: Quat = UPRIGHT
 
     def __post_init__(self) -> None:
         position_K_m = np.asarray(self.position_K_m)
@@ -96,8 +98,8 @@ def plan_grasp(
     Args:
         touchset: Touches of the object.
         match: Its fit to the target.
-        mesh: The target.
-        model: The target's tables.
+        mesh: The target, as it stands.
+        model: Its tables.
         gripper: The robot's gripper.
         side_gap_m: Gap between open jaw and object on each side.
     """
@@ -107,7 +109,7 @@ def plan_grasp(
         holds = holds_of(model, com, gripper, lowest_pads_m(model.height_m, gripper), FORCE_N)
         fitted = _fitted(touchset.candidate.index, match, model, holds, side_gap_m)
     felt = _felt(touchset, _placed(com, match), side_gap_m)
-    plans = [*fitted, *felt][: 1 + ALTERNATIVES]
+    plans = [replace(plan, quat=match.quat) for plan in (*fitted, *felt)][: 1 + ALTERNATIVES]
     return replace(plans[0], alternatives=tuple(plans[1:]))
 
 

@@ -29,13 +29,18 @@ def load_target(target: str, folder: Path) -> Mesh:
     return load_folder(folder, (target,))[0]
 
 
-def load_target_model(mesh: Mesh, gripper: Gripper) -> TargetModel:
+def load_target_model(mesh: Mesh, gripper: Gripper, stance: str) -> TargetModel:
     """Return the target's model for the gripper's pads; it is kept on disk.
+
+    Args:
+        mesh: The target.
+        gripper: The gripper.
+        stance: How the objects stand in the box, as in `ObjectSet`.
 
     Raises:
         SkillFailed: `too_low`.
     """
     try:
-        return perception.model_for(mesh, gripper)
+        return perception.model_for(mesh, gripper, stance)
     except perception.TooLow as e:
         raise TOO_LOW(str(e)) from e

@@ -54,7 +54,9 @@ def test_a_key_that_a_subtree_keeps_to_itself(found_in: Found) -> None:
 
 def test_only_a_subtree_s_own_keys_are_its_ports(found_in: Found) -> None:
     found = found_in(HEAD + "tree:\n" + FOUND % ", ports: {objects: candidates}")
-    assert [(f.code, f.valid) for f in found] == [("unknown_port", "candidates, found, postponed, probed, unmeasured")]
+    assert [(f.code, f.valid) for f in found] == [
+        ("unknown_port", "candidates, found, map, postponed, probed, unmeasured")
+    ]
 
 
 @pytest.mark.parametrize(

@@ -81,6 +81,19 @@ def test_a_target_that_is_not_there_is_absent(meshes, solids) -> None:
         assert "none of them" in ranking.reasons[0]
 
 
+@pytest.mark.parametrize("factor", [0.98, 1.02])
+def test_an_object_of_slightly_other_size_is_still_itself(meshes, solids, factor: float) -> None:
+    """All its widths are off by one factor; a likelihood without a common bias takes that for another object."""
+    touchset, _ = touched(solids.box(0.080 * factor, 0.040 * factor, 0.060 * factor), IDEAL, 21)
+    model = TargetModel.from_mesh(meshes[2])
+    known = LikelihoodParams()
+    exact = replace(known, scale_sd=1e-6, offset_sd_m=1e-6)
+    one, other = (compare(model, read_touchset(touchset, model.pad, p), p) for p in (known, exact))
+    assert one.log_ratio > other.log_ratio
+    assert one.log_twin < other.log_twin
+    assert one.bias_m == pytest.approx(0.040 * (factor - 1.0), abs=3e-4)
+
+
 def test_two_alike_share_the_probability(meshes) -> None:
     one, _ = touched(meshes[2], IDEAL, 2)
     twin = replace(one, candidate=replace(one.candidate, index=7))

@@ -129,6 +129,6 @@ def test_the_folder_follows_the_user(monkeypatch, tmp_path) -> None:
 
 def test_parts_that_do_not_fit_are_refused(mesh) -> None:
     facts, arrays = to_parts(TargetModel.from_mesh(mesh))
-    for bad in ({**facts, "version": 0}, {**facts, "l_m": [0.0]}, {k: v for k, v in facts.items() if k != "outline"}):
+    for bad in ({**facts, "version": 0}, {**facts, "l_m": [0.0]}, {k: v for k, v in facts.items() if k != "outlines"}):
         with pytest.raises(ParamError):
             from_parts("x", bad, arrays)

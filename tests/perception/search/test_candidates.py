@@ -57,6 +57,13 @@ def test_more_of_a_candidate_replaces_it_and_counts_nothing(candidate):
     np.testing.assert_allclose(sorted(admitted.candidates[0].contour.size_m), [0.044, 0.090], atol=2e-3)
 
 
+def test_the_height_of_a_new_candidate_is_that_of_the_trace_and_its_top_is_unknown():
+    contacts = half_a_box()
+    traced = OutlineTrace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)), continued=False)
+    (new,) = admit(SearchMap.blank((0.2, 0.15), expected=2), (), contacts[0], traced, 0.018, 0.01).candidates
+    assert (new.height_m, new.top_touched) == (0.018, False)
+
+
 def test_what_stands_too_near_for_another_object_is_the_same(candidate):
     """16 mm off the contacts, where no other object can stand (30 mm); 26 mm off one can."""
     two = {}

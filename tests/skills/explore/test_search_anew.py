@@ -25,6 +25,18 @@ def test_objects_are_kept_and_ways_forgotten(bench, found) -> None:
     assert covered_fraction(after, 0.03) < 0.5 * covered_fraction(before, 0.03)
 
 
+def test_one_more_object_is_looked_for_where_nothing_was_searched(bench, found) -> None:
+    before = SearchMap.blank((0.13, 0.18), 1).with_exclusion(envelope(found.round((0.05, 0.0), 0.02)), 0.01)
+    before = before.with_path(np.array([[-0.1, 0.0], [0.0, 0.1]]))
+    b = bench()
+    skill = b.make(SearchAnew, inputs={"before": before}, more_objects=1)
+    b.run(skill)
+    assert before.complete
+    assert not skill.map.complete
+    assert skill.map.expected == 2
+    assert len(skill.map.path_K_m) == len(before.path_K_m)
+
+
 def test_search_anew__nothing_searched(bench) -> None:
     b = bench()
     skill = b.make(SearchAnew)

@@ -52,13 +52,16 @@ class Oracle:
 
 @pytest.fixture
 def make(bench, found, folder, monkeypatch):
-    def make_one(oracle, things=None, grip_width_m=WIDTH, stuff=(), tip_P_m=0.13, probed=None, felt=None, **params):
+    def make_one(
+        oracle, things=None, grip_width_m=WIDTH, stuff=(), tip_P_m=0.13, probed=None, felt=None, refused=None, **params
+    ):
         b = bench(grip_width_m=grip_width_m, things=stuff, tip_P_m=tip_P_m)
         b.context.world = replace(b.world, objects=replace(b.world.objects, folder=folder))
         monkeypatch.setattr(module.recognition, "infer_belief", oracle.infer_belief)
         monkeypatch.setattr(module.recognition, "expected_gain", oracle.expected_gain)
         things = things or (found.round((0.0, -0.08), 0.025), found.round((0.0, 0.08), 0.025, index=1))
-        given = {"candidates": things} | {k: v for k, v in (("probed", probed), ("felt", felt)) if v is not None}
+        optional = {"probed": probed, "felt": felt, "refused_before": refused}
+        given = {"candidates": things} | {k: v for k, v in optional.items() if v is not None}
         return b, b.make(TouchNext, inputs=given, target="can", **params)
 
     return make_one
@@ -178,6 +181,27 @@ def test_fingers_on_something_cost_a_choice_not_the_mission(make, things) -> Non
     assert sum(len(t.layers) for t in skill.touchsets) == 0
     assert b.of_kind("note")
     assert pads_height(b) > 0.13
+
+
+def test_fingers_on_a_low_ledge_close_above_it(make, things) -> None:
+    """The ledge stops the pads at 32 mm, 11 mm above the lowest closure of a can of 60 mm."""
+    b, skill = make(Oracle(right=1, enough=1), stuff=[things.floor(0.005)], tip_P_m=0.022)
+    repeat(b, skill)
+    assert [len(t.layers) for t in skill.touchsets] == [0, 1]
+    assert skill.touchsets[1].layers[0].height_m == pytest.approx(0.035, abs=1e-3)
+    assert not skill.refused
+
+
+def test_a_refused_closure_is_not_tried_again_by_a_later_node(make, things) -> None:
+    """The mission's other ways have a `touch_next` of their own, which reads what the first one could not do."""
+    floor = things.floor(0.045)
+    b, first = make(Oracle(right=1, enough=3), stuff=[floor], tip_P_m=0.022)
+    repeat(b, first)
+    assert {key[0] for key in first.refused} == {0, 1}
+    known = {"felt": first.touchsets, "refused": first.refused}
+    _, second = make(Oracle(right=1, enough=3), stuff=[floor], tip_P_m=0.022, **known)
+    assert repeat(b, second) == 1
+    assert second.refused == first.refused
 
 
 def test_touch_next__no_candidates__or_unusable_target(make, found) -> None:

@@ -123,7 +123,7 @@ def test_depth_maps_vanish_when_they_are_old(model: RunModel, whole: Made) -> No
 
 
 def test_a_growing_record_gives_the_same_states(whole: Made, tmp_path: Path) -> None:
-    """What a live view reads piece by piece is what a later view reads at once."""
+    """Reading a record in pieces, as a live view does, gives the same model as reading it whole."""
     data = (whole.folder / "run.mcap").read_bytes()
     copy = tmp_path / "run.mcap"
     copy.write_bytes(b"")

@@ -103,14 +103,14 @@ def expected_gain(belief: Belief, touches: Sequence[Closure] | Sequence[ProbeTou
         if c.candidate not in known:
             raise ParamError("touch.candidate", c.candidate, f"one of {sorted(known)}")
     shares = {m.index: m.probability for m in belief.ranking.matches}
-    model, p = belief.model, belief.params
+    p = belief.params
     probed = [t for t in touches if isinstance(t, ProbeTouch)]
     if probed:
         candidates = [t.candidate for t in belief.touchsets]
-        return expected_probe_gains(model, candidates, belief.pairs, belief.ranking, probed, p)
+        return expected_probe_gains(candidates, belief.pairs, belief.ranking, probed, p)
     closures = [t for t in touches if isinstance(t, Closure)]
-    predictions = {x.index: predict(model, r, x, p) for r, x in zip(belief.readings, belief.pairs, strict=True)}
-    return expected_gains(model, predictions, shares, belief.ranking.p_absent, closures, p)
+    predictions = {x.index: predict(r, x, p) for r, x in zip(belief.readings, belief.pairs, strict=True)}
+    return expected_gains(belief.model.pad, predictions, shares, belief.ranking.p_absent, closures, p)
 
 
 def ranked(belief: Belief) -> Ranking:

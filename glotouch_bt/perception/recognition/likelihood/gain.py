@@ -25,7 +25,7 @@ from glotouch_bt.perception.recognition.likelihood.pair import Pair, TouchSetRea
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.perception.recognition.likelihood.scalars import yaw_prior
 from glotouch_bt.perception.recognition.likelihood.volumes import T_PEAK, width_kernel
-from glotouch_bt.perception.recognition.model import POOLED, Array32, TargetModel, hand_axes, span
+from glotouch_bt.perception.recognition.model import POOLED, Array32, PadSpec, TargetModel, hand_axes, span
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.perception.touch.calibration import MEASURED_SD_M
 from glotouch_bt.robot import Array
@@ -50,6 +50,7 @@ class Prediction:
 
     Attributes:
         candidate: The candidate.
+        model: The target, as it most probably stands.
         yaw_index, z0_m, weight: (s,) poses: relative yaw at `first_rad` in table steps, height offset, weight.
         first_rad: Yaw of that hand.
         felt: (n, 4) closures so far: x_K, y_K, height, yaw.
@@ -57,6 +58,7 @@ class Prediction:
     """
 
     candidate: Candidate
+    model: TargetModel
     yaw_index: Array
     z0_m: Array
     weight: Array
@@ -65,9 +67,9 @@ class Prediction:
     widths_m: Array
 
 
-def predict(model: TargetModel, reading: TouchSetReading, pair: Pair, p: LikelihoodParams) -> Prediction:
+def predict(reading: TouchSetReading, pair: Pair, p: LikelihoodParams) -> Prediction:
     """Return the most probable poses of a candidate."""
-    candidate = reading.touchset.candidate
+    candidate, model = reading.touchset.candidate, pair.hypothesis.model
     z0 = span(p.z0_limit_m, p.z0_steps)
     if pair.log_pose is None:
         log_pose = yaw_prior(model, candidate, pair.first_rad, p)[:, None]
@@ -84,13 +86,13 @@ def predict(model: TargetModel, reading: TouchSetReading, pair: Pair, p: Likelih
     places = [reading.touchset.sequences[e.sequence].layers[e.index] for e in layers]
     felt = np.array([[*q.position_K_m, q.height_m, q.yaw_rad] for q in places]).reshape(-1, 4)
     return Prediction(
-        candidate, best // log_pose.shape[1], z0[best % log_pose.shape[1]], weight / weight.sum(), pair.first_rad,
-        felt, np.array([e.width_m for e in layers]),
+        candidate, model, best // log_pose.shape[1], z0[best % log_pose.shape[1]], weight / weight.sum(),
+        pair.first_rad, felt, np.array([e.width_m for e in layers]),
     )  # fmt: skip
 
 
 def expected_gains(
-    model: TargetModel,
+    pad: PadSpec,
     predictions: Mapping[int, Prediction],
     shares: Mapping[int, float],
     p_absent: float,
@@ -102,7 +104,7 @@ def expected_gains(
         return np.zeros(0)
     rest = np.array([*shares.values(), p_absent])
     entropy = float(-(rest * np.log(np.maximum(rest, 1e-300))).sum())
-    library = generic_features(model.pad)
+    library = generic_features(pad)
     library = library[:: max(1, len(library) // SURFACES)]
     others = library[:: max(1, len(library) // OTHERS)][:OTHERS]
     generic_other = image_kernel(mean_squared(others, library), p).mean(axis=-1)
@@ -113,7 +115,7 @@ def expected_gains(
         q = predictions[candidate]
         where = [i for i, c in enumerate(closures) if c.candidate == candidate]
         mine = [closures[i] for i in where]
-        width, sides, novelty = _at(model, q, mine)
+        width, sides, novelty = _at(q, mine)
         # Ratios for the target (one per pose), then for other objects (one per surface and quantile).
         ratio = _width_ratios(width, np.array([_guess(q, c) for c in mine]), quantile, q.weight, p)
         for side in sides:
@@ -177,9 +179,9 @@ def entropy_decrease(there: Array, weight: Array, not_there: Array, share: float
     return np.asarray(np.maximum(entropy - mean, 0.0))
 
 
-def _at(model: TargetModel, q: Prediction, closures: Sequence[Closure]) -> tuple[Array, tuple[Array32, Array32], Array]:
+def _at(q: Prediction, closures: Sequence[Closure]) -> tuple[Array, tuple[Array32, Array32], Array]:
     """Return predicted widths (n, s), (left, right) features (n, s, 35), and novelty of each closure (n,), 0..1."""
-    n = len(model.phi_rad)
+    model, n = q.model, len(q.model.phi_rad)
     yaw = np.array([c.yaw_K_rad for c in closures])
     height = np.array([c.height_m for c in closures])
     place = np.array([c.position_K_m for c in closures], dtype=np.float64).reshape(-1, 2)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,13 +30,16 @@ from glotouch_bt.perception.recognition.likelihood.volumes import (
     slide_matrix,
     width_ratios,
 )
-from glotouch_bt.perception.recognition.model import Array32, PadSpec, TargetModel
+from glotouch_bt.perception.recognition.model import Array32, PadSpec, TargetHypothesis, TargetModel
 from glotouch_bt.perception.recognition.placement import contour_pose, fitted_pose
-from glotouch_bt.perception.touch import TouchSet
+from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import Array
 
 _read: deque[tuple[TouchSet, PadSpec, LikelihoodParams, TouchSetReading]] = deque(maxlen=32)
 
+FAR_NATS = 5.0
+"""Hypotheses whose outline and height are less likely than the best one's by this are left out. Source: ours; their
+closures would have to fit e^5 times better."""
 PARALLEL_RAD = math.radians(10.0)
 """Maximum yaw difference (modulo half a turn) of parallel tracks."""
 
@@ -70,6 +73,7 @@ class Pair:
         first_rad: Yaw of the first sequence's hand.
         bias_m: Best aperture bias.
         fit, pose_K_O, evidence: As in `Match`.
+        hypothesis: The likeliest way in which the target stands.
     """
 
     index: int
@@ -82,6 +86,7 @@ class Pair:
     fit: Fit | None
     pose_K_O: tuple[float, float, float]
     evidence: float
+    hypothesis: TargetHypothesis
 
 
 def read_touchset(touchset: TouchSet, pad: PadSpec, p: LikelihoodParams) -> TouchSetReading:
@@ -105,17 +110,50 @@ def _read_touchset(touchset: TouchSet, pad: PadSpec, p: LikelihoodParams) -> Tou
 
 
 def compare(model: TargetModel, reading: TouchSetReading, p: LikelihoodParams) -> Pair:
-    """Compute the evidence, marginalised over bias, yaw, height offset, and each sequence's shift and turn."""
-    touchset = reading.touchset
-    candidate = touchset.candidate
-    terms = {
+    """Compute the evidence, summed over the target's hypotheses; pose and terms are those of the likeliest.
+
+    Hypotheses that outline and height make far less likely than the best are left out.
+    """
+    candidate = reading.touchset.candidate
+    terms = [_scalar_terms(h.model, candidate, p) for h in model.hypotheses]
+    cheap = np.array(
+        [math.log(h.weight) + p.slope * sum(t.values()) for h, t in zip(model.hypotheses, terms, strict=True)]
+    )
+    pairs = [
+        (_compare(h, reading, t, p), math.log(h.weight))
+        for h, t, c in zip(model.hypotheses, terms, cheap, strict=True)
+        if c > cheap.max() - FAR_NATS
+    ]
+    best = max(pairs, key=lambda x: x[0].log_ratio + x[1])[0]
+    total = float(np.logaddexp.reduce([x.log_ratio + w for x, w in pairs]))
+    return replace(best, log_ratio=total)
+
+
+def _scalar_terms(model: TargetModel, candidate: Candidate, p: LikelihoodParams) -> dict[str, float]:
+    return {
         "mode": mode_ratio(model, candidate),
         "height": height_ratio(model, candidate, p),
         "contour": contour_ratio(model, candidate, p),
     }
+
+
+def _compare(
+    hypothesis: TargetHypothesis, reading: TouchSetReading, terms: dict[str, float], p: LikelihoodParams
+) -> Pair:
+    """Compute the evidence for one hypothesis, marginalised over bias, yaw, height, and each sequence's shift and turn.
+
+    Args:
+        hypothesis: How the target stands.
+        reading: Background evidence of the touches.
+        terms: Those of outline and height.
+        p: Parameters.
+    """
+    model, touchset = hypothesis.model, reading.touchset
+    candidate = touchset.candidate
     if not reading.sequences:
         ratio = p.outline_offset + p.slope * sum(terms.values())
-        return Pair(candidate.index, ratio, 0.0, terms, None, 0.0, 0.0, None, contour_pose(touchset), 0.0)
+        pose = contour_pose(touchset)
+        return Pair(candidate.index, ratio, 0.0, terms, None, 0.0, 0.0, None, pose, 0.0, hypothesis)
     bias_sd = _bias_sd_m(reading, p)
     grid = Grid.of(p, bias_sd)
     first = reading.sequences[0][0].layer.yaw_rad
@@ -171,7 +209,7 @@ def compare(model: TargetModel, reading: TouchSetReading, p: LikelihoodParams) -
     ratio = p.offset + p.slope * sum(terms.values())
     return Pair(
         candidate.index, ratio, log_twin, terms, np.asarray(log_pose - total, dtype=np.float32), first,
-        float(grid.bias_m[b]), fit, pose, reading.evidence.weight,
+        float(grid.bias_m[b]), fit, pose, reading.evidence.weight, hypothesis,
     )  # fmt: skip
 
 

@@ -71,7 +71,7 @@ def as_match(pair: Pair, ratio: float, probability: float) -> Match:
     """Build a Match; its loss is -log P(target) at even prior odds, 0 for certainty."""
     loss = float(np.logaddexp(0.0, -ratio))
     terms = pair.terms | {"twin": pair.log_twin}
-    return Match(pair.index, loss, terms, pair.fit, pair.pose_K_O, pair.evidence, probability)
+    return Match(pair.index, loss, terms, pair.fit, pair.pose_K_O, pair.evidence, probability, pair.hypothesis.quat)
 
 
 def decide(pairs: Sequence[Pair], p: LikelihoodParams) -> Ranking:

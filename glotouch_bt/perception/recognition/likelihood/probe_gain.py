@@ -35,7 +35,6 @@ HEIGHT_SAMPLES = 16
 
 
 def expected_probe_gains(
-    model: TargetModel,
     candidates: Sequence[Candidate],
     pairs: Sequence[Pair],
     ranking: Ranking,
@@ -51,7 +50,7 @@ def expected_probe_gains(
     for i, touch in enumerate(touches):
         candidate, pair = known[touch.candidate]
         measure = _tops if touch.part == "top" else _outlines
-        there, not_there = measure(model, candidate, p)
+        there, not_there = measure(pair.hypothesis.model, candidate, p)
         now = sum(pair.terms[t] for t in (("height",) if touch.part == "top" else ("mode", "contour")))
         before = log_ratio_to_others(pair.log_ratio, pair.log_twin, p)
 

@@ -21,4 +21,4 @@ from glotouch_bt.perception.recognition.model.pads import (
 from glotouch_bt.perception.recognition.model.parts import VERSION, from_parts, to_parts
 from glotouch_bt.perception.recognition.model.raster import hand_axes, mirrored, span
 from glotouch_bt.perception.recognition.model.simulated_touches import touch_windows
-from glotouch_bt.perception.recognition.model.target import STRIDE, TargetModel, table_axes
+from glotouch_bt.perception.recognition.model.target import STRIDE, TargetHypothesis, TargetModel, table_axes

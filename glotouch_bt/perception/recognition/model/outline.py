@@ -7,7 +7,9 @@ systematic errors of the fit (e.g. a leg fitted as a side) are part of the predi
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -78,20 +80,33 @@ class Outline:
         return self.as_box if self.p_box > 0.5 else self.as_round
 
 
+Tips = Callable[[Array, int, float], Array]
+"""Ball centres (k, 2) of radial approaches to a point (2,): a number of contacts, the first from a bearing in rad."""
+
+
 def traced_outline(solid: trimesh.Trimesh, traces: int = TRACES) -> Outline:
     """Trace `solid` (z up, standing on z = 0) `traces` times and fit; deterministic.
 
     Raises:
         ParamError: Fewer than 3 contacts are possible: the solid is lower than the probe's ball.
     """
-    rng = np.random.default_rng(0)
     middle = minimum_rectangle(np.asarray(solid.vertices)[:, :2])[3]
+    return outline_of(partial(traced_tips, solid), middle, traces)
+
+
+def outline_of(tips_at: Tips, middle_m: Array, traces: int = TRACES) -> Outline:
+    """Fit `traces` simulated traces about a point (2,); deterministic.
+
+    Raises:
+        ParamError: Fewer than 3 contacts are possible.
+    """
+    rng = np.random.default_rng(0)
     chosen: list[Contour] = []
     rounds: list[Contour] = []
     boxes: list[Contour] = []
     for i in range(traces):
-        aim = middle + rng.normal(0, MIDDLE_SD_M, 2)
-        tips = traced_tips(solid, aim, CONTACTS, i * math.radians(360 * 0.618) / CONTACTS)
+        aim = middle_m + rng.normal(0, MIDDLE_SD_M, 2)
+        tips = tips_at(aim, CONTACTS, i * math.radians(360 * 0.618) / CONTACTS)
         if len(tips) < 3:
             raise ParamError("solid", f"{len(tips)} contacts", "high enough to be traced: at least 12 mm")
         tips = tips + rng.normal(0, CONTACT_SD_M, tips.shape)

@@ -13,7 +13,7 @@ from glotouch_bt.perception.recognition.model.pads import Array32, PadSpec
 from glotouch_bt.perception.recognition.model.target import TargetModel
 from glotouch_bt.robot import ParamError
 
-VERSION = 1
+VERSION = 2
 """Version of the tables; increase it when a table's meaning or computation changes."""
 _NUMBERS = ("height_m", "rho", "rho_sd", "normal_dispersion", "anisotropy")
 
@@ -28,11 +28,7 @@ def to_parts(model: TargetModel) -> tuple[dict[str, Any], dict[str, Array32]]:
         "l_m": model.l_m.tolist(),
         "z_m": model.z_m.tolist(),
         "centre_m": model.centre_m.tolist(),
-        "outline": {
-            "as_round": _fit_facts(model.outline.as_round),
-            "as_box": _fit_facts(model.outline.as_box),
-            "p_box": model.outline.p_box,
-        },
+        "outlines": [_outline_facts(o) for o in (model.outline, *model.feet)],
         **{name: getattr(model, name) for name in _NUMBERS},
     }
     arrays = {
@@ -61,17 +57,21 @@ def from_parts(name: str, facts: Mapping[str, Any], arrays: Mapping[str, Array32
         for key, s in expected.items():
             if arrays[key].shape != s:
                 raise ParamError(f"table {key}", arrays[key].shape, f"{s}")
-        o = facts["outline"]
-        outline = Outline(_fit(o["as_round"]), _fit(o["as_box"]), float(o["p_box"]))
+        outline, *feet = (Outline(_fit(o["as_round"]), _fit(o["as_box"]), float(o["p_box"])) for o in facts["outlines"])
         numbers = {k: float(facts[k]) for k in _NUMBERS}
         lazy = {"images": arrays["images"], "image_norms": arrays["image_norms"]}
         return TargetModel(
             name=name, digest=str(facts["digest"]), pad=pad, phi_rad=phi, l_m=l, z_m=z, reach_m=arrays["reach_m"],
-            fine_m=arrays["fine_m"], outline=outline, centre_m=np.array(facts["centre_m"], dtype=np.float64),
-            **numbers, _lazy=lazy,
+            fine_m=arrays["fine_m"], outline=outline, feet=tuple(feet),
+            centre_m=np.array(facts["centre_m"], dtype=np.float64),
+            sides=(), **numbers, _lazy=lazy,
         )  # fmt: skip
     except (KeyError, TypeError, ValueError) as e:
         raise ParamError("model parts", type(e).__name__, "complete") from e
+
+
+def _outline_facts(outline: Outline) -> dict[str, Any]:
+    return {"as_round": _fit_facts(outline.as_round), "as_box": _fit_facts(outline.as_box), "p_box": outline.p_box}
 
 
 def _fit_facts(fit: KindFit) -> dict[str, Any]:

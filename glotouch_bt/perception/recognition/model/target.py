@@ -6,17 +6,18 @@ height z of the pads' mid-point above the floor.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
+from glotouch_bt.perception.recognition.model.feet import foot_outlines
 from glotouch_bt.perception.recognition.model.outline import Outline, minimum_rectangle, traced_outline
 from glotouch_bt.perception.recognition.model.pads import FINE, Array32, PadSpec, image_feature
 from glotouch_bt.perception.recognition.model.raster import mirrored, side_images, window_max
 from glotouch_bt.perception.recognition.model.simulated_touches import pooled_images, simulated_statistics
-from glotouch_bt.robot import Array
-from glotouch_bt.robot.scene import Mesh
+from glotouch_bt.robot import Array, ParamError
+from glotouch_bt.robot.scene import UPRIGHT, Mesh, Quat
 
 YAWS = 72
 """Number of relative yaws."""
@@ -24,8 +25,25 @@ STRIDE = 2
 """Number of raster cells per table cell: 2.3 mm along x_P, 2.7 mm in height."""
 MAX_UNEVENNESS_M = 2e-3
 """Maximum unevenness between neighbouring widths; larger differences depend on the pose, not on noise."""
+WHOLE = 0.2
+"""Probability that the probe traces an object of separate parts as a whole. Source: ours."""
 _CACHE_SIZE = 64
 _cache: dict[tuple[str, PadSpec], TargetModel] = {}
+
+
+@dataclass(frozen=True, eq=False)
+class TargetHypothesis:
+    """One way in which the object may stand and be traced.
+
+    Attributes:
+        model: Its tables and outline then.
+        quat: Rotation (w, x, y, z) from the mesh's file.
+        weight: Prior probability.
+    """
+
+    model: TargetModel
+    quat: Quat
+    weight: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +60,14 @@ class TargetModel:
         reach_m: (72, nl, nz) maximum coordinate along y_P inside the left pad's window; NaN if empty.
         fine_m: (72, fl, fz) side images, source of the tables (see `raster`); -inf if empty.
         outline: Simulated traces, about `centre_m`.
+        feet: Simulated traces of the parts that the probe takes for separate objects; empty if there is one part.
         centre_m: (2,) centre of the footprint's minimum-area rectangle, in the mesh's frame O.
         height_m: Top above the floor.
         rho: Nonplanarity predicted for a 10 N touch, median over simulated touches (the paper's rho_M).
         rho_sd: Its deviation over touches (half the 16-84 % range).
         normal_dispersion: 1 - |mean normal| over touched patches, mean over touches (the paper's d_M).
         anisotropy: 1 - short / long of the footprint's minimum-area rectangle (the paper's a_M).
+        sides: The sides on which the object may stand, each with a model of its own; empty if only as in its file.
     """
 
     name: str
@@ -65,6 +85,8 @@ class TargetModel:
     rho_sd: float
     normal_dispersion: float
     anisotropy: float
+    feet: tuple[Outline, ...] = ()
+    sides: tuple[TargetHypothesis, ...] = ()
     _lazy: dict[str, Array32] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -77,6 +99,30 @@ class TargetModel:
                 del _cache[next(iter(_cache))]
             _cache[key] = _build(mesh, pad)
         return _cache[key]
+
+    @cached_property
+    def hypotheses(self) -> tuple[TargetHypothesis, ...]:
+        """How the object may stand and what the probe may have traced of it; the weights sum to 1."""
+        found: list[TargetHypothesis] = []
+        for side in self.sides or (TargetHypothesis(self, UPRIGHT, 1.0),):
+            model, feet = side.model, side.model.feet
+            whole = WHOLE if feet else 1.0
+            found.append(replace(side, weight=side.weight * whole))
+            for foot in feet:
+                share = side.weight * (1.0 - whole) / len(feet)
+                found.append(TargetHypothesis(replace(model, outline=foot, feet=()), side.quat, share))
+        return tuple(found)
+
+    def standing(self, quat: Quat) -> TargetModel:
+        """Return the model of the object on one of its sides.
+
+        Raises:
+            ParamError: It is none of `sides`.
+        """
+        for h in self.hypotheses:
+            if h.quat == quat:
+                return h.model
+        raise ParamError("quat", quat, "one of the sides of the model")
 
     @cached_property
     def width_m(self) -> Array32:
@@ -209,5 +255,5 @@ def _build(mesh: Mesh, pad: PadSpec) -> TargetModel:
         a.setflags(write=False)
     return TargetModel(
         mesh.name, mesh.digest, pad, axes.phi_rad, axes.l_m, axes.z_m, reach, fine, outline, axes.centre_m,
-        axes.height_m, rho, rho_sd, dispersion, axes.anisotropy,
+        axes.height_m, rho, rho_sd, dispersion, axes.anisotropy, foot_outlines(solid),
     )  # fmt: skip
