@@ -125,6 +125,14 @@ class Candidate:
         along = self.extent_K_m @ np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
         return float(along.min()), float(along.max())
 
+    def strip_span_m(self, yaw_rad: float, at_K_m: Array, half_m: float) -> tuple[float, float]:
+        """Return the same of a free outline, within `half_m` of the line through a point (2,); the point if empty."""
+        u = np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
+        points = self.extent_K_m
+        inside = points[np.abs((points - at_K_m) @ [-u[1], u[0]]) <= half_m]
+        along = (inside if len(inside) else np.asarray(at_K_m)[None]) @ u
+        return float(along.min()), float(along.max())
+
     @property
     def extent_K_m(self) -> Array:
         """(n, 2) contact points and outline vertices, in K. Protruding parts are only in the contacts."""

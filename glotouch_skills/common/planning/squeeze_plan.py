@@ -39,17 +39,25 @@ class Stance:
     opening_m: float
 
 
-def stance(candidate: Candidate, along_m: float, yaw_K_rad: float, side_gap_m: float, stroke_m: float) -> Stance | None:
+def stance(
+    candidate: Candidate, along_m: float, yaw_K_rad: float, side_gap_m: float, gripper: Gripper
+) -> Stance | None:
     """Return the stance `along_m` from the candidate's centre along `yaw_K_rad`, in the middle of its extent across.
 
-    None if the candidate does not fit between the jaws there.
+    None if the candidate does not fit between the jaws there. Of an irregular outline that is too wide as a whole, only
+    what lies between the fingers must fit.
     """
+    contour, stroke_m = candidate.contour, gripper.stroke_m
     x = np.array([np.cos(yaw_K_rad), np.sin(yaw_K_rad)])
     y = np.array([-x[1], x[0]])
     low, high = candidate.span_m(yaw_K_rad + 0.5 * np.pi)
-    if high - low > stroke_m - 2 * MIN_SIDE_GAP_M:
+    widest_m = stroke_m - 2 * MIN_SIDE_GAP_M
+    if high - low > widest_m and contour.family == "free":
+        half_m = gripper.finger.half_m[0] + MIN_SIDE_GAP_M
+        low, high = candidate.strip_span_m(yaw_K_rad + 0.5 * np.pi, contour.centre_K_m + along_m * x, half_m)
+    if high - low > widest_m:
         return None
-    position = (candidate.contour.centre_K_m @ x + along_m) * x + 0.5 * (low + high) * y
+    position = (contour.centre_K_m @ x + along_m) * x + 0.5 * (low + high) * y
     return Stance(position, yaw_K_rad, min(high - low + 2 * side_gap_m, stroke_m))
 
 
@@ -116,7 +124,7 @@ def _first_free(
 ) -> Motion[Stance | None]:
     for along, yaw in alternatives:
         for gap in side_gaps_m:
-            at = stance(candidate, along, yaw, gap, arm.description.gripper.stroke_m)
+            at = stance(candidate, along, yaw, gap, arm.description.gripper)
             if at is None:
                 refusals.append(f"wider than the jaws open at yaw {np.rad2deg(yaw):.0f} deg")
                 break

@@ -69,7 +69,7 @@ def stances_over(candidate: Candidate, gripper: Gripper, side_gap_m: float) -> l
     if contour.kind == "box":
         tracks, *_ = schemes(candidate, gripper)
         places += [alternatives[0] for alternatives in tracks if abs(alternatives[0][0]) > SAME_M]
-    found = (stance(candidate, along, yaw, side_gap_m, gripper.stroke_m) for along, yaw in places)
+    found = (stance(candidate, along, yaw, side_gap_m, gripper) for along, yaw in places)
     return [s for s in found if s is not None]
 
 
