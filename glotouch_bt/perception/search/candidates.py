@@ -36,6 +36,9 @@ WELL_TRACED_QUALITY = 0.5
 """Minimum `contour_quality` of a candidate that is traced on all sides."""
 CLOSED_QUALITY = 0.75
 """Minimum `quality` of a candidate that is traced on all sides: the centre's standard deviation is below 3 mm."""
+STANDS_OUT_M = 0.012
+"""Maximum distance of all contacts of a trace from the envelope of a candidate that is known on all sides, if they are
+contacts with it. Source: ours; the ball's diameter."""
 ON_M = 0.004
 """Maximum distance from such a candidate's envelope at which a contact belongs to it."""
 HALF_QUALITY_SD_M = 0.005
@@ -185,7 +188,7 @@ def _outline(contacts: tuple[Contact, ...], radius_m: float) -> OutlineBelief:
 def _merged(old: Candidate, traced: OutlineTrace, radius_m: float, height_m: float) -> Candidate | None:
     """Return the union of candidate and trace, or None if they are two objects."""
     points = np.array([c.point_K_m for c in traced.contacts])
-    if not _overlaps(old, points) and not (_is_closed(old) and _is_inside(old, traced)):
+    if not _overlaps(old, points) and not (_is_closed(old) and _is_over(old, traced)):
         return None
     shift = np.array([*traced.displaced_K_m, 0.0])
     before = (replace(c, tip_K_m=c.tip_K_m + shift, point_K_m=c.point_K_m + shift[:2]) for c in old.contacts)
@@ -209,8 +212,14 @@ def _overlaps(old: Candidate, points: Array) -> bool:
     return float(outside_m.min()) <= SAME_M or _apart_m(old.contacts, points) <= BETWEEN_M
 
 
-def _is_inside(old: Candidate, traced: OutlineTrace) -> bool:
-    """Return True if the middle of a trace lies in a candidate: an object that was pushed lies over its old place."""
+def _is_over(old: Candidate, traced: OutlineTrace) -> bool:
+    """Return True if a whole trace lies over or close to a candidate: it was pushed, or a part of it stands out.
+
+    A trace round a neighbour has contacts on its far side.
+    """
+    points = np.array([c.point_K_m for c in traced.contacts])
+    if float(signed_distance(envelope(old), points).max()) <= STANDS_OUT_M:
+        return True
     if traced.outline is None:
         return False
     return float(signed_distance(envelope(old), traced.outline.contour.centre_K_m[None])[0]) <= 0.0
