@@ -76,6 +76,36 @@ def test_what_stands_too_near_for_another_object_is_the_same(candidate):
     assert two == {0.016: 1, 0.026: 2}
 
 
+def ring(x, y, radius, degrees):
+    """Contacts round a disc."""
+    angles = np.deg2rad(degrees)
+    return tuple(
+        contact(x + radius * c, y + radius * s, c, s) for c, s in zip(np.cos(angles), np.sin(angles), strict=True)
+    )
+
+
+def disc_of_40_mm():
+    contacts = ring(0.0, 0.0, 0.02, np.arange(0.0, 360.0, 45.0))
+    outline = _outline(contacts, R)
+    return Candidate(0, outline.contour, 0.018, quality(outline), contacts)
+
+
+@pytest.mark.parametrize(
+    ("contacts", "objects"),
+    [
+        (ring(0.050, 0.0, 0.02, [180.0, 90.0, 0.0, 270.0]), 2),  # another disc, 10 mm beside it
+        (ring(0.007, 0.0, 0.02, [0.0, 60.0, 300.0]), 1),  # the same, pushed by 7 mm
+        (ring(0.020, 0.0, 0.006, [90.0, 0.0, 270.0]), 1),  # a nose of 6 mm on its side
+    ],
+    ids=["a neighbour", "pushed", "a part that stands out"],
+)
+def test_what_lies_beside_an_outline_known_on_all_sides(contacts, objects):
+    known = disc_of_40_mm()
+    traced = OutlineTrace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)))
+    belief = SearchMap.blank((0.2, 0.15), expected=2).with_exclusion(known.contour, 0.01)
+    assert len(admit(belief, (known,), contacts[0], traced, 0.018, 0.01).candidates) == objects
+
+
 @pytest.mark.parametrize("gap", [0.016, 0.026])
 def test_a_trace_turns_out_to_be_of_a_candidate_where_it_will_be_made_one_with_it(candidate, gap):
     contacts = tuple(contact(0.01 + gap + dx, y, nx, ny) for dx, y, nx, ny in LIMB)
