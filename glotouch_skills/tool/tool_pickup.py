@@ -33,6 +33,9 @@ MAX_PULL_FORCE_N = 25.0
 simulated)."""
 OUT_M = 0.01
 """Height of the ball above the holder from which it rises fast. Source: ours."""
+DOWN_M_S = 0.03
+"""Speed down over the handle. Source: at 0.05 m/s, fingers that met a leaning handle stopped the robot (as in
+`hand.descent`, train of seed 41001)."""
 MAX_PULL_M_S = 0.05
 """Largest speed of the extraction. At this speed, a probe stuck with 3 N/mm is pulled by 2.5 N more until the arm
 stops, which stays below the hard limit."""
@@ -173,7 +176,7 @@ class ToolPickup(Skill):
             raise MotionRefused("jaws", f"they stay {state.aperture_m * 1e3:.1f} mm apart; the way down needs more")
         with may_touch(arm, "hand", "probe", "holder"):
             guard = yield from straight_guard(arm, DOWN_B, MAX_APPROACH_FORCE_N)
-            moved = yield from arm.line(grasp, 0.05, guard=guard)
+            moved = yield from arm.line(grasp, DOWN_M_S, guard=guard)
             if (why := describe_stop(moved)) is not None:
                 yield from arm.line(above, 0.05)
                 raise self.HARD_CONTACT(
