@@ -34,7 +34,7 @@ simulated)."""
 OUT_M = 0.01
 """Height of the ball above the holder from which it rises fast. Source: ours."""
 DOWN_M_S = 0.03
-"""Speed down over the handle. Source: at 0.05 m/s, fingers that met a leaning handle stopped the robot (as in
+"""Speed down over the handle. Source: at 0.05 m/s, fingers that met something there stopped the robot (as in
 `hand.descent`, train of seed 41001)."""
 MAX_PULL_M_S = 0.05
 """Largest speed of the extraction. At this speed, a probe stuck with 3 N/mm is pulled by 2.5 N more until the arm
