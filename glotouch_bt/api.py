@@ -20,6 +20,7 @@ def run(
     backend: str = "mujoco",
     seed: int = 0,
     objects: str | Path | None = None,
+    world: str | Path | None = None,
     conditions: str | Path = "nominal",
     faults: str | Path | FaultPlan | None = None,
     out: str | Path | None = None,
@@ -34,6 +35,7 @@ def run(
         backend: Name of a registered backend (`glotouch backends`).
         seed: Source of every random draw, 0 .. 2**32 - 1.
         objects: Folder of watertight STL files in metres, instead of the world's.
+        world: Path of a world file, or the name of a shipped world, instead of the mission's.
         conditions: Disturbances: ideal, nominal, harsh, realistic, or the path of a file; NAME+FIELD=VALUE changes a
             field.
         faults: A fault plan: a path, the name of a shipped plan, or a loaded plan.
@@ -62,6 +64,7 @@ def run(
             faults,
             overwrite=overwrite,
             allow_paths=tuple(map(Path, allow_paths)),
+            world=None if world is None else str(world),
         )
     )
     if isinstance(done.outcome.error, KeyboardInterrupt):

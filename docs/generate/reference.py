@@ -247,6 +247,8 @@ def worlds() -> str:
         "world of a simulation is drawn from the seed and the [conditions](conditions.md). Positions are in B, the "
         "arm's base frame; "
         "K is the centre of the container's floor.\n",
+        "A mission names its world. `run`, `check` and `bench retrieve --world WORLD` take another one: a file, or a "
+        "shipped name.\n",
         "```yaml\n" + shipped("worlds")["container_five"].read_text().rstrip() + "\n```\n",
         fields(WorldFile),
     ]

@@ -8,7 +8,17 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.shared import AllowPaths, Backend, Json, Objects, Settings, guarded, print_json, read_settings
+from glotouch_bt.commands.shared import (
+    AllowPaths,
+    Backend,
+    Json,
+    Objects,
+    Settings,
+    WorldName,
+    guarded,
+    print_json,
+    read_settings,
+)
 
 
 @guarded
@@ -16,6 +26,7 @@ def check(
     missions: Annotated[list[str], typer.Argument(metavar="MISSION", help="mission files or shipped names")],
     set_: Settings = None,
     objects: Objects = None,
+    world: WorldName = None,
     allow_path: AllowPaths = None,
     backend: Backend = "mujoco",
     strict: Annotated[bool, typer.Option("--strict", help="treat warnings as errors")] = False,
@@ -38,7 +49,7 @@ def check(
         report: dict[str, object] = {"mission": given, "ok": True}
         summary = ""
         try:
-            mission = load_mission(given, settings, objects=objects, allow_paths=allow_path or ())
+            mission = load_mission(given, settings, objects=objects, world=world, allow_paths=allow_path or ())
         except MissionFaults as e:
             found = [*e.findings, *e.warnings]
         except BadInput as e:

@@ -17,6 +17,7 @@ def run(
     seed: Annotated[int, typer.Option(help="source of every random draw")] = 0,
     set_: shared.Settings = None,
     objects: shared.Objects = None,
+    world: shared.WorldName = None,
     allow_path: shared.AllowPaths = None,
     conditions: shared.Conditions = "nominal",
     set_condition: shared.SetConditions = None,
@@ -48,6 +49,7 @@ def run(
         may_kill=True,
         overwrite=overwrite,
         allow_paths=tuple(allow_path or ()),
+        world=world,
     )
     control = Operator()
     with shared.live_page(live, control, port, no_browser, objects) as page, shared.live_tree(groot2) as tree:

@@ -103,6 +103,7 @@ def load_mission(
     *,
     skills: Mapping[str, type[Skill]] | None = None,
     objects: Path | None = None,
+    world: str | None = None,
     allow_paths: Sequence[Path] = (),
 ) -> Mission:
     """Load and check a mission.
@@ -112,6 +113,7 @@ def load_mission(
         settings: `--set` values; names the mission does not declare are left to the caller (`split_settings`).
         skills: Known skills (default: all that are installed).
         objects: A folder of STL files to use instead of the world's.
+        world: Path or name of a world to use instead of the mission's.
         allow_paths: Folders in which subtrees may be, besides the mission's own.
 
     Raises:
@@ -122,7 +124,7 @@ def load_mission(
     findings = Findings()
     roots = tuple(folder.resolve() for folder in (path.parent, *allow_paths))
     skills = SkillRegistry() if skills is None else skills
-    mission = _read(path, dict(settings or {}), skills, objects, roots, findings)
+    mission = _read(path, dict(settings or {}), skills, objects, world, roots, findings)
     if mission is None or len(findings):
         raise MissionFaults(findings.errors, findings.warnings)
     return mission
@@ -153,6 +155,7 @@ def _read(
     settings: Mapping[str, str | Value],
     skills: Mapping[str, type[Skill]],
     objects: Path | None,
+    other_world: str | None,
     roots: tuple[Path, ...],
     findings: Findings,
 ) -> Mission | None:
@@ -169,7 +172,8 @@ def _read(
             findings.unknown(key.place, "unknown_key", "key of a mission:", str(key.value), MISSION_KEYS)
     name = _text(source, "mission", findings, required=True)
     description = _text(source, "description", findings, required=False)
-    world, world_document = _world(source, path, objects, findings)
+    node = source.get("world") if other_world is None else Scalar(other_world, Place("--world"))
+    world, world_document = _world(source, node, path, objects, findings)
     chosen = world.objects if world else None
     section = source.get("parameters")
     given = {n: from_command_line(n, v, section) for n, v in settings.items()}
@@ -245,8 +249,9 @@ def _timeout(source: Map, findings: Findings) -> float:
     return float(value)
 
 
-def _world(source: Map, path: Path, objects: Path | None, findings: Findings) -> tuple[World | None, object]:
-    node = source.get("world")
+def _world(
+    source: Map, node: Node | None, path: Path, objects: Path | None, findings: Findings
+) -> tuple[World | None, object]:
     if node is None:
         findings.add(source.place, "missing_key", "a mission needs 'world'", valid="worlds/NAME.yaml or a path")
         return None, None
@@ -255,7 +260,8 @@ def _world(source: Map, path: Path, objects: Path | None, findings: Findings) ->
     if not isinstance(node, Scalar) or not isinstance(node.value, str):
         findings.add(node.place, "wrong_type", "world: must be the path of a world file")
         return None, None
-    found = _find_world(node.value, path)
+    near = path.parent if node is source.get("world") else Path()  # of the command line: beside the working folder
+    found = _find_world(node.value, (near, shipped_root()))
     if found is None:
         names = [f"worlds/{p.name}" for p in sorted((shipped_root() / "worlds").glob("*.yaml"))]
         findings.unknown(node.place, "unknown_world", "world", node.value, names)
@@ -270,10 +276,10 @@ def _world(source: Map, path: Path, objects: Path | None, findings: Findings) ->
     return read_world(content, found, findings, objects), document
 
 
-def _find_world(given: str, mission: Path) -> Path | None:
-    """Return the path of a world, relative to the mission's file or to the shipped missions; None: there is none."""
+def _find_world(given: str, roots: Sequence[Path]) -> Path | None:
+    """Return the path of a world, relative to one of these folders; None: there is none."""
     names = [given] if given.endswith((".yaml", ".yml")) else [given, f"worlds/{given}.yaml"]
-    for root in (mission.parent, shipped_root()):
+    for root in roots:
         for name in names:
             if isfile(root / name):
                 return root / name

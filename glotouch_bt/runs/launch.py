@@ -114,7 +114,9 @@ def launch(
 
 def _mission(request: RunRequest, **more: str) -> Mission:
     settings = {**request.settings, **more}
-    return load_mission(request.mission, settings, objects=request.objects, allow_paths=request.allow_paths)
+    return load_mission(
+        request.mission, settings, objects=request.objects, world=request.world, allow_paths=request.allow_paths
+    )
 
 
 def _fault_plan(request: RunRequest, mission: Mission) -> FaultPlan | None:

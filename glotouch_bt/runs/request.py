@@ -21,6 +21,7 @@ class RunRequest:
         backend: Name of a registered backend.
         seed: Source of every random draw, 0 .. 2**32 - 1.
         settings: `--set` values: mission parameters; names that are no parameter go to the backend.
+        world: Path or shipped name of a world instead of the mission's.
         objects: Folder of STL files instead of the world's.
         conditions: Path or shipped name, with changes as in `load_conditions`.
         out: The run's folder (default: runs/<time>-<mission>-s<seed>).
@@ -43,6 +44,7 @@ class RunRequest:
     report: bool = True
     overwrite: bool = True
     allow_paths: tuple[Path, ...] = ()
+    world: str | None = None
 
     def as_json(self) -> dict[str, Any]:
         """Return what is needed to open the same robot and mission again, as JSON data."""

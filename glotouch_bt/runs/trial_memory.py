@@ -90,7 +90,9 @@ def described_request(request: RunRequest) -> dict[str, Any]:
         "settings": dict(settings),
         "conditions": request.conditions,
         "faults": _described_plan(request),
-        "content": _content(request.mission, settings, request.objects, request.conditions, request.allow_paths),
+        "content": _content(
+            request.mission, settings, request.objects, request.world, request.conditions, request.allow_paths
+        ),
         "versions": installed_versions(),
     }
 
@@ -100,11 +102,12 @@ def _content(
     mission: str,
     settings: tuple[tuple[str, str], ...],
     objects: Path | None,
+    other_world: str | None,
     conditions: str,
     allow_paths: tuple[Path, ...],
 ) -> dict[str, str]:
     """Return the digests of the mission with its world, of each object, and of the conditions."""
-    loaded = load_mission(mission, dict(settings), objects=objects, allow_paths=allow_paths)
+    loaded = load_mission(mission, dict(settings), objects=objects, world=other_world, allow_paths=allow_paths)
     chosen = loaded.world.objects
     world = replace(loaded.world, objects=replace(chosen, folder=Path()))
     parts: dict[str, Any] = {

@@ -39,6 +39,7 @@ class Campaign:
         settings: `--set` values of every trial.
         conditions: Path or shipped name.
         objects: Folder of STL files instead of the world's.
+        world: Path or shipped name of a world instead of the mission's.
         backend: Registered name.
         resume: Keep the trials that are finished in `out`.
     """
@@ -49,17 +50,20 @@ class Campaign:
     settings: Mapping[str, str] = field(default_factory=dict)
     conditions: str = "nominal"
     objects: Path | None = None
+    world: str | None = None
     backend: str = "mujoco"
     resume: bool = False
 
     def request(self, seed: int, name: str, **changes: Any) -> RunRequest:
         """Return the request of a trial in the folder `name`; `changes` are further fields of the request."""
-        given = {"settings": self.settings, "objects": self.objects, "out": self.out / name, "overwrite": True}
-        return RunRequest(self.mission, self.backend, seed, conditions=self.conditions, **given | changes)
+        given: dict[str, Any] = {"settings": self.settings, "objects": self.objects, "world": self.world}
+        given |= {"conditions": self.conditions, "out": self.out / name, "overwrite": True}
+        return RunRequest(self.mission, self.backend, seed, **given | changes)
 
     def described(self) -> dict[str, Any]:
         """Return the settings that every summary.json repeats."""
-        return {"mission": self.mission, "conditions": self.conditions, "seeds": list(self.seeds)}
+        world = {} if self.world is None else {"world": self.world}
+        return {"mission": self.mission, **world, "conditions": self.conditions, "seeds": list(self.seeds)}
 
 
 @dataclass(frozen=True)

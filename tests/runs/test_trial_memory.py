@@ -75,6 +75,7 @@ def change_conditions(request: RunRequest) -> RunRequest:
     ("change", "said"),
     [
         (lambda r: replace(r, conditions="harsh"), "conditions "),
+        (lambda r: replace(r, world="lying_five"), "content of world "),
         (lambda r: replace(r, backend="mujoco"), 'backend "fake", now "mujoco"'),
         (lambda r: replace(r, seed=4), "seed 3, now 4"),
         (lambda r: replace(r, settings={"devices": "x"}), 'settings: devices none, now "x"'),

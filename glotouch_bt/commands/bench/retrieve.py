@@ -19,6 +19,7 @@ def retrieve(
     conditions: shared.Conditions = "nominal",
     set_condition: shared.SetConditions = None,
     objects: shared.Objects = None,
+    world: shared.WorldName = None,
     backend: shared.Backend = "mujoco",
     set_: shared.Settings = None,
     resume: shared.KeepTrials = False,
@@ -37,7 +38,7 @@ def retrieve(
     if "target" in settings:
         raise BadInput("--set target: use --target to choose the targets of a campaign")
     # The default target may be missing from other objects: load the mission with a target that exists.
-    loaded = load_mission(mission, settings | ({"target": names[0]} if names else {}), objects=objects)
+    loaded = load_mission(mission, settings | ({"target": names[0]} if names else {}), objects=objects, world=world)
     shared.check_parameters(loaded, ("target",))
     campaign = RetrieveCampaign(
         mission=mission,
@@ -46,6 +47,7 @@ def retrieve(
         seeds=tuple(range(seed, seed + trials)),
         conditions=shared.changed_conditions(conditions, set_condition),
         objects=objects,
+        world=world,
         backend=backend,
         out=shared.bench_folder(out, "retrieve"),
         settings=settings,

@@ -26,6 +26,7 @@ from glotouch_bt.commands.shared.options import (
     SummaryJson,
     Trials,
     Workers,
+    WorldName,
     bench_folder,
     changed_conditions,
     check_names,

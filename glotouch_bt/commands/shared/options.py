@@ -28,6 +28,9 @@ Objects = Annotated[
     Path | None,
     typer.Option("--objects", metavar="DIR", help="folder of watertight STL files in metres (see: glotouch objects)"),
 ]
+WorldName = Annotated[
+    str | None, typer.Option("--world", metavar="WORLD", help="a world file or shipped name, instead of the mission's")
+]
 AllowPaths = Annotated[
     list[Path] | None,
     typer.Option("--allow-path", metavar="DIR", help="further folder that the mission's subtrees may be in"),

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read.library import shipped_root
 from glotouch_bt.mission.read.worlds import conditions_name, load_conditions, load_world
 from glotouch_bt.mission.spec.findings import MissionFaults
@@ -138,3 +139,19 @@ def test_the_realistic_profile_is_nominal_with_every_axis() -> None:
             assert getattr(realistic, f.name) == getattr(nominal, f.name)
     assert not nominal.axes_set()
     assert not load_conditions("harsh").axes_set()
+
+
+def test_a_mission_in_another_world(tmp_path: Path) -> None:
+    """A shipped name, or a file beside the working folder; the saved mission names the world that was used."""
+    shipped = load_mission("retrieve", world="close_five")
+    assert (shipped.world.objects.min_gap_m, shipped.document["world"]) == (0.010, "worlds/close_five.yaml")
+    own = tmp_path / "mine.yaml"
+    own.write_text(
+        (shipped_root() / "worlds" / "lying_five.yaml")
+        .read_text()
+        .replace("../objects", str(shipped_root() / "objects"))
+    )
+    mine = load_mission("retrieve", world=str(own))
+    assert (mine.world.objects.stance, mine.document["world"]) == ("any", str(own))
+    with pytest.raises(MissionFaults, match="unknown world 'close_fife'"):
+        load_mission("retrieve", world="close_fife")
