@@ -23,7 +23,7 @@ def test_it_goes_through_its_stages_in_order(retrieve: Run) -> None:
         "tool_check", "wrist_check", "guarded_sweep", "orbit_probe",
         "next_probe", "refine_outline", "next_probe", "touch_top", "next_probe", "tool_check 3", "tool_return",
         "wrist_check 3", "touch_next", "touch_next",
-        "match", "put_back", "wrist_check 9", "grasp", "lift", "hold_check", "object_check",
+        "match", "put_back", "wrist_check 13", "grasp", "lift", "hold_check", "object_check",
     ]  # fmt: skip
 
 
@@ -71,10 +71,11 @@ def test_if_that_does_not_suffice_what_was_excluded_is_measured(retrieve: Run) -
     assert {t.candidate for t in touched.inputs["probed"]} == {0, 1, 2}
 
 
-def test_if_all_was_measured_the_probe_is_not_taken_again(retrieve: Run) -> None:
+def test_if_all_was_measured_the_probe_is_taken_again_only_to_search_on(retrieve: Run) -> None:
     run = scheduled(retrieve, {"match*": REFUSED, "touch_next*": DECIDED})
     assert safely(run, "not_recognised")
-    assert (run.ran("match"), run.ran("match 2"), len(run.calls_of("tool_pickup*"))) == (1, 1, 1)
+    assert (run.ran("match"), run.ran("match 2"), len(run.calls_of("tool_pickup*"))) == (1, 1, 2)
+    assert run.before("tool_pickup 5", "search_anew 2")
 
 
 @each_code("tool_pickup")
