@@ -136,10 +136,10 @@ def test_only_the_first_other_tick_is_told() -> None:
 
 
 class EveryNow(Control):
-    """Asks for a pause of 0.3 s every 2 s."""
+    """Asks for a pause of 0.3 s every second."""
 
     def wants_pause(self, ticks: int, now_s: float) -> bool:
-        return now_s % 2.0 < 0.3
+        return now_s % 1.0 < 0.3
 
 
 def test_a_paused_run_is_replayed_with_its_pauses(tmp_path: Path) -> None:
