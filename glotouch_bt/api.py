@@ -77,6 +77,7 @@ def check(
     settings: Mapping[str, str | Value] | None = None,
     *,
     objects: str | Path | None = None,
+    world: str | Path | None = None,
     allow_paths: Sequence[str | Path] = (),
     backend: str = "mujoco",
 ) -> tuple[Finding, ...]:
@@ -86,6 +87,7 @@ def check(
         mission: Path of a mission file, or the name of a shipped mission.
         settings: Values of the mission's parameters.
         objects: Folder of watertight STL files in metres, instead of the world's.
+        world: Path of a world file, or the name of a shipped world, instead of the mission's.
         allow_paths: Folders in which subtrees may be, besides the mission's own.
         backend: The robot that must be able to grasp the target.
 
@@ -96,8 +98,13 @@ def check(
         BadInput: The mission cannot be read at all.
     """
     try:
-        folder = None if objects is None else Path(objects)
-        loaded = load_mission(mission, settings, objects=folder, allow_paths=tuple(map(Path, allow_paths)))
+        loaded = load_mission(
+            mission,
+            settings,
+            objects=None if objects is None else Path(objects),
+            world=None if world is None else str(world),
+            allow_paths=tuple(map(Path, allow_paths)),
+        )
     except MissionFaults as e:
         return (*e.findings, *e.warnings)
     return (*loaded.warnings, *check_objects(loaded, backend))

@@ -1,6 +1,7 @@
 """The sides on which the target may stand, as hypotheses of its model.
 
-Sides on which an object feels the same, as those of a lying cylinder, are one hypothesis.
+Sides on which an object feels the same, as the six of a cube, are one hypothesis. An object that rolls, such as a lying
+cylinder, has no stable side there and no hypothesis.
 """
 
 from __future__ import annotations
@@ -15,18 +16,19 @@ from glotouch_bt.perception.recognition.model import PadSpec, TargetHypothesis, 
 from glotouch_bt.robot import Array, ParamError
 from glotouch_bt.robot.scene import UPRIGHT, ByDigest, Mesh, Quat, stances, standing
 
-TOPPLED = 0.1
+TOPPLED_PRIOR = 0.1
 """Prior probability that an object of an upright world lies: the probe and the jaws topple some. Source: ours."""
 MIN_SHARE = 0.03
-"""Sides with a smaller share are left out. Source: ours."""
+"""Minimum share of a side, 0..1; that of the file has at least this weight. Source: ours."""
 MAX_SIDES = 6
 """Largest number of sides besides upright. Source: ours."""
 SAMPLES = 4000
 """Number of points on the surface by which sides are compared."""
-BEARINGS, LEVELS = 72, 8
-"""Number of bearings and of slabs of height in which the points' reach is compared."""
+BEARINGS, LEVELS, LEVEL_M = 72, 8, 0.015
+"""Numbers of bearings and of levels, and height of a level, at which the points' reach is compared; the last level has
+no upper end."""
 ALIKE_M = 0.0015
-"""Mean difference in reach below which two sides feel the same. Source: ours; the sampling gives 0.5 mm."""
+"""Maximum mean difference in reach of two sides that feel the same. Source: ours."""
 
 
 def model_with_sides(mesh: Mesh, pad: PadSpec, stance: str) -> TargetModel:
@@ -49,9 +51,9 @@ def _sides(key: ByDigest, pad: PadSpec, stance: str) -> tuple[TargetHypothesis, 
     mesh = key.mesh
     shares = _distinct_sides(mesh)
     if stance == "any":
-        weights = {q: s for q, s in shares.items() if s >= MIN_SHARE}
+        weights = {q: max(s, MIN_SHARE) for q, s in shares.items() if q == UPRIGHT or s >= MIN_SHARE}
     else:
-        lying = {q: TOPPLED * s for q, s in shares.items() if q != UPRIGHT and s >= MIN_SHARE}
+        lying = {q: TOPPLED_PRIOR * s for q, s in shares.items() if q != UPRIGHT and s >= MIN_SHARE}
         weights = {UPRIGHT: 1.0 - sum(lying.values()), **lying}
     found = []
     for quat, weight in sorted(weights.items(), key=lambda w: (w[0] != UPRIGHT, -w[1]))[: 1 + MAX_SIDES]:
@@ -91,18 +93,18 @@ def _surface(mesh: Mesh) -> Array:
 
 
 def _reach(mesh: Mesh, points_m: Array, quat: Quat) -> Array:
-    """Return how far (BEARINGS, LEVELS) a side's points reach from the middle of its footprint; 0 where there are none.
+    """Return the reach (BEARINGS, LEVELS), m, of a side's points from the middle of its footprint; 0 without points.
 
-    The points are in the frame of the file; slabs are of one height for all sides.
+    The points (n, 3) are in the frame of the file.
     """
     p = standing(replace(mesh, vertices_m=points_m), quat).vertices_m
     angle = np.arange(BEARINGS) * (2 * np.pi / BEARINGS)
     along = p[:, :2] @ np.stack([np.cos(angle), np.sin(angle)])
-    slab = np.minimum((p[:, 2] / 0.015).astype(np.int64), LEVELS - 1)
+    at = np.minimum((p[:, 2] / LEVEL_M).astype(np.int64), LEVELS - 1)
     reach = np.zeros((BEARINGS, LEVELS))
     for level in range(LEVELS):
-        if (slab == level).any():
-            reach[:, level] = along[slab == level].max(axis=0)
+        if (at == level).any():
+            reach[:, level] = along[at == level].max(axis=0)
     return reach
 
 

@@ -24,7 +24,7 @@ from glotouch_bt.untrusted import parse_json
 READY, FAULT = "ready", "fault"
 """First words of the line that such a process sends first: with its address, or with the reason why it cannot start."""
 START_S = 60.0
-"""Time in which the process must send its first line. Source: ours; its imports take 2 s on an idle machine."""
+"""Time in which the process must send its first line. Source: ours; long enough for its imports on a busy machine."""
 END_S = 5.0
 """Time in which the process must end after its input was closed."""
 PYTHON = (sys.executable, "-P", "-m")

@@ -25,8 +25,8 @@ class SearchAnewParams(SkillParams):
 class SearchAnew(Skill):
     """Keep the traced objects and clear the rest of the map, after a search with a slipped or lost probe.
 
-    A place that such a probe passed without contact may not be free. With `more_objects` the map is kept, and expects
-    more objects: what was traced as two may be one, and the search ended too soon.
+    A place that such a probe passed without contact may not be free. With `more_objects` the searched places are kept,
+    and the map expects more objects: if one object was traced as two, the search ended too early.
 
     SUCCESS: `map` has the traced objects.
     """

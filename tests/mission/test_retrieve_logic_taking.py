@@ -43,7 +43,7 @@ def test_what_is_not_recognised_is_not_taken(retrieve: Run) -> None:
 
 
 def test_one_more_object_is_looked_for_before_it_gives_up(retrieve: Run) -> None:
-    """What was traced as two objects may be one: the search ended too soon."""
+    """One object may have been traced as two, so that the search ended too early."""
     unknown = {f"match{k}": fails("not_recognised") for k in ("", " 2", " 3", " 4")}
     found = {"touch_next*": ok(decided=True), "orbit_probe 2": ok(complete=True)}
     run = retrieve(unknown | found)

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from glotouch_bt.perception.recognition import MATCHERS, PadSpec
-from glotouch_bt.perception.sides import TOPPLED, model_with_sides
+from glotouch_bt.perception.sides import TOPPLED_PRIOR, model_with_sides
 from glotouch_bt.robot.scene import UPRIGHT, Mesh, load_mesh, standing
 from tests.support.acquisition import IDEAL, acquire
 
@@ -44,11 +44,18 @@ def test_a_brick_has_three_sides_by_solid_angle(brick) -> None:
     assert found == pytest.approx(expected, abs=1e-3)
 
 
+def test_the_side_of_the_file_is_always_a_hypothesis(tmp_path) -> None:
+    """A plate on its short edge, which is improbable (below 3 %). A plan that names no side has the file's."""
+    plate = written(tmp_path, "plate", trimesh.creation.box([0.060, 0.006, 0.110]))
+    model = model_with_sides(plate, PAD, "any")
+    assert model.standing(UPRIGHT).height_m == pytest.approx(0.110)
+
+
 def test_in_an_upright_world_it_stands_unless_it_toppled(brick) -> None:
     first, *others = model_with_sides(brick, PAD, "upright").hypotheses
     assert first.quat == UPRIGHT
-    assert first.weight >= 1.0 - TOPPLED
-    assert sum(h.weight for h in others) <= TOPPLED
+    assert first.weight >= 1.0 - TOPPLED_PRIOR
+    assert sum(h.weight for h in others) <= TOPPLED_PRIOR
     assert len(others) == 2
 
 

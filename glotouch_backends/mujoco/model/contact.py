@@ -26,10 +26,9 @@ STIFF = (0.004, 1.0)
 HOUSING = (0.050, 1.0)
 MIX = {ENVIRONMENT: 1.0, OBJECT: 1000.0, HAND: 150.0, PROBE: 1000.0}
 OBJECT_IMPEDANCE = 0.5
-"""Share of its acceleration that a contact imposes on a free object (MuJoCo's solimp; 1: rigid). A contact that is
-nearly rigid stops an object within a step, whatever holds it. With MuJoCo's own 0.9, an object that rocked between the
-jaws and met the floor at 0.03 m/s stopped the hand's 15 kg with it: 30 to 50 N for a millisecond, on pads that were
-parting from it. Source: traced closures; half a step's length had a similar effect on their peaks."""
+"""Impedance of the contacts of free objects (MuJoCo's solimp, 0..1; 1: rigid). With MuJoCo's default of 0.9, an object
+that rocks between the jaws and meets the floor is stopped within a step, and the hand with it. Source: ours, to lower
+such peaks: 32.7 and 37.0 N in `bench retrieve --conditions realistic`, train of seeds 36013 and 36026, 3643226."""
 PAD = (0.005, 1.0)  # gel skin; the gel model adds the gel's compliance
 PAD_HANDLE_FRICTION = (0.002, 1.0)  # pads on the probe's handle: stiffer, or the probe drifts during transfers
 

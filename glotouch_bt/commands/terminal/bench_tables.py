@@ -23,7 +23,8 @@ def print_retrieve(summary: dict[str, Any], folder: Path) -> None:
         ("all targets", "success"), ("wrong object lifted", "wrong_object"), ("safety stops", "safety_stops"),
         ("tracebacks", "tracebacks"))]  # fmt: skip
     seeds = summary["seeds"]
-    title = f"retrieve, {summary['conditions']}, seeds {seeds[0]}-{seeds[-1]}"
+    world = f" in {summary['world']}" if "world" in summary else ""
+    title = f"retrieve{world}, {summary['conditions']}, seeds {seeds[0]}-{seeds[-1]}"
     print_table(title, ("", "rate [Wilson 95 %]"), rows)
     if summary["causes"]:
         print_table("causes of failure", ("cause", "trials"), [(c, str(n)) for c, n in summary["causes"].items()])

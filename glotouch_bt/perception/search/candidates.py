@@ -34,11 +34,12 @@ FLAT_M = 1e-4
 """Width across their line below which contacts count as collinear."""
 WELL_TRACED_QUALITY = 0.5
 """Minimum `contour_quality` of a candidate that is traced on all sides."""
-CLOSED_QUALITY = 0.75
-"""Minimum `quality` of a candidate that is traced on all sides: the centre's standard deviation is below 3 mm."""
-STANDS_OUT_M = 0.012
-"""Maximum distance of all contacts of a trace from the envelope of a candidate that is known on all sides, if they are
-contacts with it. Source: ours; the ball's diameter."""
+FULLY_TRACED_QUALITY = 0.75
+"""Minimum `quality` of a candidate that is traced on all sides; the centre's standard deviation is then below 3 mm.
+Source: ours."""
+PROTRUSION_M = 0.012
+"""Maximum distance, from the envelope of a fully traced candidate, of a contact with a part that protrudes from it.
+Source: ours; the ball's diameter."""
 ON_M = 0.004
 """Maximum distance from such a candidate's envelope at which a contact belongs to it."""
 HALF_QUALITY_SD_M = 0.005
@@ -168,12 +169,12 @@ def _is_well_traced(candidate: Candidate) -> bool:
     return contour_quality(tips, candidate.contour) >= WELL_TRACED_QUALITY
 
 
-def _is_closed(candidate: Candidate) -> bool:
+def _is_fully_traced(candidate: Candidate) -> bool:
     """Return True if the outline is known on all sides, so that what lies outside it is something else.
 
     The end of something long has contacts on all sides, too, but its centre is uncertain.
     """
-    return candidate.quality >= CLOSED_QUALITY and _is_well_traced(candidate)
+    return candidate.quality >= FULLY_TRACED_QUALITY and _is_well_traced(candidate)
 
 
 def _outline(contacts: tuple[Contact, ...], radius_m: float) -> OutlineBelief:
@@ -188,7 +189,7 @@ def _outline(contacts: tuple[Contact, ...], radius_m: float) -> OutlineBelief:
 def _merged(old: Candidate, traced: OutlineTrace, radius_m: float, height_m: float) -> Candidate | None:
     """Return the union of candidate and trace, or None if they are two objects."""
     points = np.array([c.point_K_m for c in traced.contacts])
-    if not _overlaps(old, points) and not (_is_closed(old) and _is_over(old, traced)):
+    if not _overlaps(old, points) and not (_is_fully_traced(old) and _is_over(old, traced)):
         return None
     shift = np.array([*traced.displaced_K_m, 0.0])
     before = (replace(c, tip_K_m=c.tip_K_m + shift, point_K_m=c.point_K_m + shift[:2]) for c in old.contacts)
@@ -207,18 +208,18 @@ def _merged(old: Candidate, traced: OutlineTrace, radius_m: float, height_m: flo
 def _overlaps(old: Candidate, points: Array) -> bool:
     """Return True if contact points (n, 2) are near enough to a candidate to be the same object."""
     outside_m = signed_distance(envelope(old), points)
-    if _is_closed(old):
+    if _is_fully_traced(old):
         return float(np.median(outside_m)) <= ON_M
     return float(outside_m.min()) <= SAME_M or _apart_m(old.contacts, points) <= BETWEEN_M
 
 
 def _is_over(old: Candidate, traced: OutlineTrace) -> bool:
-    """Return True if a whole trace lies over or close to a candidate: it was pushed, or a part of it stands out.
+    """Return True if a whole trace lies over or close to a candidate: it was pushed, or a part protrudes from it.
 
     A trace round a neighbour has contacts on its far side.
     """
     points = np.array([c.point_K_m for c in traced.contacts])
-    if float(signed_distance(envelope(old), points).max()) <= STANDS_OUT_M:
+    if float(signed_distance(envelope(old), points).max()) <= PROTRUSION_M:
         return True
     if traced.outline is None:
         return False

@@ -28,12 +28,13 @@ MIN_GAP_M = 0.003
 FAST_RISE_RATIO = 5.0
 """Speed of moving up beside the object over the slow speed: the open fingers have just come down that way. Source:
 ours; 50 mm/s by default."""
-OFF_LEDGE_M = 0.003
-"""Height of the fingertips above a ledge that they met, so that they do not drag the object. Source: ours."""
+LEDGE_CLEARANCE_M = 0.003
+"""Clearance of the fingertips above a ledge that they met, so that they do not drag the object. Source: ours."""
 MAX_LEDGE_RATIO = 0.6
-"""Greatest height of the pads then, as part of the object's: jaws that close higher topple it. Source: ours."""
+"""Maximum height of the pads above a ledge, as a fraction of the object's height: jaws that close higher topple it.
+Source: ours."""
 LOW_M = 0.03
-"""Below this height of the pads no object topples. Source: ours."""
+"""Pads at most this high above the floor may close above a ledge of any object: it does not topple. Source: ours."""
 UNTOUCHED_M = 0.002
 """The jaws touch nothing until they have closed by this. Source: ours, half of the smallest gap beside an object."""
 OPENING_M_S = 0.2
@@ -128,7 +129,7 @@ class Squeezing:
         top_m, slow_m_s = self.candidate.height_m, p.descent_speed_m_s
         if not (yield from descend(self._context, goal, self.at.opening_m, top_m, slow_m_s)):
             height = pads_height_m(self._context)
-            above_m = height + OFF_LEDGE_M
+            above_m = height + LEDGE_CLEARANCE_M
             highest_m = max(MAX_LEDGE_RATIO * top_m, min(LOW_M, top_m - p.top_overlap_m))
             if above_m <= highest_m:
                 yield from arm.line(self._pose(above_m), p.descent_speed_m_s, check=False)

@@ -28,7 +28,7 @@ def btcpp_python() -> Path:
 
 
 def loaded(trees: Sequence[dict[str, Any]], folder: Path) -> list[dict[str, str]]:
-    """What the library makes of each tree, see `real_library.py`."""
+    """Load each tree in the real library and return its result; see `real_library.py`."""
     given, results = folder / "trees.json", folder / "results.json"
     given.write_text(json.dumps(trees))
     done = subprocess.run(

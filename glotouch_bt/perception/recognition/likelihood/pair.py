@@ -37,9 +37,9 @@ from glotouch_bt.robot import Array
 
 _read: deque[tuple[TouchSet, PadSpec, LikelihoodParams, TouchSetReading]] = deque(maxlen=32)
 
-FAR_NATS = 5.0
-"""Hypotheses whose outline and height are less likely than the best one's by this are left out. Source: ours; their
-closures would have to fit e^5 times better."""
+PRUNE_NATS = 5.0
+"""A hypothesis is left out if its outline and height are less likely than the best one's by more than this, nats.
+Source: ours; its closures would have to fit e^5 times better."""
 PARALLEL_RAD = math.radians(10.0)
 """Maximum yaw difference (modulo half a turn) of parallel tracks."""
 
@@ -122,7 +122,7 @@ def compare(model: TargetModel, reading: TouchSetReading, p: LikelihoodParams) -
     pairs = [
         (_compare(h, reading, t, p), math.log(h.weight))
         for h, t, c in zip(model.hypotheses, terms, cheap, strict=True)
-        if c > cheap.max() - FAR_NATS
+        if c > cheap.max() - PRUNE_NATS
     ]
     best = max(pairs, key=lambda x: x[0].log_ratio + x[1])[0]
     total = float(np.logaddexp.reduce([x.log_ratio + w for x, w in pairs]))

@@ -15,10 +15,10 @@ SIZES_M = (0.020, 0.110)
 """Range of the uniform background density of a side (objects of 4-11 cm)."""
 HEIGHTS_M = (0.018, 0.115)
 """Range of the uniform background density of a height."""
-FREE_TRUST = 0.4
-"""Part of the kind's evidence that is left for an irregular outline. Source: 5 of 13 irregular outlines of generated
-shapes were of the less likely kind (`bench retrieve --objects`, shapes of `tests/support/any_shape.py` 8001-8003, seed
-38000, realistic, c4bb0c7)."""
+FREE_KIND_WEIGHT = 0.4
+"""Weight of the kind (round or box) of an irregular outline, 0..1. Source: 7 of 13 targets with an irregular outline had
+a negative term `mode` in `bench retrieve --objects DIR --trials 4 --per-seed 2 --seed 38000 --conditions realistic`
+(c4bb0c7; folders of `tests/support/any_shape.py`, seeds 8001-8003)."""
 TAIL = 3.0
 """Degrees of freedom of the Student's t of a contour's side."""
 
@@ -26,8 +26,8 @@ TAIL = 3.0
 def mode_ratio(model: TargetModel, candidate: Candidate) -> float:
     """Return log P(kind | traces of the STL) - log 1/2, less of it for an irregular outline."""
     box = model.outline.p_box
-    if candidate.contour.family == "free":  # neither circle nor box: what it resembles more says little
-        box = 0.5 + FREE_TRUST * (box - 0.5)
+    if candidate.contour.family == "free":  # neither circle nor rectangle: the kind is a weak cue
+        box = 0.5 + FREE_KIND_WEIGHT * (box - 0.5)
     return math.log(2 * (box if candidate.contour.kind == "box" else 1 - box))
 
 

@@ -28,7 +28,7 @@ def to_parts(model: TargetModel) -> tuple[dict[str, Any], dict[str, Array32]]:
         "l_m": model.l_m.tolist(),
         "z_m": model.z_m.tolist(),
         "centre_m": model.centre_m.tolist(),
-        "outlines": [_outline_facts(o) for o in (model.outline, *model.feet)],
+        "outlines": [_outline_facts(o) for o in (model.outline, *model.components)],
         **{name: getattr(model, name) for name in _NUMBERS},
     }
     arrays = {
@@ -57,12 +57,14 @@ def from_parts(name: str, facts: Mapping[str, Any], arrays: Mapping[str, Array32
         for key, s in expected.items():
             if arrays[key].shape != s:
                 raise ParamError(f"table {key}", arrays[key].shape, f"{s}")
-        outline, *feet = (Outline(_fit(o["as_round"]), _fit(o["as_box"]), float(o["p_box"])) for o in facts["outlines"])
+        outline, *components = (
+            Outline(_fit(o["as_round"]), _fit(o["as_box"]), float(o["p_box"])) for o in facts["outlines"]
+        )
         numbers = {k: float(facts[k]) for k in _NUMBERS}
         lazy = {"images": arrays["images"], "image_norms": arrays["image_norms"]}
         return TargetModel(
             name=name, digest=str(facts["digest"]), pad=pad, phi_rad=phi, l_m=l, z_m=z, reach_m=arrays["reach_m"],
-            fine_m=arrays["fine_m"], outline=outline, feet=tuple(feet),
+            fine_m=arrays["fine_m"], outline=outline, components=tuple(components),
             centre_m=np.array(facts["centre_m"], dtype=np.float64),
             sides=(), **numbers, _lazy=lazy,
         )  # fmt: skip

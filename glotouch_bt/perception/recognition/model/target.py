@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from glotouch_bt.perception.recognition.model.feet import foot_outlines
+from glotouch_bt.perception.recognition.model.components import component_outlines
 from glotouch_bt.perception.recognition.model.outline import Outline, minimum_rectangle, traced_outline
 from glotouch_bt.perception.recognition.model.pads import FINE, Array32, PadSpec, image_feature
 from glotouch_bt.perception.recognition.model.raster import mirrored, side_images, window_max
@@ -25,7 +25,7 @@ STRIDE = 2
 """Number of raster cells per table cell: 2.3 mm along x_P, 2.7 mm in height."""
 MAX_UNEVENNESS_M = 2e-3
 """Maximum unevenness between neighbouring widths; larger differences depend on the pose, not on noise."""
-WHOLE = 0.2
+WHOLE_SHARE = 0.2
 """Probability that the probe traces an object of separate parts as a whole. Source: ours."""
 _CACHE_SIZE = 64
 _cache: dict[tuple[str, PadSpec], TargetModel] = {}
@@ -60,7 +60,7 @@ class TargetModel:
         reach_m: (72, nl, nz) maximum coordinate along y_P inside the left pad's window; NaN if empty.
         fine_m: (72, fl, fz) side images, source of the tables (see `raster`); -inf if empty.
         outline: Simulated traces, about `centre_m`.
-        feet: Simulated traces of the parts that the probe takes for separate objects; empty if there is one part.
+        components: Simulated traces of the parts that the probe takes for separate objects; empty if there is only one.
         centre_m: (2,) centre of the footprint's minimum-area rectangle, in the mesh's frame O.
         height_m: Top above the floor.
         rho: Nonplanarity predicted for a 10 N touch, median over simulated touches (the paper's rho_M).
@@ -85,7 +85,7 @@ class TargetModel:
     rho_sd: float
     normal_dispersion: float
     anisotropy: float
-    feet: tuple[Outline, ...] = ()
+    components: tuple[Outline, ...] = ()
     sides: tuple[TargetHypothesis, ...] = ()
     _lazy: dict[str, Array32] = field(default_factory=dict, repr=False)
 
@@ -105,12 +105,12 @@ class TargetModel:
         """How the object may stand and what the probe may have traced of it; the weights sum to 1."""
         found: list[TargetHypothesis] = []
         for side in self.sides or (TargetHypothesis(self, UPRIGHT, 1.0),):
-            model, feet = side.model, side.model.feet
-            whole = WHOLE if feet else 1.0
+            model, components = side.model, side.model.components
+            whole = WHOLE_SHARE if components else 1.0
             found.append(replace(side, weight=side.weight * whole))
-            for foot in feet:
-                share = side.weight * (1.0 - whole) / len(feet)
-                found.append(TargetHypothesis(replace(model, outline=foot, feet=()), side.quat, share))
+            for component in components:
+                share = side.weight * (1.0 - whole) / len(components)
+                found.append(TargetHypothesis(replace(model, outline=component, components=()), side.quat, share))
         return tuple(found)
 
     def standing(self, quat: Quat) -> TargetModel:
@@ -255,5 +255,5 @@ def _build(mesh: Mesh, pad: PadSpec) -> TargetModel:
         a.setflags(write=False)
     return TargetModel(
         mesh.name, mesh.digest, pad, axes.phi_rad, axes.l_m, axes.z_m, reach, fine, outline, axes.centre_m,
-        axes.height_m, rho, rho_sd, dispersion, axes.anisotropy, foot_outlines(solid),
+        axes.height_m, rho, rho_sd, dispersion, axes.anisotropy, component_outlines(solid),
     )  # fmt: skip

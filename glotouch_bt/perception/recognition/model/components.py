@@ -1,8 +1,7 @@
-"""Parts of a solid that the probe feels as separate objects: the legs of a table, the walls of an open channel.
+"""Components of a solid that the probe feels as separate objects: the legs of a table, the walls of an open channel.
 
-The probe cannot tell them apart from objects of their own, so each part is traced by itself. Parts are found on a grid:
-a place is blocked if the ball, or the shaft above it, would meet the solid there. Blocked places that do not hang
-together are separate parts.
+On a grid, a cell is blocked if the ball centred there, or the shaft above it, would meet the solid. Each connected
+component of the blocked cells is traced by itself.
 """
 
 from __future__ import annotations
@@ -32,13 +31,13 @@ CELL_M = 0.001
 LAYER_M = 0.002
 """Distance of the horizontal sections of the solid."""
 MIN_CELLS = 60
-"""Least number of blocked cells of a part. Source: ours; a needle is 110 cells wide for the ball."""
+"""Minimum number of cells of a component. Source: ours; the ball around a single point blocks 113."""
 
 Mask = npt.NDArray[np.bool_]
 
 
-def foot_outlines(solid: trimesh.Trimesh) -> tuple[Outline, ...]:
-    """Trace each separate part of a solid (z up, standing on z = 0); nothing if it has one part only."""
+def component_outlines(solid: trimesh.Trimesh) -> tuple[Outline, ...]:
+    """Return the simulated traces of each component of a solid (z up, standing on z = 0); none if there is only one."""
     low, high = solid.bounds[0, :2] - 2 * TIP_RADIUS_M, solid.bounds[1, :2] + 2 * TIP_RADIUS_M
     axes = [np.arange(l, h, CELL_M) for l, h in zip(low, high, strict=True)]
     label, count = scipy.ndimage.label(_blocked(solid, axes), structure=np.ones((3, 3)))
@@ -46,13 +45,13 @@ def foot_outlines(solid: trimesh.Trimesh) -> tuple[Outline, ...]:
     for part in (label == k for k in range(1, count + 1)):
         if part.sum() >= MIN_CELLS:
             middle = np.array([a[i].mean() for a, i in zip(axes, np.nonzero(part), strict=True)])
-            tips = _Tips(part, axes)
+            tips = _ComponentTips(part, axes)
             outlines.append(outline_of(tips, middle))
     return tuple(outlines) if len(outlines) > 1 else ()
 
 
-class _Tips:
-    """Ball centres at the first contact with one part, as `traced_tips` gives them for a whole solid."""
+class _ComponentTips:
+    """Ball centres at the first contact with one component, as `traced_tips` returns them for a whole solid."""
 
     def __init__(self, part: Mask, axes: list[Array]) -> None:
         self.part, self.axes = part, axes
@@ -82,7 +81,7 @@ def _blocked(solid: trimesh.Trimesh, axes: list[Array]) -> Mask:
     blocked = np.zeros(x.size, dtype=bool)
     for z in np.arange(SENSING_M - TIP_RADIUS_M + 0.5 * LAYER_M, min(top, SENSING_M + SHAFT_M), LAYER_M):
         above = places[:, 2] > z
-        depth = np.bincount(rays[above], enters[above], x.size)  # shells that contain the cell
+        depth = np.bincount(rays[above], enters[above], x.size)  # number of shells around the cell
         filled = (depth > 0.5).reshape(x.shape)
         if filled.any():
             ball_m = math.sqrt(max(TIP_RADIUS_M**2 - (z - SENSING_M) ** 2, 0.0))

@@ -1,4 +1,4 @@
-"""Parts of a solid that the probe takes for separate objects, against solids whose parts are known."""
+"""Components of a solid that the probe takes for separate objects, against solids whose components are known."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from glotouch_bt.perception.recognition.model.feet import foot_outlines
+from glotouch_bt.perception.recognition.model.components import component_outlines
 
 
 def block(x: float, y: float, low: float, high: float, at: tuple[float, float] = (0.0, 0.0)) -> trimesh.Trimesh:
@@ -23,13 +23,13 @@ def posts(gap_m: float, plate_m: float) -> trimesh.Trimesh:
 
 
 def test_what_hangs_together_has_no_feet() -> None:
-    assert foot_outlines(block(0.06, 0.04, 0.0, 0.05)) == ()
+    assert component_outlines(block(0.06, 0.04, 0.0, 0.05)) == ()
 
 
 def test_a_channel_has_two_walls() -> None:
     """Walls of 60 mm x 10 mm, 30 mm apart, on a floor of 5 mm, which the ball passes above."""
     walls = [block(0.06, 0.01, 0.0, 0.05, (0.0, y)) for y in (-0.02, 0.02)]
-    outlines = foot_outlines(trimesh.util.concatenate([block(0.06, 0.05, 0.0, 0.005), *walls]))
+    outlines = component_outlines(trimesh.util.concatenate([block(0.06, 0.05, 0.0, 0.005), *walls]))
     assert len(outlines) == 2
     middles = sorted((o.as_box.centre_m.tolist() for o in outlines), key=lambda c: c[1])
     np.testing.assert_allclose(middles, [[0.0, -0.02], [0.0, 0.02]], atol=2e-3)
@@ -39,9 +39,9 @@ def test_a_channel_has_two_walls() -> None:
 
 
 @pytest.mark.parametrize(
-    ("gap_m", "plate_m", "feet"),
+    ("gap_m", "plate_m", "components"),
     [(0.030, 0.0, 4), (0.008, 0.0, 0), (0.030, 0.035, 0)],
     ids=["the ball passes between", "it does not", "the shaft meets the plate above"],
 )
-def test_posts_are_apart_if_the_probe_passes_between_them(gap_m: float, plate_m: float, feet: int) -> None:
-    assert len(foot_outlines(posts(gap_m, plate_m))) == feet
+def test_posts_are_apart_if_the_probe_passes_between_them(gap_m: float, plate_m: float, components: int) -> None:
+    assert len(component_outlines(posts(gap_m, plate_m))) == components
