@@ -16,7 +16,7 @@ SIZES_M = (0.020, 0.110)
 HEIGHTS_M = (0.018, 0.115)
 """Range of the uniform background density of a height."""
 FREE_KIND_WEIGHT = 0.4
-"""Weight of the kind (round or box) of an irregular outline, 0..1. Source: 7 of 13 targets with an irregular outline had
+"""Weight of the kind (round or box) of an irregular outline, 0..1. Source: 7 of 13 targets with irregular outlines had
 a negative term `mode` in `bench retrieve --objects DIR --trials 4 --per-seed 2 --seed 38000 --conditions realistic`
 (c4bb0c7; folders of `tests/support/any_shape.py`, seeds 8001-8003)."""
 TAIL = 3.0
