@@ -202,6 +202,13 @@ def print_match(summary: dict[str, Any], folder: Path) -> None:
             for n, f in found.items()
         ],
     )
+    for name, title in (("no_twin", "without a twin"), ("twin", "with a twin")):
+        if any(f["apart"]["twin"]["right_and_accepted"]["n"] for f in found.values()):
+            print_table(
+                f"of these, targets {title} in the box",
+                ("", "present, right", "present, wrong", "absent"),
+                [(n, *(rate(r) for r in f["apart"][name].values())) for n, f in found.items()],
+            )
     apart = [
         (n, value(f["margin"]["mean"], 2), value(f["ece"]["value"]),
          *(value(f[against].get(by, {}).get("value")) for against in ("auroc", "auroc_absent")

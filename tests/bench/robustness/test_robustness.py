@@ -11,7 +11,7 @@ import pytest
 
 from glotouch_bt.bench.robustness import AXES, RobustnessCampaign, run_campaign
 from glotouch_bt.bench.robustness.axes import with_level
-from glotouch_bt.bench.robustness.synthetic import sample_layout
+from glotouch_bt.bench.match.synthetic import sample_layout
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.robot import BadInput, Conditions, load_backend
