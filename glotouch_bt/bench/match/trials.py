@@ -23,8 +23,8 @@ from glotouch_bt.robot.scene import Mesh, load_folder
 Kind = Literal["present", "absent", "untouched", "stranger"]
 
 TRIAL_COLUMNS = (
-    "method", "kind", "seed", "target", "twin", "candidates", "best", "best_object", "right", "accepted", "p_best", "p_absent",
-    "best_loss", "margin", "evidence", "position_error_mm", "yaw_error_deg", "ms_per_pair", "reasons",
+    "method", "kind", "seed", "target", "twin", "candidates", "best", "best_object", "right", "accepted", "p_best",
+    "p_absent", "best_loss", "margin", "evidence", "position_error_mm", "yaw_error_deg", "ms_per_pair", "reasons",
 )  # fmt: skip
 PAIR_COLUMNS = ("method", "seed", "target", "stranger", "candidate", "object", "loss", "probability", "evidence")
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from glotouch_bt.bench.match.summary import calibration, column_decisions, loss_matrix, separation, summarise
 from glotouch_bt.bench.match.shapes import symmetries_rad, twins
+from glotouch_bt.bench.match.summary import calibration, column_decisions, loss_matrix, separation, summarise
 from glotouch_bt.bench.match.trials import decide, pose_errors, signed_margin
 from glotouch_bt.perception.recognition import Match
 from glotouch_bt.robot.scene import load_folder

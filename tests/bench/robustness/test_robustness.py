@@ -9,9 +9,9 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from glotouch_bt.bench.robustness import AXES, RobustnessCampaign, run_campaign
-from glotouch_bt.bench.robustness.axes import with_level
 from glotouch_bt.bench.match.synthetic import sample_layout
+from glotouch_bt.bench.robustness import AXES, RobustnessCampaign, run_campaign
+from glotouch_bt.bench.robustness.axes import changed
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.robot import BadInput, Conditions, load_backend
@@ -44,7 +44,7 @@ def test_every_axis_changes_what_is_felt(axis, nominal) -> None:
     known = {f.name for f in fields(Conditions)}
     assert set(AXES[axis].fields) <= known
     far = max(AXES[axis].levels, key=lambda v: abs(v - 1.0) if 1.0 in AXES[axis].levels else abs(v))
-    felt = numbers(touched(with_level(load_conditions("nominal"), axis, far)))
+    felt = numbers(touched(load_conditions(changed("nominal", axis, far))))
     assert felt.shape == nominal.shape  # the same stances
     assert np.abs(felt - nominal).max() > 1e-6
 
