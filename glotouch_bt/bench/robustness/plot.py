@@ -19,7 +19,7 @@ WANTED = 0.9
 
 
 def rates_of(summary: Mapping[str, Any]) -> Mapping[str, str]:
-    """Return the rates of a sweep, of missions or of decisions, with their labels: the right ones, then the wrong ones."""
+    """Return the rates of a sweep, of missions or of decisions, and their labels; the right one comes first."""
     return MISSION_RATES if "success" in summary["axes"]["none"][0] else DECISION_RATES
 
 

@@ -96,6 +96,16 @@ def test_layouts_that_cannot_be_acquired_are_rows(quick, monkeypatch, tmp_path):
     assert (tmp_path / "o" / "touchsets" / "s0003-c2.npz").is_file()
 
 
+def test_touches_without_a_robot_are_written_like_acquired_ones(quick, monkeypatch, tmp_path):
+    monkeypatch.setattr(MatchCampaign, "check", lambda self: None)
+    monkeypatch.setattr(bench, "sampled_layout", lambda backend, world, conditions, seed: a_layout(seed))
+    with ThreadPoolExecutor(1) as pool:
+        summary = run_campaign(campaign(tmp_path, sampled=True), pool)
+    assert (summary["sampled"], summary["methods"]["likelihood"]["row_top1"]["n"]) == (True, 6)
+    assert summary["closures_to_confidence"] == {}
+    assert (tmp_path / "o" / "touchsets" / "s0004-c1.npz").is_file()
+
+
 def test_nothing_acquired_at_all(quick, monkeypatch, tmp_path):
     monkeypatch.setattr(MatchCampaign, "check", lambda self: None)
     monkeypatch.setattr(bench, "acquire_layout", lambda *_: a_layout(names=()))
