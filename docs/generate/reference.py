@@ -277,8 +277,9 @@ def conditions() -> str:
         "same; VALUE is a number, or `LOW,HIGH` for a range. So an axis can be studied alone "
         "(`--conditions nominal --set-condition gel_blur_m=0.0015`) or left out "
         "(`--conditions realistic+following_error_s=0`). The fields from `object_scale` on are axes that have no "
-        "effect in ideal, nominal and harsh. `strong` sets them to the ends of their sweeps, all at once. A run in which such an axis is set, its sensor is used, and not a single bit "
-        "of the model or of a reading changes, ends with an error.\n\n"
+        "effect in ideal, nominal and harsh. `strong` sets them to the ends of their sweeps, all at once. "
+        "A run in which such an axis is set, its sensor is used, and not a single bit of the model or of a reading "
+        "changes, ends with an error.\n\n"
     )
     return text + table(("field", "unit, meaning, source", *names), rows)
 
