@@ -140,7 +140,7 @@ def rates(found: list[Problem], p: LikelihoodParams) -> str:
     for x in found:
         shares, _ = posterior(x, p)
         best = int(np.argmax(shares))
-        sure = shares[best] >= p.accept and x.pairs[best].evidence >= p.evidence
+        sure = shares[best] >= p.accept and x.pairs[best].fit is not None
         n[x.target is None] += 1
         right += best == x.target
         accepted += sure and best == x.target
