@@ -36,7 +36,7 @@ def run(
         seed: Source of every random draw, 0 .. 2**32 - 1.
         objects: Folder of watertight STL files in metres, instead of the world's.
         world: Path of a world file, or the name of a shipped world, instead of the mission's.
-        conditions: Disturbances: ideal, nominal, harsh, realistic, or the path of a file; NAME+FIELD=VALUE changes a
+        conditions: Disturbances: ideal, nominal, harsh, realistic, strong, or a file's path; NAME+FIELD=VALUE changes a
             field.
         faults: A fault plan: a path, the name of a shipped plan, or a loaded plan.
         out: The run's folder (default: runs/<time>-<mission>-s<seed>).
@@ -123,7 +123,7 @@ def open_robot(
     Args:
         backend: Name of a registered backend (`glotouch backends`).
         world: A world, the path of a world file, or the name of a shipped world.
-        conditions: Disturbances: ideal, nominal, harsh, realistic, or the path of a file; NAME+FIELD=VALUE changes a
+        conditions: Disturbances: ideal, nominal, harsh, realistic, strong, or a file's path; NAME+FIELD=VALUE changes a
             field.
         seed: Source of every random draw, 0 .. 2**32 - 1.
         **options: Options of the backend.

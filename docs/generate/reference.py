@@ -265,7 +265,7 @@ def conditions() -> str:
     files = shipped("conditions")
     notes = dict(re.findall(r"^(\w+): .*?#\s*(.*)$", files["realistic"].read_text(), re.MULTILINE))
     read = {n: yaml.safe_load(p.read_text()) for n, p in files.items()}
-    names = [n for n in ("ideal", "nominal", "harsh", "realistic") if n in read]
+    names = [n for n in ("ideal", "nominal", "harsh", "realistic", "strong") if n in read]
     keys = [k for k in read["realistic"] if k != "name"]
     rows = [(code(k), notes.get(k, ""), *(read[n].get(k, "") for n in names)) for k in keys]
     text = (
@@ -277,8 +277,9 @@ def conditions() -> str:
         "same; VALUE is a number, or `LOW,HIGH` for a range. So an axis can be studied alone "
         "(`--conditions nominal --set-condition gel_blur_m=0.0015`) or left out "
         "(`--conditions realistic+following_error_s=0`). The fields from `object_scale` on are axes that have no "
-        "effect in the other profiles. A run in which such an axis is set, its sensor is used, and not a single bit "
-        "of the model or of a reading changes, ends with an error.\n\n"
+        "effect in ideal, nominal and harsh. `strong` sets them to the ends of their sweeps, all at once. "
+        "A run in which such an axis is set, its sensor is used, and not a single bit of the model or of a reading "
+        "changes, ends with an error.\n\n"
     )
     return text + table(("field", "unit, meaning, source", *names), rows)
 

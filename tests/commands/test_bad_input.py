@@ -132,7 +132,7 @@ CASES = [
     ("run survey --seed x", "'--seed'"),
     (
         "run survey --conditions gone.yaml",
-        "no such conditions file (shipped: harsh, ideal, nominal, realistic)",
+        "no such conditions file (shipped: harsh, ideal, nominal, realistic, strong)",
     ),
     ("run survey --conditions loud.yaml", "loud.yaml:2:19: force_noise_sd_N = 'loud': must be a number or a list"),
     ("run survey --conditions turned.yaml", "turned.yaml:2:17: conditions.object_mass_kg = (0.4, 0.1): must be"),

@@ -23,9 +23,8 @@ from scipy.optimize import minimize
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from glotouch_backends.rizon4 import XENSE_GRIPPER
-from glotouch_bt.bench.match import Layout
+from glotouch_bt.bench.match import Layout, sampled_layout
 from glotouch_bt.bench.match.acquire import layout_of
-from glotouch_bt.bench.robustness.synthetic import sample_layout
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.perception import model_for
@@ -35,7 +34,7 @@ from glotouch_bt.perception.recognition.likelihood.pair import Pair, compare, re
 from glotouch_bt.perception.recognition.likelihood.posterior import probabilities, ratios
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.report import read_run
-from glotouch_bt.robot import ParamError, load_backend
+from glotouch_bt.robot import ParamError
 from glotouch_bt.robot.scene import load_mesh
 
 PAD = PadSpec(XENSE_GRIPPER.pad_window_m, XENSE_GRIPPER.pad_shape, XENSE_GRIPPER.pad_depth_m)
@@ -89,9 +88,7 @@ def problems(layout: Layout, folder: Path, count: int | None, stance: str) -> It
 def sampled(folder: Path | None, seed: int, conditions: str) -> dict[str, list[Problem]]:
     """Return the decisions on one box that is touched without a robot."""
     world = load_mission("touch_all", {}, objects=folder).world
-    sampler = load_backend("mujoco").touch_sampler(world, load_conditions(conditions), seed)
-    assert sampler is not None
-    layout = sample_layout(sampler, seed, conditions)
+    layout = sampled_layout("mujoco", world, load_conditions(conditions), seed)
     name = folder.name if folder else "five"
     return {
         f"{name}, {n or 'all'} closures": list(problems(layout, world.objects.folder, n, world.objects.stance))
@@ -143,7 +140,7 @@ def rates(found: list[Problem], p: LikelihoodParams) -> str:
     for x in found:
         shares, _ = posterior(x, p)
         best = int(np.argmax(shares))
-        sure = shares[best] >= p.accept and x.pairs[best].evidence >= p.evidence
+        sure = shares[best] >= p.accept and x.pairs[best].fit is not None
         n[x.target is None] += 1
         right += best == x.target
         accepted += sure and best == x.target

@@ -12,15 +12,16 @@ from typing import Any
 
 from glotouch_bt.bench.match.acquire import acquire_layout
 from glotouch_bt.bench.match.closures import CLOSURE_COLUMNS, closures_to_confidence
-from glotouch_bt.bench.match.dataset import Layout, layout_files, read_layout
+from glotouch_bt.bench.match.dataset import Layout, layout_files, read_layout, write_layout
 from glotouch_bt.bench.match.methods import DEFAULT
 from glotouch_bt.bench.match.plots import plot_all
 from glotouch_bt.bench.match.summary import summarise
+from glotouch_bt.bench.match.synthetic import sampled_layout
 from glotouch_bt.bench.match.timing import time_matching
 from glotouch_bt.bench.match.trials import PAIR_COLUMNS, TRIAL_COLUMNS, decide, models_of
 from glotouch_bt.escaped_text import finite
 from glotouch_bt.mission import load_mission
-from glotouch_bt.mission.read import conditions_name
+from glotouch_bt.mission.read import conditions_name, load_conditions
 from glotouch_bt.robot.scene import load_folder, stl_files, stream
 from glotouch_bt.runs import Campaign, OnRow, RunRequest, Task, crashed, gather, silent, write_summary, write_table
 
@@ -37,12 +38,14 @@ class MatchCampaign(Campaign):
         methods: Names of the matchers to compare.
         strangers: Folder of STL files that are never in the box, used as absent targets; or None.
         dataset: Folder of recorded TouchSets to use instead; it defines seeds (except their number) and conditions.
+        sampled: Touch standing objects without a robot instead of running the mission.
     """
 
     mission: str = "touch_all"
     methods: tuple[str, ...]
     strangers: Path | None = None
     dataset: Path | None = None
+    sampled: bool = False
 
     @property
     def folder(self) -> Path:
@@ -65,9 +68,13 @@ class MatchCampaign(Campaign):
         if self.dataset is not None:
             layout_files(self.dataset)
 
+    def box(self, seed: int) -> Path | None:
+        """Return the folder of a layout's objects, created if it is a drawn subset; None: the world's."""
+        return objects_of(self.folder, seed, self.out / "objects") if self.objects else None
+
     def layout_request(self, seed: int) -> RunRequest:
-        """Return the mission request for a layout; create its folder of objects if it is a drawn subset."""
-        box = objects_of(self.folder, seed, self.out / "objects") if self.objects else None
+        """Return the mission request for a layout."""
+        box = self.box(seed)
         count = len(stl_files(box or self.folder))
         return self.request(seed, f"runs/s{seed:04d}", settings={"expected_objects": str(count)}, objects=box)
 
@@ -90,8 +97,15 @@ def layout_task(campaign: MatchCampaign, seed: int, file: Path | None) -> dict[s
     Raises:
         BadInput: The recording or an STL cannot be used.
     """
-    touchsets = campaign.out / "touchsets"
-    return _decided(campaign, read_layout(file) if file else acquire_layout(campaign.layout_request(seed), touchsets))
+    if file is not None:
+        layout = read_layout(file)
+    elif campaign.sampled:
+        world = load_mission(campaign.mission, {}, objects=campaign.box(seed)).world
+        layout = sampled_layout(campaign.backend, world, load_conditions(campaign.conditions), seed)
+        write_layout(campaign.out / "touchsets", layout)
+    else:
+        layout = acquire_layout(campaign.layout_request(seed), campaign.out / "touchsets")
+    return _decided(campaign, layout)
 
 
 def failed_task(campaign: MatchCampaign, seed: int, error: Exception) -> dict[str, Any]:
@@ -102,7 +116,7 @@ def failed_task(campaign: MatchCampaign, seed: int, error: Exception) -> dict[st
 def _decided(campaign: MatchCampaign, layout: Layout) -> dict[str, Any]:
     decided = decide(layout, campaign.folder, campaign.strangers, campaign.methods)
     closures: list[dict[str, Any]] = []
-    if DEFAULT in campaign.methods and layout.touched:
+    if DEFAULT in campaign.methods and layout.touched and not campaign.sampled:
         present = [n for n in layout.objects if layout.of(n)]
         models = models_of(layout, campaign.folder, present) if present else {}
         closures = closures_to_confidence(layout, models)
@@ -156,6 +170,7 @@ def run_campaign(campaign: MatchCampaign, executor: Executor, on_row: OnRow = si
             "touched": sum(x["touched"] for x in layouts),
             "nameless": sum(x["nameless"] for x in layouts),
             "recorded": campaign.dataset is not None,
+            "sampled": campaign.sampled,
             "strangers": sorted({t["target"] for t in rows["trials"] if t["kind"] == "stranger"}),
             "mission": campaign.mission,
             "backend": campaign.backend,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from glotouch_bt.perception.recognition import MATCHERS, Ranking, TargetModel
+from glotouch_bt.perception.recognition import MATCHERS, Ranking, TargetModel, infer_belief
+from glotouch_bt.perception.recognition.likelihood import LikelihoodParams
 from glotouch_bt.perception.recognition.paper import PaperParams, paper_matcher
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.robot import BadInput
@@ -17,10 +18,16 @@ PAPER_TOP1: Mapping[str, float] = {"paper_width": 0.683, "paper_depth": 0.783, "
 
 
 def methods() -> dict[str, Method]:
-    """Return every method by name: the paper's ablation, then the matchers of `recognition`."""
+    """Return every method by name: the paper's ablation, that of the likelihood, the matchers of `recognition`."""
     steps = dict(zip(PAPER_TOP1, PaperParams().ablation().values(), strict=True))
     made: dict[str, Method] = {name: paper_matcher(params) for name, params in steps.items()}
+    made |= {f"{DEFAULT}_{name}": likelihood_matcher(params) for name, params in LikelihoodParams().ablation().items()}
     return made | {name: matcher for name, matcher in MATCHERS.items() if name != "paper"}
+
+
+def likelihood_matcher(params: LikelihoodParams) -> Method:
+    """Return the likelihood matcher with given parameters."""
+    return lambda model, touchsets: infer_belief(model, touchsets, params).ranking
 
 
 def chosen(names: Sequence[str]) -> tuple[str, ...]:

@@ -62,10 +62,12 @@ def of_method(trials: Sequence[Row], pairs: Sequence[Row]) -> dict[str, Any]:
             if (mine := [t for t in present if t["target"] == name])
         },
         "col_top1": _share(columns, [c["right"] for c in columns]),
-        "right_and_accepted": _share(present, [t["right"] and t["accepted"] for t in present]),
-        "wrong_and_accepted": _share(present, [t["accepted"] and not t["right"] for t in present]),
-        "absent_lifted": _share(absent, [t["accepted"] for t in absent]),
+        **accepted(present, absent),
         "stranger_lifted": _share(stranger, [t["accepted"] for t in stranger]),
+        "apart": {
+            name: accepted([t for t in present if t["twin"] is twin], [t for t in absent if t["twin"] is twin])
+            for name, twin in (("no_twin", False), ("twin", True))
+        },
         "margin": bootstrap_mean([t["margin"] for t in present if math.isfinite(t["margin"])]),
         "auroc": separation(present, stranger) if stranger else separation(present, absent),
         "auroc_against": "strangers" if stranger else "absent",
@@ -74,6 +76,15 @@ def of_method(trials: Sequence[Row], pairs: Sequence[Row]) -> dict[str, Any]:
         "position_error_mm": quantiles([t["position_error_mm"] for t in fitted]),
         "yaw_error_deg": quantiles([t["yaw_error_deg"] for t in fitted]),
         "ms_per_pair": float(np.median([t["ms_per_pair"] for t in trials])) if trials else math.nan,
+    }
+
+
+def accepted(present: Sequence[Row], absent: Sequence[Row]) -> dict[str, Any]:
+    """Return what was accepted for targets that are in the box, and for those that are not."""
+    return {
+        "right_and_accepted": _share(present, [t["right"] and t["accepted"] for t in present]),
+        "wrong_and_accepted": _share(present, [t["accepted"] and not t["right"] for t in present]),
+        "absent_lifted": _share(absent, [t["accepted"] for t in absent]),
     }
 
 

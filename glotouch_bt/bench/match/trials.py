@@ -14,19 +14,17 @@ import numpy as np
 
 from glotouch_bt.bench.match.dataset import Layout, Planar, Touched
 from glotouch_bt.bench.match.methods import Method, methods
+from glotouch_bt.bench.match.shapes import symmetries_rad, twins
 from glotouch_bt.perception import model_with_sides
 from glotouch_bt.perception.recognition import Match, PadSpec, Ranking, TargetModel
-from glotouch_bt.robot import Array, BadInput
+from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene import Mesh, load_folder
 
 Kind = Literal["present", "absent", "untouched", "stranger"]
-SYMMETRY_STEPS = 72
-SYMMETRIC_M = 0.7e-3
-"""Mean surface distance below which a rotated mesh counts as symmetric, m."""
 
 TRIAL_COLUMNS = (
-    "method", "kind", "seed", "target", "candidates", "best", "best_object", "right", "accepted", "p_best", "p_absent",
-    "best_loss", "margin", "evidence", "position_error_mm", "yaw_error_deg", "ms_per_pair", "reasons",
+    "method", "kind", "seed", "target", "twin", "candidates", "best", "best_object", "right", "accepted", "p_best",
+    "p_absent", "best_loss", "margin", "evidence", "position_error_mm", "yaw_error_deg", "ms_per_pair", "reasons",
 )  # fmt: skip
 PAIR_COLUMNS = ("method", "seed", "target", "stranger", "candidate", "object", "loss", "probability", "evidence")
 
@@ -81,6 +79,7 @@ def decide(layout: Layout, objects: Path, strangers: Path | None, names: Sequenc
 
     Present: a touched object's STL against all TouchSets. Absent: the same without its own TouchSets.
     Untouched: the STL of an object in the box that was never squeezed. Stranger: the STL of an object outside it.
+    A target with a twin in the box is marked.
 
     Raises:
         BadInput: An STL is missing or unusable.
@@ -90,6 +89,8 @@ def decide(layout: Layout, objects: Path, strangers: Path | None, names: Sequenc
         return out
     made = methods()
     present = models_of(layout, objects)
+    meshes = {n: meshes_of(objects)[n] for n in present}
+    twin = {n: any(twins(m, other) for k, other in meshes.items() if k != n) for n, m in meshes.items()}
     foreign: dict[str, TargetModel] = {}
     if strangers is not None:
         known = {m.digest for m in meshes_of(objects).values()}
@@ -100,8 +101,8 @@ def decide(layout: Layout, objects: Path, strangers: Path | None, names: Sequenc
         for target, model in present.items():
             mine = layout.of(target)
             others = [t for i, t in enumerate(layout.touched) if i not in mine]
-            head = {"method": name, "seed": layout.seed, "target": target}
-            mesh = meshes_of(objects)[target] if mine else None
+            head = {"method": name, "seed": layout.seed, "target": target, "twin": twin[target]}
+            mesh = meshes[target] if mine else None
             row, ranking = _trial(method, model, layout.touched, target, mesh)
             out.trials.append(head | {"kind": "present" if mine else "untouched"} | row)
             out.pairs.extend(_pairs(head | {"stranger": False}, layout, ranking))
@@ -109,7 +110,7 @@ def decide(layout: Layout, objects: Path, strangers: Path | None, names: Sequenc
                 row, _ = _trial(method, model, others, target)
                 out.trials.append(head | {"kind": "absent"} | row)
         for target, model in foreign.items():
-            head = {"method": name, "seed": layout.seed, "target": target}
+            head = {"method": name, "seed": layout.seed, "target": target, "twin": False}
             row, ranking = _trial(method, model, layout.touched, target)
             out.trials.append(head | {"kind": "stranger"} | row)
             out.pairs.extend(_pairs(head | {"stranger": True}, layout, ranking))
@@ -175,37 +176,3 @@ def pose_errors(match: Match, truth: Planar | None, mesh: Mesh) -> dict[str, flo
         "position_error_mm": 1e3 * math.hypot(x - truth[0], y - truth[1]),
         "yaw_error_deg": float(np.rad2deg(np.abs(off).min())),
     }
-
-
-_symmetry: dict[str, Array] = {}
-
-
-def symmetries_rad(mesh: Mesh) -> Array:
-    """Return the yaws of symmetry about the mesh centre, in steps of 5 deg, 0 first."""
-    if mesh.digest not in _symmetry:
-        _symmetry[mesh.digest] = _symmetries(mesh)
-    return _symmetry[mesh.digest]
-
-
-def _symmetries(mesh: Mesh) -> Array:
-    """Compare rotated surface points with the surface, both about the surface centroid."""
-    import trimesh
-    from scipy.spatial import cKDTree
-
-    solid = mesh.as_trimesh()
-    points, _ = trimesh.sample.sample_surface_even(solid, 6000, seed=0)
-    points = np.asarray(points, dtype=np.float64)
-    points[:, :2] -= solid.centroid[:2]
-    tree, probe = cKDTree(points), points[::8]
-    spacing = float(np.mean(np.asarray(tree.query(points, k=2)[0])[:, 1]))
-    angles = 2 * math.pi * np.arange(SYMMETRY_STEPS) / SYMMETRY_STEPS
-    gaps = np.zeros(SYMMETRY_STEPS)
-    for k, a in enumerate(angles):
-        turned = probe.copy()
-        turned[:, :2] = probe[:, :2] @ np.array([[math.cos(a), math.sin(a)], [-math.sin(a), math.cos(a)]])
-        gaps[k] = np.mean(tree.query(turned)[0])
-    same = gaps < SYMMETRIC_M + 0.6 * spacing
-    if not same.all():  # small rotations always match nearly: keep only local minima
-        same &= (gaps <= np.roll(gaps, 1)) & (gaps <= np.roll(gaps, -1))
-    same[0] = True
-    return np.asarray(angles[same])

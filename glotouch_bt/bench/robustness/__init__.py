@@ -2,3 +2,5 @@
 
 from glotouch_bt.bench.robustness.axes import AXES
 from glotouch_bt.bench.robustness.bench import RobustnessCampaign, run_campaign
+from glotouch_bt.bench.robustness.missions import run_missions
+from glotouch_bt.bench.robustness.plot import rates_of

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from glotouch_bt.robot import BadInput, Conditions
 
@@ -50,15 +50,14 @@ AXES: Mapping[str, Axis] = {
 """The axes by name, with levels around and beyond those of `realistic`; none that acts on motions alone."""
 
 
-def with_level(base: Conditions, axis: str, level: float) -> Conditions:
-    """Return `base` with one axis at one level.
+def changed(base: str, axis: str, level: float) -> str:
+    """Return the name of conditions (see `load_conditions`) with one axis at one level.
 
     Raises:
         BadInput: No such axis.
     """
     if axis not in AXES:
         raise BadInput(f"--axis {axis}: must be among {', '.join(AXES)}")
-    fields = AXES[axis].fields
-    ranged = {f: isinstance(getattr(base, f), tuple) for f in fields}
-    values = {f: (level, level) if ranged[f] else level for f in fields}
-    return replace(base, **values, name=f"{base.name}, {axis} {level:g}")  # type: ignore[arg-type]
+    default = Conditions(name="")
+    ranged = {f: isinstance(getattr(default, f), tuple) for f in AXES[axis].fields}
+    return "+".join([base, *(f"{f}={level},{level}" if ranged[f] else f"{f}={level}" for f in ranged)])

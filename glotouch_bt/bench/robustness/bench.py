@@ -8,15 +8,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from glotouch_bt.bench.match import DEFAULT, decide
-from glotouch_bt.bench.robustness.axes import AXES, with_level
+from glotouch_bt.bench.match import DEFAULT, decide, sampled_layout
+from glotouch_bt.bench.robustness.axes import AXES, changed
 from glotouch_bt.bench.robustness.plot import plot_axes
-from glotouch_bt.bench.robustness.synthetic import sample_layout
 from glotouch_bt.bench.statistics import bootstrap_mean
 from glotouch_bt.escaped_text import finite
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read import load_conditions
-from glotouch_bt.robot import BadInput, load_backend
 from glotouch_bt.runs import Campaign, OnRow, Task, crashed, gather, silent, write_summary, write_table
 
 COLUMNS = ("axis", "level", "seed", "decisions", "right", "accepted", "wrong", "absent", "absent_taken", "cause")
@@ -35,9 +33,8 @@ class RobustnessCampaign(Campaign):
     axes: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        base = load_conditions(self.conditions)
         for axis in self.axes:
-            with_level(base, axis, AXES[axis].levels[0] if axis in AXES else 0.0)
+            load_conditions(changed(self.conditions, axis, AXES[axis].levels[0] if axis in AXES else 0.0))
 
     @property
     def points(self) -> list[tuple[str, float]]:
@@ -51,14 +48,9 @@ def sampled_row(campaign: RobustnessCampaign, axis: str, level: float, seed: int
     Raises:
         BadInput: The backend has no `TouchSampler`, or the objects cannot be used.
     """
-    conditions = load_conditions(campaign.conditions)
-    if axis:
-        conditions = with_level(conditions, axis, level)
+    conditions = load_conditions(changed(campaign.conditions, axis, level) if axis else campaign.conditions)
     world = load_mission(campaign.mission, {}, objects=campaign.objects).world
-    sampler = load_backend(campaign.backend).touch_sampler(world, conditions, seed)
-    if sampler is None:
-        raise BadInput(f"--backend {campaign.backend}: cannot touch objects without a robot")
-    layout = sample_layout(sampler, seed, conditions.name)
+    layout = sampled_layout(campaign.backend, world, conditions, seed)
     trials = decide(layout, world.objects.folder, None, (DEFAULT,)).trials
     present = [t for t in trials if t["kind"] == "present"]
     absent = [t for t in trials if t["kind"] == "absent"]

@@ -24,6 +24,9 @@ def match(
         Path | None,
         typer.Option(metavar="DIR", help="recorded TouchSets to use instead of new ones (with their own conditions)"),
     ] = None,
+    sampled: Annotated[
+        bool, typer.Option("--sampled", help="touch the objects without a robot, in about a second a layout")
+    ] = False,
     method: Annotated[list[str] | None, typer.Option(help="only these matchers (default: all)")] = None,
     backend: shared.Backend = "mujoco",
     workers: shared.Workers = 2,
@@ -41,6 +44,7 @@ def match(
         objects=objects,
         strangers=strangers,
         dataset=dataset,
+        sampled=sampled,
         methods=chosen(method or ()),
         backend=backend,
         out=shared.bench_folder(out, "match"),

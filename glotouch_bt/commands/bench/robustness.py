@@ -15,6 +15,9 @@ def robustness(
     seed: shared.FirstSeed = 0,
     axis: Annotated[list[str] | None, typer.Option(help="only these axes (default: all)")] = None,
     conditions: shared.Conditions = "nominal",
+    missions: Annotated[
+        bool, typer.Option("--missions", help="one whole mission a box instead of touches without a robot: hours")
+    ] = False,
     objects: shared.Objects = None,
     backend: shared.Backend = "mujoco",
     workers: shared.Workers = 2,
@@ -23,9 +26,9 @@ def robustness(
 ) -> None:
     """Robustness: recognition with one property of gel, gripper, arm or objects varied at a time.
 
-    On touches of standing objects, computed without a robot in about a second a box.
+    On touches of standing objects, computed without a robot in about a second a box, or by whole missions.
     """
-    from glotouch_bt.bench.robustness import AXES, RobustnessCampaign, run_campaign
+    from glotouch_bt.bench.robustness import AXES, RobustnessCampaign, run_campaign, run_missions
     from glotouch_bt.commands.terminal import print_robustness
 
     shared.check_names(conditions, backend)
@@ -40,7 +43,9 @@ def robustness(
 
     def told(row: dict[str, Any]) -> str:
         where = f"{row['axis']} {row['level']:g}" if row["axis"] else conditions
+        if missions:
+            return f"{where} seed {row['seed']}: {row['target']} {row['cause'] or 'retrieved'}"
         return f"{where} seed {row['seed']}: {row['accepted']} of {row['decisions']} right and accepted{row['cause']}"
 
-    summary = shared.run_in_pool(run_campaign, campaign, workers, told)
+    summary = shared.run_in_pool(run_missions if missions else run_campaign, campaign, workers, told)
     shared.print_summary(summary, campaign.out, print_robustness, json_)

@@ -38,7 +38,9 @@ AllowPaths = Annotated[
 Backend = Annotated[str, typer.Option(help="a registered backend (see: glotouch backends)")]
 Conditions = Annotated[
     str,
-    typer.Option(help="disturbances: ideal, nominal, harsh, realistic, or a file; NAME+FIELD=VALUE changes a field"),
+    typer.Option(
+        help="disturbances: ideal, nominal, harsh, realistic, strong, or a file; NAME+FIELD=VALUE changes a field"
+    ),
 ]
 SetConditions = Annotated[
     list[str] | None,

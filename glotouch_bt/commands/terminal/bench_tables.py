@@ -36,21 +36,27 @@ def print_retrieve(summary: dict[str, Any], folder: Path) -> None:
 
 
 def print_robustness(summary: dict[str, Any], folder: Path) -> None:
-    """Print a sweep of the axes: right and accepted, wrong and absent taken, for each level."""
-    from glotouch_bt.bench.robustness import AXES
+    """Print a sweep of the axes: rates of decisions or of missions, for each level."""
+    from glotouch_bt.bench.robustness import AXES, rates_of
 
-    rows = []
-    for name, points in summary["axes"].items():
-        for p in points:
-            label = f"{AXES[name].label}: {p['level'] * AXES[name].shown:g}" if name in AXES else summary["conditions"]
-            taken = [f"{100 * p[key]['mean']:.0f} %" for key in ("wrong", "absent_taken")]
-            accepted = p["accepted"]
-            shown = f"{100 * accepted['mean']:.0f} % [{100 * accepted['lo']:.0f}, {100 * accepted['hi']:.0f}]"
-            rows.append((label, shown, *taken))
+    rates = rates_of(summary)
+
+    def share(r: dict[str, Any]) -> str:
+        middle = r["mean"] if "mean" in r else r["rate"]
+        return f"{100 * middle:.0f} % [{100 * r['lo']:.0f}, {100 * r['hi']:.0f}]"
+
+    rows = [
+        (
+            f"{AXES[name].label}: {p['level'] * AXES[name].shown:g}" if name in AXES else summary["conditions"],
+            *(share(p[key]) for key in rates),
+        )
+        for name, points in summary["axes"].items()
+        for p in points
+    ]
     n = len(summary["seeds"])
     print_table(
-        f"recognition with one axis varied, {summary['conditions']} otherwise, {n} boxes a point",
-        ("axis and level", "right and accepted [95 %]", "wrong", "absent taken"),
+        f"{summary['mission']} with one axis varied, {summary['conditions']} otherwise, {n} boxes a point",
+        ("axis and level", *(f"{label} [95 %]" for label in rates.values())),
         rows,
     )
     where = f"{folder / 'robustness.png'}\n{folder / 'summary.json'}"
@@ -202,6 +208,13 @@ def print_match(summary: dict[str, Any], folder: Path) -> None:
             for n, f in found.items()
         ],
     )
+    for name, title in (("no_twin", "without a twin"), ("twin", "with a twin")):
+        if any(f["apart"]["twin"]["right_and_accepted"]["n"] for f in found.values()):
+            print_table(
+                f"of these, targets {title} in the box",
+                ("", "present, right", "present, wrong", "absent"),
+                [(n, *(rate(r) for r in f["apart"][name].values())) for n, f in found.items()],
+            )
     apart = [
         (n, value(f["margin"]["mean"], 2), value(f["ece"]["value"]),
          *(value(f[against].get(by, {}).get("value")) for against in ("auroc", "auroc_absent")

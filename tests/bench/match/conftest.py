@@ -67,5 +67,6 @@ def made_up(monkeypatch):
         trials, "meshes_of", lambda folder: {n: SimpleNamespace(name=n, digest=f"{folder}{n}") for n in SIZES_M}
     )
     monkeypatch.setattr(trials, "symmetries_rad", lambda mesh: np.zeros(1))
+    monkeypatch.setattr(trials, "twins", lambda a, b: {a.name, b.name} == {"small", "middle"})
     monkeypatch.setattr(trials, "methods", lambda: {"likelihood": by_size})
     return models

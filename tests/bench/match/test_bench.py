@@ -58,7 +58,7 @@ def test_a_recorded_dataset(quick, monkeypatch, tmp_path):
         (9, 2, 1, 2, 2),
     ]
     assert shown[0][0]["right"] == dict.fromkeys(chosen(()), 3)
-    assert list(summary["methods"]) == ["paper_width", "paper_depth", "paper_full", "likelihood"]
+    assert list(summary["methods"]) == list(chosen(()))
     figures = summary["methods"]["likelihood"]
     assert (figures["row_top1"]["rate"], figures["row_top1"]["n"]) == (1.0, 5)
     assert figures["row_top1"]["whole_layouts"]["n"] == 2
@@ -74,7 +74,7 @@ def test_a_recorded_dataset(quick, monkeypatch, tmp_path):
     names = {"trials.csv", "pairs.csv", "closures.csv", "layouts.csv", "summary.json"}
     assert {p.name for p in out.iterdir()} == names | {"top1.png", "losses.png", "reliability.png", "closures.png"}
     with (out / "trials.csv").open() as f:
-        assert len(list(csv.DictReader(f))) == 4 * (5 + 5 + 1 + 6)
+        assert len(list(csv.DictReader(f))) == 6 * (5 + 5 + 1 + 6)
 
 
 def test_layouts_that_cannot_be_acquired_are_rows(quick, monkeypatch, tmp_path):
@@ -94,6 +94,16 @@ def test_layouts_that_cannot_be_acquired_are_rows(quick, monkeypatch, tmp_path):
     assert summary["ended"] == {"success": 1, "traceback RuntimeError: the solver diverged": 1}
     assert (summary["layouts"], summary["methods"]["likelihood"]["row_top1"]["n"]) == (2, 3)
     assert (tmp_path / "o" / "touchsets" / "s0003-c2.npz").is_file()
+
+
+def test_touches_without_a_robot_are_written_like_acquired_ones(quick, monkeypatch, tmp_path):
+    monkeypatch.setattr(MatchCampaign, "check", lambda self: None)
+    monkeypatch.setattr(bench, "sampled_layout", lambda backend, world, conditions, seed: a_layout(seed))
+    with ThreadPoolExecutor(1) as pool:
+        summary = run_campaign(campaign(tmp_path, sampled=True), pool)
+    assert (summary["sampled"], summary["methods"]["likelihood"]["row_top1"]["n"]) == (True, 6)
+    assert summary["closures_to_confidence"] == {}
+    assert (tmp_path / "o" / "touchsets" / "s0004-c1.npz").is_file()
 
 
 def test_nothing_acquired_at_all(quick, monkeypatch, tmp_path):
@@ -124,7 +134,7 @@ def test_the_mission_of_a_layout(tmp_path):
 
 
 def test_unknown_methods_are_refused():
-    with pytest.raises(BadInput, match="must be among paper_width, paper_depth, paper_full, likelihood"):
+    with pytest.raises(BadInput, match="must be among paper_width, paper_depth, paper_full, likelihood_outline"):
         chosen(["paper_ful"])
     assert chosen(["likelihood", "paper_full"]) == ("paper_full", "likelihood")
 

@@ -10,9 +10,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import trimesh
 
+from glotouch_bt.bench.match.shapes import symmetries_rad, twins
 from glotouch_bt.bench.match.summary import calibration, column_decisions, loss_matrix, separation, summarise
-from glotouch_bt.bench.match.trials import decide, pose_errors, signed_margin, symmetries_rad
+from glotouch_bt.bench.match.trials import decide, pose_errors, signed_margin
 from glotouch_bt.perception.recognition import Match
 from glotouch_bt.robot.scene import load_folder
 from tests.bench.match.conftest import a_layout, by_size
@@ -39,6 +41,8 @@ def test_every_kind_of_decision(made_up):
     assert found.trials[0]["yaw_error_deg"] == pytest.approx(np.rad2deg(0.1))
     assert math.isnan(found.trials[1]["margin"])
     assert len(found.pairs) == 2 * 9
+    apart = summarise(found.trials, found.pairs, [], ["likelihood"])["methods"]["likelihood"]["apart"]
+    assert {name: f["right_and_accepted"]["n"] for name, f in apart.items()} == {"no_twin": 1, "twin": 2}
 
 
 def test_the_same_solid_is_no_stranger(made_up):
@@ -98,6 +102,18 @@ def test_symmetries_of_solids(tmp_path):
         "yaw_error_deg"
     ] == pytest.approx(4.0)
     assert math.isnan(pose_errors(a_match(0.0), None, meshes["jar"])["yaw_error_deg"])
+
+
+def test_twins_are_turned_copies_and_waists_of_a_few_millimetres(tmp_path):
+    solids = {"block": trimesh.creation.box((0.06, 0.04, 0.05)), "taller": trimesh.creation.box((0.06, 0.04, 0.06))}
+    solids["turned"] = solids["block"].copy()
+    solids["turned"].apply_transform(trimesh.transformations.rotation_matrix(math.radians(40.0), (0, 0, 1)))
+    solids["wider"] = trimesh.creation.box((0.061, 0.041, 0.05))
+    for name, solid in solids.items():
+        solid.export(tmp_path / f"{name}.stl")
+    meshes = {m.name: m for m in load_folder(tmp_path)}
+    found = {name: twins(meshes["block"], m) for name, m in meshes.items() if name != "block"}
+    assert found == {"taller": False, "turned": True, "wider": True}
 
 
 def a_trial(kind, right, p_best, p_absent, seed=0, loss=1.0):

@@ -9,9 +9,10 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from glotouch_bt.bench.robustness import AXES, RobustnessCampaign, run_campaign
-from glotouch_bt.bench.robustness.axes import with_level
-from glotouch_bt.bench.robustness.synthetic import sample_layout
+from glotouch_bt.bench.match.synthetic import sample_layout
+from glotouch_bt.bench.retrieve import summarise
+from glotouch_bt.bench.robustness import AXES, RobustnessCampaign, missions, run_campaign, run_missions
+from glotouch_bt.bench.robustness.axes import changed
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.robot import BadInput, Conditions, load_backend
@@ -44,7 +45,7 @@ def test_every_axis_changes_what_is_felt(axis, nominal) -> None:
     known = {f.name for f in fields(Conditions)}
     assert set(AXES[axis].fields) <= known
     far = max(AXES[axis].levels, key=lambda v: abs(v - 1.0) if 1.0 in AXES[axis].levels else abs(v))
-    felt = numbers(touched(with_level(load_conditions("nominal"), axis, far)))
+    felt = numbers(touched(load_conditions(changed("nominal", axis, far))))
     assert felt.shape == nominal.shape  # the same stances
     assert np.abs(felt - nominal).max() > 1e-6
 
@@ -83,6 +84,26 @@ def test_a_campaign_writes_its_points_picture_and_summary(tmp_path) -> None:
     assert json.loads((tmp_path / "summary.json").read_text())["axes"]["none"][0]["accepted"]["n"] == 1
     assert (tmp_path / "robustness.png").stat().st_size > 10_000
     assert len((tmp_path / "points.csv").read_text().splitlines()) == 2 + len(points)
+
+
+def test_missions_at_every_level_have_the_same_seeds_and_targets(tmp_path, monkeypatch) -> None:
+    asked = []
+
+    def retrieve(point, executor, on_row):
+        asked.append(point)
+        on_row({"target": "apple", "seed": 0, "cause": ""}, 1, 1)
+        return summarise([{"target": "apple", "seed": 0, "status": "success", "correct": True}])
+
+    monkeypatch.setattr(missions, "run_campaign", retrieve)
+    rows = []
+    campaign = RobustnessCampaign(seeds=(0,), axes=("gel_stiffness",), conditions="realistic", out=tmp_path)
+    with ThreadPoolExecutor(1) as pool:
+        summary = run_missions(campaign, pool, lambda row, *_: rows.append(row["level"]))
+    assert [p.conditions for p in asked][:2] == ["realistic", "realistic+gel_stiffness_factor=0.3,0.3"]
+    assert {(p.seeds, p.per_seed, p.targets) for p in asked} == {((0,), 1, asked[0].targets)}
+    assert rows == [0.0, *AXES["gel_stiffness"].levels]
+    assert summary["axes"]["gel_stiffness"][2]["success"]["rate"] == 1.0
+    assert (tmp_path / "robustness.png").stat().st_size > 5_000
 
 
 def test_unknown_axes_and_backends_are_refused(tmp_path) -> None:

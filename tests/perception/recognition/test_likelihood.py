@@ -266,6 +266,25 @@ def test_an_object_seen_to_turn_may_lie_at_another_yaw(meshes) -> None:
     assert observed_turns(replace(unseen, sequences=(first, seen, *later[1:]))) == pytest.approx([0, turn, turn])
 
 
+def test_parts_of_the_likelihood_alone(meshes) -> None:
+    """Outline and height alone do not see a wrong width; widths alone see neither outline nor images."""
+    touchset, _ = touched(meshes[2], NOMINAL, 43)
+    wrong = tuple(
+        replace(s, layers=tuple(replace(l, aperture_m=l.aperture_m + 0.006) for l in s.layers))
+        for s in touchset.sequences
+    )
+    model = TargetModel.from_mesh(meshes[2])
+    parts = LikelihoodParams().ablation()
+    outline, other = (
+        infer_belief(model, [t], parts["outline"]).ranking.best.probability
+        for t in (touchset, replace(touchset, sequences=wrong))
+    )
+    assert outline == pytest.approx(other, abs=1e-6)
+    terms = infer_belief(model, [touchset], parts["widths"]).pairs[0].terms
+    assert [terms[name] for name in ("mode", "height", "contour", "image")] == [0.0] * 4
+    assert terms["width"] > 0.0
+
+
 def test_probabilities_against_bayes() -> None:
     """Densities under target, twin and any object: (8, 4, 1) and (2, 2, 1); every fourth other object is a twin.
 

@@ -130,11 +130,12 @@ def compare(model: TargetModel, reading: TouchSetReading, p: LikelihoodParams) -
 
 
 def _scalar_terms(model: TargetModel, candidate: Candidate, p: LikelihoodParams) -> dict[str, float]:
-    return {
+    terms = {
         "mode": mode_ratio(model, candidate),
         "height": height_ratio(model, candidate, p),
         "contour": contour_ratio(model, candidate, p),
     }
+    return {name: p.temper_outline * value for name, value in terms.items()}
 
 
 def _compare(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 from glotouch_bt.robot import ParamError
 
@@ -39,7 +39,8 @@ class LikelihoodParams:
         contour_sd_m: Standard deviation of a contour's side, besides that of the traces.
         contour_outlier: Probability that the contour covers only a part of the object.
         yaw_sd_rad: Standard deviation of a box contour's direction.
-        temper_width, temper_image: Tempering exponents for correlated observations.
+        temper_outline, temper_width, temper_image: Tempering exponents of outline and height, widths and images for
+            correlated observations; 0 leaves a part out (`ablation`).
         slope, offset: Calibration: log odds against the background = offset + slope * summed log ratios.
         outline_offset: The same offset for a candidate of which only outline and height were measured.
         prior_absent: Prior probability that the target is none of the candidates.
@@ -78,6 +79,7 @@ class LikelihoodParams:
     contour_sd_m: float = 1.5e-3
     contour_outlier: float = 0.1
     yaw_sd_rad: float = math.radians(6.0)
+    temper_outline: float = 1.0
     temper_width: float = 0.5
     temper_image: float = 0.35
     slope: float = 0.75
@@ -106,3 +108,10 @@ class LikelihoodParams:
         ):  # fmt: skip
             if not 0 < getattr(self, name) < 1:
                 raise ParamError(f"likelihood.{name}", getattr(self, name), "between 0 and 1")
+
+    def ablation(self) -> dict[str, LikelihoodParams]:
+        """Return the parameters with parts of the likelihood left out, by what is left of it."""
+        return {
+            "outline": replace(self, temper_width=0.0, temper_image=0.0, twin_fit=0.0),
+            "widths": replace(self, temper_outline=0.0, temper_image=0.0),
+        }

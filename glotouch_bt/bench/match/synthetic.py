@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from glotouch_bt.bench.match import Layout, Touched
+from glotouch_bt.bench.match.dataset import Layout, Touched
 from glotouch_bt.perception.recognition.model import TIP_RADIUS_M, traced_tips
 from glotouch_bt.perception.touch import (
     Candidate,
@@ -17,7 +17,7 @@ from glotouch_bt.perception.touch import (
     fit_contour,
     pad_noise_m,
 )
-from glotouch_bt.robot import Array
+from glotouch_bt.robot import Array, BadInput, Conditions, World, load_backend
 from glotouch_bt.robot.scene import stream
 from glotouch_bt.robot.simulation import Place, TouchSampler
 
@@ -31,6 +31,18 @@ CONTACT_SD_M, HEIGHT_SD_M = 3e-4, 5e-4
 """Errors of a contact and of a top besides those of the conditions. Source: ours."""
 DRIFT_M, DRIFT_RAD = 1.5e-3, math.radians(3.0)
 """Motion of the object between two sequences. Source: ours."""
+
+
+def sampled_layout(backend: str, world: World, conditions: Conditions, seed: int) -> Layout:
+    """Touch every object of a trial as `sample_layout` does.
+
+    Raises:
+        BadInput: The backend has no `TouchSampler`, or the objects cannot be used.
+    """
+    sampler = load_backend(backend).touch_sampler(world, conditions, seed)
+    if sampler is None:
+        raise BadInput(f"--backend {backend}: cannot touch objects without a robot")
+    return sample_layout(sampler, seed, conditions.name)
 
 
 def sample_layout(sampler: TouchSampler, seed: int, conditions: str) -> Layout:
