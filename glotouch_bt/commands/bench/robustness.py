@@ -17,7 +17,11 @@ def robustness(
     conditions: shared.Conditions = "nominal",
     objects: shared.Objects = None,
     backend: shared.Backend = "mujoco",
+    resume: shared.KeepTrials = False,
     workers: shared.Workers = 2,
+    cluster: shared.Cluster = None,
+    shard: shared.ShardName = None,
+    trial_limit: shared.TrialLimit = shared.TRIAL_LIMIT_S,
     out: shared.BenchFolder = None,
     json_: shared.SummaryJson = False,
 ) -> None:
@@ -36,11 +40,13 @@ def robustness(
         objects=objects,
         backend=backend,
         out=shared.bench_folder(out, "robustness"),
+        resume=resume,
+        shard=shared.read_shard(shard),
     )
 
     def told(row: dict[str, Any]) -> str:
         where = f"{row['axis']} {row['level']:g}" if row["axis"] else conditions
         return f"{where} seed {row['seed']}: {row['accepted']} of {row['decisions']} right and accepted{row['cause']}"
 
-    summary = shared.run_in_pool(run_campaign, campaign, workers, told)
+    summary = shared.run_in_pool(run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), told)
     shared.print_summary(summary, campaign.out, print_robustness, json_)
