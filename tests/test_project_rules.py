@@ -208,7 +208,7 @@ CODE_IN_DATA = ("pickle", "cPickle", "_pickle", "dill", "cloudpickle", "joblib",
 """Modules whose reading of data can run code."""
 SOCKETS = {"glotouch_backends/flexiv_xense/simulated/cell.py", "glotouch_backends/flexiv_xense/simulated/remote.py"}
 """Use `multiprocessing.connection` for its sockets; `send` and `recv`, which pickle, are banned there."""
-OWN_WORKERS = {"glotouch_bt/runs/workers.py"}
+OWN_WORKERS = {"glotouch_bt/campaign/workers.py"}
 """Pickles between a process and the workers that it has started itself, over a pipe without a name."""
 BANNED_CALLS = {
     "eval", "exec", "os.system", "os.popen", "tempfile.mktemp", "yaml.load", "yaml.load_all", "yaml.unsafe_load",

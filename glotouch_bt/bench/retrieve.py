@@ -98,7 +98,7 @@ def cause(result: Mapping[str, Any]) -> str:
 
 def run_campaign(campaign: RetrieveCampaign, executor: Executor, on_row: OnRow = silent) -> dict[str, Any]:
     """Run every trial on the executor, write trials.csv and summary.json, and return the summary."""
-    rows = run_trials(executor, campaign.trials(), on_row, shard=campaign.shard, write=partial(_write, campaign.out))
+    rows = run_trials(executor, campaign.trials(), campaign, on_row, write=partial(_write, campaign.out))
     more = {"targets": list(campaign.targets), "backend": campaign.backend, "settings": dict(campaign.settings)}
     summary = summarise(rows) | campaign.described() | more
     write_summary(campaign.out, summary)

@@ -7,6 +7,7 @@ from concurrent.futures import Executor, Future
 from contextlib import suppress
 from queue import Empty, SimpleQueue
 from time import perf_counter
+from typing import Protocol
 
 from glotouch_bt.campaign.cluster import ClusterLost
 from glotouch_bt.campaign.settings import Shard
@@ -23,6 +24,17 @@ WRITE_S = 10.0
 """Wall time between two tables of a campaign under way. Source: ours; a table of 1,000 rows takes about 10 ms."""
 
 
+class CampaignFolder(Protocol):
+    """A campaign whose folder can be prepared; see `Campaign`."""
+
+    @property
+    def shard(self) -> Shard | None:
+        """The share of the trials that is run."""
+
+    def open(self) -> None:
+        """Prepare the folder."""
+
+
 class ShardDone(GlotouchError):
     """The trials of this shard are done, but not those of all shards."""
 
@@ -30,9 +42,10 @@ class ShardDone(GlotouchError):
 def run_trials(
     executor: Executor,
     trials: Sequence[Trial],
+    campaign: CampaignFolder,
     on_row: OnRow = silent,
     *,
-    shard: Shard | None = None,
+    whole: bool = False,
     write: Callable[[list[Row]], object] | None = None,
     before: int = 0,
     after: int = 0,
@@ -45,16 +58,20 @@ def run_trials(
     Args:
         executor: A `WorkerPool` or a `ClusterPool`.
         trials: The trials.
+        campaign: The campaign, which is opened before its first trials; of them, its shard is run.
         on_row: Called with (row, rows so far, trials) after each trial; not for those that were done before.
-        shard: Run the trials of this share only.
+        whole: Every shard needs the rows of all these trials; the shards share the work.
         write: Called with the rows so far, in order: now and then, and at the end, also after an error.
-        before, after: Trials of the campaign done before these, and still to come, for `on_row`.
+        before, after: Trials of the campaign done before these (0 opens it), and still to come, for `on_row`.
 
     Raises:
-        BadInput: A folder holds a trial that was made otherwise (nothing was run), or a request is wrong.
+        BadInput: A folder holds a trial or a campaign that was made otherwise (nothing was run), or a request is
+            wrong.
         ShardDone: All trials of the shard are done, but not all trials.
     """
-    state = _State(executor, trials, shard)
+    if before == 0:
+        campaign.open()
+    state = _State(executor, trials, None if whole else campaign.shard)
     total = before + state.total + after
     written = perf_counter()
     try:

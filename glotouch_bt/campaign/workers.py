@@ -159,6 +159,7 @@ class TaskProcess:
         self.limit_s = limit_s
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
+        self._ready = False
 
     def close(self) -> None:
         """End the process."""
@@ -186,6 +187,8 @@ class TaskProcess:
         """
         pipe, process = self._started()
         try:
+            if not self._ready:
+                self._ready = pipe.recv()  # the limit does not count the start of the process
             pipe.send(call)
             if not wait([pipe, process.sentinel], self.limit_s):
                 self.signal(signal.SIGKILL)
@@ -220,6 +223,7 @@ class TaskProcess:
         code = self._process.exitcode
         self._pipe.close()
         self._process = self._pipe = None
+        self._ready = False
         return code
 
 
@@ -229,6 +233,7 @@ def serve(pipe: Connection) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        pipe.send(True)
         while True:
             try:
                 function, args, kwargs = pipe.recv()

@@ -135,7 +135,7 @@ def true_tip_P_m(record: RunRecord) -> Array:
 
 def run_campaign(campaign: ContactCampaign, executor: Executor, on_row: OnRow = silent) -> dict[str, Any]:
     """Run every trial on the executor, write trials.csv, summary.json and two plots and return the summary."""
-    rows = run_trials(executor, campaign.trials(), on_row, shard=campaign.shard, write=partial(_write, campaign.out))
+    rows = run_trials(executor, campaign.trials(), campaign, on_row, write=partial(_write, campaign.out))
     rows.sort(key=_order)
     more = {
         "paper": PAPER,

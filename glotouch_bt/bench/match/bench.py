@@ -160,15 +160,15 @@ def run_campaign(campaign: MatchCampaign, executor: Executor, on_row: OnRow = si
     done = run_trials(
         executor,
         trials,
+        campaign,
         lambda found, n, total: on_row(_progress(found), n, total),
-        shard=campaign.shard,
         write=partial(_write, campaign.out),
     )
     rows, layouts = _tables(done)
     recorded = files or sorted((campaign.out / "touchsets").glob("s[0-9]*.json"))
     run = partial(timing_task, recorded[:3], campaign.folder, campaign.methods)
     timing = campaign.trial("timing", run, _untimed, methods=campaign.methods, files=recorded[:3])
-    timed = run_trials(executor, [timing])[0] if recorded else {}
+    timed = run_trials(executor, [timing], campaign, whole=True, before=len(done))[0] if recorded else {}
     figures: dict[str, Any] = finite(
         summarise(rows["trials"], rows["pairs"], rows["closures"], campaign.methods)
         | {

@@ -99,7 +99,7 @@ def run_campaign(campaign: RobustnessCampaign, executor: Executor, on_row: OnRow
     def write(rows: Sequence[Row]) -> None:
         write_table(campaign.out, "points.csv", COLUMNS, rows)
 
-    rows = run_trials(executor, trials, on_row, shard=campaign.shard, write=write)
+    rows = run_trials(executor, trials, campaign, on_row, write=write)
     axes: dict[str, list[dict[str, Any]]] = {}
     for axis, level in campaign.points:
         mine = [r for r in rows if (r["axis"], r["level"]) == (axis, level)]

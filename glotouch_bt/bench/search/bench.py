@@ -126,7 +126,7 @@ def run_campaign(campaign: SearchCampaign, executor: Executor, on_row: OnRow = s
     def write(rows: Sequence[Row]) -> None:
         _write_csv(campaign, sorted(rows, key=place), objects)
 
-    rows = sorted(run_trials(executor, campaign.trials(), on_row, shard=campaign.shard, write=write), key=place)
+    rows = sorted(run_trials(executor, campaign.trials(), campaign, on_row, write=write), key=place)
     figures: dict[str, Any] = finite(summarise(rows, campaign.policies, objects))
     planar = campaign.planar_seeds
     summary = figures | {

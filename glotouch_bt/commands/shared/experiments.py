@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import typer
 
@@ -16,20 +16,13 @@ from glotouch_bt.commands.shared.output import print_json
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-C = TypeVar("C", bound="Openable")
+C = TypeVar("C")
 Show = Callable[[Any, int, int], None]
 
 
 def progress(told: Callable[[Any], str]) -> Show:
     """Return a function that prints the line of a row on stderr, after its number."""
     return lambda row, done, total: print(f"[{done}/{total}] {told(row)}", file=sys.stderr)
-
-
-class Openable(Protocol):
-    """A campaign whose folder can be prepared."""
-
-    def open(self) -> None:
-        """See `Campaign.open`."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +70,6 @@ def run_in_pool(
     from glotouch_bt.campaign import ShardDone
     from glotouch_bt.commands.terminal import CampaignProgress
 
-    campaign.open()
     try:
         with executors.pool() as pool, CampaignProgress(told, succeeded) as progress:
             return run(campaign, pool, progress)

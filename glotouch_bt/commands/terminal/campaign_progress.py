@@ -76,7 +76,7 @@ class CampaignProgress:
     def _rest(self, done: int, total: int) -> str:
         """Return the expected rest, from the mean time of the trials of this command; empty at the end."""
         rest_s = (time.perf_counter() - self._began) / self._rows * (total - done)
-        if done >= total:
+        if rest_s < 1.0:
             return ""
         hours, minutes = divmod(int(rest_s / 60.0 + 0.5), 60)
         if hours:

@@ -82,7 +82,7 @@ def run_campaign(campaign: FaultCampaign, executor: Executor, on_row: OnRow = si
 
     nothing = FaultPlan("none", ())
     trials = [trial(s, f"twin-s{s}", nothing, {"class": "none", "skill": "", "seed": s}) for s in campaign.seeds]
-    first = run_trials(executor, trials, on_row, after=len(campaign.seeds) * len(cells))
+    first = run_trials(executor, trials, campaign, on_row, whole=True, after=len(campaign.seeds) * len(cells))
     twins = {row["seed"]: row for row in first}
     trials, not_reached = [], 0
     for seed in campaign.seeds:
@@ -100,7 +100,7 @@ def run_campaign(campaign: FaultCampaign, executor: Executor, on_row: OnRow = si
         lines = (r | {"recovery": " ".join(r.get("recovery", ()))} for r in _in_order([*first, *rows]))
         write_table(campaign.out, "trials.csv", COLUMNS, lines)
 
-    rows = run_trials(executor, trials, on_row, shard=campaign.shard, write=write, before=len(first))
+    rows = run_trials(executor, trials, campaign, on_row, write=write, before=len(first))
     return _summary(campaign, _in_order([*first, *rows]), not_reached)
 
 

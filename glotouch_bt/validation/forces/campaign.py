@@ -19,6 +19,7 @@ from glotouch_bt.campaign import (
     Campaign,
     OnRow,
     Row,
+    Shard,
     Trial,
     open_folder,
     run_trials,
@@ -63,6 +64,11 @@ class ForceCampaign:
         """Folder of the campaign."""
         return self.scenes[0].out
 
+    @property
+    def shard(self) -> Shard | None:
+        """See `Campaign`."""
+        return self.scenes[0].shard
+
     def open(self) -> None:
         """See `Campaign`."""
         first = self.scenes[0]
@@ -102,7 +108,7 @@ def run_campaign(campaign: ForceCampaign, executor: Executor, on_row: OnRow = si
     def write(rows: Sequence[Row]) -> None:
         write_table(campaign.out, "trials.csv", COLUMNS, rows)
 
-    rows = run_trials(executor, trials, on_row, shard=first.shard, write=write, before=len(twins))
+    rows = run_trials(executor, trials, campaign, on_row, write=write, before=len(twins))
     return _written(campaign, twins, rows, {p.labels["folder"]: p for p in planned})
 
 
@@ -123,7 +129,7 @@ def _twins(campaign: ForceCampaign, executor: Executor, on_row: OnRow, after: in
         request = scene.request(TWIN_SEED, name, report=False)
         failed = partial(failed_trial, labels, scene.out / name)
         trials.append(Trial.of(request, partial(run_twin, request, labels), failed))
-    rows = run_trials(executor, trials, on_row, after=after)
+    rows = run_trials(executor, trials, campaign, on_row, whole=True, after=after)
     for row in rows:
         if "accepted" not in row:
             raise GlotouchError(f"{row['folder']}: the run without faults did not end ({row['cause']})")

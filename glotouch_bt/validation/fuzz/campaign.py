@@ -86,11 +86,11 @@ def run_campaign(campaign: FuzzCampaign, executor: Executor, on_counts: OnRow = 
         on_counts(_by_class(counts), counts.total(), campaign.trials)
 
     chunks = [range(k, min(k + CHUNK, campaign.trials)) for k in range(0, campaign.trials, CHUNK)]
-    rows = run_trials(executor, [campaign.trial(c) for c in chunks], show, shard=campaign.shard)
+    rows = run_trials(executor, [campaign.trial(c) for c in chunks], campaign, show)
     lost = [r["number"] for row in rows if _lost(row) for r in row["results"]]
     rows = [row for row in rows if not _lost(row)]
     counts = Counter((r["sort"], r["came"]) for row in rows for r in row["results"])
-    rows += run_trials(executor, [campaign.trial([n]) for n in lost], show)
+    rows += run_trials(executor, [campaign.trial([n]) for n in lost], campaign, show, before=len(chunks))
     results = [Result(**r) for row in rows for r in row["results"]]
     counts = Counter((r.sort, r.came) for r in results)
     bad = [r for r in results if r.came in BAD]
