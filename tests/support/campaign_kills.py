@@ -51,6 +51,13 @@ def descendants(pid: int) -> list[int]:
     return found
 
 
+def command_line(pid: int) -> bytes:
+    """Return the command line of a process; empty if it has ended."""
+    with suppress(OSError):
+        return Path(f"/proc/{pid}/cmdline").read_bytes()
+    return b""
+
+
 class Processes:
     """The processes of a campaign by their role; a dead one is started again."""
 
@@ -70,6 +77,7 @@ class Processes:
         this = [sys.executable, "-m", "tests.support.campaign_kills", "--trials", str(trials), "--out", str(out)]
         self.words["client"] = [*this, "--client", *address]
         self.running: dict[str, subprocess.Popen[bytes]] = {}
+        self.journal = out / "journal"
         self.log = (out.parent / f"{out.name}.log").open("wb")
 
     def look(self) -> bool:
@@ -82,12 +90,19 @@ class Processes:
                 self.running[name] = subprocess.Popen(words, stdout=self.log, stderr=self.log, start_new_session=True)
         return False
 
-    def victims(self) -> dict[str, int]:
-        """Return the process to kill for each role; below a client or worker, one of its own."""
+    def victims(self, rng: np.random.Generator) -> dict[str, int]:
+        """Return a process to kill for each role: the command itself, one below it, and one that runs a trial."""
         found = {}
         for name, process in self.running.items():
-            found[name.split()[0]] = process.pid
-            found.update((f"below {name.split()[0]}", pid) for pid in descendants(process.pid)[-1:])
+            role = name.split()[0]
+            found[role] = process.pid
+            below = [p for p in descendants(process.pid) if b"resource_tracker" not in command_line(p)]
+            if below:
+                found[f"below {role}"] = int(rng.choice(below))
+        with suppress(OSError, ValueError, IndexError):
+            what, _, pid = self.journal.read_text().splitlines()[-1].split()
+            if what == "begin" and command_line(int(pid)):
+                found["trial"] = int(pid)
         return found
 
     def end(self) -> None:
@@ -112,8 +127,8 @@ def disturb(out: Path, trials: int, kills: int, seed: int, cluster: bool) -> Cou
             done = sum(1 for _ in out.glob(f"t*/{TRIAL}"))
             if at and done >= at[0]:
                 at.pop(0)
-                threading.Event().wait(rng.uniform(0.0, 0.3))
-                victims = processes.victims()
+                threading.Event().wait(rng.uniform(0.0, 0.2))
+                victims = processes.victims(rng)
                 # every role as often as the others; trials are killed in between, not at their end
                 role = min(victims, key=lambda r: (counted[r], rng.random()))
                 with suppress(OSError):
