@@ -84,7 +84,7 @@ def run_study(study: KillStudy, on_row: OnRow = silent) -> dict[str, Any]:
     """
     if not Path("/proc/self/stat").is_file():
         raise BackendError("bench resume needs /proc, which this system has not")
-    study.out.mkdir(parents=True, exist_ok=True)
+    study.open()
     rows: list[dict[str, Any]] = []
     total = len(study.seeds) * study.kills
     for seed in study.seeds:

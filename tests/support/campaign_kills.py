@@ -70,7 +70,7 @@ class Processes:
                 port = str(probe.getsockname()[1])
             address = ["--address", f"tcp://127.0.0.1:{port}"]
             scheduler = ["--host", "127.0.0.1", "--port", port, "--no-dashboard"]
-            worker = [address[1], "--nthreads", "1", "--no-dashboard", "--death-timeout", "60"]
+            worker = [address[1], "--no-nanny", "--nthreads", "1", "--no-dashboard"]
             self.words["scheduler"] = [sys.executable, "-m", "distributed.cli.dask_scheduler", *scheduler]
             for name in ("worker 1", "worker 2"):
                 self.words[name] = [sys.executable, "-m", "distributed.cli.dask_worker", *worker]
