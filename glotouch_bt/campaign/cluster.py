@@ -6,8 +6,10 @@ folders of the trials at the same paths.
 
 from __future__ import annotations
 
+import atexit
 import multiprocessing
 import os
+import signal
 import threading
 import time
 from collections.abc import Callable
@@ -144,6 +146,8 @@ def _run_beside(folder: str, limit_s: float, call: tuple[Any, Any, Any]) -> Any:
         # dask's workers are daemons, which may not start processes; ours ends when its parent is gone.
         multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
         process = _thread.process = TaskProcess()
+        # A worker that leaves would wait for its child, which waits for work.
+        atexit.register(process.signal, signal.SIGKILL)
     process.limit_s = limit_s
     return process.result_of((_in_folder, (folder, call), {}))
 
