@@ -108,7 +108,7 @@ REGISTRY = re.compile(
     rb"|--find-links|index[-_]url *="
 )
 MACHINE = re.compile(
-    rb"/home/[a-z]|/root/|/Users/|/work/[a-z]|\b(?:10|192\.168|172\.16)(?:\.\d{1,3}){2,3}\b|\blocalhost:\d"
+    rb"/home/[a-z]|/root/|/Users/|/work/[a-z]|\b(?:10\.\d{1,3}|192\.168|172\.16)(?:\.\d{1,3}){2}\b|\blocalhost:\d"
 )
 
 
