@@ -64,7 +64,11 @@ class ClusterPool(Executor):
         self._address = address
         if address == LOCAL:
             self._cluster = distributed.LocalCluster(
-                n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
+                n_workers=workers,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                dashboard_address=None,
+                silence_logs="CRITICAL",
             )
             self._address = self._cluster.scheduler_address
         try:
@@ -116,7 +120,9 @@ class ClusterPool(Executor):
 
 
 def _pass_on(result: Future[Any], theirs: Any) -> None:
-    """Give the end of a task of dask to our future."""
+    """Give the end of a task of dask to our future, unless that was cancelled."""
+    if not result.set_running_or_notify_cancel():
+        return
     if theirs.status == "finished":
         result.set_result(theirs.result())
     elif theirs.status == "error":
