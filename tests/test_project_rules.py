@@ -108,7 +108,7 @@ REGISTRY = re.compile(
     rb"|--find-links|index[-_]url *="
 )
 MACHINE = re.compile(
-    rb"/home/[a-z]|/root/|/Users/|/work/[a-z]|\b(?:10|192\.168|172\.16)(?:\.\d{1,3}){2,3}\b|\blocalhost:\d"
+    rb"/home/[a-z]|/root/|/Users/|/work/[a-z]|\b(?:10\.\d{1,3}|192\.168|172\.16)(?:\.\d{1,3}){2}\b|\blocalhost:\d"
 )
 
 
@@ -208,7 +208,7 @@ CODE_IN_DATA = ("pickle", "cPickle", "_pickle", "dill", "cloudpickle", "joblib",
 """Modules whose reading of data can run code."""
 SOCKETS = {"glotouch_backends/flexiv_xense/simulated/cell.py", "glotouch_backends/flexiv_xense/simulated/remote.py"}
 """Use `multiprocessing.connection` for its sockets; `send` and `recv`, which pickle, are banned there."""
-OWN_WORKERS = {"glotouch_bt/runs/workers.py"}
+OWN_WORKERS = {"glotouch_bt/campaign/workers.py"}
 """Pickles between a process and the workers that it has started itself, over a pipe without a name."""
 BANNED_CALLS = {
     "eval", "exec", "os.system", "os.popen", "tempfile.mktemp", "yaml.load", "yaml.load_all", "yaml.unsafe_load",

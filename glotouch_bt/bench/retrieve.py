@@ -14,14 +14,11 @@ from typing import Any
 import numpy as np
 
 from glotouch_bt.bench.statistics import bootstrap_mean, wilson
-from glotouch_bt.robot.scene import load_folder
-from glotouch_bt.runs import (
+from glotouch_bt.campaign import (
     Campaign,
     OnRow,
     Row,
-    RunRequest,
     Trial,
-    TrialMemory,
     crashed,
     launch_trial,
     run_trials,
@@ -29,6 +26,8 @@ from glotouch_bt.runs import (
     write_summary,
     write_table,
 )
+from glotouch_bt.robot.scene import load_folder
+from glotouch_bt.runs import RunRequest
 
 COLUMNS = (
     "target", "seed", "exit_code", "status", "retrieved", "correct", "cause", "candidates", "contacts", "probe_path_m",
@@ -61,7 +60,7 @@ class RetrieveCampaign(Campaign):
     def _trial(self, target: str, seed: int) -> Trial:
         request = self.request(seed, f"{target}-s{seed}", settings={**self.settings, "target": target})
         head = {"target": target, "seed": seed, "folder": f"{target}-s{seed}"}
-        return Trial(partial(run_trial, head, request), partial(_failed, head), TrialMemory(request))
+        return Trial.of(request, partial(run_trial, head, request), partial(_failed, head))
 
 
 def targets_of(folder: Path) -> tuple[str, ...]:
@@ -99,13 +98,15 @@ def cause(result: Mapping[str, Any]) -> str:
 
 def run_campaign(campaign: RetrieveCampaign, executor: Executor, on_row: OnRow = silent) -> dict[str, Any]:
     """Run every trial on the executor, write trials.csv and summary.json, and return the summary."""
-    rows = run_trials(executor, campaign.trials(), campaign.resume, on_row)
-    rows.sort(key=lambda r: (r["target"], r["seed"]))
-    write_table(campaign.out, "trials.csv", COLUMNS, rows)
+    rows = run_trials(executor, campaign.trials(), campaign, on_row, write=partial(_write, campaign.out))
     more = {"targets": list(campaign.targets), "backend": campaign.backend, "settings": dict(campaign.settings)}
     summary = summarise(rows) | campaign.described() | more
     write_summary(campaign.out, summary)
     return summary
+
+
+def _write(folder: Path, rows: Sequence[Row]) -> None:
+    write_table(folder, "trials.csv", COLUMNS, sorted(rows, key=lambda r: (r["target"], r["seed"])))
 
 
 def succeeded(row: Mapping[str, Any]) -> bool:

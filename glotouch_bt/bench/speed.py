@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from glotouch_bt.campaign import Campaign, OnRow, silent, write_summary, write_table
 from glotouch_bt.lazy import load_all
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.execution import run_mission
@@ -23,7 +24,7 @@ from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import Record, Recorder
 from glotouch_bt.report import write_report
 from glotouch_bt.robot import BadInput, Command, Observation, Request, Robot, Ticket, load_backend
-from glotouch_bt.runs import Campaign, OnRow, RunFolder, silent, write_summary, write_table
+from glotouch_bt.runs import RunFolder
 
 COLUMNS = (
     "seed", "status", "sim_s", "wall_s", "bare_s", "steps", "same_end_state", "realtime_factor", "bare_factor",

@@ -10,11 +10,11 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from glotouch_bt.campaign import write_summary
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.motion import Kinematics
 from glotouch_bt.robot import Array, Command, JointSetpoint, load_backend
-from glotouch_bt.runs import write_summary
 
 SWAY_RAD = 0.004
 """Amplitude of the first joint's sway while measuring, so that every setpoint is new."""

@@ -6,19 +6,3 @@ from glotouch_bt.runs.operator import Operator, operated
 from glotouch_bt.runs.result import installed_versions
 from glotouch_bt.runs.resume import resume
 from glotouch_bt.runs.resume_point import ResumableRun, copy_run, find_resumable
-from glotouch_bt.runs.trial_memory import TrialMemory
-from glotouch_bt.runs.trials import (
-    Campaign,
-    OnRow,
-    Row,
-    Task,
-    Trial,
-    crashed,
-    gather,
-    launch_trial,
-    run_trials,
-    silent,
-    write_summary,
-    write_table,
-)
-from glotouch_bt.runs.workers import WorkerLost, WorkerPool

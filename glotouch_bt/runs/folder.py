@@ -108,10 +108,12 @@ class RunFolder:
     def check_free(self, overwrite: bool) -> None:
         """Check that a new run may use the folder: it is empty, or holds an earlier run that may be replaced.
 
+        Hidden files do not count: a campaign keeps the claim of a trial there.
+
         Raises:
             BadInput: It holds other files, or a run that must be kept.
         """
-        if not any(self.path.iterdir()):
+        if all(p.name.startswith(".") for p in self.path.iterdir()):
             return
         if not holds_run(self.path):
             raise BadInput(f"{self.path}: is not empty and holds no run; give a new or an empty folder")

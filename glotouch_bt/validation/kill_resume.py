@@ -14,15 +14,16 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from glotouch_bt.bench import Rate, bootstrap_mean, wilson
+from glotouch_bt.campaign import Campaign, OnRow, Row, Trial, perform, silent, write_summary, write_table
 from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile
 from glotouch_bt.report import RunRecord, read_run
 from glotouch_bt.robot import BackendError, BadInput, GlotouchError
 from glotouch_bt.robot.scene import stream
-from glotouch_bt.runs import Campaign, OnRow, TrialMemory, silent, write_summary, write_table
 
 POLL_S = 0.002
 ONLY_HERE = ("wall_time_s", "wall_open_s", "resumed", "versions")
@@ -57,10 +58,6 @@ class KillStudy(Campaign):
         """The option that names the objects; a resumed run needs it again."""
         return [] if self.objects is None else ["--objects", str(self.objects)]
 
-    def memory(self, seed: int, name: str) -> TrialMemory:
-        """Return the memory of a run in the folder `name`."""
-        return TrialMemory(self.request(seed, name))
-
 
 @dataclass(frozen=True)
 class Twin:
@@ -87,19 +84,14 @@ def run_study(study: KillStudy, on_row: OnRow = silent) -> dict[str, Any]:
     """
     if not Path("/proc/self/stat").is_file():
         raise BackendError("bench resume needs /proc, which this system has not")
-    study.out.mkdir(parents=True, exist_ok=True)
+    study.open()
     rows: list[dict[str, Any]] = []
     total = len(study.seeds) * study.kills
     for seed in study.seeds:
         twin = _twin(study, seed)
         for number, share in enumerate(stream(seed, "kill").random(study.kills)):
-            memory = study.memory(seed, f"killed-s{seed}-{number}")
-            row = memory.read() if study.resume else None
-            if row is None:
-                memory.forget()
-                row = _trial(study, seed, number, float(share), twin)
-                memory.write(row)
-            rows.append(row)
+            run = partial(_trial, study, seed, number, float(share), twin)
+            rows.append(perform(Trial.of(study.request(seed, f"killed-s{seed}-{number}"), run, _unexpected)))
             _write(study, rows)
             on_row(rows[-1], len(rows), total)
     return _write(study, rows)
@@ -133,11 +125,18 @@ def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def _twin(study: KillStudy, seed: int) -> Twin:
-    folder, memory = study.out / f"twin-s{seed}", study.memory(seed, f"twin-s{seed}")
-    kept = memory.read() if study.resume else None
-    if kept is not None:
-        return Twin(folder, json.loads((folder / "result.json").read_text()), kept["began_s"], kept["ended_s"])
-    memory.forget()
+    folder = study.out / f"twin-s{seed}"
+    request = study.request(seed, f"twin-s{seed}")
+    times = perform(Trial.of(request, partial(_twin_times, study, seed, folder), _unexpected))
+    return Twin(folder, json.loads((folder / "result.json").read_text()), times["began_s"], times["ended_s"])
+
+
+def _unexpected(error: Exception) -> Row:
+    raise error
+
+
+def _twin_times(study: KillStudy, seed: int, folder: Path) -> Row:
+    """Run a twin; return the CPU times of its process when the record began and when the result was written, s."""
     began_s = ended_s = 0.0
     with _start(study.run_words(seed, folder)) as process:
         while process.poll() is None:
@@ -151,8 +150,7 @@ def _twin(study: KillStudy, seed: int) -> Twin:
         said = b"" if process.stderr is None else process.stderr.read()
     if process.returncode not in (0, 1, 3):
         raise BadInput(said.decode().strip().removeprefix("glotouch: ") or "the twin did not run")
-    memory.write({"began_s": began_s, "ended_s": ended_s})
-    return Twin(folder, json.loads((folder / "result.json").read_text()), began_s, ended_s)
+    return {"began_s": began_s, "ended_s": ended_s}
 
 
 def _trial(study: KillStudy, seed: int, number: int, share: float, twin: Twin) -> dict[str, Any]:

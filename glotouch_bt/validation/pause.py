@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from glotouch_bt.bench import wilson
+from glotouch_bt.campaign import Campaign, OnRow, launch_trial, silent, write_summary, write_table
 from glotouch_bt.mission.execution import Control
 from glotouch_bt.report import read_run
 from glotouch_bt.robot import Limits
-from glotouch_bt.runs import Campaign, OnRow, launch_trial, silent, write_summary, write_table
 
 COLUMNS = (
     "seed", "target", "status", "retrieved", "twin_status", "twin_retrieved", "same", "pauses", "on_the_way",

@@ -73,7 +73,6 @@ def test_a_resumed_campaign_keeps_what_was_run_and_passes_settings_on(
     def launch(request: RunRequest) -> Any:
         asked.append(request)
         assert request.out is not None
-        request.out.mkdir(parents=True)
         (request.out / "result.json").write_text(json.dumps(_result(request)))
         return SimpleNamespace(result=_result(request), exit_code={2: 1, 3: 3}.get(request.seed, 0))
 
@@ -93,6 +92,5 @@ def test_a_resumed_campaign_keeps_what_was_run_and_passes_settings_on(
 def test_targets_take_turns_over_the_seeds(campaign: retrieve.RetrieveCampaign) -> None:
     """Three objects, two for each seed: every object is tried as often, and each world twice."""
     turns = replace(campaign, targets=("apple", "train", "truck"), per_seed=2, seeds=range(3))
-    requests = [trial.memory.request for trial in turns.trials()]
-    tried = [(r.settings["target"], r.seed) for r in requests]
+    tried = [(t.identity["settings"]["target"], t.identity["seed"]) for t in turns.trials()]
     assert tried == [("apple", 0), ("train", 0), ("truck", 1), ("apple", 1), ("train", 2), ("truck", 2)]

@@ -18,9 +18,9 @@ import pytest
 
 from glotouch_bt.bench import speed
 from glotouch_bt.bench.speed import CycleTimes, SpeedTrial, TimedRecord, TimedRobot
+from glotouch_bt.campaign import Campaign
 from glotouch_bt.robot import Backend, BadInput, Command, Observation, Robot
 from glotouch_bt.robot.simulation.referee import BareSteps, Referee
-from glotouch_bt.runs import Campaign
 
 FAKE_CLI = Path(__file__).parents[1] / "support" / "fake_cli.py"
 MISSION = (

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from glotouch_bt.runs import WorkerLost
+from glotouch_bt.campaign import WorkerLost
 from glotouch_bt.validation.fuzz import campaign as campaign_module
 from glotouch_bt.validation.fuzz import missions as missions_module
 from glotouch_bt.validation.fuzz import trial as trial_module
@@ -20,7 +20,7 @@ from glotouch_bt.validation.fuzz.campaign import KINDS, FuzzCampaign, run_campai
 from glotouch_bt.validation.fuzz.corrupt import ODD_VALUES
 from glotouch_bt.validation.fuzz.kind import BAD, FuzzKind
 from glotouch_bt.validation.fuzz.missions import document_of
-from glotouch_bt.validation.fuzz.trial import Result, run_trials, stream_of
+from glotouch_bt.validation.fuzz.trial import Result, run_inputs, stream_of
 
 SEED = 7
 MISSIONS = KINDS["missions"]
@@ -71,7 +71,7 @@ def test_documents_are_of_both_kinds_and_in_all_states() -> None:
     ],
 )
 def test_nothing_bad_comes_of_some_of_them(kind: str, trials: int, some: set[str]) -> None:
-    results = run_trials(KINDS[kind], SEED, range(trials))
+    results = run_inputs(KINDS[kind], SEED, range(trials))
     assert [(r.number, r.came, r.detail) for r in results if r.came in BAD] == []
     assert some <= {r.came for r in results}
 
@@ -115,7 +115,7 @@ def runs_text(path: Path, settings: object) -> None:
 )  # fmt: skip
 def test_what_must_not_happen_is_noticed(broken_check: pytest.MonkeyPatch, what: object, came: str) -> None:
     broken_check.setattr(missions_module, "load_mission", what)
-    (result,) = run_trials(MISSIONS, SEED, missions(1))
+    (result,) = run_inputs(MISSIONS, SEED, missions(1))
     assert result.came == came
 
 
@@ -132,7 +132,7 @@ def test_a_kind_that_writes_does_so_below_its_folder_only(tmp_path: Path) -> Non
             (tmp_path / "outside").write_text("x")
             return "accepted", ""
 
-    (result,) = run_trials(Writes(), SEED, [0])
+    (result,) = run_inputs(Writes(), SEED, [0])
     assert result.came == "code run"
     assert result.detail.splitlines() == [f"open {str(tmp_path / 'outside')!r} w"]
 
@@ -145,7 +145,7 @@ def test_a_campaign_counts_and_keeps_what_broke(tmp_path: Path, monkeypatch: pyt
             raise WorkerLost(-9)
         return [Result(n, "mission", "traceback" if n == 3 else "ran to success", "why") for n in numbers]
 
-    monkeypatch.setattr(campaign_module, "run_trials", made)
+    monkeypatch.setattr(campaign_module, "run_inputs", made)
     with ThreadPoolExecutor(1) as pool:
         summary = run_campaign(FuzzCampaign(120, SEED, tmp_path / "out"), pool)
     assert summary["counts"] == {"mission": {"ran to success": 118, "traceback": 1}, "unknown": {"process died": 1}}

@@ -23,7 +23,7 @@ from glotouch_bt.bench.search.summary import ERRORS, summarise
 class NoPool:
     """In place of worker processes, which mocked studies do not need."""
 
-    def __init__(self, workers: int, **_: object) -> None:
+    def __init__(self, workers: int, *_: object) -> None:
         self.workers = workers
 
     def __enter__(self) -> NoPool:
@@ -40,7 +40,7 @@ class NoPool:
 def command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[CliRunner]:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setattr("glotouch_bt.runs.WorkerPool", NoPool)
+    monkeypatch.setattr("glotouch_bt.campaign.WorkerPool", NoPool)
     yield CliRunner()
     cli._debug = False
 

@@ -13,11 +13,11 @@ from typing import Any
 
 import pytest
 
+from glotouch_bt.campaign import WorkerLost
 from glotouch_bt.faults.effects.catalogue import CATALOGUE
 from glotouch_bt.mission.checkpoint.store import CheckpointRow
 from glotouch_bt.robot import BadInput, UnknownName
 from glotouch_bt.robot.fake import FakeRobot
-from glotouch_bt.runs import WorkerLost
 from glotouch_bt.runs.launch import RunRequest
 from glotouch_bt.validation.faults import exhaustive as faults_exhaustive
 from glotouch_bt.validation.faults import start as faults_start

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+from glotouch_bt.campaign import Campaign, WorkerLost
 from glotouch_bt.cli import app
 from glotouch_bt.faults import CATALOGUE, FaultPlan, check_plan
 from glotouch_bt.mission.read import limits_of, parse_yaml
-from glotouch_bt.runs import Campaign, WorkerLost
 from glotouch_bt.validation.forces import campaign as forces_campaign
 from glotouch_bt.validation.forces import trial as forces_trial
 from glotouch_bt.validation.forces.accepted import accepted_by
@@ -173,12 +173,12 @@ def test_a_success_without_the_object_is_false(change: dict[str, Any], lifts: bo
 class Here:
     """An executor that is this process."""
 
-    def submit(self, call: Any, *given: Any) -> Future[Any]:
+    def submit(self, call: Any, trial: Any) -> Future[Any]:
         future: Future[Any] = Future()
-        if call.memory.request.seed == 3 and call.memory.request.faults is not None:
+        if trial.identity["seed"] == 3 and trial.identity["faults"] is not None:
             future.set_exception(WorkerLost(-9))
         else:
-            future.set_result(call(*given))
+            future.set_result(call(trial))
         return future
 
 

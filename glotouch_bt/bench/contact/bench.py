@@ -7,10 +7,11 @@ square bolted to the floor, the second has it free.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,16 +20,11 @@ from glotouch_bt.bench.contact.plots import plot_errors, plot_traces
 from glotouch_bt.bench.contact.square import TOOLS, Tool, TracedSquare, traced_square, true_square
 from glotouch_bt.bench.retrieve import cause
 from glotouch_bt.bench.statistics import bootstrap_mean, wilson
-from glotouch_bt.perception.touch import polygon_distance
-from glotouch_bt.report import RunRecord, read_run
-from glotouch_bt.robot import Array, Pose
-from glotouch_bt.runs import (
+from glotouch_bt.campaign import (
     Campaign,
     OnRow,
     Row,
-    RunRequest,
     Trial,
-    TrialMemory,
     crashed,
     launch_trial,
     run_trials,
@@ -36,6 +32,10 @@ from glotouch_bt.runs import (
     write_summary,
     write_table,
 )
+from glotouch_bt.perception.touch import polygon_distance
+from glotouch_bt.report import RunRecord, read_run
+from glotouch_bt.robot import Array, Pose
+from glotouch_bt.runs import RunRequest
 
 METRICS = ("centre_error_mm", "contact_std_mm", "contact_rms_mm", "max_contact_mm", "side_error_mm")
 PAPER = {
@@ -76,7 +76,7 @@ class ContactCampaign(Campaign):
         name = f"{tool}-{square}-s{seed}"
         request = replace(self.request(seed, name, settings=settings), mission=f"{self.mission}_{tool}")
         head = {"tool": tool, "square": square, "seed": seed, "folder": name}
-        return Trial(partial(run_trial, head, request), partial(_failed, head), TrialMemory(request))
+        return Trial.of(request, partial(run_trial, head, request), partial(_failed, head))
 
 
 def run_trial(head: Row, request: RunRequest) -> Row:
@@ -135,9 +135,8 @@ def true_tip_P_m(record: RunRecord) -> Array:
 
 def run_campaign(campaign: ContactCampaign, executor: Executor, on_row: OnRow = silent) -> dict[str, Any]:
     """Run every trial on the executor, write trials.csv, summary.json and two plots and return the summary."""
-    rows = run_trials(executor, campaign.trials(), campaign.resume, on_row)
-    rows.sort(key=lambda r: (r["square"], r["tool"], r["seed"]))
-    write_table(campaign.out, "trials.csv", COLUMNS, rows)
+    rows = run_trials(executor, campaign.trials(), campaign, on_row, write=partial(_write, campaign.out))
+    rows.sort(key=_order)
     more = {
         "paper": PAPER,
         "contacts_per_side": campaign.per_side,
@@ -149,6 +148,14 @@ def run_campaign(campaign: ContactCampaign, executor: Executor, on_row: OnRow = 
     plot_errors(rows, PAPER, campaign.out / "errors.png")
     plot_traces(rows, campaign.out)
     return summary
+
+
+def _order(row: Mapping[str, Any]) -> tuple[str, str, int]:
+    return row["square"], row["tool"], row["seed"]
+
+
+def _write(folder: Path, rows: Sequence[Row]) -> None:
+    write_table(folder, "trials.csv", COLUMNS, sorted(rows, key=_order))
 
 
 def summarise(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:

@@ -14,10 +14,10 @@ from glotouch_bt.bench.detection.plot import plot_curves
 from glotouch_bt.bench.detection.signals import Hand, MoveKind
 from glotouch_bt.bench.detection.simulated import WORLD, FreeMotion, SimulatedProbe, free_motion, push_once
 from glotouch_bt.bench.statistics import wilson
+from glotouch_bt.campaign import write_summary, write_table
 from glotouch_bt.mission.read import load_conditions, load_world
 from glotouch_bt.perception.touch import GuardParams, Payload
 from glotouch_bt.robot import RobotDescription
-from glotouch_bt.runs import write_summary, write_table
 
 PUSH_N = 0.6
 FORCES_N = (0.10, 0.12, 0.14, 0.16, 0.18, 0.20, 0.25, 0.30, 0.40, 0.60)

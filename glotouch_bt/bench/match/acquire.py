@@ -12,10 +12,11 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from glotouch_bt.bench.match.dataset import Layout, Planar, Touched, write_layout
+from glotouch_bt.campaign import launch_trial
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.report import RunRecord, read_run
 from glotouch_bt.robot import Array, BadInput, Pose
-from glotouch_bt.runs import RunRequest, launch_trial
+from glotouch_bt.runs import RunRequest
 
 NEAREST_M = 0.025
 """A candidate whose contour centre is farther than this from every object's centre belongs to no object."""

@@ -19,11 +19,24 @@ from glotouch_bt.bench.match.summary import summarise
 from glotouch_bt.bench.match.synthetic import sampled_layout
 from glotouch_bt.bench.match.timing import time_matching
 from glotouch_bt.bench.match.trials import PAIR_COLUMNS, TRIAL_COLUMNS, decide, models_of
+from glotouch_bt.campaign import (
+    Campaign,
+    OnRow,
+    Row,
+    Trial,
+    crashed,
+    digest,
+    folder_digests,
+    run_trials,
+    silent,
+    write_summary,
+    write_table,
+)
 from glotouch_bt.escaped_text import finite
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read import conditions_name, load_conditions
 from glotouch_bt.robot.scene import load_folder, stl_files, stream
-from glotouch_bt.runs import Campaign, OnRow, RunRequest, Task, crashed, gather, silent, write_summary, write_table
+from glotouch_bt.runs import RunRequest
 
 IN_THE_BOX = 5
 """Objects in a layout. From a larger folder, each seed draws this many."""
@@ -71,6 +84,13 @@ class MatchCampaign(Campaign):
     def box(self, seed: int) -> Path | None:
         """Return the folder of a layout's objects, created if it is a drawn subset; None: the world's."""
         return objects_of(self.folder, seed, self.out / "objects") if self.objects else None
+
+    def layout_trial(self, seed: int, file: Path | None = None) -> Trial:
+        """Return the trial that acquires the layout of a seed, or reads it from a file."""
+        name = f"s{seed:04d}" if file is None else file.stem
+        content = {"strangers": folder_digests(self.strangers), "file": file and digest(file.read_bytes())}
+        run, failed = partial(layout_task, self, seed, file), partial(failed_task, self, seed)
+        return self.trial(f"layouts/{name}", run, failed, seed=seed, methods=self.methods, sampled=self.sampled, inputs=content)
 
     def layout_request(self, seed: int) -> RunRequest:
         """Return the mission request for a layout."""
@@ -150,14 +170,19 @@ def run_campaign(campaign: MatchCampaign, executor: Executor, on_row: OnRow = si
     campaign.check()
     files = layout_files(campaign.dataset)[: len(campaign.seeds)] if campaign.dataset else []
     todo: list[tuple[int, Path | None]] = [(-1, f) for f in files] or [(seed, None) for seed in campaign.seeds]
-    tasks = [Task(partial(layout_task, campaign, s, f), partial(failed_task, campaign, s)) for s, f in todo]
-    done = gather(executor, tasks, lambda found, n, total: on_row(_progress(found), n, total))
-    done.sort(key=lambda d: d["layout"]["seed"])
-    rows = {part: [r for d in done for r in d[part]] for part in ("trials", "pairs", "closures")}
-    layouts = [d["layout"] for d in done]
+    trials = [campaign.layout_trial(seed, file) for seed, file in todo]
+    done = run_trials(
+        executor,
+        trials,
+        campaign,
+        lambda found, n, total: on_row(_progress(found), n, total),
+        write=partial(_write, campaign.out),
+    )
+    rows, layouts = _tables(done)
     recorded = files or sorted((campaign.out / "touchsets").glob("s[0-9]*.json"))
-    timing = Task(partial(timing_task, recorded[:3], campaign.folder, campaign.methods), _untimed)
-    timed = gather(executor, [timing])[0] if recorded else {}
+    run = partial(timing_task, recorded[:3], campaign.folder, campaign.methods)
+    timing = campaign.trial("timing", run, _untimed, methods=campaign.methods, files=recorded[:3])
+    timed = run_trials(executor, [timing], campaign, whole=True, before=len(done))[0] if recorded else {}
     figures: dict[str, Any] = finite(
         summarise(rows["trials"], rows["pairs"], rows["closures"], campaign.methods)
         | {
@@ -176,13 +201,25 @@ def run_campaign(campaign: MatchCampaign, executor: Executor, on_row: OnRow = si
             "backend": campaign.backend,
         }
     )
-    write_table(campaign.out, "layouts.csv", LAYOUT_COLUMNS, layouts)
-    write_table(campaign.out, "trials.csv", TRIAL_COLUMNS, rows["trials"])
-    write_table(campaign.out, "pairs.csv", PAIR_COLUMNS, rows["pairs"])
-    write_table(campaign.out, "closures.csv", CLOSURE_COLUMNS, rows["closures"])
     write_summary(campaign.out, figures)
     plot_all(campaign.out, figures, rows["trials"], rows["closures"])
     return figures
+
+
+def _tables(done: Sequence[Row]) -> tuple[dict[str, list[Row]], list[Row]]:
+    """Return the rows of trials, pairs and closures, and those of the layouts, by seed."""
+    done = sorted(done, key=lambda d: int(d["layout"]["seed"]))
+    return {part: [r for d in done for r in d[part]] for part in ("trials", "pairs", "closures")}, [
+        d["layout"] for d in done
+    ]
+
+
+def _write(folder: Path, done: Sequence[Row]) -> None:
+    rows, layouts = _tables(done)
+    write_table(folder, "layouts.csv", LAYOUT_COLUMNS, layouts)
+    write_table(folder, "trials.csv", TRIAL_COLUMNS, rows["trials"])
+    write_table(folder, "pairs.csv", PAIR_COLUMNS, rows["pairs"])
+    write_table(folder, "closures.csv", CLOSURE_COLUMNS, rows["closures"])
 
 
 def _progress(done: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,10 +12,10 @@ from glotouch_bt.bench.match import DEFAULT, decide, sampled_layout
 from glotouch_bt.bench.robustness.axes import AXES, changed
 from glotouch_bt.bench.robustness.plot import plot_axes
 from glotouch_bt.bench.statistics import bootstrap_mean
+from glotouch_bt.campaign import Campaign, OnRow, Row, crashed, run_trials, silent, write_summary, write_table
 from glotouch_bt.escaped_text import finite
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read import load_conditions
-from glotouch_bt.runs import Campaign, OnRow, Task, crashed, gather, silent, write_summary, write_table
 
 COLUMNS = ("axis", "level", "seed", "decisions", "right", "accepted", "wrong", "absent", "absent_taken", "cause")
 FIGURES = ("right", "accepted", "wrong", "absent_taken")
@@ -75,14 +75,23 @@ def run_campaign(campaign: RobustnessCampaign, executor: Executor, on_row: OnRow
     Raises:
         BadInput: A setting cannot be used.
     """
-    tasks = [
-        Task(partial(sampled_row, campaign, axis, level, seed), partial(failed_row, axis, level, seed))
+    trials = [
+        campaign.trial(
+            f"points/{axis or 'none'}-{level:g}-s{seed}",
+            partial(sampled_row, campaign, axis, level, seed),
+            partial(failed_row, axis, level, seed),
+            axis=axis,
+            level=level,
+            seed=seed,
+        )
         for axis, level in campaign.points
         for seed in campaign.seeds
     ]
-    rows = gather(executor, tasks, on_row)
-    order = {point: i for i, point in enumerate(campaign.points)}
-    rows.sort(key=lambda r: (order[r["axis"], r["level"]], r["seed"]))
+
+    def write(rows: Sequence[Row]) -> None:
+        write_table(campaign.out, "points.csv", COLUMNS, rows)
+
+    rows = run_trials(executor, trials, campaign, on_row, write=write)
     axes: dict[str, list[dict[str, Any]]] = {}
     for axis, level in campaign.points:
         mine = [r for r in rows if (r["axis"], r["level"]) == (axis, level)]
@@ -95,7 +104,6 @@ def run_campaign(campaign: RobustnessCampaign, executor: Executor, on_row: OnRow
             "failed": sum(bool(r["cause"]) for r in rows),
         }
     )
-    write_table(campaign.out, "points.csv", COLUMNS, rows)
     write_summary(campaign.out, figures)
     plot_axes(campaign.out / "robustness.png", figures)
     return figures

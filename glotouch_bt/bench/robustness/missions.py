@@ -11,9 +11,9 @@ from glotouch_bt.bench.retrieve import RetrieveCampaign, run_campaign, targets_o
 from glotouch_bt.bench.robustness.axes import changed
 from glotouch_bt.bench.robustness.bench import RobustnessCampaign
 from glotouch_bt.bench.robustness.plot import plot_axes
+from glotouch_bt.campaign import OnRow, Row, silent, write_summary
 from glotouch_bt.escaped_text import finite
 from glotouch_bt.mission import load_mission
-from glotouch_bt.runs import OnRow, Row, silent, write_summary
 
 MISSION = "retrieve"
 FIGURES = ("success", "wrong_object", "safety_stops", "causes", "largest_peak_force_N", "median_sim_s")
@@ -38,6 +38,8 @@ def run_missions(campaign: RobustnessCampaign, executor: Executor, on_row: OnRow
             conditions=changed(campaign.conditions, axis, level) if axis else campaign.conditions,
             objects=campaign.objects,
             backend=campaign.backend,
+            resume=campaign.resume,
+            shard=campaign.shard,
             out=campaign.out / (f"{axis}_{level:g}" if axis else "none"),
         )
         found = run_campaign(point, executor, partial(_told, on_row, axis, level))

@@ -16,32 +16,28 @@ from glotouch_bt.bench.search.summary import COMPLETE_AT_M, MEAN_AT_M, summarise
 from glotouch_bt.bench.search.trial import (
     failed_trial,
     mission_trial,
-    planar_trials,
+    planar_trial,
     recorded_folders,
     recorded_trial,
     scene,
     sections_of,
 )
-from glotouch_bt.escaped_text import finite
-from glotouch_bt.mission.read import conditions_name
-from glotouch_bt.perception.search import POLICIES
-from glotouch_bt.robot import BadInput
-from glotouch_bt.runs import (
+from glotouch_bt.campaign import (
     Campaign,
     OnRow,
     Row,
-    Task,
     Trial,
-    TrialMemory,
-    gather,
+    digest,
     run_trials,
     silent,
     write_summary,
     write_table,
 )
+from glotouch_bt.escaped_text import finite
+from glotouch_bt.mission.read import conditions_name
+from glotouch_bt.perception.search import POLICIES
+from glotouch_bt.robot import BadInput
 
-CHUNK = 25
-"""Number of planar layouts in one task."""
 COLUMNS = (
     "simulator", "policy", "seed", "ended", *(f"discovered_{d:g}_m" for d in MEAN_AT_M),
     *(f"complete_{d:g}_m" for d in COMPLETE_AT_M), "travel_m", "before_m", "contacts", "false_candidates",
@@ -77,12 +73,37 @@ class SearchCampaign(Campaign):
         if not self.seeds and not self.planar_seeds and not self.recorded:
             raise BadInput("nothing to try: give --trials, --planar or --recorded")
 
-    def trial(self, policy: str, seed: int) -> Trial:
+    def mission_trial(self, policy: str, seed: int) -> Trial:
         """Return the mission trial of a policy."""
         settings = {"policy": policy, "expected_objects": str(self.object_count)}
         request = self.request(seed, f"{policy}-s{seed}", settings=settings)
         head = {"simulator": self.backend, "policy": policy, "seed": seed}
-        return Trial(partial(mission_trial, head, request), partial(failed_trial, head), TrialMemory(request))
+        return Trial.of(request, partial(mission_trial, head, request), partial(failed_trial, head))
+
+    def planar_trial(self, policy: str, seed: int) -> Trial:
+        """Return the trial of a policy in the planar simulator."""
+        head = {"simulator": "planar", "policy": policy, "seed": seed}
+        run = partial(planar_trial, head, self.mission, self.objects, self.planar_budget_m)
+        return self.trial(
+            f"planar/{policy}-s{seed}", run, partial(failed_trial, head), **head, budget=self.planar_budget_m
+        )
+
+    def recorded_trial(self, number: int, folder: Path) -> Trial:
+        """Return the trial that scores a recorded run."""
+        head = {"simulator": "recorded", "policy": self.policies[0], "seed": -1, "folder": str(folder)}
+        run = partial(recorded_trial, folder, self.mission, self.objects, self.policies[0])
+        content = {name: digest((folder / name).read_bytes()) for name in ("result.json", "truth.json")}
+        return self.trial(f"recorded/{number}", run, partial(failed_trial, head), **head, content=content)
+
+    def trials(self) -> list[Trial]:
+        """Return missions first, seeds outermost: an interrupted campaign has all policies on the same layouts."""
+        runs = [f for top in self.recorded for f in recorded_folders(top, conditions_name(self.conditions))]
+        plane = dict.fromkeys((*self.seeds, *self.planar_seeds))
+        return [
+            *(self.mission_trial(policy, seed) for seed in self.seeds for policy in self.policies),
+            *(self.recorded_trial(n, folder) for n, folder in enumerate(runs)),
+            *(self.planar_trial(policy, seed) for seed in plane for policy in self.policies),
+        ]
 
     @property
     def object_count(self) -> int:
@@ -97,10 +118,15 @@ def run_campaign(campaign: SearchCampaign, executor: Executor, on_row: OnRow = s
         BadInput: The objects cannot be used or do not fit.
     """
     objects = campaign.object_count
-    rows = _run(campaign, executor, on_row)
     order = {p: i for i, p in enumerate((*campaign.policies, *sorted(POLICIES)))}
-    rows.sort(key=lambda r: (r["simulator"], order.get(r["policy"], len(order)), r["seed"]))
-    _write_csv(campaign, rows, objects)
+
+    def place(row: Mapping[str, Any]) -> tuple[str, int, int]:
+        return row["simulator"], order.get(row["policy"], len(order)), row["seed"]
+
+    def write(rows: Sequence[Row]) -> None:
+        _write_csv(campaign, sorted(rows, key=place), objects)
+
+    rows = sorted(run_trials(executor, campaign.trials(), campaign, on_row, write=write), key=place)
     figures: dict[str, Any] = finite(summarise(rows, campaign.policies, objects))
     planar = campaign.planar_seeds
     summary = figures | {
@@ -117,39 +143,6 @@ def run_campaign(campaign: SearchCampaign, executor: Executor, on_row: OnRow = s
         if (example / "run.mcap").is_file():
             plot_layout(campaign.out / "layout.png", example, sections_of(campaign.mission, campaign.objects))
     return summary
-
-
-def _run(campaign: SearchCampaign, executor: Executor, on_row: OnRow) -> list[dict[str, Any]]:
-    """Run missions first, seeds outermost: an interrupted campaign has all policies on the same layouts."""
-    runs = [f for top in campaign.recorded for f in recorded_folders(top, conditions_name(campaign.conditions))]
-    plane = tuple(dict.fromkeys((*campaign.seeds, *campaign.planar_seeds)))
-    mission, objects, budget = campaign.mission, campaign.objects, campaign.planar_budget_m
-    trials = [campaign.trial(policy, seed) for seed in campaign.seeds for policy in campaign.policies]
-    others: list[Task[list[Row]]] = []
-    for folder in runs:
-        head = {"simulator": "recorded", "policy": campaign.policies[0], "seed": -1, "folder": str(folder)}
-        run = partial(recorded_trial, folder, mission, objects, campaign.policies[0])
-        others.append(Task(run, partial(_all_failed, [head])))
-    for k in range(0, len(plane), CHUNK):
-        for policy in campaign.policies:
-            seeds = plane[k : k + CHUNK]
-            heads = [{"simulator": "planar", "policy": policy, "seed": seed} for seed in seeds]
-            run = partial(planar_trials, mission, objects, policy, seeds, budget)
-            others.append(Task(run, partial(_all_failed, heads)))
-    total = len(campaign.policies) * (len(campaign.seeds) + len(plane)) + len(runs)
-    rows = run_trials(executor, trials, campaign.resume, lambda row, n, _: on_row(row, n, total))
-
-    def add(found: list[Row], *_: int) -> None:
-        for row in found:
-            rows.append(row)
-            on_row(row, len(rows), total)
-
-    gather(executor, others, add)
-    return rows
-
-
-def _all_failed(heads: Sequence[Row], error: Exception) -> list[Row]:
-    return [failed_trial(head, error) for head in heads]
 
 
 def _write_csv(campaign: SearchCampaign, rows: Sequence[Mapping[str, Any]], objects: int) -> None:

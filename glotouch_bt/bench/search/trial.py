@@ -18,12 +18,13 @@ import numpy as np
 
 from glotouch_bt.bench.planar import FeltSection, Traced, explore, felt_section, planar_world, refine_all
 from glotouch_bt.bench.search.scoring import Found, TrueLayout, score
+from glotouch_bt.campaign import Row, crashed, launch_trial
 from glotouch_bt.mission import load_mission
 from glotouch_bt.perception.search import search_policy
 from glotouch_bt.report import RunRecord, read_run
 from glotouch_bt.robot import Array, BadInput, Pose, World
 from glotouch_bt.robot.scene import Mesh, load_folder
-from glotouch_bt.runs import Row, RunRequest, crashed, launch_trial
+from glotouch_bt.runs import RunRequest
 
 SWEEP_NODE, TRACE_NODE, REFINE_NODE, PICKUP_NODE = "guarded_sweep", "orbit_probe", "refine_outline", "tool_pickup"
 TOP_NODE = "touch_top"
@@ -71,8 +72,8 @@ def recorded_folders(top: Path, conditions: str) -> list[Path]:
     return out
 
 
-def recorded_trial(folder: Path, mission: str, objects: Path | None, policy: str) -> list[Row]:
-    """Return the row of a recorded run of any mission that explores, in a list.
+def recorded_trial(folder: Path, mission: str, objects: Path | None, policy: str) -> Row:
+    """Return the row of a recorded run of any mission that explores.
 
     Args:
         folder: Folder of the run.
@@ -83,7 +84,7 @@ def recorded_trial(folder: Path, mission: str, objects: Path | None, policy: str
     policy = str((record.run.get("parameters") or {}).get("policy", policy))
     row = EMPTY_ROW | {"simulator": record.run["backend"], "policy": policy, "seed": int(record.run["seed"])}
     row["folder"] = str(folder)
-    return [row | {"ended": _ended(record.result)} | score_run(record, sections_of(mission, objects))]
+    return row | {"ended": _ended(record.result)} | score_run(record, sections_of(mission, objects))
 
 
 def _ended(result: Any) -> str:
@@ -238,23 +239,20 @@ def _travelled(places: Array) -> Array:
     return out
 
 
-def planar_trials(mission: str, objects: Path | None, policy: str, seeds: Sequence[int], budget_m: float) -> list[Row]:
-    """Run the same explorations in the planar simulator, one row a seed."""
+def planar_trial(head: Row, mission: str, objects: Path | None, budget_m: float) -> Row:
+    """Run an exploration in the planar simulator; `head` are the first columns of the row."""
+    policy, seed = head["policy"], head["seed"]
     world, meshes = scene(mission, objects)
-    rows = []
-    for seed in seeds:
-        planar = planar_world(world, meshes, seed)
-        row = EMPTY_ROW | {"simulator": "planar", "policy": policy, "seed": seed}
-        explored = explore(planar, search_policy(policy, seed), len(meshes), budget_m=budget_m)
-        layout = TrueLayout(planar.sections, planar.start_poses, planar.poses)
-        found = _planar(explored.found)
-        row |= {"ended": explored.ended, "travel_m": explored.travel_m, "contacts": explored.contacts}
-        scored = score(found, layout)
-        if len(scored["discovered_m"]) < len(meshes):  # otherwise refining discovers nothing more
-            measured = _planar(refine_all(planar, explored, budget_m=budget_m))
-            scored = score(found, TrueLayout(planar.sections, planar.start_poses, planar.poses), measured)
-        rows.append(row | scored)
-    return rows
+    planar = planar_world(world, meshes, seed)
+    explored = explore(planar, search_policy(policy, seed), len(meshes), budget_m=budget_m)
+    layout = TrueLayout(planar.sections, planar.start_poses, planar.poses)
+    found = _planar(explored.found)
+    row = {"ended": explored.ended, "travel_m": explored.travel_m, "contacts": explored.contacts}
+    scored = score(found, layout)
+    if len(scored["discovered_m"]) < len(meshes):  # otherwise refining discovers nothing more
+        measured = _planar(refine_all(planar, explored, budget_m=budget_m))
+        scored = score(found, TrueLayout(planar.sections, planar.start_poses, planar.poses), measured)
+    return EMPTY_ROW | head | row | scored
 
 
 def _planar(traced: Sequence[Traced]) -> list[Found]:

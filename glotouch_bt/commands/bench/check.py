@@ -22,7 +22,8 @@ def check(
 
     The table also gives what py_trees alone finds, and the false alarms on missions without a mistake.
     """
-    from glotouch_bt.runs import RunFolder, write_summary
+    from glotouch_bt.campaign import write_summary
+    from glotouch_bt.runs import RunFolder
     from glotouch_bt.validation.seeded_mistakes import as_markdown, compare, summary
 
     rows = compare()

@@ -16,7 +16,11 @@ def contact(
     conditions: shared.Conditions = "nominal",
     set_: shared.MissionSettings = None,
     per_side: Annotated[int, typer.Option(min=1, max=15, help="contacts per side")] = 4,
+    resume: shared.KeepTrials = False,
     workers: shared.Workers = 2,
+    cluster: shared.Cluster = None,
+    shard: shared.ShardName = None,
+    trial_limit: shared.TrialLimit = shared.TRIAL_LIMIT_S,
     out: shared.BenchFolder = None,
     json_: shared.SummaryJson = False,
 ) -> None:
@@ -41,11 +45,15 @@ def contact(
         settings=settings,
         per_side=per_side,
         out=shared.bench_folder(out, "contact"),
+        resume=resume,
+        shard=shared.read_shard(shard),
     )
 
     def told(row: dict[str, Any]) -> str:
         ending = row["cause"] or f"centre {row['centre_error_mm']:.2f} mm"
         return f"{row['tool']} {row['square']} seed {row['seed']}: {ending}"
 
-    summary = shared.run_in_pool(run_campaign, campaign, workers, told)
+    summary = shared.run_in_pool(
+        run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), told, lambda row: not row["cause"]
+    )
     shared.print_summary(summary, campaign.out, print_contact, json_)

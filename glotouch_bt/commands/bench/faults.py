@@ -29,6 +29,9 @@ def faults(
     few: shared.FewObjects = 2,
     backend: Annotated[str, typer.Option(help="a registered simulation backend")] = "mujoco",
     workers: shared.Workers = 2,
+    cluster: shared.Cluster = None,
+    shard: shared.ShardName = None,
+    trial_limit: shared.TrialLimit = shared.TRIAL_LIMIT_S,
     out: shared.BenchFolder = None,
     resume: shared.KeepTrials = False,
     keep: Annotated[bool, typer.Option("--keep", help="also keep the records of trials that ended well")] = False,
@@ -73,6 +76,7 @@ def faults(
         backend=backend,
         out=folder,
         resume=resume,
+        shard=shared.read_shard(shard),
         keep=keep,
     )
 
@@ -81,5 +85,5 @@ def faults(
         ending = f"{row['verdict']} {row.get('cause') or ''}" if row["effective"] else "altered nothing"
         return f"seed {row['seed']} {what}: {ending} ({row['wall_s']:.0f} s)"
 
-    summary = shared.run_in_pool(run_campaign, campaign, workers, told)
+    summary = shared.run_in_pool(run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), told)
     shared.print_summary(summary, campaign.out, print_faults, json_)

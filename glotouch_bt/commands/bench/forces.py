@@ -11,7 +11,7 @@ import typer
 from glotouch_bt.commands import shared
 
 if TYPE_CHECKING:
-    from glotouch_bt.runs import Campaign
+    from glotouch_bt.campaign import Campaign
     from glotouch_bt.validation.forces import ForceCampaign
 
 MISSIONS = ("calibrate", "contact_probe", "pick_at", "retrieve")
@@ -43,15 +43,18 @@ def forces(
     conditions: shared.Conditions = "nominal",
     few: shared.FewObjects = 2,
     workers: shared.Workers = 2,
+    cluster: shared.Cluster = None,
+    shard: shared.ShardName = None,
+    trial_limit: shared.TrialLimit = shared.TRIAL_LIMIT_S,
     out: shared.BenchFolder = None,
     resume: shared.KeepTrials = False,
     keep: Annotated[bool, typer.Option("--keep", help="also keep the records of trials without offence")] = False,
     json_: shared.SummaryJson = False,
 ) -> None:
     """Forces: the true peak against the hard limit, with two or three random faults in each trial."""
+    from glotouch_bt.campaign import Campaign
     from glotouch_bt.commands.terminal import print_forces
     from glotouch_bt.robot import BadInput
-    from glotouch_bt.runs import Campaign
     from glotouch_bt.validation.forces import run_campaign
 
     backends = _backends(backend or (BACKENDS[:1] if following else BACKENDS), conditions)
@@ -59,11 +62,19 @@ def forces(
         raise BadInput("--mission: the missions of --following are fixed; choose with --moment and --joint")
     if not following and (moment or joint):
         raise BadInput("--moment, --joint: only with --following")
+    share = shared.read_shard(shard)
     folder = shared.bench_folder(out, "forces-following" if following else "forces")
     seeds = (seed,) if following else tuple(range(seed, seed + trials))
     bases = [
         Campaign(
-            mission="", backend=name, settings=options, seeds=seeds, out=folder, conditions=conditions, resume=resume
+            mission="",
+            backend=name,
+            settings=options,
+            seeds=seeds,
+            out=folder,
+            conditions=conditions,
+            resume=resume,
+            shard=share,
         )
         for name, options in backends.items()
     ]
@@ -81,7 +92,7 @@ def forces(
             f"{ending}, {force} ({row['wall_s']:.0f} s)"
         )
 
-    summary = shared.run_in_pool(run_campaign, campaign, workers, told)
+    summary = shared.run_in_pool(run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), told)
     shared.print_summary(summary, folder, print_forces, json_)
 
 

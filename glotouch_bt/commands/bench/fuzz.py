@@ -17,7 +17,11 @@ def fuzz(
     kind: Annotated[str, typer.Option(help="what is fuzzed: missions (with fault plans), meshes or runs")] = "missions",
     trials: Annotated[int, typer.Option(min=1, help="number of inputs")] = 20_000,
     seed: shared.FirstSeed = 0,
+    resume: shared.KeepTrials = False,
     workers: shared.Workers = 2,
+    cluster: shared.Cluster = None,
+    shard: shared.ShardName = None,
+    trial_limit: shared.TrialLimit = shared.TRIAL_LIMIT_S,
     out: shared.BenchFolder = None,
     json_: shared.SummaryJson = False,
 ) -> int:
@@ -27,12 +31,12 @@ def fuzz(
 
     if kind not in KINDS:
         raise UnknownName("kind of input", kind, KINDS)
-    campaign = FuzzCampaign(trials, seed, shared.bench_folder(out, "fuzz"), kind)
+    campaign = FuzzCampaign(trials, seed, shared.bench_folder(out, "fuzz"), kind, resume, shared.read_shard(shard))
 
     def told(counts: Mapping[str, int]) -> str:
         return f"{sum(counts.get(name, 0) for name in BAD)} bad"
 
-    summary = shared.run_in_pool(run_campaign, campaign, workers, told)
+    summary = shared.run_in_pool(run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), told)
     shared.print_summary(summary, campaign.out, _print_fuzz, json_)
     return 1 if summary["failures"] else 0
 

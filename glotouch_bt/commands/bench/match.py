@@ -29,7 +29,11 @@ def match(
     ] = False,
     method: Annotated[list[str] | None, typer.Option(help="only these matchers (default: all)")] = None,
     backend: shared.Backend = "mujoco",
+    resume: shared.KeepTrials = False,
     workers: shared.Workers = 2,
+    cluster: shared.Cluster = None,
+    shard: shared.ShardName = None,
+    trial_limit: shared.TrialLimit = shared.TRIAL_LIMIT_S,
     out: shared.BenchFolder = None,
     json_: shared.SummaryJson = False,
 ) -> None:
@@ -48,6 +52,8 @@ def match(
         methods=chosen(method or ()),
         backend=backend,
         out=shared.bench_folder(out, "match"),
+        resume=resume,
+        shard=shared.read_shard(shard),
     )
 
     def told(row: dict[str, Any]) -> str:
@@ -55,5 +61,5 @@ def match(
         touched = f"{row['touched']} of {row['objects']} touched"
         return f"seed {row['seed']}: {row['ended']}, {touched}; right: {right}"
 
-    summary = shared.run_in_pool(run_campaign, campaign, workers, told)
+    summary = shared.run_in_pool(run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), told)
     shared.print_summary(summary, campaign.out, print_match, json_)

@@ -24,11 +24,14 @@ def retrieve(
     set_: shared.Settings = None,
     resume: shared.KeepTrials = False,
     workers: shared.Workers = 2,
+    cluster: shared.Cluster = None,
+    shard: shared.ShardName = None,
+    trial_limit: shared.TrialLimit = shared.TRIAL_LIMIT_S,
     out: shared.BenchFolder = None,
     json_: shared.SummaryJson = False,
 ) -> None:
     """Retrieval: the whole mission for every target and seed."""
-    from glotouch_bt.bench import RetrieveCampaign, run_campaign, targets_of
+    from glotouch_bt.bench import RetrieveCampaign, run_campaign, succeeded, targets_of
     from glotouch_bt.commands.terminal import print_retrieve
     from glotouch_bt.mission import load_mission
     from glotouch_bt.robot import BadInput
@@ -52,10 +55,13 @@ def retrieve(
         out=shared.bench_folder(out, "retrieve"),
         settings=settings,
         resume=resume,
+        shard=shared.read_shard(shard),
     )
 
     def told(row: dict[str, Any]) -> str:
         return f"{row['target']} seed {row['seed']}: {row['cause'] or 'retrieved'}"
 
-    summary = shared.run_in_pool(run_campaign, campaign, workers, told)
+    summary = shared.run_in_pool(
+        run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), told, succeeded
+    )
     shared.print_summary(summary, campaign.out, print_retrieve, json_)

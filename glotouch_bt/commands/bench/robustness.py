@@ -20,7 +20,11 @@ def robustness(
     ] = False,
     objects: shared.Objects = None,
     backend: shared.Backend = "mujoco",
+    resume: shared.KeepTrials = False,
     workers: shared.Workers = 2,
+    cluster: shared.Cluster = None,
+    shard: shared.ShardName = None,
+    trial_limit: shared.TrialLimit = shared.TRIAL_LIMIT_S,
     out: shared.BenchFolder = None,
     json_: shared.SummaryJson = False,
 ) -> None:
@@ -39,6 +43,8 @@ def robustness(
         objects=objects,
         backend=backend,
         out=shared.bench_folder(out, "robustness"),
+        resume=resume,
+        shard=shared.read_shard(shard),
     )
 
     def told(row: dict[str, Any]) -> str:
@@ -47,5 +53,6 @@ def robustness(
             return f"{where} seed {row['seed']}: {row['target']} {row['cause'] or 'retrieved'}"
         return f"{where} seed {row['seed']}: {row['accepted']} of {row['decisions']} right and accepted{row['cause']}"
 
-    summary = shared.run_in_pool(run_missions if missions else run_campaign, campaign, workers, told)
+    executors = shared.Executors(workers, cluster, trial_limit)
+    summary = shared.run_in_pool(run_missions if missions else run_campaign, campaign, executors, told)
     shared.print_summary(summary, campaign.out, print_robustness, json_)

@@ -22,6 +22,9 @@ def search(
     objects: shared.Objects = None,
     backend: shared.Backend = "mujoco",
     workers: shared.Workers = 2,
+    cluster: shared.Cluster = None,
+    shard: shared.ShardName = None,
+    trial_limit: shared.TrialLimit = shared.TRIAL_LIMIT_S,
     out: shared.BenchFolder = None,
     resume: shared.KeepTrials = False,
     recorded: Annotated[
@@ -47,6 +50,7 @@ def search(
         backend=backend,
         out=shared.bench_folder(out, "search"),
         resume=resume,
+        shard=shared.read_shard(shard),
         recorded=tuple(recorded or ()),
     )
 
@@ -54,5 +58,5 @@ def search(
         found = f"{len(row['discovered_m'])} found, {row['travel_m']:.2f} m, {row['ended']}"
         return f"{row['simulator']} {row['policy']} seed {row['seed']}: {found}"
 
-    summary = shared.run_in_pool(run_campaign, campaign, workers, told)
+    summary = shared.run_in_pool(run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), told)
     shared.print_summary(summary, campaign.out, print_search, json_)

@@ -23,8 +23,8 @@ def speed(
 ) -> None:
     """Speed: wall time of a mission against simulated time, and against the bare solver steps."""
     from glotouch_bt.bench import run_study
+    from glotouch_bt.campaign import Campaign
     from glotouch_bt.commands.terminal import print_speed
-    from glotouch_bt.runs import Campaign
 
     study = Campaign(
         mission=mission,

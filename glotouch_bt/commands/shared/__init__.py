@@ -1,13 +1,15 @@
 """Shared by several commands: options, error messages and exit codes, JSON output, parts of experiments."""
 
 from glotouch_bt.commands.shared.errors import guarded, set_debug, showing_tracebacks
-from glotouch_bt.commands.shared.experiments import print_summary, progress, put_few_in_box, run_in_pool
+from glotouch_bt.commands.shared.experiments import Executors, print_summary, progress, put_few_in_box, run_in_pool
 from glotouch_bt.commands.shared.live import live_page, live_tree, shown_on, wait_for_viewers
 from glotouch_bt.commands.shared.options import (
+    TRIAL_LIMIT_S,
     AllowPaths,
     Backend,
     BackendSettings,
     BenchFolder,
+    Cluster,
     Conditions,
     FewObjects,
     FirstSeed,
@@ -23,7 +25,9 @@ from glotouch_bt.commands.shared.options import (
     RunFolderArgument,
     SetConditions,
     Settings,
+    ShardName,
     SummaryJson,
+    TrialLimit,
     Trials,
     Workers,
     WorldName,
@@ -32,6 +36,7 @@ from glotouch_bt.commands.shared.options import (
     check_names,
     check_parameters,
     read_settings,
+    read_shard,
     with_bare_values,
 )
 from glotouch_bt.commands.shared.output import print_json, styled_streams

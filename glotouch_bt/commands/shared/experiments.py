@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from glotouch_bt.commands.shared.options import check_parameters
+import typer
+
+from glotouch_bt.commands.shared.options import TRIAL_LIMIT_S, check_parameters
 from glotouch_bt.commands.shared.output import print_json
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-T = TypeVar("T")
+C = TypeVar("C")
 Show = Callable[[Any, int, int], None]
 
 
@@ -22,14 +25,57 @@ def progress(told: Callable[[Any], str]) -> Show:
     return lambda row, done, total: print(f"[{done}/{total}] {told(row)}", file=sys.stderr)
 
 
-def run_in_pool(
-    run: Callable[[T, Executor, Show], dict[str, Any]], campaign: T, workers: int, told: Callable[[Any], str]
-) -> dict[str, Any]:
-    """Run a campaign in worker processes; return its summary."""
-    from glotouch_bt.runs import WorkerPool
+@dataclass(frozen=True)
+class Executors:
+    """The processes that run the trials of a campaign.
 
-    with WorkerPool(workers) as pool:
-        return run(campaign, pool, progress(told))
+    Attributes:
+        workers: Number of processes on this machine.
+        cluster: Address of a dask scheduler, or "local", instead.
+        limit_s: Wall time after which a trial counts as hanging.
+    """
+
+    workers: int
+    cluster: str | None = None
+    limit_s: float = TRIAL_LIMIT_S
+
+    def pool(self) -> Executor:
+        """Start them."""
+        from glotouch_bt.campaign import ClusterPool, WorkerPool
+
+        if self.cluster is not None:
+            return ClusterPool(self.cluster, self.workers, self.limit_s)
+        return WorkerPool(self.workers, self.limit_s)
+
+
+def run_in_pool(
+    run: Callable[[C, Executor, Show], dict[str, Any]],
+    campaign: C,
+    executors: Executors,
+    told: Callable[[Any], str],
+    succeeded: Callable[[Any], bool] | None = None,
+) -> dict[str, Any]:
+    """Run a campaign in worker processes; return its summary.
+
+    Args:
+        run: Runs the campaign on an executor.
+        campaign: Its settings.
+        executors: The processes.
+        told: Returns the line of a row.
+        succeeded: Returns True for the row of a success.
+
+    Raises:
+        Exit: The trials of this shard are done; there is no summary before those of all shards are.
+    """
+    from glotouch_bt.campaign import ShardDone
+    from glotouch_bt.commands.terminal import CampaignProgress
+
+    try:
+        with executors.pool() as pool, CampaignProgress(told, succeeded) as progress:
+            return run(campaign, pool, progress)
+    except ShardDone as e:
+        sys.stderr.write(f"{e}; when all are done, the same command with --resume instead of --shard sums them up\n")
+        raise typer.Exit(0) from e
 
 
 def print_summary(

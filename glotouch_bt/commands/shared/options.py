@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from glotouch_bt.campaign import Shard
     from glotouch_bt.mission import Mission
 
 _NUMBER = re.compile("[-+]?[0-9.]+")
@@ -72,6 +73,19 @@ Json = Annotated[bool, typer.Option("--json", help="print JSON on stdout, nothin
 Trials = Annotated[int, typer.Option(min=1, help="number of seeds")]
 FirstSeed = Annotated[int, typer.Option(min=0, help="first seed")]
 Workers = Annotated[int, typer.Option(min=1, help="worker processes")]
+TRIAL_LIMIT_S = 1800.0
+"""Default wall time after which a trial counts as hanging. Source: ours, thirty times the wall time of a mission."""
+Cluster = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="run the trials on a dask cluster: its scheduler's address, or local"),
+]
+ShardName = Annotated[
+    str | None,
+    typer.Option("--shard", metavar="I/N", help="run every N-th trial only, from number I; for batch queues"),
+]
+TrialLimit = Annotated[
+    float, typer.Option("--trial-limit", min=0.1, help="wall time after which a trial counts as hanging, s")
+]
 BenchFolder = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="folder of trials and summary (default: runs/...-bench-...)")
 ]
@@ -129,6 +143,17 @@ def bench_folder(out: Path | None, name: str) -> Path:
     folder = out or Path("runs") / f"{time.strftime('%Y%m%d-%H%M%S')}-bench-{name}"
     RunFolder(folder).discard()
     return folder
+
+
+def read_shard(given: str | None) -> Shard | None:
+    """Return the share that --shard names.
+
+    Raises:
+        BadInput: It is not I/N.
+    """
+    from glotouch_bt.campaign import Shard
+
+    return None if given is None else Shard.parse(given)
 
 
 def changed_conditions(conditions: str, changes: list[str] | None) -> str:

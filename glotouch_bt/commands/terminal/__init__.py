@@ -11,6 +11,7 @@ from glotouch_bt.commands.terminal.bench_tables import (
     print_search,
     print_speed,
 )
+from glotouch_bt.commands.terminal.campaign_progress import CampaignProgress
 from glotouch_bt.commands.terminal.console import (
     EscapingConsole,
     RunProgress,

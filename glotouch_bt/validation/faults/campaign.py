@@ -7,27 +7,18 @@ begins at its own moment inside the skill. Seeds whose twin fails are counted se
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from glotouch_bt.campaign import Campaign, OnRow, Row, Trial, run_trials, silent, write_summary, write_table
 from glotouch_bt.escaped_text import finite
 from glotouch_bt.faults import FaultPlan
 from glotouch_bt.robot import BadInput, Limits, ObjectSet
 from glotouch_bt.robot.scene import load_folder, stl_files
-from glotouch_bt.runs import (
-    Campaign,
-    OnRow,
-    Trial,
-    TrialMemory,
-    run_trials,
-    silent,
-    write_summary,
-    write_table,
-)
 from glotouch_bt.validation.faults.cases import Case
 from glotouch_bt.validation.faults.plots import plot_matrix
 from glotouch_bt.validation.faults.summary import summarise
@@ -81,19 +72,18 @@ def run_campaign(campaign: FaultCampaign, executor: Executor, on_row: OnRow = si
     campaign.out.mkdir(parents=True, exist_ok=True)
     hard_force_N = Limits().hard_force_N
     cells = [(c, s) for c in campaign.cases for s in campaign.skills if s in c.skills]
-    total = len(campaign.seeds) * (1 + len(cells))
 
     def trial(seed: int, name: str, plan: FaultPlan, labels: Mapping[str, Any]) -> Trial:
         request = campaign.request(seed, name, faults=plan, report=False)
         twin = campaign.out / f"twin-s{seed}" if plan.faults else None
         labels = {**labels, "folder": name}
         run = partial(run_trial, request, labels, hard_force_N, campaign.keep, twin)
-        return Trial(run, partial(failed_trial, labels), TrialMemory(request))
+        return Trial.of(request, run, partial(failed_trial, labels))
 
     nothing = FaultPlan("none", ())
     trials = [trial(s, f"twin-s{s}", nothing, {"class": "none", "skill": "", "seed": s}) for s in campaign.seeds]
-    rows = run_trials(executor, trials, campaign.resume, lambda row, n, _: on_row(row, n, total))
-    twins = {row["seed"]: row for row in rows}
+    first = run_trials(executor, trials, campaign, on_row, whole=True, after=len(campaign.seeds) * len(cells))
+    twins = {row["seed"]: row for row in first}
     trials, not_reached = [], 0
     for seed in campaign.seeds:
         lasted = twins[seed].get("durations_s", {})
@@ -105,14 +95,20 @@ def run_campaign(campaign: FaultCampaign, executor: Executor, on_row: OnRow = si
             labels = {"class": case.fault, "skill": skill, "seed": seed, "after_s": after_s}
             labels["twin_ok"] = twins[seed]["verdict"] == "recovered"
             trials.append(trial(seed, f"{case.fault}-{skill}-s{seed}", case.plan(skill, after_s), labels))
-    rows += run_trials(executor, trials, campaign.resume, lambda row, n, _: on_row(row, len(twins) + n, total))
-    rows.sort(key=lambda r: (str(r["class"]), str(r["skill"]), r["seed"]))
-    return _written(campaign, rows, not_reached)
+
+    def write(rows: Sequence[Row]) -> None:
+        lines = (r | {"recovery": " ".join(r.get("recovery", ()))} for r in _in_order([*first, *rows]))
+        write_table(campaign.out, "trials.csv", COLUMNS, lines)
+
+    rows = run_trials(executor, trials, campaign, on_row, write=write, before=len(first))
+    return _summary(campaign, _in_order([*first, *rows]), not_reached)
 
 
-def _written(campaign: FaultCampaign, rows: list[dict[str, Any]], not_reached: int) -> dict[str, Any]:
-    lines = (r | {"recovery": " ".join(r.get("recovery", ()))} for r in rows)
-    write_table(campaign.out, "trials.csv", COLUMNS, lines)
+def _in_order(rows: Sequence[Row]) -> list[Row]:
+    return sorted(rows, key=lambda r: (str(r["class"]), str(r["skill"]), r["seed"]))
+
+
+def _summary(campaign: FaultCampaign, rows: list[Row], not_reached: int) -> dict[str, Any]:
     summary: dict[str, Any] = finite(summarise(rows)) | {
         "not_reached": not_reached,
         **campaign.described(),

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from glotouch_bt.campaign import write_summary
 from glotouch_bt.faults import CATALOGUE, Duration, FaultInjector, FaultPlan, FaultSpec, ListeningRecord, Repeat, When
 from glotouch_bt.mission import Mission, load_mission, split_settings
 from glotouch_bt.mission.execution import Outcome, run_mission
@@ -22,7 +23,6 @@ from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import NullRecord
 from glotouch_bt.mission.spec import Place
 from glotouch_bt.robot import Backend, BadInput, Command, Observation, Request, Robot, Ticket, load_backend
-from glotouch_bt.runs import write_summary
 
 KINDS = ("robot_fault", "exception")
 HUNG_S = 30

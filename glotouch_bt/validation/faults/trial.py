@@ -8,9 +8,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from glotouch_bt.campaign import Row, crashed, launch_trial
 from glotouch_bt.faults import CATALOGUE, FaultPlan
 from glotouch_bt.robot.scene import stream
-from glotouch_bt.runs import Row, RunRequest, crashed, launch_trial
+from glotouch_bt.runs import RunRequest
 from glotouch_bt.validation.faults.cases import chosen_cases
 from glotouch_bt.validation.faults.rejoin import Rejoined
 from glotouch_bt.validation.faults.start import start_from

@@ -15,21 +15,22 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from glotouch_bt.escaped_text import finite
-from glotouch_bt.faults import FaultPlan
-from glotouch_bt.robot import GlotouchError
-from glotouch_bt.runs import (
+from glotouch_bt.campaign import (
     Campaign,
     OnRow,
     Row,
-    RunFolder,
+    Shard,
     Trial,
-    TrialMemory,
+    open_folder,
     run_trials,
     silent,
     write_summary,
     write_table,
 )
+from glotouch_bt.escaped_text import finite
+from glotouch_bt.faults import FaultPlan
+from glotouch_bt.robot import GlotouchError
+from glotouch_bt.runs import RunFolder
 from glotouch_bt.validation.forces.draw import draw_plan, draw_scene
 from glotouch_bt.validation.forces.following import MatrixCell
 from glotouch_bt.validation.forces.summary import summarise
@@ -63,6 +64,18 @@ class ForceCampaign:
         """Folder of the campaign."""
         return self.scenes[0].out
 
+    @property
+    def shard(self) -> Shard | None:
+        """See `Campaign`."""
+        return self.scenes[0].shard
+
+    def open(self) -> None:
+        """See `Campaign`."""
+        first = self.scenes[0]
+        scenes = [s.identity for s in self.scenes]
+        kind = "following errors" if self.cells else "random faults"
+        open_folder(self.out, first.identity | {"scenes": scenes, "set": kind}, keep=first.keeps)
+
 
 @dataclass(frozen=True)
 class _Planned:
@@ -83,18 +96,19 @@ def run_campaign(campaign: ForceCampaign, executor: Executor, on_row: OnRow = si
     """
     campaign.out.mkdir(parents=True, exist_ok=True)
     first = campaign.scenes[0]
-    total = len(campaign.scenes) + (len(campaign.cells) or len(first.seeds))
-    twins = _twins(campaign, executor, lambda row, n, _: on_row(row, n, total))
+    twins = _twins(campaign, executor, on_row, len(campaign.cells) or len(first.seeds))
     planned = _matrix(campaign, twins) if campaign.cells else _drawn(campaign, twins)
     trials = []
     for p in planned:
         request = p.scene.request(p.labels["seed"], p.labels["folder"], faults=p.plan, report=False)
         run = partial(run_trial, request, p.labels, p.lifts, campaign.keep)
         failed = partial(failed_trial, p.labels, campaign.out / p.labels["folder"])
-        trials.append(Trial(run, failed, TrialMemory(request)))
-    rows = run_trials(executor, trials, first.resume, lambda row, n, _: on_row(row, len(twins) + n, total))
-    order = {p.labels["folder"]: n for n, p in enumerate(planned)}
-    rows.sort(key=lambda r: order[r["folder"]])
+        trials.append(Trial.of(request, run, failed))
+
+    def write(rows: Sequence[Row]) -> None:
+        write_table(campaign.out, "trials.csv", COLUMNS, rows)
+
+    rows = run_trials(executor, trials, campaign, on_row, write=write, before=len(twins))
     return _written(campaign, twins, rows, {p.labels["folder"]: p for p in planned})
 
 
@@ -106,21 +120,20 @@ def _labels(scene: Campaign, seed: int, folder: str) -> dict[str, Any]:
     return {"mission": Path(scene.mission).stem, "backend": scene.backend, "seed": seed, "folder": folder}
 
 
-def _twins(campaign: ForceCampaign, executor: Executor, on_row: OnRow) -> list[Row]:
+def _twins(campaign: ForceCampaign, executor: Executor, on_row: OnRow, after: int) -> list[Row]:
     """Return the rows of the undisturbed runs, in the order of the scenes."""
-    trials, names = [], []
+    trials = []
     for scene in campaign.scenes:
         name = _twin_name(scene)
         labels = _labels(scene, TWIN_SEED, name) | {"faults": ""}
         request = scene.request(TWIN_SEED, name, report=False)
         failed = partial(failed_trial, labels, scene.out / name)
-        trials.append(Trial(partial(run_twin, request, labels), failed, TrialMemory(request)))
-        names.append(name)
-    rows = {r["folder"]: r for r in run_trials(executor, trials, campaign.scenes[0].resume, on_row)}
-    for name in names:
-        if "accepted" not in rows[name]:
-            raise GlotouchError(f"{name}: the run without faults did not end ({rows[name]['cause']})")
-    return [rows[name] for name in names]
+        trials.append(Trial.of(request, partial(run_twin, request, labels), failed))
+    rows = run_trials(executor, trials, campaign, on_row, whole=True, after=after)
+    for row in rows:
+        if "accepted" not in row:
+            raise GlotouchError(f"{row['folder']}: the run without faults did not end ({row['cause']})")
+    return rows
 
 
 def _drawn(campaign: ForceCampaign, twins: Sequence[Row]) -> list[_Planned]:
@@ -149,7 +162,6 @@ def _matrix(campaign: ForceCampaign, twins: Sequence[Row]) -> list[_Planned]:
 def _written(
     campaign: ForceCampaign, twins: Sequence[Row], rows: Sequence[Row], planned: Mapping[str, _Planned]
 ) -> dict[str, Any]:
-    write_table(campaign.out, "trials.csv", COLUMNS, rows)
     first = campaign.scenes[0]
     offending = []
     for row in rows:

@@ -6,9 +6,10 @@ import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from glotouch_bt.campaign import Campaign
 from glotouch_bt.faults import Duration, FaultPlan, When
 from glotouch_bt.robot import UnknownName
-from glotouch_bt.runs import Campaign, RunFolder
+from glotouch_bt.runs import RunFolder
 from glotouch_bt.validation.forces.draw import fault_of, plan_of
 from glotouch_bt.validation.forces.scenes import block_scene
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import trimesh
 
+from glotouch_bt.campaign import Campaign
 from glotouch_bt.mission import load_mission
 from glotouch_bt.robot import BadInput
-from glotouch_bt.runs import Campaign
 
 PLACE_PARAMETERS = frozenset({"x", "y", "width"})
 """Parameters of a mission that grasps at a given place."""

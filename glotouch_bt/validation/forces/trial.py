@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from glotouch_bt.campaign import Row, crashed, launch_trial
 from glotouch_bt.faults import FaultPlan, FaultSpec
 from glotouch_bt.report import read_run
 from glotouch_bt.robot import BackendError, BadInput, Limits
-from glotouch_bt.runs import Row, RunRequest, crashed, launch_trial
+from glotouch_bt.runs import RunRequest
 from glotouch_bt.untrusted import read_json
 from glotouch_bt.validation.forces.accepted import accepted_faults
 from glotouch_bt.validation.trial import Hung, durations, hang_guard, tidy

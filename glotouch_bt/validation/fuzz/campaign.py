@@ -5,18 +5,29 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from glotouch_bt.bench import wilson
-from glotouch_bt.runs import OnRow, Task, gather, silent, write_summary
+from glotouch_bt.campaign import (
+    OnRow,
+    Row,
+    Shard,
+    Trial,
+    described_code,
+    open_folder,
+    plain,
+    run_trials,
+    silent,
+    write_summary,
+)
 from glotouch_bt.validation.fuzz.kind import BAD, FuzzKind
 from glotouch_bt.validation.fuzz.meshes import MeshKind
 from glotouch_bt.validation.fuzz.missions import MissionKind
 from glotouch_bt.validation.fuzz.runs import RunKind
-from glotouch_bt.validation.fuzz.trial import MAX_DURATION_S, Result, run_trials, stream_of
+from glotouch_bt.validation.fuzz.trial import MAX_DURATION_S, Result, run_inputs, stream_of
 
 KINDS: dict[str, FuzzKind] = {kind.name: kind for kind in (MissionKind(), MeshKind(), RunKind())}
 """Every kind by its name; a new kind is registered here."""
@@ -33,12 +44,31 @@ class FuzzCampaign:
         seed: Seed of all inputs; trial n does not depend on their number.
         out: Folder for summary.json and the inputs of bad trials.
         kind: Name of the kind of input.
+        resume, shard: As in `Campaign`.
     """
 
     trials: int
     seed: int
     out: Path
     kind: str = "missions"
+    resume: bool = False
+    shard: Shard | None = None
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What all trials have in common."""
+        return {"campaign": "FuzzCampaign", "kind": self.kind, "seed": self.seed, **described_code()}
+
+    def open(self) -> None:
+        """See `Campaign`."""
+        open_folder(self.out, self.identity, keep=self.resume or self.shard is not None)
+
+    def trial(self, numbers: Sequence[int]) -> Trial:
+        """Return the trial that tries some inputs in turn."""
+        given = tuple(numbers)
+        name = f"{given[0]}-{given[-1]}"
+        run, died = partial(_tried, self.kind, self.seed, given), partial(_died, given)
+        return Trial(self.out / "inputs" / name, plain(self.identity | {"numbers": given}), run, died)
 
 
 def run_campaign(campaign: FuzzCampaign, executor: Executor, on_counts: OnRow = silent) -> dict[str, Any]:
@@ -50,27 +80,22 @@ def run_campaign(campaign: FuzzCampaign, executor: Executor, on_counts: OnRow = 
     campaign.out.mkdir(parents=True, exist_ok=True)
     kind = KINDS[campaign.kind]
     counts: Counter[tuple[str, str]] = Counter()
-    bad: list[Result] = []
-    again: list[int] = []
 
-    def count(results: list[Result], *_: int) -> None:
-        if len(results) > 1 and results[0].came == "process died":
-            again.extend(r.number for r in results)
-            return
-        for result in results:
-            counts[result.sort, result.came] += 1
-            if result.came in BAD:
-                bad.append(result)
-                _keep(campaign, kind, result)
+    def show(row: Row, *_: int) -> None:
+        counts.update((r["sort"], r["came"]) for r in row["results"])
         on_counts(_by_class(counts), counts.total(), campaign.trials)
 
-    def tasks(chunks: Sequence[Sequence[int]]) -> list[Task[list[Result]]]:
-        seed = campaign.seed
-        return [Task(partial(run_trials, kind, seed, tuple(c)), partial(_died, tuple(c))) for c in chunks]
-
     chunks = [range(k, min(k + CHUNK, campaign.trials)) for k in range(0, campaign.trials, CHUNK)]
-    gather(executor, tasks(chunks), count)
-    gather(executor, tasks([[n] for n in again]), count)
+    rows = run_trials(executor, [campaign.trial(c) for c in chunks], campaign, show)
+    lost = [r["number"] for row in rows if _lost(row) for r in row["results"]]
+    rows = [row for row in rows if not _lost(row)]
+    counts = Counter((r["sort"], r["came"]) for row in rows for r in row["results"])
+    rows += run_trials(executor, [campaign.trial([n]) for n in lost], campaign, show, before=len(chunks))
+    results = [Result(**r) for row in rows for r in row["results"]]
+    counts = Counter((r.sort, r.came) for r in results)
+    bad = [r for r in results if r.came in BAD]
+    for result in bad:
+        _keep(campaign, kind, result)
     sorts = sorted({sort for sort, _ in counts})
     summary = {
         "kind": campaign.kind,
@@ -85,8 +110,17 @@ def run_campaign(campaign: FuzzCampaign, executor: Executor, on_counts: OnRow = 
     return summary
 
 
-def _died(numbers: Sequence[int], error: Exception) -> list[Result]:
-    return [Result(n, "unknown", "process died", str(error)) for n in numbers]
+def _tried(kind: str, seed: int, numbers: Sequence[int]) -> Row:
+    return {"results": [asdict(r) for r in run_inputs(KINDS[kind], seed, numbers)]}
+
+
+def _died(numbers: Sequence[int], error: Exception) -> Row:
+    return {"results": [asdict(Result(n, "unknown", "process died", str(error))) for n in numbers]}
+
+
+def _lost(row: Row) -> bool:
+    """Return True for several inputs whose process died: which of them ended it is not known."""
+    return len(row["results"]) > 1 and row["results"][0]["came"] == "process died"
 
 
 def _by_class(counts: Counter[tuple[str, str]]) -> dict[str, int]:

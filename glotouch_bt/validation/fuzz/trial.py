@@ -43,8 +43,8 @@ def stream_of(seed: int, number: int) -> np.random.Generator:
     return np.random.default_rng([seed, number])
 
 
-def run_trials(kind: FuzzKind, seed: int, numbers: Sequence[int]) -> list[Result]:
-    """Run some trials in turn in this process."""
+def run_inputs(kind: FuzzKind, seed: int, numbers: Sequence[int]) -> list[Result]:
+    """Try some inputs in turn in this process."""
     with _folder(kind) as folder:
         return [run_trial(kind, seed, n, folder) for n in numbers]
 

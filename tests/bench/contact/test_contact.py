@@ -78,12 +78,15 @@ def test_a_trial_that_failed_counts() -> None:
 
 def test_every_mode_is_tried_on_every_seed(tmp_path: Path) -> None:
     campaign = contact.ContactCampaign(seeds=(3, 4), per_side=5, out=tmp_path)
-    asked = [(r.out, r.mission, r.seed, r.settings["contacts"]) for r in (t.memory.request for t in campaign.trials())]
+    asked = [
+        (t.folder, t.identity["mission"], t.identity["seed"], t.identity["settings"]["contacts"])
+        for t in campaign.trials()
+    ]
     assert len(asked) == len(set(asked)) == 8
     assert {a[3] for a in asked} == {"20"}
 
 
 def test_settings_are_those_of_the_probes_mission(tmp_path: Path) -> None:
     campaign = contact.ContactCampaign(seeds=(3,), per_side=4, out=tmp_path, settings={"press": "0"})
-    for request in (t.memory.request for t in campaign.trials()):
-        assert request.settings.get("press") == ("0" if request.mission == "contact_probe" else None)
+    for asked in (t.identity for t in campaign.trials()):
+        assert asked["settings"].get("press") == ("0" if asked["mission"] == "contact_probe" else None)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -23,7 +22,7 @@ from tests.bench.match.conftest import SIZES_M, a_layout, by_size
 class Threads(ThreadPoolExecutor):
     """In place of processes, so that mocks reach the work."""
 
-    def __init__(self, workers: int, **_: object) -> None:
+    def __init__(self, workers: int, *_: object) -> None:
         super().__init__(workers)
 
 
@@ -39,7 +38,7 @@ def quick(made_up, monkeypatch):
 
 def campaign(tmp_path, **changes):
     given = {
-        "seeds": (3, 4), "conditions": "nominal", "objects": None, "strangers": Path("there"), "dataset": None,
+        "seeds": (3, 4), "conditions": "nominal", "objects": None, "strangers": tmp_path, "dataset": None,
         "methods": chosen(()), "backend": "mujoco", "out": tmp_path / "o",
     }  # fmt: skip
     return MatchCampaign(**given | changes)
@@ -71,8 +70,9 @@ def test_a_recorded_dataset(quick, monkeypatch, tmp_path):
     assert set(summary["closures_to_confidence"]) == {"recorded", "in_turn", "adaptive"}
     out = tmp_path / "o"
     assert json.loads((out / "summary.json").read_text()) == summary
-    names = {"trials.csv", "pairs.csv", "closures.csv", "layouts.csv", "summary.json"}
-    assert {p.name for p in out.iterdir()} == names | {"top1.png", "losses.png", "reliability.png", "closures.png"}
+    names = {"campaign.json", "trials.csv", "pairs.csv", "closures.csv", "layouts.csv", "summary.json"}
+    plots = {"top1.png", "losses.png", "reliability.png", "closures.png"}
+    assert {p.name for p in out.iterdir() if p.is_file() and p.name[0] != "."} == names | plots
     with (out / "trials.csv").open() as f:
         assert len(list(csv.DictReader(f))) == 6 * (5 + 5 + 1 + 6)
 
@@ -155,7 +155,7 @@ BAD = [
 def command(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setattr("glotouch_bt.runs.WorkerPool", Threads)
+    monkeypatch.setattr("glotouch_bt.campaign.WorkerPool", Threads)
     yield CliRunner()
     cli._debug = False
 
@@ -173,6 +173,7 @@ def test_bad_input_is_exit_2_before_anything_is_written(words, message, command,
 @pytest.mark.parametrize("as_json", [False, True])
 def test_the_command(as_json, command, quick, monkeypatch, tmp_path):
     monkeypatch.setattr(MatchCampaign, "check", lambda self: None)
+    (tmp_path / "there").mkdir()
     write_layout(tmp_path / "set", a_layout(3))
     words = ["--dataset", "set", "--strangers", "there", "--out", "o", "--workers", "1"] + ["--json"] * as_json
     done = command.invoke(cli.app, ["bench", "match", *words])

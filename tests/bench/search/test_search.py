@@ -153,9 +153,10 @@ def test_unknown_policies_are_named():
 
 def test_the_request_of_a_trial(tmp_path):
     campaign = SearchCampaign(policies=("random_descent",), seeds=(7,), out=tmp_path)
-    request = campaign.trial("random_descent", 7).memory.request
-    assert (request.mission, request.seed, request.out) == ("survey", 7, tmp_path / "random_descent-s7")
-    assert request.settings == {"policy": "random_descent", "expected_objects": "5"}
+    trial = campaign.mission_trial("random_descent", 7)
+    assert trial.folder == tmp_path / "random_descent-s7"
+    assert (trial.identity["mission"], trial.identity["seed"]) == ("survey", 7)
+    assert trial.identity["settings"] == {"policy": "random_descent", "expected_objects": "5"}
 
 
 def test_a_campaign_in_the_plane_writes_all_there_is(tmp_path):

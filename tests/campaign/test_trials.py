@@ -12,11 +12,13 @@ from typing import Any
 
 import pytest
 
+from glotouch_bt.campaign import Campaign, Trial, run_trials
+from glotouch_bt.campaign import trial as trials
 from glotouch_bt.faults import read_plan
 from glotouch_bt.mission.read import shipped_root
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene import stl_files
-from glotouch_bt.runs import RunRequest, Trial, TrialMemory, run_trials, trials
+from glotouch_bt.runs import RunRequest
 
 MISSION = "mission: m\nworld: container_five\ntimeout_s: 60\ntree: [tool_pickup, tool_return]\n"
 
@@ -30,22 +32,23 @@ def request_(tmp_path: Path) -> RunRequest:
     (tmp_path / "m.yaml").write_text(MISSION)
     (tmp_path / "c.yaml").write_text("name: c\nforce_noise_sd_N: 0.1\n")
     conditions = str(tmp_path / "c.yaml")
-    return RunRequest(str(tmp_path / "m.yaml"), "fake", 3, {}, objects, conditions, tmp_path / "out")
+    return RunRequest(str(tmp_path / "m.yaml"), "fake", 3, {}, objects, conditions, tmp_path / "out" / "trial")
 
 
 def trial(request: RunRequest, run: Callable[[], dict[str, Any]] = lambda: {"n": 1}) -> Trial:
-    return Trial(run, lambda error: {"failed": str(error)}, TrialMemory(request))
+    return Trial.of(request, run, lambda error: {"failed": str(error)})
 
 
 def rows(trial: Trial, resume: bool = True) -> list[dict[str, Any]]:
+    campaign = Campaign(mission="m", seeds=(), out=trial.folder.parent, resume=resume)
     with ThreadPoolExecutor(1) as pool:
-        return run_trials(pool, [trial], resume)
+        return run_trials(pool, [trial], campaign)
 
 
 def forget_contents() -> None:
-    from glotouch_bt.runs import trial_memory
+    from glotouch_bt.campaign import identity
 
-    trial_memory._content.cache_clear()
+    identity._content.cache_clear()
 
 
 def test_a_finished_trial_is_kept(request_: RunRequest) -> None:

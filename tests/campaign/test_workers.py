@@ -13,12 +13,16 @@ from pathlib import Path
 
 import pytest
 
+from glotouch_bt.campaign import TrialLost, WorkerLost, WorkerPool
 from glotouch_bt.robot import BadInput, ParamError
-from glotouch_bt.runs import WorkerLost, WorkerPool
 
 
 def kill_this(number: int) -> None:
     os.kill(os.getpid(), number)
+
+
+def hang() -> None:
+    threading.Event().wait()
 
 
 def leave(code: int) -> None:
@@ -64,10 +68,16 @@ def test_a_dead_worker_is_one_lost_task_and_the_rest_goes_on() -> None:
         assert futures[4].result() == 27
 
 
+def test_a_task_that_takes_too_long_is_killed_and_lost() -> None:
+    with WorkerPool(1, limit_s=0.5) as pool:
+        late = pool.submit(hang)
+        with pytest.raises(TrialLost, match=r"it hung: no result after 0\.5 s"):
+            late.result()
+
+
 SCRIPT = """
 import os, signal, sys, threading
-from functools import partial
-from glotouch_bt.runs import Task, WorkerPool, gather
+from glotouch_bt.campaign import WorkerPool
 
 def work(number):
     os.write(1, f"worker {os.getpid()}\\n".encode())  # whole, beside the other worker's
@@ -76,7 +86,7 @@ def work(number):
 if __name__ == "__main__":
     try:
         with WorkerPool(2) as pool:
-            gather(pool, [Task(partial(work, n), str) for n in range(6)])
+            [future.result() for future in [pool.submit(work, n) for n in range(6)]]
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         print("interrupted", flush=True)

@@ -24,11 +24,21 @@ Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
 
 GRACE_S = 10.0
 """Wall time in which an interrupted worker may end its task safely; after that it is killed."""
+LIMIT_S = 1800.0
+"""Wall time after which a task counts as hanging. Source: ours, about thirty times the wall time of a mission."""
 STEP_S = 0.1
 """Wall time between two looks at ending workers."""
 
 
-class WorkerLost(GlotouchError):
+class TrialLost(GlotouchError):
+    """An attempt at a trial ended without a result, for a reason that need not be the trial's: it is tried again."""
+
+
+class Claimed(GlotouchError):
+    """Another process has the folder of the trial."""
+
+
+class WorkerLost(TrialLost):
     """The process of a task died before the task had a result."""
 
     def __init__(self, code: int | None) -> None:
@@ -37,6 +47,10 @@ class WorkerLost(GlotouchError):
         else:
             how = f"ended with code {code}"
         super().__init__(f"its process {how}")
+        self.code = code
+
+    def __reduce__(self) -> tuple[type[WorkerLost], tuple[int | None]]:
+        return WorkerLost, (self.code,)
 
 
 class WorkerPool(Executor):
@@ -48,11 +62,12 @@ class WorkerPool(Executor):
 
     Args:
         workers: Number of processes.
+        limit_s: Wall time of a task, after which its process is killed.
     """
 
-    def __init__(self, workers: int) -> None:
+    def __init__(self, workers: int, limit_s: float = LIMIT_S) -> None:
         self._waiting: SimpleQueue[tuple[Future[Any], Call] | None] = SimpleQueue()
-        self._slots = [_Slot(self._waiting) for _ in range(workers)]
+        self._slots = [_Slot(self._waiting, limit_s) for _ in range(workers)]
         self._interrupted = self._hurried = False
         self._handler_before: Any = None
         for slot in self._slots:
@@ -102,7 +117,7 @@ class WorkerPool(Executor):
     def _end_running(self) -> None:
         """Interrupt the workers, so that a mission holds its arm; kill those that are not done in time."""
         for slot in self._slots:
-            slot.signal(signal.SIGINT)
+            slot.process.signal(signal.SIGINT)
         deadline = time.perf_counter() + GRACE_S
         while not self._hurried and time.perf_counter() < deadline:
             alive = [slot for slot in self._slots if slot.is_alive()]
@@ -110,29 +125,44 @@ class WorkerPool(Executor):
                 return
             alive[0].join(STEP_S)
         for slot in self._slots:
-            slot.signal(signal.SIGKILL)
+            slot.process.signal(signal.SIGKILL)
 
 
 class _Slot(threading.Thread):
-    """A thread that hands tasks to one process and replaces it when it dies."""
+    """A thread that hands tasks to one process."""
 
-    def __init__(self, waiting: SimpleQueue[tuple[Future[Any], Call] | None]) -> None:
+    def __init__(self, waiting: SimpleQueue[tuple[Future[Any], Call] | None], limit_s: float) -> None:
         super().__init__(name="worker slot", daemon=True)
         self._waiting = waiting
-        self._process: BaseProcess | None = None
-        self._pipe: Connection | None = None
+        self.process = TaskProcess(limit_s)
 
     def run(self) -> None:
-        # A process inherits the mask of the thread that starts it: it begins deaf to Ctrl-C.
-        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         while (item := self._waiting.get()) is not None:
             future, call = item
             if not future.set_running_or_notify_cancel():
                 continue
             try:
-                future.set_result(self._result_of(call))
+                future.set_result(self.process.result_of(call))
             except BaseException as e:
                 future.set_exception(e)
+        self.process.close()
+
+
+class TaskProcess:
+    """A process that does one task after another for one thread; it is replaced when it dies or is killed.
+
+    Attributes:
+        limit_s: Wall time of a task, after which the process is killed.
+    """
+
+    def __init__(self, limit_s: float = LIMIT_S) -> None:
+        self.limit_s = limit_s
+        self._process: BaseProcess | None = None
+        self._pipe: Connection | None = None
+        self._ready = False
+
+    def close(self) -> None:
+        """End the process."""
         if self._pipe is not None and self._process is not None:
             self._pipe.close()
             self._process.join()
@@ -148,26 +178,53 @@ class _Slot(threading.Thread):
             with contextlib.suppress(OSError):
                 os.killpg(process.pid, number)
 
-    def _result_of(self, call: Call) -> Any:
+    def result_of(self, call: Call) -> Any:
+        """Do a task and return its result.
+
+        Raises:
+            TrialLost: The process died, or the task took too long.
+            GlotouchError, RuntimeError: The error of the task.
+        """
+        pipe, process = self._started()
+        try:
+            if not self._ready:
+                self._ready = pipe.recv()  # the limit does not count the start of the process
+            pipe.send(call)
+            if not wait([pipe, process.sentinel], self.limit_s):
+                self.signal(signal.SIGKILL)
+                self._ended()
+                raise TrialLost(f"it hung: no result after {self.limit_s:g} s")
+            succeeded, result = pipe.recv()
+        except (EOFError, OSError) as e:
+            raise WorkerLost(self._ended()) from e
+        if succeeded:
+            return result
+        raise result
+
+    def _started(self) -> tuple[Connection, BaseProcess]:
+        if self._process is not None and not self._process.is_alive():  # killed while it had nothing to do
+            self._ended()
         if self._process is None or self._pipe is None:
+            # A process inherits the mask of the thread that starts it: it begins deaf to Ctrl-C.
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             context = get_context("spawn")
             self._pipe, theirs = context.Pipe()
             self._process = context.Process(target=serve, args=(theirs,))
             self._process.start()
             theirs.close()
-        try:
-            self._pipe.send(call)
-            wait([self._pipe, self._process.sentinel])
-            succeeded, result = self._pipe.recv()
-        except (EOFError, OSError) as e:
-            self._process.join()
-            lost = WorkerLost(self._process.exitcode)
-            self._pipe.close()
-            self._process = self._pipe = None
-            raise lost from e
-        if succeeded:
-            return result
-        raise result
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        return self._pipe, self._process
+
+    def _ended(self) -> int | None:
+        """Wait for the end of the process; return its exit code."""
+        assert self._process is not None
+        assert self._pipe is not None
+        self._process.join()
+        code = self._process.exitcode
+        self._pipe.close()
+        self._process = self._pipe = None
+        self._ready = False
+        return code
 
 
 def serve(pipe: Connection) -> None:
@@ -176,6 +233,7 @@ def serve(pipe: Connection) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        pipe.send(True)
         while True:
             try:
                 function, args, kwargs = pipe.recv()
@@ -192,6 +250,8 @@ def _answer(function: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[st
         return True, function(*args, **kwargs)
     except BadInput as e:
         return False, BadInput(str(e))
+    except (TrialLost, Claimed) as e:
+        return False, e
     except GlotouchError as e:
         return False, GlotouchError(str(e))
     except Exception as e:
