@@ -13,6 +13,6 @@ from glotouch_bt.report.run_record import (
     Tick,
     read_run,
 )
-from glotouch_bt.report.sections import contour_of, depth_png, palette, tree_order
+from glotouch_bt.report.sections import depth_png, palette
 from glotouch_bt.report.svg import AxisScale, points, tick_text
 from glotouch_bt.report.write import write_report

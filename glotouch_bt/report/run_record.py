@@ -86,6 +86,7 @@ class RunRecord:
         tactile: stamp_s and arrived_s (f,), left_m and right_m (f, rows, cols).
         events, ticks, ports: In the order of the record.
         complete: The record was closed properly.
+        objects: Folder of the STL files of its objects, if it is not the recorded one.
     """
 
     path: Path
@@ -99,6 +100,7 @@ class RunRecord:
     ticks: list[Tick] = field(default_factory=list)
     ports: list[PortWrite] = field(default_factory=list)
     complete: bool = False
+    objects: Path | None = None
 
     def of_kind(self, *kinds: str) -> list[RecordedEvent]:
         """Return the events of these kinds."""

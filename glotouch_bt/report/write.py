@@ -7,7 +7,8 @@ from pathlib import Path
 
 from glotouch_bt.report.page import esc, page, section
 from glotouch_bt.report.run_record import RunRecord, read_run
-from glotouch_bt.report.sections import SECTIONS, verdict
+from glotouch_bt.report.scene import script
+from glotouch_bt.report.sections import SCENE_ID, SECTIONS, verdict
 from glotouch_bt.robot import BadInput
 from glotouch_bt.untrusted import require_plain, write_file
 
@@ -39,7 +40,8 @@ def render(record: RunRecord) -> str:
     """Return the report's HTML."""
     sections = [_section(title, make, record) for title, make in SECTIONS]
     mission = record.result.get("mission") or record.run.get("mission") or "run"
-    return page(f"{mission} · {verdict(record)[1]}", "".join(sections))
+    body = "".join(sections)
+    return page(f"{mission} · {verdict(record)[1]}", body, script() if SCENE_ID in body else "")
 
 
 def _section(title: str, make: Callable[[RunRecord], str], record: RunRecord) -> str:

@@ -13,7 +13,7 @@ import pytest
 from glotouch_bt.mission.record.recorder import Recorder
 from glotouch_bt.report import read_run, write_report
 from glotouch_bt.report.sections.map import tip_path_K_m
-from glotouch_bt.report.sections.timeline import spans
+from glotouch_bt.report.sections.tree import spans
 from glotouch_bt.report.truth import true_outlines
 from glotouch_bt.robot import BadInput
 
@@ -63,7 +63,7 @@ def test_the_page_says_what_the_run_says(page: str, whole: SimpleNamespace) -> N
     for said in ("Retrieved <b>wukong & co</b>", "nominal", *numbers):
         assert said in text, said
     assert f"contact stop ({len(whole.contacts)})" in text
-    for title in ("Map", "Force", "Squeezes", "Recognition", "Timeline of the tree", "Log", "About this run"):
+    for title in ("Map", "Force", "Squeezes", "Recognition", "Behavior tree", "Log", "About this run"):
         assert f"<h2>{title}</h2>" in page
     for touchset in whole.touchsets:
         for layer in touchset.layers:

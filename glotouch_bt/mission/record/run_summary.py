@@ -59,6 +59,7 @@ class RunSummary:
         candidates: Data of each candidate, without its contacts.
         ranking: Data of the last ranking event, or None.
         calibration: Data of the last calibration of the probe, or None.
+        results: The outputs that skills declare as results, by key: {text, node}; the last of each.
         last_event: (robot time, kind) of the last event.
         node: Path of the last leaf that started.
         peak_force_N: Largest norm of the sensed wrist force.
@@ -71,6 +72,7 @@ class RunSummary:
         self.candidates: list[Json] = []
         self.ranking: Json = None
         self.calibration: Json = None
+        self.results: dict[str, Json] = {}
         self.last_event: tuple[float, str] = (0.0, "")
         self.node = ""
         self.peak_force_N = 0.0
@@ -134,6 +136,8 @@ class RunSummary:
             self._store(_candidate(to_json(data.get("candidate", data))))
         elif kind == "ranking":
             self.ranking = to_json(data.get("ranking", data), summarise=True)
+        elif kind == "result":
+            self.results[str(data["key"])] = to_json({k: v for k, v in data.items() if k != "key"})
         elif kind == "calibration":
             self.calibration = to_json({k: v for k, v in data.items() if k in CALIBRATED})
         elif kind == "tool":

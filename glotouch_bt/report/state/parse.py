@@ -9,11 +9,15 @@ from typing import Any
 import numpy as np
 
 from glotouch_bt.perception.touch import Contour
-from glotouch_bt.report import RecordedEvent, contour_of, short_text
+from glotouch_bt.report.contours import contour_of
+from glotouch_bt.report.page import short_text
+from glotouch_bt.report.run_record import RecordedEvent
 from glotouch_bt.robot import Array, Pose
-from glotouch_bt.view.state.values import (
+from glotouch_bt.robot.scene import UPRIGHT
+from glotouch_bt.report.state.values import (
     CandidateOutline,
     FeltPatch,
+    FittedTarget,
     GhostObject,
     LogLine,
     PlannedGrasp,
@@ -136,6 +140,20 @@ def grasp_of(event: RecordedEvent) -> PlannedGrasp | None:
         return None
 
 
+def fit_of(event: RecordedEvent) -> FittedTarget | None:
+    """Return the accepted target of a ranking event."""
+    try:
+        ranking = event.data["ranking"]
+        if not ranking["accepted"]:
+            return None
+        best = ranking["matches"][0]
+        x, y, yaw = vector(best["pose_K_O"], 3).tolist()
+        w, *axis = vector(best.get("quat") or UPRIGHT, 4).tolist()
+        return FittedTarget(int(best["index"]), str(event.data["target"]), (x, y, yaw), (w, *axis))
+    except MALFORMED:
+        return None
+
+
 def patches_of(event: RecordedEvent, window_m: tuple[float, float]) -> list[FeltPatch]:
     """Return the patches of every closure of a touchset event that came to rest.
 
@@ -207,7 +225,11 @@ def true_bodies(listed: Any) -> Iterator[GhostObject]:
         try:
             outline = np.asarray(o["outline_B_m"], dtype=np.float64)[:, :2]
             pose = o["pose_B_O"]
-            yield GhostObject(str(o["name"]), vector(pose["position_m"], 3), vector(pose["quat"], 4), outline)
+            size = o.get("size_m")
+            yield GhostObject(
+                str(o["name"]), vector(pose["position_m"], 3), vector(pose["quat"], 4), outline,
+                None if size is None else vector(size, 3),
+            )  # fmt: skip
         except MALFORMED:
             continue
 
