@@ -10,7 +10,7 @@ from glotouch_bt.report.run_record import RunRecord
 from glotouch_bt.report.state import TreeNode, planned_nodes, tree_of, tree_order
 
 OPEN_LEVELS = 3
-"""Levels that are unfolded; below, a node is unfolded if it failed and its parent did."""
+"""Levels that are unfolded; below, a node is unfolded if it and all above it failed or were stopped."""
 _LOOKS = {"SUCCESS": ("✓", "good"), "FAILURE": ("✕", "bad"), "RUNNING": ("▪", "warn"), "": ("·", "idle")}
 """Sign and colour of a node by how its last run ended; "": it never ran."""
 
@@ -53,9 +53,10 @@ def tree_section(record: RunRecord) -> str:
     start_s, end_s = record.span_s
     picture = _Picture(runs, start_s, max(end_s - start_s, 1e-3))
     root = tree_of({n: runs[n][-1].status if n in runs else "" for n in nodes})
-    keys = [("k-good", "succeeded"), ("k-bad", "failed"), ("k-warn", "stopped or still running"), ("k-idle", "never ran")]
+    keys = [("k-good", "succeeded"), ("k-bad", "failed"), ("k-warn", "stopped")]
+    keys.append(("k-idle", "never ran"))
     lead = (
-        f"Each line is a node, its children below it; a click folds them. The strip shows its runs from {start_s:.0f} "
+        f"Each line is a node, its children below it; a click folds them. The strip shows its runs from {max(start_s, 0.0):.0f} "
         f"to {end_s:.0f} s of the robot's clock."
     )
     body = "".join(picture.branch(child, 0, True) for child in root.children)
@@ -79,7 +80,7 @@ class _Picture:
         line = self._line(node, names, depth)
         if not node.children:
             return f'<div class="leaf">{line}</div>'
-        failing = failing and node.status == "FAILURE"
+        failing = failing and node.status not in ("SUCCESS", "")
         below = "".join(self.branch(child, depth + 1, failing) for child in node.children)
         return f"<details{' open' if failing or depth < OPEN_LEVELS else ''}><summary>{line}</summary>{below}</details>"
 
