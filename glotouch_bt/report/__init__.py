@@ -3,6 +3,7 @@
 from glotouch_bt.report.page import short_text
 from glotouch_bt.report.run_record import (
     ALL_TOPICS,
+    FILM_NAME,
     RECORD_NAME,
     TREE_TOPICS,
     TRUTH_NAME,

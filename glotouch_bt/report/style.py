@@ -81,6 +81,8 @@ figure img{width:50px;height:87px;image-rendering:pixelated;border-radius:3px;ba
 figcaption{font-size:11.5px;line-height:1.35;color:var(--soft);margin-top:4px;font-variant-numeric:tabular-nums}
 figcaption b{color:var(--ink);font-weight:600}
 figure.off{opacity:.55}
+.film{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,230px),1fr));gap:12px}
+.film img{width:100%;height:auto;image-rendering:auto;border-radius:7px}
 .bar{height:10px;border-radius:5px;width:220px;display:inline-block;vertical-align:middle;margin:0 8px}
 .sparks{display:grid;grid-template-columns:repeat(auto-fill,minmax(150px,1fr));gap:10px 14px;margin-top:10px}
 .sparks figcaption{margin-top:0}

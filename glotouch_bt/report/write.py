@@ -15,10 +15,14 @@ from glotouch_bt.untrusted import require_plain, write_file
 REPORT_NAME = "report.html"
 
 
-def write_report(run_dir: Path) -> Path:
+def write_report(run_dir: Path, objects: Path | None = None) -> Path:
     """Write report.html into a run's folder from run.mcap, result.json and, if present, truth.json.
 
     Sections without data are left out. The file is written atomically.
+
+    Args:
+        run_dir: The run's folder.
+        objects: Folder of the STL files of its objects, if they are not shipped.
 
     Returns:
         The file written.
@@ -28,7 +32,9 @@ def write_report(run_dir: Path) -> Path:
     """
     require_plain(run_dir, (REPORT_NAME, f".{REPORT_NAME}.part"))
     target = run_dir / REPORT_NAME
-    text = render(read_run(run_dir))
+    record = read_run(run_dir)
+    record.objects = objects
+    text = render(record)
     try:
         write_file(target, text.encode("utf-8", "backslashreplace"))
     except OSError as e:

@@ -14,6 +14,7 @@ from glotouch_bt.commands.terminal.bench_tables import (
 from glotouch_bt.commands.terminal.console import (
     EscapingConsole,
     RunProgress,
+    print_error,
     print_settings,
     print_skill,
     print_skills,

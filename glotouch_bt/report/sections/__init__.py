@@ -9,6 +9,7 @@ from glotouch_bt.report.run_record import RunRecord
 from glotouch_bt.report.sections.about import about_section
 from glotouch_bt.report.sections.decisions import decisions_section
 from glotouch_bt.report.sections.faults import faults_section
+from glotouch_bt.report.sections.film import film_section
 from glotouch_bt.report.sections.force import force_section
 from glotouch_bt.report.sections.header import header_section, verdict
 from glotouch_bt.report.sections.log import log_section
@@ -25,6 +26,7 @@ SECTIONS: tuple[tuple[str, Callable[[RunRecord], str]], ...] = (
     ("Why", reasons_section),
     ("Injected faults", faults_section),
     ("Scene", scene_section),
+    ("Moments", film_section),
     ("Map", map_section),
     ("Reports of skills", skills_section),
     ("Force", force_section),
