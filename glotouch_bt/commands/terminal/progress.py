@@ -59,7 +59,8 @@ class RunProgress:
         expected = mission.parameters.get("expected_objects")
         self._objects = "" if expected is None else f" of {expected}"
         self._parts = {path: node.name for path, node in mission.spec.paths(mission.name).items() if node.kind == "subtree"}
-        self._console.print(f"[bold]{escape(mission.name)}[/] in {escape(mission.world.name)} -> {escape(str(folder))}")
+        head = f"[bold]{escape(mission.name)}[/] in {escape(mission.world.name)} -> {escape(str(folder))}"
+        self._console.print(head, soft_wrap=True)
         if self._console.is_terminal:
             self._usual_s = usual_duration_s(folder, mission.name)
             # Other writers are not redirected: rich would execute their escape sequences.
@@ -81,7 +82,7 @@ class RunProgress:
         elif node != self._last_node:
             self._last_node = node
             line = f"t = {robot_s:6.1f} s  {node:<14} contacts {summary.contacts:3d}  objects {len(summary.candidates):2d}"
-            self._console.print(line + _best(summary), markup=False, highlight=False)
+            self._console.print(line + _best(summary), markup=False, highlight=False, soft_wrap=True)
 
     def _lines(self, robot_s: float, wall_s: float, summary: RunSummary) -> Group:
         """Return the lines of a terminal."""
