@@ -1,6 +1,5 @@
 """The report of a run: `read_run` returns its arrays and events, `write_report` writes report.html."""
 
-from glotouch_bt.report.page import short_text
 from glotouch_bt.report.run_record import (
     ALL_TOPICS,
     FILM_NAME,

@@ -136,8 +136,18 @@ details[open]>summary>.node>span::after{content:" ▾"}
   border:1px solid var(--line);background:var(--card);color:var(--ink)}
 .boxes{display:flex;flex-wrap:wrap;gap:6px 18px;margin-top:8px;color:var(--soft);font-size:13.5px}
 footer{color:var(--soft);font-size:12.5px;padding:4px 6px}
-@media(max-width:640px){main{padding:10px 8px 30px}header,section{padding:16px 14px}h1{font-size:22px}
-  .facts span{margin-right:12px;white-space:normal}.wide{overflow-x:auto}.wide>svg{min-width:680px}.sparks .wide>svg{min-width:0}svg text{font-size:14px}
-  .tiles{grid-template-columns:repeat(2,minmax(0,1fr))}#scene{height:78vw}.play{gap:8px}}
+@media(max-width:640px){
+  main{padding:10px 8px 30px}
+  header,section{padding:16px 14px}
+  h1{font-size:22px}
+  .facts span{margin-right:12px;white-space:normal}
+  .wide{overflow-x:auto}
+  .wide>svg{min-width:680px}
+  .sparks .wide>svg{min-width:0}
+  svg text{font-size:14px}
+  .tiles{grid-template-columns:repeat(2,minmax(0,1fr))}
+  #scene{height:78vw}
+  .play{gap:8px}
+}
 @media print{body{background:#fff}section,header{break-inside:avoid;border-color:#ccc}}
 """

@@ -44,9 +44,7 @@ def test_the_lines_of_a_terminal(summary: RunSummary, tmp_path: Path) -> None:
         assert said in text, said
 
 
-def test_elsewhere_a_skill_is_one_line(
-    summary: RunSummary, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_elsewhere_a_skill_is_one_line(summary: RunSummary, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with RunProgress(quiet=False) as progress:
         progress.start(load_mission("retrieve", {"target": "apple"}), tmp_path / "run")
         for t in (1.0, 1.5):
@@ -63,7 +61,13 @@ def test_elsewhere_a_skill_is_one_line(
 
 def test_the_expected_rest_is_that_of_earlier_successful_runs(tmp_path: Path) -> None:
     for i, (mission, status, seconds) in enumerate(
-        [("a", "success", 10.0), ("a", "success", 30.0), ("a", "success", 20.0), ("a", "failure", 1.0), ("b", "success", 5.0)]
+        [
+            ("a", "success", 10.0),
+            ("a", "success", 30.0),
+            ("a", "success", 20.0),
+            ("a", "failure", 1.0),
+            ("b", "success", 5.0),
+        ]
     ):
         (tmp_path / str(i)).mkdir()
         result = {"mission": mission, "status": status, "sim_time_s": seconds}

@@ -88,7 +88,9 @@ def test_the_page_loads_nothing_and_runs_only_the_scene(page: str) -> None:
     assert f"script-src 'sha256-{digest}'" in page
 
 
-def test_without_the_script_everything_but_the_scene_is_there(page: str, tmp_path: Path, writer: SimpleNamespace) -> None:
+def test_without_the_script_everything_but_the_scene_is_there(
+    page: str, tmp_path: Path, writer: SimpleNamespace
+) -> None:
     writer.make_run(tmp_path)  # describes no robot
     without = write_report(tmp_path).read_text()
     assert "<script" not in without

@@ -97,9 +97,7 @@ def depth(rng: np.random.Generator, bow: float, deep_m: float) -> np.ndarray:
     return d
 
 
-def make_run(
-    folder: Path, *, until: str = "end", seed: int = 5, description: RobotDescription | None = None
-) -> Made:
+def make_run(folder: Path, *, until: str = "end", seed: int = 5, description: RobotDescription | None = None) -> Made:
     """Write run.mcap, result.json and truth.json. `until`: opened | sweep | end; `description`: of the robot."""
     rng = np.random.default_rng(seed)
     folder.mkdir(parents=True, exist_ok=True)

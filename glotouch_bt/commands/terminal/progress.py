@@ -58,7 +58,9 @@ class RunProgress:
         self._began_s = time.perf_counter()
         expected = mission.parameters.get("expected_objects")
         self._objects = "" if expected is None else f" of {expected}"
-        self._parts = {path: node.name for path, node in mission.spec.paths(mission.name).items() if node.kind == "subtree"}
+        self._parts = {
+            path: node.name for path, node in mission.spec.paths(mission.name).items() if node.kind == "subtree"
+        }
         head = f"[bold]{escape(mission.name)}[/] in {escape(mission.world.name)} -> {escape(str(folder))}"
         self._console.print(head, soft_wrap=True)
         if self._console.is_terminal:
@@ -81,7 +83,9 @@ class RunProgress:
                 self._live.update(self._lines(robot_s, now - self._began_s, summary), refresh=True)
         elif node != self._last_node:
             self._last_node = node
-            line = f"t = {robot_s:6.1f} s  {node:<14} contacts {summary.contacts:3d}  objects {len(summary.candidates):2d}"
+            line = (
+                f"t = {robot_s:6.1f} s  {node:<14} contacts {summary.contacts:3d}  objects {len(summary.candidates):2d}"
+            )
             self._console.print(line + _best(summary), markup=False, highlight=False, soft_wrap=True)
 
     def _lines(self, robot_s: float, wall_s: float, summary: RunSummary) -> Group:

@@ -97,7 +97,12 @@ def scene_data(record: RunRecord, setup: RunSetup) -> dict[str, Any] | None:
         "ghosts": _ghosts(record, setup),
         "skills": _skills(record),
         "colours": {name: list(c) for name, c in shapes.STATE_COLOURS.items()}
-        | {"touch": list(shapes.TOUCH), "plan": list(shapes.PLAN), "ghost": list(shapes.GHOST), "fit": list(shapes.FIT)},
+        | {
+            "touch": list(shapes.TOUCH),
+            "plan": list(shapes.PLAN),
+            "ghost": list(shapes.GHOST),
+            "fit": list(shapes.FIT),
+        },
         "sizes": [shapes.TOUCH_RADIUS_M, shapes.REACTION_M],
     }
 
@@ -198,7 +203,9 @@ def _body(body: GhostObject) -> list[float]:
 def _robot(description: RobotDescription) -> dict[str, Any]:
     zero = shapes.joint_poses(description, np.zeros(description.dof))
     return {
-        "joints": [{"at": _matrix(pose), "axis": list(j.axis)} for pose, j in zip(zero, description.joints, strict=True)],
+        "joints": [
+            {"at": _matrix(pose), "axis": list(j.axis)} for pose, j in zip(zero, description.joints, strict=True)
+        ],
         "E": _matrix(description.pose_last_E),
         "P": _matrix(description.gripper.pose_E_P),
     }

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from glotouch_bt.report.page import esc, number, section, short_text, table
+from glotouch_bt.mission.record import short_text
+from glotouch_bt.report.page import esc, number, section, table
 from glotouch_bt.report.run_record import RunRecord
 
 _SHOWN_ELSEWHERE = {"result", "report", "contact", "candidate", "sweep", "touchset", "ranking"}

@@ -154,7 +154,9 @@ def _table(
         placed = "–"
         if isinstance(pose, list) and len(pose) == 3 and all(isinstance(v, int | float) for v in pose):
             degrees = number(math.degrees(pose[2]), 0)
-            placed = f"{number(pose[0], 0, scale=1e3)}, {number(pose[1], 0, 'mm', 1e3)}, {degrees}°{_side(m.get('quat'))}"
+            placed = (
+                f"{number(pose[0], 0, scale=1e3)}, {number(pose[1], 0, 'mm', 1e3)}, {degrees}°{_side(m.get('quat'))}"
+            )
         terms = m.get("terms") or {}
         index = f"<b>{esc(m.get('index', '?'))}</b>" + (
             ' <span class="chip good">taken</span>' if accepted and not i else ""

@@ -60,4 +60,6 @@ def _strip(record: RunRecord) -> str:
         colour, top = ("var(--bad)", 0) if e.kind == "failure" else ("var(--contact)", 36)
         at = x.at(contact_stamp_s(e))
         out.append(f'<path d="M{at:.1f} {top}V44" stroke="{colour}" vector-effect="non-scaling-stroke"/>')
-    return f'<svg class="strip" viewBox="0 0 1000 44" preserveAspectRatio="none" aria-hidden="true">{"".join(out)}</svg>'
+    return (
+        f'<svg class="strip" viewBox="0 0 1000 44" preserveAspectRatio="none" aria-hidden="true">{"".join(out)}</svg>'
+    )

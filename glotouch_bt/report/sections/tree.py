@@ -56,8 +56,8 @@ def tree_section(record: RunRecord) -> str:
     keys = [("k-good", "succeeded"), ("k-bad", "failed"), ("k-warn", "stopped")]
     keys.append(("k-idle", "never ran"))
     lead = (
-        f"Each line is a node, its children below it; a click folds them. The strip shows its runs from {max(start_s, 0.0):.0f} "
-        f"to {end_s:.0f} s of the robot's clock."
+        f"Each line is a node, its children below it; a click folds them. The strip shows its runs from "
+        f"{max(start_s, 0.0):.0f} to {end_s:.0f} s of the robot's clock."
     )
     body = "".join(picture.branch(child, 0, True) for child in root.children)
     return section("Behavior tree", lead, f'<div class="tree">{body}</div>{legend(keys)}')
@@ -94,7 +94,7 @@ class _Picture:
         strip = f'<svg viewBox="0 0 1000 10" preserveAspectRatio="none" aria-hidden="true">{self._strip(runs)}</svg>'
         return (
             f'<span class="node {tone}" style="--d:{depth}" title="{esc(node.path)}"><b>{sign}</b> '
-            f'<span>{esc(" › ".join(names))}</span> <small>{facts}</small></span>{strip}'
+            f"<span>{esc(' › '.join(names))}</span> <small>{facts}</small></span>{strip}"
         )
 
     def _strip(self, runs: list[Span]) -> str:

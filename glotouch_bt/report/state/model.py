@@ -11,8 +11,8 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
+from glotouch_bt.mission.record import HIDDEN_EVENTS
 from glotouch_bt.report.run_record import RecordedEvent, RecordReader, RunRecord
-from glotouch_bt.robot import Array, Pose
 from glotouch_bt.report.state import parse
 from glotouch_bt.report.state.tree import tree_order
 from glotouch_bt.report.state.values import (
@@ -27,6 +27,7 @@ from glotouch_bt.report.state.values import (
     Share,
     TouchPoint,
 )
+from glotouch_bt.robot import Array, Pose
 
 T = TypeVar("T")
 
@@ -40,8 +41,6 @@ LOG_LINES = 200
 """Events in the log of a state."""
 NO_WINDOW_M = (0.017, 0.028)
 """Size of a pad along x_P and z_P if the record has none. Source: the shipped gripper, rounded."""
-HIDDEN_EVENTS = frozenset({"sweep", "request", "request_done"})
-"""Events that the log leaves out: many a second, or without a meaning for a person."""
 _PHASES: dict[str, Phase] = {"pause": "pausing", "paused": "paused", "resumed": "running"}
 LOST = frozenset({"tool_lost", "no_probe"})
 """Codes of failures that say that the probe is neither in the jaws nor in its holder."""

@@ -13,9 +13,9 @@ import numpy as np
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read import shipped_root
 from glotouch_bt.report.run_record import RunRecord
+from glotouch_bt.report.state.model import NO_WINDOW_M
 from glotouch_bt.robot import Array, BadInput, Container, Holder, Pose, Probe, RobotDescription
 from glotouch_bt.robot.scene import Mesh, load_mesh, stl_files
-from glotouch_bt.report.state.model import NO_WINDOW_M
 
 T = TypeVar("T")
 SHIPPED = "glotouch_missions"

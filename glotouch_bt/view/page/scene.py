@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import trimesh
 
-from glotouch_bt.robot import Array, Pose, RobotDescription
 from glotouch_bt.report.scene import shapes
 from glotouch_bt.report.state import (
     CandidateOutline,
@@ -18,6 +17,7 @@ from glotouch_bt.report.state import (
     SceneState,
     felt_points_P,
 )
+from glotouch_bt.robot import Array, Pose, RobotDescription
 
 if TYPE_CHECKING:
     import viser
@@ -222,7 +222,8 @@ class SceneDrawing:
         ball = trimesh.creation.icosphere(1, shapes.TOUCH_RADIUS_M)
         self._add("touches", self._scene.add_batched_meshes_simple(
             "/K/touches", np.array(ball.vertices), np.array(ball.faces), batched_positions=points,
-            batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1)), batched_colors=shapes.TOUCH, cast_shadow=False,
+            batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1)), batched_colors=shapes.TOUCH,
+            cast_shadow=False,
         ))  # fmt: skip
         self._add("touches", self._scene.add_line_segments(
             "/K/reactions", np.stack([points, ends], axis=1), shapes.TOUCH, thickness=2.0, thickness_units="screen",
