@@ -217,7 +217,7 @@ def test_messages_are_in_the_order_of_time(tmp_path: Path) -> None:
     write(tmp_path / "run.mcap")
     with (tmp_path / "run.mcap").open("rb") as f:
         times = [m.log_time for m in StreamReader(f, validate_crcs=True).records if type(m).__name__ == "Message"]
-    assert times[:2] == [0, 0]  # the scene
+    assert times[0] == 0  # the scene
     batches = np.array(times)
     assert (np.diff(batches) < 0).sum() <= 3  # only a late tactile stamp may step back at a batch's start
 
