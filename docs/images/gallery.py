@@ -18,7 +18,7 @@ from glotouch_bt.report import write_report
 from glotouch_bt.robot import GlotouchError
 from glotouch_bt.runs import write_film
 
-VIEWS = {"": (1120, 940), "_phone": (390, 780)}
+VIEWS = {"": (1120, 1240), "_phone": (390, 1240)}
 """Ending of a picture's name, and the size of its window."""
 FLAGS = ("--headless", "--no-sandbox", "--hide-scrollbars", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 

@@ -53,9 +53,7 @@ def main() -> None:
 
     robot.cycle = watched
     with robot:
-        done = run_mission(
-            mission, robot, NullRecord(), on_progress=lambda _, summary: shown.update(summary=summary)
-        )
+        done = run_mission(mission, robot, NullRecord(), on_progress=lambda _, summary: shown.update(summary=summary))
         draw(done.end_s)
     times = [FRAME_MS] * (len(frames) - 1) + [LAST_MS]
     out = Path(__file__).with_suffix(".webp")

@@ -167,7 +167,9 @@ class SceneDrawing:
 
     def _solids(self, above: str, solids: list[shapes.Solid]) -> None:
         for s in solids:
-            look: dict[str, Any] = {} if s.opacity == 1.0 else {"opacity": s.opacity, "side": "double"}
+            look: dict[str, Any] = {"flat_shading": not s.smooth}
+            if s.opacity < 1.0:
+                look |= {"opacity": s.opacity, "side": "double"}
             if s.name == "table":
                 look["cast_shadow"] = False
             self._scene.add_mesh_simple(f"{above}/{s.name}", s.vertices_m, s.faces, color=s.colour, **look)
