@@ -9,7 +9,7 @@ from glotouch_bt.report.page import esc, page, section
 from glotouch_bt.report.run_record import RunRecord, read_run
 from glotouch_bt.report.scene import script
 from glotouch_bt.report.sections import SCENE_ID, SECTIONS, verdict
-from glotouch_bt.robot import BadInput
+from glotouch_bt.robot import BadInput, GlotouchError
 from glotouch_bt.untrusted import require_plain, write_file
 
 REPORT_NAME = "report.html"
@@ -54,5 +54,5 @@ def _section(title: str, make: Callable[[RunRecord], str], record: RunRecord) ->
     """Return one section; data that cannot be read (of another version) cost only this section."""
     try:
         return make(record)
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as e:
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, GlotouchError) as e:
         return section(title, f"This part of the record could not be read ({esc(type(e).__name__)}: {esc(e)}).", "")

@@ -48,7 +48,7 @@ class LinkFrames:
         self, stamps_ns: npt.NDArray[np.int64], position_B_P: Array, quat_B_P: Array, q: Array, aperture_m: Array
     ) -> list[Array]:
         """Return what fills the template, a row for each stamp: P (n, 3), w x y z (n, 4), q (n, dof), jaws (n,)."""
-        stamp = np.column_stack([stamps_ns // 10**9, stamps_ns % 10**9])
+        stamp: Array = np.column_stack([stamps_ns // 10**9, stamps_ns % 10**9]).astype(np.float64)
         out = [stamp, position_B_P, quat_B_P[:, [1, 2, 3, 0]]]
         for joint, zero, angle in zip(self._joints, self._zero, q.T[: len(self._joints)], strict=True):
             out += [stamp, _turned(zero, np.array(joint.axis), angle)]
