@@ -181,7 +181,7 @@ def _is_within(model: TargetModel, largest_m: float) -> bool:
     """Return True if the numbers of a model are finite, and the lengths of its outline at most `largest_m`."""
     outlines = (model.outline, *model.components)
     fits = [f for o in outlines for f in (o.as_round, o.as_box)]
-    lengths = [v for f in fits for v in (*f.centre_m, *f.size_m, *f.size_sd_m, f.centre_sd_m)]
+    lengths = [*model.tops_m, *(v for f in fits for v in (*f.centre_m, *f.size_m, *f.size_sd_m, f.centre_sd_m))]
     others = [model.rho, model.rho_sd, model.normal_dispersion, *(v for f in fits for v in (f.yaw_rad, f.yaw_sd_rad))]
     finite = bool(np.isfinite([*lengths, *others]).all())
     return finite and max(map(abs, lengths)) <= largest_m and all(0.0 <= o.p_box <= 1.0 for o in outlines)

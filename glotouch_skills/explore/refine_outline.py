@@ -35,7 +35,7 @@ class RefineOutlineParams(TracingParams):
 
 
 class RefineOutline(Skill):
-    """Refine a coarsely traced candidate until it can be squeezed and grasped.
+    """Refine a coarsely traced candidate until it can be squeezed and grasped, or trace it anew.
 
     SUCCESS: `refined` is the candidate with its new contacts. An outline that is known well already stays unchanged.
     """
@@ -57,11 +57,13 @@ class RefineOutline(Skill):
 
     tool = In(HeldTool, "the held probe")
     candidate = In(Candidate, "the object as traced so far")
+    anew = In(tuple, "indices of candidates whose contacts and top are given up", required=False, expected=False)
     refined = Out(Candidate, "the object as traced now", key="candidate", always=True)
 
     def run(self) -> SkillRun:
         """See the class."""
         p, tool, before = self.params, self.tool, self.candidate
+        anew = before.index in (self.anew or ())
         self.refined = before
         explorer = Explorer(self.context, tool, p.speeds(), self.event)
         half = 0.5 * np.array(self.context.world.container.interior_m[:2]) - p.wall_gap_m
@@ -73,6 +75,7 @@ class RefineOutline(Skill):
             round_tip=tool.round,
             half_extent_m=half,
             columns=explorer.columns,
+            anew=anew,
         )
         traced = yield from explorer.run(plan)
         better = refined(before, traced)
@@ -86,6 +89,6 @@ class RefineOutline(Skill):
                 advice="it stands too near to them to be traced from the side",
                 off_m=off_m,
             )
-        self.refined = better
+        self.refined = replace(better, height_m=p.height_m, top_touched=False) if anew else better
         moved = float(np.linalg.norm(traced.displaced_K_m))
         self.event("candidate", candidate=self.refined, moved_m=moved, ended=traced.ended, moves=traced.moves)

@@ -85,9 +85,16 @@ class TouchNext(Skill):
     refused_before = In(
         tuple, "closures that could not be made", key="refused", element=tuple, required=False, expected=False
     )
+    doubtful_before = In(
+        tuple, "indices of candidates on which closures met something", key="doubtful", element=int, required=False,
+        expected=False,
+    )  # fmt: skip
     jaw_zero = In(JawZero, "offset of the reported aperture", required=False, expected=False)
     touchsets = Out(tuple, "touches, one TouchSet for each candidate", element=TouchSet)
     refused = Out(tuple, "closures that could not be made: candidate, yaw in degrees, height and place in mm")
+    doubtful = Out(
+        tuple, "indices of candidates on which closures met something: not where they were traced", element=int
+    )
     decided = Out(bool, "no further closure is needed")
 
     def __init__(self, name: str, params: SkillParams, context: Context) -> None:
@@ -117,6 +124,7 @@ class TouchNext(Skill):
             raise self.NO_CANDIDATES("there is no candidate to touch", candidates=len(candidates))
         touchsets: tuple[TouchSet, ...] = self.felt or ()
         self.refused = refused = self.refused_before or ()
+        self.doubtful = self.doubtful_before or ()
         before = [_state(t.candidate) for t in touchsets]
         if before != [_state(c) for c in wanted]:  # found, rejected, or measured anew
             made = {t.candidate.index: t.sequences for t in touchsets}
@@ -144,6 +152,7 @@ class TouchNext(Skill):
             down, layer = yield from self._touch(candidates, chosen, down)
         except MotionRefused as refusal:
             self._refuse(chosen)
+            self.doubtful = tuple(sorted({*self.doubtful, chosen.closure.candidate}))
             self.event("note", text=f"a closure on candidate {chosen.closure.candidate} was not made: {refusal}")
             return
         self._down = down
@@ -194,11 +203,11 @@ class TouchNext(Skill):
         worth = np.array([g.max() for g in gains]) >= p.min_gain_nats
         quick = np.array([1.0 / o.seconds for o in found])
         wanted = recognition.wanted(belief, p.confidence, self._hopeless)
-        short = recognition.short_of_evidence(belief)
+        hardly_felt = recognition.hardly_felt(belief)
         for score in (
             quick * [o.closure.candidate in wanted for o in found],
             rates * worth,
-            quick * [o.closure.candidate in short for o in found],
+            quick * [o.closure.candidate in hardly_felt for o in found],
         ):
             option = self._first(belief, found, gains, score, down)
             if option is not None:

@@ -64,15 +64,24 @@ class Grasp(Skill):
     plan = In(GraspPlan, "the planned grasps")
     known = In(tuple, "all candidates, to keep clear of", key="candidates", element=Candidate, required=False)
     before = In(tuple, "grasps made before", key="tried", required=False)
+    doubtful_before = In(
+        tuple, "indices of candidates on which closures met something", key="doubtful", element=int, required=False,
+        expected=False,
+    )  # fmt: skip
     grip_m = Out(float, "aperture of the closed jaws, m")
     made = Out(GraspPlan, "the grasp that was made")
     tried = Out(tuple, "grasps made so far", element=GraspPlan)
+    lost = Out(bool, "no grasp could be made", always=True)
+    doubtful = Out(
+        tuple, "the same, with a candidate of which no grasp could be made: it was moved", element=int, always=True
+    )
 
     def run(self) -> SkillRun:
         """See the class."""
         plan = self.plan
         others = tuple(c for c in (self.known or ()) if c.index != plan.candidate)
         made: tuple[GraspPlan, ...] = self.before or ()
+        self.lost, self.doubtful = False, self.doubtful_before or ()
         options = sorted((plan, *plan.alternatives), key=lambda option: any(_same(option, m) for m in made))
         tried: list[str] = []
         with keeping_clear_of(self.context.arm, others):
@@ -84,6 +93,7 @@ class Grasp(Skill):
                 except MotionRefused as refusal:
                     tried.append(str(refusal))
                     self.event("note", text=f"a grasp was given up: {refusal}")
+        self.lost, self.doubtful = True, tuple(sorted({*self.doubtful, plan.candidate}))
         raise self.NO_GRASP(f"none of {len(tried)} grasps could be made; the last: {tried[-1]}", grasps=len(tried))
 
     def _attempt(self, plan: GraspPlan) -> Motion[float]:

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
         ProbeOption,
         enough,
         excluded,
+        hardly_felt,
         next_probe_touch,
-        short_of_evidence,
         wanted,
     )
 
@@ -29,6 +29,6 @@ __getattr__ = lazy_door(
     **dict.fromkeys(("MATCHERS", "Matcher"), "matchers"),
     **dict.fromkeys(("PadSpec", "TargetModel"), "model"),
     **dict.fromkeys(
-        ("CHANGE_S", "ProbeOption", "enough", "excluded", "next_probe_touch", "short_of_evidence", "wanted"), "schedule"
+        ("CHANGE_S", "ProbeOption", "enough", "excluded", "hardly_felt", "next_probe_touch", "wanted"), "schedule"
     ),
 )

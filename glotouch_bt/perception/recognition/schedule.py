@@ -19,6 +19,9 @@ CHANGE_S = 42.0
 """Robot time of taking the probe once more: `tool_pickup`, `tool_calibrate` and `tool_return`. Source: measured, mean
 of 60 nominal missions."""
 
+POSE_LAYERS = 2.0
+"""Number of two-sided layers from which a grasp can be planned at the fitted pose. Source: that of the grasp plan."""
+
 
 @dataclass(frozen=True)
 class ProbeOption:
@@ -90,7 +93,7 @@ def pays_now(belief: Belief, option: ProbeOption, unmeasured: set[int]) -> bool:
 
 
 def wanted(belief: Belief, confidence: float, hopeless: frozenset[int]) -> set[int]:
-    """Return candidates to close the jaws on whatever the gain, where a decision lacks only evidence; mostly none.
+    """Return candidates to close the jaws on whatever the gain; mostly none.
 
     Args:
         belief: What is known.
@@ -99,27 +102,27 @@ def wanted(belief: Belief, confidence: float, hopeless: frozenset[int]) -> set[i
     """
     ranking = belief.ranking
     if best_of(belief).probability >= confidence:
-        return short_of_evidence(belief)
+        return hardly_felt(belief)
     if ranking.p_absent >= confidence:
         unfelt = {t.candidate.index for t in belief.touchsets if not any(layer.stable for layer in t.layers)}
-        return (unfelt or short_of_evidence(belief)) - hopeless
+        return (unfelt or hardly_felt(belief)) - hopeless
     return set()
 
 
-def short_of_evidence(belief: Belief) -> set[int]:
-    """Return the likeliest candidate if both pads did not touch it as often as a decision requires."""
+def hardly_felt(belief: Belief) -> set[int]:
+    """Return the likeliest candidate if it was not felt often enough to know its pose."""
     best = best_of(belief)
-    return {best.index} if best.evidence < belief.params.evidence else set()
+    return {best.index} if best.evidence < POSE_LAYERS else set()
 
 
 def enough(belief: Belief, confidence: float, hopeless: frozenset[int]) -> str:
     """Return why no further closure is needed, or an empty text.
 
-    Conclude that the target is absent only when every candidate was touched, and the likeliest as often as taking it
-    would require. Outlines and single closures do not suffice. Arguments as of `wanted`.
+    A target's pose must be known, too. Conclude that the target is absent only when every candidate was touched:
+    outlines do not suffice. Arguments as of `wanted`.
     """
     ranking, best = belief.ranking, best_of(belief)
-    if best.probability >= confidence and ranking.accepted:
+    if best.probability >= confidence and not hardly_felt(belief):
         return f"candidate {best.index} is the target (probability {best.probability:.3f})"
     if ranking.p_absent >= confidence and not wanted(belief, confidence, hopeless):
         return f"none of them is the target (probability {ranking.p_absent:.3f})"

@@ -96,7 +96,7 @@ def test_a_broken_touchset_is_no_evidence_and_spoils_no_other(felt, matcher: str
     model = TargetModel.from_mesh(meshes[0])
     alone = MATCHERS[matcher](model, [broken(good, **BROKEN[how])])
     assert not alone.accepted
-    assert "no evidence" in alone.reasons[0]
+    assert any(why in alone.reasons[-1] for why in ("no evidence", "no closure felt"))
     assert alone.best.evidence == 0
     beside = MATCHERS[matcher](model, [good, broken(other, **BROKEN[how])])
     assert beside.best.index == good.candidate.index

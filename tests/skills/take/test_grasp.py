@@ -29,6 +29,7 @@ def test_the_jaws_close_at_the_place(make) -> None:
     b.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message
     assert skill.grip_m == pytest.approx(0.05, abs=1e-6)
+    assert (skill.lost, skill.doubtful) == (False, ())
     np.testing.assert_allclose(b.arm.pose_B_P.position_m, [0.61, 0.04, -0.17], atol=1e-5)
     assert abs(np.sin(b.arm.pose_B_P.yaw_rad - 0.3)) < 1e-6
     targets = [c.gripper for c in b.commands if c.gripper is not None]
@@ -42,6 +43,7 @@ def test_grasp__no_grasp__jaws_close_on_nothing(make) -> None:
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_grasp")
     assert "closed to 0.0 mm" in skill.reason.message
+    assert (skill.lost, skill.doubtful) == (True, (0,)), "it was moved: it is traced anew"
     assert b.arm.aperture_m == pytest.approx(0.07, abs=1e-4)
     assert float(b.arm.pose_B_P.position_m[2]) > -0.2 + 0.14
 

@@ -75,16 +75,13 @@ def as_match(pair: Pair, ratio: float, probability: float) -> Match:
 
 
 def decide(pairs: Sequence[Pair], p: LikelihoodParams) -> Ranking:
-    """Rank by probability; accept the best if its probability and number of two-sided layers suffice."""
+    """Rank by probability; accept the best if its probability suffices and it was felt, so that its pose is known."""
     against = ratios(pairs, p)
     shares, p_absent = probabilities(against, p)
     matches = [as_match(x, r, float(s)) for x, r, s in zip(pairs, against, shares, strict=True)]
     order = tuple(sorted(matches, key=lambda m: (-m.probability, m.loss, m.index)))
     best = order[0]
     margin = order[1].loss - best.loss if len(order) > 1 else math.inf
-    if all(m.evidence == 0 for m in order):
-        reason = "no evidence: no closure on any candidate was felt by a pad"
-        return Ranking(order, 0.0, False, (reason,), p_absent)
     reasons: list[str] = []
     if best.probability < p.accept:
         reasons.append(
@@ -92,8 +89,6 @@ def decide(pairs: Sequence[Pair], p: LikelihoodParams) -> Ranking:
             + (f"; candidate {order[1].index} with {order[1].probability:.2f}" if len(order) > 1 else "")
             + f"; none of them with {p_absent:.2f}"
         )
-    if best.evidence < p.evidence:
-        reasons.append(
-            f"evidence {best.evidence:.2f} of candidate {best.index} is below {p.evidence:g} two-sided layers"
-        )
+    if best.fit is None:
+        reasons.append(f"no closure felt candidate {best.index}: its pose is not known")
     return Ranking(order, margin, not reasons, tuple(reasons), p_absent)

@@ -23,6 +23,7 @@ from glotouch_bt.perception.recognition.likelihood.scalars import (
     height_ratio,
     mode_ratio,
     size_variance_m2,
+    whole_share,
 )
 from glotouch_bt.perception.recognition.model import TargetModel
 from glotouch_bt.perception.touch import Candidate, Contour
@@ -74,9 +75,10 @@ def _tops(
     def term(height_m: float) -> float:
         return height_ratio(model, replace(candidate, height_m=height_m), p)
 
-    top = [(term(model.height_m + z * p.height_sd_m), 1.0 - p.height_lower) for z in NORMAL_QUANTILES]
-    lower = [(term(f * model.height_m), p.height_lower) for f in (0.5, 0.6, 0.7, 0.8, 0.9)]
-    return top + lower, [term(float(h)) for h in np.linspace(*HEIGHTS_M, HEIGHT_SAMPLES)]
+    whole = whole_share(model, candidate, p)
+    top = [(term(model.height_m + z * p.height_sd_m), whole / len(NORMAL_QUANTILES)) for z in NORMAL_QUANTILES]
+    parts = [(term(float(h)), (1.0 - whole) / len(model.tops_m)) for h in model.tops_m]
+    return top + parts, [term(float(h)) for h in np.linspace(*HEIGHTS_M, HEIGHT_SAMPLES)]
 
 
 def _outlines(

@@ -32,16 +32,34 @@ def mode_ratio(model: TargetModel, candidate: Candidate) -> float:
 
 
 def height_ratio(model: TargetModel, candidate: Candidate, p: LikelihoodParams) -> float:
-    """Return the log ratio of the measured top: the model's top, or a lower point of it; 0 if not touched."""
+    """Return the log ratio of the measured top; 0 if not touched.
+
+    If the contour is that of the whole object, the top is the model's, seldom a lower point. If it covers a part, the
+    top is that of a part as well.
+    """
     low, high = HEIGHTS_M
     if not candidate.top_touched:
         return 0.0
-    z = (candidate.height_m - model.height_m) / p.height_sd_m
-    top = _student(z) / p.height_sd_m
     span = max(model.height_m - SENSING_M, 5e-3)
     lower = 1 / span if SENSING_M <= candidate.height_m <= model.height_m else 0.0
-    density = (1 - p.height_lower - 0.01) * top + p.height_lower * lower + 0.01 / (high - low)
-    return math.log(density * (high - low))
+    *parts, top = _height_density(candidate.height_m - model.tops_m, model, p).tolist()
+    whole = whole_share(model, candidate, p)
+    density = whole * ((1 - p.height_lower) * top + p.height_lower * lower) + (1 - whole) * 0.5 * (
+        sum(parts) / len(parts) + lower
+    )
+    return math.log(0.99 * density * (high - low) + 0.01)
+
+
+def _height_density(off_m: Array, model: TargetModel, p: LikelihoodParams) -> Array:
+    """Return the densities (n,), 1/m, of measured less true heights (n,); an object that leans is higher."""
+    raised_m = math.hypot(p.height_sd_m, p.lean_sd_rad * 0.5 * model.outline.likely.size_m[0])
+    sd_m = np.where(off_m > 0, raised_m, p.height_sd_m)
+    return np.asarray(math.sqrt(2 / math.pi) * np.exp(-0.5 * (off_m / sd_m) ** 2) / (raised_m + p.height_sd_m))
+
+
+def whole_share(model: TargetModel, candidate: Candidate, p: LikelihoodParams) -> float:
+    """Return the probability that the contour covers the whole object, 0..1, if it is the target."""
+    return 1.0 - p.contour_outlier / math.exp(contour_ratio(model, candidate, p))
 
 
 def contour_ratio(model: TargetModel, candidate: Candidate, p: LikelihoodParams) -> float:

@@ -13,7 +13,7 @@ from glotouch_bt.perception.recognition.model.pads import Array32, PadSpec
 from glotouch_bt.perception.recognition.model.target import TargetModel
 from glotouch_bt.robot import ParamError
 
-VERSION = 2
+VERSION = 3
 """Version of the tables; increase it when a table's meaning or computation changes."""
 _NUMBERS = ("height_m", "rho", "rho_sd", "normal_dispersion", "anisotropy")
 
@@ -28,6 +28,7 @@ def to_parts(model: TargetModel) -> tuple[dict[str, Any], dict[str, Array32]]:
         "l_m": model.l_m.tolist(),
         "z_m": model.z_m.tolist(),
         "centre_m": model.centre_m.tolist(),
+        "tops_m": model.tops_m.tolist(),
         "outlines": [_outline_facts(o) for o in (model.outline, *model.components)],
         **{name: getattr(model, name) for name in _NUMBERS},
     }
@@ -65,7 +66,7 @@ def from_parts(name: str, facts: Mapping[str, Any], arrays: Mapping[str, Array32
         return TargetModel(
             name=name, digest=str(facts["digest"]), pad=pad, phi_rad=phi, l_m=l, z_m=z, reach_m=arrays["reach_m"],
             fine_m=arrays["fine_m"], outline=outline, components=tuple(components),
-            centre_m=np.array(facts["centre_m"], dtype=np.float64),
+            centre_m=np.array(facts["centre_m"], dtype=np.float64), tops_m=np.array(facts["tops_m"], dtype=np.float64),
             sides=(), **numbers, _lazy=lazy,
         )  # fmt: skip
     except (KeyError, TypeError, ValueError) as e:

@@ -16,6 +16,7 @@ from glotouch_bt.perception.recognition.model.outline import Outline, minimum_re
 from glotouch_bt.perception.recognition.model.pads import FINE, Array32, PadSpec, image_feature
 from glotouch_bt.perception.recognition.model.raster import mirrored, side_images, window_max
 from glotouch_bt.perception.recognition.model.simulated_touches import pooled_images, simulated_statistics
+from glotouch_bt.perception.recognition.model.tops import tops_within
 from glotouch_bt.robot import Array, ParamError
 from glotouch_bt.robot.scene import UPRIGHT, Mesh, Quat
 
@@ -63,6 +64,8 @@ class TargetModel:
         components: Simulated traces of the parts that the probe takes for separate objects; empty if there is only one.
         centre_m: (2,) centre of the footprint's minimum-area rectangle, in the mesh's frame O.
         height_m: Top above the floor.
+        tops_m: (TOPS,) tops within discs about the middle, from a small disc to the whole object: what a probe may
+            take for the top if it traced only a part.
         rho: Nonplanarity predicted for a 10 N touch, median over simulated touches (the paper's rho_M).
         rho_sd: Its deviation over touches (half the 16-84 % range).
         normal_dispersion: 1 - |mean normal| over touched patches, mean over touches (the paper's d_M).
@@ -81,6 +84,7 @@ class TargetModel:
     outline: Outline
     centre_m: Array
     height_m: float
+    tops_m: Array
     rho: float
     rho_sd: float
     normal_dispersion: float
@@ -255,5 +259,6 @@ def _build(mesh: Mesh, pad: PadSpec) -> TargetModel:
         a.setflags(write=False)
     return TargetModel(
         mesh.name, mesh.digest, pad, axes.phi_rad, axes.l_m, axes.z_m, reach, fine, outline, axes.centre_m,
-        axes.height_m, rho, rho_sd, dispersion, axes.anisotropy, component_outlines(solid),
+        axes.height_m, tops_within(solid, axes.radius_m), rho, rho_sd, dispersion, axes.anisotropy,
+        component_outlines(solid),
     )  # fmt: skip
