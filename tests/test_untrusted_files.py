@@ -29,6 +29,7 @@ ALLOWED = {
     "glotouch_backends/mujoco/hulls/decompose.py": OWN,
     "glotouch_backends/mujoco/hulls/coacd_worker.py": OWN,
     "glotouch_bt/robot/scene/meshes.py": "parses what the reader has bounded",
+    "glotouch_bt/report/scene/played.py": "the installed package's own script",
     "glotouch_bt/runs/folder.py": "opens the folder for its lock",
     "glotouch_bt/commands/shared/output.py": "/dev/null",
     "glotouch_bt/commands/tree.py": "writes the drawing to the file that the user names",

@@ -68,7 +68,8 @@ nanoseconds; log time equals publish time. The file holds no wall-clock time, so
 bytes. Chunks are compressed with zstd and end every 50 control cycles (0.5 s). The record of a killed process can
 be read up to its last chunk.
 
-Frames: B arm base, K container, P mid-point of the pads, S wrist sensor. Numbers that are not finite are `null` in
+Frames: B arm base, link1 ... the joints', E flange, P mid-point of the pads, left and right the fingers, K container, S
+wrist sensor. Numbers that are not finite are `null` in
 JSON. Arrays in events are nested lists, rounded to 1e-9 (large ones to 1e-6); dataclasses are objects of their
 fields.
 
@@ -79,16 +80,18 @@ without its wall times.
 events.
 """
 TOPIC_NOTES = {
-    "/wrench": "50 Hz; newest sample, force in N and torque in Nm, in S",
+    "/wrench": "50 Hz; newest sample, force in N and its magnitude, torque in Nm, in S",
     "/pose": "50 Hz; P in B",
-    "/tf": "25 Hz; P in B, and K in B once",
+    "/tf": "25 Hz; every frame: P and K in B, the links, E, the fingers in P",
     "/joints": "25 Hz; rad and rad/s",
     "/gripper": "50 Hz; as last reported",
     "/tactile/left": "at most 10 Hz; depth map, 32FC1, metres, row 0 nearest the wrist",
     "/tactile/right": "as left",
     "/tree/ticks": "on change; `node` is the path in the tree",
     "/tree/ports": "on write; arrays of more than 64 numbers as {shape, min, max}",
-    "/scene": "on change; walls, contacts and outlines, in K",
+    "/scene": "on change; contacts and outlines, in K",
+    "/scene/world": "once; robot and container",
+    "/log": "on event; in words, without sweeps and requests",
     "/packed/samples": "every force sample (1 kHz)",
     "/packed/cycles": "every control cycle; the first row precedes the first command",
     "/packed/tactile": "every pair of depth maps",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -17,7 +18,7 @@ from glotouch_backends.mujoco.simulation import MujocoDisturber, MujocoReferee
 from glotouch_backends.mujoco.truth import draw_truth
 from glotouch_backends.options import WorldOptions, convert_options
 from glotouch_backends.rizon4 import RIZON4_XENSE
-from glotouch_bt.robot import Backend, BackendError, Conditions, Limits, Robot, RobotDescription, World
+from glotouch_bt.robot import Backend, BackendError, Conditions, Limits, Picture, Robot, RobotDescription, World
 from glotouch_bt.robot.simulation import Disturber, Referee, TouchSampler
 
 SETTLE_S = 0.6
@@ -105,6 +106,12 @@ class MujocoBackend(Backend):
     def disturber(self, robot: Robot) -> Disturber | None:
         """See `Backend`."""
         return MujocoDisturber(robot) if isinstance(robot, MujocoRobot) else None
+
+    def camera(self, robot: Robot) -> Callable[[int, int], Picture] | None:
+        """See `Backend`."""
+        from glotouch_backends.mujoco.render import render
+
+        return partial(render, robot) if isinstance(robot, MujocoRobot) else None
 
     def touch_sampler(self, world: World, conditions: Conditions, seed: int) -> TouchSampler:
         """See `Backend`."""

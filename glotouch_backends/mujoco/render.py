@@ -12,13 +12,13 @@ import numpy.typing as npt
 from glotouch_backends.mujoco.robot import MujocoRobot
 from glotouch_bt.robot import BackendError, UnknownName
 
-# (body to look at, distance m, azimuth deg, elevation deg)
-CAMERAS: dict[str, tuple[str, float, float, float]] = {
-    "overview": ("container", 1.7, 140.0, -25.0),
-    "container": ("container", 0.65, 160.0, -45.0),
-    "above": ("container", 0.75, 180.0, -89.0),
-    "holder": ("holder", 0.45, 120.0, -15.0),
-    "hand": ("hand", 0.5, 120.0, -10.0),
+# (body to look at, height above it m, distance m, azimuth deg, elevation deg)
+CAMERAS: dict[str, tuple[str, float, float, float, float]] = {
+    "overview": ("container", 0.17, 1.12, 142.0, -27.0),
+    "container": ("container", 0.05, 0.72, 150.0, -38.0),
+    "above": ("container", 0.0, 0.75, 180.0, -89.0),
+    "holder": ("holder", 0.0, 0.45, 120.0, -15.0),
+    "hand": ("hand", -0.15, 0.5, 120.0, -10.0),
 }
 
 
@@ -31,11 +31,10 @@ def render(robot: MujocoRobot, width: int = 960, height: int = 720, camera: str 
     """
     if camera not in CAMERAS:
         raise UnknownName("camera", camera, CAMERAS)
-    body, distance, azimuth, elevation = CAMERAS[camera]
+    body, above_m, distance, azimuth, elevation = CAMERAS[camera]
     view = mujoco.MjvCamera()
     view.lookat[:] = robot.data.body(body).xpos
-    if body == "hand":
-        view.lookat[2] -= 0.15
+    view.lookat[2] += above_m
     view.distance, view.azimuth, view.elevation = distance, azimuth, elevation
     option = mujoco.MjvOption()
     option.geomgroup[:] = 1

@@ -11,13 +11,33 @@ import typer
 
 from glotouch_bt.commands.shared import Groot2, Json, NoBrowser, Port, RunFolderArgument, guarded, print_json
 
+RunObjects = Annotated[
+    Path | None, typer.Option("--objects", metavar="DIR", help="folder of the STL files, to show the objects")
+]
+
 
 @guarded
-def report(folder: RunFolderArgument, json_: Json = False) -> None:
-    """Write report.html of a run again."""
-    from glotouch_bt.report import write_report
+def report(
+    folder: RunFolderArgument,
+    film: Annotated[bool, typer.Option("--film", help="render moments of a simulated run into it")] = False,
+    objects: RunObjects = None,
+    json_: Json = False,
+) -> None:
+    """Write report.html of a run again.
 
-    made = write_report(folder)
+    --film draws the world as it was when skills had ended. Without a display it needs MUJOCO_GL=egl.
+    """
+    from glotouch_bt.commands.terminal import print_error
+    from glotouch_bt.report import write_report
+    from glotouch_bt.robot import GlotouchError
+    from glotouch_bt.runs import write_film
+
+    if film:
+        try:
+            write_film(folder, objects)
+        except GlotouchError as e:
+            print_error(f"no film: {e}")
+    made = write_report(folder, objects)
     if json_:
         print_json({"report": str(made)})
     else:
@@ -29,9 +49,7 @@ def view(
     folder: RunFolderArgument,
     port: Port = None,
     no_browser: NoBrowser = False,
-    objects: Annotated[
-        Path | None, typer.Option("--objects", metavar="DIR", help="folder of the STL files, to show the true objects")
-    ] = None,
+    objects: RunObjects = None,
     groot2: Groot2 = None,
 ) -> None:
     """Show a run in the browser: scene, tree, signals and a time line.

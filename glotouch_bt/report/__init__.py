@@ -1,8 +1,8 @@
 """The report of a run: `read_run` returns its arrays and events, `write_report` writes report.html."""
 
-from glotouch_bt.report.page import short_text
 from glotouch_bt.report.run_record import (
     ALL_TOPICS,
+    FILM_NAME,
     RECORD_NAME,
     TREE_TOPICS,
     TRUTH_NAME,
@@ -13,6 +13,6 @@ from glotouch_bt.report.run_record import (
     Tick,
     read_run,
 )
-from glotouch_bt.report.sections import contour_of, depth_png, palette, tree_order
+from glotouch_bt.report.sections import depth_png, palette
 from glotouch_bt.report.svg import AxisScale, points, tick_text
 from glotouch_bt.report.write import write_report

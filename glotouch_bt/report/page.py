@@ -1,10 +1,11 @@
-"""The HTML of the report: one self-contained page, light and dark, without scripts or network access."""
+"""The HTML of the report: one self-contained page, light and dark. It loads nothing, and runs only its own script."""
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 from glotouch_bt.escaped_text import html_text as esc
 from glotouch_bt.report.style import CSS
@@ -37,21 +38,21 @@ def legend(entries: Iterable[tuple[str, str]]) -> str:
     return '<p class="legend">' + "".join(f'<span><i class="{c}"></i>{label}</span>' for c, label in entries) + "</p>"
 
 
-def short_text(value: Any) -> str:
-    """Return a value as one line: numbers to four digits, lists and objects shortened."""
-    if isinstance(value, float):
-        return f"{value:.4g}"
-    if isinstance(value, list):
-        return "[" + ", ".join(short_text(v) for v in value[:8]) + (", …]" if len(value) > 8 else "]")
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{k}: {short_text(v)}" for k, v in list(value.items())[:10]) + "}"
-    return str(value)
+def page(title: str, body: str, script: str = "") -> str:
+    """Return the whole document.
 
-
-def page(title: str, body: str) -> str:
-    """Return the whole document."""
+    Its policy forbids everything from elsewhere, and every script but `script`, which the browser knows by its digest.
+    """
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    allowed = f"script-src 'sha256-{digest}'; " if script else ""
+    policy = (
+        f"default-src 'none'; {allowed}style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
+    )
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{esc(title)}</title><style>{CSS}</style></head><body><main>{body}</main></body></html>\n"
+        f"<title>{esc(title)}</title><style>{CSS}</style></head><body><main>{body}</main>"
+        + (f"<script>{script}</script>" if script else "")
+        + "</body></html>\n"
     )

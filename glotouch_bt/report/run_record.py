@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 TREE_TOPICS = "/tree/"
 """Beginning of the topics of status changes and blackboard writes."""
-RECORD_NAME, RESULT_NAME, TRUTH_NAME = "run.mcap", "result.json", "truth.json"
+RECORD_NAME, RESULT_NAME, TRUTH_NAME, FILM_NAME = "run.mcap", "result.json", "truth.json", "film.json"
 ALL_TOPICS = (EVENT_PREFIX, "/packed/", TREE_TOPICS)
 """Beginnings of the topics that a reader needs for everything that a record holds; the others are drawings of it."""
 _PACKED = {"/packed/samples": "samples", "/packed/cycles": "cycles", "/packed/tactile": "tactile"}
@@ -86,6 +86,8 @@ class RunRecord:
         tactile: stamp_s and arrived_s (f,), left_m and right_m (f, rows, cols).
         events, ticks, ports: In the order of the record.
         complete: The record was closed properly.
+        film: Rendered moments (film.json) as they are, or None.
+        objects: Folder of the STL files of its objects, if it is not the recorded one.
     """
 
     path: Path
@@ -99,6 +101,8 @@ class RunRecord:
     ticks: list[Tick] = field(default_factory=list)
     ports: list[PortWrite] = field(default_factory=list)
     complete: bool = False
+    film: Any = None
+    objects: Path | None = None
 
     def of_kind(self, *kinds: str) -> list[RecordedEvent]:
         """Return the events of these kinds."""
@@ -174,7 +178,7 @@ def read_run(path: str | Path) -> RunRecord:
     folder = record.path.parent
     result = _json_file(folder / RESULT_NAME)
     record.result = result if isinstance(result, dict) and result else record.result
-    record.truth = _json_file(folder / TRUTH_NAME)
+    record.truth, record.film = _json_file(folder / TRUTH_NAME), _json_file(folder / FILM_NAME)
     return record
 
 
@@ -198,7 +202,7 @@ class RecordReader:
     def __init__(self, path: str | Path, *, growing: bool = False, topics: tuple[str, ...] = ALL_TOPICS) -> None:
         path = Path(path)
         if path.is_dir():
-            require_plain(path, (RECORD_NAME, RESULT_NAME, TRUTH_NAME))
+            require_plain(path, (RECORD_NAME, RESULT_NAME, TRUTH_NAME, FILM_NAME))
         file = path / RECORD_NAME if path.is_dir() else path
         if not file.is_file():
             raise BadInput(f"{path}: no run here ({RECORD_NAME} is missing)")

@@ -29,7 +29,9 @@ h3 small{font-weight:400;color:var(--soft);margin-left:8px}
 .facts{color:var(--soft);margin:0}
 .facts b{color:var(--ink);font-weight:600}
 .facts span{margin-right:20px;white-space:nowrap}
-.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(106px,1fr));gap:10px;margin-top:18px}
+.results{margin:12px 0 0;padding-left:20px;font-size:15.5px}
+.results li{margin:2px 0}
+.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(122px,1fr));gap:10px;margin-top:18px}
 .tile{border:1px solid var(--line);border-radius:9px;padding:10px 13px}
 .tile b{display:block;font-size:21px;font-weight:600;line-height:1.25;font-variant-numeric:tabular-nums}
 .tile span{color:var(--soft);font-size:12.5px}
@@ -79,6 +81,8 @@ figure img{width:50px;height:87px;image-rendering:pixelated;border-radius:3px;ba
 figcaption{font-size:11.5px;line-height:1.35;color:var(--soft);margin-top:4px;font-variant-numeric:tabular-nums}
 figcaption b{color:var(--ink);font-weight:600}
 figure.off{opacity:.55}
+.film{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,230px),1fr));gap:12px}
+.film img{width:100%;height:auto;image-rendering:auto;border-radius:7px}
 .bar{height:10px;border-radius:5px;width:220px;display:inline-block;vertical-align:middle;margin:0 8px}
 .sparks{display:grid;grid-template-columns:repeat(auto-fill,minmax(150px,1fr));gap:10px 14px;margin-top:10px}
 .sparks figcaption{margin-top:0}
@@ -93,6 +97,7 @@ summary{cursor:pointer;color:var(--soft);font-size:13.5px}
 .k-jaw{background:var(--t1);height:4px!important;vertical-align:middle!important}
 .k-good{background:var(--good)}
 .k-bad{background:var(--bad)}
+.k-warn{background:var(--warn)}
 .k-idle{background:var(--idle)}
 .k-t0{background:var(--t0)}
 .k-t1{background:var(--t1)}
@@ -100,6 +105,49 @@ summary{cursor:pointer;color:var(--soft);font-size:13.5px}
 .k-t3{background:var(--t3)}
 .k-t4{background:var(--t4)}
 .k-t5{background:var(--t5)}
+.tree{font-size:13.5px;line-height:1.3}
+.tree details{margin:0}
+.tree summary,.leaf{display:grid;grid-template-columns:minmax(0,1.35fr) minmax(0,1fr);gap:12px;align-items:center;
+  padding:2px 0;border-bottom:1px solid var(--grid);color:inherit;font-size:inherit;list-style:none}
+.tree svg{height:10px;background:var(--grid);border-radius:2px}
+.node{padding-left:calc(min(14px,1.6vw)*var(--d));overflow-wrap:anywhere}
+.node b{display:inline-block;width:1.2em}
+.node small{color:var(--soft)}
+summary .node>span::after{content:" ▸";color:var(--soft)}
+details[open]>summary>.node>span::after{content:" ▾"}
+.node.good b{color:var(--good)}
+.node.bad{color:var(--bad)}
+.node.warn b{color:var(--warn)}
+.node.idle{color:var(--idle)}
+.stage{position:relative;border-radius:10px;overflow:hidden;background:linear-gradient(#dfe7f0,#f7f8fa)}
+#scene{display:block;width:100%;height:min(62vh,560px);touch-action:pan-y;cursor:grab}
+#scene-names{position:absolute;inset:0;pointer-events:none;overflow:hidden}
+#scene-names span{position:absolute;transform:translate(-50%,-100%);background:#ffffffd9;color:#14181f;font-size:12px;
+  font-weight:600;border-radius:5px;padding:0 6px;white-space:nowrap}
+.over-scene{position:absolute;left:12px;top:8px;color:#14181f;font-variant-numeric:tabular-nums}
+.over-scene b{color:#14181f;font-size:17px;margin-right:10px}
+.no-gl{display:none;position:absolute;inset:0;margin:0;place-items:center;color:#5a6472}
+#scene-box.none .no-gl{display:grid}
+.strip{height:44px;margin:8px 0 0}
+.play{display:flex;gap:12px;align-items:end}
+.play div{flex:1;min-width:0}
+.play input{width:100%;margin:0}
+.play button,.play select,.boxes select{font:inherit;font-size:13.5px;padding:3px 10px;border-radius:7px;
+  border:1px solid var(--line);background:var(--card);color:var(--ink)}
+.boxes{display:flex;flex-wrap:wrap;gap:6px 18px;margin-top:8px;color:var(--soft);font-size:13.5px}
 footer{color:var(--soft);font-size:12.5px;padding:4px 6px}
+@media(max-width:640px){
+  main{padding:10px 8px 30px}
+  header,section{padding:16px 14px}
+  h1{font-size:22px}
+  .facts span{margin-right:12px;white-space:normal}
+  .wide{overflow-x:auto}
+  .wide>svg{min-width:680px}
+  .sparks .wide>svg{min-width:0}
+  svg text{font-size:14px}
+  .tiles{grid-template-columns:repeat(2,minmax(0,1fr))}
+  #scene{height:78vw}
+  .play{gap:8px}
+}
 @media print{body{background:#fff}section,header{break-inside:avoid;border-color:#ccc}}
 """

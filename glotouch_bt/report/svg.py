@@ -86,5 +86,9 @@ def y_axis(scale: AxisScale, left: float, right: float, title: str, about: int =
 
 
 def picture(width: float, height: float, body: str, title: str) -> str:
-    """Return an SVG element as wide as its column; `title` (escaped already) is for screen readers."""
-    return f'<svg viewBox="0 0 {width:.0f} {height:.0f}" role="img" aria-label="{title}">{body}</svg>'
+    """Return a picture as wide as its column; a narrow page scrolls it.
+
+    `title` (escaped already) is for screen readers.
+    """
+    drawn = f'<svg viewBox="0 0 {width:.0f} {height:.0f}" role="img" aria-label="{title}">{body}</svg>'
+    return f'<div class="wide">{drawn}</div>'

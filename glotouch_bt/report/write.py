@@ -7,17 +7,22 @@ from pathlib import Path
 
 from glotouch_bt.report.page import esc, page, section
 from glotouch_bt.report.run_record import RunRecord, read_run
-from glotouch_bt.report.sections import SECTIONS, verdict
-from glotouch_bt.robot import BadInput
+from glotouch_bt.report.scene import script
+from glotouch_bt.report.sections import SCENE_ID, SECTIONS, verdict
+from glotouch_bt.robot import BadInput, GlotouchError
 from glotouch_bt.untrusted import require_plain, write_file
 
 REPORT_NAME = "report.html"
 
 
-def write_report(run_dir: Path) -> Path:
+def write_report(run_dir: Path, objects: Path | None = None) -> Path:
     """Write report.html into a run's folder from run.mcap, result.json and, if present, truth.json.
 
     Sections without data are left out. The file is written atomically.
+
+    Args:
+        run_dir: The run's folder.
+        objects: Folder of the STL files of its objects, if they are not shipped.
 
     Returns:
         The file written.
@@ -27,7 +32,9 @@ def write_report(run_dir: Path) -> Path:
     """
     require_plain(run_dir, (REPORT_NAME, f".{REPORT_NAME}.part"))
     target = run_dir / REPORT_NAME
-    text = render(read_run(run_dir))
+    record = read_run(run_dir)
+    record.objects = objects
+    text = render(record)
     try:
         write_file(target, text.encode("utf-8", "backslashreplace"))
     except OSError as e:
@@ -39,12 +46,13 @@ def render(record: RunRecord) -> str:
     """Return the report's HTML."""
     sections = [_section(title, make, record) for title, make in SECTIONS]
     mission = record.result.get("mission") or record.run.get("mission") or "run"
-    return page(f"{mission} · {verdict(record)[1]}", "".join(sections))
+    body = "".join(sections)
+    return page(f"{mission} · {verdict(record)[1]}", body, script() if SCENE_ID in body else "")
 
 
 def _section(title: str, make: Callable[[RunRecord], str], record: RunRecord) -> str:
     """Return one section; data that cannot be read (of another version) cost only this section."""
     try:
         return make(record)
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as e:
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, GlotouchError) as e:
         return section(title, f"This part of the record could not be read ({esc(type(e).__name__)}: {esc(e)}).", "")

@@ -39,7 +39,7 @@ from glotouch_bt.robot.geometry import (
     quat_to_matrix,
     rpy_to_matrix,
 )
-from glotouch_bt.robot.interface import Backend, Robot, Snapshot
+from glotouch_bt.robot.interface import Backend, Picture, Robot, Snapshot
 from glotouch_bt.robot.limits import Limits
 from glotouch_bt.robot.observation import SAMPLED, GripperState, Observation, TactileFrame
 from glotouch_bt.robot.registry import backend_entry_points, load_backend

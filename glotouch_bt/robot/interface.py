@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Self
+
+import numpy as np
+import numpy.typing as npt
 
 from glotouch_bt.errors import BackendError
 from glotouch_bt.robot.command import Command, Request, Ticket
@@ -16,6 +19,8 @@ from glotouch_bt.robot.simulation import Disturber, Referee, TouchSampler
 
 Snapshot = Mapping[str, object]
 """Plain values, arrays, tuples, mappings, random generators and dataclasses, as a checkpoint can encode them."""
+Picture = npt.NDArray[np.uint8]
+"""A picture (height, width, 3), RGB."""
 
 
 class Robot(ABC):
@@ -126,6 +131,14 @@ class Backend(ABC):
 
     def disturber(self, robot: Robot) -> Disturber | None:
         """Return the interface through which faults change `robot`'s world; None on hardware."""
+        return None
+
+    def camera(self, robot: Robot) -> Callable[[int, int], Picture] | None:
+        """Return a function that takes pictures of `robot`'s world, for a person to look at; None without a camera.
+
+        It takes width and height in pixels and returns (height, width, 3) RGB. It raises `BackendError` where pictures
+        cannot be drawn. Skills have no access to it.
+        """
         return None
 
     def touch_sampler(self, world: World, conditions: Conditions, seed: int) -> TouchSampler | None:

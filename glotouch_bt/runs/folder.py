@@ -12,10 +12,11 @@ from pathlib import Path
 
 from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile
 from glotouch_bt.mission.record import MCAP_MAGIC
+from glotouch_bt.report import FILM_NAME as FILM
 from glotouch_bt.robot import BadInput, GlotouchError
 from glotouch_bt.untrusted import read_json, read_start, require_plain, write_file
 
-FILES = ("mission.yaml", "run.mcap", "result.json", "truth.json", "report.html", CHECKPOINT_FILE)
+FILES = ("mission.yaml", "run.mcap", "result.json", "truth.json", "report.html", FILM, CHECKPOINT_FILE)
 LEFT_BY_SQLITE = (f"{CHECKPOINT_FILE}-wal", f"{CHECKPOINT_FILE}-shm")
 PARTS = tuple(f".{name}.part" for name in FILES)
 """Names of files that are being written; a killed process leaves one."""

@@ -216,7 +216,7 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
                 unwritten += _errors_of(lambda: folder.write_json("truth.json", truths))
             if not unwritten:  # a run killed before this can be resumed
                 unwritten = _errors_of(lambda: store.note("ended", outcome.status))
-    report, warning = _report(folder.path) if request.report else (None, "")
+    report, warning = _report(folder.path, mission.world.objects.folder) if request.report else (None, "")
     if seen is not None and seen.silent_axes and outcome.status != "aborted":
         raise BackendError(
             f"conditions {', '.join(seen.silent_axes)} altered nothing in this run ({folder.path}): "
@@ -238,11 +238,11 @@ def _errors_of(write: Callable[[], None]) -> list[str]:
     return []
 
 
-def _report(folder: Path) -> tuple[Path | None, str]:
+def _report(folder: Path, objects: Path) -> tuple[Path | None, str]:
     """Return the report's path, or a warning if it could not be made."""
     from glotouch_bt.report import write_report
 
     try:
-        return write_report(folder), ""
+        return write_report(folder, objects), ""
     except (Exception, KeyboardInterrupt) as e:
         return None, f"the report could not be made ({type(e).__name__}: {e}); `glotouch report {folder}` tries again"

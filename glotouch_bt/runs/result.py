@@ -96,6 +96,7 @@ def score(request: RunRequest, mission: Mission, outcome: Outcome, seen: FinalTr
         "target": target,
         "retrieved": retrieved,
         "correct": correct,
+        "results": found.results,
         "ranking": found.ranking,
         "calibration": found.calibration,
         "candidates": found.candidates,
@@ -107,6 +108,7 @@ def score(request: RunRequest, mission: Mission, outcome: Outcome, seen: FinalTr
         "ticks": outcome.ticks,
         "probe_path_m": round(found.probe_path_m, 6),
         "peak_force_N": round(float(peak), 6),
+        "true_peak_force_N": None if seen is None else round(float(seen.peak_force_N), 6),
         "sensed_peak_force_N": round(found.peak_force_N, 6),
         # without paths of this machine
         "parameters": {k: _stem(str(v)) if k in mission.stl_parameters else v for k, v in mission.parameters.items()},

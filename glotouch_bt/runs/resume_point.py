@@ -195,7 +195,7 @@ def _find_resumable(
     settings: Mapping[str, str],
     objects: Path | None,
 ) -> ResumableRun:
-    run, rows, notes = _stored(file), file.rows(), list[str]()
+    run, rows, notes = stored_run(file), file.rows(), list[str]()
     request = run["request"]
     if not rows:
         raise BadInput(f"{folder}: was interrupted before its first checkpoint; run it again")
@@ -215,7 +215,7 @@ def _find_resumable(
             f"{folder}: this run was made with --objects {request['objects']!r}, and a run's folder names no paths: "
             f"give it again: glotouch resume {folder} --objects DIR"
         )
-    mission = _mission(folder, run, objects)
+    mission = mission_of_run(folder, run, objects)
     fixed = [name for name in settings if name in mission.parameters]
     if fixed:
         raise BadInput(f"--set {fixed[0]}: is a parameter of the mission; a resumed run keeps its parameters")
@@ -229,7 +229,7 @@ def _find_resumable(
     return ResumableRun(folder, file, chosen, mission, path, leads, conditions, request, before, notes)
 
 
-def _stored(file: CheckpointFile) -> dict[str, Any]:
+def stored_run(file: CheckpointFile) -> dict[str, Any]:
     """Return the description of a run from its checkpoint file.
 
     Raises:
@@ -246,7 +246,7 @@ def _stored(file: CheckpointFile) -> dict[str, Any]:
     return run
 
 
-def _mission(folder: Path, run: Mapping[str, Any], objects: Path | None) -> Mission:
+def mission_of_run(folder: Path, run: Mapping[str, Any], objects: Path | None) -> Mission:
     """Load the mission of the run from its folder; if that file has changed, a shipped one of that name."""
     request = run["request"]
     problems: list[str] = []

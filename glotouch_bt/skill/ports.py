@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Generic, Self, TypeVar, cast, overload
 
 if TYPE_CHECKING:
@@ -67,6 +68,7 @@ class Out(Port[T]):
     """An output port: written as an attribute. `always=True` promises that it is written even if the skill fails.
 
     `on_success`, `on_failure`: its value after that outcome, if it is always the same; `glotouch check` relies on it.
+    `result`: the value in words; makes it a result of the mission, in result.json, in the terminal and in the report.
     """
 
     def __init__(
@@ -79,9 +81,14 @@ class Out(Port[T]):
         always: bool = False,
         on_success: T | None = None,
         on_failure: T | None = None,
+        result: Callable[[T], str] | None = None,
     ) -> None:
         super().__init__(data_type, description, key=key, element=element)
-        self.always, self.on_success, self.on_failure = always, on_success, on_failure
+        self.always, self.on_success, self.on_failure, self.result = always, on_success, on_failure, result
 
     def __set__(self, obj: Skill, value: T) -> None:
         obj.write_port(self.name, value)
+
+    def in_words(self, skill: Skill) -> str:
+        """Return the value that a skill has written in the words of `result`; nothing without one."""
+        return "" if self.result is None else self.result(cast(T, self._value(skill)))

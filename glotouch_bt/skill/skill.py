@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal
 
@@ -86,6 +86,7 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
     MAX_DURATION_S: ClassVar[float] = 900.0
 
     _failures: ClassVar[Mapping[str, Failure]] = NOTHING
+    _results: ClassVar[tuple[Out[Any], ...]] = ()
     Params: ClassVar[type[SkillParams]] = SkillParams
     INPUT_PORTS: ClassVar[dict[str, PortInformation]] = {}
     OUTPUT_PORTS: ClassVar[dict[str, PortInformation]] = {}
@@ -102,6 +103,7 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
         cls.OUTPUT_PORTS = {
             n: PortInformation(p.data_type, description=p.description) for n, p in ports.items() if isinstance(p, Out)
         }
+        cls._results = tuple(p for p in ports.values() if isinstance(p, Out) and p.result is not None)
         kwargs.setdefault("register", False)
         super().__init_subclass__(**kwargs)
 
@@ -129,6 +131,10 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
     def event(self, kind: str, **data: object) -> None:
         """Record an event of this skill at the present robot time."""
         self.context.journal.event(kind, self.context.observation.now_s, {"node": self.name, **data})
+
+    def report(self, title: str, text: str, head: Sequence[str] = (), rows: Sequence[Sequence[object]] = ()) -> None:
+        """Add a section to the report of the run: a paragraph, and a table of `rows` under the titles `head`."""
+        self.event("report", title=title, text=text, head=head, rows=rows)
 
     def remember(self) -> object:
         """Return the state that this skill keeps between runs beyond its ports, for a checkpoint, or None.
@@ -160,6 +166,8 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
         for name in self.OUTPUT_PORTS:
             if not self.blackboard_client.exists(name):
                 raise TypeError(f"run() ended without writing the output {name!r}: write `self.{name} = ...`")
+        for port in self._results:
+            self.event("result", key=port.key, text=port.in_words(self))
 
     def update_ahead(self) -> Status:
         """Update before the tree is ticked, and return the result; the next `update` returns it again."""

@@ -10,16 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from glotouch_bt.report import TRUTH_NAME
+from glotouch_bt.report.state import Player, RunModel, planned_nodes, read_setup, true_bodies
 from glotouch_bt.robot import BadInput
 from glotouch_bt.untrusted import read_json
 from glotouch_bt.view.follow import RecordFollower
 from glotouch_bt.view.page import AT_END, AT_START, MissionControls, Page
-from glotouch_bt.view.state import Player, RunModel, planned_nodes, read_setup, true_bodies
 
 if TYPE_CHECKING:
     import viser
 
-    from glotouch_bt.view.state import GhostObject
+    from glotouch_bt.report.state import GhostObject
 
 FRAME_S = 0.05
 """Wall time between two drawings. Source: ours; 20 a second look fluid; one costs 4 ms, while something moves."""

@@ -16,6 +16,13 @@ from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, pa
 from glotouch_skills.common.planning import TOO_LOW, GraspPlan, load_target, load_target_model, plan_grasp
 
 
+def in_words(ranking: Ranking) -> str:
+    """Return which candidate is the target."""
+    best = ranking.best
+    share = "" if math.isnan(best.probability) else f" with a probability of {100 * best.probability:.1f} %"
+    return f"candidate {best.index} is the target{share}"
+
+
 class MatchParams(SkillParams):
     """Parameters of `match`."""
 
@@ -54,7 +61,7 @@ class MatchTarget(Skill):
         tuple, "all candidates, to say which were not squeezed", key="candidates", element=Candidate, required=False
     )
     rejected = In(tuple, "indices of candidates that are not the target", required=False)
-    ranking = Out(Ranking, "all candidates, best first")
+    ranking = Out(Ranking, "all candidates, best first", result=in_words)
     plan = Out(GraspPlan, "how to grasp the best one")
 
     def run(self) -> SkillRun:

@@ -57,7 +57,7 @@ class Lift(Skill):
 
     grip_m = In(float, "aperture of the closed jaws")
     held_m = Out(float, "aperture at the top", key="grip_m")
-    weight_N = Out(float, "weight in the hand, N", key="weight")
+    weight_N = Out(float, "weight in the hand, N", key="weight", result=lambda w: f"weight in the hand {w:.2f} N")
 
     def run(self) -> SkillRun:
         """See the class."""

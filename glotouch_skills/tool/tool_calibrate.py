@@ -48,6 +48,15 @@ RATE_HZ = 1000.0
 """Interpolate the samples to this rate, since some may be missing."""
 
 
+def in_words(tool: HeldTool) -> str:
+    """Return the measured values of the probe in words."""
+    x, y = 1e3 * tool.tip_P_m[:2]
+    text = f"ball of the probe at ({x:.2f}, {y:.2f}) mm from the axis of the hand"
+    if tool.compliance_P_m_N is not None:
+        text += ", compliance {:.2f}, {:.2f} mm/N along x_P, y_P".format(*(1e3 * tool.compliance_P_m_N))
+    return f"{text}, wrist force {1e3 * tool.latency_s:.1f} ms late"
+
+
 class ToolCalibrateParams(SkillParams):
     """Parameters of `tool_calibrate`.
 
@@ -107,7 +116,7 @@ class ToolCalibrate(Skill):
     )
 
     before = In(HeldTool, "the probe in the jaws", key="tool")
-    tool = Out(HeldTool, "the probe, measured")
+    tool = Out(HeldTool, "the probe, measured", result=in_words)
 
     def run(self) -> SkillRun:
         """See the class."""
@@ -136,6 +145,14 @@ class ToolCalibrate(Skill):
             raise MotionRefused("calibration", "the hand cannot be turned at that corner")
         found = solve_tip(touches, given.tip_radius_m, touch_sd_m=TOUCH_SD_M, late_sd_s=latency_sd)
         self.tool = self._measured(listening, found, presses)
+        walls = corner_walls(world)
+        self.report(
+            "Calibration of the probe",
+            f"{len(touches)} touches of two walls; one place of the ball in the hand explains them to within the "
+            "residuals.",
+            ("touch", "wall", "residual, mm"),
+            [(i + 1, walls[t.wall], f"{1e3 * found.residuals_m[i]:.3f}") for i, t in enumerate(touches)],
+        )
 
     def _enter(self, tool: HeldTool, place: Array) -> Motion[None]:
         """Move to just above the floor of the corner, from anywhere."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from glotouch_backends.rizon4 import RIZON4_XENSE
 from tests.support.made_run import INTERIOR_M, OBJECTS, POSE_B_K, WANTED, Made, make_run
 
 
@@ -20,5 +20,5 @@ def writer() -> SimpleNamespace:
 @pytest.fixture(scope="session")
 def whole(tmp_path_factory: pytest.TempPathFactory, writer: SimpleNamespace) -> Made:
     """One run from start to end, made once."""
-    make: Callable[[Path], Made] = writer.make_run
-    return make(tmp_path_factory.mktemp("run"))
+    make: Callable[..., Made] = writer.make_run
+    return make(tmp_path_factory.mktemp("run"), description=RIZON4_XENSE)

@@ -9,7 +9,7 @@ import pytest
 from py_trees.common import Status
 
 from glotouch_bt.robot import HOLD, MotionRefused
-from glotouch_bt.skill import Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill import Out, Skill, SkillFailed, SkillParams, SkillRun, param
 
 
 class GoParams(SkillParams):
@@ -105,3 +105,27 @@ def test_not_at_rest(bench) -> None:
             break
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "not_at_rest")
     assert b.context.preempted
+
+
+class Weigh(Skill):
+    """Write a result, and a section of the report."""
+
+    Params = GoParams
+    weight_N = Out(float, "the weight", result=lambda w: f"weighs {w:.1f} N")
+    other = Out(float, "no result", on_failure=1.0)
+
+    def run(self) -> SkillRun:
+        self.report("Weighing", "on the scales", ("reading", "N"), [(1, 2.5)])
+        self.weight_N, self.other = 2.5, 1.0
+        if self.params.end == "fail":
+            raise SkillFailed("told_to", "the test says so")
+        yield HOLD
+
+
+def test_a_result_is_recorded_in_words_when_the_skill_succeeds(bench) -> None:
+    b = bench()
+    b.run(b.make(Weigh, end="fail"))
+    assert b.of_kind("result") == []
+    b.run(b.make(Weigh))
+    assert [dict(e) for e in b.of_kind("result")] == [{"node": "skill", "key": "weight_N", "text": "weighs 2.5 N"}]
+    assert b.of_kind("report")[-1]["rows"] == [(1, 2.5)]

@@ -11,6 +11,7 @@ import numpy as np
 from glotouch_bt.mission.record.recorder import Recorder
 from glotouch_bt.perception.touch.values import Candidate, Contact, Contour, Layer, TouchSequence, TouchSet
 from glotouch_bt.robot import HOLD, Command, GripperState, GripperTarget, JointSetpoint, Observation, Pose, TactileFrame
+from glotouch_bt.robot.description import RobotDescription
 
 TIP_M = 0.130
 POSE_B_K = Pose.planar([0.60, 0.02, -0.20], 0.1)
@@ -96,8 +97,8 @@ def depth(rng: np.random.Generator, bow: float, deep_m: float) -> np.ndarray:
     return d
 
 
-def make_run(folder: Path, *, until: str = "end", seed: int = 5) -> Made:
-    """Write run.mcap, result.json and truth.json. `until`: opened | sweep | end."""
+def make_run(folder: Path, *, until: str = "end", seed: int = 5, description: RobotDescription | None = None) -> Made:
+    """Write run.mcap, result.json and truth.json. `until`: opened | sweep | end; `description`: of the robot."""
     rng = np.random.default_rng(seed)
     folder.mkdir(parents=True, exist_ok=True)
     run = {
@@ -108,6 +109,7 @@ def make_run(folder: Path, *, until: str = "end", seed: int = 5) -> Made:
         "parameters": {"target": OBJECTS[WANTED][0], "expected_objects": 5},
         "container": {"pose_B_K": POSE_B_K, "interior_m": INTERIOR_M},
         "probe": {"grasp_to_tip_m": TIP_M},
+        "robot": {"description": description},
     }
     record = Recorder(folder / "run.mcap", run)
     made = Made(folder, [], [], [], 0)
@@ -127,6 +129,11 @@ def make_run(folder: Path, *, until: str = "end", seed: int = 5) -> Made:
     clock.aperture = 0.016
     record.event("tool", clock.now_s, {"node": "tool_pickup", "held": True, "grasp_to_tip_m": TIP_M})
     record.event("calibration", clock.now_s, {"node": "tool_calibrate", "compliance_P_m_N": [0.00163, 0.00073]})
+    for text in ("an older value", "compliance <1.63>, 0.73 mm/N"):
+        record.event("result", clock.now_s, {"node": "tool_calibrate", "key": "tool", "text": text})
+    rows = [[1, "wall <x>", 0.0113], [2, "wall y", -0.25]]
+    head = {"title": "Touches & walls", "text": "two <walls>", "head": ["touch", "wall", "mm"], "rows": rows}
+    record.event("report", clock.now_s, {"node": "tool_calibrate", **head})
     tick("retrieve/tool_pickup", "SUCCESS")
     tick("retrieve/explore", "RUNNING")
     z = 0.030
@@ -213,6 +220,8 @@ def make_run(folder: Path, *, until: str = "end", seed: int = 5) -> Made:
         "wall_time_s": 9.75,
         "probe_path_m": 6.283,
         "peak_force_N": 12.34,
+        "true_peak_force_N": 12.34,
+        "sensed_peak_force_N": 11.87,
         "versions": {"glotouch": "0.1"},
     }
     record.close(result)

@@ -156,8 +156,12 @@ def _handles(model: mujoco.MjModel, description: RobotDescription, objects: int)
 def _dress(spec: mujoco.MjSpec, floor_z_m: float) -> None:
     """Add what only a camera sees: light, sky and the arm's pedestal."""
     spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1080
-    spec.visual.headlight.ambient = (0.35, 0.35, 0.35)
-    spec.worldbody.add_light(pos=(0.3, -0.8, 1.6), dir=(0.2, 0.6, -1.0))
+    spec.visual.headlight.ambient, spec.visual.headlight.diffuse = (0.42,) * 3, (0.30,) * 3
+    spec.visual.quality.shadowsize, spec.visual.map.shadowclip = 4096, 1.6
+    spec.worldbody.add_light(
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, pos=(0.0, -0.5, 1.0), dir=(0.5, 0.45, -1.0), diffuse=(0.55,) * 3,
+        specular=(0.15,) * 3,
+    )  # fmt: skip
     spec.add_texture(
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,

@@ -61,6 +61,10 @@ class TolerantStream:
                 os.close(nowhere)
 
 
+RESET = "\x1b[0m"
+"""Ends all styles. colorama, which a dependency imports, writes just this when the program ends; it does no harm."""
+
+
 class EscapedStream:
     """A text stream that shows control characters instead of sending them. All but writing is the inner stream's own.
 
@@ -81,7 +85,7 @@ class EscapedStream:
 
     def write(self, text: str) -> int:
         """Write text; show control characters as escapes."""
-        self.styled.write(visible(text))
+        self.styled.write(text if text == RESET else visible(text))
         return len(text)
 
     def __getattr__(self, name: str) -> Any:

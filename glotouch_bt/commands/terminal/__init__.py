@@ -14,7 +14,7 @@ from glotouch_bt.commands.terminal.bench_tables import (
 from glotouch_bt.commands.terminal.campaign_progress import CampaignProgress
 from glotouch_bt.commands.terminal.console import (
     EscapingConsole,
-    RunProgress,
+    print_error,
     print_settings,
     print_skill,
     print_skills,
@@ -24,4 +24,5 @@ from glotouch_bt.commands.terminal.fault_tables import print_exhaustive, print_f
 from glotouch_bt.commands.terminal.findings import print_findings, texts_of
 from glotouch_bt.commands.terminal.force_tables import print_forces
 from glotouch_bt.commands.terminal.object_tables import print_objects
+from glotouch_bt.commands.terminal.progress import RunProgress
 from glotouch_bt.commands.terminal.run_end import print_end

@@ -1,28 +1,20 @@
-"""Errors, progress and result of a run, tables, skills."""
+"""Errors and result of a run, tables, skills."""
 
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
-from rich.live import Live
 from rich.markup import escape
 from rich.segment import Segment
 from rich.table import Table
-from rich.text import Text
 
 from glotouch_bt.escaped_text import visible
 
 if TYPE_CHECKING:
-    from glotouch_bt.mission import Mission
-    from glotouch_bt.mission.record import RunSummary
     from glotouch_bt.runs import RunResult
-
-REFRESH_S = 0.1
 
 
 class EscapingConsole(Console):
@@ -39,92 +31,46 @@ def print_error(message: str) -> None:
     sys.stderr.write(f"glotouch: {message}\n")
 
 
-class RunProgress:
-    """Progress on stderr: a live line on a terminal, plain lines elsewhere. Use as a context manager."""
-
-    def __init__(self, quiet: bool) -> None:
-        self._console = EscapingConsole(stderr=True)
-        self._quiet = quiet
-        self._live: Live | None = None
-        self._shown_s = 0.0
-        self._last_node = ""
-
-    def __enter__(self) -> RunProgress:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        if self._live is not None:
-            self._live.stop()
-
-    def start(self, mission: Mission, folder: Path) -> None:
-        """Print the mission and its folder; call when the backend is open."""
-        if self._quiet:
-            return
-        self._console.print(f"[bold]{escape(mission.name)}[/] in {escape(mission.world.name)} -> {escape(str(folder))}")
-        if self._console.is_terminal:
-            # Other writers are not redirected: rich would execute their escape sequences.
-            self._live = Live(
-                console=self._console, auto_refresh=False, transient=True, redirect_stdout=False, redirect_stderr=False
-            )
-            self._live.start()
-
-    def update(self, robot_s: float, summary: RunSummary) -> None:
-        """Show the running node and the counts."""
-        if self._quiet:
-            return
-        node = summary.node.rsplit("/", 1)[-1]
-        line = (
-            f"t = {robot_s:6.1f} s  {node:<14} contacts {summary.contacts:3d}  candidates {len(summary.candidates):2d}"
-        )
-        if summary.last_event[1] in ("pause", "paused"):
-            line += "  PAUSED (p continues)" if summary.last_event[1] == "paused" else "  pausing"
-        else:
-            line += f"  last: {summary.last_event[1]}" if summary.last_event[1] else ""
-        now = time.perf_counter()
-        if self._live is not None:
-            if now - self._shown_s >= REFRESH_S:
-                self._shown_s = now
-                self._live.update(Text(line), refresh=True)
-        elif node != self._last_node:
-            self._last_node = node
-            self._console.print(line, markup=False, highlight=False)
-
-
 def print_result(done: RunResult) -> None:
-    """Print the end of a run: the retrieved object or the reasons, the faults, the path of the report."""
+    """Print the end of a run: the reasons, the faults, the path of the report, and last the results."""
     console = EscapingConsole()
     r = done.result
+
+    def plain(text: str) -> None:
+        console.print(text, markup=False, highlight=False, soft_wrap=True)
+
     head = {"success": "[bold green]done[/]", "failure": "[bold red]failed[/]"}.get(
         str(r["status"]), "[bold red]aborted[/]"
     )
     speed = r["sim_time_s"] / r["wall_time_s"] if r["wall_time_s"] else 0.0
+    true = r.get("true_peak_force_N")
     console.print(
         f"{head}  {escape(str(r['mission']))}, seed {r['seed']}: {r['sim_time_s']:.1f} s of robot time in "
-        f"{r['wall_time_s']:.1f} s ({speed:.0f}x), peak force {r['peak_force_N']:.1f} N",
+        f"{r['wall_time_s']:.1f} s ({speed:.0f}x), peak force {r['sensed_peak_force_N']:.1f} N felt"
+        + ("" if true is None else f", {true:.1f} N true"),
         highlight=False,
         soft_wrap=True,
     )
+    for i, reason in enumerate(r["reasons"]):
+        plain(f"{'  ' * i}{'because ' if i else ''}{reason}")
+    if r.get("ending"):
+        plain(str(r["ending"]))
+    if r.get("unscored"):
+        plain(f"not scored: {r['unscored']}")
+    for fault in r.get("faults", ()):
+        plain(_fault_in_words(fault))
+    plain(f"record: {done.folder}" if done.report is None else f"report: {done.report}")
+    for result in (r.get("results") or {}).values():
+        plain(f"result: {result['text']}")
     expected = r["parameters"].get("expected_objects")
     if expected is not None:
         found = len(r["candidates"])
         colour = "green" if found == expected else "yellow"
-        console.print(f"objects found: [{colour}]{found} of {expected}[/] expected", highlight=False)
+        console.print(f"result: objects found: [{colour}]{found} of {expected}[/] expected", highlight=False)
     if r["correct"] is not None:
         held = r["retrieved"] or "nothing"
         word = "[green]the target[/]" if r["correct"] else f"[red]not the target ({escape(str(r['target']))})[/]"
-        console.print(f"in the gripper: [bold]{escape(str(held))}[/], {word}", highlight=False)
-    for i, reason in enumerate(r["reasons"]):
-        console.print(f"{'  ' * i}{'because ' if i else ''}{reason}", markup=False, highlight=False, soft_wrap=True)
-    if r.get("ending"):
-        console.print(str(r["ending"]), markup=False, highlight=False, soft_wrap=True)
-    if r.get("unscored"):
-        console.print(f"not scored: {r['unscored']}", markup=False, highlight=False, soft_wrap=True)
-    for fault in r.get("faults", ()):
-        console.print(_fault_in_words(fault), markup=False, highlight=False, soft_wrap=True)
-    if done.report is not None:
-        console.print(f"report: {done.report}", markup=False, highlight=False, soft_wrap=True)
-    else:
-        console.print(f"record: {done.folder}", markup=False, highlight=False, soft_wrap=True)
+        console.print(f"result: in the gripper: [bold]{escape(str(held))}[/], {word}", highlight=False)
 
 
 def _fault_in_words(fault: Mapping[str, Any]) -> str:

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import base64
 import re
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
+from glotouch_bt.mission.record.mcap_robot import LinkFrames
 from glotouch_bt.robot import Array
 
 Stamps = npt.NDArray[np.int64]
@@ -22,21 +23,28 @@ _PLACE, _TURN = '{"x":%.6f,"y":%.6f,"z":%.6f}', '{"x":%.7f,"y":%.7f,"z":%.7f,"w"
 
 def _rows(template: str, stamps_ns: Stamps, *columns: npt.ArrayLike) -> list[bytes]:
     """Fill `template` once per row: sec and nsec first, then the columns side by side."""
-    if len(stamps_ns) == 0:
+    return _filled(template, [stamps_ns // 10**9, stamps_ns % 10**9, *columns])
+
+
+def _filled(template: str, blocks: Sequence[npt.ArrayLike]) -> list[bytes]:
+    """Fill `template` once per row of the columns side by side."""
+    rows = len(np.asarray(blocks[0]))
+    if rows == 0:
         return []
-    blocks: list[Any] = [stamps_ns // 10**9, stamps_ns % 10**9, *columns]
-    table = np.column_stack([np.asarray(b, dtype=np.float64).reshape(len(stamps_ns), -1) for b in blocks])
-    text = "\n".join([template] * len(stamps_ns)) % tuple(table.ravel().tolist())
+    table = np.column_stack([np.asarray(b, dtype=np.float64).reshape(rows, -1) for b in blocks])
+    text = "\n".join([template] * rows) % tuple(table.ravel().tolist())
     if not np.isfinite(table).all():
         text = _NOT_FINITE.sub("null", text)
     return text.encode().split(b"\n")
 
 
 def wrench(stamps_ns: Stamps, wrench_S: Array) -> list[bytes]:
-    """Return glotouch.Wrench of `wrench_S` (n, 6): force N, torque Nm."""
+    """Return glotouch.Wrench of `wrench_S` (n, 6): force N, torque Nm, and the magnitude of the force."""
     xyz = '{"x":%.4f,"y":%.4f,"z":%.4f}'
     tail = '{"x":%.5f,"y":%.5f,"z":%.5f}'
-    return _rows(f'{{"timestamp":{_TIME},"frame_id":"S","force":{xyz},"torque":{tail}}}', stamps_ns, wrench_S)
+    norm = np.sqrt((wrench_S[:, :3] ** 2).sum(axis=1))
+    template = f'{{"timestamp":{_TIME},"frame_id":"S","force":{xyz},"torque":{tail},"force_N":%.4f}}'
+    return _rows(template, stamps_ns, wrench_S, norm)
 
 
 def pose(stamps_ns: Stamps, position_B_P: Array, quat_B_P: Array) -> list[bytes]:
@@ -45,11 +53,11 @@ def pose(stamps_ns: Stamps, position_B_P: Array, quat_B_P: Array) -> list[bytes]
     return _rows(template, stamps_ns, position_B_P, quat_B_P[:, [1, 2, 3, 0]])
 
 
-def transforms(stamps_ns: Stamps, position_B_P: Array, quat_B_P: Array) -> list[bytes]:
-    """Return foxglove.FrameTransforms of P in B: (n, 3) m and (n, 4) w x y z."""
-    head = f'{{"transforms":[{{"timestamp":{_TIME},"parent_frame_id":"B","child_frame_id":"P",'
-    template = f'{head}"translation":{_PLACE},"rotation":{_TURN}}}]}}'
-    return _rows(template, stamps_ns, position_B_P, quat_B_P[:, [1, 2, 3, 0]])
+def transforms(
+    stamps_ns: Stamps, frames: LinkFrames, position_B_P: Array, quat_B_P: Array, q: Array, aperture_m: Array
+) -> list[bytes]:
+    """Return foxglove.FrameTransforms of all frames of the robot; see `LinkFrames.columns`."""
+    return _filled(frames.template, frames.columns(stamps_ns, position_B_P, quat_B_P, q, aperture_m))
 
 
 def joints(stamps_ns: Stamps, q: Array, dq: Array) -> list[bytes]:

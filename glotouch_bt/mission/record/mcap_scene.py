@@ -1,53 +1,59 @@
-"""The 3D view of a record: the container, contacts and contours (foxglove.SceneUpdate, /tf).
+"""The 3D view of a record: the container, contacts and contours (foxglove.SceneUpdate), in frame K.
 
-Everything is drawn in frame K; the run description's `pose_B_K` places K in B.
+A viewer that jumps to a time gets the last message of each topic: what never changes is one message of its own topic.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
+import numpy as np
+
 from glotouch_bt.mission.record.mcap_json import Json, dumps
+from glotouch_bt.robot import GlotouchError, Pose
 
 Message = tuple[str, bytes]
 _EMPTY = ("arrows", "cubes", "spheres", "cylinders", "lines", "triangles", "texts", "models", "metadata")
-_WALL = {"r": 0.45, "g": 0.48, "b": 0.52, "a": 0.35}
-_CONTACT = {"r": 0.86, "g": 0.25, "b": 0.16, "a": 1.0}
-_CONTOUR = {"r": 0.10, "g": 0.40, "b": 0.78, "a": 1.0}
+Json3D = dict[str, Any]
+"""Primitives of a foxglove.SceneEntity, or one of them."""
 
 
-def container_scene(run: dict[str, Json]) -> Iterator[Message]:
-    """Yield the transform of K and the container's walls, if the run description has pose_B_K and interior_m."""
+def colour(r: float, g: float, b: float, a: float = 1.0) -> Json3D:
+    """Return a foxglove.Color."""
+    return {"r": r, "g": g, "b": b, "a": a}
+
+
+_WALL, _CONTACT, _CONTOUR = colour(0.78, 0.72, 0.62, 0.35), colour(0.86, 0.25, 0.16), colour(0.10, 0.40, 0.78)
+
+
+def world_scene(run: dict[str, Json], robot: Iterable[tuple[str, Json3D]]) -> Iterator[Message]:
+    """Yield one message with the robot's parts, by frame, and the container's walls, if the run describes them."""
+    entities = [_entity(0, f"robot {frame}", frame, **parts) for frame, parts in robot]
     container = run.get("container")
-    inside = container if isinstance(container, dict) else run
-    pose = run.get("pose_B_K", inside.get("pose_B_K"))
-    interior = inside.get("interior_m", run.get("interior_m"))
+    interior = container.get("interior_m") if isinstance(container, dict) else run.get("interior_m")
     try:
-        if isinstance(pose, dict):
-            position, quat = _floats(pose["position_m"], 3), _floats(pose["quat"], 4)
-            transform = {
-                "timestamp": _time(0),
-                "parent_frame_id": "B",
-                "child_frame_id": "K",
-                "translation": _xyz(position),
-                "rotation": {"x": quat[1], "y": quat[2], "z": quat[3], "w": quat[0]},
-            }
-            yield "/tf", dumps({"transforms": [transform]})
-        if interior is not None:
-            x, y, z = _floats(interior, 3)
-            t = 0.002
-            walls = [
-                _cube((0, 0, -t / 2), (x, y, t)),
-                _cube((x / 2 + t / 2, 0, z / 2), (t, y, z)),
-                _cube((-x / 2 - t / 2, 0, z / 2), (t, y, z)),
-                _cube((0, y / 2 + t / 2, z / 2), (x, t, z)),
-                _cube((0, -y / 2 - t / 2, z / 2), (x, t, z)),
-            ]
-            yield _entity(0, "container", cubes=walls)
+        x, y, z = _floats(interior, 3)
+        t = 0.002
+        boxes = [((0.0, 0.0, -t / 2), (x, y, t))]
+        boxes += [((s * (x + t) / 2, 0.0, z / 2), (t, y, z)) for s in (1, -1)]
+        boxes += [((0.0, s * (y + t) / 2, z / 2), (x, t, z)) for s in (1, -1)]
+        entities.append(_entity(0, "container", cubes=[cube(at, size, _WALL) for at, size in boxes]))
     except (KeyError, TypeError, ValueError):
-        return  # without usable numbers there is nothing to draw; run.json holds them as given
+        pass  # without usable numbers there is nothing to draw; run.json holds them as given
+    if entities:
+        yield "/scene/world", dumps({"deletions": [], "entities": entities})
+
+
+def registered_container(run: dict[str, Json]) -> Pose | None:
+    """Return the pose of K in B, if the run description has it."""
+    container: Any = run.get("container")
+    pose: Any = run.get("pose_B_K", container.get("pose_B_K") if isinstance(container, dict) else None)
+    try:
+        return Pose(np.array(_floats(pose["position_m"], 3)), np.array(_floats(pose["quat"], 4)))
+    except (KeyError, TypeError, ValueError, GlotouchError):
+        return None
 
 
 def event_scene(kind: str, stamp_ns: int, data: Json) -> Iterator[Message]:
@@ -58,18 +64,14 @@ def event_scene(kind: str, stamp_ns: int, data: Json) -> Iterator[Message]:
         if kind == "contact":
             contact: Any = data["contact"]
             tip, point = _floats(contact["tip_K_m"], 3), _floats(contact["point_K_m"], 2)
-            sphere = {
-                "pose": _pose((point[0], point[1], tip[2])),
-                "size": {"x": 0.004, "y": 0.004, "z": 0.004},
-                "color": _CONTACT,
-            }
-            yield _entity(stamp_ns, f"contact {stamp_ns}", spheres=[sphere])
+            ball = sphere((point[0], point[1], tip[2]), 0.002, _CONTACT)
+            yield _update(_entity(stamp_ns, f"contact {stamp_ns}", spheres=[ball]))
         elif kind == "candidate":
             candidate: Any = data["candidate"]
             outline, height = _outline(candidate["contour"]), float(candidate["height_m"])
             line = {
                 "type": 0,
-                "pose": _pose((0, 0, 0)),
+                "pose": pose_json((0, 0, 0)),
                 "thickness": 2.0,
                 "scale_invariant": True,
                 "points": [_xyz((x, y, height)) for x, y in outline],
@@ -79,14 +81,14 @@ def event_scene(kind: str, stamp_ns: int, data: Json) -> Iterator[Message]:
             }
             centre = _floats(candidate["contour"]["centre_K_m"], 2)
             text = {
-                "pose": _pose((centre[0], centre[1], height + 0.02)),
+                "pose": pose_json((centre[0], centre[1], height + 0.02)),
                 "billboard": True,
                 "font_size": 14.0,
                 "scale_invariant": True,
                 "color": _CONTOUR,
                 "text": f"candidate {candidate['index']}",
             }
-            yield _entity(stamp_ns, f"candidate {candidate['index']}", lines=[line], texts=[text])
+            yield _update(_entity(stamp_ns, f"candidate {candidate['index']}", lines=[line], texts=[text]))
     except (AttributeError, KeyError, TypeError, ValueError):
         return  # an event of another shape is recorded but not drawn
 
@@ -124,22 +126,26 @@ def _xyz(p: tuple[float, ...]) -> dict[str, float]:
     return {"x": p[0], "y": p[1], "z": p[2]}
 
 
-def _pose(p: tuple[float, ...]) -> dict[str, object]:
-    return {"position": _xyz(p), "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+def pose_json(p: tuple[float, ...], quat: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)) -> Json3D:
+    """Return a foxglove.Pose of a position and a rotation w x y z."""
+    w, x, y, z = quat
+    return {"position": _xyz(p), "orientation": {"x": x, "y": y, "z": z, "w": w}}
 
 
-def _cube(centre: tuple[float, ...], size: tuple[float, ...]) -> dict[str, object]:
-    return {"pose": _pose(centre), "size": _xyz(size), "color": _WALL}
+def cube(centre: tuple[float, ...], size: tuple[float, ...], shade: Json3D) -> Json3D:
+    """Return a foxglove.CubePrimitive."""
+    return {"pose": pose_json(centre), "size": _xyz(size), "color": shade}
 
 
-def _entity(stamp_ns: int, name: str, **parts: object) -> Message:
-    entity = {
-        "timestamp": _time(stamp_ns),
-        "frame_id": "K",
-        "id": name,
-        "lifetime": _time(0),
-        "frame_locked": True,
-        **{key: [] for key in _EMPTY},
-        **parts,
-    }
+def sphere(centre: tuple[float, ...], radius: float, shade: Json3D) -> Json3D:
+    """Return a foxglove.SpherePrimitive."""
+    return {"pose": pose_json(centre), "size": _xyz((2.0 * radius,) * 3), "color": shade}
+
+
+def _entity(stamp_ns: int, name: str, frame: str = "K", **parts: object) -> Json3D:
+    fixed = {"timestamp": _time(stamp_ns), "frame_id": frame, "id": name, "lifetime": _time(0), "frame_locked": True}
+    return fixed | {key: [] for key in _EMPTY} | parts
+
+
+def _update(entity: Json3D) -> Message:
     return "/scene", dumps({"deletions": [], "entities": [entity]})

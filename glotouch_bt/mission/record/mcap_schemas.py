@@ -32,11 +32,19 @@ _POSE = _object(position=_VECTOR3, orientation=_QUATERNION) | {"title": "foxglov
 _COLOR = _object(r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER) | {"title": "foxglove.Color"}
 
 SCHEMAS: dict[str, dict[str, object]] = {
-    "glotouch.Wrench": _object(timestamp=_TIME, frame_id=_STRING, force=_VECTOR3, torque=_VECTOR3),
+    "glotouch.Wrench": _object(timestamp=_TIME, frame_id=_STRING, force=_VECTOR3, torque=_VECTOR3, force_N=_NUMBER),
     "glotouch.Gripper": _object(timestamp=_TIME, aperture_m=_NUMBER, force_N=_NUMBER, moving=_NUMBER),
     "glotouch.Tick": _object(timestamp=_TIME, node=_STRING, old=_STRING, new=_STRING),
     "glotouch.Event": _object(timestamp=_TIME, kind=_STRING, data=_object()),
     "glotouch.Port": _object(timestamp=_TIME, key=_STRING, value=_ANY),
+    "foxglove.Log": _object(
+        timestamp=_TIME,
+        level={"type": "integer"},
+        message=_STRING,
+        name=_STRING,
+        file=_STRING,
+        line={"type": "integer"},
+    ),
     "foxglove.PoseInFrame": _object(timestamp=_TIME, frame_id=_STRING, pose=_POSE),
     "foxglove.FrameTransforms": _object(
         transforms=_array(
@@ -74,7 +82,9 @@ SCHEMAS: dict[str, dict[str, object]] = {
                 arrows=_array(_object()),
                 cubes=_array(_object(pose=_POSE, size=_VECTOR3, color=_COLOR)),
                 spheres=_array(_object(pose=_POSE, size=_VECTOR3, color=_COLOR)),
-                cylinders=_array(_object()),
+                cylinders=_array(
+                    _object(pose=_POSE, size=_VECTOR3, bottom_scale=_NUMBER, top_scale=_NUMBER, color=_COLOR)
+                ),
                 lines=_array(
                     _object(
                         type={"type": "integer"},
@@ -115,6 +125,8 @@ CHANNELS: Mapping[str, str] = {
     "/tree/ticks": "glotouch.Tick",
     "/tree/ports": "glotouch.Port",
     "/scene": "foxglove.SceneUpdate",
+    "/scene/world": "foxglove.SceneUpdate",
+    "/log": "foxglove.Log",
     "/packed/samples": PACKED_NAME,
     "/packed/cycles": PACKED_NAME,
     "/packed/tactile": PACKED_NAME,

@@ -18,10 +18,12 @@ import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from glotouch_bt.mission.record import mcap_plots as plots
+from glotouch_bt.mission.record.event_words import HIDDEN_EVENTS, event_tone, event_words
 from glotouch_bt.mission.record.mcap_chunks import RecordChunk
 from glotouch_bt.mission.record.mcap_json import dumps, to_json
 from glotouch_bt.mission.record.mcap_packing import Column, pack
-from glotouch_bt.mission.record.mcap_scene import container_scene, event_scene
+from glotouch_bt.mission.record.mcap_robot import LinkFrames, robot_shapes
+from glotouch_bt.mission.record.mcap_scene import event_scene, registered_container, world_scene
 from glotouch_bt.mission.record.mcap_schemas import EVENT_PREFIX, schema_of
 from glotouch_bt.mission.record.rounding import (
     APERTURE_M,
@@ -35,7 +37,7 @@ from glotouch_bt.mission.record.rounding import (
     STAMP_S,
     TORQUE_NM,
 )
-from glotouch_bt.robot import BadInput, Command, GlotouchError, Observation
+from glotouch_bt.robot import BadInput, Command, GlotouchError, Observation, RobotDescription
 from glotouch_bt.untrusted import create_file
 from glotouch_bt.version import __version__
 
@@ -43,6 +45,8 @@ RUN_ATTACHMENT = "run.json"
 RESULT_ATTACHMENT = "result.json"
 PLOT_EVERY_CYCLES = 2
 IMAGE_EVERY_S = 0.1
+LOG_LEVELS = {"": 2, "good": 2, "warn": 3, "bad": 4}
+"""Levels of foxglove.Log: 2 info, 3 warning, 4 error."""
 
 
 class Recorder:
@@ -84,7 +88,12 @@ class Recorder:
         self._writer.add_attachment(0, 0, RUN_ATTACHMENT, "application/json", dumps(plain))
         flat = {k: v if isinstance(v, str) else dumps(v).decode() for k, v in plain.items()}
         self._writer.add_metadata("run", flat)
-        for topic, message in container_scene(plain):
+        robot: Any = run.get("robot")
+        described = robot.get("description") if isinstance(robot, Mapping) else None
+        description = described if isinstance(described, RobotDescription) else None
+        container = registered_container(plain)
+        self._frames = LinkFrames(description, {} if container is None else {"K": container})
+        for topic, message in world_scene(plain, () if description is None else robot_shapes(description)):
             self._put(0, topic, message)
         self._file.flush()
 
@@ -104,6 +113,14 @@ class Recorder:
         """Record an event of a skill, on the channel /events/<kind>."""
         plain = to_json(data)
         self._message(stamp_s, EVENT_PREFIX + kind, {"kind": kind, "data": plain})
+        if kind not in HIDDEN_EVENTS and isinstance(plain, dict):
+            level = LOG_LEVELS[event_tone(kind)]
+            said = {
+                "level": level,
+                "message": f"{kind}: {event_words(kind, plain)}",
+                "name": str(plain.get("node", "")),
+            }
+            self._message(stamp_s, "/log", {**said, "file": "", "line": 0})
         for topic, message in event_scene(kind, _ns(stamp_s), plain):
             self._put(_ns(stamp_s), topic, message)
 
@@ -235,8 +252,11 @@ class Recorder:
         ns = np.rint(stamp_s[pick] * 1e9).astype(np.int64)
         self._put_rows("/wrench", ns, plots.wrench(ns, wrench[pick]))
         self._put_rows("/pose", ns, plots.pose(ns, position[pick], quat[pick]))
-        self._put_rows("/tf", ns[::2], plots.transforms(ns[::2], position[pick[::2]], quat[pick[::2]]))
-        self._put_rows("/joints", ns[::2], plots.joints(ns[::2], q[pick[::2]], dq[pick[::2]]))
+        few, jaws = pick[::2], np.array([o.gripper.aperture_m for o in observations])
+        jaws = jaws[(-self._cycles) % PLOT_EVERY_CYCLES :: PLOT_EVERY_CYCLES][::2]
+        frames = plots.transforms(ns[::2], self._frames, position[few], quat[few], q[few], jaws)
+        self._put_rows("/tf", ns[::2], frames)
+        self._put_rows("/joints", ns[::2], plots.joints(ns[::2], q[few], dq[few]))
 
     def _encode_cycles(self, observations: list[Observation], commands: list[Command]) -> None:
         """Write the data of each cycle: the jaws and the command."""

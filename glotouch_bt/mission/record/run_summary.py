@@ -59,6 +59,8 @@ class RunSummary:
         candidates: Data of each candidate, without its contacts.
         ranking: Data of the last ranking event, or None.
         calibration: Data of the last calibration of the probe, or None.
+        best: The candidate with the highest probability and that probability; (-1, 0) before the first decision.
+        results: The outputs that skills declare as results, by key: {text, node}; the last of each.
         last_event: (robot time, kind) of the last event.
         node: Path of the last leaf that started.
         peak_force_N: Largest norm of the sensed wrist force.
@@ -71,6 +73,8 @@ class RunSummary:
         self.candidates: list[Json] = []
         self.ranking: Json = None
         self.calibration: Json = None
+        self.best: tuple[int, float] = (-1, 0.0)
+        self.results: dict[str, Json] = {}
         self.last_event: tuple[float, str] = (0.0, "")
         self.node = ""
         self.peak_force_N = 0.0
@@ -128,12 +132,17 @@ class RunSummary:
         """Forward, and store what the result needs."""
         self._record.event(kind, stamp_s, data)
         self.last_event = (stamp_s, kind)
+        shares = data.get("probability")
+        if isinstance(shares, Mapping) and shares:
+            self.best = max(((int(i), float(p)) for i, p in shares.items()), key=lambda share: share[1])
         if kind == "contact":
             self.contacts += 1
         elif kind == "candidate":
             self._store(_candidate(to_json(data.get("candidate", data))))
         elif kind == "ranking":
             self.ranking = to_json(data.get("ranking", data), summarise=True)
+        elif kind == "result":
+            self.results[str(data["key"])] = to_json({k: v for k, v in data.items() if k != "key"})
         elif kind == "calibration":
             self.calibration = to_json({k: v for k, v in data.items() if k in CALIBRATED})
         elif kind == "tool":

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from glotouch_bt.report.page import esc, section, short_text, table
+from glotouch_bt.mission.record import short_text
+from glotouch_bt.report.page import esc, section, table
 from glotouch_bt.report.run_record import RunRecord
 
 

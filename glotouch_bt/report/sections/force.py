@@ -57,7 +57,7 @@ def force_section(record: RunRecord) -> str:
     if contacts:
         body += _close_ups(stamp, record.samples["force_S_N"], contacts)
     lead = (
-        "The wrist force over the whole run, relative to the last tare. Each dot is a contact stop. "
+        "The force felt at the wrist over the whole run, relative to the last tare. Each dot is a contact stop. "
         "The chart below shows the opening of the jaws."
     )
     return section("Force", lead, body)
@@ -90,7 +90,7 @@ def _trace(record: RunRecord, stamp: Array, force: Array, contacts: list[Recorde
                 f'stroke="var(--card)"><title>contact at {at:.2f} s: {felt:.2f} N</title></circle>'
             )
     out.append(f'<circle cx="{peak_x:.1f}" cy="{peak_y:.1f}" r="3" fill="none" stroke="var(--ink)"/>')
-    out.append(label(peak_x + shift, peak_y - 5, f"peak {force[peak]:.1f} N", f"ink s halo {anchor}".strip()))
+    out.append(label(peak_x + shift, peak_y - 5, f"felt peak {force[peak]:.1f} N", f"ink s halo {anchor}".strip()))
     height = bottom + 34
     cycles = record.cycles
     if len(cycles.get("stamp_s", ())) > 1:

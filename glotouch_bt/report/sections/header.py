@@ -36,8 +36,16 @@ def header_section(record: RunRecord) -> str:
     return (
         f'<header class="{tone}"><p class="over">GLoTouch run report · {over}</p>'
         f'<h1 class="verdict">{esc(sentence)}</h1>'
-        f'<p class="facts">{"".join(facts)}</p><div class="tiles">{tiles}</div></header>'
+        f'<p class="facts">{"".join(facts)}</p>{_results(record)}<div class="tiles">{tiles}</div></header>'
     )
+
+
+def _results(record: RunRecord) -> str:
+    """Return the results that skills declare, in the order of their outputs' first writing."""
+    found: dict[str, str] = {}
+    for e in record.of_kind("result"):
+        found[str(e.data.get("key"))] = f"<li>{esc(e.data.get('text') or '')}</li>"
+    return f'<ul class="results">{"".join(found.values())}</ul>' if found else ""
 
 
 def _numbers(record: RunRecord) -> list[tuple[str, str]]:
@@ -53,7 +61,8 @@ def _numbers(record: RunRecord) -> list[tuple[str, str]]:
             out.append(("times real time", number(sim_s / wall_s, 1) + "×"))
     found = candidates(record)
     expected = _parameter(record, "expected_objects")
-    out.append(("objects found", f"{len(found)}" + (f" of {esc(expected)}" if isinstance(expected, int) else "")))
+    if found or isinstance(expected, int):
+        out.append(("objects found", f"{len(found)}" + (f" of {esc(expected)}" if isinstance(expected, int) else "")))
     contacts = len(record.of_kind("contact"))
     if contacts:
         out.append(("contacts", str(contacts)))
@@ -63,25 +72,14 @@ def _numbers(record: RunRecord) -> list[tuple[str, str]]:
     )
     if closures:
         out.append(("jaw closures", str(closures)))
-    peak = r.get("peak_force_N")
-    if not _real(peak) and len(record.samples.get("stamp_s", ())):
-        peak = float(np.nan_to_num(np.linalg.norm(record.samples["force_S_N"], axis=1)).max())
-    out.append(("peak force", number(peak, 1, "N")))
+    felt = r.get("sensed_peak_force_N")
+    if not _real(felt) and len(record.samples.get("stamp_s", ())):
+        felt = float(np.nan_to_num(np.linalg.norm(record.samples["force_S_N"], axis=1)).max())
+    out.append(("peak force felt at the wrist", number(felt, 1, "N")))
+    out.append(("true peak force (simulation)", number(r.get("true_peak_force_N"), 1, "N")))
     if _real(r.get("probe_path_m")):
         out.append(("probe path", number(r["probe_path_m"], 2, "m")))
-    if any("grasp_to_tip_m" in e.data for e in record.of_kind("tool")):
-        out.append(("compliance of the probe along x_P, y_P", _compliance(record)))
     return [(k, v) for k, v in out if v != "–"]
-
-
-def _compliance(record: RunRecord) -> str:
-    """Return the last measured compliance of the probe."""
-    found = record.of_kind("calibration")
-    measured = found[-1].data.get("compliance_P_m_N") if found else None
-    if not (isinstance(measured, list) and len(measured) == 2 and all(map(_real, measured))):
-        return "not measured"
-    x, y = (number(1e3 * value, 2) for value in measured)
-    return f"{x}, {y} mm/N"
 
 
 def _real(value: object) -> bool:
@@ -94,7 +92,7 @@ def _clock(value: Any) -> str:
     if value < 120:
         return number(value, 1, "s")
     minutes, seconds = divmod(round(value), 60)
-    return f"{minutes} min {seconds:02d} s"
+    return f"{minutes}:{seconds:02d} min"
 
 
 def verdict(record: RunRecord) -> tuple[str, str]:

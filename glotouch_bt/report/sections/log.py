@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from glotouch_bt.report.page import esc, number, section, short_text, table
+from glotouch_bt.mission.record import short_text
+from glotouch_bt.report.page import esc, number, section, table
 from glotouch_bt.report.run_record import RunRecord
 
-_SHOWN_ELSEWHERE = {"contact", "candidate", "sweep", "touchset", "ranking"}
+_SHOWN_ELSEWHERE = {"result", "report", "contact", "candidate", "sweep", "touchset", "ranking"}
 MAX_LINES = 200
 """Lines shown."""
 

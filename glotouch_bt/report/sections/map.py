@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from glotouch_bt.perception.touch import Contour
+from glotouch_bt.report.contours import contour_of
 from glotouch_bt.report.page import esc, legend, number, section, table
 from glotouch_bt.report.run_record import RunRecord
 from glotouch_bt.report.sections.force import contact_of
@@ -29,32 +29,6 @@ def candidates(record: RunRecord) -> list[dict[str, Any]]:
     return [found[i] for i in sorted(found)]
 
 
-def contour_of(candidate: dict[str, Any]) -> Contour | None:
-    """Return the contour of a recorded candidate, or None if it is invalid."""
-    c: Any = candidate.get("contour")
-    try:
-        return Contour(
-            kind=c["kind"],
-            centre_K_m=np.asarray(c["centre_K_m"], float),
-            size_m=(float(c["size_m"][0]), float(c["size_m"][1])),
-            yaw_rad=float(c["yaw_rad"]),
-            rms_m=float(c["rms_m"] or 0.0),
-            residuals_m=np.asarray(c.get("residuals_m") or [], float),
-            family=c.get("family"),
-            boundary_K_m=_corners(c) if c.get("family") == "free" else np.zeros((0, 2)),
-        )
-    except (KeyError, TypeError, ValueError, IndexError):
-        return None
-
-
-def _corners(contour: dict[str, Any]) -> Array:
-    """Return the corners (n, 2) of a recorded free outline; raise ValueError if they are invalid."""
-    corners = np.asarray(contour["boundary_K_m"], float)
-    if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3 or not np.isfinite(corners).all():
-        raise ValueError("not the corners of an outline")
-    return corners
-
-
 def tip_path_K_m(record: RunRecord) -> Array:
     """Return the path (n, 3) of the probe's ball in K while it was held; NaN rows are gaps; (0, 3) if unknown."""
     nothing = np.zeros((0, 3))
@@ -74,9 +48,9 @@ def tip_path_K_m(record: RunRecord) -> Array:
 
 
 def map_section(record: RunRecord) -> str:
-    """Return the map and the table of candidates, or nothing if the container is unknown."""
+    """Return the map and the table of candidates; nothing without a container, or if the mission explored nothing."""
     interior = record.interior_m
-    if interior is None:
+    if interior is None or not record.of_kind("sweep", "candidate", "touchset"):
         return ""
     truth = true_outlines(record)
     found = candidates(record)

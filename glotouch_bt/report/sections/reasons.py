@@ -25,7 +25,8 @@ def reasons_section(record: RunRecord) -> str:
         return ""
     items = []
     for reason in chain:
-        node = f"<code>{esc(reason['node'])}</code> " if reason.get("node") else ""
+        path = str(reason.get("node") or "")
+        node = f'<code title="{esc(path)}">{esc(path.rsplit("/", 1)[-1])}</code> ' if path else ""
         code = f'<span class="chip idle">{esc(reason["code"])}</span> ' if reason.get("code") else ""
         found = reason.get("evidence")
         evidence = ", ".join(

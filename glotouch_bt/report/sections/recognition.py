@@ -154,7 +154,9 @@ def _table(
         placed = "–"
         if isinstance(pose, list) and len(pose) == 3 and all(isinstance(v, int | float) for v in pose):
             degrees = number(math.degrees(pose[2]), 0)
-            placed = f"{number(pose[0], 0, scale=1e3)}, {number(pose[1], 0, 'mm', 1e3)}, {degrees}°"
+            placed = (
+                f"{number(pose[0], 0, scale=1e3)}, {number(pose[1], 0, 'mm', 1e3)}, {degrees}°{_side(m.get('quat'))}"
+            )
         terms = m.get("terms") or {}
         index = f"<b>{esc(m.get('index', '?'))}</b>" + (
             ' <span class="chip good">taken</span>' if accepted and not i else ""
@@ -168,4 +170,12 @@ def _table(
                 placed,
             ]
         )
-    return f"<h3>{title}</h3>" + table(["candidate", score, *map(esc, names), "evidence", "pose x, y, yaw"], rows)
+    return f"<h3>{title}</h3>" + table(["candidate", score, *map(esc, names), "evidence", "pose x, y, yaw, side"], rows)
+
+
+def _side(quat: Any) -> str:
+    """Return the side on which the target is taken to stand, by the turn from that of its file."""
+    if not (isinstance(quat, list) and len(quat) == 4 and all(isinstance(v, int | float) for v in quat)):
+        return ""
+    turn = math.degrees(2.0 * math.acos(min(abs(quat[0]), 1.0)))
+    return ", as in its file" if turn < 1.0 else f", turned over by {number(turn, 0)}°"

@@ -8,8 +8,8 @@ import numpy as np
 
 from glotouch_bt.escaped_text import html_text
 from glotouch_bt.report import AxisScale, points, tick_text
+from glotouch_bt.report.state import LogLine, RunModel
 from glotouch_bt.robot import Array
-from glotouch_bt.view.state import LogLine, RunModel
 
 WIDTH, LEFT, RIGHT = 340.0, 30.0, 334.0
 WINDOW_S = 30.0

@@ -6,21 +6,27 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from glotouch_bt.report.state import GhostObject, Player, RunModel, SceneState
 from glotouch_bt.robot import GlotouchError
 from glotouch_bt.view.page import charts, panels
 from glotouch_bt.view.page.scene import SceneDrawing
-from glotouch_bt.view.state import GhostObject, Player, RunModel, SceneState
 
 if TYPE_CHECKING:
     import viser
 
-    from glotouch_bt.view.state import RunSetup
+    from glotouch_bt.report.state import RunSetup
 
 LEFT_PX, RIGHT_PX = 316, 372
 """Widths of the panels. Source: ours; at 1400 pixels they leave half of the width to the scene."""
 SPEEDS = ("0.5×", "1×", "2×", "5×", "10×")
 BACK, ON, LIVE, FAILED_BEFORE, FAILED_NEXT = "−5 s", "+5 s", "end", "◀ failure", "failure ▶"
-LAYERS = {"touches": "contacts", "outlines": "candidates", "patches": "felt patches", "grasp": "planned grasp"}
+LAYERS = {
+    "touches": "contacts",
+    "outlines": "candidates",
+    "patches": "felt patches",
+    "grasp": "planned grasp",
+    "fit": "target as recognised",
+}
 HIDDEN, AT_START, AT_END = "hidden", "at the start", "at the end"
 SLIDER_STEP_S = 0.01
 UNDRAWABLE = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, GlotouchError)

@@ -9,9 +9,9 @@ import numpy as np
 
 from glotouch_bt.escaped_text import html_text as esc
 from glotouch_bt.report import depth_png
+from glotouch_bt.report.scene import STATE_COLOURS
+from glotouch_bt.report.state import LogLine, SceneState, tree_rows
 from glotouch_bt.robot import Array
-from glotouch_bt.view.page.scene import STATE_COLOURS
-from glotouch_bt.view.state import LogLine, SceneState, tree_rows
 
 INK, SOFT, IDLE, LINE = "#14181f", "#5a6472", "#98a1ad", "#dfe3e8"
 TONES = {"": INK, "good": "#16834a", "warn": "#a86400", "bad": "#c5352b"}

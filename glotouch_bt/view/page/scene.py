@@ -7,48 +7,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import trimesh
 
-from glotouch_bt.robot import Array, Container, Holder, Pose, Probe, RobotDescription
-from glotouch_bt.view.page import robot_shapes as shapes
-from glotouch_bt.view.state import (
+from glotouch_bt.report.scene import shapes
+from glotouch_bt.report.state import (
     CandidateOutline,
     FeltPatch,
+    FittedTarget,
     GhostObject,
-    OutlineState,
     PlannedGrasp,
     SceneState,
     felt_points_P,
 )
+from glotouch_bt.robot import Array, Pose, RobotDescription
 
 if TYPE_CHECKING:
     import viser
 
-    from glotouch_bt.view.state import RunSetup
+    from glotouch_bt.report.state import RunSetup
 
 Colour = shapes.Colour
-STATE_COLOURS: dict[OutlineState, Colour] = {
-    "found": (37, 103, 201),
-    "best": (22, 131, 74),
-    "excluded": (98, 106, 118),
-    "rejected": (197, 53, 43),
-    "taken": (138, 85, 199),
-}
-"""Colour of a candidate by its state; the page's words have the same colours."""
-TOUCH: Colour = (206, 30, 12)
-PLAN: Colour = (200, 20, 140)
-GHOST: Colour = (0, 158, 190)
-FLOOR: Colour = (222, 210, 190)
-WALL: Colour = (200, 184, 158)
-TABLE: Colour = (243, 244, 246)
-TOUCH_RADIUS_M = 0.0028
-"""Radius of a contact's ball. Source: ours, for drawing only."""
-REACTION_M = 0.014
-"""Length of the line along the force of a contact. Source: ours, for drawing only."""
-SDS = 2.0
-"""Half width of an outline's band in standard deviations: 95 % of a normal distribution."""
-MIN_BAND_M = 0.0004
-"""Smallest half width of a band, so that it can be seen. Source: ours, for drawing only."""
-MIN_HEIGHT_M = 0.004
-"""Smallest height of a prism. Source: ours, for drawing only."""
 DEEP_M = 1e-3
 """Indentation with the brightest colour of a patch. Source: ours; the gel of the shipped gripper is 1.5 mm deep."""
 
@@ -72,7 +48,7 @@ class SceneDrawing:
         self._fingers: dict[str, Any] = {}
         self._probe: list[Any] = []
         self._ghost_bodies: tuple[GhostObject, ...] = ()
-        self.shown = {"touches": True, "outlines": True, "patches": True, "grasp": True}
+        self.shown = {"touches": True, "outlines": True, "patches": True, "grasp": True, "fit": True}
         scene = self._scene
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
@@ -83,7 +59,7 @@ class SceneDrawing:
             scene.add_light_directional(
                 f"/light/{name}", intensity=intensity, position=position, cast_shadow=name == "sun"
             )
-        self._draw_world(setup.container, setup.holder, setup.probe)
+        self._draw_world()
         if setup.description is not None:
             self._draw_robot(setup.description)
         self._look()
@@ -101,16 +77,17 @@ class SceneDrawing:
         self._ghost_bodies = bodies
         self._clear("ghost")
         for i, body in enumerate(bodies):
-            mesh = self._setup.meshes.get(body.name)
-            style: dict[str, Any] = {"color": GHOST, "opacity": 0.35, "side": "double", "cast_shadow": False}
-            if mesh is not None:
+            found = shapes.true_mesh(body, self._setup)
+            style: dict[str, Any] = {"color": shapes.GHOST, "opacity": 0.35, "side": "double", "cast_shadow": False}
+            if found is not None:
                 style |= {"wxyz": body.quat, "position": body.position_B_m}
-                handle = self._scene.add_mesh_simple(f"/ghost/{i}", mesh.vertices_m, mesh.faces, **style)
+                handle = self._scene.add_mesh_simple(f"/ghost/{i}", *found, **style)
             else:
                 floor = float(self._setup.pose_B_K.position_m[2])
                 closed = np.concatenate([body.outline_B_m, body.outline_B_m[:1]])
-                vertices, faces = shapes.prism(closed, 0.02)
-                handle = self._scene.add_mesh_simple(f"/ghost/{i}", vertices, faces, **style, position=(0, 0, floor))
+                handle = self._scene.add_mesh_simple(
+                    f"/ghost/{i}", *shapes.prism(closed, 0.02), **style, position=(0, 0, floor)
+                )
             centre = body.outline_B_m.mean(axis=0)
             label = self._scene.add_label(
                 f"/ghost/label{i}", f"true: {body.name}", position=(*centre, body.position_B_m[2]),
@@ -143,6 +120,8 @@ class SceneDrawing:
                 self._patches(state.patches)
             if self._changed("grasp", id(state.grasp)):
                 self._grasp(state.grasp)
+            if self._changed("fit", state.fit):
+                self._fit(state.fit)
             if self._changed("pads", None if state.pads is None else (id(state.pads), state.aperture_m)):
                 self._pads(state)
 
@@ -171,37 +150,29 @@ class SceneDrawing:
         camera.look_at = K - 0.09 * away + 0.02 * side + np.array([0.0, 0.0, 0.18])
         camera.fov = np.deg2rad(42.0)
 
-    def _draw_world(self, container: Container | None, holder: Holder | None, probe: Probe | None) -> None:
-        scene, pose = self._scene, self._setup.pose_B_K
-        wall_m = 0.008 if container is None else container.wall_m
-        table_m = float(pose.position_m[2]) - wall_m
-        middle = (0.5 * float(pose.position_m[0]), 0.5 * float(pose.position_m[1]), table_m - 0.003)
-        scene.add_box("/table", color=TABLE, dimensions=(1.5, 1.3, 0.006), position=middle, cast_shadow=False)
-        if table_m < 0.0:  # the base stands on something; its shape is not known
-            scene.add_cylinder("/pedestal", 0.09, -table_m, shapes.STAND, position=(0.0, 0.0, 0.5 * table_m))
-        scene.add_frame("/K", show_axes=False, wxyz=pose.quat, position=pose.position_m)
-        if container is not None:
-            x, y, z = container.interior_m
-            t = container.wall_m
-            scene.add_box("/K/floor", color=FLOOR, dimensions=(x + 2 * t, y + 2 * t, t), position=(0.0, 0.0, -0.5 * t))
-            for i, (centre, size) in enumerate(
-                [((s * 0.5 * (x + t), 0.0, 0.5 * z), (t, y + 2 * t, z)) for s in (1.0, -1.0)]
-                + [((0.0, s * 0.5 * (y + t), 0.5 * z), (x, t, z)) for s in (1.0, -1.0)]
-            ):
-                scene.add_box(f"/K/wall{i}", color=WALL, opacity=0.28, dimensions=size, position=centre, side="double")
-            corners = np.array([(a * x / 2, b * y / 2, z) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))])
+    def _draw_world(self) -> None:
+        scene, setup = self._scene, self._setup
+        scene.add_frame("/K", show_axes=False, wxyz=setup.pose_B_K.quat, position=setup.pose_B_K.position_m)
+        if setup.holder is not None:
+            grasp = setup.holder.pose_B_grasp
+            scene.add_frame("/stand", show_axes=False, wxyz=grasp.quat, position=grasp.position_m)
+        for solid in shapes.world_solids(setup):
+            self._solids(f"/{solid.frame}", [solid])
+        corners = shapes.rim(setup)
+        if len(corners):
             scene.add_line_segments(
                 "/K/rim", np.stack([corners[:-1], corners[1:]], axis=1), (120, 102, 78),
                 thickness=1.5, thickness_units="screen",
             )  # fmt: skip
-        if holder is not None and probe is not None:
-            grasp = holder.pose_B_grasp
-            scene.add_frame("/stand", show_axes=False, wxyz=grasp.quat, position=grasp.position_m)
-            self._solids("/stand", shapes.stand_solids(holder, probe, float(grasp.position_m[2]) - table_m))
 
     def _solids(self, above: str, solids: list[shapes.Solid]) -> None:
         for s in solids:
-            self._scene.add_mesh_simple(f"{above}/{s.name}", s.vertices_m, s.faces, color=s.colour)
+            look: dict[str, Any] = {"flat_shading": not s.smooth}
+            if s.opacity < 1.0:
+                look |= {"opacity": s.opacity, "side": "double"}
+            if s.name == "table":
+                look["cast_shadow"] = False
+            self._scene.add_mesh_simple(f"{above}/{s.name}", s.vertices_m, s.faces, color=s.colour, **look)
 
     def _draw_robot(self, description: RobotDescription) -> None:
         scene = self._scene
@@ -249,30 +220,31 @@ class SceneDrawing:
         if not state.touches:
             return
         points = np.stack([t.point_K_m for t in state.touches])
-        ends = points + REACTION_M * np.stack([t.outward_K for t in state.touches])
-        ball = trimesh.creation.icosphere(1, TOUCH_RADIUS_M)
+        ends = points + shapes.REACTION_M * np.stack([t.outward_K for t in state.touches])
+        ball = trimesh.creation.icosphere(1, shapes.TOUCH_RADIUS_M)
         self._add("touches", self._scene.add_batched_meshes_simple(
             "/K/touches", np.array(ball.vertices), np.array(ball.faces), batched_positions=points,
-            batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1)), batched_colors=TOUCH, cast_shadow=False,
+            batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1)), batched_colors=shapes.TOUCH,
+            cast_shadow=False,
         ))  # fmt: skip
         self._add("touches", self._scene.add_line_segments(
-            "/K/reactions", np.stack([points, ends], axis=1), TOUCH, thickness=2.0, thickness_units="screen",
+            "/K/reactions", np.stack([points, ends], axis=1), shapes.TOUCH, thickness=2.0, thickness_units="screen",
         ))  # fmt: skip
 
     def _outlines(self, state: SceneState) -> None:
         self._clear("outlines")
         for o in state.outlines:
-            colour = STATE_COLOURS[state.states.get(o.index, "found")]
+            colour = shapes.STATE_COLOURS[state.states.get(o.index, "found")]
             self._outline(o, colour, _percent(state, o.index), faded=state.states.get(o.index) in ("excluded", "taken"))
 
     def _outline(self, o: CandidateOutline, colour: Colour, percent: str, *, faded: bool) -> None:
-        name, height = f"/K/candidate{o.index}", max(o.height_m, MIN_HEIGHT_M)
+        name, height = f"/K/candidate{o.index}", max(o.height_m, shapes.MIN_HEIGHT_M)
         vertices, faces = shapes.prism(o.outline_K_m, height)
         self._add("outlines", self._scene.add_mesh_simple(
             f"{name}/wall", vertices, faces, color=colour, opacity=0.16 if faded else 0.30, side="double",
             cast_shadow=False, receive_shadow=False,
         ))  # fmt: skip
-        width = np.maximum(SDS * o.sd_m, MIN_BAND_M)
+        width = np.maximum(shapes.SDS * o.sd_m, shapes.MIN_BAND_M)
         vertices, faces = shapes.band(o.outline_K_m, width[:, None] * o.normal_K, height)
         self._add("outlines", self._scene.add_mesh_simple(
             f"{name}/band", vertices, faces, color=colour, opacity=0.5 if faded else 0.85, side="double",
@@ -305,6 +277,15 @@ class SceneDrawing:
                 f"{self._pads_frame}/felt", points, _heat(depth), point_size=0.0011, point_shape="circle",
             ))  # fmt: skip
 
+    def _fit(self, fit: FittedTarget | None) -> None:
+        """Draw the target's mesh where it was recognised, on the side on which it is taken to stand."""
+        self._clear("fit")
+        found = None if fit is None else shapes.fitted_mesh(fit, self._setup)
+        if found is not None:
+            self._add("fit", self._scene.add_mesh_simple(
+                "/K/fit", *found, color=shapes.FIT, opacity=0.55, cast_shadow=False, receive_shadow=False,
+            ))  # fmt: skip
+
     def _grasp(self, grasp: PlannedGrasp | None) -> None:
         """Draw the two pads of a planned grasp at its opening, and the way down."""
         self._clear("grasp")
@@ -314,14 +295,14 @@ class SceneDrawing:
         for name, side in (("left", 1.0), ("right", -1.0)):
             centre = pose.apply((0.0, side * (0.5 * grasp.opening_m + 0.004), -0.02))
             self._add("grasp", self._scene.add_box(
-                f"/K/grasp/{name}", color=PLAN, opacity=0.55, dimensions=(0.022, 0.008, 0.07), wxyz=pose.quat,
+                f"/K/grasp/{name}", color=shapes.PLAN, opacity=0.55, dimensions=(0.022, 0.008, 0.07), wxyz=pose.quat,
                 position=centre, cast_shadow=False,
             ))  # fmt: skip
         ways = [((0.0, 0.0, -0.16), (0.0, 0.0, -0.03)), *(
             ((0.0, s * 0.5 * grasp.opening_m, 0.0), (0.0, s * 0.5 * grasp.aperture_m, 0.0)) for s in (1.0, -1.0)
         )]  # fmt: skip
         self._add("grasp", self._scene.add_arrows(
-            "/K/grasp/ways", pose.apply(np.array(ways)), PLAN,
+            "/K/grasp/ways", pose.apply(np.array(ways)), shapes.PLAN,
             shaft_radius=0.0016, head_radius=0.005, head_length=0.012,
         ))  # fmt: skip
 

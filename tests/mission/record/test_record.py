@@ -175,7 +175,8 @@ def test_plots_hold_the_newest_sample_of_every_second_cycle(tmp_path: Path) -> N
     ]
     joints = json.loads(found["/joints"][0][1])["joints"]
     assert [j["name"] for j in joints] == [f"joint{k}" for k in range(1, 8)]
-    assert json.loads(found["/tf"][0][1])["transforms"][0]["child_frame_id"] == "K"
+    for _, data in found["/tf"]:  # a viewer that jumps gets one message only
+        assert {t["child_frame_id"] for t in json.loads(data)["transforms"]} == {"P", "K"}
 
 
 def test_ticks_events_ports_attachments(tmp_path: Path) -> None:
@@ -193,7 +194,8 @@ def test_ticks_events_ports_attachments(tmp_path: Path) -> None:
     port = json.loads(found["/tree/ports"][0][1])
     assert port["key"] == "candidates"
     assert port["value"][1] == {"shape": [35, 20], "min": 0.0, "max": 0.0}
-    names = {e["id"] for _, d in found["/scene"] for e in json.loads(d)["entities"]}
+    drawn = found["/scene"] + found["/scene/world"]
+    names = {e["id"] for _, d in drawn for e in json.loads(d)["entities"]}
     assert "container" in names
     assert any(n.startswith("contact") for n in names)
     with (tmp_path / "run.mcap").open("rb") as f:
@@ -215,7 +217,7 @@ def test_messages_are_in_the_order_of_time(tmp_path: Path) -> None:
     write(tmp_path / "run.mcap")
     with (tmp_path / "run.mcap").open("rb") as f:
         times = [m.log_time for m in StreamReader(f, validate_crcs=True).records if type(m).__name__ == "Message"]
-    assert times[:2] == [0, 0]  # the scene
+    assert times[0] == 0  # the scene
     batches = np.array(times)
     assert (np.diff(batches) < 0).sum() <= 3  # only a late tactile stamp may step back at a batch's start
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from glotouch_bt.view.state import Player
+from glotouch_bt.report.state import Player
 
 SPAN = (0.0, 20.0)
 

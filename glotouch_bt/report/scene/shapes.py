@@ -1,15 +1,23 @@
-"""The robot as coloured primitives in a tree of frames, from its recorded description. Pure: numbers in, meshes out."""
+"""Robot, container, stand and probe as coloured solids in a tree of frames. Pure: numbers in, meshes out."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-import trimesh
 
+from glotouch_bt.lazy import lazy_module
+from glotouch_bt.report.state import FittedTarget, GhostObject, OutlineState, RunSetup
 from glotouch_bt.robot import Array, Box, Capsule, Holder, Pose, Probe, RobotDescription, matrix_to_quat, rpy_to_matrix
+from glotouch_bt.robot.scene import standing
+
+if TYPE_CHECKING:
+    import trimesh
+else:
+    trimesh = lazy_module("trimesh")
 
 Colour = tuple[int, int, int]
 
@@ -21,6 +29,31 @@ GEL: Colour = (240, 140, 50)
 STEEL: Colour = (176, 184, 196)
 HANDLE: Colour = (38, 90, 166)
 STAND: Colour = (120, 124, 128)
+FLOOR: Colour = (222, 210, 190)
+WALL: Colour = (200, 184, 158)
+TABLE: Colour = (243, 244, 246)
+STATE_COLOURS: dict[OutlineState, Colour] = {
+    "found": (37, 103, 201),
+    "best": (22, 131, 74),
+    "excluded": (98, 106, 118),
+    "rejected": (197, 53, 43),
+    "taken": (138, 85, 199),
+}
+"""Colour of a candidate by its state; the page's words have the same colours."""
+TOUCH: Colour = (206, 30, 12)
+PLAN: Colour = (200, 20, 140)
+GHOST: Colour = (0, 158, 190)
+FIT: Colour = (22, 131, 74)
+TOUCH_RADIUS_M = 0.0028
+"""Radius of a contact's ball. Source: ours, for drawing only."""
+REACTION_M = 0.014
+"""Length of the line along the force of a contact. Source: ours, for drawing only."""
+SDS = 2.0
+"""Half width of an outline's band in standard deviations: 95 % of a normal distribution."""
+MIN_BAND_M = 0.0004
+"""Smallest half width of a band, so that it can be seen. Source: ours, for drawing only."""
+MIN_HEIGHT_M = 0.004
+"""Smallest height of a prism. Source: ours, for drawing only."""
 RING_M = 0.004
 """Height by which the ring at a joint stands out of its housing. Source: ours."""
 GEL_M = 0.002
@@ -29,13 +62,15 @@ GEL_M = 0.002
 
 @dataclass(frozen=True)
 class Solid:
-    """A coloured mesh in one frame: vertices (n, 3) m, faces (m, 3)."""
+    """A coloured mesh in one frame: vertices (n, 3) m, faces (m, 3), opacity 0..1; `smooth` if it has no edges."""
 
     frame: str
     name: str
     vertices_m: Array
     faces: npt.NDArray[np.int64]
     colour: Colour
+    opacity: float = 1.0
+    smooth: bool = False
 
 
 def joint_frames(description: RobotDescription) -> list[str]:
@@ -65,16 +100,16 @@ def finger_shift_m(aperture_m: float, side: float) -> tuple[float, float, float]
     return (0.0, side * 0.5 * aperture_m, 0.0)
 
 
-def robot_solids(description: RobotDescription) -> list[Solid]:
-    """Return the solids of base, links, hand and fingers.
+def robot_solids(description: RobotDescription, sections: int = 32) -> list[Solid]:
+    """Return the solids of base, links, hand and fingers; `sections` is the number of corners of a circle.
 
     Frames: "base" is B; those of `joint_frames`; "hand" is E; "left" and "right" are P moved by `finger_shift_m`.
     """
-    solids = [_capsule("base", f"housing{i}", c, HOUSING) for i, c in enumerate(description.base.capsules)]
+    solids = [_capsule("base", f"housing{i}", c, HOUSING, sections) for i, c in enumerate(description.base.capsules)]
     for frame, joint in zip(joint_frames(description), description.joints, strict=True):
-        solids += [_capsule(frame, f"housing{i}", c, HOUSING) for i, c in enumerate(joint.link.capsules)]
+        solids += [_capsule(frame, f"housing{i}", c, HOUSING, sections) for i, c in enumerate(joint.link.capsules)]
         radius = max((c.radius_m for c in joint.link.capsules), default=0.04)
-        ring = trimesh.creation.cylinder(radius + RING_M, 0.05, sections=40)
+        ring = trimesh.creation.cylinder(radius + RING_M, 0.05, sections=2 * sections)
         z = np.array([0.0, 0.0, 1.0])
         ring.apply_transform(trimesh.geometry.align_vectors(z, np.array(joint.axis)))
         solids.append(_solid(frame, "ring", ring, JOINT))
@@ -124,6 +159,57 @@ def stand_solids(holder: Holder, probe: Probe, height_m: float) -> list[Solid]:
     return [_box("stand", f"side{i}", b, STAND) for i, b in enumerate(sides)]
 
 
+def world_solids(setup: RunSetup) -> list[Solid]:
+    """Return table, pedestal, container and stand: frames "base" (B), "K" and "stand" (`stand_solids`)."""
+    container, holder, K = setup.container, setup.holder, setup.pose_B_K.position_m
+    table_m = float(K[2]) - (0.008 if container is None else container.wall_m)
+    middle = (0.5 * float(K[0]), 0.5 * float(K[1]), table_m - 0.003)
+    solids = [_box("base", "table", Box(centre_m=middle, half_m=(0.75, 0.65, 0.003)), TABLE)]
+    if table_m < 0.0:  # the base stands on something; its shape is not known
+        pedestal = trimesh.creation.cylinder(0.09, -table_m, sections=40)
+        pedestal.apply_translation((0.0, 0.0, 0.5 * table_m))
+        solids.append(_solid("base", "pedestal", pedestal, STAND))
+    if container is not None:
+        x, y, z = (0.5 * v for v in container.interior_m)
+        t = 0.5 * container.wall_m
+        floor = Box(centre_m=(0.0, 0.0, -t), half_m=(x + 2 * t, y + 2 * t, t))
+        solids.append(_box("K", "floor", floor, FLOOR))
+        walls = [Box(centre_m=(s * (x + t), 0.0, z), half_m=(t, y + 2 * t, z)) for s in (1.0, -1.0)] + [
+            Box(centre_m=(0.0, s * (y + t), z), half_m=(x, t, z)) for s in (1.0, -1.0)
+        ]
+        solids += [replace(_box("K", f"wall{i}", wall, WALL), opacity=0.28) for i, wall in enumerate(walls)]
+    if holder is not None and setup.probe is not None:
+        solids += stand_solids(holder, setup.probe, float(holder.pose_B_grasp.position_m[2]) - table_m)
+    return solids
+
+
+def rim(setup: RunSetup) -> Array:
+    """Return the upper edge of the container's interior (5, 3) in K, closed; (0, 3) without a container."""
+    if setup.container is None:
+        return np.zeros((0, 3))
+    x, y, z = setup.container.interior_m
+    return np.array([(a * x / 2, b * y / 2, z) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))])
+
+
+def true_mesh(body: GhostObject, setup: RunSetup) -> tuple[Array, npt.NDArray[np.int64]] | None:
+    """Return vertices and faces of a true object in its mesh frame, at its true size; None if its file is unknown."""
+    mesh = setup.mesh(body.name)
+    if mesh is None:
+        return None
+    scale = np.ones(3) if body.size_m is None else body.size_m / np.maximum(mesh.extents_m, 1e-9)
+    return mesh.vertices_m * scale, mesh.faces
+
+
+def fitted_mesh(fit: FittedTarget, setup: RunSetup) -> tuple[Array, npt.NDArray[np.int64]] | None:
+    """Return vertices in K and faces of the target at its fitted pose; None if its file is unknown."""
+    mesh = setup.mesh(fit.name)
+    if mesh is None:
+        return None
+    x, y, yaw = fit.pose_K_O
+    pose = Pose.planar([x, y, 0.0], yaw)
+    return pose.apply(standing(mesh, fit.quat).vertices_m), mesh.faces
+
+
 def prism(outline_m: Array, height_m: float) -> tuple[Array, npt.NDArray[np.int64]]:
     """Return the wall of an upright prism over a closed polyline (n, 2), from 0 to a height, without lids."""
     n = len(outline_m)
@@ -155,11 +241,11 @@ def _box(frame: str, name: str, box: Box, colour: Colour) -> Solid:
     return _solid(frame, name, mesh, colour)
 
 
-def _capsule(frame: str, name: str, capsule: Capsule, colour: Colour) -> Solid:
+def _capsule(frame: str, name: str, capsule: Capsule, colour: Colour, sections: int) -> Solid:
     start, end = np.array(capsule.start_m), np.array(capsule.end_m)
     length = float(np.linalg.norm(end - start))
-    mesh = trimesh.creation.capsule(length, capsule.radius_m, count=[32, 32])
+    mesh = trimesh.creation.capsule(length, capsule.radius_m, count=[sections, sections])
     if length > 0.0:
         mesh.apply_transform(trimesh.geometry.align_vectors(np.array([0.0, 0.0, 1.0]), (end - start) / length))
     mesh.apply_translation(0.5 * (start + end))  # trimesh centres a capsule on the origin
-    return _solid(frame, name, mesh, colour)
+    return replace(_solid(frame, name, mesh, colour), smooth=True)

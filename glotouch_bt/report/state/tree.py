@@ -28,13 +28,32 @@ class TreeRow:
 
 
 @dataclass
-class _Node:
+class TreeNode:
+    """A node of a tree with its status; the root of `tree_of` has no name."""
+
     name: str
+    path: str
     status: str
-    children: list[_Node]
+    children: list[TreeNode]
 
     def count(self) -> int:
+        """Return the number of nodes below."""
         return sum(1 + c.count() for c in self.children)
+
+
+def tree_of(nodes: dict[str, str]) -> TreeNode:
+    """Return the tree of nodes with a status each, by path, parents before their children."""
+    root = TreeNode("", "", "INVALID", [])
+    places = {"": root}
+    for path, status in nodes.items():
+        parent = path
+        while True:  # a parent that never had a status of its own is left out
+            parent = parent.rsplit("/", 1)[0] if "/" in parent else ""
+            if parent in places:
+                break
+        places[path] = node = TreeNode(path.rsplit("/", 1)[-1], path, status, [])
+        places[parent].children.append(node)
+    return root
 
 
 def tree_rows(nodes: dict[str, str], *, whole: bool = False) -> list[TreeRow]:
@@ -46,20 +65,11 @@ def tree_rows(nodes: dict[str, str], *, whole: bool = False) -> list[TreeRow]:
         nodes: Status of each node by its path, parents before their children.
         whole: Unfold everything.
     """
-    root = _Node("", "INVALID", [])
-    places: dict[str, _Node] = {"": root}
-    for path, status in nodes.items():
-        parent = path
-        while True:  # a parent that never had a status of its own is left out
-            parent = parent.rsplit("/", 1)[0] if "/" in parent else ""
-            if parent in places:
-                break
-        places[path] = node = _Node(path.rsplit("/", 1)[-1], status, [])
-        places[parent].children.append(node)
+    root = tree_of(nodes)
     running = any(s == "RUNNING" for s in nodes.values())
     rows: list[TreeRow] = []
 
-    def add(node: _Node, depth: int) -> None:
+    def add(node: TreeNode, depth: int) -> None:
         names = [node.name]
         while len(node.children) == 1 and node.children[0].status == node.status:
             node = node.children[0]
@@ -74,3 +84,18 @@ def tree_rows(nodes: dict[str, str], *, whole: bool = False) -> list[TreeRow]:
     for child in root.children:
         add(child, 0)
     return rows
+
+
+def tree_order(nodes: list[str]) -> list[str]:
+    """Return each node once, parents before children, siblings in the order of their first run."""
+    first: dict[str, int] = {}
+    for i, n in enumerate(nodes):
+        for cut in [k for k, c in enumerate(n) if c == "/"] + [len(n)]:
+            first.setdefault(n[:cut], i)
+    seen = set(nodes)
+
+    def key(n: str) -> list[tuple[int, str]]:
+        cuts = [k for k, c in enumerate(n) if c == "/"] + [len(n)]
+        return [(first[n[:cut]], n[:cut]) for cut in cuts]
+
+    return sorted(seen, key=key)

@@ -8,18 +8,22 @@ from typing import Any
 
 import numpy as np
 
+from glotouch_bt.mission.record import event_tone, event_words
 from glotouch_bt.perception.touch import Contour
-from glotouch_bt.report import RecordedEvent, contour_of, short_text
-from glotouch_bt.robot import Array, Pose
-from glotouch_bt.view.state.values import (
+from glotouch_bt.report.contours import contour_of
+from glotouch_bt.report.run_record import RecordedEvent
+from glotouch_bt.report.state.values import (
     CandidateOutline,
     FeltPatch,
+    FittedTarget,
     GhostObject,
     LogLine,
     PlannedGrasp,
     Share,
     TouchPoint,
 )
+from glotouch_bt.robot import Array, Pose
+from glotouch_bt.robot.scene import UPRIGHT
 
 MALFORMED = (AttributeError, IndexError, KeyError, TypeError, ValueError)
 """Errors of data of another shape."""
@@ -29,10 +33,6 @@ EDGE_M = 0.004
 """Longest edge of a drawn outline: along a side of a rectangle, the uncertainty is that of the side. Source: ours."""
 MAX_DIVISIONS = 100
 """Most parts of one edge."""
-MAX_TEXT = 160
-"""Characters of one line of the log."""
-_BAD, _WARN, _GOOD = ("failure", "guard", "stuck"), ("fault", "ending", "reject", "put_back", "pause"), ("lift",)
-_TONES = {k: t for t, kinds in (("bad", _BAD), ("warn", _WARN), ("good", (*_GOOD, "object_check"))) for k in kinds}
 
 
 def vector(value: Any, n: int) -> Array:
@@ -136,6 +136,20 @@ def grasp_of(event: RecordedEvent) -> PlannedGrasp | None:
         return None
 
 
+def fit_of(event: RecordedEvent) -> FittedTarget | None:
+    """Return the accepted target of a ranking event."""
+    try:
+        ranking = event.data["ranking"]
+        if not ranking["accepted"]:
+            return None
+        best = ranking["matches"][0]
+        x, y, yaw = vector(best["pose_K_O"], 3).tolist()
+        w, *axis = vector(best.get("quat") or UPRIGHT, 4).tolist()
+        return FittedTarget(int(best["index"]), str(event.data["target"]), (x, y, yaw), (w, *axis))
+    except MALFORMED:
+        return None
+
+
 def patches_of(event: RecordedEvent, window_m: tuple[float, float]) -> list[FeltPatch]:
     """Return the patches of every closure of a touchset event that came to rest.
 
@@ -207,55 +221,15 @@ def true_bodies(listed: Any) -> Iterator[GhostObject]:
         try:
             outline = np.asarray(o["outline_B_m"], dtype=np.float64)[:, :2]
             pose = o["pose_B_O"]
-            yield GhostObject(str(o["name"]), vector(pose["position_m"], 3), vector(pose["quat"], 4), outline)
+            size = o.get("size_m")
+            yield GhostObject(
+                str(o["name"]), vector(pose["position_m"], 3), vector(pose["quat"], 4), outline,
+                None if size is None else vector(size, 3),
+            )  # fmt: skip
         except MALFORMED:
             continue
 
 
 def log_line(event: RecordedEvent) -> LogLine:
     """Return an event in words."""
-    d = event.data
-    tone = _TONES.get(event.kind, "")
-    try:
-        text = _words(event.kind, d)
-    except MALFORMED:
-        text = None
-    if text is None:
-        pairs = [f"{k} {short_text(v)}" for k, v in d.items() if k not in ("node", "text")]
-        text = "; ".join([*([str(d["text"])] if d.get("text") else []), ", ".join(pairs)])
-    text = text if len(text) <= MAX_TEXT else text[: MAX_TEXT - 1] + "…"
-    return LogLine(event.stamp_s, event.kind, text, tone)
-
-
-def _words(kind: str, d: dict[str, Any]) -> str | None:
-    """Return the sentence of an event that has one."""
-    if kind == "contact":
-        return f"{d['contact']['force_N']:.1f} N"
-    if kind == "candidate":
-        c = d["candidate"]
-        long, short = (1e3 * v for v in c["contour"]["size_m"])
-        return (
-            f"{c['index']}: {c['contour'].get('family')}, {long:.0f} × {short:.0f} mm, {d.get('ended') or 'measured'}"
-        )
-    if kind == "top":
-        return f"candidate {d['candidate']}: {1e3 * d['height_m']:.0f} mm high"
-    if kind == "failure":
-        return f"{str(d.get('node', '')).rsplit('/', 1)[-1]}: {d.get('message') or d.get('code')}"
-    if kind == "next_probe":
-        touch = d.get("touch")
-        return f"{touch['part']} of candidate {touch['candidate']}" if touch else f"no more: {d.get('why')}"
-    if kind == "closure":
-        c = d["chosen"]
-        return f"{d['number']}: candidate {c['candidate']} at {1e3 * c['height_m']:.0f} mm"
-    if kind == "decided":
-        return str(d["why"])
-    if kind == "touchset":
-        layers = sum(len(s.get("layers") or ()) for s in d["touchset"]["sequences"])
-        return f"candidate {d['touchset']['candidate']['index']}: {layers} closures"
-    if kind == "plan":
-        p = d["plan"]
-        height, width = 1e3 * p["position_K_m"][2], 1e3 * p["aperture_m"]
-        return f"grasp candidate {p['candidate']} at {height:.0f} mm, {width:.0f} mm wide"
-    if kind == "ranking":
-        return f"{d.get('target') or 'target'} {'accepted' if d['ranking']['accepted'] else 'not accepted'}"
-    return None
+    return LogLine(event.stamp_s, event.kind, event_words(event.kind, event.data), event_tone(event.kind))

@@ -11,12 +11,14 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from glotouch_bt.report import RecordedEvent, RecordReader, RunRecord, tree_order
-from glotouch_bt.robot import Array, Pose
-from glotouch_bt.view.state import parse
-from glotouch_bt.view.state.values import (
+from glotouch_bt.mission.record import HIDDEN_EVENTS
+from glotouch_bt.report.run_record import RecordedEvent, RecordReader, RunRecord
+from glotouch_bt.report.state import parse
+from glotouch_bt.report.state.tree import tree_order
+from glotouch_bt.report.state.values import (
     CandidateOutline,
     FeltPatch,
+    FittedTarget,
     LogLine,
     OutlineState,
     Phase,
@@ -25,6 +27,7 @@ from glotouch_bt.view.state.values import (
     Share,
     TouchPoint,
 )
+from glotouch_bt.robot import Array, Pose
 
 T = TypeVar("T")
 
@@ -38,8 +41,6 @@ LOG_LINES = 200
 """Events in the log of a state."""
 NO_WINDOW_M = (0.017, 0.028)
 """Size of a pad along x_P and z_P if the record has none. Source: the shipped gripper, rounded."""
-HIDDEN_EVENTS = frozenset({"sweep", "request", "request_done"})
-"""Events that the log leaves out: many a second, or without a meaning for a person."""
 _PHASES: dict[str, Phase] = {"pause": "pausing", "paused": "paused", "resumed": "running"}
 LOST = frozenset({"tool_lost", "no_probe"})
 """Codes of failures that say that the probe is neither in the jaws nor in its holder."""
@@ -130,6 +131,7 @@ class RunModel:
         self._states: Stamped[dict[int, OutlineState]] = Stamped()
         self._shares: Stamped[tuple[Share, ...]] = Stamped()
         self._grasps: Stamped[PlannedGrasp | None] = Stamped()
+        self._fits: Stamped[FittedTarget | None] = Stamped()
         self._tips: Stamped[float | None] = Stamped()
         self._lost: Stamped[bool] = Stamped()
         self._phases: Stamped[Phase] = Stamped()
@@ -168,9 +170,19 @@ class RunModel:
             return NO_WINDOW_M
         return x, z
 
+    @classmethod
+    def of(cls, record: RunRecord) -> RunModel:
+        """Return the model of a whole record, without its depth maps."""
+        model = cls()
+        if len(record.samples.get("stamp_s", ())):
+            model._samples(record.samples)
+        if len(record.cycles.get("stamp_s", ())):
+            model._cycles(record.cycles)
+        model._entries(record)
+        return model
+
     def feed(self, reader: RecordReader) -> None:
         """Take over what a reader has read since the last call; its packed parts are taken out."""
-        record = self.record = reader.record
         for parts, take in ((reader.packed["samples"], self._samples), (reader.packed["cycles"], self._cycles)):
             while parts:
                 take(parts.pop(0))
@@ -178,6 +190,11 @@ class RunModel:
             part = reader.packed["tactile"].pop(0)
             for stamp_s, left, right in zip(part["arrived_s"], part["left_m"], part["right_m"], strict=True):
                 self._pads.add(float(stamp_s), (left.astype(np.float32), right.astype(np.float32)))
+        self._entries(reader.record)
+
+    def _entries(self, record: RunRecord) -> None:
+        """Take over the events and ticks of a record since the last call."""
+        self.record = record
         for event in record.events[self._events_read :]:
             self._saw(event.stamp_s)
             self._event(event)
@@ -212,6 +229,7 @@ class RunModel:
             states=self._candidate_states(t_s, shares),
             shares=shares,
             grasp=self._grasps.last(t_s),
+            fit=self._fits.last(t_s),
             pads=self._pads_at(t_s),
             nodes=self._nodes(t_s),
             log=tuple(self.log.until(t_s)[-LOG_LINES:]),
@@ -276,6 +294,8 @@ class RunModel:
             self._shares.add(stamp_s, shares)
         if kind == "plan" and (grasp := parse.grasp_of(event)):
             self._grasps.add(stamp_s, grasp)
+        if kind == "ranking":
+            self._fits.add(stamp_s, parse.fit_of(event))
         if kind == "tool":
             length = data.get("grasp_to_tip_m") if data.get("held") else None
             self._tips.add(stamp_s, float(length) if isinstance(length, int | float) else None)
@@ -303,5 +323,6 @@ class RunModel:
             elif event.kind == "put_back":
                 states = {i: s for i, s in states.items() if s != "taken"}
             self._grasps.add(event.stamp_s, None)
+            self._fits.add(event.stamp_s, None)
         if states != before:
             self._states.add(event.stamp_s, states)

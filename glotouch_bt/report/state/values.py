@@ -95,12 +95,31 @@ class GhostObject:
         position_B_m: (3,) origin of its mesh frame.
         quat: (4,) orientation w x y z.
         outline_B_m: (n, 2) convex outline from above.
+        size_m: (3,) its true size along the axes of its mesh frame; None if unknown.
     """
 
     name: str
     position_B_m: Array
     quat: Array
     outline_B_m: Array
+    size_m: Array | None = None
+
+
+@dataclass(frozen=True)
+class FittedTarget:
+    """The target at the pose that the recognition accepted.
+
+    Attributes:
+        candidate: Index of the candidate.
+        name: STL stem of the target.
+        pose_K_O: (x, y, yaw) of the mesh, turned by `quat`.
+        quat: (w, x, y, z) rotation of the mesh onto the side on which it is taken to stand.
+    """
+
+    candidate: int
+    name: str
+    pose_K_O: tuple[float, float, float]
+    quat: tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -137,6 +156,7 @@ class SceneState:
         states: State of each candidate.
         shares: The posterior, most probable first; empty before the first decision.
         grasp: The planned grasp, until the object is lifted or put back.
+        fit: The target where it was recognised, until it is lifted.
         pads: Newest depth maps (left, right), each (rows, cols), or None if older than `PADS_S`.
         nodes: Status of each node by its path, in the order of the tree; "" for one that has not run yet.
         log: Events until then, oldest first.
@@ -156,6 +176,7 @@ class SceneState:
     states: dict[int, OutlineState] = field(default_factory=dict)
     shares: tuple[Share, ...] = ()
     grasp: PlannedGrasp | None = None
+    fit: FittedTarget | None = None
     pads: tuple[Array, Array] | None = None
     nodes: dict[str, str] = field(default_factory=dict)
     log: tuple[LogLine, ...] = ()

@@ -12,10 +12,10 @@ import numpy as np
 
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read import shipped_root
-from glotouch_bt.report import RunRecord
+from glotouch_bt.report.run_record import RunRecord
+from glotouch_bt.report.state.model import NO_WINDOW_M
 from glotouch_bt.robot import Array, BadInput, Container, Holder, Pose, Probe, RobotDescription
 from glotouch_bt.robot.scene import Mesh, load_mesh, stl_files
-from glotouch_bt.view.state.model import NO_WINDOW_M
 
 T = TypeVar("T")
 SHIPPED = "glotouch_missions"
@@ -43,14 +43,18 @@ class RunSetup:
     objects: Path | None = None
 
     @cached_property
-    def meshes(self) -> dict[str, Mesh]:
-        """Meshes of the objects by name, for the true objects of a simulation; empty if a file is unusable."""
-        if self.objects is None:
-            return {}
+    def _files(self) -> dict[str, Path]:
         try:
-            return {name: load_mesh(path) for name, path in stl_files(self.objects).items()}
+            return {} if self.objects is None else stl_files(self.objects)
         except (BadInput, OSError):
             return {}
+
+    def mesh(self, name: str) -> Mesh | None:
+        """Return the mesh of an object; None if its file is unknown or unusable."""
+        try:
+            return load_mesh(self._files[name]) if name in self._files else None
+        except (BadInput, OSError):
+            return None
 
 
 def read_setup(record: RunRecord, objects: Path | None = None) -> RunSetup:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from glotouch_bt.view.state import TreeRow, tree_rows
+from glotouch_bt.report.state import TreeRow, tree_rows
 
 NODES = {
     "m/top": "RUNNING",

@@ -10,7 +10,7 @@ import pytest
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.record.recorder import Recorder
 from glotouch_bt.report import RecordReader
-from glotouch_bt.view.state import RunModel, SceneState, planned_nodes
+from glotouch_bt.report.state import RunModel, SceneState, planned_nodes
 from tests.support.made_run import OBJECTS, TIP_M, WANTED, Made
 
 

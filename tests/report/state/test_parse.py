@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from glotouch_bt.perception.touch import Contour
+from glotouch_bt.report.state import felt_points_P
+from glotouch_bt.report.state.parse import densified, outline_sd_m, outward_normals
 from glotouch_bt.robot import Pose
-from glotouch_bt.view.state import felt_points_P
-from glotouch_bt.view.state.parse import densified, outline_sd_m, outward_normals
 
 RECTANGLE = Contour("box", np.array([0.03, -0.02]), (0.08, 0.04), 0.6, 0.0, np.zeros(0))
 

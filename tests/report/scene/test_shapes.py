@@ -9,8 +9,8 @@ import pytest
 
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.motion import Kinematics
+from glotouch_bt.report.scene import shapes
 from glotouch_bt.robot import Probe
-from glotouch_bt.view.page import robot_shapes as shapes
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -1,0 +1,85 @@
+"""Rendered moments of a simulated run, from the worlds that its checkpoints hold."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from glotouch_bt.mission import split_settings
+from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile, CheckpointRow
+from glotouch_bt.mission.read import conditions_of
+from glotouch_bt.robot import BackendError, BadInput, load_backend
+from glotouch_bt.runs.folder import FILM, require_run_folder
+from glotouch_bt.runs.resume_point import mission_of_run, stored_run
+from glotouch_bt.untrusted import write_file
+
+MOMENTS = 8
+"""Maximum number of pictures. Source: ours; two rows of four on the page."""
+SIZE = (480, 360)
+"""Width and height of a picture, pixels."""
+OVERSAMPLED = 2
+"""Pictures are drawn larger by this factor, so that their edges become smooth."""
+
+
+def write_film(folder: Path, objects: Path | None = None) -> Path:
+    """Render what the world looked like when the main skills of a run had ended, and write film.json into its folder.
+
+    Args:
+        folder: The run's folder.
+        objects: Folder of STL files, if the run was made with one.
+
+    Raises:
+        BadInput: The run has no simulated world, its mission cannot be loaded, or the folder cannot be written.
+        BackendError: The world cannot be built, or no picture can be taken here.
+    """
+    require_run_folder(folder)
+    file = CheckpointFile(folder / CHECKPOINT_FILE)
+    try:
+        run = stored_run(file)
+        request = run["request"]
+        mission = mission_of_run(folder, run, objects)
+        backend = load_backend(request["backend"])
+        asked = split_settings(mission, request["settings"])
+        options = {n: value for n, value in asked.items() if backend.is_portable(n, value)}
+        conditions = conditions_of(run["conditions"], f"{folder}: conditions")
+        pictures = []
+        with backend.open(mission.world, conditions, request["seed"], options) as robot:
+            camera = backend.camera(robot)
+            if camera is None:
+                raise BadInput(f"{folder}: the backend {request['backend']!r} has no camera")
+            for row in moments(file.rows()):
+                world = file.world(row.number)
+                assert world is not None
+                robot.restore(world)
+                large = Image.fromarray(np.asarray(camera(*(OVERSAMPLED * s for s in SIZE))))
+                pictures.append({"t_s": row.stamp_s, "node": row.node, "status": row.status, "jpeg": _jpeg(large)})
+    finally:
+        file.close()
+    target = folder / FILM
+    try:
+        write_file(target, json.dumps(pictures).encode())
+    except OSError as e:
+        raise BadInput(f"{target}: cannot be written ({e.strerror})") from e
+    if not pictures:
+        raise BackendError(f"{folder}: no checkpoint holds a simulated world")
+    return target
+
+
+def moments(rows: list[CheckpointRow]) -> list[CheckpointRow]:
+    """Return the last checkpoint after each kind of skill, in the order of time; at most `MOMENTS`, evenly chosen."""
+    last = {r.node.rsplit("/", 1)[-1].rstrip(" 0123456789"): r for r in rows if r.node and r.has_world}
+    found = sorted(last.values(), key=lambda r: r.number)
+    if len(found) <= MOMENTS:
+        return found
+    return [found[i] for i in np.linspace(0, len(found) - 1, MOMENTS).round().astype(int).tolist()]
+
+
+def _jpeg(picture: Image.Image) -> str:
+    out = io.BytesIO()
+    picture.resize(SIZE, Image.Resampling.LANCZOS).save(out, "JPEG", quality=82, optimize=True)
+    return base64.b64encode(out.getvalue()).decode()
