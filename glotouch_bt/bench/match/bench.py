@@ -90,7 +90,9 @@ class MatchCampaign(Campaign):
         name = f"s{seed:04d}" if file is None else file.stem
         content = {"strangers": folder_digests(self.strangers), "file": file and digest(file.read_bytes())}
         run, failed = partial(layout_task, self, seed, file), partial(failed_task, self, seed)
-        return self.trial(f"layouts/{name}", run, failed, seed=seed, methods=self.methods, sampled=self.sampled, inputs=content)
+        return self.trial(
+            f"layouts/{name}", run, failed, seed=seed, methods=self.methods, sampled=self.sampled, inputs=content
+        )
 
     def layout_request(self, seed: int) -> RunRequest:
         """Return the mission request for a layout."""
