@@ -18,8 +18,7 @@ from glotouch_bt.campaign.identity import (
     plain,
 )
 from glotouch_bt.campaign.trial import Row, Trial
-from glotouch_bt.campaign.trial_folder import CLAIM, TRIAL, TrialFolder, claimed
-from glotouch_bt.campaign.workers import Claimed
+from glotouch_bt.campaign.trial_folder import CLAIM, claimed
 from glotouch_bt.robot import BadInput
 from glotouch_bt.runs import RunFolder, RunRequest
 from glotouch_bt.untrusted import read_json
@@ -113,15 +112,14 @@ class Campaign:
 
     @property
     def keeps(self) -> bool:
-        """True if finished trials are kept: a share of a campaign never forgets the others."""
+        """True if the folder may hold trials: a share of a campaign continues the others."""
         return self.resume or self.shard is not None
 
     def open(self) -> None:
-        """Prepare the folder: with `resume` or `shard` check that it holds this campaign, otherwise begin anew.
+        """Prepare the folder: check that it holds this campaign, or without `resume` and `shard` no trial.
 
         Raises:
-            BadInput: It holds another campaign (the message names the differences), or another command runs a trial
-                in it.
+            BadInput: It holds another campaign (the message names the differences), or trials that are not to be kept.
         """
         open_folder(self.out, self.identity, keep=self.keeps)
 
@@ -145,13 +143,10 @@ def open_folder(folder: Path, identity: Mapping[str, Any], *, keep: bool) -> Non
                     "continue with the same code and options, or give another folder"
                 )
             return
-        if not keep:
-            try:
-                for file in sorted(folder.rglob(TRIAL)):
-                    if (file.parent / CLAIM).exists():
-                        TrialFolder(file.parent).forget()
-            except Claimed as e:
-                raise BadInput(f"{e}; add --resume to work on the same campaign") from e
+        if not keep and (begun := sum(claim.parent != folder for claim in folder.rglob(CLAIM))):
+            raise BadInput(
+                f"{folder}: holds {begun} trials; add --resume to continue with them, or give another folder"
+            )
         RunFolder(folder).write_text(MANIFEST, json.dumps(asked, indent=1) + "\n")
 
 

@@ -115,16 +115,6 @@ class TrialFolder:
         plain: dict[str, Any] = _decoded(json.loads(json.dumps(encoded)))
         return plain
 
-    def forget(self) -> None:
-        """Forget the result and the lost attempts.
-
-        Raises:
-            Claimed: A process runs the trial.
-        """
-        with claimed(self.path):
-            for name in (TRIAL, LOST):
-                (self.path / name).unlink(missing_ok=True)
-
     def lost(self) -> list[str]:
         """Return the causes of the attempts that were lost."""
         with suppress(BadInput):

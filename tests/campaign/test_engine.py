@@ -134,8 +134,8 @@ def test_another_campaign_is_refused_with_the_difference(tmp_path: Path, monkeyp
     monkeypatch.setattr(identity, "code_versions", lambda: now)
     with pytest.raises(BadInput, match=r'code: glotouch_bt "[0-9a-f]{16}", now "other"'):
         short_campaign(tmp_path, resume=True).open()
-    short_campaign(tmp_path).open()
-    assert TrialFolder(tmp_path / "t0000").read({}) is None, "without --resume it begins anew"
+    with pytest.raises(BadInput, match="holds 1 trials; add --resume"):
+        short_campaign(tmp_path).open()
 
 
 def test_a_worker_with_other_code_is_refused(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ world: worlds/container_five.yaml
 parameters: {seconds: {type: float, default: 3.0}}
 tree: {sequence: [{wait: {seconds: $seconds}}, {succeed: {wait: {seconds: 0.2, end: fail}}}]}
 """
-PATIENCE_S = 60.0
+PATIENCE_S = 180.0
 
 
 def waited_for(done: Callable[[], object]) -> bool:
