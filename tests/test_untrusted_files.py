@@ -38,8 +38,8 @@ ALLOWED = {
     "glotouch_backends/trial_message.py": "private folder of the driver",
     "glotouch_backends/flexiv_xense/client": "private folder of the driver, and the log that the user names",
     "glotouch_bt/bench": BENCH,
+    "glotouch_bt/campaign": BENCH,
     "glotouch_bt/validation": BENCH,
-    "glotouch_bt/runs/trial_memory.py": "digests of files that were read and checked before",
     "glotouch_bt/commissioning/keys.py": "keys in the folder that the user names, created anew with mode 0600",
     "glotouch_bt/mission/load.py": "parses a word of the command line",
 }

@@ -33,7 +33,7 @@ tree:
 """
 LIVE = {"sequence": "RUNNING", "first": "SUCCESS", "long": "RUNNING", "waited": "IDLE", "never mind": "IDLE"}
 ENDED = {"sequence": "SUCCESS", "first": "SUCCESS", "long": "SUCCESS", "waited": "SUCCESS", "never mind": "SUCCESS"}
-PATIENCE_S = 60.0
+PATIENCE_S = 180.0
 
 
 @pytest.fixture
