@@ -48,7 +48,7 @@ def test_a_killed_run_is_compared_with_its_twin(tmp_path: Path, monkeypatch: pyt
     assert json.loads((tmp_path / "out" / "summary.json").read_text()) == json.loads(json.dumps(summary))
     again = run_study(replace(study, resume=True, words=("false",)))
     assert again["same_record"] == summary["same_record"], "nothing was run again"
-    with pytest.raises(BadInput, match="made otherwise: conditions"):
+    with pytest.raises(BadInput, match="holds another campaign: conditions"):
         run_study(replace(study, resume=True, conditions="harsh"))
 
 
