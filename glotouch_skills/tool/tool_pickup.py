@@ -44,6 +44,10 @@ HANDLE_TOLERANCE_M = 0.004
 MIN_OPEN_M = 0.01
 """The jaws are opened at least this much wider than the handle before they go down over it. Source: ours."""
 
+CLUTTER_M = 0.010
+"""What is met from this height above the nominal floor is something else. Source: ours; objects are 15 mm high or
+more."""
+
 
 class ToolPickupParams(SkillParams):
     """Parameters of `tool_pickup`."""
@@ -91,7 +95,7 @@ class ToolPickup(Skill):
     )
     NO_FLOOR = Failure(
         "no_floor",
-        "the ball met nothing where the container's floor should be; the probe is held",
+        "the ball met nothing where the container's floor should be, or something above it; the probe is held",
         advice="check the container's pose and that the probe is held by its handle",
     )
     HARD_CONTACT = Failure(
@@ -143,7 +147,13 @@ class ToolPickup(Skill):
             yaw_B_rad=yaw,
         )
         if p.floor_touch:
-            floor_z = yield from feel_floor(self.context, tool, p.corner_gap_m, p.speed_m_s)
+            floor_z = yield from feel_floor(self.context, tool, p.corner_gap_m, p.speed_m_s, slowly=True)
+            if floor_z is not None and floor_z > CLUTTER_M:
+                raise self.NO_FLOOR(
+                    f"the ball met something {floor_z * 1e3:.0f} mm above the floor in the corner next to the holder",
+                    advice="clear that corner: the probe is measured there",
+                    above_m=floor_z,
+                )
             if floor_z is None:
                 raise self.NO_FLOOR(
                     f"the ball met no floor {FLOOR_SEARCH_M * 1e3:.0f} mm below where the registration puts it"

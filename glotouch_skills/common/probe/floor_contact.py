@@ -34,7 +34,7 @@ FEEL_FLOOR_FAILURES = Prober.FAILURES
 
 
 def feel_floor(
-    context: Context, tool: HeldTool, corner_gap_m: float, speed_m_s: float, may_have_turned: bool = False
+    context: Context, tool: HeldTool, corner_gap_m: float, speed_m_s: float, slowly: bool = False
 ) -> Motion[float | None]:
     """Lower the ball in the corner nearest to the holder; return the floor's height in K, or None without contact.
 
@@ -43,7 +43,7 @@ def feel_floor(
         tool: The held probe; the floor is expected at the height it was touched at before.
         corner_gap_m: Distance of the ball's centre from each wall of that corner.
         speed_m_s: Speed on the way there.
-        may_have_turned: The ball may be centimetres from where it is believed: move down slowly everywhere.
+        slowly: The ball may be centimetres from where it is believed, or something may stand in the corner.
 
     Raises:
         SkillFailed: `hard_contact`.
@@ -55,7 +55,7 @@ def feel_floor(
     rim = world.container.interior_m[2]
     yield from prober.hop(np.array([*corner, 0.0]), max(rim + 0.06, float(prober.tip_K_m[2])), speed_m_s)
     high, floor = float(prober.tip_K_m[2]), tool.floor_z_K_m
-    inside_m_s = GUARDED_M_S if may_have_turned else min(speed_m_s, FREE_M_S)
+    inside_m_s = GUARDED_M_S if slowly else min(speed_m_s, FREE_M_S)
     paces = (
         (high - rim - RIM_M, GUARDED_M_S),
         (high - rim + RIM_M, inside_m_s),

@@ -148,6 +148,15 @@ def test_tool_pickup__no_floor(make) -> None:
     assert not b.arm.scene._allowed
 
 
+def test_tool_pickup__no_floor__something_stands_in_the_corner(make) -> None:
+    """Its top, 60 mm high, is met slowly, and is not taken for the floor."""
+    b, skill = make(floor_m=0.06)
+    b.run(skill)
+    assert skill.status is Status.FAILURE
+    assert skill.reason.code in ("no_floor", "hard_contact"), "by how hard it is"
+    assert b.robot.peak_force_N < 25.0
+
+
 def test_tool_pickup__motion_refused(make) -> None:
     """A thing in the way up to which the hand would have to go through."""
     b, skill = make()
