@@ -94,7 +94,7 @@ def run_trials(
 
 
 class _State:
-    """What is known of the trials, and the futures of those under way."""
+    """The rows so far, and the futures of the running trials."""
 
     def __init__(self, executor: Executor, trials: Sequence[Trial], shard: Shard | None) -> None:
         self._executor = executor
@@ -122,7 +122,7 @@ class _State:
                 self._rows[n] = row
 
     def cancel(self) -> None:
-        """Cancel what has not begun."""
+        """Cancel the trials that have not started."""
         for future in self._futures:
             future.cancel()
 

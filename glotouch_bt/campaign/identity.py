@@ -1,4 +1,4 @@
-"""What a result depends on: code, versions, settings, and the content of mission, world, objects and conditions."""
+"""Identity of a trial: code, versions, settings, and digests of mission, world, objects and conditions."""
 
 from __future__ import annotations
 

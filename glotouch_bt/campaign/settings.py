@@ -129,7 +129,7 @@ def open_folder(folder: Path, identity: Mapping[str, Any], *, keep: bool) -> Non
 
     Args:
         folder: The folder.
-        identity: What all its trials have in common.
+        identity: Code, settings and objects that all its trials share.
         keep: Keep finished trials.
     """
     asked = plain(identity)
@@ -145,7 +145,7 @@ def open_folder(folder: Path, identity: Mapping[str, Any], *, keep: bool) -> Non
             return
         if not keep and (begun := sum(claim.parent != folder for claim in folder.rglob(CLAIM))):
             raise BadInput(
-                f"{folder}: holds {begun} trials; add --resume to continue with them, or give another folder"
+                f"{folder}: already holds trials ({begun}); add --resume to continue with them, or give another folder"
             )
         RunFolder(folder).write_text(MANIFEST, json.dumps(asked, indent=1) + "\n")
 

@@ -65,20 +65,20 @@ def perform(trial: Trial) -> Row:
     if made_by is not None and made_by != code_versions():
         raise BadInput(f"this worker has other code than the command: {difference(made_by, code_versions())}")
     try:
-        with claimed(trial.folder) as begun:
-            return _claimed_row(trial, begun)
+        with claimed(trial.folder) as claimed_before:
+            return _claimed_row(trial, claimed_before)
     except Exception as e:
         if (lost := _lost_on_disk(e)) is not None:
             raise lost from e
         raise
 
 
-def _claimed_row(trial: Trial, begun: bool) -> Row:
+def _claimed_row(trial: Trial, claimed_before: bool) -> Row:
     folder = TrialFolder(trial.folder)
     row = folder.read(trial.identity)
     if row is not None:
         return row
-    if begun:
+    if claimed_before:
         RunFolder(trial.folder).clear()  # a killed process left parts of a run
     try:
         row = trial.run()

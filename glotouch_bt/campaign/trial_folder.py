@@ -33,14 +33,14 @@ _NUMBER = "number"
 
 @contextmanager
 def claimed(folder: Path, *, wait: bool = False) -> Iterator[bool]:
-    """Have a folder for this process alone until the block or the process ends; yield True if one had it before.
+    """Lock a folder for this process until the block or the process ends; yield True if it was claimed before.
 
     Args:
-        folder: The folder, which is made.
-        wait: Wait for the process that has it.
+        folder: The folder; it is created.
+        wait: Wait for the process that holds it.
 
     Raises:
-        Claimed: Another process has it.
+        Claimed: Another process holds it.
         GlotouchError: The folder cannot be written, or its file system has no locks.
     """
     import fcntl
@@ -72,7 +72,7 @@ def _owner(handle: int) -> str:
 
 
 class TrialFolder:
-    """What a campaign keeps in the folder of a trial.
+    """Access to the result and the lost attempts of a trial.
 
     Args:
         path: The folder.

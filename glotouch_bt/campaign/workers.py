@@ -35,7 +35,7 @@ class TrialLost(GlotouchError):
 
 
 class Claimed(GlotouchError):
-    """Another process has the folder of the trial."""
+    """Another process holds the folder of the trial."""
 
 
 class WorkerLost(TrialLost):
@@ -205,7 +205,7 @@ class TaskProcess:
         if self._process is not None and not self._process.is_alive():  # killed while it had nothing to do
             self._ended()
         if self._process is None or self._pipe is None:
-            # A process inherits the mask of the thread that starts it: it begins deaf to Ctrl-C.
+            # A process inherits the mask of the thread that starts it: it starts with Ctrl-C blocked.
             before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             context = get_context("spawn")
             self._pipe, theirs = context.Pipe()

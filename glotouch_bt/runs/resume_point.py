@@ -260,7 +260,7 @@ def mission_of_run(folder: Path, run: Mapping[str, Any], objects: Path | None) -
         if _plain(found.document) == _plain(run["mission"]):
             return found
         problems.append(f"{given}: has changed since")
-    raise BadInput(f"{folder}: its mission cannot be loaded again: {'; '.join(problems)}")
+    raise BadInput(f"{folder}: its mission cannot be loaded again: {'; '.join(dict.fromkeys(problems))}")
 
 
 def _plain(document: Mapping[str, Any]) -> Any:

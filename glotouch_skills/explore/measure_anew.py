@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from glotouch_bt.perception.recognition import ProbeTouch
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.robot import HOLD
@@ -25,8 +23,6 @@ class MeasureAnew(Skill):
 
     Params = MeasureAnewParams
     params: MeasureAnewParams
-
-    FAILURES: ClassVar = ()
 
     before_doubtful = In(tuple, "candidates on which closures met something", key="doubtful", required=False)
     before_probed = In(tuple, "measurements so far", key="probed", element=ProbeTouch, required=False, expected=False)

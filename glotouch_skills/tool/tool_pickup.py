@@ -45,8 +45,8 @@ MIN_OPEN_M = 0.01
 """The jaws are opened at least this much wider than the handle before they go down over it. Source: ours."""
 
 CLUTTER_M = 0.010
-"""What is met from this height above the nominal floor is something else. Source: ours; objects are 15 mm high or
-more."""
+"""Maximum height of the floor above its nominal place; anything higher is an object. Source: ours; objects are at least
+15 mm high."""
 
 
 class ToolPickupParams(SkillParams):

@@ -134,7 +134,7 @@ def test_another_campaign_is_refused_with_the_difference(tmp_path: Path, monkeyp
     monkeypatch.setattr(identity, "code_versions", lambda: now)
     with pytest.raises(BadInput, match=r'code: glotouch_bt "[0-9a-f]{16}", now "other"'):
         short_campaign(tmp_path, resume=True).open()
-    with pytest.raises(BadInput, match="holds 1 trials; add --resume"):
+    with pytest.raises(BadInput, match=r"already holds trials \(1\); add --resume"):
         short_campaign(tmp_path).open()
 
 

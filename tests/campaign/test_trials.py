@@ -54,7 +54,7 @@ def forget_contents() -> None:
 def test_a_finished_trial_is_kept(request_: RunRequest) -> None:
     assert rows(trial(request_)) == [{"n": 1}]
     assert rows(trial(request_, lambda: {"n": 2})) == [{"n": 1}]
-    with pytest.raises(BadInput, match="holds 1 trials; add --resume"):
+    with pytest.raises(BadInput, match=r"already holds trials \(1\); add --resume"):
         rows(trial(request_, lambda: {"n": 2}), resume=False)
 
 

@@ -1,4 +1,4 @@
-"""What `glotouch run` says while it runs: three live lines on a terminal, one line for each skill elsewhere."""
+"""Progress of `glotouch run`: three live lines on a terminal, one line for each skill elsewhere."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from glotouch_bt.campaign import Campaign, OnRow, Row, Shard, Trial, crashed, ru
 
 COLUMNS = ("number", "digest", "value", "status", "cause")
 Kind = str
-"""What a trial does: "" works; "raise", "kill", "leave", "hang", "full" fail; "kill once" and "full once" recover."""
+"""Behaviour of a trial: "" works; "raise", "kill", "leave", "hang", "full" fail; "kill once", "full once" recover."""
 
 
 def short_campaign(out: Path, *, resume: bool = False, shard: Shard | None = None, **changes: Any) -> Campaign:

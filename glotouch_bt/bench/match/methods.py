@@ -39,5 +39,5 @@ def chosen(names: Sequence[str]) -> tuple[str, ...]:
     known = methods()
     unknown = [n for n in names if n not in known]
     if unknown:
-        raise BadInput(f"--methods {','.join(unknown)}: must be among {', '.join(known)}")
+        raise BadInput(f"--method {','.join(unknown)}: must be among {', '.join(known)}")
     return tuple(n for n in known if not names or n in names)

@@ -1,4 +1,4 @@
-"""What touch cannot tell of two meshes: yaws of symmetry of one, and twins. Computed from the surfaces alone."""
+"""Ambiguities of meshes under touch: the yaws of symmetry of one, and pairs of twins. Computed from surfaces alone."""
 
 from __future__ import annotations
 

@@ -37,7 +37,10 @@ class CampaignProgress:
     def __enter__(self) -> CampaignProgress:
         console = EscapingConsole(stderr=True)
         if console.is_terminal:
-            self._live = Live(console=console, transient=True, auto_refresh=False)
+            # Other writers are not redirected: rich would execute their escape sequences.
+            self._live = Live(
+                console=console, transient=True, auto_refresh=False, redirect_stdout=False, redirect_stderr=False
+            )
             self._live.start()
         return self
 

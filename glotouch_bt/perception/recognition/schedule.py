@@ -20,7 +20,7 @@ CHANGE_S = 42.0
 of 60 nominal missions."""
 
 POSE_LAYERS = 2.0
-"""Number of two-sided layers from which a grasp can be planned at the fitted pose. Source: that of the grasp plan."""
+"""Minimum number of two-sided layers for a pose at which a grasp can be planned. Source: ours."""
 
 
 @dataclass(frozen=True)

@@ -19,12 +19,12 @@ def film_section(record: RunRecord) -> str:
     figures = []
     for moment in record.film[:MAX_PICTURES] if isinstance(record.film, list) else []:
         try:
-            data = base64.b64decode(moment["jpeg"], validate=True)
+            data, t_s = base64.b64decode(moment["jpeg"], validate=True), float(moment["t_s"])
         except (binascii.Error, LookupError, TypeError, ValueError):
             continue
         if data.startswith(JPEG):
             name, failed = str(moment.get("node")).rsplit("/", 1)[-1], moment.get("status") == "FAILURE"
-            said = f"<b>{float(moment.get('t_s') or 0.0):.1f} s</b> after {esc(name)}{' failed' if failed else ''}"
+            said = f"<b>{t_s:.1f} s</b> after {esc(name)}{' failed' if failed else ''}"
             source = f"data:image/jpeg;base64,{base64.b64encode(data).decode()}"
             figures.append(f'<figure><img alt="{esc(name)}" src="{source}"><figcaption>{said}</figcaption></figure>')
     if not figures:

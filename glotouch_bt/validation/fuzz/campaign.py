@@ -56,7 +56,7 @@ class FuzzCampaign:
 
     @property
     def identity(self) -> dict[str, Any]:
-        """What all trials have in common."""
+        """Settings that all trials share."""
         return {"campaign": "FuzzCampaign", "kind": self.kind, "seed": self.seed, **described_code()}
 
     def open(self) -> None:

@@ -1,4 +1,4 @@
-"""What an MCAP viewer is shown of the robot: its frames as its kinematics have them, its shapes, the log."""
+"""Robot, frames and log in the record, as an MCAP viewer reads them; the frames against the kinematics."""
 
 from __future__ import annotations
 

@@ -34,10 +34,8 @@ class LikelihoodParams:
         image_alike: Background probability that an image resembles a neighbouring one.
         height_sd_m: Standard deviation of the measured top.
         lean_sd_rad: Standard deviation of the lean of an object that stands on an uneven base.
-        height_lower: Probability that a lower point of a wholly traced object was measured as its top. Source: 2 of
-            178 tops by 3 mm or more, with a margin; recorded missions of `bench retrieve --per-seed 2 --conditions
-            realistic` (`--trials 30 --seed 42000`, 83648de; `--objects DIR --trials 5 --seed 42100`, 3526743). Four
-            more were tops of partly traced objects.
+        height_lower: Probability that a lower point of a wholly traced object was measured as its top. Source: ours; in
+            recorded realistic missions nearly all low tops were those of partly traced objects.
         contour_sd_m: Standard deviation of a contour's side, besides that of the traces.
         contour_outlier: Probability that the contour covers only a part of the object.
         yaw_sd_rad: Standard deviation of a box contour's direction.
