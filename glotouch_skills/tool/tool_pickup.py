@@ -178,7 +178,7 @@ class ToolPickup(Skill):
             + ", ".join(f"{1e3 * z:.0f}" for z in heights_m)
             + " mm above the floor",
             advice="clear one corner for the probe; if nothing stands there, check the container's pose",
-            above_m=heights_m,
+            above_m=max(heights_m),
         )
 
     def _handle_wide(self, aperture_m: float) -> bool:
