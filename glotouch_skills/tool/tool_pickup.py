@@ -192,7 +192,7 @@ class ToolPickup(Skill):
         above = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, 0.06]))
         handle = world.probe.handle_m[1]
         opening = min(handle + 0.03, arm.description.gripper.stroke_m)
-        yield from arm.jaws(opening, speed_m_s=0.15)
+        yield from arm.jaws(max(opening, arm.aperture_m), speed_m_s=0.15)  # not narrower: an object may be between them
         yield from arm.transit(
             above, height_B_m=max(above.position_m[2], arm.pose_B_P.position_m[2]), speed_m_s=p.free_speed_m_s
         )

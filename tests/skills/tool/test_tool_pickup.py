@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from py_trees.common import Status
 
-from glotouch_bt.robot import GuardTripped
+from glotouch_bt.robot import Command, GripperTarget, GuardTripped
 from glotouch_skills.common.hand.line_guard import MAX_OFF_LINE_M
 from glotouch_skills.tool.tool_pickup import MAX_APPROACH_FORCE_N, MAX_PULL_FORCE_N, ToolPickup
 
@@ -138,6 +138,25 @@ def test_an_arm_that_goes_astray_in_the_holder_is_stopped(make) -> None:
         b.run(skill)
     assert b.arm.scene.holding_tool
     assert MAX_OFF_LINE_M < max(far_m) < 0.003
+
+
+def test_wide_jaws_are_not_narrowed_before_they_are_above_the_stand(make) -> None:
+    """The last closure may have ended with an object between them."""
+    b, skill = make()
+    while b.arm.aperture_m < 0.08:
+        b.robot.cycle(Command(motion=None, gripper=GripperTarget(0.085, 0.35, 10.0), tactile=False))
+        b.arm.sync(b.robot.observe())
+    cycle, narrowed_at = b.robot.cycle, []
+
+    def watch(command):
+        if command.gripper is not None and command.gripper.aperture_m < 0.08:
+            narrowed_at.append(b.arm.pose_B_P.position_m[:2])
+        return cycle(command)
+
+    b.robot.cycle = watch
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    assert np.allclose(narrowed_at[0], STOWED[:2], atol=0.002)
 
 
 def test_tool_pickup__no_floor(make) -> None:
