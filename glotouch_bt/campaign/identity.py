@@ -24,7 +24,7 @@ OURS = ("glotouch_bt", "glotouch_missions")
 """Packages that every result depends on."""
 GROUPS = ("glotouch_bt.backends", "glotouch_bt.skills", "glotouch_bt.resume_check")
 """Entry points of further packages."""
-SOURCES = (".py", ".yaml")
+SOURCES = (".py", ".yaml", ".urdf")
 
 
 @cache

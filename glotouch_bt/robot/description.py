@@ -56,6 +56,7 @@ class Joint:
         torque_Nm: Torque limit.
         armature_kgm2: Reflected rotor inertia.
         link: The link it moves; the link frame is the joint frame.
+        servo_stiffness_Nm_rad: Stiffness of its position servo; 0 if unknown. Only a simulated arm needs it.
     """
 
     name: str
@@ -68,6 +69,7 @@ class Joint:
     torque_Nm: float
     armature_kgm2: float
     link: Link
+    servo_stiffness_Nm_rad: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
