@@ -16,6 +16,7 @@ from glotouch_bt.mission.read import conditions_of
 from glotouch_bt.robot import BackendError, BadInput, load_backend
 from glotouch_bt.runs.folder import FILM, require_run_folder
 from glotouch_bt.runs.resume_point import mission_of_run, stored_run
+from glotouch_bt.runs.robot_identity import require_same_robot
 from glotouch_bt.untrusted import write_file
 
 MOMENTS = 8
@@ -49,6 +50,7 @@ def write_film(folder: Path, objects: Path | None = None) -> Path:
         conditions = conditions_of(run["conditions"], f"{folder}: conditions")
         pictures = []
         with backend.open(mission.world, conditions, request["seed"], options) as robot:
+            require_same_robot(folder, run, robot.description)
             camera = backend.camera(robot)
             if camera is None:
                 raise BadInput(f"{folder}: the backend {request['backend']!r} has no camera")

@@ -99,11 +99,14 @@ def _faults_of(given: RobotFile, chain: Chain, urdf: Path) -> list[str]:
     """Return what does not fit between the two files."""
     joints = [j.name for j in chain.joints]
     links = [chain.base.name, *(j.link.name for j in chain.joints)]
-    faults = [*_unlike("joints", "joint", given.joints, joints, urdf), *_unlike("capsules", "link", given.capsules, links, urdf)]
+    faults = [
+        *_unlike("joints", "joint", given.joints, joints, urdf),
+        *_unlike("capsules", "link", given.capsules, links, urdf),
+    ]
     if len(joints) < MIN_JOINTS:
         faults.append(
-            f"{len(joints)} joints move between base {given.base!r} and flange {given.flange!r}; the hand needs at least "
-            f"{MIN_JOINTS} to take any pose"
+            f"{len(joints)} joints move between base {given.base!r} and flange {given.flange!r}; "
+            f"the hand needs at least {MIN_JOINTS} to take any pose"
         )
     for joint in chain.joints:
         home = given.joints[joint.name].home_rad if joint.name in given.joints else joint.lower_rad
@@ -178,6 +181,5 @@ def _require_home(path: Path, robot: RobotDescription) -> None:
     if tilt_deg > MAX_HOME_TILT_DEG:
         raise BadInput(
             f"{path}: at home (joints.*.home_rad) z_P points along {approach.round(3).tolist()} in B, {tilt_deg:.1f} deg "
-            f"from straight down; at most {MAX_HOME_TILT_DEG:g} deg are allowed: choose a posture with the hand pointing "
-            "down, or correct gripper.pose_E_P or the URDF"
+            f"from straight down, at most {MAX_HOME_TILT_DEG:g} deg: choose a posture with the hand pointing down"
         )

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 import numpy as np
 
@@ -35,7 +35,7 @@ LIMITS = {
 }
 """Attributes of a joint's <limit> that must be there."""
 
-Element = ElementTree.Element
+Element = ET.Element
 Inertia = tuple[float, float, float, float, float, float]
 NO_LINK = Link(name="", mass_kg=1.0, com_m=(0.0, 0.0, 0.0), inertia_kgm2=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
 """Stands for a link with a fault, so that the other faults can be found."""
@@ -84,8 +84,8 @@ def _parse(path: Path) -> Element:
     if b"<!ENTITY" in text:
         raise BadInput(f"{path}: defines XML entities, which a URDF does not need: remove them")
     try:
-        root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError) as e:
+        root = ET.fromstring(text)
+    except (ET.ParseError, ValueError) as e:
         raise BadInput(f"{path}: is not XML ({e}); a xacro file must be expanded to a URDF first") from e
     if root.tag != "robot":
         raise BadInput(f"{path}: begins with <{root.tag}>; a URDF begins with <robot>")
@@ -208,7 +208,8 @@ class _ChainReader:
         if any(rpy):
             turn = rpy_to_matrix(rpy)
             m = turn @ _matrix(moments) @ turn.T
-            moments = (*(float(m[i, i]) for i in range(3)), float(m[0, 1]), float(m[0, 2]), float(m[1, 2]))
+            xx, yy, zz, xy, xz, yz = (float(m[i]) for i in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
+            moments = (xx, yy, zz, xy, xz, yz)
         if not mass_kg > 0.0:
             self.faults.append(f"link {name!r}: its mass {mass_kg:g} kg must be positive")
         principal = np.linalg.eigvalsh(_matrix(moments))
@@ -217,9 +218,7 @@ class _ChainReader:
                 f"link {name!r}: no body has the principal moments of inertia {principal.tolist()} kg m2; each must be "
                 "positive and at most the sum of the other two"
             )
-        return Link(
-            name=name, mass_kg=mass_kg, com_m=self._numbers(inertial, "origin", "xyz"), inertia_kgm2=moments
-        )
+        return Link(name=name, mass_kg=mass_kg, com_m=self._numbers(inertial, "origin", "xyz"), inertia_kgm2=moments)
 
     def _require_massless(self, fixed: Element, joints: list[Joint]) -> None:
         """Refuse a mass behind the last moving joint: it would be lost."""
