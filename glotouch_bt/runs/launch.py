@@ -92,7 +92,8 @@ def launch(
                 if resumable is not None:
                     require_same_robot(folder.path, resumable.file.run, robot.description)
                 if faults := out_of_reach(robot.description, mission.world):
-                    raise BadInput("\n".join(f"{robot.description.name} cannot reach {fault}" for fault in faults))
+                    listed = "\n".join(f"{robot.description.name} cannot reach {fault}" for fault in faults)
+                    raise BadInput(f"{listed}\nmove it in the world file, or use an arm that reaches farther")
                 if world is not None:
                     robot.restore(world)
                 if plan is not None:

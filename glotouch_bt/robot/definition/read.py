@@ -180,6 +180,6 @@ def _require_home(path: Path, robot: RobotDescription) -> None:
     tilt_deg = float(np.degrees(np.arccos(np.clip(-approach[2], -1.0, 1.0))))
     if tilt_deg > MAX_HOME_TILT_DEG:
         raise BadInput(
-            f"{path}: at home (joints.*.home_rad) z_P points along {approach.round(3).tolist()} in B, {tilt_deg:.1f} deg "
+            f"{path}: at home (joints.*.home_rad) z_P is {approach.round(3).tolist()} in B, {tilt_deg:.1f} deg "
             f"from straight down, at most {MAX_HOME_TILT_DEG:g} deg: choose a posture with the hand pointing down"
         )
