@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -27,15 +28,16 @@ OVERSAMPLED = 2
 """Pictures are drawn larger by this factor, so that their edges become smooth."""
 
 
-def write_film(folder: Path, objects: Path | None = None) -> Path:
+def write_film(folder: Path, objects: Path | None = None, settings: Mapping[str, str] | None = None) -> Path:
     """Render what the world looked like when the main skills of a run had ended, and write film.json into its folder.
 
     Args:
         folder: The run's folder.
         objects: Folder of STL files, if the run was made with one.
+        settings: Backend options that the run's folder does not choose, such as the file of a robot.
 
     Raises:
-        BadInput: The run has no simulated world, its mission cannot be loaded, or the folder cannot be written.
+        BadInput: The run has no simulated world, was made with another robot, its mission cannot be loaded, or the folder cannot be written.
         BackendError: The world cannot be built, or no picture can be taken here.
     """
     require_run_folder(folder)
@@ -46,7 +48,8 @@ def write_film(folder: Path, objects: Path | None = None) -> Path:
         mission = mission_of_run(folder, run, objects)
         backend = load_backend(request["backend"])
         asked = split_settings(mission, request["settings"])
-        options = {n: value for n, value in asked.items() if backend.is_portable(n, value)}
+        portable = {n: value for n, value in asked.items() if backend.is_portable(n, value)}
+        options = {**portable, **(settings or {})}
         conditions = conditions_of(run["conditions"], f"{folder}: conditions")
         pictures = []
         with backend.open(mission.world, conditions, request["seed"], options) as robot:

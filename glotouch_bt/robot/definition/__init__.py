@@ -2,3 +2,4 @@
 
 from glotouch_bt.robot.definition.read import read_robot
 from glotouch_bt.robot.definition.robot_file import RobotFile
+from glotouch_bt.robot.definition.urdf import LIMITS
