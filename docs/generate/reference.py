@@ -285,7 +285,7 @@ def robots() -> str:
     limits = [(code(f"limit {name}"), what) for name, what in LIMITS.items()]
     text += [
         "## The URDF\n",
-        "Only the chain from `base` to `flange` is read. Its joints must be revolute; joints after the last one of them "
+        "Only the chain from `base` to `flange` is read. Its joints must be revolute; joints after the last of them "
         "may be fixed, and their links have no mass. Meshes, transmissions and branches are ignored.\n",
         table(
             ("part", "meaning"),

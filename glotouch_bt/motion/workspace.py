@@ -12,6 +12,8 @@ from glotouch_bt.robot import MotionRefused, Pose, RobotDescription, World
 
 YAWS_RAD = (0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi)
 """Directions of the hand that are tried at a place, from x of its frame; one that works is enough."""
+BARE_INSET_M = 0.03
+"""Distance from the walls at which the bare hand works at the floor. Source: ours; an object's half width, and a finger."""
 RISE_M = 0.05
 """Height above the rim, and above the stand, at which the hand travels. Source: ours."""
 
@@ -29,7 +31,7 @@ def out_of_reach(description: RobotDescription, world: World) -> list[str]:
     levels = (
         ("with the probe at the floor", probe.tip_radius_m, probe.tip_radius_m + held_m),
         ("with the probe above the rim", probe.tip_radius_m, z + RISE_M + held_m),
-        ("with the bare hand at the floor", world.objects.min_wall_gap_m, tips_m),
+        ("with the bare hand at the floor", BARE_INSET_M, tips_m),
     )
     faults = []
     for what, inset_m, height_m in levels:

@@ -37,7 +37,8 @@ def write_film(folder: Path, objects: Path | None = None, settings: Mapping[str,
         settings: Backend options that the run's folder does not choose, such as the file of a robot.
 
     Raises:
-        BadInput: The run has no simulated world, was made with another robot, its mission cannot be loaded, or the folder cannot be written.
+        BadInput: The run has no simulated world or was made with another robot, its mission cannot be loaded, or the
+            folder cannot be written.
         BackendError: The world cannot be built, or no picture can be taken here.
     """
     require_run_folder(folder)

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ValidationError
 
 from glotouch_bt.errors import BadInput
 from glotouch_bt.robot.definition.robot_file import BoxSection, GripperSection, RobotFile
-from glotouch_bt.robot.definition.urdf import Chain, read_chain
+from glotouch_bt.robot.definition.urdf import UrdfChain, read_chain
 from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription
 from glotouch_bt.robot.fake import forward
 from glotouch_bt.robot.geometry import Pose
@@ -95,7 +95,7 @@ def _section(above: Iterable[int | str]) -> type[BaseModel]:
     return section
 
 
-def _faults_of(given: RobotFile, chain: Chain, urdf: Path) -> list[str]:
+def _faults_of(given: RobotFile, chain: UrdfChain, urdf: Path) -> list[str]:
     """Return what does not fit between the two files."""
     joints = [j.name for j in chain.joints]
     links = [chain.base.name, *(j.link.name for j in chain.joints)]
@@ -135,7 +135,7 @@ def _unlike(section: str, kind: str, given: Mapping[str, object], there: list[st
     return faults
 
 
-def _described(given: RobotFile, chain: Chain) -> RobotDescription:
+def _described(given: RobotFile, chain: UrdfChain) -> RobotDescription:
     def dressed(link: Link) -> Link:
         return replace(link, capsules=tuple(Capsule(**c.model_dump()) for c in given.capsules[link.name]))
 

@@ -11,11 +11,13 @@ Positive = Annotated[float, Field(gt=0.0)]
 PositiveVec3 = tuple[Positive, Positive, Positive]
 
 
-class _Section(BaseModel):
+class RobotFileSection(BaseModel):
+    """A mapping in the file; unknown keys are refused."""
+
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
 
-class JointSection(_Section):
+class JointSection(RobotFileSection):
     """One joint of the URDF, by its name there."""
 
     home_rad: float = Field(description="position at home, rad")
@@ -23,7 +25,7 @@ class JointSection(_Section):
     servo_stiffness_Nm_rad: float = Field(gt=0.0, description="stiffness of the joint's position servo, Nm/rad")
 
 
-class CapsuleSection(_Section):
+class CapsuleSection(RobotFileSection):
     """A collision capsule in its link's frame; see `robot.Capsule`."""
 
     start_m: Vec3 = Field(description="one end of its axis, m, in the link's frame")
@@ -31,21 +33,21 @@ class CapsuleSection(_Section):
     radius_m: float = Field(gt=0.0, description="radius, m")
 
 
-class PadFrameSection(_Section):
+class PadFrameSection(RobotFileSection):
     """Frame P in the flange frame E."""
 
     position_m: Vec3 = Field(description="origin of P in E, m")
     yaw_deg: float = Field(default=0.0, description="rotation of P about z_E; z_P points along z_E, away from the arm")
 
 
-class BoxSection(_Section):
+class BoxSection(RobotFileSection):
     """An axis-aligned box; see `robot.Box`."""
 
     centre_m: Vec3 = Field(description="centre, m")
     half_m: PositiveVec3 = Field(description="half sizes, m")
 
 
-class GripperSection(_Section):
+class GripperSection(RobotFileSection):
     """A parallel gripper with a gel pad on each finger; see `robot.Gripper`."""
 
     pose_E_P: PadFrameSection = Field(description="pads' mid-point P in E: z along the approach, y along closing")
@@ -66,7 +68,7 @@ class GripperSection(_Section):
     pad_depth_m: float = Field(gt=0.0, description="largest indentation that a pad can show, m")
 
 
-class RobotFile(_Section):
+class RobotFile(RobotFileSection):
     """A robot's file."""
 
     robot: str = Field(min_length=1, description="name of the robot; runs and reports state it")

@@ -42,7 +42,7 @@ NO_LINK = Link(name="", mass_kg=1.0, com_m=(0.0, 0.0, 0.0), inertia_kgm2=(1.0, 1
 
 
 @dataclass(frozen=True)
-class Chain:
+class UrdfChain:
     """The arm as its URDF states it: links without collision shapes, joints without armature and servo.
 
     Attributes:
@@ -56,7 +56,7 @@ class Chain:
     pose_last_E: Pose
 
 
-def read_chain(path: Path, base: str, flange: str) -> Chain:
+def read_chain(path: Path, base: str, flange: str) -> UrdfChain:
     """Read the chain between two links. Links and joints beside it are ignored.
 
     Args:
@@ -121,7 +121,7 @@ class _ChainReader:
         self._links = links
         self.faults: list[str] = []
 
-    def chain(self, base: str, way: list[Element]) -> Chain:
+    def chain(self, base: str, way: list[Element]) -> UrdfChain:
         """Return the chain along joints, from the base to the flange."""
         joints: list[Joint] = []
         fixed: list[Element] = []
@@ -148,7 +148,7 @@ class _ChainReader:
         length = sum(math.hypot(*joint.origin_m) for joint in joints)
         if length > MAX_CHAIN_M:
             self.faults.append(f"its joints are {length:g} m apart in all; lengths are in m, at most {MAX_CHAIN_M:g} m")
-        return Chain(self._link(base), tuple(joints), pose_last_E)
+        return UrdfChain(self._link(base), tuple(joints), pose_last_E)
 
     def _joint(self, element: Element) -> Joint:
         axis = self._numbers(element, "axis", "xyz", (1.0, 0.0, 0.0))
