@@ -13,7 +13,7 @@ from glotouch_bt.robot import MotionRefused, Pose, RobotDescription, World
 YAWS_RAD = (0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi)
 """Directions of the hand that are tried at a place, from x of its frame; one that works is enough."""
 BARE_INSET_M = 0.03
-"""Distance from the walls at which the bare hand works at the floor. Source: ours; an object's half width, and a finger."""
+"""Distance from the walls at which the bare hand works at the floor. Source: ours; half an object and a finger."""
 RISE_M = 0.05
 """Height above the rim, and above the stand, at which the hand travels. Source: ours."""
 
