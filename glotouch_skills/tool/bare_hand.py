@@ -12,7 +12,7 @@ from glotouch_bt.robot import Pose
 from glotouch_bt.skill import MOTION_REFUSED, Failure, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
 from glotouch_skills.common.hand import REQUEST_FAILED, WRIST_STATES, set_payload_and_tare
-from glotouch_skills.common.probe import corner_place
+from glotouch_skills.common.probe import corner_place, corners
 
 TRAVEL_M_S = 0.1
 """Speed on the way to the corner."""
@@ -56,7 +56,8 @@ class BareHand(Skill):
         here = arm.pose_B_P
         yaw = yaw_near_home(arm, np.deg2rad(self.params.yaw_deg))
         container = self.context.world.container.pose_B_K
-        over = container.apply(np.array([*corner_place(self.context.world, self.params.corner_gap_m), 0.0]))
+        world = self.context.world
+        over = container.apply(np.array([*corner_place(world, corners(world)[0], self.params.corner_gap_m), 0.0]))
         yield from arm.line(Pose.pointing_down((*over[:2], here.position_m[2]), yaw), TRAVEL_M_S)
         yield from set_payload_and_tare(self.context)
         gripper = arm.description.gripper

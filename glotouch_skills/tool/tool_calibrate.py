@@ -22,7 +22,7 @@ from glotouch_bt.robot import Array, MotionRefused, Observation
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool, Prober
 from glotouch_skills.common.hand import may_touch
-from glotouch_skills.common.probe import corner_place, corner_walls, quiet_corner
+from glotouch_skills.common.probe import corner_of, corner_place, corner_walls
 
 NEAR_M = 0.012
 """Within this planar distance of its corner, the ball moves straight there, otherwise over the walls."""
@@ -82,7 +82,7 @@ class ToolCalibrateParams(SkillParams):
 
 
 class ToolCalibrate(Skill):
-    """Touch the two walls of the corner nearest to the holder with the hand straight and turned to either side.
+    """Touch the two walls of the tool's corner with the hand straight and turned to either side.
 
     Touches of the same wall at different yaws give the ball's offset from its nominal place in the hand; the errors of
     the walls cancel. The rise to the touching height accelerates the hand: the delay of the wrist's force behind the
@@ -122,7 +122,8 @@ class ToolCalibrate(Skill):
         """See the class."""
         world, given = self.context.world, self.before
         height = given.floor_z_K_m + world.container.interior_m[2] - self.params.below_edge_m
-        place = np.array([*corner_place(world, self.params.gap_m), height])
+        corner = corner_of(world, given)
+        place = np.array([*corner_place(world, corner, self.params.gap_m), height])
         yield from self._enter(given, place)
         latency, latency_sd = yield from self._rise(given, place)
         listening = dataclasses.replace(given, latency_s=latency)
@@ -130,7 +131,7 @@ class ToolCalibrate(Skill):
         presses: list[Press] = []
         turned, turn = 0, np.deg2rad(self.params.turn_deg)
         straight = given.yaw_B_rad - math.remainder(given.yaw_B_rad - world.container.pose_B_K.yaw_rad, 0.5 * math.pi)
-        with may_touch(self.context.arm, "tool", *corner_walls(world)):
+        with may_touch(self.context.arm, "tool", *corner_walls(corner)):
             for yaw in (straight, given.yaw_B_rad + turn, given.yaw_B_rad - turn):
                 try:
                     yield from self._turn(listening, place, yaw)
@@ -145,7 +146,7 @@ class ToolCalibrate(Skill):
             raise MotionRefused("calibration", "the hand cannot be turned at that corner")
         found = solve_tip(touches, given.tip_radius_m, touch_sd_m=TOUCH_SD_M, late_sd_s=latency_sd)
         self.tool = self._measured(listening, found, presses)
-        walls = corner_walls(world)
+        walls = corner_walls(corner)
         self.report(
             "Calibration of the probe",
             f"{len(touches)} touches of two walls; one place of the ball in the hand explains them to within the "
@@ -196,9 +197,9 @@ class ToolCalibrate(Skill):
         """Touch each wall once, from `place` and back; append a press of each to `presses`."""
         p, arm = self.params, self.context.arm
         prober = Prober(self.context, tool, GuardParams(latency_s=tool.latency_s))
-        sides = quiet_corner(self.context.world)
+        sides = corner_of(self.context.world, tool)
         found = []
-        for wall, name in enumerate(corner_walls(self.context.world)):
+        for wall, name in enumerate(corner_walls(sides)):
             out = np.zeros(3)
             out[wall] = sides[wall]
             probed = yield from prober.move(place + (p.gap_m - tool.tip_radius_m + p.search_m) * out, p.speed_m_s)
@@ -250,7 +251,7 @@ class ToolCalibrate(Skill):
             tip_P_m=tool.tip_P_m + np.array([*found.tip_error_P_m, 0.0]),
             latency_s=latency,
             tip_sd_m=found.tip_sd_m,
-            corner_K_m=quiet_corner(self.context.world) * found.walls_m,
+            corner_K_m=corner_of(self.context.world, tool) * found.walls_m,
             compliance_P_m_N=solve_compliance(presses) if presses else None,
         )
         self.event(

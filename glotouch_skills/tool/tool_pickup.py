@@ -1,4 +1,4 @@
-"""Take the probe out of its holder and touch the floor with it."""
+"""Take the probe out of its holder and touch the floor with it, in a corner where nothing stands."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from glotouch_skills.common.hand import (
     straight_guard,
     weigh_N,
 )
-from glotouch_skills.common.probe import FEEL_FLOOR_FAILURES, FLOOR_SEARCH_M, feel_floor
+from glotouch_skills.common.probe import FEEL_FLOOR_FAILURES, FLOOR_SEARCH_M, corner_walls, corners, feel_floor
 
 MAX_APPROACH_FORCE_N = 8.0
 """Change of force that stops the open hand above the handle; without an obstacle it stays below 2 N."""
@@ -95,8 +95,9 @@ class ToolPickup(Skill):
     )
     NO_FLOOR = Failure(
         "no_floor",
-        "the ball met nothing where the container's floor should be, or something above it; the probe is held",
-        advice="check the container's pose and that the probe is held by its handle",
+        "the ball met nothing where the container's floor should be, or something stands in every corner; the probe "
+        "is held",
+        advice="check the container's pose, that the probe is held by its handle, and that one corner is free",
     )
     HARD_CONTACT = Failure(
         "hard_contact",
@@ -147,23 +148,38 @@ class ToolPickup(Skill):
             yaw_B_rad=yaw,
         )
         if p.floor_touch:
-            floor_z = yield from feel_floor(self.context, tool, p.corner_gap_m, p.speed_m_s, slowly=True)
-            if floor_z is not None and floor_z > CLUTTER_M:
-                raise self.NO_FLOOR(
-                    f"the ball met something {floor_z * 1e3:.0f} mm above the floor in the corner next to the holder",
-                    advice="clear that corner: the probe is measured there",
-                    above_m=floor_z,
-                )
-            if floor_z is None:
-                raise self.NO_FLOOR(
-                    f"the ball met no floor {FLOOR_SEARCH_M * 1e3:.0f} mm below where the registration puts it"
-                )
-            tool = dataclasses.replace(tool, floor_z_K_m=floor_z)
+            tool = yield from self._on_floor(tool)
         self.event(
             "tool", held=True, grasp_to_tip_m=probe.grasp_to_tip_m, floor_z_K_m=tool.floor_z_K_m, weight_N=weight_N,
             jaw_zero=self.jaw_zero,
         )  # fmt: skip
         self.tool = tool
+
+    def _on_floor(self, tool: HeldTool) -> Motion[HeldTool]:
+        """Touch the floor in the first corner where nothing stands; return the tool with that corner and height."""
+        world, p = self.context.world, self.params
+        heights_m: list[float] = []
+        for corner in corners(world):
+            there = dataclasses.replace(tool, corner=corner)
+            floor_z = yield from feel_floor(self.context, there, p.corner_gap_m, p.speed_m_s, slowly=True)
+            if floor_z is None:
+                raise self.NO_FLOOR(
+                    f"the ball met no floor {FLOOR_SEARCH_M * 1e3:.0f} mm below where the registration puts it"
+                )
+            if floor_z <= CLUTTER_M:
+                return dataclasses.replace(there, floor_z_K_m=floor_z)
+            self.event(
+                "note",
+                text=f"something {floor_z * 1e3:.0f} mm high stands by {' and '.join(corner_walls(corner))}",
+            )
+            heights_m.append(floor_z)
+        raise self.NO_FLOOR(
+            "something stands in every corner: the ball met it "
+            + ", ".join(f"{1e3 * z:.0f}" for z in heights_m)
+            + " mm above the floor",
+            advice="clear one corner for the probe; if nothing stands there, check the container's pose",
+            above_m=max(heights_m),
+        )
 
     def _handle_wide(self, aperture_m: float) -> bool:
         """Return True if the aperture is the handle's width."""

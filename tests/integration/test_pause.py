@@ -19,7 +19,7 @@ from glotouch_bt.robot.simulation.referee import Referee
 from glotouch_bt.skill import Skill, SkillRun
 from glotouch_bt.validation.pause import EveryNthTick
 from glotouch_skills.common.hand.compliant_close import close_compliantly
-from glotouch_skills.common.probe.free_corner import corner_place
+from glotouch_skills.common.probe.free_corner import corner_place, corners
 
 PAUSE_S = 20.0
 OPEN_M = 0.08
@@ -78,7 +78,7 @@ class Presses(Told):
         arm, world = self.context.arm, self.context.world
         yield from arm.jaws(0.0)
         tip = arm.description.gripper.fingertip_below_P_m
-        over = world.container.pose_B_K.apply([*corner_place(world, 0.03), tip + 0.03])
+        over = world.container.pose_B_K.apply([*corner_place(world, corners(world)[0], 0.03), tip + 0.03])
         yield from arm.transit(Pose.pointing_down(over, arm.pose_B_P.yaw_rad), arm.pose_B_P.position_m[2], 0.2)
         rest = np.concatenate([b.wrench_S for b in (yield from arm.hold(0.2))]).mean(axis=0)
 

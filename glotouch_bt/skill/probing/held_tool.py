@@ -27,6 +27,7 @@ class HeldTool:
         section: Planar section about the reference point, in P's x and y; None: the ball's disc.
         latency_s: Estimated age of a wrench sample when it arrives.
         tip_sd_m: Standard deviation of the reference point in P, per planar axis; None if not calibrated.
+        corner: (2,) signs in K of the container's corner where the floor was touched; None: the nearest to the holder.
         corner_K_m: (2,) position of the container's corner found by the calibration, in K; None if not calibrated.
         compliance_P_m_N: (2,) displacement of the reference point per force along x_P and y_P; None if not measured,
             which counts as `UNMEASURED_M_N`.
@@ -41,6 +42,7 @@ class HeldTool:
     section: Section | None = None
     latency_s: float = GuardParams().latency_s
     tip_sd_m: float | None = None
+    corner: Array | None = None
     corner_K_m: Array | None = None
     compliance_P_m_N: Array | None = None
 

@@ -1,4 +1,4 @@
-"""Touch the container's floor with the held probe, in the corner that no object reaches."""
+"""Touch the container's floor with the held probe, in a corner."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ import numpy as np
 
 from glotouch_bt.motion import FREE_M_S, Motion
 from glotouch_bt.perception.touch import GuardParams
-from glotouch_bt.robot import MotionRefused
 from glotouch_bt.skill import Context
 from glotouch_bt.skill.probing import HeldTool, Prober
 from glotouch_skills.common.hand import may_touch
-from glotouch_skills.common.probe.free_corner import corner_place
+from glotouch_skills.common.probe.free_corner import corner_of, corner_place
 
 FLOOR_SEARCH_M = 0.005
 """Search for the floor down to this far below its nominal height."""
@@ -36,7 +35,10 @@ FEEL_FLOOR_FAILURES = Prober.FAILURES
 def feel_floor(
     context: Context, tool: HeldTool, corner_gap_m: float, speed_m_s: float, slowly: bool = False
 ) -> Motion[float | None]:
-    """Lower the ball in the corner nearest to the holder; return the floor's height in K, or None without contact.
+    """Lower the ball in the tool's corner; return the height in K of what it met, or None without contact.
+
+    What it met is the floor only if the height says so: something may stand in that corner, and a box that is not where
+    it was registered is met at its rim.
 
     Args:
         context: The skill's.
@@ -47,10 +49,10 @@ def feel_floor(
 
     Raises:
         SkillFailed: `hard_contact`.
-        MotionRefused: The corner cannot be reached, or the probe met the rim.
+        MotionRefused: The corner cannot be reached.
     """
     world, arm = context.world, context.arm
-    corner = corner_place(world, corner_gap_m)
+    corner = corner_place(world, corner_of(world, tool), corner_gap_m)
     prober = Prober(context, tool, GuardParams())
     rim = world.container.interior_m[2]
     yield from prober.hop(np.array([*corner, 0.0]), max(rim + 0.06, float(prober.tip_K_m[2])), speed_m_s)
@@ -67,7 +69,5 @@ def feel_floor(
         probed = yield from prober.move(lowest, speed_m_s, paces=paces)
         if probed.contact is None:
             return None
-        if probed.contact.tip_K_m[2] > rim - RIM_M:
-            raise MotionRefused("floor", "the probe met something at the container's rim; is the container registered?")
         yield from prober.retreat(np.array([0.0, 0.0, 1.0]), RETREAT_M, RETREAT_M_S)
     return float(probed.contact.tip_K_m[2]) - tool.tip_radius_m

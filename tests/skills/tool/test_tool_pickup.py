@@ -25,8 +25,8 @@ def probe_weight(position_B, aperture: float) -> float:
 
 @pytest.fixture
 def make(bench, things):
-    def make_one(grip_width_m=0.016, weight_N=probe_weight, floor_m=FLOOR_M, **params):
-        b = bench(things=[things.floor(floor_m)], weight_N=weight_N, grip_width_m=grip_width_m)
+    def make_one(grip_width_m=0.016, weight_N=probe_weight, floor_m=FLOOR_M, standing=(), **params):
+        b = bench(things=[things.floor(floor_m), *standing], weight_N=weight_N, grip_width_m=grip_width_m)
         return b, b.make(ToolPickup, **params)
 
     return make_one
@@ -148,13 +148,23 @@ def test_tool_pickup__no_floor(make) -> None:
     assert not b.arm.scene._allowed
 
 
-def test_tool_pickup__no_floor__something_stands_in_the_corner(make) -> None:
-    """Its top, 60 mm high, is met slowly, and is not taken for the floor."""
-    b, skill = make(floor_m=0.06)
+@pytest.mark.parametrize("top_m", [0.02, 0.06, 0.085], ids=["low", "up to the rim", "higher than the box"])
+def test_the_next_corner_is_taken_if_something_stands_in_the_first(make, things, top_m) -> None:
+    b, skill = make(standing=[things.post((-0.13, -0.18), 0.03, top_m)])
     b.run(skill)
-    assert skill.status is Status.FAILURE
-    assert skill.reason.code in ("no_floor", "hard_contact"), "by how hard it is"
-    assert b.robot.peak_force_N < 25.0
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    assert skill.tool.corner.tolist() == [1.0, -1.0]
+    assert skill.tool.floor_z_K_m == pytest.approx(FLOOR_M, abs=3e-4)
+    assert b.robot.peak_force_N < 5.0
+
+
+def test_tool_pickup__no_floor__something_stands_in_every_corner(make, things) -> None:
+    """The tops, 40 mm high, are met slowly, and are not taken for the floor."""
+    b, skill = make(standing=[things.post((x, y), 0.03, 0.04) for x in (-0.13, 0.13) for y in (-0.18, 0.18)])
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_floor")
+    assert "40, 40, 40, 40 mm" in skill.reason.message
+    assert b.robot.peak_force_N < 5.0
 
 
 def test_tool_pickup__motion_refused(make) -> None:

@@ -7,10 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from glotouch_bt.motion import FREE_M_S
 from glotouch_bt.perception.search import Move, MoveOutcome
 from glotouch_bt.skill import SkillFailed
-from glotouch_skills.common.probe.plan_driver import Explorer, ExploringSpeeds
+from glotouch_skills.common.probe.plan_driver import COLUMN_M_S, Explorer, ExploringSpeeds
 
 POST, RADIUS, TOP, BALL = (0.03, -0.04), 0.03, 0.06, 0.006
 START = np.array([0.03, 0.06, 0.018])
@@ -107,5 +106,5 @@ def test_the_ball_comes_down_fast_only_where_it_has_felt_free_space(make) -> Non
         go(b, explorer, Move("hop", goal))
     slow, fast, again = np.diff([*stamps, b.context.observation.now_s])
     height = ExploringSpeeds().headroom_m - ExploringSpeeds().height_m
-    assert slow - fast == pytest.approx(height / ExploringSpeeds().lower_m_s - height / FREE_M_S, abs=0.3)
+    assert slow - fast == pytest.approx(height / ExploringSpeeds().lower_m_s - height / COLUMN_M_S, abs=0.3)
     assert again == pytest.approx(fast, abs=0.1), "it has been there by now"
