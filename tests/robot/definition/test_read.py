@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
+import yaml
 
 from glotouch_backends.robots import load_robot, shipped_robots
-from glotouch_bt.robot import BadInput, RobotDescription, UnknownName
+from glotouch_bt.robot import BadInput, RobotDescription, RobotFile, UnknownName
 
 FILE = shipped_robots()["iiwa14"]
 TEXT = FILE.read_text()
@@ -70,6 +72,16 @@ def test_what_is_no_mapping(text: str, tmp_path: Path) -> None:
     (tmp_path / "arm.yaml").write_text(text)
     with pytest.raises(BadInput, match="must be a mapping with robot, source, urdf"):
         load_robot(str(tmp_path / "arm.yaml"))
+
+
+def test_the_guide_explains_every_key() -> None:
+    guide = (Path(__file__).parents[3] / "docs/guides/backend.md").read_text()
+    (shown,) = re.findall(r"```yaml\n(robot: .*?)```", guide, re.DOTALL)
+    file = yaml.safe_load(shown)
+    assert file.keys() == RobotFile.model_fields.keys()
+    assert file["gripper"].keys() == yaml.safe_load(TEXT)["gripper"].keys()
+    joints = yaml.safe_load(TEXT)["joints"]
+    assert all(set(joints[name]) == set(given) for name, given in file["joints"].items())
 
 
 def test_an_unknown_name_lists_the_shipped_robots() -> None:
