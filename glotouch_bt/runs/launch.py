@@ -23,7 +23,7 @@ from glotouch_bt.mission.execution import Control, Outcome, SkillHung, deferred_
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import Record, Recorder, RunSummary
 from glotouch_bt.motion import out_of_reach
-from glotouch_bt.robot import BackendError, BadInput, Conditions, GlotouchError, Robot, load_backend
+from glotouch_bt.robot import BackendError, BadInput, Conditions, GlotouchError, Robot, RobotDescription, load_backend
 from glotouch_bt.robot.simulation import Referee, TrueObject
 from glotouch_bt.runs.folder import MODELS, RunFolder, locked
 from glotouch_bt.runs.request import RunRequest, RunResult
@@ -78,22 +78,24 @@ def launch(
                 folder.check_free(request.overwrite)
             if plan is not None and resumable is None and (models := wrong_models(plan, mission, folder.path / MODELS)):
                 mission = _mission(request, **models)
+            known = backend.describe(options)
+            if known is not None:  # before a real arm is enabled
+                _require_reach(known, mission)
             try:
                 robot = backend.open(mission.world, conditions, request.seed, options)
             except BadInput as e:
                 if not options:
                     raise
-                known = ", ".join(mission.parameters) or "none"
-                raise BadInput(f"{e} (parameters of mission {mission.name!r}: {known})") from e
+                names = ", ".join(mission.parameters) or "none"
+                raise BadInput(f"{e} (parameters of mission {mission.name!r}: {names})") from e
             try:
                 referee = backend.referee(robot)
                 world = None if resumable is None else resumable.file.world(resumable.row.number)
                 objects_at_start = referee.objects() if referee else []
                 if resumable is not None:
                     require_same_robot(folder.path, resumable.file.run, robot.description)
-                if faults := out_of_reach(robot.description, mission.world):
-                    listed = "\n".join(f"{robot.description.name} cannot reach {fault}" for fault in faults)
-                    raise BadInput(f"{listed}\nmove it in the world file, or use an arm that reaches farther")
+                if known is None:
+                    _require_reach(robot.description, mission)
                 if world is not None:
                     robot.restore(world)
                 if plan is not None:
@@ -117,6 +119,12 @@ def launch(
                 request, mission, conditions, robot, referee, folder, objects_at_start, began, resumable, resume_point
             )
             return _run(run, on_progress, control)
+
+
+def _require_reach(description: RobotDescription, mission: Mission) -> None:
+    if faults := out_of_reach(description, mission.world):
+        listed = "\n".join(f"{description.name} cannot reach {fault}" for fault in faults)
+        raise BadInput(f"{listed}\nmove it in the world file, or use an arm that reaches farther")
 
 
 def _mission(request: RunRequest, **more: str) -> Mission:

@@ -17,8 +17,7 @@ from pydantic import BaseModel, ValidationError
 from glotouch_bt.errors import BadInput
 from glotouch_bt.robot.definition.robot_file import BoxSection, GripperSection, RobotFile
 from glotouch_bt.robot.definition.urdf import UrdfChain, read_chain
-from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription
-from glotouch_bt.robot.fake import forward
+from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription, forward
 from glotouch_bt.robot.geometry import Pose
 from glotouch_bt.untrusted import read_file
 
