@@ -4,18 +4,22 @@ VENV := .venv
 BIN := $(VENV)/bin
 export MPLBACKEND := Agg
 
-.PHONY: demo dev test test-integration check format docs reference results-page pins clean
+.PHONY: demo dev test test-integration test-browser check format docs reference results-page pins clean
 
 demo: $(VENV)
 	$(BIN)/glotouch run retrieve --set target=apple --seed 0
 
-# Quick tests: no whole mission in MuJoCo.
+# Quick tests: no whole mission in MuJoCo, no browser.
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest -n 2 --ignore=tests/integration
+	$(BIN)/python -m pytest -n 2 --ignore=tests/integration --ignore=tests/browser
 
 # Whole missions, backends and conformance in MuJoCo and on simulated devices.
 test-integration: $(VENV)/.dev
 	$(BIN)/python -m pytest -n 2 tests/integration
+
+# The pages in Chromium: needs chromium and chromium-driver (Debian's packages).
+test-browser: $(VENV)/.dev
+	GLOTOUCH_REQUIRE_BROWSER=1 $(BIN)/python -m pytest -n 2 tests/browser
 
 check: $(VENV)/.dev
 	$(BIN)/ruff format --check .
