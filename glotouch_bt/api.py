@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from glotouch_bt.faults import FaultPlan
-from glotouch_bt.mission import check_objects, load_mission
+from glotouch_bt.mission import check_feasible, load_mission, split_settings
 from glotouch_bt.mission.read import Value, load_conditions, load_world
 from glotouch_bt.mission.spec import Finding, MissionFaults
 from glotouch_bt.robot import BadInput, Robot, World, load_backend
@@ -81,15 +81,15 @@ def check(
     allow_paths: Sequence[str | Path] = (),
     backend: str = "mujoco",
 ) -> tuple[Finding, ...]:
-    """Check a mission against every outcome of every skill, and its objects, as `glotouch check` does.
+    """Check a mission against every outcome of every skill, its objects and the arm's reach, as `glotouch check` does.
 
     Args:
         mission: Path of a mission file, or the name of a shipped mission.
-        settings: Values of the mission's parameters.
+        settings: Values of the mission's parameters. Others are backend options, such as `robot`.
         objects: Folder of watertight STL files in metres, instead of the world's.
         world: Path of a world file, or the name of a shipped world, instead of the mission's.
         allow_paths: Folders in which subtrees may be, besides the mission's own.
-        backend: The robot that must be able to grasp the target.
+        backend: The robot that must be able to reach the container and to grasp the target.
 
     Returns:
         Every mistake and warning (`Finding.severity`), with its place; empty for a mission without any.
@@ -107,7 +107,7 @@ def check(
         )
     except MissionFaults as e:
         return (*e.findings, *e.warnings)
-    return (*loaded.warnings, *check_objects(loaded, backend))
+    return (*loaded.warnings, *check_feasible(loaded, backend, split_settings(loaded, settings or {})))
 
 
 def open_robot(

@@ -64,7 +64,9 @@ def type_name(kind: Any) -> str:
     """Return a type as a reader writes it."""
     text = kind.__name__ if inspect.isclass(kind) and not getattr(kind, "__args__", ()) else str(kind)
     text = re.sub(r"typing\.Literal\[(.*)\]", lambda m: m[1].replace("'", "").replace(", ", " or "), text)
-    text = re.sub(r"\b(?:[a-z_]\w*\.)+(?=[A-Z])", "", text).replace("typing.", "")
+    text = re.sub(r"\b(?:[a-z_]\w*\.)+(?=[A-Z])", "", text)
+    text = re.sub(r"Annotated\[(\w+), FieldInfo\([^()]*\([^()]*\)[^()]*\)\]", r"\1", text)
+    text = text.replace("typing.", "")
     return text.replace(" | None", "").replace(" | ", " or ")
 
 

@@ -7,20 +7,22 @@ import re
 import tempfile
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin
 
 import yaml
 from markdown_text import NOTE, code, codes, fields, prose, table
 from mcap.reader import make_reader
 from pydantic import BaseModel
 
+from glotouch_backends.robots import load_robot, shipped_robots
 from glotouch_bt.faults import CATALOGUE
 from glotouch_bt.mission.export import describe_nodes, describe_skill, mission_schema
 from glotouch_bt.mission.read import Declaration, SkillRegistry, WorldFile, shipped
 from glotouch_bt.mission.record import Recorder
 from glotouch_bt.mission.record.mcap_schemas import CHANNELS as CHANNELS_OF_RECORD
 from glotouch_bt.mission.spec import UNITS, describe_findings
-from glotouch_bt.robot import HOLD, FakeRobot
+from glotouch_bt.robot import HOLD, FakeRobot, RobotFile
+from glotouch_bt.robot.definition import LIMITS
 
 MISSION = """# Mission files
 
@@ -131,6 +133,7 @@ def pages() -> dict[str, str]:
         "nodes": nodes,
         "skills": skills,
         "worlds": worlds,
+        "robots": robots,
         "conditions": conditions,
         "faults": faults,
         "findings": findings,
@@ -261,6 +264,56 @@ def worlds() -> str:
             text.append(f"## {name}\n\n{prose(kind.__doc__ or '')}\n\n{fields(kind)}")
     rows = [(code(n), yaml.safe_load(p.read_text()).get("description", "")) for n, p in shipped("worlds").items()]
     return "\n".join([*text, "## Shipped worlds\n", table(("world", "description"), rows)])
+
+
+def robots() -> str:
+    """Return the page on robots' files."""
+    text = [
+        "# Robots\n",
+        "A robot of the simulation is a URDF and a YAML file. The URDF has the arm's kinematics, inertias and limits. "
+        "The YAML file has what a URDF cannot say. `--set robot=NAME` takes a shipped robot, `--set robot=FILE.yaml` "
+        "one of your own; [Write a backend](../guides/backend.md) shows how to write it.\n",
+        table(
+            ("shipped", "robot", "source"),
+            [(code(n), load_robot(n).name, load_robot(n).source) for n in shipped_robots()],
+        ),
+        "## The YAML file\n",
+        fields(RobotFile),
+    ]
+    for name, model in sections(RobotFile):
+        text.append(f"### {name}\n\n{prose(model.__doc__ or '')}\n\n{fields(model)}")
+    limits = [(code(f"limit {name}"), what) for name, what in LIMITS.items()]
+    text += [
+        "## The URDF\n",
+        "Only the chain from `base` to `flange` is read. Its joints must be revolute; joints after the last of them "
+        "may be fixed, and their links have no mass. Meshes, transmissions and branches are ignored.\n",
+        table(
+            ("part", "meaning"),
+            [
+                (code("joint origin"), "frame of the joint in the link before it; m and rad (roll, pitch, yaw)"),
+                (code("joint axis"), "axis of rotation in the joint's frame"),
+                *limits,
+                (code("link inertial"), "mass in kg, inertia in kg m2 and the frame of both, of every link"),
+            ],
+        ),
+        "## The shipped file iiwa14.yaml\n",
+        "```yaml\n" + shipped_robots()["iiwa14"].read_text().rstrip() + "\n```\n",
+    ]
+    return "\n".join(text)
+
+
+def sections(model: type[BaseModel], above: str = "") -> list[tuple[str, type[BaseModel]]]:
+    """Return every section inside a file's model, with its place."""
+    found: list[tuple[str, type[BaseModel]]] = []
+    for name, field in model.model_fields.items():
+        inside = [field.annotation]
+        for kind in inside:
+            inside += get_args(kind)
+        named = f"{above}{name}" + (".NAME" if get_origin(field.annotation) is dict else "")
+        for kind in inside:
+            if inspect.isclass(kind) and issubclass(kind, BaseModel):
+                found += [(named, kind), *sections(kind, f"{named}.")]
+    return found
 
 
 def conditions() -> str:

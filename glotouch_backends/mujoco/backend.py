@@ -18,9 +18,11 @@ from glotouch_backends.mujoco.simulation import MujocoDisturber, MujocoReferee
 from glotouch_backends.mujoco.truth import draw_truth
 from glotouch_backends.options import WorldOptions, convert_options
 from glotouch_backends.rizon4 import RIZON4_XENSE
+from glotouch_backends.robots import load_robot, shipped_robots
 from glotouch_bt.robot import Backend, BackendError, Conditions, Limits, Picture, Robot, RobotDescription, World
 from glotouch_bt.robot.simulation import Disturber, Referee, TouchSampler
 
+DEFAULT_ROBOT = "rizon4"
 SETTLE_S = 0.6
 """Simulated time in which the world comes to rest. Source: ours."""
 START_APERTURE_M = 0.040
@@ -32,9 +34,11 @@ class MujocoOptions(WorldOptions):
     """Options of this backend.
 
     Attributes:
+        robot: Name of a shipped robot, or path of a robot's YAML file.
         trace: Record every control input, so that the referee can repeat the solver steps (80 kB/s).
     """
 
+    robot: str = DEFAULT_ROBOT
     trace: bool = False
 
 
@@ -75,29 +79,35 @@ def build_world(
 
 
 class MujocoBackend(Backend):
-    """A Rizon 4 with a tactile gripper, a probe in its stand and free objects in a box, in MuJoCo.
+    """An arm with a tactile gripper, a probe in its stand and free objects in a box, in MuJoCo.
 
     Args:
-        description: The robot; the servo gains are for this arm.
         limits: Hard limits to enforce.
     """
 
     name = "mujoco"
-    summary = "MuJoCo: Rizon 4, tactile gripper, free objects in a container; seeded, no display needed"
+    summary = (
+        "MuJoCo: an arm (--set robot=NAME or FILE), tactile gripper, free objects in a container; seeded, "
+        "no display needed"
+    )
+    description = RIZON4_XENSE
 
-    def __init__(self, description: RobotDescription = RIZON4_XENSE, limits: Limits | None = None) -> None:
-        self.description: RobotDescription = description
+    def __init__(self, limits: Limits | None = None) -> None:
         self._limits = limits or Limits()
+
+    def describe(self, options: Mapping[str, object]) -> RobotDescription:
+        """See `Backend`."""
+        return load_robot(str(options.get("robot", DEFAULT_ROBOT)))
 
     def open(self, world: World, conditions: Conditions, seed: int, options: Mapping[str, object]) -> Robot:
         """See `Backend`; options in `MujocoOptions`."""
         chosen = MujocoOptions(**convert_options(self.name, options, MujocoOptions))
-        built = build_world(self.description, world, conditions, seed, chosen)
+        built = build_world(load_robot(chosen.robot), world, conditions, seed, chosen)
         return MujocoRobot(built, self._limits, chosen.trace)
 
     def is_portable(self, option: str, value: object) -> bool:
-        """See `Backend`: every option describes the simulated world."""
-        return True
+        """See `Backend`: every option describes the simulated world, except a robot's file."""
+        return option != "robot" or value in shipped_robots()
 
     def referee(self, robot: Robot) -> Referee | None:
         """See `Backend`."""

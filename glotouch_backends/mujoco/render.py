@@ -15,6 +15,7 @@ from glotouch_bt.robot import BackendError, UnknownName
 # (body to look at, height above it m, distance m, azimuth deg, elevation deg)
 CAMERAS: dict[str, tuple[str, float, float, float, float]] = {
     "overview": ("container", 0.17, 1.12, 142.0, -27.0),
+    "whole": ("container", 0.34, 1.75, 142.0, -14.0),
     "container": ("container", 0.05, 0.72, 150.0, -38.0),
     "above": ("container", 0.0, 0.75, 180.0, -89.0),
     "holder": ("holder", 0.0, 0.45, 120.0, -15.0),

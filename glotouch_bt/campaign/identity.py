@@ -14,17 +14,18 @@ from typing import Any
 
 from glotouch_bt.escaped_text import json_text
 from glotouch_bt.faults import FaultPlan, read_plan
-from glotouch_bt.mission import load_mission
+from glotouch_bt.mission import load_mission, split_settings
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import to_json
+from glotouch_bt.robot import load_backend
 from glotouch_bt.robot.scene import stl_files
-from glotouch_bt.runs import RunRequest, installed_versions
+from glotouch_bt.runs import RunRequest, installed_versions, robot_identity
 
 OURS = ("glotouch_bt", "glotouch_missions")
 """Packages that every result depends on."""
 GROUPS = ("glotouch_bt.backends", "glotouch_bt.skills", "glotouch_bt.resume_check")
 """Entry points of further packages."""
-SOURCES = (".py", ".yaml")
+SOURCES = (".py", ".yaml", ".urdf")
 
 
 @cache
@@ -64,7 +65,13 @@ def described_request(request: RunRequest) -> dict[str, Any]:
         "conditions": request.conditions,
         "faults": _described_plan(request),
         "content": _content(
-            request.mission, settings, request.objects, request.world, request.conditions, request.allow_paths
+            request.mission,
+            settings,
+            request.objects,
+            request.world,
+            request.conditions,
+            request.allow_paths,
+            request.backend,
         ),
         **described_code(),
     }
@@ -84,8 +91,9 @@ def _content(
     other_world: str | None,
     conditions: str,
     allow_paths: tuple[Path, ...],
+    backend: str,
 ) -> dict[str, str]:
-    """Return the digests of the mission with its world, of each object, and of the conditions."""
+    """Return the digests of the mission with its world, of each object, of the conditions, and of the robot."""
     loaded = load_mission(mission, dict(settings), objects=objects, world=other_world, allow_paths=allow_paths)
     chosen = loaded.world.objects
     world = replace(loaded.world, objects=replace(chosen, folder=Path()))
@@ -95,8 +103,10 @@ def _content(
     }
     found = {name: digest(json.dumps(part, sort_keys=True).encode()) for name, part in parts.items()}
     files = stl_files(chosen.folder)
+    robot = load_backend(backend).describe(split_settings(loaded, dict(settings)))
     return (
         found
+        | ({} if robot is None else {"robot": robot_identity(robot)["digest"]})
         | {"conditions": conditions_digest(conditions)}
         | {f"object {n}": digest(files[n].read_bytes()) for n in chosen.names or files}
     )

@@ -34,10 +34,10 @@ def check(
 ) -> int:
     """Check missions against every outcome of every skill.
 
-    The objects must fit into the box, and the target between the jaws. Each mistake is shown with its line, the
-    reason and the shortest run that reaches it. Nothing moves.
+    The arm must reach the box, the objects must fit into it, and the target between the jaws. Each mistake is shown
+    with its line, the reason and the shortest run that reaches it. Nothing moves.
     """
-    from glotouch_bt.mission import check_objects, load_mission, split_settings
+    from glotouch_bt.mission import check_feasible, load_mission, split_settings
     from glotouch_bt.mission.nodes import kind_of
     from glotouch_bt.mission.spec import Finding, Findings, MissionFaults, Place
     from glotouch_bt.robot import BadInput
@@ -59,10 +59,11 @@ def check(
                 sys.stderr.write(f"{e}\n")
             continue
         else:
-            found = [*mission.warnings, *check_objects(mission, backend)]
+            options = split_settings(mission, settings)
+            found = [*mission.warnings, *check_feasible(mission, backend, options)]
             left = ", ".join(
                 f"{name}; did you mean {near!r}?" if (near := Findings.nearest(name, mission.parameters)) else name
-                for name in split_settings(mission, settings)
+                for name in options
             )
             nodes, runs = sum(1 for _ in mission.spec.walk()), kind_of(mission.spec).max_runs(mission.spec)
             report |= {"nodes": nodes, "skill_runs": str(runs), "timeout_s": mission.timeout_s}

@@ -9,7 +9,17 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.shared import Groot2, Json, NoBrowser, Port, RunFolderArgument, guarded, print_json
+from glotouch_bt.commands.shared import (
+    BackendSettings,
+    Groot2,
+    Json,
+    NoBrowser,
+    Port,
+    RunFolderArgument,
+    guarded,
+    print_json,
+    read_settings,
+)
 
 RunObjects = Annotated[
     Path | None, typer.Option("--objects", metavar="DIR", help="folder of the STL files, to show the objects")
@@ -21,11 +31,13 @@ def report(
     folder: RunFolderArgument,
     film: Annotated[bool, typer.Option("--film", help="render moments of a simulated run into it")] = False,
     objects: RunObjects = None,
+    set_: BackendSettings = None,
     json_: Json = False,
 ) -> None:
     """Write report.html of a run again.
 
-    --film draws the world as it was when skills had ended. Without a display it needs MUJOCO_GL=egl.
+    --film draws the world as it was when skills had ended. Without a display it needs MUJOCO_GL=egl. A run with a robot
+    of one's own needs --set robot=FILE.
     """
     from glotouch_bt.commands.terminal import print_error
     from glotouch_bt.report import write_report
@@ -34,7 +46,7 @@ def report(
 
     if film:
         try:
-            write_film(folder, objects)
+            write_film(folder, objects, read_settings(set_))
         except GlotouchError as e:
             print_error(f"no film: {e}")
     made = write_report(folder, objects)

@@ -1,12 +1,14 @@
-"""Find before a run what would end it: objects that do not fit into the container, a target that cannot be grasped."""
+"""Find before a run what would end it: a box out of reach, objects that do not fit into it, an impossible target."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.read import shipped_root
 from glotouch_bt.mission.spec import Finding, Findings, Place
+from glotouch_bt.motion import out_of_reach
 from glotouch_bt.perception import TooLow, model_for, too_wide
 from glotouch_bt.robot import BadInput, Gripper, ObjectSet, load_backend
 from glotouch_bt.robot.scene import Mesh, draw_layout, load_folder, load_mesh
@@ -15,20 +17,28 @@ SEED = 0
 """Seed of the layout that is tried: the default of a run. Objects that fit tightly may fail with another one."""
 
 
-def check_objects(mission: Mission, backend: str) -> tuple[Finding, ...]:
-    """Place the objects of a mission once, and judge its targets; each fault in the words of the run that would fail.
+def check_feasible(mission: Mission, backend: str, options: Mapping[str, object]) -> tuple[Finding, ...]:
+    """Check reach, place the objects once, and judge the targets; each fault in the words of the run that would fail.
 
     The shipped objects are not judged again, so that checking a shipped mission stays quick.
 
+    Args:
+        mission: The mission.
+        backend: Name of a registered backend.
+        options: Its options, as `Backend.open` takes them.
+
     Raises:
-        BadInput: There is no such backend.
+        BadInput: There is no such backend, or its robot cannot be read.
         BackendError: It cannot be used here.
     """
     objects, findings = mission.world.objects, Findings()
-    description = load_backend(backend).description
+    description = load_backend(backend).describe(options)
     gripper = None if description is None else description.gripper
+    if description is not None:
+        for fault in out_of_reach(description, mission.world):
+            findings.add(Place(f"world {mission.world.name}"), "box_out_of_reach", f"{description.name}: {fault}")
     if objects.folder.resolve() == (shipped_root() / "objects").resolve():
-        return ()
+        return tuple(findings.sorted())
     meshes = load_folder(objects.folder, objects.names)
     try:
         draw_layout(meshes, mission.world, SEED)
@@ -36,7 +46,7 @@ def check_objects(mission: Mission, backend: str) -> tuple[Finding, ...]:
         findings.add(Place(str(objects.folder)), "no_layout", str(e))
     for name in mission.stl_parameters:
         target = str(mission.parameters.get(name, ""))
-        if target and gripper is not None and (fault := out_of_reach(_loaded(target, objects), gripper)):
+        if target and gripper is not None and (fault := ungraspable(_loaded(target, objects), gripper)):
             findings.add(Place(f"--set {name}"), "target_out_of_reach", fault)
     return tuple(findings.sorted())
 
@@ -47,7 +57,7 @@ def _loaded(target: str, objects: ObjectSet) -> Mesh:
     return load_folder(objects.folder, (target,))[0]
 
 
-def out_of_reach(mesh: Mesh, gripper: Gripper) -> str:
+def ungraspable(mesh: Mesh, gripper: Gripper) -> str:
     """Return why an object cannot be felt or grasped, or empty."""
     try:
         return too_wide(model_for(mesh, gripper), gripper)

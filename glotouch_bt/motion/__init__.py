@@ -12,3 +12,4 @@ from glotouch_bt.motion.plan import MotionPlan, plan_piece
 from glotouch_bt.motion.shapes import finger_outline_half_m
 from glotouch_bt.motion.timing import Paces, ProfileLimits, rest_to_rest
 from glotouch_bt.motion.travel import Motion, MoveResult, drive
+from glotouch_bt.motion.workspace import out_of_reach

@@ -26,7 +26,7 @@ h3 small{font-weight:400;color:var(--soft);margin-left:8px}
 .good .verdict{color:var(--good)}
 .bad .verdict{color:var(--bad)}
 .warn .verdict{color:var(--warn)}
-.facts{color:var(--soft);margin:0}
+.facts{color:var(--soft);margin:0;display:flex;flex-wrap:wrap}
 .facts b{color:var(--ink);font-weight:600}
 .facts span{margin-right:20px;white-space:nowrap}
 .results{margin:12px 0 0;padding-left:20px;font-size:15.5px}

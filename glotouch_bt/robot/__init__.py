@@ -1,4 +1,4 @@
-"""The interface between missions and robots. Imports only `lazy` of this project.
+"""The interface between missions and robots. Imports only the lowest layers of this project.
 
 `Robot.cycle(command) -> observation` is the contract; see `interface`. Values are frozen and carry units and frames in
 their names; see `observation` for the frames.
@@ -27,6 +27,7 @@ from glotouch_bt.robot.command import (
     Tare,
     Ticket,
 )
+from glotouch_bt.robot.definition import RobotFile, read_robot
 from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription
 from glotouch_bt.robot.fake import FakeRobot
 from glotouch_bt.robot.geometry import (

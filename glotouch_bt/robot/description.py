@@ -8,8 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
-from glotouch_bt.robot.geometry import Array, Pose
+from glotouch_bt.robot.geometry import Array, Pose, cross_matrix, rpy_to_matrix
 
 Vec3 = tuple[float, float, float]
 
@@ -56,6 +57,7 @@ class Joint:
         torque_Nm: Torque limit.
         armature_kgm2: Reflected rotor inertia.
         link: The link it moves; the link frame is the joint frame.
+        servo_stiffness_Nm_rad: Stiffness of its position servo; 0 if unknown. Only a simulated arm needs it.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Joint:
     torque_Nm: float
     armature_kgm2: float
     link: Link
+    servo_stiffness_Nm_rad: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,3 +152,18 @@ class RobotDescription:
     def dof(self) -> int:
         """Number of joints."""
         return len(self.joints)
+
+
+def forward(description: RobotDescription, q: npt.ArrayLike) -> Pose:
+    """Return the pose of P in B at `q` (dof,) rad by chaining the description's frames."""
+    pose = Pose(np.zeros(3))
+    for joint, angle in zip(description.joints, np.asarray(q, dtype=np.float64), strict=True):
+        turn = rpy_to_matrix(joint.origin_rpy_rad) @ _about(joint.axis, float(angle))
+        pose = pose @ Pose.from_matrix(joint.origin_m, turn)
+    return pose @ description.pose_last_E @ description.gripper.pose_E_P
+
+
+def _about(axis: tuple[float, float, float], angle: float) -> Array:
+    """Return the rotation matrix (3, 3) about a unit axis (Rodrigues)."""
+    k = cross_matrix(axis)
+    return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k), dtype=np.float64)

@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from glotouch_bt.errors import BadInput, ParamError, SafetyStop
 from glotouch_bt.robot.command import Command, GripperTarget, PendingTicket, Request, SetPayload
-from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription
-from glotouch_bt.robot.geometry import Array, Pose, cross, cross_matrix, frozen_array, rpy_to_matrix
+from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription, forward
+from glotouch_bt.robot.geometry import Array, Pose, cross, frozen_array
 from glotouch_bt.robot.interface import Backend, Robot
 from glotouch_bt.robot.limits import Limits
 from glotouch_bt.robot.observation import GripperState, Observation, TactileFrame
@@ -85,21 +85,6 @@ def _fake_arm() -> RobotDescription:
 
 
 FAKE_ARM = _fake_arm()
-
-
-def forward(description: RobotDescription, q: npt.ArrayLike) -> Pose:
-    """Return the pose of P in B at `q` (dof,) rad by chaining the description's frames."""
-    pose = Pose(np.zeros(3))
-    for joint, angle in zip(description.joints, np.asarray(q, dtype=np.float64), strict=True):
-        turn = rpy_to_matrix(joint.origin_rpy_rad) @ _about(joint.axis, float(angle))
-        pose = pose @ Pose.from_matrix(joint.origin_m, turn)
-    return pose @ description.pose_last_E @ description.gripper.pose_E_P
-
-
-def _about(axis: tuple[float, float, float], angle: float) -> Array:
-    """Return the rotation matrix (3, 3) about a unit axis (Rodrigues)."""
-    k = cross_matrix(axis)
-    return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k), dtype=np.float64)
 
 
 def _turned(quat: Array, vector: Array) -> Array:

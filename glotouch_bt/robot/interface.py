@@ -117,6 +117,14 @@ class Backend(ABC):
             BackendError: The device did not come up.
         """
 
+    def describe(self, options: Mapping[str, object]) -> RobotDescription | None:
+        """Return the robot that `open` would open with these options, without opening it; None as for `description`.
+
+        Raises:
+            BadInput: The options name a robot that cannot be read.
+        """
+        return self.description
+
     def is_portable(self, option: str, value: object) -> bool:
         """Return True if a run's folder, which may come from a stranger, may set this option when it is resumed.
 

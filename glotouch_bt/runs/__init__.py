@@ -7,3 +7,4 @@ from glotouch_bt.runs.operator import Operator, operated
 from glotouch_bt.runs.result import installed_versions
 from glotouch_bt.runs.resume import resume
 from glotouch_bt.runs.resume_point import ResumableRun, copy_run, find_resumable
+from glotouch_bt.runs.robot_identity import robot_identity

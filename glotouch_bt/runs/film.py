@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from glotouch_bt.mission.read import conditions_of
 from glotouch_bt.robot import BackendError, BadInput, load_backend
 from glotouch_bt.runs.folder import FILM, require_run_folder
 from glotouch_bt.runs.resume_point import mission_of_run, stored_run
+from glotouch_bt.runs.robot_identity import require_same_robot
 from glotouch_bt.untrusted import write_file
 
 MOMENTS = 8
@@ -26,15 +28,17 @@ OVERSAMPLED = 2
 """Pictures are drawn larger by this factor, so that their edges become smooth."""
 
 
-def write_film(folder: Path, objects: Path | None = None) -> Path:
+def write_film(folder: Path, objects: Path | None = None, settings: Mapping[str, str] | None = None) -> Path:
     """Render what the world looked like when the main skills of a run had ended, and write film.json into its folder.
 
     Args:
         folder: The run's folder.
         objects: Folder of STL files, if the run was made with one.
+        settings: Backend options that the run's folder does not choose, such as the file of a robot.
 
     Raises:
-        BadInput: The run has no simulated world, its mission cannot be loaded, or the folder cannot be written.
+        BadInput: The run has no simulated world or was made with another robot, its mission cannot be loaded, or the
+            folder cannot be written.
         BackendError: The world cannot be built, or no picture can be taken here.
     """
     require_run_folder(folder)
@@ -45,10 +49,12 @@ def write_film(folder: Path, objects: Path | None = None) -> Path:
         mission = mission_of_run(folder, run, objects)
         backend = load_backend(request["backend"])
         asked = split_settings(mission, request["settings"])
-        options = {n: value for n, value in asked.items() if backend.is_portable(n, value)}
+        portable = {n: value for n, value in asked.items() if backend.is_portable(n, value)}
+        options = {**portable, **(settings or {})}
         conditions = conditions_of(run["conditions"], f"{folder}: conditions")
         pictures = []
         with backend.open(mission.world, conditions, request["seed"], options) as robot:
+            require_same_robot(folder, run, robot.description)
             camera = backend.camera(robot)
             if camera is None:
                 raise BadInput(f"{folder}: the backend {request['backend']!r} has no camera")

@@ -22,12 +22,14 @@ from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile, Chec
 from glotouch_bt.mission.execution import Control, Outcome, SkillHung, deferred_interrupt, run_mission
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import Record, Recorder, RunSummary
-from glotouch_bt.robot import BackendError, BadInput, Conditions, GlotouchError, Robot, load_backend
+from glotouch_bt.motion import out_of_reach
+from glotouch_bt.robot import BackendError, BadInput, Conditions, GlotouchError, Robot, RobotDescription, load_backend
 from glotouch_bt.robot.simulation import Referee, TrueObject
 from glotouch_bt.runs.folder import MODELS, RunFolder, locked
 from glotouch_bt.runs.request import RunRequest, RunResult
 from glotouch_bt.runs.result import description, final_truth, installed_versions, mission_yaml, score, truth
 from glotouch_bt.runs.resume_point import ResumableRun, describe_checkpointed_run
+from glotouch_bt.runs.robot_identity import require_same_robot, robot_identity
 
 MAX_SEED = 2**32 - 1
 RECORD_PART = ".run.mcap.part"
@@ -76,17 +78,24 @@ def launch(
                 folder.check_free(request.overwrite)
             if plan is not None and resumable is None and (models := wrong_models(plan, mission, folder.path / MODELS)):
                 mission = _mission(request, **models)
+            known = backend.describe(options)
+            if known is not None:  # before a real arm is enabled
+                _require_reach(known, mission)
             try:
                 robot = backend.open(mission.world, conditions, request.seed, options)
             except BadInput as e:
                 if not options:
                     raise
-                known = ", ".join(mission.parameters) or "none"
-                raise BadInput(f"{e} (parameters of mission {mission.name!r}: {known})") from e
+                names = ", ".join(mission.parameters) or "none"
+                raise BadInput(f"{e} (parameters of mission {mission.name!r}: {names})") from e
             try:
                 referee = backend.referee(robot)
                 world = None if resumable is None else resumable.file.world(resumable.row.number)
                 objects_at_start = referee.objects() if referee else []
+                if resumable is not None:
+                    require_same_robot(folder.path, resumable.file.run, robot.description)
+                if known is None:
+                    _require_reach(robot.description, mission)
                 if world is not None:
                     robot.restore(world)
                 if plan is not None:
@@ -110,6 +119,12 @@ def launch(
                 request, mission, conditions, robot, referee, folder, objects_at_start, began, resumable, resume_point
             )
             return _run(run, on_progress, control)
+
+
+def _require_reach(description: RobotDescription, mission: Mission) -> None:
+    if faults := out_of_reach(description, mission.world):
+        listed = "\n".join(f"{description.name} cannot reach {fault}" for fault in faults)
+        raise BadInput(f"{listed}\nmove it in the world file, or use an arm that reaches farther")
 
 
 def _mission(request: RunRequest, **more: str) -> Mission:
@@ -148,6 +163,7 @@ def _record(run: _Run) -> tuple[Recorder, CheckpointFile, CheckpointWriter]:
     if resumable is None:
         recorder = Recorder(folder.path / "run.mcap", setup)
         described = describe_checkpointed_run(run.request.as_json(), run.mission, run.conditions, installed_versions())
+        described["robot"] = robot_identity(run.robot.description)
         file = CheckpointFile.create(folder.path / CHECKPOINT_FILE, described)
         return recorder, file, CheckpointWriter(file, recorder)
     recorder = Recorder(folder.path / RECORD_PART, setup)
@@ -157,7 +173,7 @@ def _record(run: _Run) -> tuple[Recorder, CheckpointFile, CheckpointWriter]:
 def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, control: Control | None) -> RunResult:
     request, mission, robot, referee, folder = run.request, run.mission, run.robot, run.referee, run.folder
     if run.resumable is None:
-        folder.write_text("mission.yaml", mission_yaml(request, mission))
+        folder.write_text("mission.yaml", mission_yaml(request, mission, robot.description.name))
     ready = time.perf_counter()
     recorder, store, checkpoints = _record(run)
     resume_point = run.resume_point
@@ -171,7 +187,9 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
         """Write what is known and end the process, because the main thread hangs in a skill."""
         try:
             record.event("stuck", outcome.end_s, {"node": stuck.node, "stack": stuck.stack})
-            result = score(request, mission, outcome, None) | {"wall_time_s": round(time.perf_counter() - ready, 3)}
+            result = score(request, mission, outcome, None, robot) | {
+                "wall_time_s": round(time.perf_counter() - ready, 3)
+            }
             _write_end(recorder, folder, result)
             sys.stderr.write(f"glotouch: {outcome.reasons[-1]}\n{stuck.stack}")
             sys.stderr.flush()
@@ -201,7 +219,7 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
         with deferred_interrupt(raising=False):  # Ctrl-C must not lose the result
             ended = time.perf_counter()
             seen, unscored = final_truth(referee)
-            result = score(request, mission, outcome, seen) | ({"unscored": unscored} if unscored else {})
+            result = score(request, mission, outcome, seen, robot) | ({"unscored": unscored} if unscored else {})
             result |= {"wall_time_s": round(ended - ready, 3), "wall_open_s": round(ready - run.began, 3)}
             if run.resumable is not None:
                 result["resumed"] = [*run.resumable.before, run.resumable.as_dict()]

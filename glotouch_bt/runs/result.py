@@ -6,6 +6,7 @@ The truth of a simulated world is read here after the run, for scoring only.
 from __future__ import annotations
 
 import dataclasses
+import json
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -25,9 +26,10 @@ GO_ON = "glotouch resume RUN"
 RECORDED_PACKAGES = ("mujoco", "numpy", "pin", "py_trees", "ruckig", "scipy", "trimesh")
 
 
-def mission_yaml(request: RunRequest, mission: Mission) -> str:
-    """Return the resolved mission as YAML, with a comment that says how it was run."""
+def mission_yaml(request: RunRequest, mission: Mission, robot: str) -> str:
+    """Return the resolved mission as YAML, with a comment that says how and with which robot it was run."""
     head = f"# backend {request.backend}, seed {request.seed}, conditions {request.conditions}\n"
+    head += f"# robot {json.dumps(robot)}\n"
     return head + mission.resolved_yaml()
 
 
@@ -73,7 +75,9 @@ def final_truth(referee: Referee | None) -> tuple[FinalTruth | None, str]:
         return None, f"the simulated world can no longer be asked for the truth: {e}"
 
 
-def score(request: RunRequest, mission: Mission, outcome: Outcome, seen: FinalTruth | None) -> dict[str, Any]:
+def score(
+    request: RunRequest, mission: Mission, outcome: Outcome, seen: FinalTruth | None, robot: Robot
+) -> dict[str, Any]:
     """Return the content of result.json without wall times; without the truth, nothing counts as retrieved."""
     found = outcome.summary
     target = _target(mission)
@@ -88,6 +92,7 @@ def score(request: RunRequest, mission: Mission, outcome: Outcome, seen: FinalTr
     return {
         "mission": mission.name,
         "backend": request.backend,
+        "robot": robot.description.name,
         "seed": request.seed,
         "conditions": conditions_name(request.conditions),
         "status": outcome.status,

@@ -17,7 +17,7 @@ import numpy as np
 from glotouch_backends.flexiv_xense.simulated.kinematics import ControllerKinematics, inverse, rotation_between
 from glotouch_backends.flexiv_xense.simulated.trajectory import Trajectory, cubic_extremes, shortest
 from glotouch_backends.mujoco.control import BRAKE_REACH_M
-from glotouch_backends.mujoco.model import DAMPING_PER_STIFFNESS_S, JOINT_DAMPING, STEP_S, STIFFNESS_NM_RAD, BuiltWorld
+from glotouch_backends.mujoco.model import DAMPING_PER_STIFFNESS_S, JOINT_DAMPING, STEP_S, BuiltWorld
 from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, WristSensor, up_in
 from glotouch_bt.robot import Array, Pose, cross_matrix, quat_to_matrix
 from glotouch_bt.robot.scene import stream
@@ -101,7 +101,7 @@ class SimulatedArm:
         self._model, self._data, self._h, self.sensors = model, data, handles, handles.sensors
         self.trajectory = Trajectory(np.array(data.qpos[handles.arm_qpos]))
         self.kinematics = ControllerKinematics(model, handles)
-        kp = np.array(STIFFNESS_NM_RAD)
+        kp = np.array([j.servo_stiffness_Nm_rad for j in description.joints])
         self._per_kp, self._lead = 1.0 / kp, DAMPING_PER_STIFFNESS_S + JOINT_DAMPING / kp
         self._vector, self._product = np.zeros(model.nv), np.zeros(model.nv)
         self._jacobian = np.zeros((6, model.nv))

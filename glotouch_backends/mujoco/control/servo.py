@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from glotouch_backends.mujoco.model import DAMPING_PER_STIFFNESS_S, JOINT_DAMPING, STEPS, STIFFNESS_NM_RAD, Handles
+from glotouch_backends.mujoco.model import DAMPING_PER_STIFFNESS_S, JOINT_DAMPING, STEPS, Handles
 from glotouch_bt.compiled import compiled
 from glotouch_bt.robot import Array, JointSetpoint, ParamError, RobotDescription
 
@@ -78,7 +78,7 @@ class Servo:
             [0.5 * (upper - lower) + 1e-9, fastest, np.full(n, MAX_ACCELERATION_RAD_S2), VELOCITY_SLACK * fastest]
         )
         self._names = [j.name for j in joints]
-        kp = np.array(STIFFNESS_NM_RAD)
+        kp = np.array([j.servo_stiffness_Nm_rad for j in joints])
         self._per_kp = 1.0 / kp
         self._lead = DAMPING_PER_STIFFNESS_S + JOINT_DAMPING / kp
         self._ahead = self._lead - lag_s

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import mujoco
 import numpy as np
 
@@ -11,9 +13,6 @@ from glotouch_bt.robot import Array, Link, ParamError, Pose, RobotDescription, m
 
 JOINT_DAMPING = 2.0
 """Joint damping, Nm s/rad. Source: ours."""
-STIFFNESS_NM_RAD = (10000.0, 10000.0, 6000.0, 6000.0, 3000.0, 3000.0, 3000.0)
-"""Position servo, proximal to distal. Source: tuned; it tracks 60 mm/s to 0.12 mm and yields 0.13-0.19 mm/N at the
-hand."""
 DAMPING_PER_STIFFNESS_S = 0.04
 """Servo damping over stiffness, s. Source: ours."""
 ARM_COLOUR = (0.80, 0.82, 0.85, 1.0)
@@ -35,21 +34,31 @@ def _dress(body: mujoco.MjsBody, link: Link) -> None:
         set_friction(geom, HAND_FRICTION)
 
 
+def _require_simulable(description: RobotDescription) -> None:
+    for joint in description.joints:
+        if not joint.servo_stiffness_Nm_rad > 0.0:
+            value = joint.servo_stiffness_Nm_rad
+            raise ParamError(f"{joint.name}.servo_stiffness_Nm_rad", value, "positive to simulate the arm")
+    own = r"hand|probe|holder|container|finger_.*|object\d+|tip|jaw_.*"
+    for name in (description.base.name, *(n for j in description.joints for n in (j.name, j.link.name))):
+        if re.fullmatch(own, name):
+            raise ParamError("name of a link or joint", name, "another one: the simulated world uses it")
+
+
 def add_arm(spec: mujoco.MjSpec, description: RobotDescription, errors_rad: Array) -> mujoco.MjsBody:
     """Add the arm and its servos (actuators named as the joints); return the body of the flange frame E, still empty.
 
     `errors_rad` (joints, 3) are rotation vectors by which the true joint frames differ from the description.
 
     Raises:
-        ParamError: The servo gains are for a seven-axis arm.
+        ParamError: A joint has no servo stiffness, or the world has a body of the name of a link.
     """
-    if description.dof != len(STIFFNESS_NM_RAD):
-        raise ParamError("description.dof", description.dof, f"{len(STIFFNESS_NM_RAD)}")
+    _require_simulable(description)
     body = spec.worldbody.add_body(name=description.base.name)
     _dress(body, description.base)
     for geom in body.geoms:  # the base stands on the table
         geom.contype = geom.conaffinity = 0
-    for joint, kp, error in zip(description.joints, STIFFNESS_NM_RAD, errors_rad, strict=True):
+    for joint, error in zip(description.joints, errors_rad, strict=True):
         quat = matrix_to_quat(rpy_to_matrix(joint.origin_rpy_rad))
         if error.any():
             quat = (Pose(np.zeros(3), quat) @ rotation_vector(error)).quat
@@ -67,7 +76,9 @@ def add_arm(spec: mujoco.MjSpec, description: RobotDescription, errors_rad: Arra
         )
         _dress(body, joint.link)
         servo = spec.add_actuator(name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-        servo.set_to_position(kp=kp, kv=DAMPING_PER_STIFFNESS_S * kp)
+        servo.set_to_position(
+            kp=joint.servo_stiffness_Nm_rad, kv=DAMPING_PER_STIFFNESS_S * joint.servo_stiffness_Nm_rad
+        )
         servo.forcelimited = True
         servo.forcerange = (-joint.torque_Nm, joint.torque_Nm)
     return body.add_body(name="hand", pos=description.pose_last_E.position_m, quat=description.pose_last_E.quat)

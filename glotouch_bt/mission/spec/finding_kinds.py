@@ -59,6 +59,12 @@ _KINDS = (
         "use fewer or smaller objects, or a larger container",
     ),
     _Error(
+        "box_out_of_reach",
+        "the arm cannot reach a part of the container, or the probe in its stand",
+        "a motion there would be refused, and the mission would fail",
+        "move the container or the stand in the world file, or use an arm that reaches farther",
+    ),
+    _Error(
         "target_out_of_reach",
         "the target is too low to be felt, or too wide for the jaws",
         "the mission can only fail",

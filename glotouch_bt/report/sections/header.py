@@ -23,9 +23,11 @@ def header_section(record: RunRecord) -> str:
     tone, sentence = verdict(record)
     r, run = record.result, record.run
     facts = []
-    for name in ("mission", "target", "seed", "conditions", "backend"):
+    for name in ("mission", "target", "seed", "conditions", "backend", "robot"):
         value = r.get(name, run.get(name, _parameter(record, name)))
-        if isinstance(value, dict):
+        if name == "robot":
+            value = record.of_run("robot", "description", "name")
+        elif isinstance(value, dict):
             value = value.get("name")
         if value is not None:
             facts.append(f"<span>{name} <b>{esc(value)}</b></span>")

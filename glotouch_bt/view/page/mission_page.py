@@ -111,7 +111,7 @@ class Page:
         named = {
             "mission": run.get("mission"), "target": target, "seed": run.get("seed"),
             "conditions": conditions.get("name") if isinstance(conditions, dict) else None,
-            "robot": run.get("backend"),
+            "robot": run.get("backend") if setup.description is None else setup.description.name,
         }  # fmt: skip
         shown = [panels.fact(k, v) for k, v in named.items() if v is not None]
         self._facts = [" &nbsp; ".join(shown[:2]), " &nbsp; ".join(shown[2:])]

@@ -15,7 +15,7 @@ from glotouch_bt import check
 from glotouch_bt.cli import app
 from glotouch_bt.faults import read_plan
 from glotouch_bt.mission import load_mission
-from glotouch_bt.mission.read import SkillRegistry
+from glotouch_bt.mission.read import SkillRegistry, shipped, shipped_root
 from glotouch_bt.mission.spec import FINDING_KINDS, Finding, MissionFaults, Place, describe_findings
 from glotouch_bt.robot import BadInput
 from glotouch_bt.skill import Skill
@@ -56,7 +56,10 @@ EXAMPLES = {
     "unused_subtree": HEAD + "tree: [bare_hand]\nsubtrees:\n  other: {tree: bare_hand}\n",
     "practically_endless": HEAD + "tree: {retry: {attempts: 10000, do: {retry: {attempts: 10000, do: bare_hand}}}}\n",
 }
-ELSEWHERE = {"unreadable", "unusable_skill", "unknown_fault", "unknown_node", "no_layout", "target_out_of_reach"}
+ELSEWHERE = {
+    "unreadable", "unusable_skill", "unknown_fault", "unknown_node", "no_layout", "target_out_of_reach",
+    "box_out_of_reach",
+}  # fmt: skip
 """Kinds that no mission text alone can raise; the tests at the end of this file raise them."""
 
 
@@ -150,6 +153,19 @@ def test_faults_of_objects(code: str, size_m: tuple[float, ...], count: int, sai
         trimesh.creation.box(size_m).export(tmp_path / f"o{i}.stl")
     found = check("retrieve", {"target": "o0"}, objects=tmp_path)
     assert [f.what for f in found if f.code == code and said in f.what], found
+
+
+@pytest.mark.parametrize("robot", ["rizon4", "iiwa14"])
+def test_box_out_of_reach(robot: str, tmp_path: Path) -> None:
+    shipped_world = shipped("worlds")["container_five"].read_text()
+    world = tmp_path / "far.yaml"
+    world.write_text(shipped_world.replace("[0.60, 0.0, -0.20]", "[0.80, 0.0, -0.20]"))
+    found = check("retrieve", {"robot": robot}, world=world, objects=shipped_root() / "objects")
+    said = [f.what for f in found if f.code == "box_out_of_reach"]
+    assert said
+    assert "container" in said[0]
+    assert "cannot be reached" in said[0]
+    assert not [f for f in check("retrieve", {"robot": robot}) if f.code == "box_out_of_reach"]
 
 
 @pytest.mark.parametrize("count", [1, 3, 8])

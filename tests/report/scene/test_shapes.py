@@ -7,25 +7,30 @@ from functools import reduce
 import numpy as np
 import pytest
 
-from glotouch_backends.rizon4 import RIZON4_XENSE
+from glotouch_backends.robots import load_robot, shipped_robots
 from glotouch_bt.motion import Kinematics
 from glotouch_bt.report.scene import shapes
-from glotouch_bt.robot import Probe
+from glotouch_bt.robot import Probe, RobotDescription
+
+
+@pytest.fixture(params=sorted(shipped_robots()))
+def robot(request: pytest.FixtureRequest) -> RobotDescription:
+    return load_robot(request.param)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_hand_is_where_the_kinematics_have_it(seed: int) -> None:
-    q = np.random.default_rng(seed).uniform(-1.2, 1.2, RIZON4_XENSE.dof)
-    chain = [*shapes.joint_poses(RIZON4_XENSE, q), RIZON4_XENSE.pose_last_E, RIZON4_XENSE.gripper.pose_E_P]
+def test_the_hand_is_where_the_kinematics_have_it(robot: RobotDescription, seed: int) -> None:
+    q = np.random.default_rng(seed).uniform(-1.2, 1.2, robot.dof)
+    chain = [*shapes.joint_poses(robot, q), robot.pose_last_E, robot.gripper.pose_E_P]
     drawn = reduce(lambda a, b: a @ b, chain)
-    true = Kinematics(RIZON4_XENSE).fk(q)
+    true = Kinematics(robot).fk(q)
     np.testing.assert_allclose(drawn.position_m, true.position_m, atol=1e-9)
     np.testing.assert_allclose(drawn.rotation, true.rotation, atol=1e-9)
 
 
-def test_a_capsule_reaches_from_its_start_to_its_end() -> None:
-    solids = {(s.frame, s.name): s for s in shapes.robot_solids(RIZON4_XENSE)}
-    for frame, joint in zip(shapes.joint_frames(RIZON4_XENSE), RIZON4_XENSE.joints, strict=True):
+def test_a_capsule_reaches_from_its_start_to_its_end(robot: RobotDescription) -> None:
+    solids = {(s.frame, s.name): s for s in shapes.robot_solids(robot)}
+    for frame, joint in zip(shapes.joint_frames(robot), robot.joints, strict=True):
         for i, capsule in enumerate(joint.link.capsules):
             vertices = solids[frame, f"housing{i}"].vertices_m
             a, b = np.array(capsule.start_m), np.array(capsule.end_m)
@@ -34,8 +39,8 @@ def test_a_capsule_reaches_from_its_start_to_its_end() -> None:
             np.testing.assert_allclose(distance, capsule.radius_m, rtol=0.02)
 
 
-def test_the_gels_face_each_other_at_the_opening() -> None:
-    solids = {(s.frame, s.name): s for s in shapes.robot_solids(RIZON4_XENSE)}
+def test_the_gels_face_each_other_at_the_opening(robot: RobotDescription) -> None:
+    solids = {(s.frame, s.name): s for s in shapes.robot_solids(robot)}
     faces = {}
     for frame, side in (("left", 1.0), ("right", -1.0)):
         y = solids[frame, "gel"].vertices_m[:, 1] + shapes.finger_shift_m(0.06, side)[1]
