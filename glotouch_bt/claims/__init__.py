@@ -1,0 +1,6 @@
+"""The figures that the documentation claims: their table, the commands that make them, and the transfer into docs/results."""
+
+from glotouch_bt.claims.collect import collect
+from glotouch_bt.claims.run import Outcome, finished, run_claims
+from glotouch_bt.claims.source import commit_of_source
+from glotouch_bt.claims.table import Claim, chosen, made_by, read_claims, scaled
