@@ -79,7 +79,9 @@ def _board(claim: Mapping[str, Any], part: str, board: Mapping[str, Any], column
     ]
     older = " (older code)" if claim.get("older") else ""
     title = f"### {claim['title']}{', ' + part if part else ''}{older}\n"
-    made = f"`{claim['command']}`; commit {claim['commit']}; conditions {claim['conditions']}; seeds {claim['seeds']}.\n"
+    made = (
+        f"`{claim['command']}`; commit {claim['commit']}; conditions {claim['conditions']}; seeds {claim['seeds']}.\n"
+    )
     return [title, table(("", *columns), rows), made]
 
 

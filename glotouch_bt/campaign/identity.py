@@ -126,18 +126,27 @@ def _described_plan(request: RunRequest) -> Any:
     return {"seed": plan.seed, "faults": [{"fault": f.kind.name, **f.requested()} for f in plan.faults]}
 
 
-def difference(there: Mapping[str, Any], asked: Mapping[str, Any], within: str = "") -> str:
+def difference(there: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
     """Return the keys in which two descriptions differ, with both values, in words."""
     words = []
+    for path, one, two in changes(there, asked):
+        within = "".join("content of " if key == "content" else f"{key}: " for key in path[:-1])
+        words.append(f"{within}{path[-1]} {_short(one)}, now {_short(two)}")
+    return "; ".join(words)
+
+
+def changes(
+    there: Mapping[str, Any], asked: Mapping[str, Any], path: tuple[str, ...] = ()
+) -> list[tuple[tuple[str, ...], Any, Any]]:
+    """Return (path of keys, value there, value asked) of all that differs between two nested descriptions."""
+    found = []
     for key in sorted({*there, *asked}):
         one, two = there.get(key), asked.get(key)
-        if one == two:
-            continue
         if isinstance(one, dict) and isinstance(two, dict):
-            words.append(difference(one, two, f"{key}: " if key != "content" else "content of "))
-        else:
-            words.append(f"{within}{key} {_short(one)}, now {_short(two)}")
-    return "; ".join(words)
+            found += changes(one, two, (*path, key))
+        elif one != two:
+            found.append(((*path, key), one, two))
+    return found
 
 
 def _short(value: object) -> str:

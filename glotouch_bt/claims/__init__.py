@@ -2,5 +2,4 @@
 
 from glotouch_bt.claims.collect import collect
 from glotouch_bt.claims.run import Outcome, finished, run_claims
-from glotouch_bt.claims.source import commit_of_source
 from glotouch_bt.claims.table import Claim, chosen, made_by, read_claims, scaled

@@ -11,8 +11,8 @@ from typing import Any
 
 import yaml
 
+from glotouch_bt.campaign import CHANGED
 from glotouch_bt.claims.run import MANIFEST_SCALE, SUMMARY, finished
-from glotouch_bt.claims.source import CHANGED
 from glotouch_bt.claims.table import COUNTS, Claim, made_by
 from glotouch_bt.robot import BadInput
 from glotouch_bt.untrusted import read_json
@@ -46,7 +46,9 @@ def collect(claims: Mapping[str, Claim], out: Path, results: Path) -> tuple[list
     ends = {name: end for name, c in claims.items() if c.commands and (end := finished(out, name)) is not None}
     changed = [name for name, end in ends.items() if end["commit"].endswith(CHANGED)]
     if not ends or changed:
-        what = f"{', '.join(changed)} were measured with changes that are not committed" if changed else "is not finished"
+        what = (
+            f"{', '.join(changed)} were measured with changes that are not committed" if changed else "is not finished"
+        )
         raise BadInput(f"{out}: {what}; a published figure needs a commit")
     for name, end in ends.items():
         summary = read_json(out / name / SUMMARY)

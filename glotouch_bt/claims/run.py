@@ -1,10 +1,10 @@
 """Measure claims: run their commands one after another, each in a process and a folder of its own.
 
-    DIR/campaign.json            code, versions and scale: a folder holds figures of one state of the code
-    DIR/NAME/[PART/]             folder of the command (`--out`)
-    DIR/NAME/[PART/]output.txt   what the commands print on stdout
-    DIR/NAME/summary.json        the figures
-    DIR/NAME/done.json           written last: command lines, commit, exit codes, wall time
+DIR/campaign.json            code, versions and scale: a folder holds figures of one state of the code
+DIR/NAME/[PART/]             folder of the command (`--out`)
+DIR/NAME/[PART/]output.txt   what the commands print on stdout
+DIR/NAME/summary.json        the figures
+DIR/NAME/done.json           written last: command lines, commit, exit codes, wall time
 """
 
 from __future__ import annotations
@@ -23,8 +23,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from glotouch_bt.campaign import described_code, open_folder
-from glotouch_bt.claims.source import ROOT, commit_of_source
+from glotouch_bt.campaign import ROOT, commit_of_source, described_code, open_folder
 from glotouch_bt.claims.table import Claim
 from glotouch_bt.robot import BadInput, GlotouchError
 from glotouch_bt.runs import RunFolder
@@ -202,7 +201,9 @@ def _argv(words: list[str]) -> list[str]:
     if words[1].endswith(".py"):
         script = ROOT / words[1]
         if not script.is_file():
-            raise GlotouchError(f"{words[1]}: is not installed; run `glotouch bench all` from a clone of the repository")
+            raise GlotouchError(
+                f"{words[1]}: is not installed; run `glotouch bench all` from a clone of the repository"
+            )
         return [sys.executable, str(script), *words[2:]]
     return [sys.executable, *words[1:]]
 

@@ -136,7 +136,7 @@ def run_campaign(campaign: SearchCampaign, executor: Executor, on_row: OnRow = s
         "objects": objects,
         "backend": campaign.backend,
     }
-    write_summary(campaign.out, summary)
+    summary = write_summary(campaign.out, summary)
     plot_discovered(campaign.out / "discovered.png", rows, campaign.policies, objects)
     if campaign.seeds:
         example = campaign.out / f"{campaign.policies[0]}-s{campaign.seeds[0]}"

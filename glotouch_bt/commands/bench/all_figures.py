@@ -41,7 +41,8 @@ def all_(
 
     Ctrl-C keeps what is done. Exit code 1: a command had no result.
     """
-    from glotouch_bt.claims import chosen, commit_of_source, read_claims, run_claims
+    from glotouch_bt.campaign import commit_of_source
+    from glotouch_bt.claims import chosen, read_claims, run_claims
     from glotouch_bt.claims import collect as copy_summaries
     from glotouch_bt.commands.terminal import minutes
     from glotouch_bt.robot import BadInput
@@ -60,7 +61,9 @@ def all_(
         return 0
     if out is None:
         raise BadInput("give the folder of the figures with --out DIR (--list shows them); the same folder continues")
-    words = [w for option, v in (("--workers", workers), ("--cluster", cluster)) if v is not None for w in (option, str(v))]
+    words = [
+        w for option, v in (("--workers", workers), ("--cluster", cluster)) if v is not None for w in (option, str(v))
+    ]
     expected = sum(c.minutes for c in wanted.values())
     sys.stderr.write(f"{len(wanted)} figures of {commit_of_source()}; ")
     sys.stderr.write(f"about {minutes(expected * scale)} on two cores\n")
@@ -73,9 +76,7 @@ def all_(
         how = f"FAILED: {end.failed}" if end.failed else "was done before" if end.before else "done"
         sys.stderr.write(f"[{numbers[end.name]}/{len(wanted)}] {end.name}: {how} ({minutes(end.wall_s / 60)})\n")
 
-    outcomes = run_claims(
-        wanted, out, scale=scale, more=_options(), words=words, on_start=on_start, on_end=on_end
-    )
+    outcomes = run_claims(wanted, out, scale=scale, more=_options(), words=words, on_start=on_start, on_end=on_end)
     if json_:
         shared.print_json({o.name: {"failed": o.failed, "wall_s": round(o.wall_s, 1)} for o in outcomes})
     failed = [o.name for o in outcomes if o.failed]

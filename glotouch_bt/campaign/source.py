@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from functools import cache
 from pathlib import Path
 
 from glotouch_bt.version import __version__
@@ -14,6 +15,7 @@ CHANGED = " (changed)"
 """Follows the commit of a checkout with changes that are not committed."""
 
 
+@cache
 def commit_of_source() -> str:
     """Return the short commit of the checkout, with `CHANGED` if tracked files differ; else the version."""
     git = shutil.which("git")
