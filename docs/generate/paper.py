@@ -13,8 +13,8 @@ from markdown_text import table
 FACTS = Path(__file__).with_name("paper.yaml")
 HEAD = """## The paper's figures beside ours
 
-The paper is GLoTouch, whose method this project builds on. The figures below are read from its tables and from the sections that follow, which name
-command, commit and seeds. An empty cell is not measured.
+The paper is GLoTouch, whose method this project builds on. The paper's figures are read from its tables, ours from
+the sections that follow, which name command, commit and seeds. An empty cell is not measured.
 """
 
 

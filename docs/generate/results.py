@@ -1,4 +1,4 @@
-"""docs/results.md from docs/results/*/summary.json, the meta.yaml beside each, and the table of claims of the package."""
+"""docs/results.md from docs/results/*/summary.json, the meta.yaml beside each, and the table of claims."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The figures that the documentation claims: their table, the commands that make them, and the transfer into docs/results."""
+"""The figures that the documentation claims: their table, the commands that measure them, and their publication."""
 
 from glotouch_bt.claims.collect import collect
 from glotouch_bt.claims.run import Outcome, finished, run_claims

@@ -6,6 +6,7 @@ import re
 import shlex
 import shutil
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +89,7 @@ def seeds_of(line: str, summary: Any) -> str:
         seeds = sorted(summary["seeds"])
         return f"{seeds[0]}-{seeds[-1]}" if len(seeds) > 1 else str(seeds[0])
     words = shlex.split(line)
-    options = dict(zip(words, words[1:], strict=False))
+    options = dict(pairwise(words))
     if "--seed" not in options:
         return "none"
     first = int(options["--seed"])

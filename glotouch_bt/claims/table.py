@@ -16,6 +16,9 @@ from glotouch_bt.robot import BadInput, UnknownName
 TABLE = Path(__file__).with_name("claims.yaml")
 COUNTS = ("--trials", "--planar", "--phases", "--boxes", "--shapes", "--kills", "--duration")
 """Options whose number `scaled` changes."""
+SMALL_SEEDS = 1_000_000
+"""Added to the seeds of a small version."""
+_SEED = re.compile(r"--seed (\d+)(?!\S)")
 _COUNT = re.compile(rf"(?<!\S)({'|'.join(COUNTS)}) (\d+)(?!\S)")
 
 
@@ -123,6 +126,8 @@ def made_by(claims: Mapping[str, Claim], name: str) -> tuple[str, ...]:
 def scaled(line: str, scale: float) -> str:
     """Return a command line with its numbers of trials (`COUNTS`) times `scale`, rounded up; 0 stays 0.
 
+    A small version has other seeds, so that trying a command does not show the layouts of the figure.
+
     Raises:
         BadInput: The scale is not in (0, 1].
     """
@@ -130,4 +135,5 @@ def scaled(line: str, scale: float) -> str:
         raise BadInput(f"--scale {scale:g}: must be above 0 and at most 1")
     if scale == 1.0:
         return line
+    line = _SEED.sub(lambda found: f"--seed {int(found[1]) + SMALL_SEEDS}", line)
     return _COUNT.sub(lambda found: f"{found[1]} {math.ceil(int(found[2]) * scale)}", line)

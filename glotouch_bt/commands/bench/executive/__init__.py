@@ -1,4 +1,4 @@
-"""`glotouch bench ...`, experiments on the executive: faults, forces, kills, pauses, fuzzing, seeded mistakes, the link."""
+"""`glotouch bench ...`, experiments on the executive and on the path to the hardware: one file for each."""
 
 from glotouch_bt.commands.bench.executive.check import check
 from glotouch_bt.commands.bench.executive.faults import faults
