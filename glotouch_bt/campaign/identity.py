@@ -12,6 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from glotouch_bt import plugins
 from glotouch_bt.escaped_text import json_text
 from glotouch_bt.faults import FaultPlan, read_plan
 from glotouch_bt.mission import load_mission
@@ -22,7 +23,7 @@ from glotouch_bt.runs import RunRequest, installed_versions
 
 OURS = ("glotouch_bt", "glotouch_missions")
 """Packages that every result depends on."""
-GROUPS = ("glotouch_bt.backends", "glotouch_bt.skills", "glotouch_bt.resume_check")
+GROUPS = ("glotouch_bt.backends", "glotouch_bt.skills", "glotouch_bt.resume_check", plugins.MATCHERS, plugins.POLICIES)
 """Entry points of further packages."""
 SOURCES = (".py", ".yaml")
 
@@ -37,6 +38,8 @@ def code_versions() -> dict[str, str]:
 def _source_digest(package: str) -> str:
     spec = find_spec(package)
     found = hashlib.sha256()
+    if spec is not None and spec.submodule_search_locations is None and spec.origin is not None:  # a single file
+        found.update(Path(spec.origin).read_bytes())
     for top in map(Path, (spec and spec.submodule_search_locations) or ()):
         for path in sorted(p for p in top.rglob("*") if p.suffix in SOURCES):
             found.update(str(path.relative_to(top)).encode() + b"\0" + path.read_bytes() + b"\0")

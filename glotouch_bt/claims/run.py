@@ -147,8 +147,8 @@ def _measure(task: _Task, claim: Claim, lines: Sequence[str]) -> str | None:
         if claim.parts:
             summaries = {part: read_json(task.folder / part / SUMMARY) for part in claim.parts}
             RunFolder(task.folder).write_text(SUMMARY, json.dumps(summaries, indent=1) + "\n")
-        end = {"commands": list(lines), "commit": commit_of_source(), "exit_codes": codes}
-        end["wall_s"] = round(perf_counter() - began, 1)
+        wall_s = round(perf_counter() - began, 1)
+        end = {"commands": list(lines), "commit": commit_of_source(), "exit_codes": codes, "wall_s": wall_s}
         RunFolder(task.folder).write_text(DONE, json.dumps(end, indent=1) + "\n")
     except GlotouchError as e:
         return str(e)

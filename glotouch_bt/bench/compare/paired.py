@@ -51,7 +51,7 @@ def paired_mean(a: npt.ArrayLike, b: npt.ArrayLike, world: Sequence[str]) -> Pai
     if len(mean) > 1 and np.ptp(mean) > 0:
         test = stats.ttest_1samp(mean, 0.0)
         interval = test.confidence_interval(CONFIDENCE)
-        lo, hi, p = interval.low, interval.high, test.pvalue
+        lo, hi, p = float(interval.low), float(interval.high), float(test.pvalue)
     elif len(mean) > 1:  # all worlds agree: the t statistic is 0 / 0 or infinite
         lo, hi, p = difference, difference, float(difference == 0.0)
     return {
