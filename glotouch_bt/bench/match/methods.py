@@ -45,14 +45,15 @@ PAPER_TOP1: Mapping[str, float] = {"paper_width": 0.683, "paper_depth": 0.783, "
 def methods() -> dict[str, Method]:
     """Return every method by name: the paper's ablation, that of the likelihood, those of `recognition`, outside ones.
 
-    An outside matcher is an entry point of the group `plugins.MATCHERS`; it is imported when it is first called.
+    An outside matcher is an entry point of the group `plugins.MATCHERS`; it is imported when it is first called. It
+    cannot take the name of one of ours.
     """
     steps = dict(zip(PAPER_TOP1, PaperParams().ablation().values(), strict=True))
     made: dict[str, Matcher] = {name: paper_matcher(params) for name, params in steps.items()}
     made |= {f"{DEFAULT}_{name}": likelihood_matcher(params) for name, params in LikelihoodParams().ablation().items()}
     made |= {name: matcher for name, matcher in MATCHERS.items() if name != "paper"}
     found: dict[str, Method] = {name: partial(judge, point) for name, point in plugins(OUTSIDE).items()}
-    return {**{name: partial(_by_model, matcher) for name, matcher in made.items()}, **found}
+    return {**found, **{name: partial(_by_model, matcher) for name, matcher in made.items()}}
 
 
 def _by_model(matcher: Matcher, target: Target, touchsets: Sequence[TouchSet]) -> Ranking:
