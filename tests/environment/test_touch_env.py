@@ -9,10 +9,10 @@ import pytest
 
 gymnasium = pytest.importorskip("gymnasium")
 
-from gymnasium.utils.env_checker import check_env
+from gymnasium.utils.env_checker import check_env  # noqa: E402
 
-from glotouch_bt.environment import ACTION_KEYS, OBSERVATION_KEYS, TouchEnv, Transition
-from glotouch_bt.robot import FakeRobot, ParamError, load_backend
+from glotouch_bt.environment import ACTION_KEYS, OBSERVATION_KEYS, TouchEnv, Transition  # noqa: E402
+from glotouch_bt.robot import FakeRobot, ParamError, load_backend  # noqa: E402
 
 
 def checked(env: TouchEnv) -> None:
