@@ -31,7 +31,7 @@ SOURCES = (".py", ".yaml")
 @cache
 def code_versions() -> dict[str, str]:
     """Return the digest of the source files of each package that takes part in a run, by its name."""
-    others = {point.value.partition(".")[0] for group in GROUPS for point in entry_points(group=group)}
+    others = {point.module.partition(".")[0] for group in GROUPS for point in entry_points(group=group)}
     return {name: _source_digest(name) for name in sorted({*OURS, *others})}
 
 

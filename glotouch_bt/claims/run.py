@@ -39,7 +39,7 @@ RESULTS = (0, 1)
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ClaimEnd:
     """The end of one claim.
 
     Attributes:
@@ -63,8 +63,8 @@ def run_claims(
     more: Mapping[str, Collection[str]] | None = None,
     words: Sequence[str] = (),
     on_start: Callable[[str, str], object] = lambda name, line: None,
-    on_end: Callable[[Outcome], object] = lambda outcome: None,
-) -> list[Outcome]:
+    on_end: Callable[[ClaimEnd], object] = lambda outcome: None,
+) -> list[ClaimEnd]:
     """Run the commands of the claims that the folder does not hold yet. One that fails does not stop the others.
 
     Args:
@@ -89,11 +89,11 @@ def run_claims(
         if kept is not None:
             if kept["commands"] != list(lines[name]):
                 raise BadInput(f"{out / name}: was made by other commands ({'; '.join(kept['commands'])}); remove it")
-            outcomes.append(Outcome(name, before=True))
+            outcomes.append(ClaimEnd(name, before=True))
         else:
             began = perf_counter()
             failed = _measure(_Task(name, out, more or {}, tuple(words), on_start), claim, lines[name])
-            outcomes.append(Outcome(name, perf_counter() - began, failed))
+            outcomes.append(ClaimEnd(name, perf_counter() - began, failed))
         on_end(outcomes[-1])
     return outcomes
 

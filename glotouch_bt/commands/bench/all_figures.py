@@ -13,7 +13,7 @@ from glotouch_bt.commands import shared
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from glotouch_bt.claims import Claim, Outcome
+    from glotouch_bt.claims import Claim, ClaimEnd
 
 
 @shared.guarded
@@ -72,7 +72,7 @@ def all_(
     def on_start(name: str, line: str) -> None:
         sys.stderr.write(f"[{numbers[name]}/{len(wanted)}] {name}: {line}\n")
 
-    def on_end(end: Outcome) -> None:
+    def on_end(end: ClaimEnd) -> None:
         how = f"FAILED: {end.failed}" if end.failed else "was done before" if end.before else "done"
         sys.stderr.write(f"[{numbers[end.name]}/{len(wanted)}] {end.name}: {how} ({minutes(end.wall_s / 60)})\n")
 

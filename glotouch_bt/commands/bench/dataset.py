@@ -13,8 +13,6 @@ from glotouch_bt.commands import shared
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from glotouch_bt.commands.shared.experiments import Show
-
 
 @shared.guarded
 def dataset(
@@ -65,7 +63,7 @@ def dataset(
     words += [w for profile in profiles for w in ("--conditions", profile)]
     words += [] if objects is None else ["--objects", objects.name]
 
-    def run(given: list[MatchCampaign], pool: Executor, show: Show) -> dict[str, Any]:
+    def run(given: list[MatchCampaign], pool: Executor, show: Any) -> dict[str, Any]:
         command = f"glotouch bench dataset {shlex.join(words)}"
         return make_dataset(given, pool, show, out=folder / "dataset", name=name, version=version, command=command)
 
