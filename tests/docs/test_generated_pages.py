@@ -21,7 +21,8 @@ MODULE = re.compile(r"\bglotouch_(?:bt|skills|backends)(?:\.[a-z_]\w*)+")
 LINK = re.compile(r"\]\((?!https?:|#|\.\./\.\.)([^)#\s]+)")
 CODE = re.compile(r"^```.*?^```|^    .*?$|`[^`\n]*`", re.DOTALL | re.MULTILINE)
 PLACEHOLDER = re.compile(r"\b[A-Z]{3,}\b")
-ENTRY_POINT_GROUPS = ("glotouch_bt.skills", "glotouch_bt.backends", "glotouch_bt.matchers", "glotouch_bt.search_policies")
+GROUPS = ("skills", "backends", "matchers", "search_policies")
+ENTRY_POINT_GROUPS = tuple(f"glotouch_bt.{group}" for group in GROUPS)
 ATTRIBUTE_DEPTH = 2
 """Number of trailing words of a dotted name that may be attributes instead of modules."""
 

@@ -45,23 +45,25 @@ PARTS = {
 """Values of a TouchSet, by the prefix of their columns."""
 README = """# {name} {version}
 
-TouchSets: what a probe and a pair of tactile fingers felt of single objects in a box, with the truth. {count} TouchSets of {layouts} layouts, simulated.
-Made by GLoTouch-BT ({commit}) with
+TouchSets: what a probe and a pair of tactile fingers felt of single objects in a box, with the truth. {count} TouchSets
+of {layouts} layouts, simulated. Made by GLoTouch-BT ({commit}) with
 
     {command}
 
 ## Files
 
 - `dataset.json`: format, version, conditions, seeds, and the SHA-256 of every file. `digest` is that of the whole set.
-- `objects/NAME.stl`: the objects, in metres. Frame O: the mesh shifted so that its lowest vertex is at z = 0 and its bounding box centred on x = y = 0.
-- `CONDITIONS/sSEED.json`: one layout. `objects` are the names in the box; `candidates` lists what was touched: `file`, `index`, `object` (the true
-  one; null for a false candidate), `pose_K_O` (x, y, yaw of O in the container frame K, m and rad, after all touches), `tilt_rad`, `closures`, `stable`
-  (closures on which the aperture reached a plateau while the arm stood still).
-- `CONDITIONS/sSEED-cINDEX.npz`: one TouchSet, as NumPy arrays without pickles. Rows of `layer.*` belong to the sequences in order: `sequence.layers` says
-  how many to each.
+- `objects/NAME.stl`: the objects, in metres. Frame O: the mesh shifted so that its lowest vertex is at z = 0 and its
+  bounding box centred on x = y = 0.
+- `CONDITIONS/sSEED.json`: one layout. `objects` are the names in the box; `candidates` lists what was touched: `file`,
+  `index`, `object` (the true one; null for a false candidate), `pose_K_O` (x, y, yaw of O in the container frame K,
+  m and rad, after all touches), `tilt_rad`, `closures`, `stable` (closures on which the aperture reached a plateau
+  while the arm stood still).
+- `CONDITIONS/sSEED-cINDEX.npz`: one TouchSet, as NumPy arrays without pickles. Rows of `layer.*` belong to the
+  sequences in order: `sequence.layers` says how many to each.
 
-SI units. Frames: K, the container's floor, z up; P, the middle between the pads. A depth map is (rows, columns), m, row 0 nearest the wrist; NaN is a
-dead taxel.
+SI units. Frames: K, the container's floor, z up; P, the middle between the pads. A depth map is (rows, columns), m,
+row 0 nearest the wrist; NaN is a dead taxel.
 
 ## Columns of a TouchSet
 
@@ -201,9 +203,10 @@ def _write(campaigns: Sequence[MatchCampaign], out: Path, head: Mapping[str, Any
     )
     RunFolder(out).write_text("README.md", text)
     files = {str(p.relative_to(out)): _sha256(p) for p in sorted(out.rglob("*")) if p.is_file()}
+    profiles = {conditions_name(c.conditions): {"seeds": list(c.seeds), "sampled": c.sampled} for c in campaigns}
     manifest = {
         "format": FORMAT, **head, "commit": commit_of_source(), "command": command, "code": code_versions(),
-        "conditions": {conditions_name(c.conditions): {"seeds": list(c.seeds), "sampled": c.sampled} for c in campaigns},
+        "conditions": profiles,
         "objects": sorted(p.stem for p in (out / "objects").iterdir()), "touchsets": len(touchsets),
         "digest": data_digest(files), "files": files,
     }  # fmt: skip

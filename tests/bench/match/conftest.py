@@ -41,7 +41,10 @@ def a_layout(seed=3, names=("small", "middle", "large"), sizes=None, layers=(2, 
 
 
 def by_size(shown, touchsets):
-    """Rank by size, for a `Target` or its model. Loss: difference of sizes in cm. Accepted if below 0.5; P falls with the square, the rest is p_absent."""
+    """Rank by size, for a `Target` or its model.
+
+    Loss: difference of sizes in cm. Accepted if below 0.5; P falls with the square, the rest is p_absent.
+    """
     size_m = SIZES_M[getattr(shown, "model", shown).name]
     loss = {t.candidate.index: 100 * abs(t.candidate.contour.size_m[0] - size_m) for t in touchsets}
     weight = {
