@@ -72,7 +72,7 @@ def _claim(meta: dict[str, Any], summary: Any) -> str:
         f"commit {meta['commit']}",
         f"conditions {meta['conditions']}",
         f"seeds {meta['seeds']}",
-        *([f"{meta['wall_min']:g} min on two cores"] if "wall_min" in meta else []),
+        *([f"wall time {meta['wall_min']:g} min"] if "wall_min" in meta else []),
     ]
     parts = [f"### {meta['title']}{older}\n", meta["claim"] + "\n"]
     parts.append(table(("", *columns, *(["wanted"] if wanted else [])), rows))
