@@ -32,8 +32,8 @@ from glotouch_bt.robot import (
 from glotouch_bt.robot.simulation import Referee
 
 ACCELERATION_RAD_S2 = 2.0
-"""Default limit on joint accelerations. Source: measured; random actions ran 8 s without a stop at 3 rad/s2 (seeds 1-3),
-and tripped the force guard at 5 by the inertia of the hand."""
+"""Default limit on joint accelerations. Source: measured; random actions ran 8 s without a stop at 3 rad/s2 (seeds
+1-3), and tripped the force guard at 5 by the inertia of the hand."""
 TARE_PERIODS = 1000
 """Longest wait for the tare at a reset, in control periods."""
 
