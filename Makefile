@@ -56,7 +56,9 @@ docs: $(VENV)/.dev
 reference: $(VENV)/.dev
 	$(BIN)/python docs/generate reference architecture
 
+# With DIR=FOLDER: first take over what `glotouch bench all --out FOLDER` measured.
 results-page: $(VENV)/.dev
+	$(if $(DIR),$(BIN)/glotouch bench all --out $(DIR) --collect docs/results)
 	$(BIN)/python docs/generate results
 
 # Renew the pinned, hashed requirements (no registry address is written).

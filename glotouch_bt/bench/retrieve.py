@@ -101,8 +101,7 @@ def run_campaign(campaign: RetrieveCampaign, executor: Executor, on_row: OnRow =
     rows = run_trials(executor, campaign.trials(), campaign, on_row, write=partial(_write, campaign.out))
     more = {"targets": list(campaign.targets), "backend": campaign.backend, "settings": dict(campaign.settings)}
     summary = summarise(rows) | campaign.described() | more
-    write_summary(campaign.out, summary)
-    return summary
+    return write_summary(campaign.out, summary)
 
 
 def _write(folder: Path, rows: Sequence[Row]) -> None:

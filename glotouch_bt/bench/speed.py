@@ -222,8 +222,7 @@ def run_study(study: Campaign, on_row: OnRow = silent) -> dict[str, Any]:
     rows = ({k: round(v, 6) if isinstance(v, float) else v for k, v in t.row.items()} for t in trials)
     write_table(study.out, "trials.csv", COLUMNS, rows)
     summary = summarise(trials) | study.described() | {"settings": dict(study.settings), "backend": study.backend}
-    write_summary(study.out, summary)
-    return summary
+    return write_summary(study.out, summary)
 
 
 def spread(values: Sequence[float]) -> dict[str, float]:

@@ -6,6 +6,7 @@ It holds the settings of a campaign, what a result depends on, the trial's folde
 from glotouch_bt.campaign.cluster import ClusterPool
 from glotouch_bt.campaign.engine import ShardDone, run_trials
 from glotouch_bt.campaign.identity import (
+    changes,
     code_versions,
     described_code,
     described_request,
@@ -13,7 +14,8 @@ from glotouch_bt.campaign.identity import (
     folder_digests,
     plain,
 )
-from glotouch_bt.campaign.settings import Campaign, Shard, open_folder
+from glotouch_bt.campaign.settings import MANIFEST, Campaign, Shard, open_folder
+from glotouch_bt.campaign.source import CHANGED, ROOT, commit_of_source
 from glotouch_bt.campaign.tables import write_summary, write_table
 from glotouch_bt.campaign.trial import OnRow, Row, Trial, crashed, launch_trial, perform, silent
 from glotouch_bt.campaign.trial_folder import TRIAL, TrialFolder

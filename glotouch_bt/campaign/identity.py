@@ -12,6 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from glotouch_bt import plugins
 from glotouch_bt.escaped_text import json_text
 from glotouch_bt.faults import FaultPlan, read_plan
 from glotouch_bt.mission import load_mission, split_settings
@@ -23,7 +24,7 @@ from glotouch_bt.runs import RunRequest, installed_versions, robot_identity
 
 OURS = ("glotouch_bt", "glotouch_missions")
 """Packages that every result depends on."""
-GROUPS = ("glotouch_bt.backends", "glotouch_bt.skills", "glotouch_bt.resume_check")
+GROUPS = ("glotouch_bt.backends", "glotouch_bt.skills", "glotouch_bt.resume_check", plugins.MATCHERS, plugins.POLICIES)
 """Entry points of further packages."""
 SOURCES = (".py", ".yaml", ".urdf")
 
@@ -31,13 +32,15 @@ SOURCES = (".py", ".yaml", ".urdf")
 @cache
 def code_versions() -> dict[str, str]:
     """Return the digest of the source files of each package that takes part in a run, by its name."""
-    others = {point.value.partition(".")[0] for group in GROUPS for point in entry_points(group=group)}
+    others = {point.module.partition(".")[0] for group in GROUPS for point in entry_points(group=group)}
     return {name: _source_digest(name) for name in sorted({*OURS, *others})}
 
 
 def _source_digest(package: str) -> str:
     spec = find_spec(package)
     found = hashlib.sha256()
+    if spec is not None and spec.submodule_search_locations is None and spec.origin is not None:  # a single file
+        found.update(Path(spec.origin).read_bytes())
     for top in map(Path, (spec and spec.submodule_search_locations) or ()):
         for path in sorted(p for p in top.rglob("*") if p.suffix in SOURCES):
             found.update(str(path.relative_to(top)).encode() + b"\0" + path.read_bytes() + b"\0")
@@ -136,18 +139,27 @@ def _described_plan(request: RunRequest) -> Any:
     return {"seed": plan.seed, "faults": [{"fault": f.kind.name, **f.requested()} for f in plan.faults]}
 
 
-def difference(there: Mapping[str, Any], asked: Mapping[str, Any], within: str = "") -> str:
+def difference(there: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
     """Return the keys in which two descriptions differ, with both values, in words."""
     words = []
+    for path, one, two in changes(there, asked):
+        within = "".join("content of " if key == "content" else f"{key}: " for key in path[:-1])
+        words.append(f"{within}{path[-1]} {_short(one)}, now {_short(two)}")
+    return "; ".join(words)
+
+
+def changes(
+    there: Mapping[str, Any], asked: Mapping[str, Any], path: tuple[str, ...] = ()
+) -> list[tuple[tuple[str, ...], Any, Any]]:
+    """Return (path of keys, value there, value asked) of all that differs between two nested descriptions."""
+    found = []
     for key in sorted({*there, *asked}):
         one, two = there.get(key), asked.get(key)
-        if one == two:
-            continue
         if isinstance(one, dict) and isinstance(two, dict):
-            words.append(difference(one, two, f"{key}: " if key != "content" else "content of "))
-        else:
-            words.append(f"{within}{key} {_short(one)}, now {_short(two)}")
-    return "; ".join(words)
+            found += changes(one, two, (*path, key))
+        elif one != two:
+            found.append(((*path, key), one, two))
+    return found
 
 
 def _short(value: object) -> str:

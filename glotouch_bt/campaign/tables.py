@@ -8,7 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from glotouch_bt.campaign.trial_folder import claimed
+from glotouch_bt.campaign.source import commit_of_source
+from glotouch_bt.campaign.trial_folder import LOST, TrialFolder, claimed
 from glotouch_bt.escaped_text import json_text
 from glotouch_bt.runs import RunFolder
 
@@ -22,9 +23,16 @@ def write_table(folder: Path, name: str, columns: Sequence[str], rows: Iterable[
     write_alone(folder, name, text.getvalue())
 
 
-def write_summary(folder: Path, summary: Mapping[str, Any]) -> None:
-    """Write summary.json atomically, with null for numbers that are not finite."""
-    write_alone(folder, "summary.json", json_text(summary))
+def write_summary(folder: Path, summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Write summary.json atomically, with null for numbers that are not finite; return what was written.
+
+    It adds `commit`, and `lost_attempts`: the attempts at trials that died, hung or could not write, of which all but
+    the last of a trial were repeated.
+    """
+    lost = sum(len(TrialFolder(path.parent).lost()) for path in folder.rglob(LOST))
+    whole = {**summary, "lost_attempts": lost, "commit": commit_of_source()}
+    write_alone(folder, "summary.json", json_text(whole))
+    return whole
 
 
 def write_alone(folder: Path, name: str, text: str) -> None:

@@ -90,19 +90,27 @@ class TrialFolder:
         Raises:
             BadInput: The folder holds a trial with another identity; the message names the differences.
         """
-        path = self.path / TRIAL
-        if not os.path.lexists(path):
+        if not os.path.lexists(self.path / TRIAL):
             return None
+        made, row = self.kept()
+        if made != identity:
+            raise BadInput(
+                f"{self.path}: holds a trial that was made otherwise: {difference(made, identity)}; "
+                "continue with the same code and options, or give another folder"
+            )
+        return row
+
+    def kept(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Return the identity and the row of the finished trial, whatever made it.
+
+        Raises:
+            BadInput: There is none, or it cannot be read.
+        """
+        path = self.path / TRIAL
         kept = read_json(path)
         if not isinstance(kept, dict) or not all(isinstance(kept.get(k), dict) for k in ("identity", "row")):
             raise BadInput(f"{path}: is not a trial of a campaign; remove it to run this trial again")
-        if kept["identity"] != identity:
-            raise BadInput(
-                f"{self.path}: holds a trial that was made otherwise: {difference(kept['identity'], identity)}; "
-                "continue with the same code and options, or give another folder"
-            )
-        row: dict[str, Any] = _decoded(kept["row"])
-        return row
+        return kept["identity"], _decoded(kept["row"])
 
     def write(self, identity: Mapping[str, Any], row: Mapping[str, Any]) -> dict[str, Any]:
         """Keep the row, whole or not at all; return it as `read` will.

@@ -103,5 +103,4 @@ def run_study(study: LinkStudy, on_progress: Callable[[float], None] | None = No
         "late_periods": late,
         "samples_per_cycle": {"min": min(blocks), "median": float(np.median(blocks)), "max": max(blocks)},
     }
-    write_summary(study.out, summary)
-    return summary
+    return write_summary(study.out, summary)

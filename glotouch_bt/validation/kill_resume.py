@@ -100,8 +100,7 @@ def run_study(study: KillStudy, on_row: OnRow = silent) -> dict[str, Any]:
 def _write(study: KillStudy, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     write_table(study.out, "trials.csv", COLUMNS, rows)
     summary = summarise(rows) | study.described() | {"settings": dict(study.settings), "kills": study.kills}
-    write_summary(study.out, summary)
-    return summary
+    return write_summary(study.out, summary)
 
 
 def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

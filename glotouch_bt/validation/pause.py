@@ -81,8 +81,7 @@ def run_pauses(study: PauseStudy, on_row: OnRow = silent) -> dict[str, Any]:
         "pause_s": study.pause_s,
         **study.described(),
     }
-    write_summary(study.out, summary)
-    return summary
+    return write_summary(study.out, summary)
 
 
 def _pair(study: PauseStudy, seed: int) -> dict[str, Any]:

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
-from glotouch_bt.perception.search import SearchMap, search_policy, seek
+from glotouch_bt.perception.search import SearchMap, policy_names, search_policy, seek
 from glotouch_bt.perception.touch import Contact
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
 from glotouch_skills.common.probe import Explorer, ExploringSpeeds
+
+if TYPE_CHECKING:
+    PolicyName = str
+else:
+    PolicyName = Literal[*policy_names()]
 
 
 class GuardedSweepParams(SkillParams):
     """Parameters of `guarded_sweep`."""
 
     expected_objects: int = param("Number of objects in the container", default=5, ge=1, le=20)
-    policy: Literal["expected_find", "nearest_frontier", "random_descent"] = param(
+    policy: PolicyName = param(
         "How to choose the next place: most expected finds for the distance, or one of the paper's two policies",
         default="expected_find",
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from glotouch_bt.campaign import Campaign, write_summary, write_table
+from glotouch_bt.campaign import Campaign, TrialFolder, write_summary, write_table
 from glotouch_bt.escaped_text import finite, json_text
 
 NAN, INF = float("nan"), float("inf")
@@ -27,8 +27,16 @@ def test_files_hold_null_for_what_is_no_number(tmp_path: Path) -> None:
     assert (tmp_path / "new" / "trials.csv").read_bytes() == b'a,b\r\n1,\r\n,"x, y"\r\n'
     write_summary(tmp_path, {"mean": NAN, "all": [1.5, INF, {"low": -INF}], "n": 3})
     written = json.loads((tmp_path / "summary.json").read_text())
-    assert written == {"mean": None, "all": [1.5, None, {"low": None}], "n": 3}
+    assert written.pop("commit")
+    assert written == {"mean": None, "all": [1.5, None, {"low": None}], "n": 3, "lost_attempts": 0}
     assert sorted(p.name for p in tmp_path.iterdir()) == [".claim", "new", "summary.json"]
+
+
+def test_a_summary_counts_the_attempts_that_were_lost(tmp_path: Path) -> None:
+    for name, causes in (("x/s1", ["killed"]), ("x/s2", ["killed", "hung"]), ("s3", [])):
+        (tmp_path / name).mkdir(parents=True)
+        TrialFolder(tmp_path / name).note_lost(causes)
+    assert write_summary(tmp_path, {"n": 3})["lost_attempts"] == 3
 
 
 def test_json_text_keeps_what_json_has() -> None:

@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from glotouch_bt.claims import read_claims
+
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([*ROOT.glob("docs/**/*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"])
 FILE = re.compile(r"\b(?:glotouch_(?:bt|skills|backends|missions)|docs)/[\w/.*-]*\w")
@@ -19,7 +21,8 @@ MODULE = re.compile(r"\bglotouch_(?:bt|skills|backends)(?:\.[a-z_]\w*)+")
 LINK = re.compile(r"\]\((?!https?:|#|\.\./\.\.)([^)#\s]+)")
 CODE = re.compile(r"^```.*?^```|^    .*?$|`[^`\n]*`", re.DOTALL | re.MULTILINE)
 PLACEHOLDER = re.compile(r"\b[A-Z]{3,}\b")
-ENTRY_POINT_GROUPS = ("glotouch_bt.skills", "glotouch_bt.backends")
+GROUPS = ("skills", "backends", "matchers", "search_policies")
+ENTRY_POINT_GROUPS = tuple(f"glotouch_bt.{group}" for group in GROUPS)
 ATTRIBUTE_DEPTH = 2
 """Number of trailing words of a dotted name that may be attributes instead of modules."""
 
@@ -62,7 +65,9 @@ def test_every_page_is_in_the_navigation() -> None:
 
 @pytest.mark.parametrize("meta", sorted(ROOT.glob("docs/results/*/meta.yaml")), ids=lambda p: p.parent.name)
 def test_every_claim_names_command_commit_conditions_and_seeds(meta: Path) -> None:
-    given = yaml.safe_load(meta.read_text(encoding="utf-8"))
+    claim = read_claims().get(meta.parent.name)
+    entry = {} if claim is None else claim.model_dump(exclude_defaults=True)
+    given = entry | yaml.safe_load(meta.read_text(encoding="utf-8"))
     assert all(
         given.get(key) for key in ("section", "title", "claim", "command", "commit", "conditions", "seeds", "rows")
     )

@@ -174,7 +174,13 @@ def main() -> int:
             sys.stderr.write(f"shape {n} of seed {options_.seed}:\n{text}\n")
     kinds = sorted({r.kind for r in results})
     table = {k: _rates([r for r in results if r.kind == k]) for k in kinds}
-    summary = {"shapes": options_.shapes, "seed": options_.seed, "exceptions": failed, "all": _rates(results)} | table
+    summary = {
+        "shapes": options_.shapes,
+        "seed": options_.seed,
+        "exceptions": failed,
+        "exceptions_total": failed.total(),
+        "all": _rates(results),
+    } | table
     sys.stdout.write(json.dumps(summary | {"cpu_s": round(time.process_time() - start)}, indent=1) + "\n")
     return 1 if failed else 0
 

@@ -144,7 +144,7 @@ def run_campaign(campaign: ContactCampaign, executor: Executor, on_row: OnRow = 
         "backend": campaign.backend,
     }
     summary = summarise(rows) | campaign.described() | more
-    write_summary(campaign.out, summary)
+    summary = write_summary(campaign.out, summary)
     plot_errors(rows, PAPER, campaign.out / "errors.png")
     plot_traces(rows, campaign.out)
     return summary

@@ -59,7 +59,7 @@ def run_study(study: DetectionStudy, on_line: Callable[[str], None] = lambda _: 
         synthetic = _synthetic(study, name, description, rows, on_line)
         summary["conditions"][name] = {"simulated": simulated, "synthetic": synthetic}
     write_table(study.out, "trials.csv", COLUMNS, rows)
-    write_summary(study.out, summary)
+    summary = write_summary(study.out, summary)
     plot_curves(summary, study.out / "detection.png")
     return summary
 

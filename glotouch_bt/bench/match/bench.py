@@ -203,7 +203,7 @@ def run_campaign(campaign: MatchCampaign, executor: Executor, on_row: OnRow = si
             "backend": campaign.backend,
         }
     )
-    write_summary(campaign.out, figures)
+    figures = write_summary(campaign.out, figures)
     plot_all(campaign.out, figures, rows["trials"], rows["closures"])
     return figures
 

@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 
 from glotouch_bt.bench.match.dataset import Layout
-from glotouch_bt.bench.match.methods import DEFAULT, Method, methods
+from glotouch_bt.bench.match.methods import DEFAULT, Method, Target, methods
 from glotouch_bt.bench.match.trials import meshes_of, pad_of
 from glotouch_bt.perception import target_model
-from glotouch_bt.perception.recognition import TargetModel
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.robot import Array
 
@@ -44,16 +43,16 @@ def time_matching(layouts: Sequence[Layout], objects: Path, names: Sequence[str]
             here, there = Path(folder) / f"{mesh.name} built", Path(folder) / f"{mesh.name} moved"
             began = _clocks()
             model = target_model(unseen, pad_of(touched[0]), here)
-            new.append(_clocks() - began + _first_use(head, model, first))
+            new.append(_clocks() - began + _first_use(head, Target(mesh, model), first))
             shutil.copytree(here, there)
             began = _clocks()
             model = target_model(unseen, pad_of(touched[0]), there)
-            load.append(_clocks() - began + _first_use(head, model, first))
+            load.append(_clocks() - began + _first_use(head, Target(mesh, model), first))
             for layout in touched:
                 touchsets = [t.touchset for t in layout.touched]
                 for name, method in made.items():
-                    method(model, touchsets)
-                    pairs[name].append(_spent(method, model, touchsets) / len(touchsets))
+                    method(Target(mesh, model), touchsets)
+                    pairs[name].append(_spent(method, Target(mesh, model), touchsets) / len(touchsets))
     wall, cpu = ({n: float(1e3 * np.median(v, axis=0)[k]) for n, v in pairs.items()} for k in (0, 1))
     out: dict[str, Any] = {"pair_ms": wall, "pair_cpu_ms": cpu}
     for key, spent in (("new_stl", new), ("load_stl", load)):
@@ -68,12 +67,12 @@ def _clocks() -> Array:
     return np.array([time.perf_counter(), time.process_time()])
 
 
-def _spent(method: Method, model: TargetModel, touchsets: Sequence[TouchSet]) -> Array:
+def _spent(method: Method, target: Target, touchsets: Sequence[TouchSet]) -> Array:
     began = _clocks()
-    method(model, touchsets)
+    method(target, touchsets)
     return _clocks() - began
 
 
-def _first_use(method: Method, model: TargetModel, touchsets: Sequence[TouchSet]) -> Array:
+def _first_use(method: Method, target: Target, touchsets: Sequence[TouchSet]) -> Array:
     """Return the extra time of the first ranking over the second, at least 0."""
-    return np.asarray(np.maximum(_spent(method, model, touchsets) - _spent(method, model, touchsets), 0.0))
+    return np.asarray(np.maximum(_spent(method, target, touchsets) - _spent(method, target, touchsets), 0.0))

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from glotouch_bt.bench.match.dataset import Layout, Planar, Touched
-from glotouch_bt.bench.match.methods import Method, methods
+from glotouch_bt.bench.match.methods import Method, Target, methods
 from glotouch_bt.bench.match.shapes import symmetries_rad, twins
 from glotouch_bt.perception import model_with_sides
 from glotouch_bt.perception.recognition import Match, PadSpec, Ranking, TargetModel
@@ -91,11 +91,9 @@ def decide(layout: Layout, objects: Path, strangers: Path | None, names: Sequenc
     present = models_of(layout, objects)
     meshes = {n: meshes_of(objects)[n] for n in present}
     twin = {n: any(twins(m, other) for k, other in meshes.items() if k != n) for n, m in meshes.items()}
-    foreign: dict[str, TargetModel] = {}
-    if strangers is not None:
-        known = {m.digest for m in meshes_of(objects).values()}
-        new = [n for n, m in meshes_of(strangers).items() if m.digest not in known]
-        foreign = models_of(layout, strangers, new) if new else {}
+    known = {m.digest for m in meshes_of(objects).values()}
+    strange = {} if strangers is None else {n: m for n, m in meshes_of(strangers).items() if m.digest not in known}
+    foreign = {} if strangers is None or not strange else models_of(layout, strangers, tuple(strange))
     for name in names:
         method = made[name]
         for target, model in present.items():
@@ -103,26 +101,27 @@ def decide(layout: Layout, objects: Path, strangers: Path | None, names: Sequenc
             others = [t for i, t in enumerate(layout.touched) if i not in mine]
             head = {"method": name, "seed": layout.seed, "target": target, "twin": twin[target]}
             mesh = meshes[target] if mine else None
-            row, ranking = _trial(method, model, layout.touched, target, mesh)
+            shown = Target(meshes[target], model)
+            row, ranking = _trial(method, shown, layout.touched, target, mesh)
             out.trials.append(head | {"kind": "present" if mine else "untouched"} | row)
             out.pairs.extend(_pairs(head | {"stranger": False}, layout, ranking))
             if mine and others:
-                row, _ = _trial(method, model, others, target)
+                row, _ = _trial(method, shown, others, target)
                 out.trials.append(head | {"kind": "absent"} | row)
         for target, model in foreign.items():
             head = {"method": name, "seed": layout.seed, "target": target, "twin": False}
-            row, ranking = _trial(method, model, layout.touched, target)
+            row, ranking = _trial(method, Target(strange[target], model), layout.touched, target)
             out.trials.append(head | {"kind": "stranger"} | row)
             out.pairs.extend(_pairs(head | {"stranger": True}, layout, ranking))
     return out
 
 
 def _trial(
-    method: Method, model: TargetModel, touched: Sequence[Touched], target: str, mesh: Mesh | None = None
+    method: Method, shown: Target, touched: Sequence[Touched], target: str, mesh: Mesh | None = None
 ) -> tuple[dict[str, Any], Ranking]:
     """Make one decision; `mesh` is the target's if it is in `touched` (a stranger may share an object's name)."""
     began = time.perf_counter()
-    ranking = method(model, [t.touchset for t in touched])
+    ranking = method(shown, [t.touchset for t in touched])
     took = time.perf_counter() - began
     by_index = {t.touchset.candidate.index: t for t in touched}
     best = ranking.best

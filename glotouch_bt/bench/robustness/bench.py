@@ -104,7 +104,7 @@ def run_campaign(campaign: RobustnessCampaign, executor: Executor, on_row: OnRow
             "failed": sum(bool(r["cause"]) for r in rows),
         }
     )
-    write_summary(campaign.out, figures)
+    figures = write_summary(campaign.out, figures)
     plot_axes(campaign.out / "robustness.png", figures)
     return figures
 

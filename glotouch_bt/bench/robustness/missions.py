@@ -47,7 +47,7 @@ def run_missions(campaign: RobustnessCampaign, executor: Executor, on_row: OnRow
     figures: dict[str, Any] = finite(
         {**campaign.described(), "mission": MISSION, "backend": campaign.backend, "axes": axes}
     )
-    write_summary(campaign.out, figures)
+    figures = write_summary(campaign.out, figures)
     plot_axes(campaign.out / "robustness.png", figures)
     return figures
 

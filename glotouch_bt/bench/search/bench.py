@@ -35,7 +35,7 @@ from glotouch_bt.campaign import (
 )
 from glotouch_bt.escaped_text import finite
 from glotouch_bt.mission.read import conditions_name
-from glotouch_bt.perception.search import POLICIES
+from glotouch_bt.perception.search import policy_names
 from glotouch_bt.robot import BadInput
 
 COLUMNS = (
@@ -67,9 +67,10 @@ class SearchCampaign(Campaign):
     planar_budget_m: float = BUDGET_M
 
     def __post_init__(self) -> None:
-        unknown = [p for p in self.policies if p not in POLICIES]
+        known = policy_names()
+        unknown = [p for p in self.policies if p not in known]
         if unknown or not self.policies:
-            raise BadInput(f"--policies {','.join(unknown)}: must be among {', '.join(POLICIES)}")
+            raise BadInput(f"--policies {','.join(unknown)}: must be among {', '.join(known)}")
         if not self.seeds and not self.planar_seeds and not self.recorded:
             raise BadInput("nothing to try: give --trials, --planar or --recorded")
 
@@ -118,7 +119,7 @@ def run_campaign(campaign: SearchCampaign, executor: Executor, on_row: OnRow = s
         BadInput: The objects cannot be used or do not fit.
     """
     objects = campaign.object_count
-    order = {p: i for i, p in enumerate((*campaign.policies, *sorted(POLICIES)))}
+    order = {p: i for i, p in enumerate((*campaign.policies, *sorted(policy_names())))}
 
     def place(row: Mapping[str, Any]) -> tuple[str, int, int]:
         return row["simulator"], order.get(row["policy"], len(order)), row["seed"]
@@ -136,7 +137,7 @@ def run_campaign(campaign: SearchCampaign, executor: Executor, on_row: OnRow = s
         "objects": objects,
         "backend": campaign.backend,
     }
-    write_summary(campaign.out, summary)
+    summary = write_summary(campaign.out, summary)
     plot_discovered(campaign.out / "discovered.png", rows, campaign.policies, objects)
     if campaign.seeds:
         example = campaign.out / f"{campaign.policies[0]}-s{campaign.seeds[0]}"

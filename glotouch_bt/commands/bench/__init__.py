@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import typer
 
-from glotouch_bt.commands.bench.check import check
+from glotouch_bt.commands.bench.all_figures import all_
+from glotouch_bt.commands.bench.compare import compare
 from glotouch_bt.commands.bench.contact import contact
+from glotouch_bt.commands.bench.dataset import dataset
 from glotouch_bt.commands.bench.detection import detection
-from glotouch_bt.commands.bench.faults import faults
-from glotouch_bt.commands.bench.forces import forces
-from glotouch_bt.commands.bench.fuzz import fuzz
-from glotouch_bt.commands.bench.link import link
+from glotouch_bt.commands.bench.executive import check, faults, forces, fuzz, link, pause, resume
 from glotouch_bt.commands.bench.match import match
-from glotouch_bt.commands.bench.pause import pause
-from glotouch_bt.commands.bench.resume import resume
 from glotouch_bt.commands.bench.retrieve import retrieve
 from glotouch_bt.commands.bench.robustness import robustness
 from glotouch_bt.commands.bench.search import search
@@ -40,5 +37,8 @@ for _experiment in (
     link,
     fuzz,
     check,
+    dataset,
 ):
     bench.command()(_experiment)
+bench.command("all")(all_)
+bench.command()(compare)

@@ -12,6 +12,8 @@ from glotouch_bt.commands.terminal.bench_tables import (
     print_speed,
 )
 from glotouch_bt.commands.terminal.campaign_progress import CampaignProgress
+from glotouch_bt.commands.terminal.claim_tables import minutes, print_claims
+from glotouch_bt.commands.terminal.comparison_tables import print_comparison
 from glotouch_bt.commands.terminal.console import (
     EscapingConsole,
     print_error,

@@ -10,6 +10,7 @@ from glotouch_bt.perception.search.policies import (
     NearestFrontier,
     SearchPolicy,
     Stretch,
+    policy_names,
     search_policy,
 )
 from glotouch_bt.perception.search.routes import Routes, segment_is_free

@@ -118,6 +118,6 @@ def _summary(campaign: FaultCampaign, rows: list[Row], not_reached: int) -> dict
         "backend": campaign.backend,
         "hard_force_N": Limits().hard_force_N,
     }
-    write_summary(campaign.out, summary)
+    summary = write_summary(campaign.out, summary)
     plot_matrix(campaign.out / "matrix.png", rows, [c.fault for c in campaign.cases], campaign.skills)
     return summary

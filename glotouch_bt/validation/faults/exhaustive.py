@@ -172,8 +172,7 @@ def run_exhaustive(study: Exhaustive, on_progress: Callable[[int, str], None] | 
         "kinds": list(KINDS),
         "bad": bad,
     }
-    write_summary(study.out, summary)
-    return summary
+    return write_summary(study.out, summary)
 
 
 def _run(

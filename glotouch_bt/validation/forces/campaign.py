@@ -181,8 +181,7 @@ def _written(
             for s in campaign.scenes
         ],
     }
-    write_summary(campaign.out, summary)
-    return summary
+    return write_summary(campaign.out, summary)
 
 
 def _command(scene: Campaign, seed: int, plan: Path) -> str:

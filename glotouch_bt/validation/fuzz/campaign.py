@@ -106,8 +106,7 @@ def run_campaign(campaign: FuzzCampaign, executor: Executor, on_counts: OnRow = 
         "bad": wilson(len(bad), campaign.trials),
         "failures": [{"trial": r.number, "sort": r.sort, "came": r.came, "detail": r.detail} for r in bad],
     }
-    write_summary(campaign.out, summary)
-    return summary
+    return write_summary(campaign.out, summary)
 
 
 def _tried(kind: str, seed: int, numbers: Sequence[int]) -> Row:

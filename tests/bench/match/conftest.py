@@ -40,9 +40,13 @@ def a_layout(seed=3, names=("small", "middle", "large"), sizes=None, layers=(2, 
     return Layout(seed, "nominal", tuple(sorted(SIZES_M)), tuple(felt), "success", 100.0)
 
 
-def by_size(model, touchsets):
-    """Loss: difference of sizes in cm. Accepted if below 0.5; P falls with the square, the rest is p_absent."""
-    loss = {t.candidate.index: 100 * abs(t.candidate.contour.size_m[0] - SIZES_M[model.name]) for t in touchsets}
+def by_size(shown, touchsets):
+    """Rank by size, for a `Target` or its model.
+
+    Loss: difference of sizes in cm. Accepted if below 0.5; P falls with the square, the rest is p_absent.
+    """
+    size_m = SIZES_M[getattr(shown, "model", shown).name]
+    loss = {t.candidate.index: 100 * abs(t.candidate.contour.size_m[0] - size_m) for t in touchsets}
     weight = {
         i: math.exp(-(x**2) * 4) * sum(len(s.layers) > 0 for s in t.sequences)
         for (i, x), t in zip(loss.items(), touchsets, strict=True)
