@@ -81,9 +81,9 @@ class Groot2Publisher:
             if self.state is not None:
                 with suppress(GlotouchError):  # a broken record: its last state stays
                     self.state.update()
-            with suppress(zmq.ZMQError):  # the monitor is gone
+            with suppress(zmq.ZMQError):  # the monitor is gone, maybe since the poll: never wait for its request
                 if self._server.poll(_POLL_MS):
-                    self._server.send_multipart(self._reply(self._server.recv_multipart()))
+                    self._server.send_multipart(self._reply(self._server.recv_multipart(zmq.NOBLOCK)))
 
     def close(self) -> None:
         """Close the ports; idempotent."""
