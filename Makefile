@@ -11,11 +11,11 @@ demo: $(VENV)
 
 # Quick tests: no whole mission in MuJoCo, no browser.
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest -n 2 --ignore=tests/integration --ignore=tests/browser
+	$(BIN)/python -m pytest -n 2 --dist worksteal --ignore=tests/integration --ignore=tests/browser
 
 # Whole missions, backends and conformance in MuJoCo and on simulated devices.
 test-integration: $(VENV)/.dev
-	$(BIN)/python -m pytest -n 2 tests/integration
+	$(BIN)/python -m pytest -n 2 --dist worksteal tests/integration
 
 # The pages in Chromium: needs chromium and chromium-driver (Debian's packages).
 test-browser: $(VENV)/.dev

@@ -39,6 +39,7 @@ ALLOWED = {
     "glotouch_backends/flexiv_xense/client": "private folder of the driver, and the log that the user names",
     "glotouch_bt/bench": BENCH,
     "glotouch_bt/campaign": BENCH,
+    "glotouch_bt/claims": BENCH,
     "glotouch_bt/validation": BENCH,
     "glotouch_bt/commissioning/keys.py": "keys in the folder that the user names, created anew with mode 0600",
     "glotouch_bt/mission/load.py": "parses a word of the command line",

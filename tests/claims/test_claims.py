@@ -53,7 +53,8 @@ def test_every_command_of_the_table_is_understood() -> None:
             words = [w for w in shlex.split(line) if not w.startswith("OMP_")]
             if words[:2] == ["glotouch", "bench"]:
                 command = vars(group)["commands"][words[2]]
-                text = [claim.parts.get(next(iter(claim.parts), ""), "") if w == "{part}" else w for w in words[3:]]
+                part = claim.parts.get(next(iter(claim.parts), ""), "")
+                text = [w.replace("{part}", part) for w in words[3:]]
                 flat = [x for w in text for x in shlex.split(w)] if claim.parts else text
                 command.make_context(words[2], [w.format(objects="o", out="o") for w in flat])
             elif words[0] == "python" and words[1].endswith(".py"):

@@ -107,9 +107,9 @@ def test_look_alikes(gripper: Gripper, tmp_path: Path) -> None:
 
 
 def test_the_shipped_objects_need_no_check(gripper: Gripper) -> None:
-    """`check_objects` skips them: they fit into every shipped world's box and between the jaws."""
+    """`check_feasible` skips them: they fit into every shipped world's box and between the jaws."""
     for path in stl_files(shipped_root() / "objects").values():
-        assert not feasible.out_of_reach(load_mesh(path), gripper)
+        assert not feasible.ungraspable(load_mesh(path), gripper)
     for world in ("container_five", "close_five"):
         scene = load_world(world)
         feasible.draw_layout(feasible.load_folder(scene.objects.folder), scene, feasible.SEED)

@@ -28,9 +28,9 @@ def test_poisson_interval_against_the_tables():
 
 @pytest.mark.parametrize("condition", ["nominal", "harsh"])
 def test_free_motion_is_silent_because_the_inertia_is_taken_out(condition):
-    """Five minutes of each kind of move; downwards it would trip on every stop without."""
+    """Two minutes of each kind of move; downwards it would trip on every stop without."""
     conditions = load_conditions(condition)
-    quiet = false_alarms(HAND, conditions, SEEDS, hours=0.08)
+    quiet = false_alarms(HAND, conditions, SEEDS, hours=0.03)
     assert [r["count"] for r in quiet.values()] == [0, 0, 0]
     loud = false_alarms(HAND, conditions, range(2), hours=0.01, compensate=False)
     assert loud["down"]["rate"] > 300
