@@ -38,7 +38,19 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.mark.slow
 def test_an_outside_matcher_and_ours_on_the_same_touches(installed: None, tmp_path: Path) -> None:
-    words = ["--sampled", "--phases", "1", "--seed", "11", "--workers", "1", "--method", "by_size", "--method", "likelihood"]
+    words = [
+        "--sampled",
+        "--phases",
+        "1",
+        "--seed",
+        "11",
+        "--workers",
+        "1",
+        "--method",
+        "by_size",
+        "--method",
+        "likelihood",
+    ]
     done = CliRunner().invoke(cli.app, ["bench", "match", *words, "--out", str(tmp_path / "o"), "--json"])
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)["methods"]
