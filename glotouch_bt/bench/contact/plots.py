@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from glotouch_bt.bench.contact.square import TOOLS, rectangle, traced_square, true_square
 from glotouch_bt.report import read_run
@@ -26,6 +25,8 @@ LABELS = {
 
 def plot_errors(rows: Sequence[Mapping[str, Any]], paper: Mapping[str, Mapping[str, float]], path: Path) -> None:
     """Draw a box plot of each error, bolted and free, with the paper's mean as a mark."""
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(11, 4.4), layout="constrained")
     for column, square in enumerate(("fixed", "free")):
         axes = figure.add_subplot(1, 2, column + 1)
@@ -54,6 +55,8 @@ def plot_errors(rows: Sequence[Mapping[str, Any]], paper: Mapping[str, Mapping[s
 
 def plot_traces(rows: Sequence[Mapping[str, Any]], out: Path) -> None:
     """Write traces.png: a grid of traced squares with truth, contacts and fit, centred on the truth, in mm."""
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(3.1 * SHOWN, 3.2 * len(TOOLS)), layout="constrained")
     for line, tool in enumerate(TOOLS):
         good = [r for r in rows if (r["square"], r["tool"]) == ("fixed", tool) and not r["cause"]][:SHOWN]

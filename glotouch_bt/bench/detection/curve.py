@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Literal, TypedDict, get_args
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from glotouch_bt.bench.detection.signals import RATE_HZ, FreeMove, Hand, MoveKind, Wrist
 from glotouch_bt.bench.statistics import Rate, wilson
@@ -34,11 +34,11 @@ class PerHour(TypedDict):
 
 
 def per_hour(count: int, hours: float) -> PerHour:
-    """Return the rate with Garwood's interval (Biometrika 28, 1936), from chi-square quantiles of 2k and 2k + 2."""
+    """Return the rate with Garwood's interval (Biometrika 28, 1936), from gamma quantiles of order k and k + 1."""
     if hours <= 0:
         return {"rate": float("nan"), "lo": 0.0, "hi": float("inf"), "count": count, "hours": hours}
-    lo = 0.5 * float(chi2.ppf(0.025, 2 * count)) if count else 0.0
-    hi = 0.5 * float(chi2.ppf(0.975, 2 * count + 2))
+    lo = float(gammaincinv(count, 0.025)) if count else 0.0
+    hi = float(gammaincinv(count + 1, 0.975))
     return {"rate": count / hours, "lo": lo / hours, "hi": hi / hours, "count": count, "hours": hours}
 
 

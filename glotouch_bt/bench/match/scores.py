@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import rankdata
 
 from glotouch_bt.bench.statistics import wilson
 from glotouch_bt.robot import Array
@@ -55,7 +54,8 @@ def auroc(positive: npt.ArrayLike, negative: npt.ArrayLike) -> float:
     a, b = _scores(positive), _scores(negative)
     if not a.size or not b.size:
         return float("nan")
-    rank = rankdata(np.concatenate([a, b]))
+    _, place, ties = np.unique(np.concatenate([a, b]), return_inverse=True, return_counts=True)
+    rank = (np.cumsum(ties) - 0.5 * (ties - 1))[place]  # equal scores share their mean rank
     return float((rank[: a.size].sum() - a.size * (a.size + 1) / 2) / (a.size * b.size))
 
 

@@ -7,8 +7,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
-
 from glotouch_bt.bench.robustness.axes import AXES
 
 COLUMNS = 4
@@ -31,6 +29,8 @@ def plot_axes(path: Path, summary: Mapping[str, Any]) -> None:
     rates = rates_of(summary)
     columns = min(COLUMNS, len(names))
     rows = math.ceil(len(names) / columns)
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(3.1 * columns, 2.3 * rows + 0.3), layout="constrained")
     panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
     for name, axes in zip(names, panels, strict=False):

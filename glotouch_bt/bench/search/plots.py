@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from glotouch_bt.bench.planar import FeltSection
 from glotouch_bt.bench.search.scoring import discovered_at
@@ -17,6 +15,9 @@ from glotouch_bt.bench.search.trial import SWEEP_NODE, TRACE_NODE, true_layout
 from glotouch_bt.report import RunRecord, read_run
 from glotouch_bt.robot import Array
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 COLOURS = ("#2567c9", "#e08a1e", "#16937a", "#8a55c7", "#c4437f", "#6b7787")
 MAX_TRAVEL_M = 6.0
 """Right end of the travel axis."""
@@ -24,6 +25,8 @@ MAX_TRAVEL_M = 6.0
 
 def plot_discovered(path: Path, rows: Sequence[Mapping[str, Any]], policies: Sequence[str], objects: int) -> None:
     """Draw mean discovered objects against travel, 95 % bands: MuJoCo solid, planar dashed, paper dots."""
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(7.5, 4.6), layout="constrained")
     axes = figure.subplots()
     at = np.linspace(0.0, MAX_TRAVEL_M, 121)
@@ -59,6 +62,8 @@ def plot_layout(path: Path, run: Path, sections: Mapping[str, FeltSection]) -> N
     if record.truth is None or pose_B_K is None or interior is None:
         return
     layout = true_layout(record.truth, pose_B_K, dict(sections))
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(5.2, 6.4), layout="constrained")
     axes = figure.subplots()
     half = 500.0 * np.array(interior[:2])

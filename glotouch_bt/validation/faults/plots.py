@@ -6,9 +6,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Rectangle
-
 from glotouch_bt.validation.faults.summary import matrix
 from glotouch_bt.validation.faults.trial import VERDICTS
 
@@ -19,6 +16,9 @@ EMPTY = "#eef0f3"
 def plot_matrix(path: Path, rows: Sequence[Mapping[str, Any]], classes: Sequence[str], skills: Sequence[str]) -> None:
     """Draw each cell as a bar of its trials; grey: the class cannot affect that skill."""
     counts = matrix(rows, classes, skills)
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Patch, Rectangle
+
     figure = Figure(figsize=(1.9 + 1.05 * len(skills), 1.6 + 0.27 * len(classes)), layout="constrained")
     axes = figure.subplots()
     for y, name in enumerate(classes):
