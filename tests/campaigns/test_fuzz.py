@@ -65,9 +65,9 @@ def test_documents_are_of_both_kinds_and_in_all_states() -> None:
 @pytest.mark.parametrize(
     ("kind", "trials", "some"),
     [
-        ("missions", 60, {"refused unread", "refused with places"}),
-        ("meshes", 60, {"accepted", "refused with places"}),
-        ("runs", 16, {"accepted", "refused unread"}),
+        ("missions", 40, {"refused unread", "refused with places"}),
+        ("meshes", 40, {"accepted", "refused with places"}),
+        ("runs", 10, {"accepted", "refused unread"}),
     ],
 )
 def test_nothing_bad_comes_of_some_of_them(kind: str, trials: int, some: set[str]) -> None:
@@ -79,6 +79,7 @@ def test_nothing_bad_comes_of_some_of_them(kind: str, trials: int, some: set[str
 @pytest.fixture
 def broken_check(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Lets a test say what reading a mission does."""
+    run_inputs(MISSIONS, SEED, [])  # the missions made in advance are sound
     monkeypatch.setattr(trial_module, "MAX_DURATION_S", 0.3)
     return monkeypatch
 

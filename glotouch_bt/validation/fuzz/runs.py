@@ -18,7 +18,6 @@ import msgspec
 import numpy as np
 import zstandard
 
-from glotouch_bt.lazy import load_all
 from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile
 from glotouch_bt.mission.execution import Control
 from glotouch_bt.report import write_report
@@ -58,8 +57,7 @@ class RunKind(FuzzKind):
     writes = True
 
     def prepare(self, folder: Path) -> None:
-        """Make the base runs, and import what all commands use."""
-        load_all()
+        """Make the base runs."""
         _victim()
         for backend in set(BACKENDS):
             _base(backend)

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from glotouch_bt.lazy import load_all
 from glotouch_bt.validation.fuzz.kind import Class, FuzzKind
 from glotouch_bt.validation.fuzz.watch import TooLong, Watch
 
@@ -54,6 +55,7 @@ def _folder(kind: FuzzKind) -> Iterator[Path]:
     folder = Path(tempfile.mkdtemp(prefix="glotouch-fuzz-"))
     here = Path.cwd()
     try:
+        load_all()  # a module that is loaded later may write a cache
         kind.prepare(folder)
         os.chdir(folder)
         yield folder

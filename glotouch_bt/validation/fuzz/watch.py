@@ -35,6 +35,7 @@ class Watch:
         self._on = False
         self._writable = ""
         sys.addaudithook(self._hear)
+        sys.dont_write_bytecode = True  # importing a module is no write
         soft, hard = resource.getrlimit(resource.RLIMIT_AS)
         if soft == resource.RLIM_INFINITY:
             resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY_BYTES, hard))

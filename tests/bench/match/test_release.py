@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +15,19 @@ from glotouch_bt import cli
 from glotouch_bt.bench.match import load_dataset
 from glotouch_bt.robot import BadInput
 
+SHIPPED = Path(__file__).parents[3] / "glotouch_missions" / "objects"
+
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two releases of the same command, with two objects."""
     folder = tmp_path_factory.mktemp("made")
+    (folder / "objects").mkdir()
+    for mesh in ("apple.stl", "truck.stl"):
+        shutil.copy(SHIPPED / mesh, folder / "objects")
     for name in ("one", "two"):
-        words = ["--sampled", "--phases", "1", "--seed", "7", "--workers", "1", "--out", str(folder / name), "--json"]
+        words = ["--sampled", "--phases", "1", "--seed", "7", "--workers", "1", "--objects", str(folder / "objects")]
+        words += ["--out", str(folder / name), "--json"]
         done = CliRunner().invoke(cli.app, ["bench", "dataset", *words])
         assert done.exit_code == 0, done.output
     return folder
