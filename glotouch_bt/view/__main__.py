@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 
 from glotouch_bt.robot import GlotouchError
-from glotouch_bt.view.live import LEFT, PAUSE, RESUME, STOP
+from glotouch_bt.view.live import LEFT, PAUSE, RESUME, STOP, UNSEEN
 from glotouch_bt.view.page import MissionControls
 from glotouch_bt.view.process import FAULT, RunLink
 from glotouch_bt.view.serve import page_server
@@ -46,12 +46,14 @@ def main() -> int:
 
 
 def _tell_when_left(watch: RunWatch, link: RunLink) -> None:
-    """Say when the run is over and nobody has had the page open for `GRACE_S`, or nobody ever had."""
+    """Say when the run is over and nobody has had the page open for `GRACE_S`."""
     link.finished.wait()
+    while link.told.get("patient") and not watch.was_viewed and not link.ended.wait(LOOK_S):
+        pass
     absent_s = 0.0
     while watch.was_viewed and absent_s < GRACE_S and not link.ended.wait(LOOK_S):
         absent_s = 0.0 if watch.viewers else absent_s + LOOK_S
-    link.tell(LEFT)
+    link.tell(LEFT if watch.was_viewed else UNSEEN)
 
 
 if __name__ == "__main__":

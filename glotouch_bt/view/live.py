@@ -18,8 +18,8 @@ from glotouch_bt.view.server import require_viser
 
 PAGE = (*PYTHON, "glotouch_bt.view")
 """The page's program."""
-LEFT = "left"
-"""Word of the page's process: the run is over, and nobody has the page open."""
+LEFT, UNSEEN = "left", "unseen"
+"""Words of the page's process: the run is over, and nobody has the page open any more; nobody ever had."""
 PAUSE, RESUME, STOP = "pause", "resume", "stop"
 """Requests that the page sends."""
 
@@ -46,6 +46,7 @@ class LiveView(FollowingProcess):
         require_viser()
         self._control = control
         self._left = threading.Event()
+        self._viewed = False
         given = ["" if port is None else str(port), "yes" if browser else "", str(objects.resolve()) if objects else ""]
         super().__init__([*PAGE, *given], self._obey, self._left.set)
 
@@ -57,10 +58,15 @@ class LiveView(FollowingProcess):
         """Offer the true objects of a simulation, as they stand at the start."""
         self.tell(truth=to_json(objects))
 
-    def wait(self) -> None:
-        """Wait until nobody has the page open any more, for example after the run."""
-        self.tell(over=True)
+    def wait(self, *, patient: bool) -> bool:
+        """Wait until nobody has the page open any more, for example after the run; return True if anybody had it open.
+
+        Args:
+            patient: Wait for the first viewer if there was none yet.
+        """
+        self.tell(over=True, patient=patient)
         self._left.wait()
+        return self._viewed
 
     def _obey(self, word: str) -> None:
         if word == PAUSE:
@@ -69,5 +75,6 @@ class LiveView(FollowingProcess):
             self._control.resume()
         elif word == STOP:
             self._control.stop("stopped on the page of --live")
-        elif word == LEFT:
+        elif word in (LEFT, UNSEEN):
+            self._viewed = word == LEFT
             self._left.set()

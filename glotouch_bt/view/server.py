@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import logging
 import re
 import socket
 from collections.abc import Iterator
@@ -81,6 +82,7 @@ def open_server(port: int) -> viser.ViserServer:
             """Refuse."""
             return None
 
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)  # a port scan is no fault of ours
     with _own_pages_only(port), contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner
         server = LoopbackServer(host=HOST, port=port, verbose=False)
     if server.get_port() != port:

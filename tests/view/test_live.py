@@ -82,6 +82,11 @@ def test_a_record_that_is_watched_is_not_changed(nap: Path) -> None:
     assert {p.name: (p.read_bytes(), p.stat().st_mtime_ns) for p in folder.iterdir()} == before
 
 
+def test_a_page_that_nobody_opened_is_told(nap: Path) -> None:
+    done = run(nap, "a", "--live", "--no-browser")
+    assert done.stderr.endswith("nobody had the page open; look at it with: glotouch view a\n")
+
+
 def test_options_of_the_page_need_the_page(nap: Path) -> None:
     for option in (("--port", "9000"), ("--no-browser",)):
         done = run(nap, "a", *option)
@@ -113,7 +118,7 @@ def test_pause_resume_and_stop_reach_the_mission(monkeypatch: pytest.MonkeyPatch
         page.show(Path("somewhere"))
         assert waited_for(lambda: control.stopped)
         assert control.stopped == "stopped on the page of --live"
-        page.wait()
+        assert page.wait(patient=False)
 
 
 def test_a_page_that_dies_leaves_the_mission_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -122,7 +127,7 @@ def test_a_page_that_dies_leaves_the_mission_alone(monkeypatch: pytest.MonkeyPat
     with LiveView(control, browser=False) as page:
         for _ in range(200):  # more than a pipe without a reader takes
             page.show(Path("x" * 1000))
-        page.wait()
+        page.wait(patient=False)
     assert (control.paused, control.stopped) == (False, None)
 
 

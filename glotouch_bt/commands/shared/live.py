@@ -76,9 +76,13 @@ def shown_on(
 
 
 def wait_for_viewers(page: LiveView | None, done: RunResult) -> None:
-    """Keep the page of a finished run until nobody has it open, or Ctrl-C; not if Ctrl-C ended the run."""
+    """Keep the page of a finished run until nobody has it open, or Ctrl-C; not if Ctrl-C ended the run.
+
+    At a terminal it also waits for the first viewer.
+    """
     if page is None or done.exit_code == INTERRUPTED:
         return
-    sys.stderr.write("the page stays until it is closed in the browser; Ctrl-C ends it now\n")
+    sys.stderr.write(f"the page stays until it is closed in the browser; Ctrl-C ends it now: {page.address}\n")
     with suppress(KeyboardInterrupt):
-        page.wait()
+        if not page.wait(patient=sys.stderr.isatty()):
+            sys.stderr.write(f"nobody had the page open; look at it with: glotouch view {done.folder}\n")

@@ -42,8 +42,12 @@ LOG_LINES = 200
 NO_WINDOW_M = (0.017, 0.028)
 """Size of a pad along x_P and z_P if the record has none. Source: the shipped gripper, rounded."""
 _PHASES: dict[str, Phase] = {"pause": "pausing", "paused": "paused", "resumed": "running"}
+RESULTS = frozenset({"SUCCESS", "FAILURE"})
+"""Status of a node that has ended. It stays in view when the node is reset, until it runs again."""
 LOST = frozenset({"tool_lost", "no_probe"})
 """Codes of failures that say that the probe is neither in the jaws nor in its holder."""
+NEAR_S = 1.0
+"""A node that failed within this time of a mark needs none of its own."""
 MARKS = frozenset({"failure", "guard", "fault", "stuck", "ending"})
 """Events that a person jumps to."""
 
@@ -203,6 +207,8 @@ class RunModel:
         self._ticks_read = len(record.ticks)
         for tick in ticks:
             self._saw(tick.stamp_s)
+        if record.complete:
+            self._mark_failed(record)
         known = set(self._order)
         new = dict.fromkeys(t.node for t in ticks if t.node not in known)
         if new:
@@ -256,7 +262,8 @@ class RunModel:
         for tick in self.record.ticks if self.record is not None else ():
             if tick.stamp_s > t_s + EPSILON_S:
                 break
-            now[tick.node] = tick.new
+            if tick.new != "INVALID" or now.get(tick.node) not in RESULTS:
+                now[tick.node] = tick.new
         return {node: now.get(node, "") for node in self._order if node in now or node in self._planned}
 
     def _saw(self, stamp_s: float) -> None:
@@ -305,6 +312,16 @@ class RunModel:
         if phase := _PHASES.get(kind):
             self._phases.add(stamp_s, phase)
         self._judge(event)
+
+    def _mark_failed(self, record: RunRecord) -> None:
+        """Mark where the node failed at which the mission ended: a condition that is false is no event."""
+        reasons = record.result.get("reasons")
+        node, _, text = str(reasons[-1] if isinstance(reasons, list) and reasons else "").partition(": ")
+        failed = [t.stamp_s for t in record.ticks if t.new == "FAILURE" and f"/{t.node}".endswith(f"/{node}")]
+        if failed and not any(abs(failed[-1] - stamp_s) < NEAR_S for stamp_s in self.marks.stamps):
+            line = LogLine(failed[-1], "failed", f"{node.rsplit('/', 1)[-1]}: {text}", "bad")
+            self.marks.add(failed[-1], line)
+            self.log.add(failed[-1], line)
 
     def _judge(self, event: RecordedEvent) -> None:
         """Note which candidates an event excludes, rejects, lifts or puts back."""

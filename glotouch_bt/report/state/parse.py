@@ -72,7 +72,10 @@ def outline_of(event: RecordedEvent) -> CandidateOutline | None:
         height = float(candidate["height_m"])
         if not (np.isfinite(outline).all() and math.isfinite(height)):
             return None
-        return CandidateOutline(int(candidate["index"]), outline, normal, sd, height, str(contour.family))
+        long, short = map(float, contour.size_m)
+        return CandidateOutline(
+            int(candidate["index"]), outline, normal, sd, (long, short), height, str(contour.family)
+        )
     except MALFORMED:
         return None
 

@@ -42,6 +42,7 @@ class CandidateOutline:
         outline_K_m: (n, 2) closed polyline.
         normal_K: (n, 2) outward normal at each corner.
         sd_m: (n,) standard deviation of the outline along its normal, zero if unknown.
+        size_m: Length and width of the fitted shape.
         height_m: Top above the floor; the sensing height until it was measured.
         kind: Fitted shape: circle, rectangle or free.
     """
@@ -50,6 +51,7 @@ class CandidateOutline:
     outline_K_m: Array
     normal_K: Array
     sd_m: Array
+    size_m: tuple[float, float]
     height_m: float
     kind: str
 

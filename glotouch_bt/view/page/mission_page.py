@@ -65,6 +65,7 @@ class Page:
         self._facts: list[str] = []
         self._target = "the target"
         self._undrawn = ""
+        self._question: Any = None
         gui = server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(37, 103, 201))
         gui.set_panel_label("GLoTouch")
@@ -138,6 +139,9 @@ class Page:
             note, tone = self._undrawn, "bad"
         if self.mission_buttons is not None:
             self.mission_buttons.visible = not self._model.ended
+            if self._model.ended and self._question is not None:
+                self._question.close()
+                self._question = None
         self._set("status", panels.status(state, facts, note, tone))
         self._set("tree", panels.tree(state, whole=self._whole.value))
         self._set("posterior", panels.posterior(state, self._target))
@@ -177,7 +181,7 @@ class Page:
 
     def _confirm_stop(self, controls: MissionControls) -> None:
         gui = self._server.gui
-        modal = gui.add_modal("Stop the mission?")
+        self._question = modal = gui.add_modal("Stop the mission?")
         with modal:
             gui.add_markdown(
                 "The arm stops, rises if it is free, and holds. The mission ends; it can be resumed later."

@@ -66,14 +66,18 @@ def tree(state: SceneState, *, whole: bool = False) -> str:
 
 
 def posterior(state: SceneState, target: str) -> str:
-    """Return one bar for each candidate, and one for none of them."""
+    """Return one bar for each candidate, and one for none of them; their sizes while nothing was compared."""
     rows = []
     shares = {s.index: s.probability for s in state.shares}
+    sizes = {o.index: (*o.size_m, o.height_m) for o in state.outlines}
     known = sorted({o.index for o in state.outlines} | {i for i in shares if i is not None})[:MAX_ROWS]
     for index in known:
         word = state.states.get(index, "found")
         colour = "rgb({},{},{})".format(*STATE_COLOURS[word])
-        rows.append(_bar(f"candidate {index}", shares.get(index), colour, "" if word == "found" else word))
+        if shares:
+            rows.append(_bar(f"candidate {index}", shares.get(index), colour, "" if word == "found" else word))
+        else:
+            rows.append(_size(f"candidate {index}", colour, sizes[index]))
     if None in shares:
         rows.append(_bar("none of them", shares[None], IDLE, ""))
     if not rows:
@@ -95,21 +99,28 @@ def _bar(name: str, share: float | None, colour: str, word: str) -> str:
     )
 
 
+def _size(name: str, colour: str, size_m: tuple[float, float, float]) -> str:
+    words = " × ".join(f"{1e3 * m:.0f}" for m in size_m)
+    return (
+        '<div style="display:flex;gap:8px;height:19px;font-variant-numeric:tabular-nums">'
+        f'<span style="width:94px;color:{colour};font-weight:600">{esc(name)}</span><span>{words} mm</span></div>'
+    )
+
+
 def gels(state: SceneState) -> str:
     """Return both depth maps side by side, on one colour scale, and the jaws' report."""
     jaws = f"opening {1e3 * state.aperture_m:.1f} mm · jaw force {state.jaw_force_N:.1f} N"
-    sides = [_gel(name, None if state.pads is None else state.pads[i]) for i, name in enumerate(("left", "right"))]
+    if state.pads is None:
+        return f'<div style="{_BOX};color:{SOFT}">{_nothing("no image")} · {jaws}</div>'
+    sides = [_gel(name, pad) for name, pad in zip(("left", "right"), state.pads, strict=True)]
     return (
         f'<div style="{_BOX}"><div style="display:flex;gap:14px;justify-content:center">{"".join(sides)}</div>'
         f'<div style="color:{SOFT};text-align:center">{jaws}</div></div>'
     )
 
 
-def _gel(name: str, depth_m: Array | None) -> str:
+def _gel(name: str, depth_m: Array) -> str:
     frame = f"width:84px;height:147px;border-radius:5px;background:#14101f;border:1px solid {LINE}"
-    if depth_m is None:
-        words = f'<div style="{frame};display:grid;place-items:center;color:#8a93a3">idle</div>'
-        return f'<div style="text-align:center">{words}<div style="color:{SOFT}">{name}</div></div>'
     data = base64.b64encode(depth_png(depth_m, DEEP_M)).decode()
     deepest = 1e3 * float(np.nanmax(depth_m)) if np.isfinite(depth_m).any() else 0.0
     picture = f'<img alt="{name} gel" style="{frame};image-rendering:pixelated" src="data:image/png;base64,{data}">'

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -208,3 +210,31 @@ def test_events_of_another_version_are_listed_and_not_drawn(tmp_path: Path) -> N
 def test_the_target_of_the_ranking_is_said(model: RunModel) -> None:
     line = next(v for v in model.log.values if v.kind == "ranking")
     assert line.text == f"{OBJECTS[WANTED][0]} accepted"
+
+
+FAKE_CLI = Path(__file__).parents[2] / "support" / "fake_cli.py"
+FULL = """
+mission: full
+world: container_five
+tree:
+  selector:
+    - sequence:
+        - wait: {name: look, seconds: 2.0}
+        - condition: {name: nothing there, port: done, equals: false}
+    - fail: {name: end safely, do: {wait: {name: stow, seconds: 2.0}}}
+"""
+
+
+def test_where_a_mission_failed_stays_in_view(tmp_path: Path) -> None:
+    """A false condition is no event, and the selector resets it before the mission ends."""
+    (tmp_path / "full.yaml").write_text(FULL)
+    words = [sys.executable, str(FAKE_CLI), "run", "full.yaml", "--out", "run"]
+    assert subprocess.run(words, cwd=tmp_path, capture_output=True, check=False).returncode == 1
+    model = read(tmp_path / "run")
+    (mark,) = model.marks.values
+    assert (mark.kind, mark.tone) == ("failed", "bad")
+    assert mark.text.startswith("nothing there: ")
+    assert mark.stamp_s == pytest.approx(2.0, abs=0.1)
+    end = {n.rsplit("/", 1)[-1]: s for n, s in model.state_at(model.span_s[1]).nodes.items()}
+    assert end["look"] == "SUCCESS"
+    assert (end["sequence"], end["nothing there"], end["end safely"]) == ("FAILURE", "FAILURE", "FAILURE")
