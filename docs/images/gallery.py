@@ -8,8 +8,10 @@ It needs chromium, chromium-driver and tmux. Runs that FOLDER holds already are 
 from __future__ import annotations
 
 import io
+import math
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -19,12 +21,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 from rich.console import Console
 from rich.text import Text
 
 from glotouch_bt.errors import GlotouchError
-from glotouch_bt.report import write_report
+from glotouch_bt.report import RecordReader, write_report
+from glotouch_bt.report.state import RunModel
 from glotouch_bt.runs import write_film
 from glotouch_bt.view.page import AT_START
 from glotouch_bt.view.serve import page_server
@@ -49,7 +53,13 @@ STAGES = {
     "grasp": "grasp",
     "lift": "lift",
 }
-"""Skills during which the live view is photographed, and the name of the picture."""
+"""Skills during which the view is photographed, and the name of the picture."""
+FELT_M = 2e-4
+"""Indentation of a gel that shows something."""
+PAUSE_AFTER_S = 6.0
+"""Wall time of the mission before it is paused for its picture."""
+TREES = ("retrieved", "crowded")
+"""Runs whose tree is shown."""
 VIEW, REPORT, TREE = (1440, 900), (1120, 1240), (900, 1300)
 TERMINAL = (96, 16)
 """Columns and rows."""
@@ -60,12 +70,13 @@ def main(folder: str = "runs") -> None:
     runs = Path(folder)
     runs.mkdir(parents=True, exist_ok=True)
     if not (runs / "retrieved" / "result.json").is_file():
-        photograph_live(runs / "retrieved")
+        run_paused(runs / "retrieved")
     for name, words in RUNS.items():
         if not (runs / name / "result.json").is_file():
             subprocess.run([GLOTOUCH, "run", *words, "--out", str(runs / name)], check=False)
-    photograph_view(runs / "aborted", "view_aborted")
-    photograph_view(runs / "retrieved", "view_truth", AT_START)
+    photograph_stages(runs / "retrieved")
+    for name in ("aborted", "crowded"):
+        photograph_view(runs / name, {f"view_{name}": (math.inf, "")})
     for name in ("retrieved", *RUNS):
         photograph_report(runs / name)
     photograph_terminal(runs)
@@ -93,53 +104,54 @@ def save(page: Page, name: str) -> None:
     print(out.name, out.stat().st_size, "bytes")
 
 
-@contextmanager
-def serving(words: list[str]) -> Iterator[str]:
-    """Run a command that serves a page, and yield the address that it prints."""
-    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as program:
-        assert program.stdout is not None
-        try:
-            for line in program.stdout:
-                if found := re.search(r"http://\S+", line):
-                    yield found[0]
-                    return
-            sys.exit(f"no page: {' '.join(words)}")
-        finally:
-            program.terminate()
+def run_paused(folder: Path) -> None:
+    """Make the retrieval with its live page, and photograph the page while the mission is paused."""
+    words = [GLOTOUCH, "run", *RETRIEVE, "--live", "--no-browser", "--out", str(folder)]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as program, window(VIEW) as page:
+        assert program.stderr is not None
+        address = next(found[0] for line in program.stderr if (found := re.search(r"http://\S+", line)))
+        until((folder / "run.mcap").is_file, "the record")
+        time.sleep(PAUSE_AFTER_S)
+        program.send_signal(signal.SIGUSR1)
+        page.open(address)
+        page.says("paused")
+        shoot(page, "live_paused")
+        page.press("go on")
+        page.says("the mission succeeded")  # the command ends when its window is closed
 
 
-def photograph_live(folder: Path) -> None:
-    """Make the retrieval, and photograph its live view when each stage is first seen, and once paused."""
-    with (
-        window(VIEW) as page,
-        serving([GLOTOUCH, "run", *RETRIEVE, "--live", "--no-browser", "--out", str(folder)]) as at,
-    ):
-        page.open(at)
-        missing = dict(STAGES)
-        while missing and not (folder / "result.json").is_file():
-            time.sleep(0.1)
-            running = next((skill for skill in missing if re.search(rf"^.*\b{skill}\b", head(page))), None)
-            if running is None:
-                continue
-            save(page, f"live_{missing.pop(running)}")
-            if running == "refine_outline":
-                page.press("pause")
-                page.says("paused")
-                save(page, "live_paused")
-                page.press("go on")
-        until((folder / "result.json").is_file, "the end of the mission")
-        page.says("the mission succeeded")
-        time.sleep(3.0)
-        save(page, "live_end")
+def photograph_stages(folder: Path) -> None:
+    """Photograph the page of a run during the longest run of each skill of `STAGES`."""
+    model = RunModel()
+    with RecordReader(folder) as reader:
+        reader.read()
+        model.feed(reader)
+        ticks = [(t.node.rsplit("/", 1)[-1].split(" ")[0], t) for t in reader.record.ticks]
+    longest: dict[str, tuple[float, float]] = {}
+    began: dict[str, float] = {}
+    for skill, tick in ticks:
+        if skill in STAGES and tick.new == "RUNNING":
+            began[tick.node] = tick.stamp_s
+        elif tick.node in began:
+            start = began.pop(tick.node)
+            longest[skill] = max(longest.get(skill, (0.0, 0.0)), (tick.stamp_s - start, tick.stamp_s))
+    moments = {f"view_{STAGES[s]}": (moment(model, end - length, end), "") for s, (length, end) in longest.items()}
+    photograph_view(folder, moments | {"view": (math.inf, ""), "view_truth": (math.inf, AT_START)})
 
 
-def head(page: Page) -> str:
-    """Return the head of the page: clock, phase, mission, running skill."""
-    return page.text.partition("Time")[0]
+def moment(model: RunModel, start_s: float, end_s: float) -> float:
+    """Return the time at which the gels are pressed deepest, or one at 70 % of the way if they feel nothing."""
+    deepest, best_s = FELT_M, start_s + 0.7 * (end_s - start_s)
+    for t_s in np.arange(start_s, end_s, 0.25):
+        pads = model.state_at(t_s).pads
+        depth = max((float(np.nanmax(pad)) for pad in pads), default=0.0) if pads is not None else 0.0
+        if depth > deepest:
+            deepest, best_s = depth, float(t_s)
+    return best_s
 
 
-def photograph_view(folder: Path, name: str, ghost: str = "") -> None:
-    """Photograph the page of a finished run at its end, with the true objects if `ghost` says when."""
+def photograph_view(folder: Path, moments: dict[str, tuple[float, str]]) -> None:
+    """Photograph the page of a finished run: for each name at a robot clock, and with the true objects of a moment."""
     over = threading.Event()
     with window(VIEW) as page, page_server(None, browser=False) as (server, at):
         watch = RunWatch(server, folder)
@@ -148,13 +160,23 @@ def photograph_view(folder: Path, name: str, ghost: str = "") -> None:
         try:
             page.open(at)
             page.says("the mission")
-            if ghost:
-                watch.page.ghost_switch.value = ghost
-            time.sleep(3.0)
-            save(page, name)
+            for name, (t_s, ghost) in moments.items():
+                watch.player.seek(t_s)
+                if ghost:
+                    watch.page.ghost_switch.value = ghost
+                shoot(page, name)
         finally:
             over.set()
             drawing.join()
+
+
+def shoot(page: Page, name: str) -> None:
+    """Photograph a page of the view once it is drawn."""
+    dismiss = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(b => b.click())"
+    time.sleep(3.0)
+    page.driver.execute_script(dismiss)  # viser warns that the scene is drawn in software
+    time.sleep(2.0)
+    save(page, name)
 
 
 def photograph_report(run: Path) -> None:
@@ -167,6 +189,8 @@ def photograph_report(run: Path) -> None:
             page.open(address)
             time.sleep(2.0)
             save(page, f"report_{run.name}{ending}")
+    if run.name not in TREES:
+        return
     with window(TREE) as page:
         page.open(address)
         page.driver.execute_script("document.querySelector('.tree').scrollIntoView()")

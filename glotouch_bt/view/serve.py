@@ -15,10 +15,13 @@ from typing import TYPE_CHECKING
 
 from glotouch_bt.report import RECORD_NAME
 from glotouch_bt.robot import BadInput
-from glotouch_bt.view.server import address, free_port, open_server, require_viser
+from glotouch_bt.view.server import PortTaken, address, free_port, open_server, require_viser
 
 if TYPE_CHECKING:
     import viser
+
+TRIES = 5
+"""Ports that are tried if other programs take them at the same moment."""
 
 
 def view_run(
@@ -76,8 +79,7 @@ def page_server(port: int | None, browser: bool) -> Iterator[tuple[viser.ViserSe
         BadInput: The port is in use, or viser is not installed.
     """
     require_viser()
-    number = free_port(port)
-    server = open_server(number)
+    number, server = _open(port)
     try:
         if browser and _has_display():
             threading.Thread(target=webbrowser.open, args=(address(number),), daemon=True).start()
@@ -85,6 +87,18 @@ def page_server(port: int | None, browser: bool) -> Iterator[tuple[viser.ViserSe
     finally:
         with contextlib.redirect_stdout(io.StringIO()):  # viser prints a farewell
             server.stop()
+
+
+def _open(port: int | None) -> tuple[int, viser.ViserServer]:
+    """Serve an empty page on the port, or on a free one; another program may take that one meanwhile."""
+    for _ in range(TRIES):
+        number = free_port(port)
+        try:
+            return number, open_server(number)
+        except PortTaken:
+            if port is not None:
+                raise
+    raise PortTaken(f"{TRIES} ports were taken meanwhile; give one with --port")
 
 
 def _has_display() -> bool:

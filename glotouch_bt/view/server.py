@@ -28,6 +28,10 @@ INSTALL = "pip install 'viser>=1.1'"
 """Command that installs what a view needs."""
 
 
+class PortTaken(BadInput):
+    """Another program took the port between the look and the opening."""
+
+
 def require_viser() -> None:
     """Require that viser is installed.
 
@@ -70,7 +74,8 @@ def open_server(port: int) -> viser.ViserServer:
     """Serve an empty page on a port of the loopback interface.
 
     Raises:
-        BadInput: viser is not installed, or the port was taken meanwhile.
+        BadInput: viser is not installed.
+        PortTaken: Another program took the port meanwhile.
     """
     require_viser()
     import viser
@@ -85,9 +90,11 @@ def open_server(port: int) -> viser.ViserServer:
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)  # a port scan is no fault of ours
     with _own_pages_only(port), contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner
         server = LoopbackServer(host=HOST, port=port, verbose=False)
-    if server.get_port() != port:
-        server.stop()
-        raise BadInput(f"port {port} was taken meanwhile; try again")
+        taken = server.get_port() != port
+        if taken:
+            server.stop()
+    if taken:
+        raise PortTaken(f"port {port} was taken meanwhile; try again")
     return server
 
 

@@ -70,6 +70,7 @@ class TouchTop(Skill):
     tool = In(HeldTool, "the held probe")
     candidate = In(Candidate, "the object, as traced")
     measured = Out(Candidate, "the same with its height", always=True)
+    height_m = Out(float, "height of its top above the floor, m")
 
     def run(self) -> SkillRun:
         """See the class."""
@@ -84,7 +85,7 @@ class TouchTop(Skill):
                 sides_m=touched_m,
             )
         height = float(top.ball_K_m[2]) - tool.tip_radius_m - tool.floor_z_K_m
-        self.measured = replace(candidate, height_m=height, top_touched=True)
+        self.measured, self.height_m = replace(candidate, height_m=height, top_touched=True), height
         self.event("candidate", candidate=self.measured)  # the final record of this candidate, with its height
         self.event("top", candidate=candidate.index, height_m=height, touches=top.touches, passed=top.passed)
 

@@ -52,19 +52,32 @@ MARKS = frozenset({"failure", "guard", "fault", "stuck", "ending"})
 """Events that a person jumps to."""
 
 
+MAX_KEPT = 2**16
+"""Rows that are kept, so that the view of a long mission stays small. The last five minutes are never thinned."""
+
+
 class GrowingRows:
-    """Rows of numbers that are appended; memory doubles when it is full.
+    """Rows of numbers that are appended. From `MAX_KEPT` rows on, each two neighbours become one.
 
     Args:
         width: Numbers in a row.
+        peak: Column of which the larger number of two rows is kept; of the others it is the later one.
     """
 
-    def __init__(self, width: int) -> None:
+    def __init__(self, width: int, peak: int | None = None) -> None:
         self._data = np.zeros((256, width))
         self._count = 0
+        self._peak = peak
 
     def append(self, rows: Array) -> None:
         """Append rows (n, width)."""
+        if self._count >= MAX_KEPT:
+            pairs = self._data[: self._count // 2 * 2].reshape(-1, 2, self._data.shape[1])
+            kept = pairs[:, 1].copy()
+            if self._peak is not None:
+                kept[:, self._peak] = pairs[:, :, self._peak].max(axis=1)
+            self._data[: len(kept)] = kept
+            self._count = len(kept)
         needed = self._count + len(rows)
         if needed > len(self._data):
             bigger = np.zeros((max(needed, 2 * len(self._data)), self._data.shape[1]))
@@ -115,9 +128,9 @@ class RunModel:
 
     Attributes:
         record: Its description, result, events and ticks.
-        motion: Rows (stamp_s, wrist force N, q ...), one for each control period; the force is the largest norm of the
-            period. None before the first.
-        jaws: Rows (stamp_s, aperture m, force N), one for each control period.
+        motion: Rows (stamp_s, wrist force N, q ...), one for each control period, and fewer of long ago; the force is
+            the largest norm since the row before. None before the first.
+        jaws: Rows (stamp_s, aperture m, force N), as often.
         log: All events in words.
         marks: The events that a person jumps to.
     """
@@ -193,7 +206,7 @@ class RunModel:
         while reader.packed["tactile"]:
             part = reader.packed["tactile"].pop(0)
             for stamp_s, left, right in zip(part["arrived_s"], part["left_m"], part["right_m"], strict=True):
-                self._pads.add(float(stamp_s), (left.astype(np.float32), right.astype(np.float32)))
+                self._pads.add(float(stamp_s), (left.astype(np.float16), right.astype(np.float16)))
         self._entries(reader.record)
 
     def _entries(self, record: RunRecord) -> None:
@@ -275,7 +288,7 @@ class RunModel:
         first = np.maximum(last - SAMPLES_A_PERIOD + 1, 0)
         force = np.maximum.reduceat(np.nan_to_num(np.linalg.norm(part["force_S_N"], axis=1)), first)
         if self.motion is None:
-            self.motion = GrowingRows(2 + part["q"].shape[1])
+            self.motion = GrowingRows(2 + part["q"].shape[1], peak=1)
         self.motion.append(np.column_stack([part["stamp_s"][last], force, part["q"][last]]))
         self._saw(float(part["stamp_s"][0]))
         self._saw(float(part["stamp_s"][-1]))

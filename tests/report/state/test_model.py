@@ -13,6 +13,7 @@ from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.record.recorder import Recorder
 from glotouch_bt.report import RecordReader
 from glotouch_bt.report.state import RunModel, SceneState, planned_nodes
+from glotouch_bt.report.state.model import MAX_KEPT, GrowingRows
 from tests.support.made_run import OBJECTS, TIP_M, WANTED, Made
 
 
@@ -238,3 +239,19 @@ def test_where_a_mission_failed_stays_in_view(tmp_path: Path) -> None:
     end = {n.rsplit("/", 1)[-1]: s for n, s in model.state_at(model.span_s[1]).nodes.items()}
     assert end["look"] == "SUCCESS"
     assert (end["sequence"], end["nothing there"], end["end safely"]) == ("FAILURE", "FAILURE", "FAILURE")
+
+
+def test_a_long_mission_is_kept_in_bounded_memory_with_its_peaks() -> None:
+    rows, count = GrowingRows(3, peak=1), 200_000
+    t_s = 0.01 * np.arange(count)
+    force = np.zeros(count)
+    force[[77, 60_001, 199_998]] = 9.0
+    for part in np.array_split(np.column_stack([t_s, force, t_s]), 400):
+        rows.append(part)
+    assert len(rows.rows) <= MAX_KEPT + 500
+    assert rows._data.nbytes < 10e6
+    assert (np.diff(rows.rows[:, 0]) > 0).all()
+    assert (rows.rows[:, 1] == 9.0).sum() == 3
+    at = rows.at(700.0)
+    assert at is not None
+    assert at[2] == pytest.approx(700.0, abs=0.2)
