@@ -132,6 +132,14 @@ def test_a_run_that_stopped_early_gives_a_shorter_report(tmp_path: Path, writer:
         assert "Why" in text
 
 
+def test_the_title_of_a_failed_run_names_the_node_that_failed(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "run.mcap", {"mission": "crowded"}) as record:
+        record.event("note", 1.0, {"text": "it ended"})
+    reason = {"node": "not too full", "code": "condition_false", "message": "found is 5, not at most 3"}
+    (tmp_path / "result.json").write_text(json.dumps({"status": "failure", "reason_chain": [reason]}))
+    assert "Failed: not too full: found is 5, not at most 3" in write_report(tmp_path).read_text()
+
+
 def test_a_cut_record_without_a_result_still_gives_a_report(whole: SimpleNamespace, tmp_path: Path) -> None:
     data = (whole.folder / "run.mcap").read_bytes()
     (tmp_path / "run.mcap").write_bytes(data[: len(data) // 2])

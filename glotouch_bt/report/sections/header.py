@@ -111,9 +111,11 @@ def verdict(record: RunRecord) -> tuple[str, str]:
             return "good", f"Retrieved {target}"
         return "good", "The mission succeeded"
     reasons = reason_chain(record)
-    root = (reasons[-1].get("message") or reasons[-1].get("code") or "") if reasons else ""
+    last = reasons[-1] if reasons else {}
+    root = last.get("message") or last.get("code") or ""
     if status == "failure":
-        return "bad", "Failed" + (f": {root}" if root else "")
+        node = str(last.get("node") or "").rpartition("/")[2]
+        return "bad", ": ".join(part for part in ("Failed", node, root) if part)
     if status == "aborted":
         return "warn", "Aborted" + (f": {root}" if root else "")
     return "warn", "The run did not end" if not record.complete else "The run has no result"
