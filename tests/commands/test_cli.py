@@ -168,7 +168,9 @@ def test_missions_and_nodes(command: CliRunner) -> None:
     nodes = {n["name"]: n for n in json.loads(command.invoke(cli.app, ["nodes", "--json"]).stdout)}
     assert [s["name"] for s in nodes["retry"]["settings"]] == ["attempts"]
     assert "attempts" in command.invoke(cli.app, ["nodes", "retry"]).stdout
-    assert "conditions: harsh, ideal, nominal" in command.invoke(cli.app, ["missions"]).stdout
+    listed = command.invoke(cli.app, ["missions"]).stdout
+    assert "conditions: harsh, ideal, nominal" in listed
+    assert "subtrees: explore, find_objects" in listed
     assert "expected_objects" in command.invoke(cli.app, ["missions", "retrieve"]).stdout
     for words in (["missions", "retriev"], ["nodes", "rety"]):
         assert "did you mean" in command.invoke(cli.app, words).stderr

@@ -165,7 +165,7 @@ def _children(kind: NodeKind, below: Node | None, place: Place, scope: Scope) ->
             scope.findings.add(place, "no_children", f"{kind.name} has no child", valid="do: a node")
             return ()
         return (parse_tree(below, scope),)
-    if (isinstance(below, Map) and len(below.entries) > 1) or _is_text(below):
+    if below is not None and ((isinstance(below, Map) and len(below.entries) > 1) or _is_text(below)):
         below = _listed(kind, below, scope)
     if isinstance(below, Seq):
         children = tuple(parse_tree(i, scope) for i in below.items)
@@ -184,7 +184,7 @@ def _without_dashes(body: Node, scope: Scope) -> bool:
     return _is_text(body)
 
 
-def _is_text(node: Node | None) -> bool:
+def _is_text(node: Node) -> bool:
     return isinstance(node, Scalar) and isinstance(node.value, str) and not node.poisoned
 
 
