@@ -8,6 +8,7 @@ export MPLBACKEND := Agg
 
 demo: $(VENV)
 	$(BIN)/glotouch run retrieve --set target=apple --seed 0
+	@echo "next: source $(BIN)/activate, then: glotouch run calibrate --live"
 
 # Quick tests: no whole mission in MuJoCo, no browser.
 test: $(VENV)/.dev

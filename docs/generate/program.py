@@ -21,9 +21,15 @@ MAX_WIDTH = 90
 """Characters of a signature on one line."""
 CLI = """# Command line
 
-Exit codes: 0 done, 1 the mission failed (with reasons) or a check found mistakes in a mission, 2 bad input, 3 a
-safety stop or a backend failure, 130 Ctrl-C. Results go to stdout, progress and messages to stderr. `--debug` shows
-the traceback of an error.
+| exit code | meaning |
+|---|---|
+| 0 | done |
+| 1 | the mission or a test failed, a replay differs, or `doctor` found a fault |
+| 2 | bad input, such as a mission in which `check` finds an error; nothing moved |
+| 3 | a safety stop, a backend failure or an internal error |
+| 130 | Ctrl-C |
+
+Results go to stdout, progress and messages to stderr. `--debug` shows the traceback of an error.
 """
 API = """# Python API
 

@@ -1,4 +1,4 @@
-"""Pages on what a mission may say: language, nodes, skills, worlds, conditions, faults, findings, record."""
+"""Pages on what a mission may use: nodes, skills, worlds, conditions, faults, findings; and on the record."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
+import missions
 import yaml
 from markdown_text import NOTE, code, codes, fields, prose, table
 from mcap.reader import make_reader
@@ -16,52 +17,14 @@ from pydantic import BaseModel
 
 from glotouch_backends.robots import load_robot, shipped_robots
 from glotouch_bt.faults import CATALOGUE
-from glotouch_bt.mission.export import describe_nodes, describe_skill, mission_schema
-from glotouch_bt.mission.read import Declaration, SkillRegistry, WorldFile, shipped
+from glotouch_bt.mission.export import describe_nodes, describe_skill
+from glotouch_bt.mission.read import SkillRegistry, WorldFile, shipped
 from glotouch_bt.mission.record import Recorder
 from glotouch_bt.mission.record.mcap_schemas import CHANNELS as CHANNELS_OF_RECORD
-from glotouch_bt.mission.spec import UNITS, describe_findings
+from glotouch_bt.mission.spec import describe_findings
 from glotouch_bt.robot import HOLD, FakeRobot, RobotFile
 from glotouch_bt.robot.definition import LIMITS
 
-MISSION = """# Mission files
-
-A mission is one YAML file. `glotouch check FILE` reports every mistake in it with file, line and column; nothing
-moves. `glotouch schema` prints a JSON Schema of this page for editors.
-
-```yaml
-mission: ring
-world: container_five
-parameters:
-  x: {type: float, unit: mm, default: -48, range: [-120, 120]}
-tree:
-  sequence:
-    - retry: {attempts: 2, do: {press: {x_m: $x, force_N: 5 N}}}
-    - condition: {port: height_m, at_least: 20 mm}
-```
-"""
-TREE = """## Trees
-
-A node is a name (`tool_return`), or a name with settings (`retry: {attempts: 3, do: ...}`). Names are those of
-[nodes](nodes.md) and of installed [skills](skills.md). A YAML list is a sequence. Every node takes `name:`, the
-name that messages, records and fault plans use. A second node of the same name is called `squeeze 2`.
-
-A skill reads and writes **ports**. A port is wired to a **key** of its own name; `in: {port: key}` and `out: {port:
-key}` wire it to another key. An input port also takes a value: `in: {grip_m: 40 mm}`. `$name` stands for a mission
-parameter.
-"""
-SUBTREES = """## Subtrees
-
-`subtree: {file: subtrees/explore.yaml, parameters: {...}, ports: {its_key: our_key}}` inserts the tree of another
-file. The path is relative to the mission; shipped files are found as well. All keys that `ports` does not name are
-private. A mission may also hold its subtrees itself, in `subtrees: {NAME: {parameters: ..., tree: ...}}`, used as
-`file: NAME`. The `mission.yaml` of a run folder is written this way, so it needs no other file.
-"""
-UNITS_TEXT = """## Units
-
-A number without a unit is in SI units; a number with a unit is converted: `speed_m_s: 40 mm/s`. The suffix of a
-name gives its unit: `grip_m`, `force_N`, `speed_m_s`. A number of another quantity is refused (`wrong_unit`).
-"""
 RECORD = """# The record of a run: run.mcap
 
 Every run writes one [MCAP](https://mcap.dev) file. It carries Foxglove's schemas and has been read back with
@@ -129,7 +92,7 @@ from), `guard` (supervision), `fault` (injected), `pause`, `paused`, `resumed`, 
 def pages() -> dict[str, str]:
     """Return every page of this module by its path below docs/."""
     made = {
-        "missions": missions,
+        "missions": missions.page,
         "nodes": nodes,
         "skills": skills,
         "worlds": worlds,
@@ -146,45 +109,6 @@ def _own_skills() -> list[dict[str, Any]]:
     """Descriptions of the skills that ship with the project."""
     shelf = SkillRegistry()
     return [describe_skill(n, shelf[n]) for n in sorted(shelf) if shelf[n].__module__.startswith("glotouch_skills.")]
-
-
-def missions() -> str:
-    """Return the page on mission files."""
-    schema = mission_schema(SkillRegistry())
-    meaning = {
-        "mission": "name: letters, digits, `_` and `-`",
-        "description": "one sentence for people",
-        "world": "a [world](worlds.md): a path, a shipped name, or the world itself",
-        "parameters": "values that `--set NAME=VALUE` may change, used as `$NAME`",
-        "timeout_s": "longest duration of the mission on the robot's clock, in seconds without a unit",
-        "leaves": "states that a successful run must end in, for example `{hand: object}`",
-        "subtrees": "subtrees held in the mission itself",
-        "tree": "the tree",
-    }
-    keys = [(code(k), "yes" if k in schema["required"] else "", meaning[k]) for k in schema["properties"]]
-    by_si: dict[str, list[str]] = {}
-    for unit, (si, _) in UNITS.items():
-        by_si.setdefault(si, []).append(unit)
-    ships = []
-    for name in shipped(""):
-        loaded = yaml.safe_load(shipped("")[name].read_text())
-        given = codes(loaded.get("parameters") or {})
-        ships.append((code(name), loaded.get("description", ""), given))
-    return "\n".join(
-        (
-            MISSION,
-            table(("key", "required", "meaning"), keys),
-            "## Parameters\n",
-            "`glotouch run FILE --set x=30` overrides a default. A parameter that no node uses is reported.\n",
-            fields(Declaration),
-            TREE,
-            SUBTREES,
-            UNITS_TEXT,
-            table(("SI unit", "accepted"), ((code(si) or "(ratio)", codes(units)) for si, units in by_si.items())),
-            "## Shipped missions\n",
-            table(("mission", "goal", "parameters"), ships),
-        )
-    )
 
 
 def nodes() -> str:
@@ -216,11 +140,11 @@ def skills() -> str:
         text.append(f"## {s['name']}\n\n{prose(s['description'])}\n")
         text.append(_parameters(s["parameters"], "parameter"))
         ports = [
-            (code(p["name"]), way, p["type"], "yes" if p.get("required") else "", p["description"])
+            (code(p["name"]), way, code(p["key"]), p["type"], "yes" if p.get("required") else "", p["description"])
             for way, many in (("in", s["inputs"]), ("out", s["outputs"]))
             for p in many
         ]
-        text.append(table(("port", "direction", "type", "required", "meaning"), ports))
+        text.append(table(("port", "direction", "key", "type", "required", "meaning"), ports))
         hand = [(code(r), "before", codes(states)) for r, states in s["needs"].items()]
         hand += [(code(r), "after success", code(state)) for r, state in s["leaves"].items()]
         hand += [(code(r), "after failure", codes(states)) for r, states in s["after_failure"].items()]

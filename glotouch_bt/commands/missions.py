@@ -16,7 +16,7 @@ def missions(
 ) -> None:
     """List the shipped missions, or describe one.
 
-    The list also names the shipped worlds, conditions and fault plans.
+    The list also names the shipped subtrees, worlds, conditions and fault plans.
     """
     from glotouch_bt.commands.terminal import print_settings, print_table
     from glotouch_bt.mission.export import describe_mission
@@ -33,8 +33,8 @@ def missions(
     if name is None:
         rows = [(d["name"], d["description"], ", ".join(p["name"] for p in d["parameters"])) for d in described]
         print_table("missions", ("name", "description", "parameters (--set NAME=VALUE)"), rows)
-        for kind, title in (("worlds", "worlds"), ("conditions", "conditions"), ("faults", "fault plans")):
-            sys.stdout.write(f"{title}: {', '.join(shipped(kind))}\n")
+        for kind in ("subtrees", "worlds", "conditions", "faults"):
+            sys.stdout.write(f"{'fault plans' if kind == 'faults' else kind}: {', '.join(shipped(kind))}\n")
         return
     (d,) = described
     sys.stdout.write(f"{d['name']}: {d['description']}\n{d['file']}\nworld {d['world']}\n")

@@ -18,6 +18,7 @@ from glotouch_bt.mission.read import (
     Reading,
     Scope,
     SkillRegistry,
+    Unreadable,
     Value,
     check_used,
     entries_of,
@@ -159,7 +160,11 @@ def _read(
     roots: tuple[Path, ...],
     findings: Findings,
 ) -> Mission | None:
-    source = read_yaml(path, shown(path))
+    try:
+        source = read_yaml(path, shown(path))
+    except Unreadable as e:
+        findings.add(e.place, "unreadable", e.what)
+        return None
     if not isinstance(source, Map):
         findings.add(source.place, "wrong_type", "a mission must be a mapping", valid=", ".join(MISSION_KEYS))
         return None
@@ -191,7 +196,7 @@ def _read(
     for key, _ in entries_of(source.get("subtrees")):
         if f"carried {key.value}" not in reading.sources.values():
             findings.add(key.place, "unused_subtree", f"no node uses the subtree {key.value!r}, so it is not checked")
-    check_flow(tree, findings, _leaves(source, findings), timeout_s)
+    check_flow(tree, skills, findings, _leaves(source, findings), timeout_s)
     if world is not None and not len(findings):
         _check_twins(parameters, given, section, world.objects, findings)
     if world is None or len(findings):
@@ -234,7 +239,12 @@ def _text(source: Map, key: str, findings: Findings, *, required: bool) -> str:
         findings.add(node.place, "wrong_type", f"{key}: must be text")
         return ""
     if key == "mission" and not all(c.isalnum() or c in "_-" for c in node.value):
-        findings.add(node.place, "wrong_name", f"mission name {node.value!r}", valid="letters, digits, _ and -")
+        findings.add(
+            node.place,
+            "wrong_name",
+            f"mission name {node.value!r} has characters that are not allowed",
+            valid="letters, digits, _ and -",
+        )
     return node.value
 
 

@@ -23,7 +23,16 @@ from glotouch_bt.mission.execution import Control, Outcome, SkillHung, deferred_
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.mission.record import Record, Recorder, RunSummary
 from glotouch_bt.motion import out_of_reach
-from glotouch_bt.robot import BackendError, BadInput, Conditions, GlotouchError, Robot, RobotDescription, load_backend
+from glotouch_bt.robot import (
+    BackendError,
+    BadInput,
+    Conditions,
+    GlotouchError,
+    Robot,
+    RobotDescription,
+    UnknownName,
+    load_backend,
+)
 from glotouch_bt.robot.simulation import Referee, TrueObject
 from glotouch_bt.runs.folder import MODELS, RunFolder, locked
 from glotouch_bt.runs.request import RunRequest, RunResult
@@ -83,11 +92,12 @@ def launch(
                 _require_reach(known, mission)
             try:
                 robot = backend.open(mission.world, conditions, request.seed, options)
-            except BadInput as e:
-                if not options:
+            except UnknownName as e:
+                if e.name not in options:
                     raise
                 names = ", ".join(mission.parameters) or "none"
-                raise BadInput(f"{e} (parameters of mission {mission.name!r}: {names})") from e
+                what = f"--set {e.name}: mission {mission.name!r} has no such parameter (valid: {names})"
+                raise BadInput(f"{what}; {e}") from e
             try:
                 referee = backend.referee(robot)
                 world = None if resumable is None else resumable.file.world(resumable.row.number)

@@ -39,6 +39,7 @@ def description(request: RunRequest, mission: Mission, conditions: Conditions, r
     objects = dataclasses.replace(world.objects, folder=Path(shown(world.objects.folder)))
     return {
         "mission": mission.name,
+        "description": mission.description,
         "backend": request.backend,
         "seed": request.seed,
         "conditions": conditions,

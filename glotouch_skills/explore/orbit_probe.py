@@ -18,12 +18,6 @@ NEAR_M = 0.015
 on the object's other side."""
 
 
-def sizes_in_words(candidates: tuple[Candidate, ...]) -> str:
-    """Return the number of candidates and their sizes in mm, as traced so far."""
-    sizes = ["{:.0f} × {:.0f}".format(*(1e3 * v for v in c.contour.size_m)) for c in candidates]
-    return f"{len(candidates)} objects traced: {', '.join(sizes)} mm"
-
-
 class OrbitProbeParams(TracingParams):
     """Parameters of `orbit_probe`: a coarse outline, so that the next object is found soon."""
 
@@ -76,7 +70,7 @@ class OrbitProbe(Skill):
     previous_map = In(SearchMap, "the search map", key="map")
     previous = In(tuple, "candidates so far", key="candidates", required=False)
     map = Out(SearchMap, "the search map with the object excluded")
-    candidates = Out(tuple, "candidates, the new one last", element=Candidate, result=sizes_in_words)
+    candidates = Out(tuple, "candidates, the new one last", element=Candidate)
     found = Out(int, "number of traced objects")
     complete = Out(bool, "all expected objects are traced")
 

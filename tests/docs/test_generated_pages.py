@@ -7,11 +7,13 @@ import os
 import re
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
 import pytest
 import yaml
 
+import glotouch_bt as gt
 from glotouch_bt.claims import read_claims
 
 ROOT = Path(__file__).parents[2]
@@ -56,6 +58,12 @@ def test_modules_of_a_page_exist(page: Path) -> None:
         if name not in ENTRY_POINT_GROUPS and not any(f.is_dir() or f.with_suffix(".py").is_file() for f in files):
             missing.append(name)
     assert missing == []
+
+
+def test_the_mission_of_the_readme_has_no_finding(tmp_path: Path) -> None:
+    (block,) = re.findall(r"```yaml\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    (tmp_path / "survey.yaml").write_text(textwrap.dedent(block), encoding="utf-8")
+    assert gt.check(tmp_path / "survey.yaml") == ()
 
 
 def test_every_page_is_in_the_navigation() -> None:

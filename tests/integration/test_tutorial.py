@@ -100,6 +100,11 @@ def test_what_counts_as_the_same_output(expected: str, found: str, same: bool) -
     assert fits(expected, found) is same
 
 
+def test_the_mission_without_code_is_the_example() -> None:
+    (shown,) = [step.body for step in steps((ROOT / "docs/tutorial.md").read_text()) if step.file == "crowded.yaml"]
+    assert shown == (ROOT / "examples/crowded.yaml").read_text()
+
+
 def test_the_page_has_files_and_commands() -> None:
     found = steps((ROOT / "docs/tutorial.md").read_text())
     assert sum(bool(s.file) for s in found) >= 6

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.mission.record.recorder import Recorder
 from glotouch_bt.report import read_run, write_report
 from glotouch_bt.report.scene import script
@@ -103,6 +104,31 @@ def test_a_skill_adds_its_own_section(page: str) -> None:
     assert all(said in page for said in ("two &lt;walls&gt;", "wall &lt;x&gt;", "0.0113", "-0.25"))
 
 
+def test_the_page_says_what_the_mission_is_for_and_how_large_the_objects_are_before_the_probe(page: str) -> None:
+    text = " ".join(parsed(page).text)
+    places = [
+        text.index(said) for said in ("bring <one> object", "5 objects traced: 62 × 62 × 59,", "compliance <1.63>")
+    ]
+    assert places == sorted(places)
+    assert "times real time" not in text
+
+
+def test_the_scene_speaks_of_a_target_only_if_the_mission_has_one(
+    page: str, tmp_path: Path, writer: SimpleNamespace
+) -> None:
+    assert "probability that it is the target" in page
+    writer.make_run(tmp_path, until="sweep", description=RIZON4_XENSE, target="")
+    without = write_report(tmp_path).read_text()
+    assert "The number at a candidate is its index." in without
+    assert "the target" not in without
+
+
+def test_the_log_leaves_out_what_is_none(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "run.mcap", {}) as record:
+        record.event("tool", 1.0, {"held": False, "error": None, "force_N": 3.25})
+    assert "<td>not held, force_N = 3.25</td>" in write_report(tmp_path).read_text()
+
+
 def test_a_mission_that_explored_nothing_has_no_map(tmp_path: Path) -> None:
     with Recorder(tmp_path / "run.mcap", {"container": {"interior_m": [0.4, 0.3, 0.1]}}) as record:
         record.event("tool", 1.0, {"held": True})
@@ -130,6 +156,14 @@ def test_a_run_that_stopped_early_gives_a_shorter_report(tmp_path: Path, writer:
     if until == "sweep":
         assert "Aborted: interrupted by <user> & co" in text
         assert "Why" in text
+
+
+def test_the_title_of_a_failed_run_names_the_node_that_failed(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "run.mcap", {"mission": "crowded"}) as record:
+        record.event("note", 1.0, {"text": "it ended"})
+    reason = {"node": "not too full", "code": "condition_false", "message": "found is 5, not at most 3"}
+    (tmp_path / "result.json").write_text(json.dumps({"status": "failure", "reason_chain": [reason]}))
+    assert "Failed: not too full: found is 5, not at most 3" in write_report(tmp_path).read_text()
 
 
 def test_a_cut_record_without_a_result_still_gives_a_report(whole: SimpleNamespace, tmp_path: Path) -> None:

@@ -14,12 +14,12 @@ from glotouch_bt.robot import (
     HOLD,
     Backend,
     BackendError,
-    BadInput,
     GripperState,
     Limits,
     Observation,
     Robot,
     SafetyStop,
+    UnknownName,
 )
 from glotouch_bt.robot.fake import FAKE_ARM
 from glotouch_bt.skill import Out, Skill, SkillFailed, SkillParams, SkillRun, param
@@ -119,7 +119,7 @@ class NullBackend(Backend):
         if "cable" in options:
             raise BackendError("the cable is out")
         if options:
-            raise BadInput(f"unknown option {', '.join(options)}")
+            raise UnknownName("option", next(iter(options)), ["cable"])
         return NullRobot(seed)
 
 

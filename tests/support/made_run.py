@@ -97,16 +97,18 @@ def depth(rng: np.random.Generator, bow: float, deep_m: float) -> np.ndarray:
     return d
 
 
-def make_run(folder: Path, *, until: str = "end", seed: int = 5, description: RobotDescription | None = None) -> Made:
+def make_run(folder: Path, *, until: str = "end", seed: int = 5, description: RobotDescription | None = None,
+             target: str = OBJECTS[WANTED][0]) -> Made:  # fmt: skip
     """Write run.mcap, result.json and truth.json. `until`: opened | sweep | end; `description`: of the robot."""
     rng = np.random.default_rng(seed)
     folder.mkdir(parents=True, exist_ok=True)
     run = {
         "mission": "retrieve",
+        "description": "bring <one> object",
         "backend": "fake",
         "seed": 7,
         "conditions": "nominal",
-        "parameters": {"target": OBJECTS[WANTED][0], "expected_objects": 5},
+        "parameters": {"target": target, "expected_objects": 5},
         "container": {"pose_B_K": POSE_B_K, "interior_m": INTERIOR_M},
         "probe": {"grasp_to_tip_m": TIP_M},
         "robot": {"description": description},

@@ -16,6 +16,8 @@ from glotouch_bt.mission.check.requirements import all_requirements
 from glotouch_bt.mission.check.variables_of import variables_of
 from glotouch_bt.mission.nodes import ANYTHING, EMPTY, UNSET, Requirement, StateVariables, ValueKind, kind_of
 from glotouch_bt.mission.spec import Findings, NodeSpec, Place, base_of
+from glotouch_bt.robot import BadInput
+from glotouch_bt.skill import Skill
 
 MAX_PATHS = 40
 """Number of findings that are reported with a path; later ones come without."""
@@ -24,12 +26,17 @@ MAX_RECURSION = 50_000
 
 
 def check_flow(
-    tree: NodeSpec, findings: Findings, leaves: Mapping[str, tuple[frozenset[str], Place]], timeout_s: float
+    tree: NodeSpec,
+    skills: Mapping[str, type[Skill]],
+    findings: Findings,
+    leaves: Mapping[str, tuple[frozenset[str], Place]],
+    timeout_s: float,
 ) -> None:
     """Report what can go wrong on some run of a tree.
 
     Args:
         tree: Its root, names numbered.
+        skills: Known skills, to say which of them writes a key.
         findings: Where faults go.
         leaves: States in which the mission promises to leave resources after success, and the place of the promise.
         timeout_s: Longest duration of the mission.
@@ -40,7 +47,7 @@ def check_flow(
         exact = DataFlow(tree, variables, requirements)
         blocked = any(exact.entered.get(id(n), EMPTY) == EMPTY for n in tree.walk())
         lenient = DataFlow(tree, variables, requirements, lenient=True) if blocked else exact
-        _Rules(exact, lenient, findings).all(leaves)
+        _Rules(exact, lenient, skills, findings).all(leaves)
         check_lint(lenient, findings, timeout_s)
 
 
@@ -58,8 +65,10 @@ def _deep_recursion() -> Iterator[None]:
 class _Rules:
     """Nodes that some run enters are judged by the exact sets, nodes after a mistake by the lenient ones."""
 
-    def __init__(self, exact: DataFlow, lenient: DataFlow, findings: Findings) -> None:
-        self._exact, self._lenient, self._findings = exact, lenient, findings
+    def __init__(
+        self, exact: DataFlow, lenient: DataFlow, skills: Mapping[str, type[Skill]], findings: Findings
+    ) -> None:
+        self._exact, self._lenient, self._skills, self._findings = exact, lenient, skills, findings
         self._variables, self._sets = exact.variables, exact.variables.sets
         self._writers = _writers(exact.tree, exact.variables)
         self._paths, self._budget = 0, StepBudget()
@@ -137,6 +146,8 @@ class _Rules:
         later = [(n, p) for n, p in self._places(requirement) if n is not requirement.node]
         if later:
             what += f"; {later[0][0].name!r} at line {later[0][1].line} writes it, but later or elsewhere"
+        elif able := _skills_that_write(name, self._skills, requirement.node.skill):
+            what += f"; skills that write it: {', '.join(able)}"
         prefix = requirement.key.rpartition("/")[0]
         written = sorted(
             key
@@ -265,6 +276,20 @@ def _writers(tree: NodeSpec, variables: StateVariables) -> dict[str, list[tuple[
         for port, wire in node.writes.items():
             kinds = kind_of(node).written_kinds(node, port, variables.written_kinds)
             found.setdefault(wire.key, []).append((node, wire.place, kinds))
+    return found
+
+
+def _skills_that_write(key: str, skills: Mapping[str, type[Skill]], reader: str) -> list[str]:
+    """Return the skills other than the reader that write a key of this name unless a mission rewires them."""
+    found = []
+    for name in skills:
+        try:
+            skill = skills[name]
+        except BadInput:  # its module cannot be imported here
+            continue
+        keys = skill.default_keys()
+        if name != reader and key in (keys[port] for port in skill.OUTPUT_PORTS):
+            found.append(name)
     return found
 
 

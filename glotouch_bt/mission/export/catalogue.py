@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from types import UnionType
@@ -11,8 +12,19 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 
 from glotouch_bt.mission.nodes import NODES, ConditionSettings
-from glotouch_bt.mission.read import limits_of, read_yaml, shown, unit_of
-from glotouch_bt.mission.spec import plain
+from glotouch_bt.mission.read import (
+    Scope,
+    SkillRegistry,
+    limits_of,
+    parse_tree,
+    read_named_yaml,
+    read_parameters,
+    read_yaml,
+    shown,
+    substitute,
+    unit_of,
+)
+from glotouch_bt.mission.spec import Findings, Wire, plain
 from glotouch_bt.skill import Skill
 
 
@@ -47,12 +59,37 @@ def describe_mission(file: Path) -> dict[str, Any]:
         BadInput: The file cannot be read.
     """
     source: Any = plain(read_yaml(file, shown(file)))
+    return {**_head(file, source), "world": source.get("world", "")}
+
+
+def describe_subtree(file: Path) -> dict[str, Any]:
+    """Return a shipped subtree as JSON data: name, description, parameters, and the keys that a mission can share.
+
+    `reads`: keys that it reads and never writes; `writes`: keys that it writes.
+    """
+    source = read_named_yaml(file, shown(file), "tree")
+    findings = Findings()
+    parameters = read_parameters(source.get("parameters"), {}, findings, None)
+    tree = source.get("tree")
+    assert tree is not None
+    spec = parse_tree(substitute(tree, parameters, findings), Scope(SkillRegistry(), findings, file))
+    nodes = list(spec.walk())
+    writes = _own_keys(w for n in nodes for w in n.writes.values())
+    reads = _own_keys(w for n in nodes for w in n.reads.values())
+    return {**_head(file, plain(source)), "reads": sorted(reads - writes), "writes": sorted(writes)}
+
+
+def _own_keys(wires: Iterable[Wire]) -> set[str]:
+    """Return the keys that belong to the file itself: not to subtrees inside it, and not to constants."""
+    return {w.key for w in wires if "/" not in w.key and "@" not in w.key}
+
+
+def _head(file: Path, source: Any) -> dict[str, Any]:
     declared = source.get("parameters") or {}
     keys = {"type": "", "unit": "", "default": None, "range": None, "description": ""}
     return {
         "name": file.stem,
         "description": source.get("description", ""),
-        "world": source.get("world", ""),
         "file": str(file),
         "parameters": [{"name": n} | {k: p.get(k, empty) for k, empty in keys.items()} for n, p in declared.items()],
     }

@@ -24,6 +24,7 @@ from glotouch_bt.mission.nodes.base import (
     Values,
     btcpp_name,
     comparison_ports,
+    failure_in_words,
     holds,
     in_code,
     in_words,
@@ -47,10 +48,9 @@ class PortCondition(Behaviour):
         if holds(self._settings, value):
             self.feedback_message, self.reason = "", None
             return Status.SUCCESS
-        plain = isinstance(value, (int, float, str))
-        found = "not set" if value is None else repr(value) if plain else "something else"
-        self.feedback_message = f"{in_words(self._settings)} does not hold: it is {found}"
-        evidence = {"wanted": in_words(self._settings), "found": value if plain else found}
+        self.feedback_message = failure_in_words(self._settings, value)
+        found = value if isinstance(value, (int, float, str)) else "not set" if value is None else "another value"
+        evidence = {"wanted": in_words(self._settings), "found": found}
         self.reason = Reason("condition_false", self.feedback_message, evidence, node=self.name)
         return Status.FAILURE
 

@@ -31,4 +31,4 @@ from glotouch_bt.mission.read.worlds import (
     read_world,
     split_conditions,
 )
-from glotouch_bt.mission.read.yaml_source import MAX_BYTES, parse_yaml, read_named_yaml, read_yaml
+from glotouch_bt.mission.read.yaml_source import MAX_BYTES, Unreadable, parse_yaml, read_named_yaml, read_yaml

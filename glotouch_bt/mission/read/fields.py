@@ -12,7 +12,19 @@ from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from glotouch_bt.mission.spec import Findings, Map, Node, Place, Scalar, Seq, convert, split_quantity, units_for, walk
+from glotouch_bt.mission.spec import (
+    SMALLER_UNITS,
+    Findings,
+    Map,
+    Node,
+    Place,
+    Scalar,
+    Seq,
+    convert,
+    split_quantity,
+    units_for,
+    walk,
+)
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -262,7 +274,18 @@ def _report(
     said = f"{subject}: {rule}{unit if code == 'wrong_range' else ''}"
     known = [a for a in get_args(field.annotation) if isinstance(a, str)] if field else []
     hint = findings.nearest(node.value, known) if isinstance(node, Scalar) and isinstance(node.value, str) else ""
+    if field and code == "wrong_range":
+        hint = _in_smaller_unit(node, field)
     findings.add(place, code, said, valid=_valid(field, unit), hint=hint)
+
+
+def _in_smaller_unit(node: Node, field: FieldInfo) -> str:
+    """Return a number that was written without a unit in the next smaller one, if the field allows that; else empty."""
+    smaller = SMALLER_UNITS.get(unit_of(field))
+    if smaller is None or not isinstance(node, Scalar) or node.unit or not isinstance(node.value, int | float):
+        return ""
+    value = convert(node.value, smaller, unit_of(field))
+    return f"{node.value:g} {smaller}" if all(holds(value, limit) for _, limit, holds in limits_of(field)) else ""
 
 
 def _keys(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:

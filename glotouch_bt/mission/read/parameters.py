@@ -105,7 +105,8 @@ def read_parameters(
     for key, body in node.entries:
         name = str(key.value)
         if not NAME.fullmatch(name):
-            findings.add(key.place, "wrong_name", f"parameter name {name!r}", valid="letters, digits and _")
+            what = f"parameter name {name!r} has characters that are not allowed"
+            findings.add(key.place, "wrong_name", what, valid="letters, digits and _, the first a letter")
         if not isinstance(body, Map):
             findings.add(
                 body.place, "wrong_type", f"parameter {name!r} must be a mapping", valid="type, default, range"

@@ -51,7 +51,8 @@ def _node(node: Node, scope: Scope) -> NodeSpec:
         return _node_of_kind(NODES["sequence"], node.place, node, scope)
     if isinstance(node, Map) and node.entries:
         names = ", ".join(node.keys())
-        what = f"a node has one name, here are {len(node.entries)}: {names} (is the indentation right?)"
+        what = f"a node has one name, here are {len(node.entries)}: {names}"
+        what += " (is the indentation right, and does each node begin with '- '?)"
         scope.findings.add(node.entries[1][0].place, "not_a_node", what)
         key, body = node.entries[0]
         return _named(str(key.value), key.place, body, scope) if key.value in {*NODES, *scope.skills} else _lost(node)
@@ -131,6 +132,8 @@ def _node_named(name: str, place: Place, body: Node, scope: Scope) -> NodeSpec:
 
 
 def _node_of_kind(kind: NodeKind, place: Place, body: Node, scope: Scope) -> NodeSpec:
+    if kind.children == "many" and _without_dashes(body, scope):
+        body = _listed(kind, body, scope)
     bare = kind.children == "one" and not kind.Settings.model_fields  # `succeed: {orbit_probe: ...}` needs no `do`
     if (kind.children == "many" and isinstance(body, Seq)) or (
         bare and not (isinstance(body, Map) and ("do" in body or not body.entries))
@@ -162,6 +165,8 @@ def _children(kind: NodeKind, below: Node | None, place: Place, scope: Scope) ->
             scope.findings.add(place, "no_children", f"{kind.name} has no child", valid="do: a node")
             return ()
         return (parse_tree(below, scope),)
+    if below is not None and ((isinstance(below, Map) and len(below.entries) > 1) or _is_text(below)):
+        below = _listed(kind, below, scope)
     if isinstance(below, Seq):
         children = tuple(parse_tree(i, scope) for i in below.items)
     elif isinstance(below, Map):
@@ -170,6 +175,26 @@ def _children(kind: NodeKind, below: Node | None, place: Place, scope: Scope) ->
         what = f"{kind.name} has no children"
         scope.findings.add(place, "no_children", what, valid=f"{kind.name}: [node, node, ...]")
     return children
+
+
+def _without_dashes(body: Node, scope: Scope) -> bool:
+    """Return True if children stand below a name without dashes: text, or a mapping of nodes."""
+    if isinstance(body, Map):
+        return "do" not in body and any(key.value in NODES or key.value in scope.skills for key, _ in body.entries)
+    return _is_text(body)
+
+
+def _is_text(node: Node) -> bool:
+    return isinstance(node, Scalar) and isinstance(node.value, str) and not node.poisoned
+
+
+def _listed(kind: NodeKind, undashed: Node, scope: Scope) -> Seq:
+    """Report children without dashes, and return them as a list."""
+    what = f"the children of {kind.name} are a list: begin each of them with '- '"
+    scope.findings.add(undashed.place, "not_a_node", what, valid=f"{kind.name}: [node, node, ...]")
+    if isinstance(undashed, Map):
+        return Seq(tuple(Map((entry,), entry[0].place) for entry in undashed.entries), undashed.place)
+    return Seq((Scalar(None, undashed.place, poisoned=True),), undashed.place)
 
 
 def _skill(name: str, skill: type[Skill], place: Place, body: Node, scope: Scope) -> NodeSpec:

@@ -66,13 +66,11 @@ def parse_yaml(data: bytes | str, shown: str) -> Node:
     try:
         return _build(loader, shown)
     except yaml.reader.ReaderError as e:
-        raise BadInput(f"{_at(text, e.position, shown)}: a character that YAML does not allow ({e.reason})") from e
+        raise Unreadable(_at(text, e.position, shown), f"a character that YAML does not allow ({e.reason})") from e
     except yaml.MarkedYAMLError as e:
         mark = e.problem_mark or e.context_mark
-        place = f"{shown}:{mark.line + 1}:{mark.column + 1}" if mark else shown
-        tab = mark is not None and text[mark.index : mark.index + 1] == "\t"
-        what = "a tab; indent with blanks" if tab else e.problem or e.context
-        raise BadInput(f"{place}: not valid YAML: {what}") from e
+        place = Place(shown, mark.line + 1, mark.column + 1) if mark else Place(shown)
+        raise Unreadable(place, f"not valid YAML: {_fault_of_syntax(e, text)}") from e
     except yaml.YAMLError as e:
         raise BadInput(f"{shown}: not valid YAML: {e}") from e
     finally:
@@ -90,15 +88,44 @@ def _decode(data: bytes | str, shown: str) -> str:
         line, column = data[: e.start].count(b"\n") + 1, e.start - (data.rfind(b"\n", 0, e.start) + 1) + 1
         utf16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
         found = "but UTF-16" if utf16 else f"(byte 0x{data[e.start]:02x})"
-        raise BadInput(f"{shown}:{line}:{column}: not UTF-8 text {found}") from e
+        raise Unreadable(Place(shown, line, column), f"not UTF-8 text {found}") from e
 
 
-def _at(text: str, position: int, shown: str) -> str:
+def _at(text: str, position: int, shown: str) -> Place:
     before = text[: max(position, 0)]
-    return f"{shown}:{before.count(chr(10)) + 1}:{len(before) - (before.rfind(chr(10)) + 1) + 1}"
+    return Place(shown, before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1)
 
 
-class YamlRefused(BadInput):
+def _fault_of_syntax(error: yaml.MarkedYAMLError, text: str) -> str:
+    """Return what is wrong with the syntax; YAML's own words do not say that the indentation is."""
+    mark, block = error.problem_mark or error.context_mark, error.context_mark
+    words = str(error.problem or error.context)
+    if mark is None:
+        return words
+    if text[mark.index : mark.index + 1] == "\t":
+        return "a tab; indent with blanks"
+    first = not text[mark.index - mark.column : mark.index].strip()
+    if first and block is not None and "block" in str(error.context) and mark.column != block.column:
+        return f"{words}; this line begins in another column than its neighbours"
+    if "mapping values are not allowed" in words:
+        return f"{words}; begin the line in the column of its neighbours, or quote a text that has ': ' in it"
+    return words
+
+
+class Unreadable(BadInput):
+    """A document that cannot or may not be read.
+
+    Attributes:
+        place: Where.
+        what: What is wrong.
+    """
+
+    def __init__(self, place: Place, what: str) -> None:
+        super().__init__(f"{place}: {what}")
+        self.place, self.what = place, what
+
+
+class YamlRefused(Unreadable):
     """A document that may not be read.
 
     Args:
@@ -111,7 +138,7 @@ class YamlRefused(BadInput):
     """
 
     def __init__(self, place: Place, what: str, piece: str) -> None:
-        super().__init__(f"{place}: {what.format(piece)}")
+        super().__init__(place, what.format(piece))
         self.unquoted = f"{place}: {what.format('...')}"
 
 
@@ -130,14 +157,14 @@ class _Open:
 
     def _check_key(self, key: Node) -> None:
         if not isinstance(key, Scalar) or not isinstance(key.value, str):
-            raise BadInput(f"{key.place}: a key must be a plain word")
+            raise Unreadable(key.place, "a key must be a plain word")
         if key.value == "<<":
-            raise BadInput(f"{key.place}: merge keys (<<) are not allowed")
+            raise Unreadable(key.place, "merge keys (<<) are not allowed")
         if key.value in self.seen:
             first = self.seen[key.value]
             raise YamlRefused(key.place, f"duplicate key {{}} (first at line {first.line})", repr(key.value))
         if key.value and (fault := fault_of_name(key.value)):
-            raise BadInput(f"{key.place}: this key {fault}")
+            raise Unreadable(key.place, f"this key {fault}")
         self.seen[key.value] = key.place
 
     def close(self) -> Node:
@@ -156,12 +183,12 @@ def _build(loader: Any, shown: str) -> Node:
             break
         if isinstance(event, (yaml.StreamStartEvent, yaml.DocumentStartEvent, yaml.DocumentEndEvent)):
             if isinstance(event, yaml.DocumentStartEvent) and root is not None:
-                raise BadInput(f"{_place(event, shown)}: a second document; a file holds one document")
+                raise Unreadable(_place(event, shown), "a second document; a file holds one document")
             continue
         _refuse(event, shown)
         if isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent)):
             if len(stack) >= MAX_DEPTH:
-                raise BadInput(f"{_place(event, shown)}: nested deeper than {MAX_DEPTH} levels")
+                raise Unreadable(_place(event, shown), f"nested deeper than {MAX_DEPTH} levels")
             stack.append(_Open(_place(event, shown), isinstance(event, yaml.MappingStartEvent)))
             continue
         node = _scalar(event, shown) if isinstance(event, yaml.ScalarEvent) else stack.pop().close()
@@ -170,7 +197,7 @@ def _build(loader: Any, shown: str) -> Node:
         else:
             root = node
     if root is None:
-        raise BadInput(f"{shown}: holds no YAML document")
+        raise Unreadable(Place(shown), "holds no YAML document")
     return root
 
 
@@ -191,7 +218,7 @@ def _refuse(event: Any, shown: str) -> None:
 def _scalar(event: Any, shown: str) -> Scalar:
     place, text = _place(event, shown), event.value
     if fault := fault_of_text(text):
-        raise BadInput(f"{place}: this text {fault}; a terminal would execute it")
+        raise Unreadable(place, f"this text {fault}; a terminal would execute it")
     if event.style not in (None, ""):
         return Scalar(text, place)
     if text in ("", "~", "null", "Null", "NULL"):

@@ -1,6 +1,14 @@
 """Write and read the record of a run: one MCAP file with everything sensed, commanded, ticked and decided."""
 
-from glotouch_bt.mission.record.event_words import HIDDEN_EVENTS, event_tone, event_words, short_text
+from glotouch_bt.mission.record.event_words import (
+    HIDDEN_EVENTS,
+    OBJECTS_RESULT,
+    event_tone,
+    event_words,
+    fields_in_words,
+    objects_in_words,
+    short_text,
+)
 from glotouch_bt.mission.record.mcap_chunks import (
     BROKEN,
     MAX_RECORD_BYTES,

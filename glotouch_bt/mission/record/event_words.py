@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 MALFORMED = (AttributeError, IndexError, KeyError, TypeError, ValueError)
 """Errors of data of another shape."""
 MAX_TEXT = 160
 """Characters of one line of the log."""
+OBJECTS_RESULT = "candidates"
+"""Key of the result that says how large the traced objects are."""
 HIDDEN_EVENTS = frozenset({"sweep", "request", "request_done", "report"})
 """Events that logs leave out: many a second, or without a meaning for a person."""
 _BAD, _WARN, _GOOD = (
@@ -29,6 +32,30 @@ def short_text(value: Any) -> str:
     return str(value)
 
 
+def fields_in_words(data: Mapping[str, Any]) -> str:
+    """Return the fields of an event: `force_N = 3.2, not held`. Node and text are left out, and what is None."""
+    shown = ((k, v) for k, v in data.items() if k not in ("node", "text") and v is not None)
+    return ", ".join(f"{'' if v else 'not '}{k}" if isinstance(v, bool) else f"{k} = {short_text(v)}" for k, v in shown)
+
+
+def objects_in_words(candidates: Iterable[Any]) -> str:
+    """Return the sizes of recorded candidates: `2 objects traced: 103 × 44 × 63, 62 × 62 mm`; nothing without any.
+
+    The third number is the height, once the top was touched.
+    """
+    sizes = [size for c in candidates if (size := _size_in_words(c))]
+    return f"{len(sizes)} object{'s' if len(sizes) > 1 else ''} traced: {', '.join(sizes)} mm" if sizes else ""
+
+
+def _size_in_words(candidate: Any) -> str:
+    try:
+        long, short = candidate["contour"]["size_m"]
+        sides = (long, short, candidate["height_m"]) if candidate["top_touched"] else (long, short)
+        return " × ".join(f"{1e3 * side:.0f}" for side in sides)
+    except MALFORMED:
+        return ""
+
+
 def event_tone(kind: str) -> str:
     """Return good, warn or bad, or nothing."""
     return _TONES.get(kind, "")
@@ -41,8 +68,7 @@ def event_words(kind: str, d: dict[str, Any]) -> str:
     except MALFORMED:
         text = None
     if text is None:
-        pairs = [f"{k} {short_text(v)}" for k, v in d.items() if k not in ("node", "text")]
-        text = "; ".join([*([str(d["text"])] if d.get("text") else []), ", ".join(pairs)])
+        text = "; ".join(part for part in (str(d.get("text") or ""), fields_in_words(d)) if part)
     return text if len(text) <= MAX_TEXT else text[: MAX_TEXT - 1] + "…"
 
 

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from glotouch_bt.mission.record import Json, to_json
+from glotouch_bt.mission.record import OBJECTS_RESULT, Json, objects_in_words, to_json
 from glotouch_bt.robot import Array, Command, Observation
 from glotouch_bt.untrusted import require_type
 
@@ -60,7 +60,8 @@ class RunSummary:
         ranking: Data of the last ranking event, or None.
         calibration: Data of the last calibration of the probe, or None.
         best: The candidate with the highest probability and that probability; (-1, 0) before the first decision.
-        results: The outputs that skills declare as results, by key: {text, node}; the last of each.
+        results: What was found, by key: {text, node}; the last of each. First the sizes of the candidates, then the
+            outputs that skills declare as results.
         last_event: (robot time, kind) of the last event.
         node: Path of the last leaf that started.
         peak_force_N: Largest norm of the sensed wrist force.
@@ -138,7 +139,7 @@ class RunSummary:
         if kind == "contact":
             self.contacts += 1
         elif kind == "candidate":
-            self._store(_candidate(to_json(data.get("candidate", data))))
+            self._store(_candidate(to_json(data.get("candidate", data))), str(data.get("node", "")))
         elif kind == "ranking":
             self.ranking = to_json(data.get("ranking", data), summarise=True)
         elif kind == "result":
@@ -149,14 +150,15 @@ class RunSummary:
             self.flush()
             self._probe_held = bool(data.get("held", False))
 
-    def _store(self, candidate: Json) -> None:
+    def _store(self, candidate: Json, node: str) -> None:
         """Store a candidate; a candidate measured again replaces its earlier entry."""
         index = candidate.get("index") if isinstance(candidate, dict) else None
-        for i, known in enumerate(self.candidates):
-            if index is not None and isinstance(known, dict) and known.get("index") == index:
-                self.candidates[i] = candidate
-                return
-        self.candidates.append(candidate)
+        known = [c.get("index") if isinstance(c, dict) else None for c in self.candidates]
+        at = known.index(index) if index is not None and index in known else len(known)
+        self.candidates[at : at + 1] = [candidate]
+        if text := objects_in_words(self.candidates):
+            others = {key: result for key, result in self.results.items() if key != OBJECTS_RESULT}
+            self.results = {OBJECTS_RESULT: {"node": node, "text": text}, **others}
 
 
 def _candidate(data: Json) -> Json:

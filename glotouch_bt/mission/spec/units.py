@@ -36,6 +36,9 @@ UNITS: dict[str, tuple[str, float]] = {
 }
 """Unit: (its SI unit, factor). The SI unit of angles is the radian."""
 
+SMALLER_UNITS = {"m": "mm", "m/s": "mm/s", "m/s2": "mm/s2", "rad": "deg", "rad/s": "deg/s", "kg": "g", "s": "ms"}
+"""The unit in which people think of small values of an SI unit."""
+
 # Longest first: `_m_s` before `_s`.
 _SUFFIXES: tuple[tuple[str, str], ...] = (
     ("_m_s2", "m/s2"),

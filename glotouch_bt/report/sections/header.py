@@ -7,13 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from glotouch_bt.mission.record import OBJECTS_RESULT, objects_in_words
 from glotouch_bt.report.page import esc, number
 from glotouch_bt.report.run_record import RunRecord
 from glotouch_bt.report.sections.map import candidates
 from glotouch_bt.report.sections.reasons import reason_chain
 
 
-def _parameter(record: RunRecord, name: str) -> Any:
+def parameter(record: RunRecord, name: str) -> Any:
+    """Return a parameter of the mission, else the value of this name in the description of the run."""
     value = record.of_run("parameters", name)
     return record.run.get(name) if value is None else value
 
@@ -24,7 +26,7 @@ def header_section(record: RunRecord) -> str:
     r, run = record.result, record.run
     facts = []
     for name in ("mission", "target", "seed", "conditions", "backend", "robot"):
-        value = r.get(name, run.get(name, _parameter(record, name)))
+        value = r.get(name, run.get(name, parameter(record, name)))
         if name == "robot":
             value = record.of_run("robot", "description", "name")
         elif isinstance(value, dict):
@@ -37,17 +39,24 @@ def header_section(record: RunRecord) -> str:
     over = esc(r.get("mission") or run.get("mission") or "run")
     return (
         f'<header class="{tone}"><p class="over">GLoTouch run report · {over}</p>'
-        f'<h1 class="verdict">{esc(sentence)}</h1>'
+        f'<h1 class="verdict">{esc(sentence)}</h1>{_description(record)}'
         f'<p class="facts">{"".join(facts)}</p>{_results(record)}<div class="tiles">{tiles}</div></header>'
     )
 
 
+def _description(record: RunRecord) -> str:
+    """Return what the mission is for, as its file says it."""
+    text = record.of_run("description")
+    return f'<p class="lead">{esc(text)}</p>' if isinstance(text, str) and text else ""
+
+
 def _results(record: RunRecord) -> str:
-    """Return the results that skills declare, in the order of their outputs' first writing."""
-    found: dict[str, str] = {}
-    for e in record.of_kind("result"):
-        found[str(e.data.get("key"))] = f"<li>{esc(e.data.get('text') or '')}</li>"
-    return f'<ul class="results">{"".join(found.values())}</ul>' if found else ""
+    """Return the sizes of the objects, then the results that skills declare, in the order of their first writing."""
+    found = {OBJECTS_RESULT: ""}
+    found |= {str(e.data.get("key")): str(e.data.get("text") or "") for e in record.of_kind("result")}
+    found[OBJECTS_RESULT] = objects_in_words(candidates(record)) or found[OBJECTS_RESULT]
+    lines = "".join(f"<li>{esc(text)}</li>" for text in found.values() if text)
+    return f'<ul class="results">{lines}</ul>' if lines else ""
 
 
 def _numbers(record: RunRecord) -> list[tuple[str, str]]:
@@ -60,9 +69,9 @@ def _numbers(record: RunRecord) -> list[tuple[str, str]]:
     if _real(wall_s):
         out.append(("wall time", _clock(wall_s)))
         if _real(sim_s) and wall_s > 0:
-            out.append(("times real time", number(sim_s / wall_s, 1) + "×"))
+            out.append(("real time", number(sim_s / wall_s, 1) + "×"))
     found = candidates(record)
-    expected = _parameter(record, "expected_objects")
+    expected = parameter(record, "expected_objects")
     if found or isinstance(expected, int):
         out.append(("objects found", f"{len(found)}" + (f" of {esc(expected)}" if isinstance(expected, int) else "")))
     contacts = len(record.of_kind("contact"))
@@ -100,7 +109,7 @@ def _clock(value: Any) -> str:
 def verdict(record: RunRecord) -> tuple[str, str]:
     """Return (good | bad | warn, one sentence)."""
     r = record.result
-    target = r.get("target") or _parameter(record, "target") or "the target"
+    target = r.get("target") or parameter(record, "target") or "the target"
     status = r.get("status")
     if status == "success":
         if r.get("correct") is False:
@@ -111,9 +120,11 @@ def verdict(record: RunRecord) -> tuple[str, str]:
             return "good", f"Retrieved {target}"
         return "good", "The mission succeeded"
     reasons = reason_chain(record)
-    root = (reasons[-1].get("message") or reasons[-1].get("code") or "") if reasons else ""
+    last = reasons[-1] if reasons else {}
+    root = last.get("message") or last.get("code") or ""
     if status == "failure":
-        return "bad", "Failed" + (f": {root}" if root else "")
+        node = str(last.get("node") or "").rpartition("/")[2]
+        return "bad", ": ".join(part for part in ("Failed", node, root) if part)
     if status == "aborted":
         return "warn", "Aborted" + (f": {root}" if root else "")
     return "warn", "The run did not end" if not record.complete else "The run has no result"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from glotouch_bt.mission.record import short_text
+from glotouch_bt.mission.record import fields_in_words
 from glotouch_bt.report.page import esc, number, section, table
 from glotouch_bt.report.run_record import RunRecord
 
@@ -17,12 +17,8 @@ def log_section(record: RunRecord) -> str:
     for e in record.events:
         if e.kind in _SHOWN_ELSEWHERE:
             continue
-        data = {k: v for k, v in e.data.items() if k not in ("node", "text")}
-        text = esc(e.data.get("text", ""))
-        pairs = ", ".join(f"{esc(k)} = {esc(short_text(v))}" for k, v in data.items())
-        rows.append(
-            [number(e.stamp_s, 2), esc(e.kind), esc(e.data.get("node", "")), "; ".join(p for p in (text, pairs) if p)]
-        )
+        words = "; ".join(part for part in (str(e.data.get("text") or ""), fields_in_words(e.data)) if part)
+        rows.append([number(e.stamp_s, 2), esc(e.kind), esc(e.data.get("node", "")), esc(words)])
     if not rows:
         return ""
     cut = f"<p>The first {MAX_LINES} of {len(rows)} lines.</p>" if len(rows) > MAX_LINES else ""

@@ -8,6 +8,7 @@ from glotouch_bt.report.page import section
 from glotouch_bt.report.run_record import RunRecord
 from glotouch_bt.report.scene import scene_data, scene_json
 from glotouch_bt.report.sections.force import contact_stamp_s, envelope
+from glotouch_bt.report.sections.header import parameter
 from glotouch_bt.report.state import read_setup
 from glotouch_bt.report.svg import AxisScale, polyline
 
@@ -29,9 +30,14 @@ def scene_section(record: RunRecord) -> str:
         options = "".join(f'<option value="{i - 1}">{word}</option>' for i, word in enumerate(words))
         boxes += f'<label>true objects <select id="show-truth">{options}</select></label>'
     lead = (
-        "Drag to turn, scroll or pinch to zoom, drag with the right button to move. The number at a candidate is the "
-        "probability that it is the target; the green solid is the target where it was recognised."
+        "Drag to turn, scroll or pinch to zoom, drag with the right button to move. The number at a candidate is its "
+        "index."
     )
+    if record.result.get("target") or parameter(record, "target"):
+        lead += (
+            " The percentage is the probability that it is the target. The green solid is the target where it was "
+            "recognised."
+        )
     body = (
         '<div id="scene-box"><div class="stage"><canvas id="scene"></canvas><div id="scene-names"></div>'
         '<p class="facts over-scene"><b id="scene-time"></b> <span id="scene-skill"></span> '

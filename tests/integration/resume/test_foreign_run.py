@@ -108,9 +108,8 @@ def test_a_folder_chooses_no_program_file_address_or_device(run: Path, base: Pat
     describe(run, settings={name: str(program)})
     assert f"--set {name}=..." in refused("resume", run)
     assert left_alone(run, base)
-    assert f"unknown option {name}" in refused("resume", run, "--set", f"{name}=mine"), (
-        "that of the command line counts"
-    )
+    said = refused("resume", run, "--set", f"{name}=mine")
+    assert f"unknown option '{name}'" in said, "that of the command line counts"
     assert left_alone(run, base)
     assert glotouch("resume", run, "--set", f"{name}=").code == 3, "left out: the safety stop again"
     assert sorted(os.listdir(tmp_path)) == ["program", "run"]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from glotouch_bt.mission.spec.findings import Findings, MissionFaults
+from glotouch_bt.mission import load_mission
+from glotouch_bt.mission.spec.findings import Finding, Findings, MissionFaults
 
 HEAD = "mission: m\nworld: container_five\n"
 
@@ -54,6 +56,52 @@ def test_one_finding_for_a_misspelt_key_of_a_condition_inside_a_loop(load: Calla
 ])  # fmt: skip
 def test_capitals_and_separators_do_not_count(given: str, valid: list[str], nearest: str) -> None:
     assert Findings.nearest(given, valid) == nearest
+
+
+@pytest.fixture
+def findings_of(tmp_path: Path) -> Callable[[str], list[Finding]]:
+    """The findings of a tree of shipped skills."""
+
+    def check(tree: str) -> list[Finding]:
+        (tmp_path / "m.yaml").write_text(f"{HEAD}tree:\n{tree}")
+        with pytest.raises(MissionFaults) as e:
+            load_mission(tmp_path / "m.yaml")
+        return e.value.findings
+
+    return check
+
+
+@pytest.mark.parametrize(("value", "hint"), [("60", "60 mm"), ("400", ""), ("-60", ""), ("0.4 m", ""), ("60 cm", "")])
+def test_a_number_that_fits_in_millimetres(findings_of: Callable[[str], list[Finding]], value: str, hint: str) -> None:
+    (found,) = (f for f in findings_of(f"  - lift: {{height_m: {value}}}\n") if f.code == "wrong_range")
+    assert found.hint == hint
+
+
+def test_an_unset_port_names_the_skills_that_write_it(findings_of: Callable[[str], list[Finding]]) -> None:
+    said = [f.what for f in findings_of("  - orbit_probe\n") if f.code == "port_unset"]
+    reads = "'orbit_probe' reads port 'contact', which no node writes before it"
+    assert f"{reads}; skills that write it: guarded_sweep" in said
+
+
+@pytest.mark.parametrize(
+    "tree",
+    [
+        "  tare\n    tool_pickup\n",
+        "\n    tare:\n    tool_pickup:\n",
+        "\n    do:\n      tare:\n      tool_pickup:\n",
+        "\n    do: tare\n",
+        "\n    tool_pickup: {grip_N: 30 N}\n",
+    ],
+)
+def test_children_without_dashes(findings_of: Callable[[str], list[Finding]], tree: str) -> None:
+    (found,) = findings_of(f"  sequence:{tree}")
+    said = "the children of sequence are a list: begin each of them with '- '"
+    assert (found.code, found.what) == ("not_a_node", said)
+
+
+def test_a_name_that_is_not_allowed_is_a_sentence(load: Callable[..., Any]) -> None:
+    with pytest.raises(MissionFaults, match="mission name 'my mission' has characters that are not allowed"):
+        load("mission: my mission\nworld: container_five\ntree: {find: {}}\n")
 
 
 def test_a_range_of_one_number(load: Callable[..., Any]) -> None:

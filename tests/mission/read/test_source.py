@@ -53,6 +53,8 @@ def test_scalars(text: str, value: object) -> None:
         ("1: 2", "f:1:1", "key"),
         ("a: [1, 2\nb: 3", "f:2:", "not valid YAML"),
         ("a:\n\t- 1", "f:2:1", "not valid YAML: a tab; indent with blanks"),
+        ("a:\n  - b:\n      c: 1\n     d: 2", "f:4:6", "; this line begins in another column than its neighbours"),
+        ("a: 1\n  b: 2", "f:2:4", "; begin the line in the column of its neighbours"),
         ("a: .nan", "f:1:4", "finite"),
         ("a: -.inf", "f:1:4", "finite"),
         ("a: 1e999", "f:1:4", "finite"),

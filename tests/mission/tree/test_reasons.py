@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from glotouch_bt.mission.execution.runner import run_mission
+from glotouch_bt.mission.nodes.base import ConditionSettings, failure_in_words
 from glotouch_bt.mission.record.run_summary import NullRecord
 
 
@@ -27,7 +28,7 @@ def fails(load: Any, robot: Any, no_arm: Any) -> Any:
         (
             "  - find: {how_many: 1}\n  - condition: {port: found, at_least: 4}\n",
             ["step_failed", "condition_false"],
-            {"wanted": "found at_least 4", "found": 1},
+            {"wanted": "found is at least 4", "found": 1},
         ),
         (
             "  - timeout: {seconds: 0.05, do: {act: {script: RRRRRRRRRRRRRRRRRRS}}}\n",
@@ -51,6 +52,23 @@ def test_codes_along_the_chain(fails: Any, tree: str, codes: list[str], evidence
     assert [f["code"] for f in chain] == codes
     assert evidence.items() <= chain[-1]["evidence"].items()
     assert all(f["message"] for f in chain)
+
+
+@pytest.mark.parametrize(
+    ("asked", "value", "said"),
+    [
+        ({"at_most": 3}, 5, "p is 5, not at most 3"),
+        ({"at_least": 0.02}, 0.0125, "p is 0.0125, not at least 0.02"),
+        ({"equals": True}, False, "p is false, not true"),
+        ({"equals": "top"}, "outline", "p is 'outline', not 'top'"),
+        ({"equals": 3}, object(), "p is another value, not 3"),
+        ({"at_least": 1}, None, "p is not set"),
+        ({"is_set": True}, None, "p is not set"),
+        ({"is_set": False}, 2, "p is set"),
+    ],
+)
+def test_a_condition_says_what_it_found_and_what_it_wanted(asked: dict[str, Any], value: object, said: str) -> None:
+    assert failure_in_words(ConditionSettings(port="p", **asked), value) == said
 
 
 def test_a_skill_s_failure_says_what_was_sensed(fails: Any) -> None:

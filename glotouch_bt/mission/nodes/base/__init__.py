@@ -11,7 +11,14 @@ from glotouch_bt.mission.nodes.base.analysis import (
 )
 from glotouch_bt.mission.nodes.base.behaviours import BuildContext, CountedLoop, Keys, MissionDecorator
 from glotouch_bt.mission.nodes.base.btcpp import BtcppForm, btcpp_key, btcpp_name, btcpp_value
-from glotouch_bt.mission.nodes.base.comparison import ConditionSettings, comparison_ports, holds, in_code, in_words
+from glotouch_bt.mission.nodes.base.comparison import (
+    ConditionSettings,
+    comparison_ports,
+    failure_in_words,
+    holds,
+    in_code,
+    in_words,
+)
 from glotouch_bt.mission.nodes.base.kind import (
     NODES,
     NodeKind,

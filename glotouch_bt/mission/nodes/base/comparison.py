@@ -55,12 +55,32 @@ def holds(comparison: ConditionSettings, value: Any) -> bool:
 
 
 def in_words(comparison: ConditionSettings) -> str:
-    """Return the comparison for people: `found at_least 1`."""
-    for word in ("equals", "at_least", "at_most", "is_set"):
-        wanted = getattr(comparison, word)
-        if wanted is not None:
-            return f"{comparison.port} {word} {f'{wanted:g}' if isinstance(wanted, float) else wanted}"
-    return comparison.port
+    """Return the comparison for people: `found is at least 1`."""
+    return f"{comparison.port} is {_wanted(comparison)}"
+
+
+def failure_in_words(comparison: ConditionSettings, value: Any) -> str:
+    """Return why a comparison with a value fails: `found is 5, not at most 3`; None is a port that is not set."""
+    if value is None or comparison.is_set is not None:
+        return f"{comparison.port} is {'not set' if value is None else 'set'}"
+    return f"{comparison.port} is {_value_in_words(value)}, not {_wanted(comparison)}"
+
+
+def _wanted(comparison: ConditionSettings) -> str:
+    """Return the values for which the comparison holds: `at least 1`."""
+    if comparison.is_set is not None:
+        return "set" if comparison.is_set else "not set"
+    words = (("", comparison.equals), ("at least ", comparison.at_least), ("at most ", comparison.at_most))
+    return next((f"{word}{_value_in_words(value)}" for word, value in words if value is not None), "set")
+
+
+def _value_in_words(value: Any) -> str:
+    """Return a value as a mission file has it: `true`, `0.02`, `'outline'`."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        return f"{value:g}"
+    return repr(value) if isinstance(value, (int, str)) else "another value"
 
 
 def in_code(comparison: ConditionSettings, key: str) -> str | None:

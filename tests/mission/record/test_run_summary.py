@@ -1,0 +1,32 @@
+"""What a run found, for its result: the sizes of the objects first, then what skills declare."""
+
+from __future__ import annotations
+
+import pytest
+
+from glotouch_bt.mission.record import NullRecord, RunSummary
+
+
+def candidate(index: int, height_m: float, top_touched: bool) -> dict[str, object]:
+    size_m = [0.103, 0.044]
+    return {"index": index, "contour": {"size_m": size_m}, "height_m": height_m, "top_touched": top_touched}
+
+
+def test_the_result_has_each_object_as_it_was_measured_last() -> None:
+    summary = RunSummary(NullRecord())
+    summary.event("result", 1.0, {"node": "tool_calibrate", "key": "tool", "text": "a probe"})
+    summary.event("candidate", 2.0, {"node": "orbit_probe", "candidate": candidate(0, 0.03, False)})
+    assert summary.results["candidates"] == {"node": "orbit_probe", "text": "1 object traced: 103 × 44 mm"}
+    summary.event("candidate", 3.0, {"node": "orbit_probe", "candidate": candidate(1, 0.03, False)})
+    summary.event("candidate", 4.0, {"node": "touch_top", "candidate": candidate(0, 0.063, True)})
+    text = "2 objects traced: 103 × 44 × 63, 103 × 44 mm"
+    assert summary.results["candidates"] == {"node": "touch_top", "text": text}
+    assert list(summary.results) == ["candidates", "tool"]
+
+
+@pytest.mark.parametrize("odd", [None, {}, {"index": 0}, {"contour": 3}, {"contour": {"size_m": ["a", "b"]}}])
+def test_a_candidate_of_another_shape_is_no_result(odd: object) -> None:
+    summary = RunSummary(NullRecord())
+    summary.event("candidate", 1.0, {"candidate": odd})
+    assert len(summary.candidates) == 1
+    assert summary.results == {}
