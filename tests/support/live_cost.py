@@ -47,6 +47,7 @@ tree:
         do:
           for_each:
             items: candidates
+            item: candidate
             on_failure: continue
             do: {{sequence: [refine_outline, touch_top]}}
 """
