@@ -148,7 +148,7 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=30.0, help="robot time of the long mission; 0: none")
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
-    given.out.mkdir(parents=True)
+    given.out.mkdir(parents=True, exist_ok=True)
     rows = []
     with browser() as window:
         run(["calibrate"], given.out / "first", "live", window)  # fills the caches
@@ -156,7 +156,7 @@ def main() -> None:
             for arm in ARMS[n % 3 :] + ARMS[: n % 3]:
                 words = ["survey", "--seed", str(given.seed)]
                 rows.append(run(words, given.out / f"{n}-{arm.replace(' ', '_')}", arm, window))
-                print(json.dumps({k: v for k, v in rows[-1].items() if k != "page_MB"}), flush=True)
+                print(json.dumps({k: v for k, v in rows[-1].items() if k != "page_MB"}), file=sys.stderr, flush=True)
         long = rounds(given.out, given.minutes, given.seed, window) if given.minutes else None
     summary: dict[str, Any] = {"pairs": given.pairs, "seeds": [given.seed]}
     alone = [r for r in rows if r["arm"] == "alone"]
@@ -164,7 +164,7 @@ def main() -> None:
         these = [r for r in rows if r["arm"] == arm]
         for key in ("wall_s", "cpu_s"):
             shares = [100.0 * (a[key] / b[key] - 1.0) for a, b in zip(these, alone, strict=True)]
-            summary[f"{arm} {key}".replace(" ", "_")] = {"mean": mean(shares), "lo": min(shares), "hi": max(shares)}
+            summary[f"{arm} {key}".replace(" ", "_")] = {"mean": mean(shares), "min": min(shares), "max": max(shares)}
     if long is not None:
         summary["page"] = long
     (given.out / "summary.json").write_text(json.dumps(summary, indent=2))
