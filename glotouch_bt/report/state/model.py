@@ -199,7 +199,7 @@ class RunModel:
         return model
 
     def feed(self, reader: RecordReader) -> None:
-        """Take over what a reader has read since the last call; its packed parts are taken out."""
+        """Take over what a reader has read since the last call; its packed parts and its events are taken out."""
         for parts, take in ((reader.packed["samples"], self._samples), (reader.packed["cycles"], self._cycles)):
             while parts:
                 take(parts.pop(0))
@@ -208,6 +208,8 @@ class RunModel:
             for stamp_s, left, right in zip(part["arrived_s"], part["left_m"], part["right_m"], strict=True):
                 self._pads.add(float(stamp_s), (left.astype(np.float16), right.astype(np.float16)))
         self._entries(reader.record)
+        reader.record.events.clear()
+        self._events_read = 0
 
     def _entries(self, record: RunRecord) -> None:
         """Take over the events and ticks of a record since the last call."""

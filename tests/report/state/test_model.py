@@ -11,7 +11,7 @@ import pytest
 
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.record.recorder import Recorder
-from glotouch_bt.report import RecordReader
+from glotouch_bt.report import RecordReader, read_run
 from glotouch_bt.report.state import RunModel, SceneState, planned_nodes
 from glotouch_bt.report.state.model import MAX_KEPT, GrowingRows
 from tests.support.made_run import OBJECTS, TIP_M, WANTED, Made
@@ -50,8 +50,8 @@ def _axes(yaw: float) -> np.ndarray:
     return np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
 
 
-def test_a_time_holds_nothing_of_later(model: RunModel) -> None:
-    events = [(e.stamp_s, e.kind) for e in model.record.events] if model.record else []
+def test_a_time_holds_nothing_of_later(model: RunModel, whole: Made) -> None:
+    events = [(e.stamp_s, e.kind) for e in read_run(whole.folder).events]
     for t_s in np.linspace(*model.span_s, 23):
         state = model.state_at(t_s)
         assert len(state.touches) == sum(kind == "contact" and s <= t_s + 1e-9 for s, kind in events)
@@ -59,23 +59,21 @@ def test_a_time_holds_nothing_of_later(model: RunModel) -> None:
         assert all(line.stamp_s <= t_s + 1e-9 for line in state.log)
 
 
-def test_joints_jaws_and_force_are_the_newest(model: RunModel) -> None:
+def test_joints_jaws_and_force_are_the_newest(model: RunModel, whole: Made) -> None:
     t_s = 0.5 * sum(model.span_s)
     state = model.state_at(t_s)
     assert state.q is not None
     stamp = np.floor(t_s * 100) / 100  # the record has a row every 10 ms
     np.testing.assert_allclose(state.q, np.sin(0.1 * stamp) * np.arange(1, 8) * 0.1, atol=1e-3)
     assert model.state_at(model.span_s[1]).aperture_m == pytest.approx(0.046)
-    contact = next(e for e in model.record.events if e.kind == "contact") if model.record else None
-    assert contact is not None
+    contact = next(e for e in read_run(whole.folder).events if e.kind == "contact")
     rows = model.motion.rows if model.motion is not None else np.zeros((0, 2))
     near = rows[(rows[:, 0] > contact.stamp_s - 0.07) & (rows[:, 0] <= contact.stamp_s)]
     assert near[:, 1].max() == pytest.approx(2.0, abs=0.3)  # the bump's peak, in noise of 0.05 N a component
 
 
-def test_the_probe_is_in_the_hand_between_two_events(model: RunModel) -> None:
-    assert model.record is not None
-    taken, returned = (e.stamp_s for e in model.record.events if e.kind == "tool")
+def test_the_probe_is_in_the_hand_between_two_events(model: RunModel, whole: Made) -> None:
+    taken, returned = (e.stamp_s for e in read_run(whole.folder).events if e.kind == "tool")
     assert model.state_at(taken - 0.01).tip_m is None
     assert model.state_at(taken).tip_m == TIP_M
     assert model.state_at(returned - 0.01).tip_m == TIP_M
@@ -116,8 +114,7 @@ def test_the_plan_is_that_of_the_runs_mission(tmp_path: Path) -> None:
 
 
 def test_depth_maps_vanish_when_they_are_old(model: RunModel, whole: Made) -> None:
-    assert model.record is not None
-    squeezed = [e.stamp_s for e in model.record.events if e.kind == "touchset"]
+    squeezed = [e.stamp_s for e in read_run(whole.folder).events if e.kind == "touchset"]
     pads = model.state_at(squeezed[0]).pads
     assert pads is not None
     left = whole.touchsets[0].sequences[-1].layers[-1].left_m
