@@ -96,9 +96,9 @@ def window(size: tuple[int, int]) -> Iterator[Page]:
             page.driver.quit()
 
 
-def save(page: Page, name: str) -> None:
-    """Write the picture of a page."""
-    picture = Image.open(io.BytesIO(page.driver.get_screenshot_as_png())).convert("RGB")
+def save(page: Page, name: str, png: bytes | None = None) -> None:
+    """Write the picture of a page, or another one."""
+    picture = Image.open(io.BytesIO(png or page.driver.get_screenshot_as_png())).convert("RGB")
     out = HERE / f"{name}.webp"
     picture.save(out, quality=80, method=6)
     print(out.name, out.stat().st_size, "bytes")
@@ -193,9 +193,7 @@ def photograph_report(run: Path) -> None:
         return
     with window(TREE) as page:
         page.open(address)
-        page.driver.execute_script("document.querySelector('.tree').scrollIntoView()")
-        time.sleep(1.0)
-        save(page, f"tree_{run.name}")
+        save(page, f"tree_{run.name}", page.find("section:has(.tree)").screenshot_as_png)
 
 
 def photograph_terminal(runs: Path) -> None:
@@ -203,7 +201,7 @@ def photograph_terminal(runs: Path) -> None:
     columns, rows = map(str, TERMINAL)
     session = ["tmux", "-L", "gallery"]
     with tempfile.TemporaryDirectory() as out:
-        command = f"TERM=xterm-256color {GLOTOUCH} run {' '.join(RETRIEVE)} --out {out}/run"
+        command = f"cd {out}; TERM=xterm-256color {GLOTOUCH} run {' '.join(RETRIEVE)} --out runs/apple"
         subprocess.run([*session, "new-session", "-d", "-x", columns, "-y", rows, command], check=True)
         try:
             time.sleep(14.0)
