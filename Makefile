@@ -14,9 +14,9 @@ demo: $(VENV)
 test: $(VENV)/.dev
 	$(BIN)/python -m pytest -n 2 --dist worksteal --ignore=tests/integration --ignore=tests/browser
 
-# Whole missions, backends and conformance in MuJoCo and on simulated devices.
+# Whole missions, backends and conformance in MuJoCo and on simulated devices, for which some tests wait.
 test-integration: $(VENV)/.dev
-	$(BIN)/python -m pytest -n 2 --dist worksteal tests/integration
+	$(BIN)/python -m pytest -n 3 --dist worksteal tests/integration
 
 # The pages in Chromium: needs chromium and chromium-driver (Debian's packages).
 test-browser: $(VENV)/.dev

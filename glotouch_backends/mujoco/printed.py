@@ -9,8 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import gaussian_filter, map_coordinates
-from scipy.spatial import ConvexHull
+import scipy
 
 from glotouch_bt.robot import Array
 from glotouch_bt.robot.scene import Mesh
@@ -60,7 +59,7 @@ def printed_hull(vertices_m: Array, scale: float, offset_m: float) -> Array:
         return vertices_m
     points = np.asarray(scale * vertices_m)
     if offset_m != 0.0:
-        hull = ConvexHull(points)
+        hull = scipy.spatial.ConvexHull(points)
         faces = hull.simplices.astype(np.int64)
         corners = points[faces]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -94,10 +93,12 @@ class Roughness:
     """
 
     def __init__(self, rms_m: float, rng: np.random.Generator) -> None:
-        field = gaussian_filter(rng.standard_normal((GRID, GRID, GRID)), ROUGHNESS_LENGTH_M / GRID_STEP_M, mode="wrap")
+        field = scipy.ndimage.gaussian_filter(
+            rng.standard_normal((GRID, GRID, GRID)), ROUGHNESS_LENGTH_M / GRID_STEP_M, mode="wrap"
+        )
         self._field: Array = rms_m * (field - field.mean()) / field.std()
 
     def at(self, points_m: Array) -> Array:
         """Return the heights (n,) above the smooth surface at points (n, 3) in the mesh frame."""
         where = (np.asarray(points_m) / GRID_STEP_M).T
-        return np.asarray(map_coordinates(self._field, where, order=1, mode="grid-wrap"))
+        return np.asarray(scipy.ndimage.map_coordinates(self._field, where, order=1, mode="grid-wrap"))

@@ -20,12 +20,12 @@ def test_a_local_cluster_gives_the_same_rows(tmp_path: Path) -> None:
     for name, kind in (("workers", WorkerPool), ("cluster", ClusterPool)):
         given = (2,) if kind is WorkerPool else ("local", 2)
         campaign = short_campaign(tmp_path / name)
-        with kind(*given, limit_s=2.0) as pool:
+        with kind(*given, limit_s=1.0) as pool:
             run_short(campaign, pool, short_trials(campaign, 8, 10, KINDS))
     tables = [(tmp_path / name / "trials.csv").read_text() for name in ("workers", "cluster")]
     assert tables[0] == tables[1]
     assert "1,,,lost,lost: its process was killed (SIGKILL)" in tables[1]
-    assert "4,,,lost,lost: it hung: no result after 2 s" in tables[1]
+    assert "4,,,lost,lost: it hung: no result after 1 s" in tables[1]
 
 
 def test_no_scheduler_is_bad_input(monkeypatch: pytest.MonkeyPatch) -> None:

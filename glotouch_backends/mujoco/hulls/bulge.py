@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
-from scipy.spatial import ConvexHull, cKDTree
+import scipy
 
+from glotouch_bt.lazy import lazy_module
 from glotouch_bt.robot import Array
 from glotouch_bt.robot.scene import Mesh
+
+if TYPE_CHECKING:
+    import trimesh
+else:
+    trimesh = lazy_module("trimesh")
 
 SKIN_M = 0.001
 """Points deeper than this inside the solid lie in a gap between two hulls, not on the outer surface. Source: ours."""
@@ -19,7 +25,7 @@ def depth_inside_m(points: Array, hulls: Sequence[Array]) -> Array:
     """Return the depth (n,) of each point inside the nearest hull; negative outside: a lower bound of the gap."""
     depth = np.full(len(points), -np.inf)
     for hull in hulls:
-        planes = ConvexHull(hull).equations
+        planes = scipy.spatial.ConvexHull(hull).equations
         np.maximum(depth, -(points @ planes[:, :3].T + planes[:, 3]).max(axis=1), out=depth)
     return depth
 
@@ -28,7 +34,7 @@ def surface_distance_m(points: Array, mesh: Mesh, samples: int = 200_000) -> Arr
     """Return the distance (n,) of points from the mesh: exact to the triangles next to the nearest of dense samples."""
     solid = mesh.as_trimesh()
     near, triangle = trimesh.sample.sample_surface(solid, samples, seed=0)
-    _, index = cKDTree(near).query(points, k=6)
+    _, index = scipy.spatial.cKDTree(near).query(points, k=6)
     closest = trimesh.triangles.closest_point(
         solid.triangles[triangle[index].ravel()], np.repeat(points, index.shape[1], axis=0)
     )

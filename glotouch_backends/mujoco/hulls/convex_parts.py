@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+import scipy
 
 from glotouch_bt.robot import Array
 
@@ -27,8 +27,8 @@ def trimmed_hull(points: Array, max_vertices: int, tolerance_m: float) -> Array 
         (k, 3) with 4 <= k <= max_vertices; None if the points span no volume.
     """
     try:
-        hull = ConvexHull(points)
-    except (QhullError, ValueError):
+        hull = scipy.spatial.ConvexHull(points)
+    except (scipy.spatial.QhullError, ValueError):
         return None
     if hull.volume < MIN_VOLUME_M3:
         return None
@@ -50,12 +50,12 @@ def trimmed_hull(points: Array, max_vertices: int, tolerance_m: float) -> Array 
     return vertices[chosen]
 
 
-def _hull(points: Array) -> ConvexHull:
+def _hull(points: Array) -> scipy.spatial.ConvexHull:
     """Return the convex hull; joggle the points if coplanar ones defeat the exact algorithm."""
     try:
-        return ConvexHull(points)
-    except QhullError:
-        return ConvexHull(points, qhull_options="QJ")
+        return scipy.spatial.ConvexHull(points)
+    except scipy.spatial.QhullError:
+        return scipy.spatial.ConvexHull(points, qhull_options="QJ")
 
 
 def _first_simplex(vertices: Array) -> list[int]:

@@ -30,7 +30,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import QhullError
+import scipy
 
 from glotouch_backends.mujoco.hulls.bulge import bulge_m, depth_inside_m
 from glotouch_backends.mujoco.hulls.convex_parts import trimmed_hull
@@ -160,7 +160,7 @@ def _fitting(mesh: Mesh, path: Path) -> Parts | None:
     try:
         if found is not None:
             _check(mesh, found.hulls)
-    except (_CutFailed, QhullError, ValueError):  # hulls without a volume
+    except (_CutFailed, scipy.spatial.QhullError, ValueError):  # hulls without a volume
         return None
     return found
 

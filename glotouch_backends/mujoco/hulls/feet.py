@@ -8,7 +8,7 @@ A flat round base touches a plane in three or four contacts that change from ste
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+import scipy
 
 from glotouch_bt.robot import Array
 from glotouch_bt.robot.scene import Mesh
@@ -43,6 +43,6 @@ def foot_centres(mesh: Mesh) -> Array:
 def _support_polygon(points: Array) -> Array:
     """Return the corners (m, 2) of the convex outline; (0, 2) if it has no area."""
     try:
-        return np.asarray(points[ConvexHull(points).vertices])
-    except (QhullError, ValueError):
+        return np.asarray(points[scipy.spatial.ConvexHull(points).vertices])
+    except (scipy.spatial.QhullError, ValueError):
         return np.zeros((0, 2))

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import numpy.typing as npt
-import trimesh
 
+from glotouch_bt.lazy import lazy_module
 from glotouch_bt.robot import Array
+
+if TYPE_CHECKING:
+    import trimesh
+else:
+    trimesh = lazy_module("trimesh")
 
 
 def shell_labels(vertices_m: Array, faces: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:

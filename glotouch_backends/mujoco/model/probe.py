@@ -7,10 +7,10 @@ lie inside the handle's outline, so that closed fingers pass them; the slot is w
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
-import trimesh
 
 from glotouch_backends.mujoco.model.contact import (
     ENVIRONMENT,
@@ -25,8 +25,14 @@ from glotouch_backends.mujoco.model.contact import (
     set_friction,
 )
 from glotouch_backends.mujoco.truth import Truth
+from glotouch_bt.lazy import lazy_module
 from glotouch_bt.robot import Holder, ParamError, Probe
 from glotouch_bt.robot.scene import Mesh
+
+if TYPE_CHECKING:
+    import trimesh
+else:
+    trimesh = lazy_module("trimesh")
 
 RAIL_HEIGHT_M = 0.003
 """Height of the rails. Source: ours."""

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.ndimage import correlate1d
+import scipy
 
 from glotouch_backends.mujoco.axis_proof import AxisProof
 from glotouch_bt.robot import Array, Conditions
@@ -41,8 +41,8 @@ def gaussian_weights(sd: float) -> Array:
 
 def smoothed(maps: Array, kernel: tuple[Array, Array]) -> Array:
     """Return maps (n, rows, cols) smoothed along rows and columns; beyond an edge they continue with its values."""
-    rows = correlate1d(maps, kernel[0], axis=1, mode="nearest")
-    return np.asarray(correlate1d(rows, kernel[1], axis=2, mode="nearest"))
+    rows = scipy.ndimage.correlate1d(maps, kernel[0], axis=1, mode="nearest")
+    return np.asarray(scipy.ndimage.correlate1d(rows, kernel[1], axis=2, mode="nearest"))
 
 
 class DepthErrors:

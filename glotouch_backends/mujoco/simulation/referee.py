@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from scipy.spatial import ConvexHull
+import scipy
 
 from glotouch_backends.mujoco.axis_proof import AxisProof
 from glotouch_backends.mujoco.sensing import body_pose
@@ -45,7 +45,7 @@ class MujocoReferee:
             pose = body_pose(r.data, body)
             seen = pose.apply(item.mesh.vertices_m)[:, :2]
             held = all(body in p for p in pads) and not self._on(body, r.handles.container_body)
-            outline = seen[ConvexHull(seen).vertices]
+            outline = seen[scipy.spatial.ConvexHull(seen).vertices]
             result.append(TrueObject(item.mesh.name, pose, item.mass_kg, outline, held, np.array(item.mesh.extents_m)))
         return result
 

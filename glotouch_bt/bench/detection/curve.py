@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Literal, TypedDict, get_args
 
 import numpy as np
-from scipy.special import gammaincinv
+import scipy
 
 from glotouch_bt.bench.detection.signals import RATE_HZ, FreeMove, Hand, MoveKind, Wrist
 from glotouch_bt.bench.statistics import Rate, wilson
@@ -37,8 +37,8 @@ def per_hour(count: int, hours: float) -> PerHour:
     """Return the rate with Garwood's interval (Biometrika 28, 1936), from gamma quantiles of order k and k + 1."""
     if hours <= 0:
         return {"rate": float("nan"), "lo": 0.0, "hi": float("inf"), "count": count, "hours": hours}
-    lo = float(gammaincinv(count, 0.025)) if count else 0.0
-    hi = float(gammaincinv(count + 1, 0.975))
+    lo = float(scipy.special.gammaincinv(count, 0.025)) if count else 0.0
+    hi = float(scipy.special.gammaincinv(count + 1, 0.975))
     return {"rate": count / hours, "lo": lo / hours, "hi": hi / hours, "count": count, "hours": hours}
 
 

@@ -17,10 +17,9 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 import trimesh
 from contourpy import contour_generator
-from scipy.ndimage import label
-from scipy.spatial import ConvexHull, cKDTree
 
 from glotouch_bt.perception.touch import area_and_centroid, minimum_rectangle
 from glotouch_bt.robot import Array, Probe
@@ -157,9 +156,9 @@ def _section(key: _Keyed, probe: Probe, height_m: float) -> FeltSection:
     high = points[:, :2].max(axis=0) + r + BORDER_M
     shape = np.ceil((high - low) / GRID_M).astype(np.int64) + 1
     shape += -shape % COARSE  # whole coarse cells
-    by_ball = cKDTree(points, balanced_tree=False)
+    by_ball = scipy.spatial.cKDTree(points, balanced_tree=False)
     upper = points[points[:, 2] >= height_m, :2]
-    by_shaft = cKDTree(_thinned(upper), balanced_tree=False) if len(upper) else None
+    by_shaft = scipy.spatial.cKDTree(_thinned(upper), balanced_tree=False) if len(upper) else None
 
     def gap(places: Array, shaft_m: float) -> Array:
         """Return the distance of a probe with shaft radius `shaft_m` from the surface, ball at places (n, 2)."""
@@ -172,7 +171,7 @@ def _section(key: _Keyed, probe: Probe, height_m: float) -> FeltSection:
     )
     shrunk = side.level(-r)
     corners = np.concatenate(shrunk)
-    polygon = corners[ConvexHull(corners).vertices]
+    polygon = corners[scipy.spatial.ConvexHull(corners).vertices]
     _, size, yaw = minimum_rectangle(polygon)
     return FeltSection(
         name=mesh.name,
@@ -255,7 +254,7 @@ def _signed(solid: trimesh.Trimesh, origin: Array, field: Array, height_m: float
 
     Regions of positive gap outside the solid are outside; regions within the solid are inside.
     """
-    parts, count = label(field > 0.0)
+    parts, count = scipy.ndimage.label(field > 0.0)
     solidly = np.zeros(count + 1, dtype=np.bool_)
     deepest = [int(np.argmax(np.where(parts == k, field, -np.inf))) for k in range(1, count + 1)]
     if deepest:
@@ -276,7 +275,7 @@ def _to_polygons(polygons: list[Array], nodes: Array) -> Array:
     vertex = np.concatenate([p[:-1] for p in polygons])
     before = np.concatenate([np.roll(p[:-1], 1, axis=0) for p in polygons])
     after = np.concatenate([np.roll(p[:-1], -1, axis=0) for p in polygons])
-    nearest = cKDTree(vertex).query(nodes, k=min(2, len(vertex)))[1].reshape(len(nodes), -1)
+    nearest = scipy.spatial.cKDTree(vertex).query(nodes, k=min(2, len(vertex)))[1].reshape(len(nodes), -1)
     best = np.full(len(nodes), np.inf)
     for k in nearest.T:
         for other in (before[k], after[k]):

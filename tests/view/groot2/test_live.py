@@ -27,7 +27,7 @@ mission: nap
 world: container_five
 tree:
   - wait: {name: first, seconds: 2.0}
-  - wait: {name: long, seconds: 300.0}
+  - wait: {name: long, seconds: 200.0}
   - condition: {name: waited, port: done, equals: true}
   - succeed: {name: never mind, do: {wait: {name: last, seconds: 0.2, end: fail}}}
 """
@@ -40,7 +40,7 @@ PATIENCE_S = 180.0
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "nap.yaml").write_text(NAP)
     for name, seconds in (("short", 3.0), ("middle", 120.0)):
-        (tmp_path / f"{name}.yaml").write_text(NAP.replace("nap", name).replace("300.0", str(seconds)))
+        (tmp_path / f"{name}.yaml").write_text(NAP.replace("nap", name).replace("200.0", str(seconds)))
     return tmp_path
 
 
