@@ -3,19 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
 
-from glotouch_bt.lazy import lazy_module
 from glotouch_bt.robot import Array
 from glotouch_bt.robot.scene import Mesh
-
-if TYPE_CHECKING:
-    import trimesh
-else:
-    trimesh = lazy_module("trimesh")
 
 SKIN_M = 0.001
 """Points deeper than this inside the solid lie in a gap between two hulls, not on the outer surface. Source: ours."""
@@ -32,6 +25,8 @@ def depth_inside_m(points: Array, hulls: Sequence[Array]) -> Array:
 
 def surface_distance_m(points: Array, mesh: Mesh, samples: int = 200_000) -> Array:
     """Return the distance (n,) of points from the mesh: exact to the triangles next to the nearest of dense samples."""
+    import trimesh
+
     solid = mesh.as_trimesh()
     near, triangle = trimesh.sample.sample_surface(solid, samples, seed=0)
     _, index = scipy.spatial.cKDTree(near).query(points, k=6)
@@ -54,6 +49,8 @@ def bulge_m(mesh: Mesh, hulls: Sequence[Array], samples: int = 20_000) -> Array:
         (n,) distances from the true surface in m, n <= samples; 0 where the union lies within the solid (to measure how
         far it falls short, use `depth_inside_m` of points on the true surface).
     """
+    import trimesh
+
     shells = [trimesh.convex.convex_hull(h) for h in hulls]
     area = np.array([s.area for s in shells])
     counts = np.maximum(1, np.rint(samples * area / area.sum())).astype(int)

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import numpy.typing as npt
 
-from glotouch_bt.lazy import lazy_module
 from glotouch_bt.robot import Array
-
-if TYPE_CHECKING:
-    import trimesh
-else:
-    trimesh = lazy_module("trimesh")
 
 
 def shell_labels(vertices_m: Array, faces: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
     """Return the shell number (f,) of each face, from 0; -1 for the walls of inner cavities."""
+    import trimesh
+
     solid = trimesh.Trimesh(vertices_m, faces, process=False)
     raw = trimesh.graph.connected_component_labels(solid.face_adjacency, node_count=len(faces))
     corners = solid.triangles

@@ -7,7 +7,6 @@ lie inside the handle's outline, so that closed fingers pass them; the slot is w
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -25,14 +24,8 @@ from glotouch_backends.mujoco.model.contact import (
     set_friction,
 )
 from glotouch_backends.mujoco.truth import Truth
-from glotouch_bt.lazy import lazy_module
 from glotouch_bt.robot import Holder, ParamError, Probe
 from glotouch_bt.robot.scene import Mesh
-
-if TYPE_CHECKING:
-    import trimesh
-else:
-    trimesh = lazy_module("trimesh")
 
 RAIL_HEIGHT_M = 0.003
 """Height of the rails. Source: ours."""
@@ -49,6 +42,8 @@ HANDLE_COLOUR, STEEL_COLOUR, STAND_COLOUR = (0.15, 0.35, 0.65, 1.0), (0.75, 0.77
 
 def handle_mesh(probe: Probe) -> Mesh:
     """Return the handle as a solid in the probe's body frame; the pads sense it while they hold the probe."""
+    import trimesh
+
     box = trimesh.creation.box(probe.handle_m)
     return Mesh("handle", np.array(box.vertices), np.array(box.faces, dtype=np.int64), f"handle {probe.handle_m}")
 
