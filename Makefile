@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 export MPLBACKEND := Agg
 
-.PHONY: demo dev test test-integration test-browser check format docs reference results-page pins clean
+.PHONY: demo dev test test-integration test-studies test-browser check format docs reference results-page pins clean
 
 demo: $(VENV)
 	$(BIN)/glotouch run retrieve --set target=apple --seed 0
@@ -12,11 +12,15 @@ demo: $(VENV)
 
 # Quick tests: no whole mission in MuJoCo, no browser.
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest -n 2 --dist worksteal --ignore=tests/integration --ignore=tests/browser
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not study" --ignore=tests/integration --ignore=tests/browser
 
 # Whole missions, backends and conformance in MuJoCo and on simulated devices, for which some tests wait.
 test-integration: $(VENV)/.dev
-	$(BIN)/python -m pytest -n 3 --dist worksteal tests/integration
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not study" tests/integration
+
+# Benches on a small scale, whole: minutes of work that shows little more than the tests of their parts. Not in .ci/run.
+test-studies: $(VENV)/.dev
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m study
 
 # The pages in Chromium: needs chromium and chromium-driver (Debian's packages).
 test-browser: $(VENV)/.dev

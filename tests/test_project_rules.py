@@ -150,7 +150,6 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
-@pytest.mark.slow
 def test_a_wheel_carries_everything(wheel: Path) -> None:
     """Missions, worlds, conditions, meshes and hulls are package data; the wheel has the module of each entry point."""
     with zipfile.ZipFile(wheel) as archive:
@@ -182,7 +181,6 @@ print(gt.run("calibrate", backend="fake").status)
 """
 
 
-@pytest.mark.slow
 def test_a_user_s_own_folders_do_not_break_an_installed_wheel(wheel: Path, tmp_path: Path) -> None:
     """Packages named skills, backends and missions stand beside the user's script."""
     site, work = tmp_path / "site", tmp_path / "work"

@@ -38,7 +38,7 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         cached.cache_clear()
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_an_outside_matcher_and_ours_on_the_same_touches(installed: None, tmp_path: Path) -> None:
     (tmp_path / "objects").mkdir()
     for name in ("apple", "train", "truck"):
@@ -53,7 +53,7 @@ def test_an_outside_matcher_and_ours_on_the_same_touches(installed: None, tmp_pa
     assert "outside_methods" in json.loads((tmp_path / "o" / "campaign.json").read_text())["code"]
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_an_outside_policy_and_ours_on_the_same_layouts(installed: None, tmp_path: Path) -> None:
     words = ["--trials", "0", "--planar", "2", "--seed", "11", "--policies", "lawnmower,expected_find"]
     done = CliRunner().invoke(cli.app, ["bench", "search", *words, "--out", str(tmp_path / "o"), "--json"])

@@ -13,7 +13,7 @@ from tests.support.short_trials import run_short, short_campaign, short_trials
 KINDS = {1: "kill", 2: "kill once", 3: "raise", 4: "hang"}
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.filterwarnings("ignore")
 def test_a_local_cluster_gives_the_same_rows(tmp_path: Path) -> None:
     pytest.importorskip("distributed")

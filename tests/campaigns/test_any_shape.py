@@ -31,6 +31,7 @@ def test_solids_are_closed_stand_and_fit_the_jaws(kind) -> None:
     assert mesh.bounds[0, 2] == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.study
 @settings(max_examples=SHAPES, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(seed=st.integers(0, 2**31), number=st.integers(0, 10 * len(any_shape.KINDS)))
 def test_no_shape_ends_in_an_exception(seed: int, number: int) -> None:

@@ -62,6 +62,7 @@ def test_documents_are_of_both_kinds_and_in_all_states() -> None:
     pytest.fail(f"never drawn: {missing}; {pickups} documents with a skill of this project")
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("kind", "trials", "some"),
     [

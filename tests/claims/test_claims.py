@@ -165,6 +165,7 @@ def test_ctrl_c_ends_the_command_and_keeps_what_is_done(tmp_path: Path) -> None:
     assert not (tmp_path / "o" / "second" / "done.json").exists()
 
 
+@pytest.mark.study
 def test_a_real_bench_is_made_small_and_listed(tmp_path: Path) -> None:
     runner = CliRunner()
     words = ["bench", "all", "--out", str(tmp_path / "o"), "--only", "check", "--scale", "0.01"]

@@ -16,8 +16,6 @@ from glotouch_bt.robot import Conditions, Robot, SafetyStop
 from tests.conformance.broken import Break, Degrees, DroppedSamples, LateStop, SwallowedFault, Wrapped, WrongSign
 from tests.conformance.conformance_world import OPTIONS, WORLD, floor
 
-pytestmark = pytest.mark.slow
-
 
 def blow_up(robot: Robot) -> None:
     assert isinstance(robot, Wrapped)

@@ -32,7 +32,6 @@ def test_the_checker_passes_on_the_fake_robot() -> None:
     checked(TouchEnv("fake", duration_s=1.0))
 
 
-@pytest.mark.slow
 def test_the_checker_passes_in_mujoco() -> None:
     env = TouchEnv("mujoco", duration_s=1.0)
     checked(env)

@@ -6,9 +6,12 @@ import json
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import pytest
+
 from glotouch_bt.bench import contact
 
 
+@pytest.mark.study
 def test_one_seed_for_real(tmp_path: Path) -> None:
     """The bolted square by the probe is far better than the targets; the whole folder is written."""
     campaign = contact.ContactCampaign(seeds=(1,), per_side=3, out=tmp_path)

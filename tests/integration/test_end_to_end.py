@@ -71,7 +71,6 @@ def check_folder(done: RunResult) -> None:
     assert not done.warning
 
 
-@pytest.mark.slow
 def test_an_apple_is_retrieved(tmp_path: Path) -> None:
     """What `make demo` shows."""
     done = launch(RunRequest("retrieve", seed=0, settings={"target": "apple"}, out=tmp_path / "run"))

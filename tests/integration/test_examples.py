@@ -25,14 +25,13 @@ def test_script_without_physics(name: str, tmp_path: Path) -> None:
     run_python(str(EXAMPLES / f"{name}.py"), cwd=tmp_path)
 
 
-@pytest.mark.slow
 def test_run_mission(tmp_path: Path) -> None:
     out = run_python(str(EXAMPLES / "run_mission.py"), "run", cwd=tmp_path)
     assert "success" in out
     assert (tmp_path / "run" / "report.html").is_file()
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_notebook(tmp_path: Path) -> None:
     """The cells run in order as one script, with one object fewer to find."""
     notebook = json.loads((EXAMPLES / "tour.ipynb").read_text())

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
 from typer.testing import CliRunner
 
 from glotouch_bt.cli import app
 
 
+@pytest.mark.study
 def test_a_part_of_the_matrix(tmp_path: Path) -> None:
     words = ["bench", "forces", "--following", "--moment", "draw", "--joint", "6", "--workers", "1"]
     done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "a"), "--json"])

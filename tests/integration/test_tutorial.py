@@ -60,7 +60,6 @@ def own_environment(folder: Path) -> dict[str, str]:
     return keep | {"PATH": f"{bin_}{os.pathsep}{keep['PATH']}", "COLUMNS": "120", "NO_COLOR": "1", "MPLBACKEND": "Agg"}
 
 
-@pytest.mark.slow
 def test_the_page_is_true(tmp_path: Path) -> None:
     environment = own_environment(tmp_path / "venv")
     reader = tmp_path / "bell"

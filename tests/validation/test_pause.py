@@ -13,6 +13,7 @@ from glotouch_bt.cli import app
 from glotouch_bt.validation.pause import EveryNthTick, PauseStudy, run_pauses
 
 
+@pytest.mark.study
 def test_a_paused_mission_beside_its_twin(tmp_path: Path) -> None:
     told = []
     study = PauseStudy(
@@ -68,6 +69,7 @@ def test_bad_input_is_one_message(words: list[str], message: str, tmp_path: Path
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.study
 def test_the_table_and_the_json(tmp_path: Path) -> None:
     words = ["bench", "pause", "--mission", "pick_at", "--backend", "fake", "--conditions", "ideal", "--trials", "1"]
     done = CliRunner().invoke(app, [*words, "--pause", "0.1", "--out", str(tmp_path / "a")])

@@ -25,7 +25,6 @@ CLASSES = {
     "xensegripper.xense_gripper": ("XenseGripper", "XenseTCPGripper", "XenseSerialGripper"),
 }
 OUR_OWN_ERROR = {"SerialException": "OSError"}  # which it is a kind of
-pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")

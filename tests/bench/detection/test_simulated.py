@@ -3,9 +3,12 @@
 import csv
 import json
 
+import pytest
+
 from glotouch_bt.bench.detection import DetectionStudy, run_study, table
 
 
+@pytest.mark.study
 def test_a_small_study_writes_its_folder(tmp_path):
     study = DetectionStudy(
         conditions=("nominal",),

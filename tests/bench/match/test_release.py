@@ -33,7 +33,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_equal_commands_give_equal_data(made: Path) -> None:
     one, two = (load_dataset(made / name / "dataset") for name in ("one", "two"))
     assert one.manifest["digest"] == two.manifest["digest"]
@@ -44,7 +44,7 @@ def test_equal_commands_give_equal_data(made: Path) -> None:
         list(one.layouts("harsh"))
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_numpy_and_json_are_enough_to_read_it(made: Path) -> None:
     """The manifest is checked as sha256sum would, and every column of the README is in the file."""
     folder = made / "one" / "dataset"
@@ -59,7 +59,7 @@ def test_numpy_and_json_are_enough_to_read_it(made: Path) -> None:
     assert all(r[4].strip() for r in listed)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_a_changed_file_is_found(made: Path, tmp_path: Path) -> None:
     folder = made / "two" / "dataset"
     (folder / "objects" / "apple.stl").write_bytes(b"x")

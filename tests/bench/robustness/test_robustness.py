@@ -73,6 +73,7 @@ def test_widths_of_an_ideal_box_are_those_of_its_stl() -> None:
         assert width >= 0.9 * max(spans) - 1e-3
 
 
+@pytest.mark.study
 def test_a_campaign_writes_its_points_picture_and_summary(tmp_path, monkeypatch) -> None:
     few = replace(AXES["depth_gain"], levels=AXES["depth_gain"].levels[:1])
     monkeypatch.setitem(AXES, "depth_gain", few)

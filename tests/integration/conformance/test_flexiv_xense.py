@@ -6,8 +6,6 @@ import os
 import signal
 from collections.abc import Callable, Mapping
 
-import pytest
-
 from glotouch_backends.flexiv_xense.client.backend import FlexivXenseBackend
 from glotouch_backends.flexiv_xense.client.robot import FlexivXenseRobot
 from glotouch_backends.flexiv_xense.driver.messages import RefereeAnswer, RefereeRequest
@@ -15,8 +13,6 @@ from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.conformance import RobotConformance, Wall
 from glotouch_bt.robot import Conditions, Robot
 from tests.conformance.conformance_world import OPTIONS, WORLD, floor
-
-pytestmark = pytest.mark.slow
 
 
 def disturb(name: str) -> Callable[[Robot], None]:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from typing import ClassVar
 
 import numpy as np
-import pytest
 
 from glotouch_backends.mujoco import MujocoBackend
 from glotouch_backends.mujoco.robot import MujocoRobot
@@ -14,8 +13,6 @@ from glotouch_backends.robots import load_robot
 from glotouch_bt.conformance import RobotConformance, Wall
 from glotouch_bt.robot import Conditions, Robot
 from tests.conformance.conformance_world import OPTIONS, WORLD, floor
-
-pytestmark = pytest.mark.slow
 
 
 def blow_up(robot: Robot) -> None:

@@ -12,8 +12,6 @@ from glotouch_bt.robot import BadInput
 from glotouch_bt.runs import RunRequest, launch, resume
 from glotouch_bt.runs.replay import replay
 
-pytestmark = pytest.mark.slow
-
 
 def test_a_run_keeps_its_robot(tmp_path: Path) -> None:
     for suffix in (".yaml", ".urdf"):

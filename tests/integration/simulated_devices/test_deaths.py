@@ -18,7 +18,6 @@ from glotouch_bt.mission.record import RunSummary
 from glotouch_bt.report import read_run
 from glotouch_bt.runs import RunRequest, find_resumable, installed_versions, launch
 
-pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[3]
 
 

@@ -21,7 +21,6 @@ from glotouch_backends.trial_message import trial_message
 from glotouch_bt.robot import Conditions
 from tests.conformance.conformance_world import OPTIONS, WORLD
 
-pytestmark = pytest.mark.slow
 SPEED_M_S = 0.10
 REACH_M = 0.65  # of P from the first axis, which does most of this motion
 ROOT = Path(__file__).parents[3]
