@@ -54,14 +54,22 @@ def pages() -> dict[str, str]:
         if meta["section"] != section:
             section = meta["section"]
             text.append(f"## {section}\n")
-        text.append(_claim(meta, summaries[name]))
+        text.append(_claim(name, meta, summaries[name]))
     return {"results.md": "\n".join(text).rstrip() + "\n", "leaderboard.md": leaderboard.page(known, summaries)}
 
 
-def _claim(meta: dict[str, Any], summary: Any) -> str:
+def _claim(name: str, meta: dict[str, Any], summary: Any) -> str:
+    """Return the section of a claim.
+
+    Raises:
+        ValueError: A row has no value in any column.
+    """
     older = " (older code)" if meta.get("older") else ""
     columns = meta.get("columns") or {"measured": ""}
     wanted = any("wanted" in row for row in meta["rows"])
+    for row in meta["rows"]:
+        if all(value_at(summary, at, row["at"]) is None for at in columns.values()):
+            raise ValueError(f"docs/results/{name}: the summary has nothing at {row['at']!r} ({row['label']})")
     rows = [
         [row["label"], *(figure(value_at(summary, at, row["at"]), row) for at in columns.values())]
         + ([row.get("wanted", "")] if wanted else [])
