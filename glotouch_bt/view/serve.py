@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     import viser
 
 TRIES = 5
-"""Ports that are tried if other programs take them at the same moment."""
+"""Attempts to open a free port. Source: ours; one fails only if another program takes the port in the milliseconds
+between finding it and opening it, and the next one starts with a new search."""
 
 
 def view_run(

@@ -87,7 +87,8 @@ def open_server(port: int) -> viser.ViserServer:
             """Refuse."""
             return None
 
-    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)  # a port scan is no fault of ours
+    # websockets logs each connection that is no websocket, for example of a port scan, as an error with a traceback
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
     with _own_pages_only(port), contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner
         server = LoopbackServer(host=HOST, port=port, verbose=False)
         taken = server.get_port() != port

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.support import any_shape
 from tests.support.touched_shapes import try_shape
 
-SHAPES = 6
+SHAPES = 24
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -66,9 +66,9 @@ def test_documents_are_of_both_kinds_and_in_all_states() -> None:
 @pytest.mark.parametrize(
     ("kind", "trials", "some"),
     [
-        ("missions", 40, {"refused unread", "refused with places"}),
-        ("meshes", 40, {"accepted", "refused with places"}),
-        ("runs", 10, {"accepted", "refused unread"}),
+        ("missions", 60, {"refused unread", "refused with places"}),
+        ("meshes", 60, {"accepted", "refused with places"}),
+        ("runs", 16, {"accepted", "refused unread"}),
     ],
 )
 def test_nothing_bad_comes_of_some_of_them(kind: str, trials: int, some: set[str]) -> None:

@@ -6,6 +6,7 @@ import json
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -177,3 +178,24 @@ def test_only_the_page_of_a_live_run_has_mission_buttons(watch: Callable[..., Ru
     told(live)
     assert live.page.mission_buttons.visible is False  # the mission has ended
     assert watch(cut.folder).page.mission_buttons is None
+
+
+@pytest.mark.parametrize("answered", [False, True])
+def test_the_question_to_stop_closes_when_the_mission_ends(
+    server: Any, watch: Callable[..., RunWatch], tmp_path: Path, answered: bool
+) -> None:
+    asked: list[str] = []
+    live = watch(tmp_path / "run", MissionControls(*(lambda word=word: asked.append(word) for word in ("a", "b", "c"))))
+    told(live)
+    (press,) = live.page.mission_buttons._impl.update_cb
+    press(SimpleNamespace(target=SimpleNamespace(value="stop")))
+    told(live)
+    (question,) = server.gui._modal_handle_from_uuid.values()
+    if answered:
+        (let_it_run,) = (c for c in question._children.values() if getattr(c, "label", "") == "Let it run")
+        let_it_run._impl.update_cb[0](None)
+    assert question.closed is answered
+    make_run(tmp_path / "run", until="sweep")
+    told(live)
+    assert question.closed is True
+    assert asked == []

@@ -82,7 +82,7 @@ def wait_for_viewers(page: LiveView | None, done: RunResult) -> None:
     """
     if page is None or done.exit_code == INTERRUPTED:
         return
-    sys.stderr.write(f"the page stays until it is closed in the browser; Ctrl-C ends it now: {page.address}\n")
+    sys.stderr.write(f"the page stays at {page.address} while a browser shows it; Ctrl-C ends it now\n")
     with suppress(KeyboardInterrupt):
         if not page.wait(patient=sys.stderr.isatty()):
             sys.stderr.write(f"nobody had the page open; look at it with: glotouch view {done.folder}\n")

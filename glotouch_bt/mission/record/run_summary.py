@@ -60,8 +60,8 @@ class RunSummary:
         ranking: Data of the last ranking event, or None.
         calibration: Data of the last calibration of the probe, or None.
         best: The candidate with the highest probability and that probability; (-1, 0) before the first decision.
-        results: What was found, by key: {text, node}; the last of each. First the sizes of the candidates, then the
-            outputs that skills declare as results.
+        results: Results of the run by key, each {text, node}, the latest of its key: the sizes of the candidates,
+            then the outputs that skills declare as results.
         last_event: (robot time, kind) of the last event.
         node: Path of the last leaf that started.
         peak_force_N: Largest norm of the sensed wrist force.

@@ -53,48 +53,63 @@ MARKS = frozenset({"failure", "guard", "fault", "stuck", "ending"})
 
 
 MAX_KEPT = 2**16
-"""Rows that are kept, so that the view of a long mission stays small. The last five minutes are never thinned."""
+"""Rows that are kept, so that the view of a long mission stays small: 11 minutes at one row in 10 ms."""
 
 
 class GrowingRows:
-    """Rows of numbers that are appended. From `MAX_KEPT` rows on, each two neighbours become one.
+    """Rows of numbers that are appended; at most `MAX_KEPT` rows are kept, at a uniform spacing.
+
+    When there would be more, each two neighbours become one, and later rows are merged to the same, doubled spacing.
+    The last row may stand for fewer rows than the others: the newest numbers are always there.
 
     Args:
         width: Numbers in a row.
-        peak: Column of which the larger number of two rows is kept; of the others it is the later one.
+        peak: Column of which a merged row has the largest number; of the others it has the latest.
     """
 
     def __init__(self, width: int, peak: int | None = None) -> None:
         self._data = np.zeros((256, width))
-        self._count = 0
+        self._count = self._appended = 0
+        self._stride = 1  # appended rows in a kept row
         self._peak = peak
 
     def append(self, rows: Array) -> None:
         """Append rows (n, width)."""
-        if self._count >= MAX_KEPT:
-            pairs = self._data[: self._count // 2 * 2].reshape(-1, 2, self._data.shape[1])
-            kept = pairs[:, 1].copy()
-            if self._peak is not None:
-                kept[:, self._peak] = pairs[:, :, self._peak].max(axis=1)
-            self._data[: len(kept)] = kept
-            self._count = len(kept)
-        needed = self._count + len(rows)
+        if not len(rows):
+            return
+        begun = int(self._appended % self._stride > 0)  # the last row stands for less than a stride: it is merged on
+        kept = self._count - begun
+        new = self._merged(np.concatenate([self._data[kept : self._count], rows]), self._appended - begun, self._stride)
+        self._appended += len(rows)
+        needed = kept + len(new)
         if needed > len(self._data):
             bigger = np.zeros((max(needed, 2 * len(self._data)), self._data.shape[1]))
-            bigger[: self._count] = self.rows
+            bigger[:kept] = self._data[:kept]
             self._data = bigger
-        self._data[self._count : needed] = rows
+        self._data[kept:needed] = new
         self._count = needed
+        while self._count > MAX_KEPT:
+            halved = self._merged(self.rows, 0, 2)
+            self._count, self._stride = len(halved), 2 * self._stride
+            self._data[: self._count] = halved
+
+    def _merged(self, rows: Array, index: int, stride: int) -> Array:
+        """Return one row for each `stride` rows; `index` is the number of rows before the first one."""
+        starts = np.append(0, np.arange(stride - index % stride, len(rows), stride))
+        merged: Array = rows[np.append(starts[1:], len(rows)) - 1]
+        if self._peak is not None:
+            merged[:, self._peak] = np.maximum.reduceat(rows[:, self._peak], starts)
+        return merged
 
     @property
     def rows(self) -> Array:
-        """The rows (n, width) so far; a view."""
+        """The kept rows (n, width); a view, which the next `append` may change."""
         return self._data[: self._count]
 
     def at(self, t_s: float) -> Array | None:
-        """Return the last row whose first number is not after `t_s`, or None."""
+        """Return a copy of the last row whose first number is not after `t_s`, or None."""
         i = int(np.searchsorted(self.rows[:, 0], t_s + EPSILON_S, side="right")) - 1
-        return self.rows[i] if i >= 0 else None
+        return self.rows[i].copy() if i >= 0 else None
 
 
 class Stamped(Generic[T]):
@@ -128,8 +143,8 @@ class RunModel:
 
     Attributes:
         record: Its description, result, events and ticks.
-        motion: Rows (stamp_s, wrist force N, q ...), one for each control period, and fewer of long ago; the force is
-            the largest norm since the row before. None before the first.
+        motion: Rows (stamp_s, wrist force N, q ...), one for each control period, fewer in a long mission; the force
+            is the largest norm since the row before. None before the first.
         jaws: Rows (stamp_s, aperture m, force N), as often.
         log: All events in words.
         marks: The events that a person jumps to.

@@ -140,7 +140,8 @@ class Page:
         if self.mission_buttons is not None:
             self.mission_buttons.visible = not self._model.ended
             if self._model.ended and self._question is not None:
-                self._question.close()
+                if not self._question.closed:  # viser warns about a second close
+                    self._question.close()
                 self._question = None
         self._set("status", panels.status(state, facts, note, tone))
         self._set("tree", panels.tree(state, whole=self._whole.value))

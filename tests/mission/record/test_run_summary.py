@@ -1,4 +1,4 @@
-"""What a run found, for its result: the sizes of the objects first, then what skills declare."""
+"""Results of a run: the sizes of the objects, then the results that skills declare."""
 
 from __future__ import annotations
 

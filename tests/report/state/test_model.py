@@ -13,6 +13,7 @@ from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.record.recorder import Recorder
 from glotouch_bt.report import RecordReader, read_run
 from glotouch_bt.report.state import RunModel, SceneState, planned_nodes
+from glotouch_bt.report.state import model as model_file
 from glotouch_bt.report.state.model import MAX_KEPT, GrowingRows
 from tests.support.made_run import OBJECTS, TIP_M, WANTED, Made
 
@@ -239,16 +240,36 @@ def test_where_a_mission_failed_stays_in_view(tmp_path: Path) -> None:
 
 
 def test_a_long_mission_is_kept_in_bounded_memory_with_its_peaks() -> None:
-    rows, count = GrowingRows(3, peak=1), 200_000
+    count = 200_000
     t_s = 0.01 * np.arange(count)
     force = np.zeros(count)
-    force[[77, 60_001, 199_998]] = 9.0
-    for part in np.array_split(np.column_stack([t_s, force, t_s]), 400):
+    force[[77, 60_001, 131_073, 199_998]] = 9.0
+    numbers = np.column_stack([t_s, force, t_s])
+    rows, at_once = GrowingRows(3, peak=1), GrowingRows(3, peak=1)
+    at_once.append(numbers)
+    for part in np.array_split(numbers, 401):
         rows.append(part)
-    assert len(rows.rows) <= MAX_KEPT + 500
+        assert rows.rows[-1, 0] == part[-1, 0], "a live view shows the newest row"
+        assert len(rows.rows) <= MAX_KEPT
+        spacing_s = np.diff(rows.rows[:-1, 0])
+        np.testing.assert_allclose(spacing_s, spacing_s[0], atol=1e-6)
+    assert spacing_s[0] == pytest.approx(0.04)
+    np.testing.assert_array_equal(rows.rows, at_once.rows)
     assert rows._data.nbytes < 10e6
-    assert (np.diff(rows.rows[:, 0]) > 0).all()
-    assert (rows.rows[:, 1] == 9.0).sum() == 3
+    assert (rows.rows[:, 1] == 9.0).sum() == 4
     at = rows.at(700.0)
     assert at is not None
-    assert at[2] == pytest.approx(700.0, abs=0.2)
+    assert at[2] == pytest.approx(700.0, abs=0.04)
+
+
+def test_rows_are_merged_as_their_numbers_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Closed form: row i of stride s has the stamp of the last number of its group, and the group's maximum."""
+    monkeypatch.setattr(model_file, "MAX_KEPT", 4)
+    numbers = np.column_stack([np.arange(40.0), np.random.default_rng(0).random(40)])
+    rows = GrowingRows(2, peak=1)
+    rows.append(numbers[:0])
+    for n in range(1, 41):
+        rows.append(numbers[n - 1 : n])
+        stride = next(s for s in (1, 2, 4, 8, 16) if -(-n // s) <= 4)
+        groups = [numbers[i : min(i + stride, n)] for i in range(0, n, stride)]
+        np.testing.assert_array_equal(rows.rows, [[g[-1, 0], g[:, 1].max()] for g in groups])

@@ -181,6 +181,7 @@ def test_the_height_of_a_post(make, things) -> None:
     b.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message
     assert skill.measured.height_m == pytest.approx(TOP, abs=5e-4)
+    assert skill.height_m == skill.measured.height_m
     assert skill.measured.top_touched
     assert skill.measured.contour is skill.candidate.contour
     (event,) = b.of_kind("candidate")
