@@ -27,6 +27,8 @@ MIN_PRESSING_SHARE = 0.25
 """Share of the limit below which a pressing hand is not judged."""
 MAX_STEEPENING = 4.0
 """Mean rise of a contact over that of one sample; the weight of an object that is lifted hardly rises."""
+REACTION_SAMPLES = 3
+"""Samples for which a force goes on rising at its present rate, until the brakes act."""
 SAMPLE_S = 0.001
 """Nominal time between samples."""
 FREE_M_S = 0.015
@@ -40,7 +42,8 @@ class HardLimit:
     """Decides at each sample whether the arm must stop.
 
     A hand that moves at v into what it touches presses harder by stiffness times v in every second, until it stands.
-    v is the power that goes into the contact over the force, of the measured motion or of the setpoint's.
+    v is the power that goes into the contact over the force, of the measured motion or of the setpoint's. What is
+    stiffer than assumed shows in the force's rise, which is extrapolated over the reaction.
 
     Args:
         force_N, torque_Nm: Norms of the contact wrench in S at which the arm stops.
@@ -70,12 +73,14 @@ class HardLimit:
         soon = share + min(
             self._rise_s_m * max(0.0, speed_m_s - FREE_M_S), self._samples_ahead * MAX_STEEPENING * max(0.0, rise)
         )
+        on_braking = share + REACTION_SAMPLES * max(0.0, rise)
         self._over = self._over + 1 if share > 1.0 else 0
-        self._pressing = self._pressing + 1 if soon > 1.0 and speed_m_s > MIN_PRESSING_M_S else 0
+        pressing = max(soon, on_braking) > 1.0 and speed_m_s > MIN_PRESSING_M_S
+        self._pressing = self._pressing + 1 if pressing else 0
         if self._over >= MAX_SAMPLES_OVER:
             kind, ahead = "", 1.0
         elif self._pressing >= (MAX_SAMPLES_PRESSING if soon < MAX_SHARE_SOON else 1):
-            kind, ahead = "extrapolated_", soon / share
+            kind, ahead = "extrapolated_", max(soon, on_braking) / share
         else:
             return None
         if force / self._max_N >= torque / self._max_Nm:

@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import mujoco
 
-# A geom has one category (contype) and collides with the categories of its affinity.
-ENVIRONMENT, OBJECT, HAND, PROBE = 1, 2, 4, 8
+# A geom has one category (contype) and collides with the categories of its affinity. The gel pads hold the probe's
+# handle in contact pairs of their own (`add_probe`).
+ENVIRONMENT, OBJECT, HAND, GEL, PROBE, HANDLE = 1, 2, 4, 8, 16, 32
 AFFINITY = {
-    ENVIRONMENT: OBJECT | HAND | PROBE,
-    OBJECT: ENVIRONMENT | OBJECT | HAND | PROBE,
-    HAND: ENVIRONMENT | OBJECT | PROBE,
-    PROBE: ENVIRONMENT | OBJECT | HAND,
+    ENVIRONMENT: OBJECT | HAND | GEL | PROBE | HANDLE,
+    OBJECT: ENVIRONMENT | OBJECT | HAND | GEL | PROBE | HANDLE,
+    HAND: ENVIRONMENT | OBJECT | PROBE | HANDLE,
+    GEL: ENVIRONMENT | OBJECT | PROBE,
+    PROBE: ENVIRONMENT | OBJECT | HAND | GEL,
+    HANDLE: ENVIRONMENT | OBJECT | HAND,
 }
 GROUP_VISUAL, GROUP_COLLISION = 2, 3
 
@@ -24,12 +27,13 @@ GROUP_VISUAL, GROUP_COLLISION = 2, 3
 # contact point, like slender fingers. The pads have their own constant. Source: ours.
 STIFF = (0.004, 1.0)
 HOUSING = (0.050, 1.0)
-MIX = {ENVIRONMENT: 1.0, OBJECT: 1000.0, HAND: 150.0, PROBE: 1000.0}
+MIX = {ENVIRONMENT: 1.0, OBJECT: 1000.0, HAND: 150.0, GEL: 150.0, PROBE: 1000.0, HANDLE: 1000.0}
 OBJECT_IMPEDANCE = 0.5
 """Impedance of the contacts of free objects (MuJoCo's solimp, 0..1; 1: rigid). With MuJoCo's default of 0.9, an object
 that rocks between the jaws and meets the floor is stopped within a step, and the hand with it. Source: ours, to lower
 such peaks: 32.7 and 37.0 N in `bench retrieve --conditions realistic`, train of seeds 36013 and 36026, 3643226."""
 PAD = (0.005, 1.0)  # gel skin; the gel model adds the gel's compliance
+PAD_HANDLE = (0.0035, 1.0)  # as stiff in all as PAD: a pad meets the handle in two points, another face in four
 PAD_HANDLE_FRICTION = (0.002, 1.0)  # pads on the probe's handle: stiffer, or the probe drifts during transfers
 
 GEL_TORSION_M = 0.005
@@ -52,7 +56,7 @@ def set_category(geom: mujoco.MjsGeom, category: int) -> None:
     geom.conaffinity = AFFINITY[category]
     geom.condim = 4
     geom.group = GROUP_COLLISION
-    geom.solref = HOUSING if category == HAND else STIFF
+    geom.solref = HOUSING if category in (HAND, GEL) else STIFF
     geom.solmix = MIX[category]
     if category == OBJECT:
         geom.solimp[:2] = OBJECT_IMPEDANCE

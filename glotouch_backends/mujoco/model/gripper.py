@@ -8,7 +8,15 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from glotouch_backends.mujoco.model.contact import GEL_TORSION_M, HAND, HAND_FRICTION, PAD, set_category, set_friction
+from glotouch_backends.mujoco.model.contact import (
+    GEL,
+    GEL_TORSION_M,
+    HAND,
+    HAND_FRICTION,
+    PAD,
+    set_category,
+    set_friction,
+)
 from glotouch_bt.robot import Box, Gripper
 
 PAD_PROUD_M = 0.002
@@ -30,11 +38,13 @@ def box_inertia(mass_kg: float, half_m: tuple[float, float, float]) -> tuple[flo
     return mass_kg / 3 * (y + z), mass_kg / 3 * (x + z), mass_kg / 3 * (x + y)
 
 
-def _box(body: mujoco.MjsBody, box: Box, colour: tuple[float, ...], name: str = "") -> mujoco.MjsGeom:
+def _box(
+    body: mujoco.MjsBody, box: Box, colour: tuple[float, ...], name: str = "", category: int = HAND
+) -> mujoco.MjsGeom:
     geom = body.add_geom(
         name=name, type=mujoco.mjtGeom.mjGEOM_BOX, pos=box.centre_m, size=box.half_m, rgba=colour, mass=0.0
     )
-    set_category(geom, HAND)
+    set_category(geom, category)
     set_friction(geom, HAND_FRICTION)
     return geom
 
@@ -79,7 +89,7 @@ def add_gripper(spec: mujoco.MjSpec, hand: mujoco.MjsBody, gripper: Gripper, pad
             armature=JAW_ARMATURE_KG,
         )
         _box(finger, back, FINGER_COLOUR)
-        gel = _box(finger, pad, PAD_COLOUR, f"pad_{name}")
+        gel = _box(finger, pad, PAD_COLOUR, f"pad_{name}", GEL)
         gel.solref = PAD
         set_friction(gel, pad_friction, priority=2, torsion_m=GEL_TORSION_M)
         motor = spec.add_actuator(name=f"jaw_{name}", target=f"jaw_{name}", trntype=mujoco.mjtTrn.mjTRN_JOINT)

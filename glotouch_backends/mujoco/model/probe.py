@@ -14,8 +14,10 @@ import numpy as np
 from glotouch_backends.mujoco.model.contact import (
     ENVIRONMENT,
     GEL_TORSION_M,
+    GROUP_COLLISION,
+    HANDLE,
     HOLDER_FRICTION,
-    PAD,
+    PAD_HANDLE,
     PAD_HANDLE_FRICTION,
     PROBE,
     ROLLING_M,
@@ -33,6 +35,11 @@ MIN_BALL_CLEARANCE_M = 0.001
 """Smallest gap between ball and rail on each side. Source: ours."""
 LEDGE_M = 0.0015
 """Overlap of a rail with the handle. Source: ours."""
+RIDGE_RADIUS_M = 0.002
+"""Radius of the ridges that the pads hold. Source: ours."""
+RIDGE_SHARE = 0.85
+"""Length of a ridge between the centres of its ends, over the handle's: the ends stay on a pad that is held 2 mm off.
+Source: ours."""
 MAX_SHAFT_STIFFNESS_NM_RAD = 170.0
 """Largest stiffness between handle and shaft, or 1 ms steps become unstable; 0.1 mm/N at the ball. Source: ours."""
 GEL_DAMPING_RATIO = 0.5
@@ -79,7 +86,8 @@ def _compliant(spec: mujoco.MjSpec, body: mujoco.MjsBody, probe: Probe, truth: T
 def add_probe(spec: mujoco.MjSpec, probe: Probe, holder: Holder, truth: Truth) -> None:
     """Add the stand and, standing in it, the free body `probe` (frame: handle's centre, z to the tip).
 
-    Its geoms are `handle`, `shaft` and `ball`; the site `tip` is the ball's centre.
+    Its geoms are `handle`, `shaft`, `ball`, and a ridge along z flush with each face that the pads hold: a pad has two
+    contacts with a ridge, and four with a face, which make a step a third longer. The site `tip` is the ball's centre.
     """
     pose_handle_shaft, pad_friction = truth.pose_handle_shaft, truth.pad_friction
     pose = holder.pose_B_grasp
@@ -87,7 +95,7 @@ def add_probe(spec: mujoco.MjSpec, probe: Probe, holder: Holder, truth: Truth) -
     body.add_freejoint(name="probe")
     hx, hy, hz = (0.5 * s for s in probe.handle_m)
     handle = body.add_geom(name="handle", type=mujoco.mjtGeom.mjGEOM_BOX, size=(hx, hy, hz), rgba=HANDLE_COLOUR)
-    set_category(handle, PROBE)
+    set_category(handle, HANDLE)
     set_friction(handle, HOLDER_FRICTION, priority=1)
 
     body.explicitinertial = True
@@ -111,11 +119,21 @@ def add_probe(spec: mujoco.MjSpec, probe: Probe, holder: Holder, truth: Truth) -
         set_friction(geom, TIP_FRICTION, priority=1)
     lower.add_site(name="tip", pos=ball, quat=pose_handle_shaft.quat)
 
-    for side in ("left", "right"):
-        pair = spec.add_pair(name=f"grip_{side}", geomname1=f"pad_{side}", geomname2="handle", condim=4)
-        pair.friction = (pad_friction, pad_friction, GEL_TORSION_M, ROLLING_M, ROLLING_M)
-        pair.solref = PAD
-        pair.solreffriction = PAD_HANDLE_FRICTION
+    for side, face in ((1.0, "left"), (-1.0, "right")):
+        ridge = body.add_geom(
+            name=f"ridge_{face}",
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            pos=(0.0, side * (hy - RIDGE_RADIUS_M), 0.0),
+            size=(RIDGE_RADIUS_M, RIDGE_SHARE * hz, 0.0),
+            contype=0,
+            conaffinity=0,
+            group=GROUP_COLLISION,
+        )
+        for pad in ("pad_left", "pad_right"):  # the hand holds the handle either way round
+            pair = spec.add_pair(name=f"{pad}_{face}", geomname1=pad, geomname2=ridge.name, condim=4)
+            pair.friction = (pad_friction, pad_friction, GEL_TORSION_M, ROLLING_M, ROLLING_M)
+            pair.solref = PAD_HANDLE
+            pair.solreffriction = PAD_HANDLE_FRICTION
     _add_stand(spec, probe, holder)
 
 
