@@ -30,8 +30,10 @@ class FeltSpace:
     """Record of where the held tool was, and where it was touched; in K."""
 
     def __init__(self) -> None:
-        self._free_K_m: Array = np.zeros((0, 3))
-        self._touched_K_m: Array = np.zeros((0, 2))
+        self._free_K_m: Array
+        self._hand_K_m: Array
+        self._touched_K_m: Array
+        self.forget()
 
     def add(self, path_K_m: Array, touch_K_m: Array | None = None) -> None:
         """Record a path (n, 3) of the tool's reference point, and the point (2 or 3,) of a contact at its end."""
@@ -43,19 +45,21 @@ class FeltSpace:
         if touch_K_m is not None:
             self._touched_K_m = np.concatenate([self._touched_K_m, np.asarray(touch_K_m)[None, :2]])
 
-    def add_hand(self, places_K_m: Array) -> None:
-        """Record places (n, 2) where the open hand came down; they tell nothing of the wider ball."""
-        above = np.column_stack([places_K_m, np.full(len(places_K_m), np.inf)])
-        self._free_K_m = np.concatenate([self._free_K_m, above])
+    def add_hand(self, places_K_m: Array, tips_K_m: float) -> None:
+        """Record places (n, 2) where the open fingers stood, at a height; they tell nothing of the wider ball."""
+        stood = np.column_stack([places_K_m, np.full(len(places_K_m), tips_K_m)])
+        self._hand_K_m = np.concatenate([self._hand_K_m, stood])
 
     def forget(self) -> None:
         """Remove everything: the objects may have been moved, or the tool was not held."""
-        self._free_K_m, self._touched_K_m = np.zeros((0, 3)), np.zeros((0, 2))
+        self._free_K_m, self._hand_K_m, self._touched_K_m = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 2))
 
     def forget_near(self, place_K_m: Array) -> None:
         """Remove what was felt within `HANDLED_M` of a place (2 or 3,): the jaws move what they close on."""
-        far = np.linalg.norm(self._free_K_m[:, :2] - np.asarray(place_K_m)[:2], axis=1) > HANDLED_M
-        self._free_K_m = self._free_K_m[far]
+        place = np.asarray(place_K_m)[:2]
+        self._free_K_m, self._hand_K_m = (
+            felt[np.linalg.norm(felt[:, :2] - place, axis=1) > HANDLED_M] for felt in (self._free_K_m, self._hand_K_m)
+        )
 
     def columns(self, height_K_m: float) -> Array:
         """Return the places (n, 2) with a free column down to a height of the tool's reference point."""
@@ -65,18 +69,26 @@ class FeltSpace:
             far &= np.sum((low - touched) ** 2, axis=1) >= CLEAR_OF_TOUCH_M**2
         return low[far]
 
-    def covers(self, places_K_m: Array, within_m: float) -> bool:
-        """Return True if tool or hand stood free within a distance of each place (n, 2), near touches or not."""
-        if not len(self._free_K_m):
-            return False
-        away = np.linalg.norm(self._free_K_m[None, :, :2] - places_K_m[:, None], axis=2).min(axis=1)
-        return bool(away.max() <= within_m)
+    def free_down_to(self, places_K_m: Array, within_m: float) -> float:
+        """Return the height in K down to which the fingers find free space at all places (n, 2).
+
+        The tool, or the open fingers themselves, stood within a distance of each of them, near touches or not; a tool
+        counts as on the floor. Infinite if nothing stood near one.
+        """
+        free = np.concatenate([self._free_K_m * [1.0, 1.0, 0.0], self._hand_K_m])
+        away = np.linalg.norm(free[None, :, :2] - places_K_m[:, None], axis=2)
+        return float(np.where(away <= within_m, free[:, 2], np.inf).min(axis=1, initial=np.inf).max())
 
     def state(self) -> dict[str, Any]:
         """Return the record, for `restore`."""
-        return {"free_K_m": self._free_K_m.copy(), "touched_K_m": self._touched_K_m.copy()}
+        return {
+            "free_K_m": self._free_K_m.copy(),
+            "hand_K_m": self._hand_K_m.copy(),
+            "touched_K_m": self._touched_K_m.copy(),
+        }
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Restore a `state`."""
         self._free_K_m = np.array(state["free_K_m"], dtype=np.float64).reshape(-1, 3)
+        self._hand_K_m = np.array(state["hand_K_m"], dtype=np.float64).reshape(-1, 3)
         self._touched_K_m = np.array(state["touched_K_m"], dtype=np.float64).reshape(-1, 2)

@@ -37,11 +37,14 @@ def test_columns_keep_away_from_every_touch_whenever_it_was() -> None:
 def test_places_are_covered_by_tool_and_hand() -> None:
     felt = FeltSpace()
     places = np.array([[0.05, 0.004], [0.08, 0.0]])
-    assert not felt.covers(places, 0.005)
+    assert felt.free_down_to(places, 0.005) == np.inf
     felt.add(path(0.0, 0.07))
-    assert not felt.covers(places, 0.005)
-    felt.add_hand(np.array([[0.081, 0.0]]))
-    assert felt.covers(places, 0.005)
+    assert felt.free_down_to(places, 0.005) == np.inf
+    felt.add_hand(np.array([[0.081, 0.0]]), 0.03)
+    assert felt.free_down_to(places, 0.005) == 0.03
+    felt.add_hand(np.array([[0.08, 0.001]]), 0.02)
+    assert felt.free_down_to(places, 0.005) == 0.02
+    assert felt.free_down_to(places[:1], 0.005) == 0.0
     assert felt.columns(1.0)[:, 0].max() <= 0.07, "where the fingers were, the ball may not fit"
 
 
@@ -58,7 +61,9 @@ def test_the_record_is_kept_and_forgotten() -> None:
 def test_what_the_jaws_handled_is_forgotten() -> None:
     felt = FeltSpace()
     felt.add(path(0.0, 0.3))
-    assert felt.covers(np.array([[0.05, 0.0], [0.25, 0.0]]), 0.005)
+    felt.add_hand(np.array([[0.05, 0.02]]), 0.03)
+    assert felt.free_down_to(np.array([[0.05, 0.0], [0.25, 0.0], [0.05, 0.02]]), 0.005) == 0.03
     felt.forget_near(np.array([0.0, 0.0, 0.1]))
-    assert not felt.covers(np.array([[0.05, 0.0]]), 0.005)
-    assert felt.covers(np.array([[0.25, 0.0]]), 0.005)
+    assert felt.free_down_to(np.array([[0.05, 0.0]]), 0.005) == np.inf
+    assert felt.free_down_to(np.array([[0.05, 0.02]]), 0.005) == np.inf
+    assert felt.free_down_to(np.array([[0.25, 0.0]]), 0.005) == 0.0

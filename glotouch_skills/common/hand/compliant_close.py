@@ -14,6 +14,7 @@ import numpy as np
 
 from glotouch_bt.motion import Arm, JawRestDetector, Motion
 from glotouch_bt.robot import Array, GripperState, MotionRefused, Observation
+from glotouch_skills.common.hand.descent import note_open_fingers
 
 GENTLE_FORCE_N = 3.0
 """Jaw force until both jaws rest. Coupled jaws of which only one touches push with twice this force. 6 N slide the
@@ -209,10 +210,11 @@ def release(arm: Arm, opening_m: float) -> Motion[None]:
     A force on the hand although the jaws hold nothing means that a fingertip stands on the object, or is caught under
     it or in a hollow of its side. Then the jaws stop, the hand moves along the force until it is free, and the jaws
     open again. The object may drop onto a fingertip only after its release, so the force is checked until the jaws are
-    open. A pause waits until then.
+    open. A pause waits until then. What was moved by the jaws stands between the open fingers.
     """
     with arm.pause_signal.finishing():
         yield from _release(arm, opening_m)
+    note_open_fingers(arm)
 
 
 def _release(arm: Arm, opening_m: float) -> Motion[None]:

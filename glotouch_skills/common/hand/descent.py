@@ -30,8 +30,8 @@ EDGE_PLACES = 5
 def descend(context: Context, goal_B_P: Pose, opening_m: float, top_m: float, slow_m_s: float) -> Motion[bool]:
     """Move the open hand from above an object straight down beside it; return False if the fingers touched something.
 
-    Where the held probe has felt free space between object and fingers, or the hand came down before, only the last
-    millimetres are slow. Else, and once the jaws have closed there, the fingers are slow from just above the top on.
+    Where the held probe has felt free space between object and fingers, or the open fingers stood before, only the
+    millimetres below are slow. Else the fingers are slow from just above the top on.
 
     Args:
         context: The skill's.
@@ -49,14 +49,22 @@ def descend(context: Context, goal_B_P: Pose, opening_m: float, top_m: float, sl
     tips = float(at[2]) - arm.description.gripper.fingertip_below_P_m
     beside = max(tips - top_m - OVER_TOP_M, 0.0)
     paces: Paces = ((0.0, ABOVE_RATIO * slow_m_s), (beside, slow_m_s))
-    if arm.felt.covers(edges, FELT_WITHIN_M):
-        paces = ((0.0, FREE_M_S), (beside, BESIDE_M_S), (max(tips - FOOT_M, beside), slow_m_s))
+    free_m = arm.felt.free_down_to(edges, FELT_WITHIN_M)
+    if np.isfinite(free_m):
+        paces = ((0.0, FREE_M_S), (beside, BESIDE_M_S), (max(tips - max(free_m, FOOT_M), beside), slow_m_s))
     reached = yield from glide(context, goal_B_P, FREE_M_S, paces)
     if reached:
-        arm.felt.add_hand(edges)
+        note_open_fingers(arm)
     else:
         arm.felt.forget_near(at)
     return reached
+
+
+def note_open_fingers(arm: Arm) -> None:
+    """Record that the open fingers stand free where they are."""
+    at = arm.world.container.pose_B_K.inverse().apply(arm.pose_B_P.position_m)
+    tips = float(at[2]) - arm.description.gripper.fingertip_below_P_m
+    arm.felt.add_hand(_inner_edges(arm, arm.pose_B_P, arm.aperture_m), tips)
 
 
 def _inner_edges(arm: Arm, goal_B_P: Pose, opening_m: float) -> Array:
