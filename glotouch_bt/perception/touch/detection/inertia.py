@@ -19,12 +19,6 @@ from glotouch_bt.robot import Array, Gripper, Observation, ParamError, Pose, Pro
 NEAREST = 9
 """Number of samples per acceleration: 4 ms to either side at 1 kHz, a usual wrist latency. Position noise of 1 um gives
 0.11 m/s2 before the guard's filter."""
-NEIGHBOURS = np.arange(NEAREST)
-"""Sample offsets of the window."""
-EVEN_S = 1e-7
-"""Maximum difference between sampling steps that count as equal."""
-MAX_OFF_GRID = 0.45
-"""Largest distance of a delayed sample from the nearest one, in sampling steps, for which no rounding decides."""
 BEFORE_S = 0.001
 """Spacing of the padding before the first sample; the hand is assumed at rest there."""
 
@@ -79,39 +73,44 @@ def _inertial(acceleration: Array, mass_kg: float, com: Array) -> Array:
     return out
 
 
-@compiled("f8[::1]", "f8[:, ::1]", "i8", "f8", "given f8[:]", "f8[:, ::1]")
-def _even_bends(stamps: Array, places: Array, n: int, lag_s: float, evenly: Array, out: Array) -> int:
+@compiled("f8[::1]", "f8[:, ::1]", "f8", "f8[:, ::1]")
+def _bends(stamps: Array, places: Array, lag_s: float, out: Array) -> int:
     """Fill `out` (n, 3) with the accelerations `lag_s` before the last n samples; return the last window's start.
 
-    Return -1 if the samples are not on a uniform grid, or their windows not inside it, or the delayed samples lie
-    half-way between two others, where rounding chooses one.
+    The second derivative of the least-squares parabola through a window: the values, weighted with x^2 made orthogonal
+    to 1 and x, over the norm of these weights; x are the stamps from their mean.
     """
-    least = greatest = stamps[1] - stamps[0]
-    for i in range(1, len(stamps) - 1):
-        step = stamps[i + 1] - stamps[i]
-        least, greatest = min(least, step), max(greatest, step)
-    if not greatest - least < EVEN_S:
-        return -1
-    where = (stamps[len(stamps) - n] - lag_s - stamps[0]) / (stamps[1] - stamps[0])
-    nearest = int(np.rint(where))
-    at = nearest - NEAREST // 2
-    if abs(where - nearest) > MAX_OFF_GRID or not 0 <= at <= len(stamps) - n - NEAREST + 1:
-        return -1
-    step_2 = (stamps[at + 1] - stamps[at]) ** 2
+    n, nearest, first = len(out), 0, 0
+    x, bow = np.zeros(NEAREST), np.zeros(NEAREST)
     for i in range(n):
+        at = stamps[len(stamps) - n + i] - lag_s
+        while nearest < len(stamps) - 1 and 0.5 * (stamps[nearest] + stamps[nearest + 1]) < at:
+            nearest += 1
+        first = min(max(nearest - NEAREST // 2, 0), len(stamps) - NEAREST)
+        mean = 0.0
+        for k in range(NEAREST):
+            mean += stamps[first + k] / NEAREST
+        second = third = norm = 0.0
+        for k in range(NEAREST):
+            x[k] = stamps[first + k] - mean
+            second += x[k] ** 2
+            third += x[k] ** 3
+        for k in range(NEAREST):
+            bow[k] = x[k] ** 2 - second / NEAREST - x[k] * (third / second)
+            norm += bow[k] ** 2
         for axis in range(3):
             total = 0.0
             for k in range(NEAREST):
-                total += evenly[k] / step_2 * places[at + i + k, axis]
+                total += 2.0 * bow[k] / norm * (places[first + k, axis] - places[first, axis])
             out[i, axis] = total
-    return at + n - 1
+    return first
 
 
 class MeasuredInertia:
     """Inertial wrench from the measured motion of the hand, block by block.
 
-    The acceleration is that of the least-squares parabola through the `NEAREST` positions (Savitzky and Golay, 1964, on
-    a uniform grid), `lag_s` before each sample, so no future samples are needed. The planned acceleration would have no
+    The acceleration is that of the least-squares parabola through the `NEAREST` positions (Savitzky and Golay, 1964),
+    `lag_s` before each sample, so no future samples are needed. The planned acceleration would have no
     noise, but an arm follows it only to some milliseconds. Missing samples are allowed. The hand does not rotate.
 
     Args:
@@ -133,35 +132,8 @@ class MeasuredInertia:
             self._position_m = np.repeat(o.position_B_P[:1], before, axis=0)
         stamps = np.concatenate([self._stamp_s, o.stamp_s])
         places = np.concatenate([self._position_m, o.position_B_P])
-        n = len(o.stamp_s)
-        acceleration: Array = np.zeros((n, 3))
-        last = _even_bends(stamps, places, n, self._lag_s, EVENLY, acceleration)
-        if last < 0:
-            nearest = np.searchsorted(0.5 * (stamps[1:] + stamps[:-1]), o.stamp_s - self._lag_s)
-            first = np.clip(nearest - NEAREST // 2, 0, len(stamps) - NEAREST)
-            last = int(first[-1])
-            steps = np.diff(stamps[first[0] : last + NEAREST])
-            near = first[:, None] + NEIGHBOURS
-            if steps.max() - steps.min() < EVEN_S:
-                acceleration = np.einsum("k,nkc->nc", EVENLY / steps[0] ** 2, places[near])
-            else:
-                acceleration = np.einsum("nk,nkc->nc", _bend(stamps[near]), places[near])
+        acceleration: Array = np.zeros((len(o.stamp_s), 3))
+        last = _bends(stamps, places, self._lag_s, acceleration)
         kept = max(0, last - NEAREST)
         self._stamp_s, self._position_m = stamps[kept:], places[kept:]
         return self._carried.wrench_S(acceleration @ (quat_to_matrix(o.quat_B_P[-1]) @ self._R_P_E))
-
-
-def _bend(stamp_s: Array) -> Array:
-    """Return weights (n, k) that map values at stamps (n, k) to the second derivative of the least-squares parabola.
-
-    They are x^2 made orthogonal to 1 and x, normalised.
-    """
-    x = stamp_s - stamp_s.mean(axis=1, keepdims=True)
-    square = x * x
-    second = square.sum(axis=1, keepdims=True)
-    bow = square - second / x.shape[1] - x * ((square * x).sum(axis=1, keepdims=True) / second)
-    return np.asarray(2.0 * bow / (bow * bow).sum(axis=1, keepdims=True))
-
-
-EVENLY = _bend(NEIGHBOURS[None].astype(np.float64))[0]
-"""Weights (NEAREST,) on a uniform grid of unit spacing."""
