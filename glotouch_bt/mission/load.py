@@ -125,10 +125,22 @@ def load_mission(
     findings = Findings()
     roots = tuple(folder.resolve() for folder in (path.parent, *allow_paths))
     skills = SkillRegistry() if skills is None else skills
-    mission = _read(path, dict(settings or {}), skills, objects, world, roots, findings)
+    mission = _read(path, dict(settings or {}), skills, objects, world, roots, findings, flow=True)
     if mission is None or len(findings):
         raise MissionFaults(findings.errors, findings.warnings)
     return mission
+
+
+def node_paths(file: Path) -> list[str]:
+    """Return the paths of all nodes of a mission file, parents first; what can happen in a run is not checked.
+
+    A file with errors has none.
+
+    Raises:
+        BadInput: The file cannot be read.
+    """
+    mission = _read(file, {}, SkillRegistry(), None, None, (file.parent.resolve(),), Findings(), flow=False)
+    return [] if mission is None else list(mission.spec.paths(mission.name))
 
 
 def split_settings(mission: Mission, settings: Mapping[str, object]) -> dict[str, object]:
@@ -159,6 +171,8 @@ def _read(
     other_world: str | None,
     roots: tuple[Path, ...],
     findings: Findings,
+    *,
+    flow: bool,
 ) -> Mission | None:
     try:
         source = read_yaml(path, shown(path))
@@ -196,7 +210,9 @@ def _read(
     for key, _ in entries_of(source.get("subtrees")):
         if f"carried {key.value}" not in reading.sources.values():
             findings.add(key.place, "unused_subtree", f"no node uses the subtree {key.value!r}, so it is not checked")
-    check_flow(tree, skills, findings, _leaves(source, findings), timeout_s)
+    leaves = _leaves(source, findings)
+    if flow:
+        check_flow(tree, skills, findings, leaves, timeout_s)
     if world is not None and not len(findings):
         _check_twins(parameters, given, section, world.objects, findings)
     if world is None or len(findings):

@@ -194,13 +194,9 @@ class Kinematics:
             MotionRefused: No solution within the joint limits; gives the remaining distance and the blocking joint.
         """
         seed = self._checked(np.asarray(q_seed, dtype=np.float64))
-        turned = self.home.copy()
-        home_P = self.place(self.home)[0]
-        turn = np.arctan2(pose_B_P.position_m[1], pose_B_P.position_m[0]) - np.arctan2(home_P[1], home_P[0])
-        turned[0] = np.clip(turned[0] + turn, self.lower[0], self.upper[0])
         best = ""
         least = np.inf
-        for start in (seed, self.home, turned):
+        for start in (seed, self.home, self.home_towards(pose_B_P.position_m)):
             q, error, blocked = self._solve(pose_B_P, np.clip(start, self.lower, self.upper), posture_weight)
             if error == 0.0:
                 return q
@@ -211,6 +207,13 @@ class Kinematics:
                 best = f"P at {where} m in B cannot be reached, the nearest is {missing * 1e3:.1f} mm away"
                 best += f" with {blocked}" if blocked else " (out of reach or too near a singularity)"
         raise MotionRefused(what, best)
+
+    def home_towards(self, position_m: Array) -> Array:
+        """Return home (dof,), rad, with the first joint turned towards a position (3,) in B as far as it can."""
+        turned, home_P = self.home.copy(), self.place(self.home)[0]
+        turn = np.arctan2(position_m[1], position_m[0]) - np.arctan2(home_P[1], home_P[0])
+        turned[0] = np.clip(turned[0] + turn, self.lower[0], self.upper[0])
+        return turned
 
     def _solve(self, pose: Pose, q: Array, weight: float) -> tuple[Array, float, str]:
         target = pose.rotation

@@ -52,10 +52,10 @@ def out_of_reach(description: RobotDescription, world: World) -> list[str]:
 
 def _blocked(kinematics: Kinematics, place: Pose) -> str:
     """Return why P cannot be at a place (upright frame in B) with the hand pointing down; empty if it can."""
-    why = ""
+    why, seed = "", kinematics.home_towards(place.position_m)
     for yaw in YAWS_RAD:
         try:
-            kinematics.ik(Pose.pointing_down(place.position_m, place.yaw_rad + yaw), kinematics.home)
+            kinematics.ik(Pose.pointing_down(place.position_m, place.yaw_rad + yaw), seed)
         except MotionRefused as e:
             why = why or e.why
             continue

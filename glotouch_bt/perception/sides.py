@@ -99,17 +99,18 @@ def _reach(mesh: Mesh, points_m: Array, quat: Quat) -> Array:
     """
     p = standing(replace(mesh, vertices_m=points_m), quat).vertices_m
     angle = np.arange(BEARINGS) * (2 * np.pi / BEARINGS)
-    along = p[:, :2] @ np.stack([np.cos(angle), np.sin(angle)])
     at = np.minimum((p[:, 2] / LEVEL_M).astype(np.int64), LEVELS - 1)
+    rising = np.argsort(at)
+    along = p[rising, :2] @ np.stack([np.cos(angle), np.sin(angle)])
+    levels, first = np.unique(at[rising], return_index=True)
     reach = np.zeros((BEARINGS, LEVELS))
-    for level in range(LEVELS):
-        if (at == level).any():
-            reach[:, level] = along[at == level].max(axis=0)
+    reach[:, levels] = np.maximum.reduceat(along, first).T
     return reach
 
 
 def _is_alike(a: Array, b: Array) -> bool:
     """Return True if two sides reach equally far, but for a turn about the vertical."""
     used = (a != 0).any(axis=0) | (b != 0).any(axis=0)
-    off = min(float(np.abs(np.roll(a, k, axis=0) - b)[:, used].mean()) for k in range(BEARINGS))
-    return off < ALIKE_M
+    bearing = np.arange(BEARINGS)
+    turned = a[:, used][bearing - bearing[:, None]]  # by each number of bearings
+    return bool(np.abs(turned - b[:, used]).mean(axis=(1, 2)).min() < ALIKE_M)

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
+import numpy.typing as npt
 
 from glotouch_bt.mission import split_settings
 from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile, CheckpointRow
@@ -62,8 +62,8 @@ def write_film(folder: Path, objects: Path | None = None, settings: Mapping[str,
                 world = file.world(row.number)
                 assert world is not None
                 robot.restore(world)
-                large = Image.fromarray(np.asarray(camera(*(OVERSAMPLED * s for s in SIZE))))
-                pictures.append({"t_s": row.stamp_s, "node": row.node, "status": row.status, "jpeg": _jpeg(large)})
+                jpeg = _jpeg(camera(*(OVERSAMPLED * s for s in SIZE)))
+                pictures.append({"t_s": row.stamp_s, "node": row.node, "status": row.status, "jpeg": jpeg})
     finally:
         file.close()
     target = folder / FILM
@@ -85,7 +85,11 @@ def moments(rows: list[CheckpointRow]) -> list[CheckpointRow]:
     return [found[i] for i in np.linspace(0, len(found) - 1, MOMENTS).round().astype(int).tolist()]
 
 
-def _jpeg(picture: Image.Image) -> str:
+def _jpeg(picture: npt.ArrayLike) -> str:
+    from PIL import Image
+
     out = io.BytesIO()
-    picture.resize(SIZE, Image.Resampling.LANCZOS).save(out, "JPEG", quality=82, optimize=True)
+    Image.fromarray(np.asarray(picture)).resize(SIZE, Image.Resampling.LANCZOS).save(
+        out, "JPEG", quality=82, optimize=True
+    )
     return base64.b64encode(out.getvalue()).decode()

@@ -37,8 +37,8 @@ class DataFlow:
             Otherwise nothing goes on, as in a run.
 
     Attributes:
-        entered: Set in which each node was entered, by node id.
-        exits: Exit states of each node, by node id.
+        entered: Ids of the nodes that are entered in some state.
+        ends: (node id, True: in success) of the nodes that may end so.
         looked: Set in which each requirement was looked at.
         end: Exit states of the root.
     """
@@ -49,8 +49,8 @@ class DataFlow:
         self.tree, self.variables, self.requirements, self.lenient = tree, variables, requirements, lenient
         self.sets = variables.sets
         self.has_unknown = any(kind_of(n).is_unknown(n) for n in tree.walk())
-        self.entered: dict[int, int] = {}
-        self.exits: dict[int, ExitStates] = {}
+        self.entered: set[int] = set()
+        self.ends: set[tuple[int, bool]] = set()
         self.looked: dict[Requirement, int] = {}
         self._known: dict[tuple[int, int], ExitStates] = {}
         self.end = self.run(tree, START)
@@ -61,9 +61,10 @@ class DataFlow:
             return ExitStates()
         key = (id(node), entry)
         if key not in self._known:
-            self.entered[id(node)] = self.sets.union(self.entered.get(id(node), EMPTY), entry)
+            self.entered.add(id(node))
             made = self._known[key] = self._exits(node, entry)
-            self.exits[id(node)] = self.exits.get(id(node), ExitStates()).joined(made, self.sets)
+            ways = ((True, made.success), (False, made.failure))
+            self.ends.update((id(node), succeeded) for succeeded, states in ways if states != EMPTY)
         return self._known[key]
 
     def _exits(self, node: NodeSpec, entry: int) -> ExitStates:

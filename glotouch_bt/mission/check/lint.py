@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from glotouch_bt.mission.check.data_flow import DataFlow
 from glotouch_bt.mission.check.requirements import verdicts
-from glotouch_bt.mission.nodes import EMPTY, UNSET, kind_of
+from glotouch_bt.mission.nodes import UNSET, kind_of
 from glotouch_bt.mission.spec import Findings, NodeSpec, Place
 
 MAX_RUNS = 1_000_000
@@ -155,13 +155,13 @@ class _Lint:
             self._add(node, "no_effect", f"{node.name!r} changes nothing: {why}")
 
     def _entered(self, node: NodeSpec) -> bool:
-        return self._flow.entered.get(id(node), EMPTY) != EMPTY
+        return id(node) in self._flow.entered
 
     def _fails(self, node: NodeSpec) -> bool:
-        return id(node) in self._flow.exits and self._flow.exits[id(node)].failure != EMPTY
+        return (id(node), False) in self._flow.ends
 
     def _succeeds(self, node: NodeSpec) -> bool:
-        return id(node) in self._flow.exits and self._flow.exits[id(node)].success != EMPTY
+        return (id(node), True) in self._flow.ends
 
 
 def _users(node: NodeSpec) -> dict[str, NodeSpec]:

@@ -45,7 +45,7 @@ def check_flow(
         variables = variables_of(tree)
         requirements = all_requirements(tree, variables)
         exact = DataFlow(tree, variables, requirements)
-        blocked = any(exact.entered.get(id(n), EMPTY) == EMPTY for n in tree.walk())
+        blocked = any(id(n) not in exact.entered for n in tree.walk())
         lenient = DataFlow(tree, variables, requirements, lenient=True) if blocked else exact
         _Rules(exact, lenient, skills, findings).all(leaves)
         check_lint(lenient, findings, timeout_s)
@@ -215,7 +215,7 @@ class _Rules:
     def _unreachable(self, node: NodeSpec) -> None:
         """Report the topmost nodes that are never entered."""
         for i, child in enumerate(node.children):
-            if self._lenient.entered.get(id(child), EMPTY) == EMPTY:
+            if id(child) not in self._lenient.entered:
                 before = node.children[i - 1] if i else node
                 word = "fails" if kind_of(node).continue_on else "succeeds"
                 what = f"{child.name!r} can never be reached: {before.name!r} (line {before.place.line}) always {word}"

@@ -27,12 +27,13 @@ class LinkFrames:
     """
 
     def __init__(self, description: RobotDescription | None, fixed: Mapping[str, Pose]) -> None:
-        self._joints = () if description is None else description.joints
-        self._zero = [matrix_to_quat(rpy_to_matrix(j.origin_rpy_rad)) for j in self._joints]
+        joints = () if description is None else description.joints
+        turns = [_turn(matrix_to_quat(rpy_to_matrix(j.origin_rpy_rad)), np.array(j.axis)) for j in joints]
+        self._turns: Array = np.array(turns).reshape(-1, 2, 4)
         self._fingers = description is not None
-        names = ["B", *(f"link{i + 1}" for i in range(len(self._joints)))]
+        names = ["B", *(f"link{i + 1}" for i in range(len(joints)))]
         parts = [_frame("B", "P", _PLACE, _TURN)]
-        for above, name, joint in zip(names[:-1], names[1:], self._joints, strict=True):
+        for above, name, joint in zip(names[:-1], names[1:], joints, strict=True):
             parts.append(_frame(above, name, _PLACE % tuple(joint.origin_m), _TURN))
         if description is not None:
             parts += [_frame("P", side, '{"x":0,"y":%.6f,"z":0}', _TURN % (0, 0, 0, 1)) for side in ("left", "right")]
@@ -50,8 +51,10 @@ class LinkFrames:
         """Return what fills the template, a row for each stamp: P (n, 3), w x y z (n, 4), q (n, dof), jaws (n,)."""
         stamp: Array = np.column_stack([stamps_ns // 10**9, stamps_ns % 10**9]).astype(np.float64)
         out = [stamp, position_B_P, quat_B_P[:, [1, 2, 3, 0]]]
-        for joint, zero, angle in zip(self._joints, self._zero, q.T[: len(self._joints)], strict=True):
-            out += [stamp, _turned(zero, np.array(joint.axis), angle)]
+        half = 0.5 * q[:, : len(self._turns), None]
+        turned = np.cos(half) * self._turns[:, 0] + np.sin(half) * self._turns[:, 1]
+        for joint in range(len(self._turns)):
+            out += [stamp, turned[:, joint]]
         if self._fingers:
             out += [stamp, 0.5 * aperture_m, stamp, -0.5 * aperture_m]
         return out + [stamp] * self._fixed
@@ -64,12 +67,13 @@ def _frame(above: str, name: str, place: str, turn: str) -> str:
     )
 
 
-def _turned(zero: Array, axis: Array, angle: Array) -> Array:
-    """Return the quaternions x y z w (n, 4) of a fixed rotation w x y z (4,), then turns (n,) about an axis (3,)."""
-    c, s = np.cos(0.5 * angle), np.sin(0.5 * angle)
+def _turn(zero: Array, axis: Array) -> tuple[Array, Array]:
+    """Return the quaternions x y z w that make a fixed rotation w x y z (4,), then a turn about an axis (3,).
+
+    They are for the cosine and the sine of half the angle.
+    """
     w, v = zero[0], zero[1:]
-    turned = np.outer(c, v) + np.outer(s, w * axis + np.cross(v, axis))
-    return np.column_stack([turned, w * c - s * float(v @ axis)])
+    return np.append(v, w), np.append(w * axis + np.cross(v, axis), -(v @ axis))
 
 
 def robot_shapes(description: RobotDescription) -> Iterator[tuple[str, Json3D]]:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import msgspec
 import numpy as np
 
-from glotouch_bt.mission import load_mission
+from glotouch_bt.mission import node_paths
 from glotouch_bt.mission.read import shipped_root
 from glotouch_bt.report.run_record import RunRecord
 from glotouch_bt.report.state.model import NO_WINDOW_M
@@ -78,12 +78,10 @@ def read_setup(record: RunRecord, objects: Path | None = None) -> RunSetup:
 
 def planned_nodes(folder: Path) -> list[str]:
     """Return the paths of all nodes of a run's mission, parents first; none if its mission.yaml cannot be loaded."""
-    file = folder / "mission.yaml"
     try:
-        mission = load_mission(file)
+        return node_paths(folder / "mission.yaml")
     except BadInput:
         return []
-    return list(mission.spec.paths(mission.name))
 
 
 def _part(value: Any, kind: type[T]) -> T | None:

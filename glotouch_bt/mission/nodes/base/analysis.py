@@ -70,14 +70,6 @@ class ExitStates:
     failure: int = EMPTY
     running: int = EMPTY
 
-    def joined(self, other: ExitStates, sets: StateSets) -> ExitStates:
-        """Return the union with another one."""
-        return ExitStates(
-            sets.union(self.success, other.success),
-            sets.union(self.failure, other.failure),
-            sets.union(self.running, other.running),
-        )
-
 
 class DataFlowAnalysis(Protocol):
     """The data-flow analysis of one tree, as a node kind uses it to compute its exit states."""

@@ -3,14 +3,17 @@
 A set is a zero-suppressed multi-valued decision diagram (Minato, Zero-suppressed BDDs for set manipulation in
 combinatorial problems, DAC 1993). A node of it tests one variable and has a child for each of its values; equal nodes
 are one node; a variable that is 0 in all states of a set is not tested. So two sets are equal exactly if their numbers
-are equal, independent variables cost their sum, not their product, and a variable that is still 0 costs nothing. The
-recursion is as deep as there are variables. It goes through list comprehensions only, which stay off the C stack, so
-that the interpreter's recursion limit may be raised for it.
+are equal, independent variables cost their sum, not their product, and a variable that is still 0 costs nothing. Each
+node also has the values that occur in its states, so a condition that all states meet, or none, is not looked for.
+
+The recursion is as deep as there are variables. It goes through plain calls and list comprehensions only, which stay
+off the C stack, so that the interpreter's recursion limit may be raised for it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import accumulate
 
 EMPTY = 0
 """The empty set of states."""
@@ -28,11 +31,14 @@ class StateSets:
 
     def __init__(self, sizes: Sequence[int]) -> None:
         self._sizes = tuple(sizes)
+        self._first = [0, *accumulate(self._sizes)]  # bit of each variable's value 0 in `_held`
         self._nodes: list[tuple[int, tuple[int, ...]]] = [(-1, ()), (-1, ())]
+        self._held = [0, sum(1 << bit for bit in self._first[:-1])]  # each node's values of all variables, as bits
         self._ids: dict[tuple[int, tuple[int, ...]], int] = {}
         self._unions: dict[tuple[int, int], int] = {}
         self._meets: dict[tuple[int, int], int] = {}
-        self._done: dict[tuple[int, int, int, int], int] = {}
+        self._parts: dict[tuple[int, int, int], int] = {}
+        self._written: dict[tuple[int, int, int, bool], int] = {}
 
     def _node(self, variable: int, children: tuple[int, ...]) -> int:
         if not any(children[1:]):
@@ -42,12 +48,13 @@ class StateSets:
         if found is None:
             found = self._ids[made] = len(self._nodes)
             self._nodes.append(made)
+            zero = 1 << self._first[variable]
+            held = self._held[children[0]]
+            for value, child in enumerate(children):
+                if value and child:
+                    held |= self._held[child] ^ zero | zero << value
+            self._held.append(held)
         return found
-
-    def _children(self, node: int, variable: int) -> tuple[int, ...]:
-        """Return a node's children by the values of a variable that it tests first, or that is 0 in it."""
-        at, children = self._nodes[node]
-        return children if at == variable else (node,) + (EMPTY,) * (self._sizes[variable] - 1)
 
     def union(self, *sets: int) -> int:
         """Return the union."""
@@ -57,84 +64,99 @@ class StateSets:
         return made
 
     def _union(self, a: int, b: int) -> int:
-        if EMPTY in (a, b) or a == b:
-            return a or b
+        if a == b or b == EMPTY:
+            return a
+        if a == EMPTY:
+            return b
         key = (a, b) if a < b else (b, a)
         found = self._unions.get(key)
         if found is None:
-            variable = max(self._nodes[a][0], self._nodes[b][0])
-            pairs = zip(self._children(a, variable), self._children(b, variable), strict=True)
-            found = self._unions[key] = self._node(variable, tuple([self._union(x, y) for x, y in pairs]))
+            (at, these), (other, those) = self._nodes[a], self._nodes[b]
+            if at == other:
+                made = self._node(at, tuple([self._union(x, y) for x, y in zip(these, those, strict=True)]))
+            elif at > other:
+                made = self._node(at, (self._union(these[0], b), *these[1:]))
+            else:
+                made = self._node(other, (self._union(a, those[0]), *those[1:]))
+            found = self._unions[key] = made
         return found
 
     def meet(self, a: int, b: int) -> int:
         """Return the intersection of two sets."""
-        if EMPTY in (a, b):
-            return EMPTY
-        if a == b:
-            return a
+        if a == b or EMPTY in (a, b):
+            return a and b
         key = (a, b) if a < b else (b, a)
         found = self._meets.get(key)
         if found is None:
-            variable = max(self._nodes[a][0], self._nodes[b][0])
-            pairs = zip(self._children(a, variable), self._children(b, variable), strict=True)
-            found = self._meets[key] = self._node(variable, tuple([self.meet(x, y) for x, y in pairs]))
+            (at, these), (other, those) = self._nodes[a], self._nodes[b]
+            if at == other:
+                made = self._node(at, tuple([self.meet(x, y) for x, y in zip(these, those, strict=True)]))
+            else:
+                made = self.meet(these[0], b) if at > other else self.meet(a, those[0])
+            found = self._meets[key] = made
         return found
 
     def where(self, given: int, variable: int, values: Iterable[int]) -> int:
         """Return the states in which a variable has one of some values."""
-        bits = 0
-        for value in values:
-            bits |= 1 << value
-        return self._apply(given, variable, bits, 0)
+        return self._where(given, variable, _bits(values))
+
+    def _where(self, given: int, variable: int, bits: int) -> int:
+        held = self._values(given, variable)
+        if not held & bits:
+            return EMPTY
+        if held & bits == held:
+            return given
+        key = (given, variable, bits)
+        found = self._parts.get(key)
+        if found is None:
+            at, children = self._nodes[given]
+            if at > variable:
+                made = [self._where(c, variable, bits) for c in children]
+            else:
+                made = [c if bits >> v & 1 else EMPTY for v, c in enumerate(children)]
+            found = self._parts[key] = self._node(at, tuple(made))
+        return found
 
     def assign(self, given: int, variable: int, value: int) -> int:
         """Return all states, with a variable set to a value."""
-        return self._apply(given, variable, 1 << value, 1)
+        return self._write(given, variable, 1 << value, keep=False)
 
     def allow(self, given: int, variable: int, values: Iterable[int]) -> int:
         """Return all states as they are, and with a variable set to any of some values."""
-        return self.union(given, *(self.assign(given, variable, v) for v in values))
+        return self._write(given, variable, _bits(values), keep=True)
 
-    def _apply(self, given: int, variable: int, bits: int, forget: int) -> int:
-        """Restrict a variable to the values in `bits`; with `forget`, whatever value it had."""
-        at = self._nodes[given][0]
-        if given == EMPTY:
-            return EMPTY
-        if at < variable:  # it is 0
-            if not forget:
-                return given if bits & 1 else EMPTY
-            return self._node(
-                variable, tuple([given if bits >> v & 1 else EMPTY for v in range(self._sizes[variable])])
-            )
-        key = (given, variable, bits, forget)
-        found = self._done.get(key)
+    def _write(self, given: int, variable: int, bits: int, keep: bool) -> int:
+        """Set a variable to each value in `bits`; with `keep`, keep the states as they are as well."""
+        held = self._values(given, variable)
+        if held == 0 or held == bits == bits & -bits:  # no state, or all have that value
+            return given
+        key = (given, variable, bits, keep)
+        found = self._written.get(key)
         if found is None:
-            children = self._nodes[given][1]
+            at, children = self._nodes[given]
             if at > variable:
-                made = tuple([self._apply(c, variable, bits, forget) for c in children])
+                made = [self._write(c, variable, bits, keep) for c in children]
             else:
-                if forget:
-                    children = (self.union(*children),) * len(children)
-                made = tuple([c if bits >> v & 1 else EMPTY for v, c in enumerate(children)])
-            found = self._done[key] = self._node(at, made)
+                if at < variable:  # it is 0
+                    children = (given,) + (EMPTY,) * (self._sizes[variable] - 1)
+                whole = self.union(*children)
+                made = [whole if bits >> v & 1 else c if keep else EMPTY for v, c in enumerate(children)]
+            found = self._written[key] = self._node(max(at, variable), tuple(made))
         return found
 
     def values(self, given: int, variable: int) -> frozenset[int]:
         """Return the values that a variable has in some state of a set."""
-        found: set[int] = set()
-        seen: set[int] = set()
-        todo = [given] if given else []
-        while todo:
-            node = todo.pop()
-            if node in seen:
-                continue
-            seen.add(node)
-            at, children = self._nodes[node]
-            if at > variable:
-                todo += [c for c in children if c]
-            elif at == variable:
-                found.update(v for v, c in enumerate(children) if c)
-            else:
-                found.add(0)
-        return frozenset(found)
+        held = self._values(given, variable)
+        return frozenset(v for v in range(self._sizes[variable]) if held >> v & 1)
+
+    def _values(self, given: int, variable: int) -> int:
+        """Return these values as bits."""
+        return self._held[given] >> self._first[variable] & (1 << self._sizes[variable]) - 1
+
+
+def _bits(values: Iterable[int]) -> int:
+    """Return the numbers as bits."""
+    bits = 0
+    for value in values:
+        bits |= 1 << value
+    return bits
