@@ -29,10 +29,8 @@ SLOW_FROM_M = 0.02
 """Height above its place from which the probe is lowered slowly."""
 ENTRY_M = 0.02
 """Height of the ball above the holder from which the probe is lowered at the speed of the insertion. Source: ours."""
-INSIDE_M_S = 0.04
-"""Speed once the ball is as far inside the holder as it was above it before. Source: ours."""
 SLOW_M_S = 0.01
-"""Largest speed from `SLOW_FROM_M` on."""
+"""Largest speed from there."""
 SEAT_M = 0.003
 """Height above its place from which the probe is lowered to its seat. Source: ours; a slip of 2 mm is found before."""
 SEAT_M_S = 0.005
@@ -116,11 +114,7 @@ def return_probe(
     near = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, SLOW_FROM_M]))
     if float(arm.pose_B_P.position_m[2]) > float(near.position_m[2]):
         outside = float(arm.pose_B_P.position_m[2] - grasp.position_m[2]) - world.probe.length_m - ENTRY_M
-        paces: Paces = (
-            (0.0, max(FREE_M_S, insert_speed_m_s)),
-            (max(outside, 0.0), insert_speed_m_s),
-            (max(outside + 2.0 * ENTRY_M, 0.0), max(INSIDE_M_S, insert_speed_m_s)),
-        )
+        paces = ((0.0, max(FREE_M_S, insert_speed_m_s)), (max(outside, 0.0), insert_speed_m_s))
         moved = yield from _lower(context, near, paces, aperture_m, MAX_INSERT_FORCE_N)
         if (why := describe_stop(moved)) is not None:
             yield from _rise(context, insert_speed_m_s)  # do not keep pressing on the holder

@@ -47,7 +47,7 @@ def test_a_standing_hand_may_be_pressed_steeply_but_not_too_hard() -> None:
     """An object rocks between closing jaws: the arm can do nothing about it."""
     ramp = [0.0, 8.0, 16.0, 24.0, 26.0, 26.0, 26.0]
     assert tripped_after(ramp) is None
-    assert tripped_after(ramp, measured_m_s=0.05) == 4
+    assert tripped_after(ramp, measured_m_s=0.05) == 3
 
 
 @pytest.mark.parametrize("speed_m_s", [-0.2, 0.0])
@@ -70,6 +70,18 @@ def test_an_arm_that_presses_on_is_stopped_before_the_limit(speed_m_s: float, so
     braking_N = 54e3 * speed_m_s * min(0.0025, 0.025 * speed_m_s)  # the motors' torque bounds the deceleration
 
     assert rise_N * (count - 1) + braking_N < Limits().hard_force_N
+
+
+@pytest.mark.parametrize("first_N", [0.0, 1.8, 3.5])
+def test_what_is_stiffer_than_assumed_shows_in_the_rise(first_N: float) -> None:
+    """The probe in its stand: 280 N/mm at 18 mm/s, wherever the samples fall."""
+    count = tripped_after([first_N + 5.0 * i for i in range(12)], measured_m_s=0.018)
+    assert count is not None
+    assert first_N + 5.0 * (count - 1) + 5.0 < Limits().hard_force_N
+
+
+def test_a_burst_of_one_sample_does_not_trip_it() -> None:
+    assert tripped_after([2.0, 2.0, 27.0, 6.0, 2.0, 2.0], measured_m_s=0.01) is None
 
 
 def test_a_hand_that_turns_into_a_contact_presses_too() -> None:
