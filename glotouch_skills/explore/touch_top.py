@@ -30,7 +30,7 @@ MIN_REACH_M = 0.003
 class TouchTopParams(SkillParams):
     """Parameters of `touch_top`."""
 
-    down_speed_m_s: float = param("Speed down onto the top", unit="m/s", default=0.03, gt=0.0, le=0.06)
+    down_speed_m_s: float = param("Speed down onto the top", unit="m/s", default=0.02, gt=0.0, le=0.06)
     pass_speed_m_s: float = param("Speed of the passes above it", unit="m/s", default=0.04, gt=0.0, le=0.06)
     feel_speed_m_s: float = param("Speed of passes likely to touch something", unit="m/s", default=0.02, gt=0.0,
                                   le=0.06)  # fmt: skip

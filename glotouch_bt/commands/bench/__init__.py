@@ -10,6 +10,7 @@ from glotouch_bt.commands.bench.contact import contact
 from glotouch_bt.commands.bench.dataset import dataset
 from glotouch_bt.commands.bench.detection import detection
 from glotouch_bt.commands.bench.executive import check, faults, forces, fuzz, link, pause, resume
+from glotouch_bt.commands.bench.growth import growth
 from glotouch_bt.commands.bench.match import match
 from glotouch_bt.commands.bench.retrieve import retrieve
 from glotouch_bt.commands.bench.robustness import robustness
@@ -25,6 +26,7 @@ bench = typer.Typer(
 for _experiment in (
     retrieve,
     search,
+    growth,
     match,
     robustness,
     contact,

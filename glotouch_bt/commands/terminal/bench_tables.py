@@ -35,6 +35,28 @@ def print_retrieve(summary: dict[str, Any], folder: Path) -> None:
     )
 
 
+def print_growth(summary: dict[str, Any], folder: Path) -> None:
+    """Print travel and planning of explorations by objects and area."""
+    rows = [
+        (
+            p["objects"],
+            f"{p['area']:g}",
+            f"{100 * p['complete']:.0f} %",
+            f"{p['travel_m']['mean']:.2f} [{p['travel_m']['lo']:.2f}, {p['travel_m']['hi']:.2f}]",
+            f"{p['contacts']['mean']:.0f}",
+            f"{p['planning_s']['mean']:.1f}",
+            f"{1e3 * p['plan_s']:.0f} ({1e3 * p['longest_plan_s']:.0f})",
+        )
+        for p in summary["points"]
+    ]
+    columns = ("objects", "areas", "all found", "travel, m [95 %]", "contacts", "planning, s", "a plan, ms (longest)")
+    print_table(f"{summary['policy']}, {len(summary['seeds'])} layouts a point", columns, rows)
+    words = (
+        f"{k.rsplit('_', 1)[0]}: objects^{s['objects']:.2f} area^{s['area']:.2f}" for k, s in summary["slopes"].items()
+    )
+    EscapingConsole().print("; ".join(words), markup=False, highlight=False, soft_wrap=True)
+
+
 def print_robustness(summary: dict[str, Any], folder: Path) -> None:
     """Print a sweep of the axes: rates of decisions or of missions, for each level."""
     from glotouch_bt.bench.robustness import AXES, rates_of

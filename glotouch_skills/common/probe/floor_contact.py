@@ -20,8 +20,6 @@ GUARDED_FROM_M = 0.04
 """Height above the floor from which the descent is guarded: the probe may have sunk in the jaws by its handle."""
 GUARDED_M_S = 0.02
 """Speed of the descent from there, and past the rim."""
-UNKNOWN_M_S = 0.03
-"""Speed between the two if something may stand there. Source: ours; descents beside unknown objects have 0.04 m/s."""
 SLOW_FROM_M = 0.02
 """Height above the floor from which the descent is slow."""
 SLOW_M_S = 0.01
@@ -59,7 +57,7 @@ def feel_floor(
     rim = world.container.interior_m[2]
     yield from prober.hop(np.array([*corner, 0.0]), max(rim + 0.06, float(prober.tip_K_m[2])), speed_m_s)
     high, floor = float(prober.tip_K_m[2]), tool.floor_z_K_m
-    inside_m_s = min(speed_m_s, UNKNOWN_M_S if slowly else FREE_M_S)
+    inside_m_s = GUARDED_M_S if slowly else min(speed_m_s, FREE_M_S)
     paces = (
         (high - rim - RIM_M, GUARDED_M_S),
         (high - rim + RIM_M, inside_m_s),
