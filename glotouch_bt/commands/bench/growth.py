@@ -27,7 +27,7 @@ def growth(
 
     On the planar model of the exploration, with the mission's objects repeated.
     """
-    from glotouch_bt.bench.growth import GrowthCampaign, run_campaign
+    from glotouch_bt.bench.planar import GrowthCampaign, run_growth
     from glotouch_bt.commands.terminal import print_growth
 
     campaign = GrowthCampaign(
@@ -44,5 +44,5 @@ def growth(
         return f"{where}: {row['found']} found, {row['travel_m']:.2f} m, {row['cause'] or row['ended']}"
 
     executors = shared.Executors(workers, cluster, trial_limit)
-    summary = shared.run_in_pool(run_campaign, campaign, executors, told)
+    summary = shared.run_in_pool(run_growth, campaign, executors, told)
     shared.print_summary(summary, campaign.out, print_growth, json_)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glotouch_bt.bench.growth import POINTS, GrowthCampaign, failed_row, growth_row, slopes, summarise
+from glotouch_bt.bench.planar.growth import POINTS, GrowthCampaign, failed_row, growth_row, slopes, summarise
 from glotouch_bt.robot import BadInput
 
 

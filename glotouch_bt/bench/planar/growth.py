@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from glotouch_bt.bench.planar import BUDGET_M, explore, planar_world
+from glotouch_bt.bench.planar.explore import BUDGET_M, explore
+from glotouch_bt.bench.planar.layout import planar_world
 from glotouch_bt.bench.statistics import bootstrap_mean
 from glotouch_bt.campaign import Campaign, OnRow, Row, crashed, run_trials, silent, write_summary, write_table
 from glotouch_bt.mission import load_mission
@@ -97,7 +98,7 @@ def failed_row(objects: int, area: float, seed: int, error: Exception) -> dict[s
     return {"objects": objects, "area": area, "seed": seed, "ended": "error", **none, "cause": cause}
 
 
-def run_campaign(campaign: GrowthCampaign, executor: Executor, on_row: OnRow = silent) -> dict[str, Any]:
+def run_growth(campaign: GrowthCampaign, executor: Executor, on_row: OnRow = silent) -> dict[str, Any]:
     """Explore all points, write trials.csv and summary.json, and return the summary.
 
     Raises:
