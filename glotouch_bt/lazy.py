@@ -72,5 +72,7 @@ def load_all() -> None:
             load()
     finally:
         gc.enable()
+    if gc.get_freeze_count():
+        gc.collect()  # what an earlier run in this process has left would be kept for ever
     gc.freeze()  # a collection while the arm moves looks at what is made from now on only
     gc.set_threshold(GARBAGE_OBJECTS)

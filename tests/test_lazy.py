@@ -39,3 +39,12 @@ def test_load_all_loads_what_missions_need() -> None:
     code = "from glotouch_bt.mission import load_mission; load_mission('retrieve')\n"
     loaded = loaded_after(code + "from glotouch_bt.lazy import load_all; load_all()")
     assert set(loaded) >= set(HEAVY) - {"mcap", "mujoco", "matplotlib"}
+
+
+def test_load_all_does_not_keep_what_an_earlier_run_left() -> None:
+    code = (
+        "import gc, weakref\nfrom glotouch_bt.lazy import load_all\nload_all(); gc.disable()\n"
+        "class World: pass\nworld = World(); world.itself = world; left = weakref.ref(world); del world\n"
+        "load_all(); assert left() is None\n"
+    )
+    loaded_after(code)
