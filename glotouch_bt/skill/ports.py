@@ -69,6 +69,7 @@ class Out(Port[T]):
 
     `on_success`, `on_failure`: its value after that outcome, if it is always the same; `glotouch check` relies on it.
     `result`: the value in words; makes it a result of the mission, in result.json, in the terminal and in the report.
+    No words: no result. After a failure, only a port that is `always` written gives one.
     """
 
     def __init__(

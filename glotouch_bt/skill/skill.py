@@ -158,7 +158,11 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
             yield from come_to_rest(self.context)
         self.context.arm.not_run.clear()
         body: Generator[Command, Observation, object] = self.run()
-        returned = yield from body
+        try:
+            returned = yield from body
+        except SkillFailed:
+            self._say_results(always=True)
+            raise
         if returned is not None:  # most likely a status, which would be taken for success
             raise TypeError(f"run() returned {returned!r}; it returns nothing, and raises SkillFailed to fail")
         if self.context.arm.not_run:
@@ -166,8 +170,13 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
         for name in self.OUTPUT_PORTS:
             if not self.blackboard_client.exists(name):
                 raise TypeError(f"run() ended without writing the output {name!r}: write `self.{name} = ...`")
+        self._say_results()
+
+    def _say_results(self, *, always: bool = False) -> None:
+        """Record the results that have words; with `always`, of the ports alone that a failure writes too."""
         for port in self._results:
-            self.event("result", key=port.key, text=port.in_words(self))
+            if (port.always or not always) and (text := port.in_words(self)):
+                self.event("result", key=port.key, text=text)
 
     def update_ahead(self) -> Status:
         """Update before the tree is ticked, and return the result; the next `update` returns it again."""

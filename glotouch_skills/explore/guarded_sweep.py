@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
+from pydantic import Field
 
-from glotouch_bt.perception.search import SearchMap, policy_names, search_policy, seek
+from glotouch_bt.perception.search import SearchMap, left_in_words, policy_names, search_policy, seek
 from glotouch_bt.perception.touch import Contact
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
@@ -21,7 +22,14 @@ else:
 class GuardedSweepParams(SkillParams):
     """Parameters of `guarded_sweep`."""
 
-    expected_objects: int = param("Number of objects in the container", default=5, ge=1, le=20)
+    expected_objects: Annotated[int, Field(ge=1, le=20)] | Literal["unknown"] = param(
+        "Number of objects in the container; unknown: search until hardly anything of 15 mm or more can be left",
+        default=5,
+    )
+    left_below: float = param(
+        "With an unknown number: the search ends when the chance that something is left is below this",
+        default=0.05, gt=0.0, lt=1.0,
+    )  # fmt: skip
     policy: PolicyName = param(
         "How to choose the next place: most expected finds for the distance, or one of the paper's two policies",
         default="expected_find",
@@ -54,7 +62,7 @@ class GuardedSweep(Skill):
 
     SEARCH_EXHAUSTED = Failure(
         "search_exhausted",
-        "nothing is left to explore, or to reach",
+        "nothing is left to explore, or to reach; with an unknown number, hardly anything can be left",
         advice="check expected_objects; a lower height_m meets flatter objects",
     )
     FAILURES: ClassVar = (*Explorer.FAILURES, MOTION_REFUSED)
@@ -64,27 +72,34 @@ class GuardedSweep(Skill):
     map = Out(SearchMap, "what has been explored now")
     contact = Out(Contact, "the contact that ended the sweep")
     exhausted = Out(bool, "nothing is left to explore, or to reach", always=True, on_success=False)
+    chance_left = Out(
+        float,
+        "chance that an object of at least 15 mm is left; nan with a known number",
+        always=True,
+        result=left_in_words,
+    )
 
     def run(self) -> SkillRun:
         """See the class."""
-        self.exhausted = False
+        self.exhausted, self.chance_left = False, float("nan")
         p, tool = self.params, self.tool
         speeds = ExploringSpeeds(
             sweep_m_s=p.speed_m_s, travel_m_s=p.travel_speed_m_s, height_m=p.height_m, headroom_m=p.headroom_m
         )
         explorer = Explorer(self.context, tool, speeds, self.event)
         belief = self.previous or self._blank_map()
+        self.chance_left = belief.chance_left
         plan = seek(belief, search_policy(p.policy), explorer.tip_K_m, lowered=explorer.lowered)
         sought = yield from explorer.run(plan)
-        self.map = sought.belief
+        self.map, self.chance_left = sought.belief, sought.belief.chance_left
         if sought.contact is None:
             self.exhausted = True
-            raise self.SEARCH_EXHAUSTED(
-                f"nothing unexplored is left; {belief.found} of {p.expected_objects} objects were found",
-                found=belief.found,
-            )
+            of = f" of {belief.expected}" if belief.expected is not None else ""
+            why = left_in_words(self.chance_left) or "nothing unexplored is left"
+            raise self.SEARCH_EXHAUSTED(f"{why}; {belief.found}{of} objects were found", found=belief.found)
         self.contact = sought.contact
 
     def _blank_map(self) -> SearchMap:
-        half = 0.5 * np.array(self.context.world.container.interior_m[:2]) - self.params.wall_gap_m
-        return SearchMap.blank(half, expected=self.params.expected_objects)
+        p = self.params
+        half = 0.5 * np.array(self.context.world.container.interior_m[:2]) - p.wall_gap_m
+        return SearchMap.blank(half, None if p.expected_objects == "unknown" else p.expected_objects, p.left_below)

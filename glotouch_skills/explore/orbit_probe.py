@@ -7,7 +7,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.perception.search import Move, SearchMap, SearchPlan, admit, joins, of_another, part_of, trace
+from glotouch_bt.perception.search import (
+    Move,
+    SearchMap,
+    SearchPlan,
+    admit,
+    joins,
+    left_in_words,
+    of_another,
+    part_of,
+    trace,
+)
 from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
@@ -72,13 +82,17 @@ class OrbitProbe(Skill):
     map = Out(SearchMap, "the search map with the object excluded")
     candidates = Out(tuple, "candidates, the new one last", element=Candidate)
     found = Out(int, "number of traced objects")
-    complete = Out(bool, "all expected objects are traced")
+    complete = Out(bool, "all expected objects are traced; with an unknown number, hardly anything can be left")
+    chance_left = Out(
+        float, "chance that an object of at least 15 mm is left; nan with a known number", result=left_in_words
+    )
 
     def run(self) -> SkillRun:
         """See the class."""
         p, belief, first = self.params, self.previous_map, self.contact
         known: tuple[Candidate, ...] = self.previous or ()
         self.candidates, self.found, self.complete = known, len(known), belief.complete
+        self.chance_left = belief.chance_left
         if belief.knows(first):
             self.map = belief.with_dropped(first.point_K_m)
             raise self.KNOWN_OBJECT(
@@ -117,7 +131,8 @@ class OrbitProbe(Skill):
             moves=traced.moves,
         )
         self.candidates = admitted.candidates
-        self.found, self.complete = len(admitted.candidates), admitted.belief.complete
+        self.found, self.complete = len(admitted.candidates), self.map.complete
+        self.chance_left = self.map.chance_left
 
 
 def _back_to(first: Contact, clearance_m: float) -> SearchPlan[None]:

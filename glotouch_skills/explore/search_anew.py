@@ -26,7 +26,8 @@ class SearchAnew(Skill):
     """Keep the traced objects and clear the rest of the map, after a search with a slipped or lost probe.
 
     A place that such a probe passed without contact may not be free. With `more_objects` the searched places are kept,
-    and the map expects more objects: if one object was traced as two, the search ended too early.
+    and the map expects more objects: if one object was traced as two, the search ended too early. An unknown number
+    becomes a known one.
 
     SUCCESS: `map` has the traced objects.
     """

@@ -120,12 +120,15 @@ CASES = [
     ("run units.yaml", "units.yaml:4:27: grip_N is in N, not 'mm' (valid: N, mN, kN)"),
     ("run ranges.yaml", "ranges.yaml:4:27: grip_N = 61: must be <= 60.0 N"),
     # settings
-    ("run survey --set expected_objects=2.5", "expected_objects = '2.5': must be a whole number (valid: int, 1 to 20)"),
+    (
+        "run survey --set expected_objects=2.5",
+        "expected_objects = '2.5': must be a whole number or unknown (valid: int, 1 to 20, or unknown)",
+    ),
     ("run pick_at --set x=2kg", "--set x: x is in mm, not 'kg' (valid: m, cm, mm, um)"),
     ("run pick_at --set width=0.05", "--set width: width = 0.05: must be in [3, 80] mm"),
     (
         "run survey --set nonsense=1",
-        "--set nonsense: mission 'survey' has no such parameter (valid: expected_objects, policy); unknown option of",
+        "--set nonsense: mission 'survey' has no such parameter (valid: expected_objects, left_below, policy); unknown",
     ),
     ("run survey --set layout=here", "option layout = 'here': must be a mapping of object names"),
     ("run survey --set layout={apple", "--set layout: begins like JSON but is not"),

@@ -9,7 +9,7 @@ import pytest
 from py_trees.common import Status
 
 from glotouch_bt.robot import HOLD, MotionRefused
-from glotouch_bt.skill import Out, Skill, SkillFailed, SkillParams, SkillRun, param
+from glotouch_bt.skill import Failure, Out, Skill, SkillFailed, SkillParams, SkillRun, param
 
 
 class GoParams(SkillParams):
@@ -120,6 +120,25 @@ class Weigh(Skill):
         if self.params.end == "fail":
             raise SkillFailed("told_to", "the test says so")
         yield HOLD
+
+
+class Give(Skill):
+    """Write a result, and fail."""
+
+    GIVEN_UP = Failure("given_up", "it always fails", advice="none")
+    tries = Out(int, "tries", always=True, result=lambda n: f"{n} tries" if n else "")
+    best = Out(int, "the best", result=lambda n: f"best {n}")
+
+    def run(self) -> SkillRun:
+        yield HOLD
+        self.tries, self.best = 3, 1
+        raise self.GIVEN_UP("it always fails")
+
+
+def test_of_a_failure_only_what_is_always_written_is_a_result(bench) -> None:
+    b = bench()
+    b.run(b.make(Give))
+    assert [e["text"] for e in b.of_kind("result")] == ["3 tries"]
 
 
 def test_a_result_is_recorded_in_words_when_the_skill_succeeds(bench) -> None:

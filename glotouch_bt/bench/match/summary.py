@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from glotouch_bt.bench.match.methods import DEFAULT, PAPER_TOP1
-from glotouch_bt.bench.match.scores import shared_auroc, shared_calibration, shared_rate
+from glotouch_bt.bench.scores import shared_auroc, shared_calibration, shared_rate
 from glotouch_bt.bench.search import quantiles
 from glotouch_bt.bench.statistics import bootstrap_mean
 

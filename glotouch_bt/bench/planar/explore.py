@@ -12,6 +12,7 @@ from glotouch_bt.bench.planar.world import PlanarWorld
 from glotouch_bt.mission.read import SkillRegistry
 from glotouch_bt.motion import drive
 from glotouch_bt.perception.search import (
+    LEFT_BELOW,
     Move,
     MoveOutcome,
     SearchMap,
@@ -50,6 +51,7 @@ class Explored:
         travel_m: Planar path length of the ball.
         ended: "complete", "exhausted" or "budget".
         belief: The map at the end.
+        maps: The maps before and after each sweep.
         contacts: Number of contacts of the candidates.
     """
 
@@ -57,6 +59,7 @@ class Explored:
     travel_m: float
     ended: str
     belief: SearchMap
+    maps: tuple[SearchMap, ...] = ()
 
     @property
     def contacts(self) -> int:
@@ -86,26 +89,36 @@ def _defaults(skill: str) -> Any:
     return SkillRegistry()[skill].Params()
 
 
-def explore(world: PlanarWorld, policy: SearchPolicy, expected: int, *, budget_m: float = BUDGET_M) -> Explored:
+def explore(
+    world: PlanarWorld,
+    policy: SearchPolicy,
+    expected: int | None,
+    *,
+    budget_m: float = BUDGET_M,
+    left_below: float = LEFT_BELOW,
+) -> Explored:
     """Run the mission's exploration on geometry alone.
 
     Args:
         world: The layout; its travel meter must be at 0.
         policy: Search policy.
-        expected: Number of objects to find.
+        expected: Number of objects to find; None: unknown.
         budget_m: Travel at which it stops.
+        left_below: With an unknown number, the chance that something is left below which it stops.
     """
     sweep, orbit = _defaults("guarded_sweep"), _defaults("orbit_probe")
-    belief = SearchMap.blank(world.half_m + world.tip_radius_m - sweep.wall_gap_m, expected)
+    belief = SearchMap.blank(world.half_m + world.tip_radius_m - sweep.wall_gap_m, expected, left_below)
+    maps: list[SearchMap] = []
     found: dict[int, Traced] = {}
     candidates: tuple[Candidate, ...] = ()
     execute, ended = _limited(world, budget_m), "complete"
     try:
         while not belief.complete:
             sought = drive(seek(belief, policy, world.tip_K_m, lowered=world.lowered), execute)
+            maps += belief, sought.belief
             belief = sought.belief
             if sought.contact is None:
-                ended = "exhausted"
+                ended = "complete" if belief.complete else "exhausted"
                 break
             first, radius = sought.contact, world.tip_radius_m
             old = part_of(candidates, first, radius)
@@ -129,7 +142,7 @@ def explore(world: PlanarWorld, policy: SearchPolicy, expected: int, *, budget_m
                 found[admitted.index] = Traced(world.travel_m, candidates[admitted.index])
     except _OutOfBudget:
         ended = "budget"
-    return Explored(tuple(found[i] for i in sorted(found)), world.travel_m, ended, belief)
+    return Explored(tuple(found[i] for i in sorted(found)), world.travel_m, ended, belief, tuple(maps))
 
 
 def refine_all(world: PlanarWorld, explored: Explored, *, budget_m: float = BUDGET_M) -> tuple[Traced, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -17,6 +17,13 @@ def search(
     ),
     trials: Annotated[int, typer.Option(min=0, help="missions per policy, each with its own layout")] = 100,
     planar: Annotated[int, typer.Option(min=0, help="layouts explored in the planar model only")] = 0,
+    count: Annotated[
+        Literal["known", "unknown"],
+        typer.Option(
+            help="unknown: is the stated chance that something is left right? On --planar layouts of 1 to 8 "
+            "random objects, in the planar model only, with the first policy"
+        ),
+    ] = "known",
     seed: shared.FirstSeed = 0,
     conditions: shared.Conditions = "nominal",
     objects: shared.Objects = None,
@@ -37,12 +44,30 @@ def search(
 
     On the mission, and on a planar model of it with the same and more layouts.
     """
-    from glotouch_bt.bench.search import SearchCampaign, run_campaign
-    from glotouch_bt.commands.terminal import print_search
+    from glotouch_bt.bench.search import CountCampaign, SearchCampaign, run_campaign, run_count_campaign
+    from glotouch_bt.commands.terminal import print_counts, print_search
 
     shared.check_names(conditions, backend)
+    names = tuple(p.strip() for p in policies.split(",") if p.strip())
+    executors = shared.Executors(workers, cluster, trial_limit)
+    if count == "unknown":
+        counting = CountCampaign(
+            policy=names[0] if names else "",
+            seeds=tuple(range(seed, seed + planar)),
+            out=shared.bench_folder(out, "search"),
+            resume=resume,
+            shard=shared.read_shard(shard),
+        )
+
+        def said(row: dict[str, Any]) -> str:
+            known, unknown = (f"{row[c]['right']} in {row[c]['travel_m']:.2f} m" for c in ("known", "unknown"))
+            return f"seed {row['seed']}: {row['objects']} objects; known number: {known}; unknown: {unknown}"
+
+        figures = shared.run_in_pool(run_count_campaign, counting, executors, said)
+        shared.print_summary(figures, counting.out, print_counts, json_)
+        return
     campaign = SearchCampaign(
-        policies=tuple(p.strip() for p in policies.split(",") if p.strip()),
+        policies=names,
         seeds=tuple(range(seed, seed + trials)),
         planar_seeds=tuple(range(seed, seed + planar)),
         conditions=conditions,
@@ -58,5 +83,5 @@ def search(
         found = f"{len(row['discovered_m'])} found, {row['travel_m']:.2f} m, {row['ended']}"
         return f"{row['simulator']} {row['policy']} seed {row['seed']}: {found}"
 
-    summary = shared.run_in_pool(run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), told)
+    summary = shared.run_in_pool(run_campaign, campaign, executors, told)
     shared.print_summary(summary, campaign.out, print_search, json_)

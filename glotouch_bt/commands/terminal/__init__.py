@@ -5,6 +5,7 @@ Nothing here computes; the module of a table takes the summary that an experimen
 
 from glotouch_bt.commands.terminal.bench_tables import (
     print_contact,
+    print_counts,
     print_growth,
     print_match,
     print_retrieve,

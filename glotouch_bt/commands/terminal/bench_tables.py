@@ -174,6 +174,27 @@ def print_search(summary: dict[str, Any], folder: Path) -> None:
     EscapingConsole().print(f"{folder / 'summary.json'}", markup=False, highlight=False, soft_wrap=True)
 
 
+def print_counts(summary: dict[str, Any], folder: Path) -> None:
+    """Print searches with a known and an unknown number of objects, and whether the stated chances are right."""
+
+    def percent(r: dict[str, Any], key: str = "rate") -> str:
+        return f"{100 * r[key]:.1f} % [{100 * r['lo']:.1f}, {100 * r['hi']:.1f}]"
+
+    rows = [
+        (f"{c} number", percent(summary[c]["success"]), _mean(summary[c]["travel_m"])) for c in ("known", "unknown")
+    ]
+    print_table(f"searches of {summary['layouts']} random planar layouts", ("", "all found", "travel, m"), rows)
+    left, stated = summary["left"], summary["stated"]
+    figures = [
+        ("ended with something left", percent(left["share"])),
+        ("mean stated chance then", percent(left["stated"], "mean")),
+        ("calibration error of all stated chances", percent(stated["calibration"], "value")),
+        ("Brier score of all stated chances", "{mean:.3f} [{lo:.3f}, {hi:.3f}]".format_map(stated["brier"])),
+    ]
+    print_table("chance that something is left", ("", "value"), figures)
+    EscapingConsole().print(f"{folder / 'summary.json'}", markup=False, highlight=False, soft_wrap=True)
+
+
 def print_contact(summary: dict[str, Any], folder: Path) -> None:
     """Print a contact campaign: errors of probe and bare gripper, the paper's figures, squares not traced."""
     from glotouch_bt.bench.contact import METRICS, TOOLS

@@ -66,7 +66,8 @@ def print_result(done: RunResult) -> None:
     if expected is not None:
         found = len(r["candidates"])
         colour = "green" if found == expected else "yellow"
-        console.print(f"result: objects found: [{colour}]{found} of {expected}[/] expected", highlight=False)
+        of = f"[{colour}]{found} of {expected}[/] expected" if isinstance(expected, int) else f"{found}"
+        console.print(f"result: objects found: {of}", highlight=False)
     if r["correct"] is not None:
         held = r["retrieved"] or "nothing"
         word = "[green]the target[/]" if r["correct"] else f"[red]not the target ({escape(str(r['target']))})[/]"

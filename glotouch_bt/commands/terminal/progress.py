@@ -57,7 +57,7 @@ class RunProgress:
             return
         self._began_s = time.perf_counter()
         expected = mission.parameters.get("expected_objects")
-        self._objects = "" if expected is None else f" of {expected}"
+        self._objects = f" of {expected}" if isinstance(expected, int) else ""
         self._parts = {
             path: node.name for path, node in mission.spec.paths(mission.name).items() if node.kind == "subtree"
         }

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from types import UnionType
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 
@@ -119,6 +119,8 @@ def _type_in_words(annotation: Any) -> str:
     options = get_args(annotation)
     if get_origin(annotation) is Literal:
         return " or ".join(repr(o) for o in options)
+    if get_origin(annotation) is Annotated:
+        return _type_in_words(options[0])
     if get_origin(annotation) is dict:
         return "mapping"
     if options and get_origin(annotation) in (Union, UnionType):

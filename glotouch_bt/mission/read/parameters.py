@@ -41,9 +41,11 @@ _KINDS: dict[str, tuple[Any, str]] = {
     "str": (str, "text"),
     "bool": (bool, "true or false"),
     "stl": (str, "text"),
-    "count": (int, "a whole number"),
+    "count": (int, "a whole number or unknown"),
 }
 """Type of each kind of parameter, and its name in messages."""
+UNKNOWN = "unknown"
+"""Value of a count that the user does not know."""
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
 
@@ -53,7 +55,7 @@ class Declaration(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     type: Literal["int", "float", "str", "bool", "stl", "count"] = Field(
-        description="int, float, str, bool, stl (an object) or count (of objects; default: those of the world)"
+        description="int, float, str, bool, stl (an object), count (of objects, or unknown; default: the world's)"
     )
     default: bool | int | float | str | None = Field(
         default=None, description="value unless --set gives one; none: required"
@@ -231,6 +233,8 @@ def _from_text(given: str | Value, kind: str) -> Value:
 
 def _fault(value: Value, declared: Declaration) -> str:
     """Return why a value does not fit its declaration, or empty."""
+    if declared.type == "count" and value == UNKNOWN:
+        return ""
     kind, words = _KINDS[declared.type]
     if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
         return f"must be {words}"
@@ -245,7 +249,8 @@ def _fault(value: Value, declared: Declaration) -> str:
 
 def _valid(declared: Declaration) -> str:
     words = ("int" if declared.type == "count" else declared.type) + (f" in {declared.unit}" if declared.unit else "")
-    return words + (f", {declared.range[0]:g} to {declared.range[1]:g}" if declared.range else "")
+    words += f", {declared.range[0]:g} to {declared.range[1]:g}" if declared.range else ""
+    return words + (f", or {UNKNOWN}" if declared.type == "count" else "")
 
 
 def stl_usable(name: str, objects: ObjectSet | None, place: Place, findings: Findings) -> bool:

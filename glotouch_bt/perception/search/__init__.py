@@ -1,7 +1,7 @@
 """Pure planners of tactile exploration: search for objects, outline tracing and height measurement."""
 
 from glotouch_bt.perception.search.candidates import admit, elsewhere_m, joins, of_another, part_of, refined
-from glotouch_bt.perception.search.map import SearchMap
+from glotouch_bt.perception.search.map import LEFT_BELOW, SearchMap
 from glotouch_bt.perception.search.moves import Move, MoveKind, MoveOutcome, SearchPlan, T
 from glotouch_bt.perception.search.policies import (
     POLICIES,
@@ -13,6 +13,7 @@ from glotouch_bt.perception.search.policies import (
     policy_names,
     search_policy,
 )
+from glotouch_bt.perception.search.remaining import chance_left, left_in_words
 from glotouch_bt.perception.search.routes import Routes, segment_is_free
 from glotouch_bt.perception.search.seeking import Sought, seek
 from glotouch_bt.perception.search.top import BallMove, BallOutcome, Top, TopPlan, TopRule, rounds, top_plan

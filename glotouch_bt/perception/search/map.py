@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from glotouch_bt.perception.search.remaining import ANY, USUAL, DiscPrior, Remaining, chance_left, remaining
 from glotouch_bt.perception.touch import Contact, Contour, signed_distance
 from glotouch_bt.robot import Array, ParamError, frozen_array
 
@@ -23,6 +24,8 @@ KNOWN_M = 0.005
 FACING = -0.4
 """Minimum cosine between the force on the ball and the direction from an object's centre to the contact for the contact
 to belong to the object."""
+LEFT_BELOW = 0.05
+"""Default chance that something is left below which the search for an unknown number of objects is complete."""
 Mask = npt.NDArray[np.bool_]
 
 
@@ -48,37 +51,41 @@ class SearchMap:
 
     Attributes:
         half_extent_m: (2,) limits of the tip's centre: |x| <= half[0], |y| <= half[1] in K.
-        expected: Number of objects to find.
+        expected: Number of objects to find; None: unknown.
         found: Number of traced objects.
         path_K_m: (n, 2) positions of the tip's centre at sensing height, every 2 mm, oldest first.
         exclusions: Traced objects and obstacles.
         dropped: (m, 2) positions given up: unreachable frontiers, contacts without an object.
         hints: Contacts with other objects during a trace; the search visits them first.
+        left_below: With an unknown number, the chance that something is left below which the search is complete.
     """
 
     half_extent_m: Array
-    expected: int
+    expected: int | None
     found: int
     path_K_m: Array
     exclusions: tuple[Exclusion, ...]
     dropped: Array
     hints: tuple[Contact, ...] = ()
+    left_below: float = LEFT_BELOW
 
     @classmethod
-    def blank(cls, half_extent_m: npt.ArrayLike, expected: int) -> SearchMap:
+    def blank(cls, half_extent_m: npt.ArrayLike, expected: int | None, left_below: float = LEFT_BELOW) -> SearchMap:
         """Return a map without any exploration.
 
         Raises:
-            ParamError: A half extent that is not positive, or no object expected.
+            ParamError: A half extent that is not positive, no object expected, or a chance outside 0..1.
         """
         half = frozen_array("half_extent_m", half_extent_m, (2,))
         if not (half > 0).all():
             raise ParamError("half_extent_m", half.tolist(), "positive")
-        if expected < 1:
-            raise ParamError("expected", expected, "at least 1")
+        if expected is not None and expected < 1:
+            raise ParamError("expected", expected, "at least 1, or None")
+        if not 0.0 <= left_below <= 1.0:
+            raise ParamError("left_below", left_below, "in [0, 1]")
         none = np.zeros((0, 2))
         none.setflags(write=False)
-        return cls(half, expected, 0, none, (), none)
+        return cls(half, expected, 0, none, (), none, left_below=left_below)
 
     def with_path(self, points_K_m: npt.ArrayLike) -> SearchMap:
         """Add an executed, connected path (n, 2 or 3), resampled to 2 mm."""
@@ -158,9 +165,38 @@ class SearchMap:
         return np.asarray(self._tree.query(points)[0], dtype=np.float64)
 
     @property
+    def half(self) -> tuple[float, float]:
+        """Return the limits of the tip's centre, m."""
+        return float(self.half_extent_m[0]), float(self.half_extent_m[1])
+
+    @property
+    def prior(self) -> DiscPrior:
+        """Return the sizes and places of what is looked for: any object if the number is unknown."""
+        return ANY if self.expected is None else USUAL
+
+    @cached_property
+    def hidden(self) -> Remaining:
+        """Where objects may still be."""
+        traced = [e.contour for e in self.exclusions]
+        return remaining(self.half, self.prior, traced, self.path_distance, self.dropped)
+
+    @cached_property
+    def chance_left(self) -> float:
+        """Probability that at least one object of the prior is left; nan with a known number."""
+        if self.expected is not None:
+            return float("nan")
+        floor_m2 = float(np.prod(2.0 * (self.half_extent_m + self.prior.wall_m)))
+        return chance_left(self.hidden.share, self.found, floor_m2)
+
+    @property
     def complete(self) -> bool:
-        """True if all expected objects are traced."""
-        return self.found >= self.expected
+        """True if all expected objects are traced; for an unknown number, if hardly anything can be left.
+
+        A hint that is not followed yet is an object that is left.
+        """
+        if self.expected is not None:
+            return self.found >= self.expected
+        return not self.hints and self.chance_left < self.left_below
 
     @cached_property
     def _tree(self) -> scipy.spatial.cKDTree:

@@ -39,7 +39,8 @@ class Sought:
 
     Attributes:
         belief: The updated map.
-        contact: Side contact with a new object; None if nothing is left to explore or to reach.
+        contact: Side contact with a new object; None if nothing is left to explore or to reach, or if hardly anything
+            of an unknown number can be left.
         lowered: The ball is at sensing height.
     """
 
@@ -67,7 +68,7 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
         if contact is not None:
             outcome = yield Move("retreat", tip - RETREAT_M * contact.approach_K[:2])
             return Sought(belief.with_path(outcome.path_K_m), contact, True)
-    while True:
+    while belief.expected is not None or not belief.complete:
         stretch = policy.next_stretch(belief, tip)
         if stretch is not None and (cornered or not lowered) and not stretch.raised:
             stretch = None
@@ -104,6 +105,7 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
                 return Sought(belief.with_path(outcome.path_K_m), side, True)
             belief = belief.with_dropped(place)
             break
+    return Sought(belief, None, lowered)
 
 
 def _follow(belief: SearchMap, hint: Contact, tip: Array) -> SearchPlan[tuple[SearchMap, Contact | None, Array]]:

@@ -175,4 +175,6 @@ def test_objects_are_counted(count: int, tmp_path: Path) -> None:
     assert load_mission("retrieve", {"target": "o0"}, objects=tmp_path).parameters["expected_objects"] == count
     told = load_mission("retrieve", {"target": "o0", "expected_objects": "2"}, objects=tmp_path)
     assert told.parameters["expected_objects"] == 2
+    open_ = load_mission("retrieve", {"target": "o0", "expected_objects": "unknown"}, objects=tmp_path)
+    assert open_.parameters["expected_objects"] == "unknown"
     assert not [f for f in check("retrieve", {"target": "o0"}, objects=tmp_path) if f.severity == "error"]

@@ -103,3 +103,21 @@ def test_a_surface_that_faces_a_traced_object_is_not_that_objects():
     assert not known.knows(contact(0.050, 1.0))
     assert not known.knows(contact(0.038, -1.0))
     assert not known.with_obstacle((0.1, 0.0), 0.012).knows(contact(0.1, 1.0))
+
+
+def test_an_unknown_number_is_complete_when_hardly_anything_can_be_left():
+    belief = SearchMap.blank((0.188, 0.138), expected=None, left_below=0.2)
+    assert not belief.complete
+    assert not belief.with_exclusion(DISC, 0.01).complete
+    rows = np.arange(-0.138, 0.139, 0.012)
+    x = np.tile([-0.188, 0.188, 0.188, -0.188], len(rows))[: 2 * len(rows)]
+    swept = belief.with_path(np.column_stack([x, np.repeat(rows, 2)]))
+    assert swept.chance_left < 0.2
+    assert swept.complete
+    up = np.array([0.0, 0.0, 1.0])
+    hint = Contact(0.0, np.zeros(3), -up, up, np.zeros(2), 1.0)
+    assert not swept.with_hints((hint,)).complete, "what a hint belongs to is left"
+    assert np.isnan(blank().chance_left)
+    for left_below in (-0.1, 1.1, np.nan):
+        with pytest.raises(ParamError, match="left_below"):
+            SearchMap.blank((0.1, 0.1), None, left_below)

@@ -176,3 +176,17 @@ def test_a_hint_on_a_traced_object_is_passed_over() -> None:
     sought, moves = run(seek(known, Towards(), start, lowered=True), start, free)
     assert (sought.contact, sought.belief.hints) == (None, ())
     assert all(m.kind != "sweep" for m in moves)
+
+
+def test_an_unknown_number_is_sought_until_hardly_anything_can_be_left() -> None:
+    """After the first sweep the chance is below the limit, though the policy would go on."""
+    belief = SearchMap.blank(HALF, expected=None, left_below=0.8)
+    rows = np.arange(-HALF[1], HALF[1] - 0.05, 0.02)
+    x = np.tile([-HALF[0], HALF[0], HALF[0], -HALF[0]], len(rows))[: 2 * len(rows)]
+    belief = belief.with_path(np.column_stack([x, np.repeat(rows, 2)]))
+    start = belief.path_K_m[-1]
+    sought, moves = run(seek(belief, Towards((0.1, 0.18), (-0.1, 0.18)), start, lowered=True), start, free)
+    assert (len(moves), sought.contact) == (0, None)
+    strict = SearchMap.blank(HALF, expected=None, left_below=0.0)
+    sought, moves = run(seek(strict, Towards((0.1, 0.18), (-0.1, 0.18)), start, lowered=True), start, free)
+    assert [m.kind for m in moves[:2]] == ["sweep", "sweep"]

@@ -71,11 +71,11 @@ def test_the_sweep_ends_at_the_post(make) -> None:
     assert np.linalg.norm(tip[:2] - POST) > RADIUS + BALL + 0.002
 
 
-def swept(upto_m: float) -> SearchMap:
+def swept(upto_m: float, expected: int | None = 5) -> SearchMap:
     """The bench's box, gone over in rows 20 mm apart from below up to a y."""
     rows = np.arange(-0.188, upto_m, 0.02)
     x = np.tile([-0.138, 0.138, 0.138, -0.138], (len(rows) + 1) // 2)[: 2 * len(rows)]
-    return SearchMap.blank(np.array([0.138, 0.188]), expected=5).with_path(np.column_stack([x, np.repeat(rows, 2)]))
+    return SearchMap.blank(np.array([0.138, 0.188]), expected).with_path(np.column_stack([x, np.repeat(rows, 2)]))
 
 
 @pytest.mark.parametrize("policy", ["expected_find", "nearest_frontier"])
@@ -89,6 +89,27 @@ def test_guarded_sweep__search_exhausted(make, policy: str) -> None:
     assert not b.of_kind("contact")
     assert skill.reason.evidence["found"] == 0
     assert covered_fraction(skill.map, 0.02) > 0.95 > covered_fraction(belief, 0.02)
+
+
+def test_guarded_sweep__search_exhausted__with_an_unknown_number(make) -> None:
+    """It ends when hardly anything can be left, and the chance is a result of the run, though the skill fails."""
+    belief = swept(0.12, expected=None)
+    b, skill = make(stands=False, start=(-0.05, 0.1, 0.018), inputs={"previous": belief})
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "search_exhausted")
+    assert 0.0 <= skill.chance_left < 0.05 < belief.chance_left
+    (event,) = b.of_kind("result")
+    assert event["key"] == "chance_left"
+    assert event["text"] in skill.reason.message
+    assert skill.exhausted is True
+
+
+def test_an_unknown_number_begins_with_an_open_map(make) -> None:
+    b, skill = make(expected_objects="unknown", left_below=0.2)
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    assert (skill.map.expected, skill.map.left_below) == (None, 0.2)
+    assert 0.2 < skill.chance_left < 1.0, "most of the box is unexplored"
 
 
 def test_what_was_touched_by_the_way_is_looked_at_first(make) -> None:

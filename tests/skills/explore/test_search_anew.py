@@ -42,3 +42,11 @@ def test_search_anew__nothing_searched(bench) -> None:
     skill = b.make(SearchAnew)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "nothing_searched")
+
+
+def test_an_unknown_number_becomes_a_known_one(bench, found) -> None:
+    before = SearchMap.blank((0.13, 0.18), None).with_exclusion(envelope(found.round((0.05, 0.0), 0.02)), 0.01)
+    b = bench()
+    skill = b.make(SearchAnew, inputs={"before": before}, more_objects=1)
+    b.run(skill)
+    assert skill.map.expected == 2

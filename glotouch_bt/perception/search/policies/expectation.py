@@ -1,10 +1,12 @@
 """Search policy that maximises the discounted probability of finding hidden objects.
 
-The belief is a weight for every position and size of a hidden object: discs on a grid, of a few radii. Discs that a
-swept path would have touched, or that overlap a traced object, are excluded; discs near walls or objects are unlikely.
-A path finds the discs within its swath. Beam search over straight legs between lattice nodes maximises the weight
-found, discounted by the travel up to it (a surrogate of expected search time; Stone, Theory of Optimal Search, 1975).
-Only the first leg is executed before replanning.
+The belief is a weight for every position and size of a hidden object; see `remaining`. A path finds the discs within
+its swath. Beam search over straight legs between lattice nodes maximises the weight found, discounted by the travel up
+to it (a surrogate of expected search time; Stone, Theory of Optimal Search, 1975). Only the first leg is executed
+before replanning.
+
+With an unknown number of objects the whole floor must be searched, for small objects too. The order hardly matters
+then, and `NearestHidden` covers it on a shorter way.
 """
 
 from __future__ import annotations
@@ -17,9 +19,10 @@ import numpy.typing as npt
 
 from glotouch_bt.perception.search.map import Exclusion, Mask, SearchMap
 from glotouch_bt.perception.search.policies.frontier import NearestFrontier
+from glotouch_bt.perception.search.policies.hidden import NearestHidden
 from glotouch_bt.perception.search.policies.policy import Stretch
+from glotouch_bt.perception.search.remaining import DiscPrior, Discs, discs
 from glotouch_bt.perception.search.routes import Routes, segment_is_free
-from glotouch_bt.perception.touch import signed_distance
 from glotouch_bt.robot import Array
 
 Indices = npt.NDArray[np.int64]
@@ -32,41 +35,27 @@ class ExpectationParams:
     """Parameters of `ExpectedFind`.
 
     Attributes:
-        radii_m: Half mean widths of the expected objects, equally likely: objects 4-11 cm long.
-        grid_m: Spacing of the positions.
         node_m: Spacing of the lattice nodes.
         leg_m: Maximum length of a lattice leg.
-        tip_radius_m: Radius of the ball.
-        touch: Fraction of disc radius plus ball radius within which a path excludes a disc.
-        gap_m: Usual distance of objects from walls and from each other.
-        gap_weight: Weight of a disc at less than the usual distance.
-        wall_m: Minimum distance of the tip's centre from the walls.
         discount_m: Travel after which a find is worth 1/e.
         depth, width: Number of legs ahead, and beam width.
         left: Remaining weight below which the frontier search takes over.
     """
 
-    radii_m: tuple[float, ...] = (0.020, 0.028, 0.038)
-    grid_m: float = 0.0125
     node_m: float = 0.034
     leg_m: float = 0.13
-    tip_radius_m: float = 0.006
-    touch: float = 0.85
-    gap_m: float = 0.030
-    gap_weight: float = 0.05
-    wall_m: float = 0.012
     discount_m: float = 0.25
     depth: int = 5
     width: int = 16
     left: float = 0.004
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _SearchLattice:
     """Discs, nodes, legs and the swath of each leg.
 
     Attributes:
-        centre, radius, prior: (h, 2), (h,), (h,) of every disc.
+        discs: The h discs.
         nodes: (n, 2) positions, m.
         ends: (l, 2) start and end node of every leg, in both directions.
         length: (l,) lengths of the legs, m.
@@ -75,9 +64,7 @@ class _SearchLattice:
         samples, owner: points along all legs (s, 2) and the leg of each (s,).
     """
 
-    centre: Array
-    radius: Array
-    prior: Array
+    discs: Discs
     nodes: Array
     ends: Indices
     length: Array
@@ -100,24 +87,14 @@ def touched(centre: Array, reach: Array, a: Array, b: Array) -> Mask:
 
 
 @lru_cache(maxsize=4)
-def _lattice(half: tuple[float, float], p: ExpectationParams) -> _SearchLattice:
-    inner = np.array(half) + p.wall_m
-    axes = [np.linspace(-h, h, max(round(2 * h / p.grid_m) + 1, 2)) for h in inner]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-    centre = np.concatenate([grid] * len(p.radii_m))
-    radius = np.repeat(np.array(p.radii_m), len(grid))
-    gap = (inner - np.abs(centre)).min(axis=1) - radius
-    prior = np.where(gap >= p.gap_m, 1.0, p.gap_weight) * (gap >= 0)
-    keep = prior > 0
-    centre, radius, prior = centre[keep], radius[keep], prior[keep]
-    for r in p.radii_m:  # every size equally likely
-        prior[radius == r] /= max(prior[radius == r].sum(), 1e-9) * len(p.radii_m)
+def _lattice(half: tuple[float, float], prior: DiscPrior, p: ExpectationParams) -> _SearchLattice:
+    every = discs(half, prior)
     node_axes = [np.linspace(-h, h, max(round(2 * h / p.node_m) + 1, 2)) for h in half]
     nodes = np.stack(np.meshgrid(*node_axes, indexing="ij"), axis=-1).reshape(-1, 2)
     distance = np.linalg.norm(nodes[:, None] - nodes[None], axis=2)
     start, end = np.nonzero((distance > 0) & (distance <= p.leg_m))
     swath = np.concatenate([
-        touched(centre, p.touch * (radius + p.tip_radius_m), nodes[start[i : i + 256]], nodes[end[i : i + 256]])
+        touched(every.centre, every.reach, nodes[start[i : i + 256]], nodes[end[i : i + 256]])
         for i in range(0, len(start), 256)
     ]).astype(np.float32)  # fmt: skip
     first = np.searchsorted(start, np.arange(len(nodes) + 1))
@@ -127,12 +104,11 @@ def _lattice(half: tuple[float, float], p: ExpectationParams) -> _SearchLattice:
     t = np.concatenate([np.linspace(0, 1, c) for c in count])[:, None]
     samples = (1 - t) * nodes[start][owner] + t * nodes[end][owner]
     ends = np.column_stack([start, end])
-    return _SearchLattice(centre, radius, prior, nodes, ends, length, swath, np.asarray(first), samples, owner)
+    return _SearchLattice(every, nodes, ends, length, swath, np.asarray(first), samples, owner)
 
 
 @lru_cache(maxsize=8)
-def _free_legs(half: tuple[float, float], p: ExpectationParams, exclusions: tuple[Exclusion, ...]) -> Mask:
-    lattice = _lattice(half, p)
+def _free_legs(lattice: _SearchLattice, exclusions: tuple[Exclusion, ...]) -> Mask:
     free = np.ones(len(lattice.ends), dtype=np.bool_)
     for e in exclusions:
         free[lattice.owner[e.clearance(lattice.samples) < 0.0]] = False
@@ -149,25 +125,14 @@ class ExpectedFind:
     def __init__(self, params: ExpectationParams | None = None) -> None:
         self.params = params or ExpectationParams()
         self._rest = NearestFrontier(passes=((1.0, 0.0), (0.6, 0.0)))
-
-    def weights(self, belief: SearchMap) -> tuple[Array, Array, Array]:
-        """Return centres (h, 2), radii (h,) and weights (h,) of hidden objects; the weights sum to 1 initially."""
-        p = self.params
-        lattice = _lattice(_half(belief), p)
-        weight = lattice.prior.copy()
-        weight[belief.path_distance(lattice.centre) < p.touch * (lattice.radius + p.tip_radius_m)] = 0.0
-        for e in belief.exclusions:
-            gap = signed_distance(e.contour, lattice.centre) - lattice.radius
-            weight *= np.where(gap < 0.0, 0.0, np.where(gap < p.gap_m, p.gap_weight, 1.0))
-        if len(belief.dropped):
-            near = np.linalg.norm(lattice.centre[:, None] - belief.dropped[None], axis=2).min(axis=1)
-            weight[near < p.tip_radius_m] = 0.0
-        return lattice.centre, lattice.radius, weight
+        self._everywhere = NearestHidden()
 
     def next_stretch(self, belief: SearchMap, tip_K_m: Array) -> Stretch | None:
         """See `SearchPolicy`."""
         tip = np.asarray(tip_K_m, dtype=np.float64)[:2]
-        _, _, weight = self.weights(belief)
+        if belief.expected is None:
+            return self._everywhere.next_stretch(belief, tip)
+        weight = belief.hidden.weight
         if weight.sum() > self.params.left:
             node = self._first_node(belief, tip, weight.astype(np.float32))
             if node is not None:
@@ -180,10 +145,9 @@ class ExpectedFind:
 
     def _first_node(self, belief: SearchMap, tip: Array, weight: npt.NDArray[np.float32]) -> Array | None:
         """Return the end of the best path's first leg, or None if no path finds anything."""
-        p, half = self.params, _half(belief)
-        lattice = _lattice(half, p)
-        free = _free_legs(half, p, belief.exclusions)
-        reach = p.touch * (lattice.radius + p.tip_radius_m)
+        p = self.params
+        lattice = _lattice(belief.half, belief.prior, p)
+        free = _free_legs(lattice, belief.exclusions)
         lengths = Routes(belief, tip).lengths(lattice.nodes)
         straight = np.linalg.norm(lattice.nodes - tip, axis=1)
         # The first leg may be longer than a lattice leg, to leave fully explored surroundings.
@@ -193,7 +157,8 @@ class ExpectedFind:
         ]
         if len(near) == 0:
             return None
-        swath = touched(lattice.centre, reach, np.broadcast_to(tip, (len(near), 2)), lattice.nodes[near])
+        every = lattice.discs
+        swath = touched(every.centre, every.reach, np.broadcast_to(tip, (len(near), 2)), lattice.nodes[near])
         left = weight[None] * ~swath
         mass = weight.sum() - left.sum(axis=1)
         length = lengths[near]
@@ -222,7 +187,3 @@ class ExpectedFind:
             if float(score[0]) > best_score:
                 best_score, best_root = float(score[0]), int(root[0])
         return lattice.nodes[best_root] if best_score > 1e-6 else None
-
-
-def _half(belief: SearchMap) -> tuple[float, float]:
-    return float(belief.half_extent_m[0]), float(belief.half_extent_m[1])

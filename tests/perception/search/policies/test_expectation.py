@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from glotouch_bt.perception.search import ExpectationParams, ExpectedFind, SearchMap
 from glotouch_bt.perception.search.policies.expectation import touched
+from glotouch_bt.perception.search.remaining import USUAL
 from glotouch_bt.perception.touch import Contour
 
 HALF = np.array([0.138, 0.188])
@@ -23,6 +24,12 @@ def blank() -> SearchMap:
     return SearchMap.blank(HALF, expected=5)
 
 
+def weights(belief: SearchMap) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Centres, radii and weights of hidden discs."""
+    left = belief.hidden
+    return left.discs.centre, left.discs.radius, left.weight
+
+
 def serpentine(upto_m: float, apart_m: float = 0.02) -> np.ndarray:
     rows = np.arange(-HALF[1], upto_m + 1e-9, apart_m)
     x = np.tile([-HALF[0], HALF[0], HALF[0], -HALF[0]], len(rows))[: 2 * len(rows)]
@@ -30,12 +37,12 @@ def serpentine(upto_m: float, apart_m: float = 0.02) -> np.ndarray:
 
 
 def test_before_any_search_the_weights_are_a_distribution_over_discs_that_fit() -> None:
-    centre, radius, weight = POLICY.weights(blank())
+    centre, radius, weight = weights(blank())
     assert weight.sum() == pytest.approx(1.0)
-    inner = HALF + PARAMS.wall_m
+    inner = HALF + USUAL.wall_m
     assert np.all(np.abs(centre) + radius[:, None] <= inner + 1e-9)
-    for r in PARAMS.radii_m:  # every size as likely
-        assert weight[radius == r].sum() == pytest.approx(1.0 / len(PARAMS.radii_m))
+    for r in USUAL.radii_m:  # every size as likely
+        assert weight[radius == r].sum() == pytest.approx(1.0 / len(USUAL.radii_m))
 
 
 @settings(max_examples=30, deadline=None)
@@ -54,12 +61,12 @@ def test_touched_is_the_distance_of_a_point_from_a_segment(
 
 def test_a_disc_the_path_swept_over_is_ruled_out_and_no_other() -> None:
     way = np.array([[-0.1, -0.05], [0.08, 0.12]])
-    before = POLICY.weights(blank())[2]
-    centre, radius, weight = POLICY.weights(blank().with_path(way))
+    before = weights(blank())[2]
+    centre, radius, weight = weights(blank().with_path(way))
     d = way[1] - way[0]  # the map keeps a point every 2 mm of it
     t = np.clip(((centre - way[0]) @ d) / (d @ d), 0.0, 1.0)
     distance = np.linalg.norm(centre - way[0] - t[:, None] * d, axis=1)
-    reach = PARAMS.touch * (radius + PARAMS.tip_radius_m)
+    reach = USUAL.touch * (radius + USUAL.tip_radius_m)
     assert np.all(weight[distance < reach - 2.1e-3] == 0.0)
     np.testing.assert_array_equal(weight[distance > reach + 2.1e-3], before[distance > reach + 2.1e-3])
 
@@ -70,20 +77,20 @@ def test_hidden_mass_only_falls(places: list[tuple[float, float]]) -> None:
     belief, last = blank(), 1.0
     for a, b in pairwise(places):
         belief = belief.with_path([a, b])
-        mass = float(POLICY.weights(belief)[2].sum())
+        mass = float(weights(belief)[2].sum())
         assert mass <= last + 1e-12
         last = mass
 
 
 def test_nothing_is_hidden_inside_a_traced_object_and_little_beside_it() -> None:
     disc = Contour("round", np.array([0.0, 0.0]), (0.06, 0.06), 0.0, 0.0, np.zeros(0))
-    before = POLICY.weights(blank())[2]
-    centre, radius, weight = POLICY.weights(blank().with_exclusion(disc, 0.01))
+    before = weights(blank())[2]
+    centre, radius, weight = weights(blank().with_exclusion(disc, 0.01))
     gap = np.linalg.norm(centre, axis=1) - 0.03 - radius
     assert np.all(weight[gap < -1e-9] == 0.0)
-    near = (gap > 1e-9) & (gap < PARAMS.gap_m - 1e-9)
-    np.testing.assert_allclose(weight[near], PARAMS.gap_weight * before[near])
-    np.testing.assert_array_equal(weight[gap > PARAMS.gap_m + 1e-9], before[gap > PARAMS.gap_m + 1e-9])
+    near = (gap > 1e-9) & (gap < USUAL.gap_m - 1e-9)
+    np.testing.assert_allclose(weight[near], USUAL.gap_weight * before[near])
+    np.testing.assert_array_equal(weight[gap > USUAL.gap_m + 1e-9], before[gap > USUAL.gap_m + 1e-9])
 
 
 def test_it_goes_where_nobody_has_been() -> None:
@@ -97,7 +104,7 @@ def test_it_goes_where_nobody_has_been() -> None:
 
 def test_when_all_is_known_it_ends() -> None:
     belief = blank().with_path(serpentine(HALF[1]))
-    assert float(POLICY.weights(belief)[2].sum()) < PARAMS.left
+    assert float(weights(belief)[2].sum()) < PARAMS.left
     assert POLICY.next_stretch(belief, belief.path_K_m[-1]) is None
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from glotouch_bt.bench.match.scores import (
+from glotouch_bt.bench.scores import (
     auroc,
     calibration_error,
     reliability,
