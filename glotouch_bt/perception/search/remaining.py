@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
 from glotouch_bt.perception.touch import Contour, signed_distance
 from glotouch_bt.robot import Array
@@ -68,16 +69,23 @@ class Discs:
     """Discs that fit into a container.
 
     Attributes:
-        centre: (h, 2) m.
+        grid: (g, 2) positions, m.
+        place: (h,) position of each disc in the grid.
         radius: (h,) m.
         weight: (h,) prior weights; the sum is 1, and equal for each radius.
         reach: (h,) distance of the tip's centre from the disc's below which a path excludes it, m.
     """
 
-    centre: Array
+    grid: Array
+    place: npt.NDArray[np.int64]
     radius: Array
     weight: Array
     reach: Array
+
+    @property
+    def centre(self) -> Array:
+        """(h, 2) m."""
+        return np.asarray(self.grid[self.place])
 
 
 @lru_cache(maxsize=8)
@@ -86,15 +94,15 @@ def discs(half: tuple[float, float], prior: DiscPrior) -> Discs:
     p, inner = prior, np.array(half) + prior.wall_m
     axes = [np.linspace(-h, h, max(round(2 * h / p.grid_m) + 1, 2)) for h in inner]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-    centre = np.concatenate([grid] * len(p.radii_m))
+    place = np.tile(np.arange(len(grid)), len(p.radii_m))
     radius = np.repeat(np.array(p.radii_m), len(grid))
-    gap = (inner - np.abs(centre)).min(axis=1) - radius
+    gap = (inner - np.abs(grid)).min(axis=1)[place] - radius
     weight = np.where(gap >= p.gap_m, 1.0, p.gap_weight) * (gap >= 0)
     keep = weight > 0
-    centre, radius, weight = centre[keep], radius[keep], weight[keep]
+    place, radius, weight = place[keep], radius[keep], weight[keep]
     for r in p.radii_m:
         weight[radius == r] /= max(weight[radius == r].sum(), 1e-9) * len(p.radii_m)
-    return Discs(centre, radius, weight, p.touch * (radius + p.tip_radius_m))
+    return Discs(grid, place, radius, weight, p.touch * (radius + p.tip_radius_m))
 
 
 @dataclass(frozen=True)
@@ -138,12 +146,12 @@ def remaining(
     every = discs(half, prior)
     beside = every.weight.copy()
     for contour in traced:
-        gap = signed_distance(contour, every.centre) - every.radius
+        gap = signed_distance(contour, every.grid)[every.place] - every.radius
         beside *= np.where(gap < 0.0, 0.0, np.where(gap < prior.gap_m, prior.gap_weight, 1.0))
-    weight = np.where(path_distance(every.centre) < every.reach, 0.0, beside)
+    weight = np.where(path_distance(every.grid)[every.place] < every.reach, 0.0, beside)
     if len(dropped):
-        near = np.linalg.norm(every.centre[:, None] - dropped[None], axis=2).min(axis=1)
-        weight[near < prior.tip_radius_m] = 0.0
+        near = np.linalg.norm(every.grid[:, None] - dropped[None], axis=2).min(axis=1)
+        weight[near[every.place] < prior.tip_radius_m] = 0.0
     return Remaining(every, beside, weight)
 
 
