@@ -27,7 +27,7 @@ MIN_PRESSING_SHARE = 0.25
 """Share of the limit below which a pressing hand is not judged."""
 MAX_STEEPENING = 4.0
 """Mean rise of a contact over that of one sample; the weight of an object that is lifted hardly rises."""
-REACTION_SAMPLES = 3
+REACTION_SAMPLES = 2
 """Samples for which a force goes on rising at its present rate, until the brakes act."""
 SAMPLE_S = 0.001
 """Nominal time between samples."""
