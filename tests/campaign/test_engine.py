@@ -208,7 +208,7 @@ def test_an_ended_command_leaves_all_that_is_done(tmp_path: Path, number: int) -
     assert 1 <= done < 40
     if number == signal.SIGINT:
         rows = len((out / "trials.csv").read_text().splitlines()) - 1
-        assert 1 <= rows <= done  # a worker may end a trial after the table was written; its folder is the truth
+        assert max(1, done - 2) <= rows <= done  # each of two workers may end a trial after the table was written
     threading.Event().wait(0.2)
     again = subprocess.run([*words, "50000"], stdout=subprocess.PIPE, env=environment, check=True)
     assert again.stdout.count(b"row") == 40 - done

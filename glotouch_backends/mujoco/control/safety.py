@@ -25,8 +25,9 @@ MIN_PRESSING_SHARE = 0.25
 """Share of the stop limit below which a pressing hand is not judged. Source: measured in a nominal
 retrieval of seed 9401; objects that the hand meets at 50 mm/s push it with 4 N."""
 REACTION_SAMPLES = 2
-"""Samples for which a force goes on rising at its present rate, until the brakes act. Source: ours; a hand that presses
-the probe into its stand gains 5 N in a sample, at 0.015 m/s (tests/integration/test_force_limit.py)."""
+"""Samples for which a force goes on rising at its present rate, until the brakes act. Source: ours; with 1, the
+hand that presses the probe into its stand may pass the limit (tests/integration/test_force_limit.py), and with 3, a
+slipped probe cannot be put back (tests/integration/test_recovery.py)."""
 QUIET_SHARE = 0.99 * MIN_PRESSING_SHARE
 """Smaller samples are not judged, whatever the rounding."""
 MAX_STEEPENING = 4.0

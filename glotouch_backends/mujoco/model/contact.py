@@ -33,7 +33,7 @@ OBJECT_IMPEDANCE = 0.5
 that rocks between the jaws and meets the floor is stopped within a step, and the hand with it. Source: ours, to lower
 such peaks: 32.7 and 37.0 N in `bench retrieve --conditions realistic`, train of seeds 36013 and 36026, 3643226."""
 PAD = (0.005, 1.0)  # gel skin; the gel model adds the gel's compliance
-PAD_HANDLE = (0.0035, 1.0)  # as stiff in all as PAD: a pad meets the handle in two points, another face in four
+PAD_HANDLE = (0.0035, 1.0)  # two contacts are as stiff as the four of a pad and a face with PAD
 PAD_HANDLE_FRICTION = (0.002, 1.0)  # pads on the probe's handle: stiffer, or the probe drifts during transfers
 
 GEL_TORSION_M = 0.005

@@ -38,8 +38,8 @@ LEDGE_M = 0.0015
 RIDGE_RADIUS_M = 0.002
 """Radius of the ridges that the pads hold. Source: ours."""
 RIDGE_SHARE = 0.85
-"""Length of a ridge between the centres of its ends, over the handle's: the ends stay on a pad that is held 2 mm off.
-Source: ours."""
+"""Length of a ridge between the centres of its ends, over the handle's. Source: ours; both ends lie on a pad of 28.5 mm
+whose middle is within 0.6 mm of the handle's. Farther off, the pad's edge meets the ridge."""
 MAX_SHAFT_STIFFNESS_NM_RAD = 170.0
 """Largest stiffness between handle and shaft, or 1 ms steps become unstable; 0.1 mm/N at the ball. Source: ours."""
 GEL_DAMPING_RATIO = 0.5
@@ -87,7 +87,7 @@ def add_probe(spec: mujoco.MjSpec, probe: Probe, holder: Holder, truth: Truth) -
     """Add the stand and, standing in it, the free body `probe` (frame: handle's centre, z to the tip).
 
     Its geoms are `handle`, `shaft`, `ball`, and a ridge along z flush with each face that the pads hold: a pad has two
-    contacts with a ridge, and four with a face, which make a step a third longer. The site `tip` is the ball's centre.
+    contacts with a ridge. With a face it has four, which cost the solver much more. The site `tip` is the ball's centre.
     """
     pose_handle_shaft, pad_friction = truth.pose_handle_shaft, truth.pad_friction
     pose = holder.pose_B_grasp

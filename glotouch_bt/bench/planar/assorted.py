@@ -16,12 +16,15 @@ COUNT = (1, 8)
 HALF_WIDTH_M = (0.0075, 0.045)
 """Range of the half mean width: objects of 15-90 mm, log-uniform."""
 MIN_SIDE_M = 0.015
+"""Shortest side of a box."""
 ASPECT = 2.0
 """Largest aspect ratio of a box; half of the objects are boxes, half are cylinders."""
 HEIGHT_M = 0.06
+"""Height of every object; the ball passes below it."""
 GAP_M = (0.02, 0.045)
 """Range of the least gap between objects in a layout."""
 WALL_GAP_M = (0.005, 0.04)
+"""Range of the least gap between objects and walls in a layout. Source of all ranges: ours."""
 
 
 def assorted_world(world: World, seed: int) -> PlanarWorld:

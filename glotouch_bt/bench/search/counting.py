@@ -132,12 +132,12 @@ def summarise_counts(rows: Sequence[Row]) -> dict[str, Any]:
     """
     out: dict[str, Any] = {"layouts": len(rows), "objects": bootstrap_mean([r["objects"] for r in rows])}
     for count in ("known", "unknown"):
-        mine = [r[count] for r in rows]
+        searches = [r[count] for r in rows]
         out[count] = {
             "success": wilson(sum(r[count]["right"] == r["objects"] for r in rows), len(rows)),
-            "travel_m": bootstrap_mean([m["travel_m"] for m in mine]),
-            "false_candidates": bootstrap_mean([m["found"] - m["right"] for m in mine]),
-            "ended": dict(Counter(m["ended"] for m in mine).most_common()),
+            "travel_m": bootstrap_mean([s["travel_m"] for s in searches]),
+            "false_candidates": bootstrap_mean([s["found"] - s["right"] for s in searches]),
+            "ended": dict(Counter(s["ended"] for s in searches).most_common()),
         }
     success = np.array([[r[c]["right"] == r["objects"] for c in ("unknown", "known")] for r in rows], dtype=np.float64)
     out["success_difference"] = bootstrap_mean(success[:, 0] - success[:, 1])

@@ -46,11 +46,14 @@ def search(
     """
     from glotouch_bt.bench.search import CountCampaign, SearchCampaign, run_campaign, run_count_campaign
     from glotouch_bt.commands.terminal import print_counts, print_search
+    from glotouch_bt.robot import BadInput
 
     shared.check_names(conditions, backend)
     names = tuple(p.strip() for p in policies.split(",") if p.strip())
     executors = shared.Executors(workers, cluster, trial_limit)
     if count == "unknown":
+        if objects is not None or recorded or conditions != "nominal":
+            raise BadInput("--count unknown makes objects of its own: omit --objects, --recorded and --conditions")
         counting = CountCampaign(
             policy=names[0] if names else "",
             seeds=tuple(range(seed, seed + planar)),

@@ -54,7 +54,8 @@ def print_growth(summary: dict[str, Any], folder: Path) -> None:
     words = (
         f"{k.rsplit('_', 1)[0]}: objects^{s['objects']:.2f} area^{s['area']:.2f}" for k, s in summary["slopes"].items()
     )
-    EscapingConsole().print("; ".join(words), markup=False, highlight=False, soft_wrap=True)
+    text = f"growth of {'; '.join(words)}\n{folder / 'summary.json'}"
+    EscapingConsole().print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def print_robustness(summary: dict[str, Any], folder: Path) -> None:

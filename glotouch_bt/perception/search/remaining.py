@@ -107,7 +107,7 @@ def discs(half: tuple[float, float], prior: DiscPrior) -> Discs:
 
 @dataclass(frozen=True)
 class Remaining:
-    """What the map leaves of a prior.
+    """The places and sizes of a prior that a map has not excluded.
 
     Attributes:
         discs: The discs of the prior.
@@ -134,7 +134,7 @@ def remaining(
     path_distance: Callable[[Array], Array],
     dropped: Array,
 ) -> Remaining:
-    """Return what is left of a prior.
+    """Return the places and sizes of a prior that a search has not excluded.
 
     Args:
         half: Limits of the tip's centre, m.

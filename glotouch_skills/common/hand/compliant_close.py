@@ -210,7 +210,8 @@ def release(arm: Arm, opening_m: float) -> Motion[None]:
     A force on the hand although the jaws hold nothing means that a fingertip stands on the object, or is caught under
     it or in a hollow of its side. Then the jaws stop, the hand moves along the force until it is free, and the jaws
     open again. The object may drop onto a fingertip only after its release, so the force is checked until the jaws are
-    open. A pause waits until then. What was moved by the jaws stands between the open fingers.
+    open. A pause waits until then. What the jaws have moved stands between the open
+    fingers, so the places of the fingers are recorded as free.
     """
     with arm.pause_signal.finishing():
         yield from _release(arm, opening_m)
