@@ -173,7 +173,7 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
         self._say_results()
 
     def _say_results(self, *, always: bool = False) -> None:
-        """Record the results that have words; with `always`, only those of ports that are written after a failure too."""
+        """Record the results that have words; with `always`, only those of ports also written after a failure."""
         for port in self._results:
             if (port.always or not always) and (text := port.in_words(self)):
                 self.event("result", key=port.key, text=text)

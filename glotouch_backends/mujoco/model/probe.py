@@ -87,7 +87,8 @@ def add_probe(spec: mujoco.MjSpec, probe: Probe, holder: Holder, truth: Truth) -
     """Add the stand and, standing in it, the free body `probe` (frame: handle's centre, z to the tip).
 
     Its geoms are `handle`, `shaft`, `ball`, and a ridge along z flush with each face that the pads hold: a pad has two
-    contacts with a ridge. With a face it has four, which cost the solver much more. The site `tip` is the ball's centre.
+    contacts with a ridge. With a face it has four, which cost the solver much more. The site `tip` is the centre of
+    the ball.
     """
     pose_handle_shaft, pad_friction = truth.pose_handle_shaft, truth.pad_friction
     pose = holder.pose_B_grasp
