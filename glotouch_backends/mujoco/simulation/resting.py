@@ -17,9 +17,11 @@ from glotouch_bt.robot import Array
 
 Ints = npt.NDArray[np.int32]
 
-REACH_M = 0.02
-"""Largest approach of two bodies within a control period: 2 m/s. Whatever is faster touches one period late. Source:
-ours; the hand moves at 0.5 m/s at most, and an object that falls into the container at 2 m/s."""
+GAP_M = 0.003
+"""Distance to which a body counts as reached, beyond its own motion. Source: ours; larger than any contact margin."""
+MOTIONS = 2.0
+"""Distance to which a body counts as reached, over its motion in the last period: it may speed up, and what it hits
+may leave it faster than it came. Whatever is faster touches one period late. Source: ours."""
 
 
 @compiled(
@@ -28,6 +30,7 @@ ours; the hand moves at 0.5 m/s at most, and an object that falls into the conta
     "i4[:, ::1]",
     "i4[::1]",
     "i8[:, ::1]",
+    "f8[:, ::1]",
     "f8[:, ::1]",
     "f8[:, ::1]",
     "f8[:, ::1]",
@@ -47,6 +50,7 @@ def _leave_out(
     xpos: Array,
     xmat: Array,
     last: Array,
+    spans: Array,
     qpos: Array,
     qvel: Array,
     forces: Array,
@@ -62,20 +66,23 @@ def _leave_out(
         boxes: (n, 6) centre and half sizes of each body's box, in its frame.
         xpos, xmat, qpos, qvel, forces: Of mjData, `forces` is xfrc_applied.
         last: (objects, 7) qpos of each object at the last call; updated.
+        spans: (n, 6) lowest and highest corner of each body's box in B at the last call; updated.
         objects: Number of objects.
     """
     n = len(bodies)
-    low, high = np.zeros((n, 3)), np.zeros((n, 3))
+    reach = np.zeros(n)
     near = np.zeros(n, dtype=np.bool_)
     near[objects:] = True
     for b in range(n):
-        body = bodies[b, 0]
+        body, moved = bodies[b, 0], 0.0
         for i in range(3):
-            centre, half = xpos[body, i], 0.5 * REACH_M
+            centre, half = xpos[body, i], 0.0
             for j in range(3):
                 centre += xmat[body, 3 * i + j] * boxes[b, j]
                 half += abs(xmat[body, 3 * i + j]) * boxes[b, 3 + j]
-            low[b, i], high[b, i] = centre - half, centre + half
+            moved = max(moved, abs(centre - half - spans[b, i]), abs(centre + half - spans[b, 3 + i]))
+            spans[b, i], spans[b, 3 + i] = centre - half, centre + half
+        reach[b] = GAP_M + MOTIONS * moved
     for b in range(objects):
         body, at, dof = bodies[b, 0], bodies[b, 1], bodies[b, 2]
         near[b] = awake[body] != 0
@@ -88,11 +95,11 @@ def _leave_out(
         for a in range(objects):
             for b in range(n):
                 if near[b] and not near[a]:
-                    near[a] = (
-                        (low[a, 0] < high[b, 0] and low[b, 0] < high[a, 0])
-                        and (low[a, 1] < high[b, 1] and low[b, 1] < high[a, 1])
-                        and (low[a, 2] < high[b, 2] and low[b, 2] < high[a, 2])
-                    )
+                    near[a] = True
+                    for i in range(3):
+                        near[a] &= spans[a, i] < spans[b, 3 + i] + reach[b] and spans[b, i] < spans[a, 3 + i] + reach[b]
+                    if near[a]:
+                        reach[a] = max(reach[a], reach[b])  # what it is hit by may move it as fast
     for b in range(objects):
         body = bodies[b, 0]
         contype[body] = categories[b, 0] if near[b] else 0
@@ -141,7 +148,8 @@ class RestingObjects:
         kinds = np.stack([model.body_contype[free], model.body_conaffinity[free]], axis=1)
         self._categories = model.body_contype, model.body_conaffinity, kinds
         last: Array = np.full((len(free), 7), np.nan)
-        now = data.xpos, data.xmat, last, data.qpos, data.qvel, data.xfrc_applied
+        spans: Array = np.full((len(self._bodies), 6), np.inf)  # at first everything is near
+        now = data.xpos, data.xmat, last, spans, data.qpos, data.qvel, data.xfrc_applied
         self._all = *self._categories, data.body_awake, self._bodies, boxes, *now, len(free)
 
     def __enter__(self) -> None:
