@@ -75,7 +75,12 @@ def targets_of(folder: Path) -> tuple[str, ...]:
 def run_trial(head: Row, request: RunRequest) -> Row:
     """Run one trial in this process and return its row, which begins with the columns `head`."""
     done = launch_trial(request)
-    found = {"candidates": len(done.result["candidates"]), "cause": cause(done.result), "exit_code": done.exit_code}
+    found = {
+        "skill_time_s": done.result["skill_time_s"],
+        "candidates": len(done.result["candidates"]),
+        "cause": cause(done.result),
+        "exit_code": done.exit_code,
+    }
     return head | {k: done.result[k] for k in COLUMNS if k in done.result} | found
 
 
@@ -139,5 +144,14 @@ def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "median_sim_s": float(np.median(times)) if times else math.nan,
         "median_wall_s": float(np.median(walls)) if walls else math.nan,
         "peak_force_N": bootstrap_mean([r["peak_force_N"] for r in rows if r.get("peak_force_N") is not None]),
+        "skill_time_s": _mean_by_skill([r["skill_time_s"] for r in rows if r.get("skill_time_s")]),
         "largest_peak_force_N": max((float(r.get("peak_force_N") or 0.0) for r in rows), default=0.0),
     }
+
+
+def _mean_by_skill(trials: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Return the mean robot time of each skill in a trial, s, the longest first; a skill that did not run took none."""
+    total: Counter[str] = Counter()
+    for times in trials:
+        total.update(times)
+    return {skill: round(time_s / len(trials), 3) for skill, time_s in total.most_common()}

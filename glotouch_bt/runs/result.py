@@ -108,6 +108,9 @@ def score(
         "candidates": found.candidates,
         "contacts": found.contacts,
         "sim_time_s": round(outcome.end_s - outcome.start_s, 6),
+        "skill_time_s": {
+            name: round(cycles * robot.period_s, 6) for name, cycles in sorted(found.skill_cycles.items()) if name
+        },
         "paused_s": round(outcome.paused_s, 6),
         "guards": dict(outcome.guards),
         "ending": outcome.safe_stop,

@@ -22,6 +22,7 @@ def _result(request: RunRequest) -> dict[str, Any]:
     return {
         "status": status, "retrieved": held, "correct": held == target, "candidates": [1, 2], "sim_time_s": 100.0,
         "wall_time_s": 10.0 + request.seed, "peak_force_N": 9.0, "probe_path_m": 3.0, "contacts": 7,
+        "skill_time_s": {"squeeze": 60.0 + request.seed, **({"lift": 4.0} if held else {})},
         "reason_chain": [LOST] if request.seed == 2 else [{**LOST, "code": "safety_stop"}] if request.seed == 3 else [],
     }  # fmt: skip
 
@@ -48,6 +49,7 @@ def test_every_trial_is_counted_and_named(campaign: retrieve.RetrieveCampaign, m
     assert (summary["success"]["rate"], summary["success"]["n"]) == (0.2, 10)
     assert summary["by_target"]["apple"]["rate"] == 0.2
     assert summary["wrong_object"]["rate"] == 0.2
+    assert summary["skill_time_s"] == {"squeeze": 61.5, "lift": 2.0}
     assert summary["safety_stops"]["rate"] == 0.2
     assert summary["tracebacks"]["rate"] == 0.2
     assert summary["causes"] == {

@@ -28,6 +28,9 @@ def print_retrieve(summary: dict[str, Any], folder: Path) -> None:
     print_table(title, ("", "rate [Wilson 95 %]"), rows)
     if summary["causes"]:
         print_table("causes of failure", ("cause", "trials"), [(c, str(n)) for c, n in summary["causes"].items()])
+    if times := summary["skill_time_s"]:
+        shown = [(skill, f"{time_s:.1f}") for skill, time_s in times.items() if time_s >= 1.0]
+        print_table("robot time by skill, mean", ("skill", "s"), shown)
     EscapingConsole().print(
         f"robot time {summary['median_sim_s']:.0f} s, wall time {summary['median_wall_s']:.0f} s in the median; "
         f"largest peak force {summary['largest_peak_force_N']:.1f} N\n{folder / 'summary.json'}",

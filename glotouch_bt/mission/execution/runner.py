@@ -374,6 +374,7 @@ class _TickLoop:
             self._state.status[node.id] = new
             if new is Status.RUNNING and not node.children:
                 self._summary.node = self._tree.paths[node.id]
+                self._summary.skill = self._tree.skills.get(node.id, "")
                 if isinstance(node, Skill):
                     self._gate.pause_signal.style = node.PAUSE
         if changes:

@@ -64,6 +64,8 @@ class RunSummary:
             then the outputs that skills declare as results.
         last_event: (robot time, kind) of the last event.
         node: Path of the last leaf that started.
+        skill: Name of its skill; empty for another node.
+        skill_cycles: Control cycles by skill.
         peak_force_N: Largest norm of the sensed wrist force.
         probe_path_m: Length of the path of P while the probe was in the jaws (between `tool` events).
     """
@@ -77,7 +79,8 @@ class RunSummary:
         self.best: tuple[int, float] = (-1, 0.0)
         self.results: dict[str, Json] = {}
         self.last_event: tuple[float, str] = (0.0, "")
-        self.node = ""
+        self.node = self.skill = ""
+        self.skill_cycles: dict[str, int] = {}
         self.peak_force_N = 0.0
         self.probe_path_m = 0.0
         self._probe_held = False
@@ -88,6 +91,7 @@ class RunSummary:
         """Forward and measure, in batches."""
         self._record.block(observation, command)
         self._pending.append(observation)
+        self.skill_cycles[self.skill] = self.skill_cycles.get(self.skill, 0) + 1
         if len(self._pending) >= BATCH:
             self.flush()
 

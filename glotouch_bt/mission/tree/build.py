@@ -22,12 +22,14 @@ class BuiltTree:
     Attributes:
         root: The root node.
         paths: Path in the tree (`retrieve/sequence/squeeze`) by node id.
+        skills: Name of the skill by node id, of the nodes that are one.
         keys: All keys, as the mission names them.
         namespace: Where the keys live on py_trees' blackboard.
     """
 
     root: Behaviour
     paths: Mapping[object, str]
+    skills: Mapping[object, str]
     keys: tuple[str, ...]
     namespace: str
 
@@ -56,14 +58,19 @@ def build_tree(spec: NodeSpec, context: Context, title: str) -> BuiltTree:
     _runs += 1
     namespace = f"/run{_runs}"
     paths: dict[object, str] = {}
-    root = _build(spec, title, BuildContext(context, namespace), paths)
+    skills: dict[object, str] = {}
+    root = _build(spec, title, BuildContext(context, namespace), paths, skills)
     keys = dict.fromkeys(w.key for n in spec.walk() for w in (*n.reads.values(), *n.writes.values()))
-    return BuiltTree(root, paths, tuple(keys), namespace)
+    return BuiltTree(root, paths, skills, tuple(keys), namespace)
 
 
-def _build(spec: NodeSpec, above: str, made: BuildContext, paths: dict[object, str]) -> Behaviour:
+def _build(
+    spec: NodeSpec, above: str, made: BuildContext, paths: dict[object, str], skills: dict[object, str]
+) -> Behaviour:
     path = f"{above}/{spec.name}"
-    children = [_build(c, path, made, paths) for c in spec.children]
+    children = [_build(c, path, made, paths, skills) for c in spec.children]
     node = kind_of(spec).build(spec, children, made)
     paths[node.id] = path
+    if spec.skill:
+        skills[node.id] = spec.skill
     return node

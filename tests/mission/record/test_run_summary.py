@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 
 from glotouch_bt.mission.record import NullRecord, RunSummary
+from glotouch_bt.robot import HOLD
+from glotouch_bt.robot.fake import FakeRobot
 
 
 def candidate(index: int, height_m: float, top_touched: bool) -> dict[str, object]:
@@ -30,3 +32,16 @@ def test_a_candidate_of_another_shape_is_no_result(odd: object) -> None:
     summary.event("candidate", 1.0, {"candidate": odd})
     assert len(summary.candidates) == 1
     assert summary.results == {}
+
+
+def test_cycles_are_counted_by_skill() -> None:
+    summary = RunSummary(NullRecord())
+    observation = FakeRobot().observe()
+    for skill, cycles in (("sweep", 2), ("squeeze", 3), ("sweep", 1)):
+        summary.skill = skill
+        for _ in range(cycles):
+            summary.block(observation, HOLD)
+    assert summary.skill_cycles == {"sweep": 3, "squeeze": 3}
+    again = RunSummary(NullRecord())
+    again.restore(summary.state())
+    assert again.skill_cycles == summary.skill_cycles

@@ -57,7 +57,7 @@ def test_an_object_that_a_fault_moves_is_taken_in_at_once(world: World, change: 
 
 
 def test_an_object_near_the_hand_is_not_left_out(world: World, drive: Drive) -> None:
-    """Open pads stand 15 mm beside the block, then 2 mm; the replay, which leaves nothing out, ends in the same state."""
+    """Pads stand far beside the block, then near it; the replay, which leaves nothing out, ends in the same state."""
     with open_with(world, NEAR) as robot:
         driver = drive(robot)
         driver.jaws(0.070, force_N=20.0, time_s=0.2)
