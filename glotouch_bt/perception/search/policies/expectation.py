@@ -16,6 +16,7 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from glotouch_bt.perception.search.map import Exclusion, Mask, SearchMap
 from glotouch_bt.perception.search.policies.frontier import NearestFrontier
@@ -28,6 +29,8 @@ from glotouch_bt.robot import Array
 Indices = npt.NDArray[np.int64]
 SAMPLE_M = 0.008
 """Spacing of the points at which legs are checked against envelopes."""
+LEGS_AT_ONCE = 2048
+"""Number of legs whose swaths are found at once, for memory."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +62,7 @@ class _SearchLattice:
         nodes: (n, 2) positions, m.
         ends: (l, 2) start and end node of every leg, in both directions.
         length: (l,) lengths of the legs, m.
-        swath: (l, h) float32, 1 where the leg touches the disc.
+        swath, begin: leg i touches the discs swath[begin[i]:begin[i + 1]].
         first: (n + 1,) legs of node i are first[i]..first[i + 1].
         samples, owner: points along all legs (s, 2) and the leg of each (s,).
     """
@@ -68,22 +71,47 @@ class _SearchLattice:
     nodes: Array
     ends: Indices
     length: Array
-    swath: npt.NDArray[np.float32]
+    swath: Indices
+    begin: Indices
     first: Indices
     samples: Array
     owner: Indices
 
+    def gains(self, node: int, left: Array) -> Array:
+        """Return the weight found on each leg of a node, of the weights (h,) that are left."""
+        begin = self.begin[self.first[node] : self.first[node + 1] + 1]
+        found = np.concatenate([[0.0], np.cumsum(left[self.swath[begin[0] : begin[-1]]])])
+        return np.asarray(np.diff(found[begin - begin[0]]))
+
 
 def touched(centre: Array, reach: Array, a: Array, b: Array) -> Mask:
-    """Return (l, h) True where a segment a-b (l, 2) comes within reach (h,) of a centre (h, 2)."""
-    ab = b - a
-    along_x, along_y = ab[:, :1], ab[:, 1:]
-    x, y = centre.T
-    t = (x - a[:, :1]) * along_x + (y - a[:, 1:]) * along_y
-    t /= np.maximum((ab * ab).sum(axis=1), 1e-12)[:, None]
-    np.clip(t, 0.0, 1.0, out=t)
-    away_x, away_y = x - (a[:, :1] + t * along_x), y - (a[:, 1:] + t * along_y)
-    return np.asarray(away_x * away_x + away_y * away_y < reach**2)
+    """Return True where a segment a-b comes within reach of a centre, all broadcast: (..., 2), but `reach` (...)."""
+    along, from_a = b - a, centre - a
+    t = (from_a * along).sum(axis=-1) / np.maximum((along * along).sum(axis=-1), 1e-12)
+    away = from_a - np.clip(t, 0.0, 1.0)[..., None] * along
+    return np.asarray((away * away).sum(axis=-1) < reach**2)
+
+
+def _swaths(every: Discs, start: Array, end: Array) -> tuple[Indices, Indices]:
+    """Return the discs that the segments start-end (l, 2) touch, one after another, and where each begins (l + 1,)."""
+    middle, half_m = 0.5 * (start + end), 0.5 * np.linalg.norm(end - start, axis=1)
+    tree, count, found = scipy.spatial.cKDTree(every.centre), np.zeros(len(start), dtype=np.int64), []
+    for i in range(0, len(start), LEGS_AT_ONCE):
+        part = slice(i, i + LEGS_AT_ONCE)
+        near = tree.query_ball_point(middle[part], half_m[part] + every.reach.max(), return_sorted=True)
+        disc = np.concatenate([np.asarray(n, dtype=np.int64) for n in near])
+        leg = i + np.repeat(np.arange(len(near)), [len(n) for n in near])
+        hit = touched(every.centre[disc], every.reach[disc], start[leg], end[leg])
+        found.append(disc[hit])
+        count += np.bincount(leg[hit], minlength=len(start))
+    return np.concatenate(found), np.concatenate([[0], np.cumsum(count)])
+
+
+def _repeated(values: Indices, begin: Indices, rows: Indices) -> tuple[Indices, Indices]:
+    """Return the chosen rows of a ragged table, one after another, and where each begins."""
+    lengths = np.diff(begin)[rows]
+    begins = np.concatenate([[0], np.cumsum(lengths)])
+    return values[np.arange(begins[-1]) + np.repeat(begin[rows] - begins[:-1], lengths)], begins
 
 
 @lru_cache(maxsize=4)
@@ -93,18 +121,18 @@ def _lattice(half: tuple[float, float], prior: DiscPrior, p: ExpectationParams) 
     nodes = np.stack(np.meshgrid(*node_axes, indexing="ij"), axis=-1).reshape(-1, 2)
     distance = np.linalg.norm(nodes[:, None] - nodes[None], axis=2)
     start, end = np.nonzero((distance > 0) & (distance <= p.leg_m))
-    swath = np.concatenate([
-        touched(every.centre, every.reach, nodes[start[i : i + 256]], nodes[end[i : i + 256]])
-        for i in range(0, len(start), 256)
-    ]).astype(np.float32)  # fmt: skip
+    one_way = start < end  # a leg and its reverse touch the same discs
+    swath, begin = _swaths(every, nodes[start[one_way]], nodes[end[one_way]])
+    key = len(nodes) * np.minimum(start, end) + np.maximum(start, end)
+    swath, begin = _repeated(swath, begin, np.searchsorted(key[one_way], key))
     first = np.searchsorted(start, np.arange(len(nodes) + 1))
     length = distance[start, end]
     count = np.maximum(np.ceil(length / SAMPLE_M).astype(int) + 1, 2)
     owner = np.repeat(np.arange(len(start)), count)
-    t = np.concatenate([np.linspace(0, 1, c) for c in count])[:, None]
+    t = ((np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)) / (count - 1)[owner])[:, None]
     samples = (1 - t) * nodes[start][owner] + t * nodes[end][owner]
     ends = np.column_stack([start, end])
-    return _SearchLattice(every, nodes, ends, length, swath, np.asarray(first), samples, owner)
+    return _SearchLattice(every, nodes, ends, length, swath, begin, np.asarray(first), samples, owner)
 
 
 @lru_cache(maxsize=8)
@@ -134,7 +162,7 @@ class ExpectedFind:
             return self._everywhere.next_stretch(belief, tip)
         weight = belief.hidden.weight
         if weight.sum() > self.params.left:
-            node = self._first_node(belief, tip, weight.astype(np.float32))
+            node = self._first_node(belief, tip, weight)
             if node is not None:
                 if segment_is_free(belief, tip, node):
                     return Stretch(node[None, :])
@@ -143,7 +171,7 @@ class ExpectedFind:
                     return Stretch(way)
         return self._rest.next_stretch(belief, tip)
 
-    def _first_node(self, belief: SearchMap, tip: Array, weight: npt.NDArray[np.float32]) -> Array | None:
+    def _first_node(self, belief: SearchMap, tip: Array, weight: Array) -> Array | None:
         """Return the end of the best path's first leg, or None if no path finds anything."""
         p = self.params
         lattice = _lattice(belief.half, belief.prior, p)
@@ -158,7 +186,7 @@ class ExpectedFind:
         if len(near) == 0:
             return None
         every = lattice.discs
-        swath = touched(every.centre, every.reach, np.broadcast_to(tip, (len(near), 2)), lattice.nodes[near])
+        swath = touched(every.centre[None], every.reach[None], tip, lattice.nodes[near][:, None])
         left = weight[None] * ~swath
         mass = weight.sum() - left.sum(axis=1)
         length = lengths[near]
@@ -167,21 +195,19 @@ class ExpectedFind:
         best_score, best_root = float(np.max(score)), int(root[int(np.argmax(score))])
         for _ in range(p.depth - 1):
             kept = np.argsort(-score, kind="stable")[: p.width]
-            parent, leg = [], []
-            for i in kept:
-                legs = np.arange(lattice.first[node[i]], lattice.first[node[i] + 1])
-                legs = legs[free[legs]]
-                parent.append(np.full(len(legs), i))
-                leg.append(legs)
-            parents, legs = np.concatenate(parent), np.concatenate(leg)
+            leg = [np.arange(lattice.first[node[i]], lattice.first[node[i] + 1]) for i in kept]
+            legs, parents = np.concatenate(leg), np.repeat(kept, [len(ls) for ls in leg])
+            gained = np.concatenate([lattice.gains(node[i], left[i]) for i in kept])[free[legs]]
+            legs, parents = legs[free[legs]], parents[free[legs]]
             if len(legs) == 0:
                 break
-            gained = np.concatenate([lattice.swath[ls] @ left[i] for i, ls in zip(kept, leg, strict=True)])
             middle = length[parents] + 0.5 * lattice.length[legs]
             score = score[parents] + gained * np.exp(-middle / p.discount_m)
             top = np.argsort(-score, kind="stable")[: 3 * p.width]
             parents, legs, score = parents[top], legs[top], score[top]
-            left = left[parents] * (1.0 - lattice.swath[legs])
+            left = left[parents]
+            for weights, begin, end in zip(left, lattice.begin[legs], lattice.begin[legs + 1], strict=True):
+                weights[lattice.swath[begin:end]] = 0.0
             length = length[parents] + lattice.length[legs]
             root, node = root[parents], lattice.ends[legs, 1]
             if float(score[0]) > best_score:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glotouch_bt.perception.search import ExpectationParams, ExpectedFind, SearchMap
-from glotouch_bt.perception.search.policies.expectation import touched
+from glotouch_bt.perception.search.policies.expectation import _lattice, touched
 from glotouch_bt.perception.search.remaining import USUAL
 from glotouch_bt.perception.touch import Contour
 
@@ -55,8 +55,18 @@ def test_touched_is_the_distance_of_a_point_from_a_segment(
     centre = np.random.default_rng(0).uniform(-0.2, 0.2, (200, 2))
     distance = np.linalg.norm(centre[:, None] - line[None], axis=2).min(axis=1)
     clear = np.abs(distance - reach) > 2e-4  # of what is nearer the sampled line says nothing
-    got = touched(centre, np.full(200, reach), start[None], end[None])[0]
+    got = touched(centre, np.full(200, reach), start, end)
     np.testing.assert_array_equal(got[clear], (distance < reach)[clear])
+
+
+def test_the_legs_of_a_node_find_the_weight_that_they_touch() -> None:
+    """Against all discs compared with all legs."""
+    lattice = _lattice((0.05, 0.08), USUAL, PARAMS)
+    start, end = (lattice.nodes[lattice.ends[:, i]][:, None] for i in (0, 1))
+    every = touched(lattice.discs.centre[None], lattice.discs.reach[None], start, end)
+    weight = np.random.default_rng(1).uniform(size=every.shape[1])
+    found = [lattice.gains(node, weight) for node in range(len(lattice.nodes))]
+    np.testing.assert_allclose(np.concatenate(found), every @ weight, atol=1e-9)
 
 
 def test_a_disc_the_path_swept_over_is_ruled_out_and_no_other() -> None:
