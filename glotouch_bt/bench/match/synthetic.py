@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -33,6 +34,10 @@ DRIFT_M, DRIFT_RAD = 1.5e-3, math.radians(3.0)
 """Motion of the object between two sequences. Source: ours."""
 
 
+Stances = Callable[[Contour, np.random.Generator], list[Place]]
+"""The hand's places over an object with that outline."""
+
+
 def sampled_layout(backend: str, world: World, conditions: Conditions, seed: int) -> Layout:
     """Touch every object of a trial as `sample_layout` does.
 
@@ -55,7 +60,16 @@ def sample_layout(sampler: TouchSampler, seed: int, conditions: str) -> Layout:
     return Layout(seed, conditions, sampler.names, tuple(touched))
 
 
-def _touch(sampler: TouchSampler, name: str, index: int, rng: np.random.Generator) -> tuple[TouchSet, Place]:
+def handle_each(sampler: TouchSampler, seed: int) -> dict[str, TouchSet]:
+    """Handle every object alone as `glotouch run remember` does, with at most 20 closures."""
+    return {
+        name: _touch(sampler, name, 0, stream(seed, f"handling {name}"), _handling)[0] for name in sampler.names
+    }  # fmt: skip
+
+
+def _touch(
+    sampler: TouchSampler, name: str, index: int, rng: np.random.Generator, stances: Stances | None = None
+) -> tuple[TouchSet, Place]:
     solid = sampler.solid(name).as_trimesh()
     place: Place = (*rng.uniform(-0.05, 0.05, 2).tolist(), float(rng.uniform(-math.pi, math.pi)))
     top_m = float(np.asarray(solid.vertices)[:, 2].max()) + HEIGHT_SD_M * float(rng.standard_normal())
@@ -71,7 +85,7 @@ def _touch(sampler: TouchSampler, name: str, index: int, rng: np.random.Generato
     if heights[-1] - heights[0] < 0.003:
         heights = heights[:1]
     sequences = []
-    for stance in _stances(contour, rng):
+    for stance in (stances or _stances)(contour, rng):
         drift = rng.standard_normal(3) * [DRIFT_M, DRIFT_M, DRIFT_RAD]
         place = (place[0] + drift[0], place[1] + drift[1], place[2] + drift[2])
         layers = []
@@ -93,6 +107,16 @@ def _stances(contour: Contour, rng: np.random.Generator) -> list[Place]:
         (x + k * contour.size_m[0] * along[0], y + k * contour.size_m[0] * along[1], contour.yaw_rad)
         for k in (-0.25, 0.0, 0.25)
     ]
+
+
+def _handling(contour: Contour, rng: np.random.Generator) -> list[Place]:
+    """Return the hand's places of `remember`: five directions of a round object, three tracks and both diagonals."""
+    x, y = contour.centre_K_m.tolist()
+    if contour.kind == "round":
+        first = float(rng.uniform(0.0, math.pi))
+        return [(x, y, first + k * math.pi / 5) for k in range(5)]
+    turned = [(x, y, contour.yaw_rad + k * math.pi / 2) for k in (1,)]
+    return _stances(contour, rng) + turned
 
 
 def _close(sampler: TouchSampler, name: str, place: Place, hand: Place, height_m: float) -> tuple[Layer, Place]:

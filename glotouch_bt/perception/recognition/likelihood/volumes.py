@@ -63,34 +63,40 @@ def width_ratios(
     """Return log ratios (nb, 72, nd, nz) summed over layers, those of a twin (1, 72, nd, nz), and residual and scale
     (72, nd, nz) of each layer.
 
-    The twin differs from the target at each closure independently with probability `twin_width`.
+    The twin differs from the target at each closure independently with probability `twin_width`. A width that the model
+    does not know is as that of any object (`Certainty`).
     """
     shape = (len(model.phi_rad), len(grid.shift_m), len(grid.z0_m))
     total, twin = np.zeros((len(grid.bias_m), *shape), dtype=np.float32), np.zeros((1, *shape), dtype=np.float32)
     bias = grid.bias_m.astype(np.float32)[:, None, None, None]
     offs: list[tuple[Array32, Array32]] = []
-    outlier, far_sd = np.float32(p.width_outlier), np.float32(p.twin_width_sd_m)
+    outlier, far_sd, known = np.float32(p.width_outlier), np.float32(p.twin_width_sd_m), np.float32(1)
     for o in seen:
         e = o.layer
         at, z_m = e.along_m + grid.shift_m, e.height_m + grid.z0_m
         off = np.float32(e.width_m) - interpolated_width(model, at, z_m, turn_rad)[None]
-        sd = np.float32(p.width_rough) * nearest_unevenness(model, at, z_m, turn_rad)[None]
+        sd = np.float32(p.width_rough) * nearest(model.unevenness_m, model, at, z_m, turn_rad)[None]
         sd = np.sqrt(sd * sd + np.float32(p.width_sd_m**2))
+        if model.certainty is not None:
+            unsure = nearest(model.certainty.width_sd_m, model, at, z_m, turn_rad)[None]
+            sd, far_sd = np.hypot(sd, unsure), np.hypot(np.float32(p.twin_width_sd_m), unsure)
+            known = nearest(model.certainty.width_known, model, at, z_m, turn_rad)[None]
         offs.append((off[0], sd[0]))
         scale = (1 - p.width_outlier) * math.exp(-o.log_width)
         if e.upper_only:  # contact of the other finger outside its gel: the width is an upper bound
-            far_peak = np.float32(scale / p.width_range_m)
-            peak = np.full((1, 1, 1, 1), far_peak)
+            far_peak = np.full((1, 1, 1, 1), np.float32(scale / p.width_range_m))
+            peak = far_peak
             biased = np.minimum(off - bias, np.float32(0))
             off = np.minimum(off, np.float32(0))
         else:
-            far_peak = np.float32(scale * T_PEAK / p.twin_width_sd_m)
+            far_peak = np.float32(scale * T_PEAK) / far_sd
             peak = np.float32(scale * T_PEAK) / sd
             biased = off - bias
         # An empty window (NaN) predicts no contact; only the outlier density remains.
-        total += np.log(_or_none(width_kernel(biased / sd) * peak) + outlier)
+        missed = outlier + (1 - known) * (1 - outlier)
+        total += np.log(_or_none(known * width_kernel(biased / sd) * peak) + missed)
         near, far = width_kernel(off / sd) * peak, width_kernel(off / far_sd) * far_peak
-        twin += np.log(_or_none(near + np.float32(p.twin_width) * (far - near)) + outlier)
+        twin += np.log(_or_none(known * (near + np.float32(p.twin_width) * (far - near))) + missed)
     return total, twin, offs
 
 
@@ -120,7 +126,11 @@ def image_ratios(
             squared = _squared_distance(model, m, at, z_m)
             # (kernel / background) (1 - outlier) + outlier
             good = np.float32((1 - p.image_outlier) * math.exp(-o.log_images[side]))
-            ratio = np.log(image_kernel(squared, p) * good + np.float32(p.image_outlier))
+            missed = np.float32(p.image_outlier)
+            if model.certainty is not None:
+                known = nearest(model.certainty.image_known, model, at, z_m, 0.0).transpose(2, 1, 0)
+                good, missed = good * known, missed + (1 - known) * (1 - missed)
+            ratio = np.log(image_kernel(squared, p) * good + missed)
             roll %= yaws
             total[:, :, : yaws - roll] += ratio[:, :, roll:]
             total[:, :, yaws - roll :] += ratio[:, :, :roll]
@@ -165,14 +175,14 @@ def interpolated_width(model: TargetModel, l_m: Array, z_m: Array, turn_rad: flo
     return np.asarray((1 - part) * first + part * np.concatenate([first[1:], first[:1]]), dtype=np.float32)
 
 
-def nearest_unevenness(model: TargetModel, l_m: Array, z_m: Array, turn_rad: float) -> Array32:
-    """Return the unevenness (72, nl, nz) of the nearest cells, at yaws phi + turn."""
+def nearest(table: Array32, model: TargetModel, l_m: Array, z_m: Array, turn_rad: float) -> Array32:
+    """Return the values (72, nl, nz) of the nearest cells of a table of a model, at yaws phi + turn."""
     i, j = (
         np.clip(np.rint((x - axis[0]) / (axis[1] - axis[0])), 0, len(axis) - 1).astype(np.int64)
         for axis, x in ((model.l_m, l_m), (model.z_m, z_m))
     )
     turn = round(turn_rad / (2 * np.pi) * len(model.phi_rad))
-    return np.roll(model.unevenness_m[:, i[:, None], j[None, :]], -turn, axis=0)
+    return np.roll(table[:, i[:, None], j[None, :]], -turn, axis=0)
 
 
 def _positions(axis: Array, x: Array) -> tuple[Index, Array32]:
