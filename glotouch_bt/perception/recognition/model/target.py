@@ -49,17 +49,19 @@ class TargetHypothesis:
 
 @dataclass(frozen=True, eq=False)
 class Certainty:
-    """How well the tables of an object known only by touch are known; each (72, nl, nz).
+    """How well the tables, each (72, nl, nz), and the height of an object known only by touch are known.
 
     Attributes:
         width_sd_m: Standard deviation of the width, besides that of a measurement.
         width_known: Probability that the table predicts the width; otherwise it is as that of any object.
         image_known: The same of the left pad's image.
+        height_sd_m: Standard deviation of the height.
     """
 
     width_sd_m: Array32
     width_known: Array32
     image_known: Array32
+    height_sd_m: float
 
 
 @dataclass(frozen=True, eq=False)

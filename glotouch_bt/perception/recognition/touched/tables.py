@@ -33,6 +33,9 @@ IMAGE_PHI_RAD, IMAGE_L_M, IMAGE_Z_M = math.radians(10.0), 4e-3, 4e-3
 """Distances from a felt image within which another image is like it. Source: ours; a block of an image is 4 mm."""
 OVERHANG_M = 0.015
 """The tables reach this far beyond the outline: the object may be wider above it. Source: ours."""
+TOP_SD_M, LEAN_RAD = 1.2e-3, 0.03
+"""Standard deviations of a measured top, and of the lean of the object when it was measured. Source:
+`LikelihoodParams`."""
 TOPS = 8
 """Number of tops of parts, all unknown: each is the whole object's. Source: `model.tops`."""
 
@@ -56,7 +59,8 @@ def touched_model(felt: TouchedObject, pad: PadSpec) -> TargetModel:
     reach = 0.5 * width + 0.5 * (high + low)[:, :, None]
     images, image_known = _images(felt.closures, phi, l, z)
     certainty = Certainty(
-        sd.astype(np.float32), (1.0 / (1.0 + (sd / VAGUE_M) ** 2)).astype(np.float32), image_known
+        sd.astype(np.float32), (1.0 / (1.0 + (sd / VAGUE_M) ** 2)).astype(np.float32), image_known,
+        math.hypot(TOP_SD_M, LEAN_RAD * 0.5 * max(c.size_m[0] for c in contours)) / math.sqrt(len(contours)),
     )  # fmt: skip
     stored = np.ascontiguousarray(images.transpose(2, 1, 0, 3))
     long, short = max((c.size_m for c in contours), key=lambda size: size[0])
