@@ -17,8 +17,15 @@ from glotouch_bt.bench.match.dataset import Layout, Planar, Touched
 from glotouch_bt.bench.match.methods import TOUCHED, Method, Target, by_touch, methods
 from glotouch_bt.bench.match.shapes import symmetries_rad, twins
 from glotouch_bt.perception import model_with_sides
-from glotouch_bt.perception.recognition import Match, PadSpec, Ranking, TargetModel
-from glotouch_bt.perception.recognition.touched import TouchedObject, encounter_of, touched_model
+from glotouch_bt.perception.recognition import (
+    Match,
+    PadSpec,
+    Ranking,
+    TargetModel,
+    TouchedObject,
+    encounter_of,
+    touched_model,
+)
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene import Mesh, load_folder
