@@ -36,12 +36,24 @@ OVERHANG_M = 0.015
 TOP_SD_M, LEAN_RAD = 1.2e-3, 0.03
 """Standard deviations of a measured top, and of the lean of the object when it was measured. Source:
 `LikelihoodParams`."""
+KEPT = 16
+"""Number of models kept in memory. Source: ours; one takes 20 MB."""
+_latest: dict[tuple[str, str, PadSpec], TargetModel] = {}
 TOPS = 8
 """Number of tops of parts, all unknown: each is the whole object's. Source: `model.tops`."""
 
 
 def touched_model(felt: TouchedObject, pad: PadSpec) -> TargetModel:
-    """Return the model of an object that is known only by touch (below a second)."""
+    """Return the model of an object that is known only by touch (below a second; the latest are kept in memory)."""
+    key = (felt.name, digest_of(felt), pad)
+    if key not in _latest:
+        while len(_latest) >= KEPT:
+            del _latest[next(iter(_latest))]
+        _latest[key] = _build(felt, pad)
+    return _latest[key]
+
+
+def _build(felt: TouchedObject, pad: PadSpec) -> TargetModel:
     contours = [e.contour for e in felt.encounters]
     radius = max(float(np.linalg.norm(c.outline_K_m(), axis=1).max()) for c in contours) + OVERHANG_M
     axes = axes_within(radius, felt.height_m, pad)
