@@ -31,7 +31,9 @@ def wrong_models(plan: FaultPlan, mission: Mission, folder: Path) -> dict[str, s
             raise BadInput(f"{spec.place}: {spec.name}: mission {mission.name!r} has no parameter of type stl")
         for name in mission.stl_parameters:
             if touched_name(str(mission.parameters[name])):
-                raise BadInput(f"{spec.place}: {spec.name}: {mission.parameters[name]!r} has no STL; choose another fault")
+                raise BadInput(
+                    f"{spec.place}: {spec.name}: {mission.parameters[name]!r} has no STL; choose another fault"
+                )
             source = Path(given.get(name, str(mission.parameters[name])))
             if source.suffix.lower() != ".stl":
                 source = stl_files(mission.world.objects.folder)[str(source)]

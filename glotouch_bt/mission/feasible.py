@@ -46,7 +46,12 @@ def check_feasible(mission: Mission, backend: str, options: Mapping[str, object]
         findings.add(Place(str(objects.folder)), "no_layout", str(e))
     for name in mission.stl_parameters:
         target = str(mission.parameters.get(name, ""))
-        if target and not touched_name(target) and gripper is not None and (fault := ungraspable(_loaded(target, objects), gripper)):
+        if (
+            target
+            and not touched_name(target)
+            and gripper is not None
+            and (fault := ungraspable(_loaded(target, objects), gripper))
+        ):
             findings.add(Place(f"--set {name}"), "target_out_of_reach", fault)
     return tuple(findings.sorted())
 

@@ -23,7 +23,8 @@ class NextProbeParams(SkillParams):
     """Parameters of `next_probe`."""
 
     target: str = param(
-        "The object wanted: an STL file, the name of one in the world's object folder, or touched:NAME; empty: measure everything",
+        "The object wanted: an STL file, the name of one in the world's object folder, or touched:NAME; "
+        "empty: measure everything",
         default="",
         names="stl",
     )

@@ -25,7 +25,9 @@ def in_words(ranking: Ranking) -> str:
 class MatchParams(SkillParams):
     """Parameters of `match`."""
 
-    target: str = param("The object to find: an STL file, the name of one in the world's object folder, or touched:NAME", names="stl")
+    target: str = param(
+        "The object to find: an STL file, the name of one in the world's object folder, or touched:NAME", names="stl"
+    )
     matcher: Literal["likelihood", "paper"] = param("Method of comparing candidates", default="likelihood")
 
 

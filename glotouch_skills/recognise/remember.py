@@ -65,7 +65,10 @@ class Remember(Skill):
                 + ("touched" if touchset.candidate.top_touched else "not touched"),
                 layers=layers,
             )
-        path, pad = perception.touched_path(self.params.object), perception.pads_of(self.context.arm.description.gripper)
+        path, pad = (
+            perception.touched_path(self.params.object),
+            perception.pads_of(self.context.arm.description.gripper),
+        )
         if path.exists():
             felt = self._grown(perception.read_touched(self.params.object), touchset, pad)
         else:

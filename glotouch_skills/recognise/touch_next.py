@@ -43,7 +43,9 @@ STILL_THERE_M = 0.003
 class TouchNextParams(ClosureParams):
     """Parameters of `touch_next`."""
 
-    target: str = param("The object to find: an STL file, the name of one in the world's object folder, or touched:NAME", names="stl")
+    target: str = param(
+        "The object to find: an STL file, the name of one in the world's object folder, or touched:NAME", names="stl"
+    )
     confidence: float = param("Sufficient probability", default=0.9, gt=0.5, lt=1.0)
     unmeasured: bool = param("Touch candidates that the probe did not measure, too", default=False)
     min_gain_nats: float = param(

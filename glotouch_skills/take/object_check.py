@@ -26,7 +26,9 @@ class ObjectCheckParams(SkillParams):
     wood to steel, so the weight only excludes the impossible.
     """
 
-    target: str = param("The object wanted: an STL file, the name of one in the world's object folder, or touched:NAME", names="stl")
+    target: str = param(
+        "The object wanted: an STL file, the name of one in the world's object folder, or touched:NAME", names="stl"
+    )
     width_m: float = param("Largest deviation from that range", unit="m", default=0.0025, gt=0.0, le=0.02)
     lightest_kg_m3: float = param("Least density of the target", unit="kg/m3", default=100.0, gt=0.0)
     heaviest_kg_m3: float = param("Largest density of the target", unit="kg/m3", default=8000.0, gt=0.0)
@@ -71,6 +73,7 @@ class ObjectCheck(Skill):
         p, made = self.params, self.made
         gripper = self.context.arm.description.gripper
         target = find_target(p.target, self.context.world.objects, gripper)
+        name = target.name
         least_m3, most_m3 = target.volume_m3
         light, heavy = GRAVITY_M_S2 * p.lightest_kg_m3 * least_m3, GRAVITY_M_S2 * p.heaviest_kg_m3 * most_m3
         give = 2.0 * gripper.pad_depth_m
@@ -79,7 +82,7 @@ class ObjectCheck(Skill):
         if not light <= self.weight_N <= heavy:
             self.impossible = True
             raise self.WRONG_OBJECT(
-                f"{target.name} weighs {light:.2f} to {heavy:.1f} N, of wood or steel; this weighs {self.weight_N:.2f} N",
+                f"{name} weighs {light:.2f} to {heavy:.1f} N, of wood or steel; this weighs {self.weight_N:.2f} N",
                 weight_N=self.weight_N,
                 light_N=light,
                 heavy_N=heavy,
@@ -93,13 +96,13 @@ class ObjectCheck(Skill):
         if least <= p.width_m:
             raise self.NOT_AS_FELT(
                 f"the jaws stopped at {self.grip_m * 1e3:.1f} mm where {made.aperture_m * 1e3:.1f} mm were planned; "
-                f"{target.name} is that wide elsewhere",
+                f"{name} is that wide elsewhere",
                 off_m=off,
                 limit_m=p.width_m,
             )
         self.impossible = True
         raise self.WRONG_OBJECT(
-            f"the jaws stopped at {self.grip_m * 1e3:.1f} mm; wherever {target.name} is held at this height, they would "
+            f"the jaws stopped at {self.grip_m * 1e3:.1f} mm; wherever {name} is held at this height, they would "
             f"stop at least {least * 1e3:.1f} mm from there",
             off_m=off,
             min_m=least,

@@ -76,7 +76,10 @@ def samplers(backend: str, world: World, conditions: Conditions, seed: int) -> l
 
 
 def sample_layout(sampler: TouchSampler, seed: int, conditions: str, first: int = 0) -> Layout:
-    """Touch every object once; equal seeds draw equal stances whatever the conditions. Candidates count from `first`."""
+    """Touch every object once; equal seeds draw equal stances whatever the conditions.
+
+    Candidates are numbered from `first`.
+    """
     touched = []
     for index, name in enumerate(sampler.names, first):
         rng = stream(seed, f"stances {name}")

@@ -168,8 +168,12 @@ def _image_ratios(
     inner = np.maximum(norm[:, :, None] + norm[:, None, :] - 2 * side @ side.transpose(0, 2, 1), 0) / np.float32(size)
     shares = known * weight
     unknown = (1 - shares.sum(axis=1))[:, None]
-    own = np.einsum("nij,nj->ni", image_kernel(inner, p), shares) / image_kernel(mean_squared(flat, library), p).mean(axis=-1).reshape(n, s)
-    other = (image_kernel(mean_squared(others, flat), p).reshape(len(others), n, s) * shares).sum(axis=2).T / generic_other
+    own = np.einsum("nij,nj->ni", image_kernel(inner, p), shares) / image_kernel(mean_squared(flat, library), p).mean(
+        axis=-1
+    ).reshape(n, s)
+    other = (image_kernel(mean_squared(others, flat), p).reshape(len(others), n, s) * shares).sum(
+        axis=2
+    ).T / generic_other
     ratio = np.concatenate([own, other], axis=1) + unknown
     return np.asarray(p.temper_image * np.log((1 - p.image_outlier) * ratio + p.image_outlier), dtype=np.float64)
 

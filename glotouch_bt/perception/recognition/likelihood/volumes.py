@@ -70,7 +70,9 @@ def width_ratios(
     total, twin = np.zeros((len(grid.bias_m), *shape), dtype=np.float32), np.zeros((1, *shape), dtype=np.float32)
     bias = grid.bias_m.astype(np.float32)[:, None, None, None]
     offs: list[tuple[Array32, Array32]] = []
-    outlier, far_sd, known = np.float32(p.width_outlier), np.float32(p.twin_width_sd_m), np.float32(1)
+    outlier = np.float32(p.width_outlier)
+    far_sd: Floats = np.full((1, 1, 1, 1), p.twin_width_sd_m, dtype=np.float32)
+    known: Floats = np.ones((1, 1, 1, 1), dtype=np.float32)
     for o in seen:
         e = o.layer
         at, z_m = e.along_m + grid.shift_m, e.height_m + grid.z0_m
@@ -84,8 +86,8 @@ def width_ratios(
         offs.append((off[0], sd[0]))
         scale = (1 - p.width_outlier) * math.exp(-o.log_width)
         if e.upper_only:  # contact of the other finger outside its gel: the width is an upper bound
-            far_peak = np.full((1, 1, 1, 1), np.float32(scale / p.width_range_m))
-            peak = far_peak
+            far_peak: Floats = np.full((1, 1, 1, 1), np.float32(scale / p.width_range_m))
+            peak: Floats = far_peak
             biased = np.minimum(off - bias, np.float32(0))
             off = np.minimum(off, np.float32(0))
         else:
@@ -125,8 +127,8 @@ def image_ratios(
                 at, roll = -at, turn + yaws // 2
             squared = _squared_distance(model, m, at, z_m)
             # (kernel / background) (1 - outlier) + outlier
-            good = np.float32((1 - p.image_outlier) * math.exp(-o.log_images[side]))
-            missed = np.float32(p.image_outlier)
+            good: Floats = np.full((1, 1, 1), (1 - p.image_outlier) * math.exp(-o.log_images[side]), dtype=np.float32)
+            missed: Floats = np.full((1, 1, 1), p.image_outlier, dtype=np.float32)
             if model.certainty is not None:
                 known = nearest(model.certainty.image_known, model, at, z_m, 0.0).transpose(2, 1, 0)
                 good, missed = good * known, missed + (1 - known) * (1 - missed)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -24,7 +25,7 @@ def points_of(contour: Contour) -> Array:
     """Return points (n, 2) along an outline, `STEP_M` apart."""
     corners = contour.outline_K_m(96)
     out = []
-    for a, b in zip(corners[:-1], corners[1:], strict=True):
+    for a, b in pairwise(corners):
         count = max(2, math.ceil(float(np.linalg.norm(b - a)) / STEP_M))
         out.append(a + np.linspace(0.0, 1.0, count, endpoint=False)[:, None] * (b - a))
     return np.concatenate(out)
