@@ -12,7 +12,7 @@ from glotouch_bt.perception.recognition import Ranking
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import HOLD, BadInput
 from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.planning import TOO_LOW, GraspPlan, Target, find_target, plan_grasp
+from glotouch_skills.common.planning import TOO_LOW, GraspPlan, SoughtObject, find_target, plan_grasp
 
 
 def in_words(ranking: Ranking) -> str:
@@ -98,7 +98,7 @@ class MatchTarget(Skill):
         self.plan = plan_grasp(best, ranking.best, target.standing(quat), model.standing(quat), gripper)
         self.event("plan", plan=self.plan)
 
-    def _told_of_twins(self, ranking: Ranking, target: Target) -> Ranking:
+    def _told_of_twins(self, ranking: Ranking, target: SoughtObject) -> Ranking:
         """Say which objects of the box have exactly the target's shape: nobody can tell them apart by touch."""
         twins = target.twins
         if not twins:

@@ -27,7 +27,7 @@ from glotouch_skills.common.planning import (
 class SqueezeParams(ClosureParams):
     """Parameters of `squeeze`."""
 
-    most_closures: int = param(
+    max_closures: int = param(
         "Closures at most, spread over all sides and heights; 0: three sequences", default=0, ge=0, le=100
     )
 
@@ -36,7 +36,7 @@ class Squeeze(Skill):
     """Squeeze one candidate with limited force at several heights.
 
     A round candidate is squeezed at three yaws, 60 degrees apart; a box-like one on three parallel tracks across its
-    short side. Heights ascend: the first closure centres the object where it cannot topple. With `most_closures`, the
+    short side. Heights ascend: the first closure centres the object where it cannot topple. With `max_closures`, the
     sequences come from all sides instead: for an object to be remembered.
 
     SUCCESS: there is at least one stable layer; `touchset` has all layers.
@@ -78,7 +78,7 @@ class Squeeze(Skill):
             heights = layer_heights(candidate, arm.description.gripper, self.params)
             container = self.context.world.container
             gaps_m = (self.params.side_gap_m, 0.5 * self.params.side_gap_m)
-            most = self.params.most_closures
+            most = self.params.max_closures
             choices = [all_sides(candidate, arm.description.gripper, max(most // len(heights), 1))] if most else ()
             stances, refusals = yield from plan_stances(candidate, arm, container, float(heights[0]), gaps_m, choices)
             for at in stances:

@@ -74,8 +74,8 @@ class ObjectCheck(Skill):
         gripper = self.context.arm.description.gripper
         target = find_target(p.target, self.context.world.objects, gripper)
         name = target.name
-        least_m3, most_m3 = target.volume_m3
-        light, heavy = GRAVITY_M_S2 * p.lightest_kg_m3 * least_m3, GRAVITY_M_S2 * p.heaviest_kg_m3 * most_m3
+        low_m3, high_m3 = target.volume_m3
+        light, heavy = GRAVITY_M_S2 * p.lightest_kg_m3 * low_m3, GRAVITY_M_S2 * p.heaviest_kg_m3 * high_m3
         give = 2.0 * gripper.pad_depth_m
         off = misfit_m(np.array(made.aperture_m), self.grip_m, give).item()
         self.event("object_check", grip_m=self.grip_m, off_m=off, weight_N=self.weight_N, light_N=light, heavy_N=heavy)

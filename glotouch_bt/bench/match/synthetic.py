@@ -38,7 +38,7 @@ BOX = 5
 """Largest number of objects that a sampler places in one box."""
 HANDLED_SEED = 1_000_000
 """Added to a layout's seed: an object is handled in another trial, with other errors, than it is recognised in."""
-MOST_CLOSURES = 20
+MAX_CLOSURES = 20
 """Largest number of closures of one handling. Source: `RememberParams`."""
 
 
@@ -120,7 +120,7 @@ def _touch(
     if heights[-1] - heights[0] < 0.003:
         heights = heights[:1]
     sequences = []
-    stances = _handling(contour, rng, MOST_CLOSURES // len(heights)) if alone else _stances(contour, rng)
+    stances = _handling(contour, rng, MAX_CLOSURES // len(heights)) if alone else _stances(contour, rng)
     for stance in stances:
         drift = rng.standard_normal(3) * [DRIFT_M, DRIFT_M, DRIFT_RAD]
         place = (place[0] + drift[0], place[1] + drift[1], place[2] + drift[2])

@@ -11,5 +11,5 @@ from glotouch_skills.common.planning.squeeze_motion import (
     pads_height_m,
 )
 from glotouch_skills.common.planning.squeeze_plan import Stance, all_sides, plan_stances
-from glotouch_skills.common.planning.target import TOO_LOW, Target, find_target
+from glotouch_skills.common.planning.target import TOO_LOW, SoughtObject, find_target
 from glotouch_skills.common.planning.touch_options import Option, Standing, best_rates, options

@@ -22,7 +22,7 @@ may be hollow, or wider above the outline."""
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
+class SoughtObject:
     """The object to find.
 
     Attributes:
@@ -44,7 +44,7 @@ class Target:
         return standing(self.solid, quat) if isinstance(self.solid, Mesh) else self.solid
 
 
-def find_target(target: str, objects: ObjectSet, gripper: Gripper) -> Target:
+def find_target(target: str, objects: ObjectSet, gripper: Gripper) -> SoughtObject:
     """Return the target: an STL file, an object of the world's folder, or `touched:NAME`.
 
     Args:
@@ -61,14 +61,14 @@ def find_target(target: str, objects: ObjectSet, gripper: Gripper) -> Target:
     mesh = load_target(target, objects.folder)
     volume = float(mesh.as_trimesh().volume)
     model = load_target_model(mesh, gripper, objects.stance)
-    return Target(mesh.name, model, mesh, (volume, volume), twins_of(target, objects))
+    return SoughtObject(mesh.name, model, mesh, (volume, volume), twins_of(target, objects))
 
 
-def _touched(felt: TouchedObject, gripper: Gripper) -> Target:
+def _touched(felt: TouchedObject, gripper: Gripper) -> SoughtObject:
     model = recognition.touched_model(felt, perception.pads_of(gripper))
     long, short = model.outline.likely.size_m
     least, most = (share * long * short * felt.height_m for share in FILLED)
-    return Target(felt.name, model, felt, (least, most))
+    return SoughtObject(felt.name, model, felt, (least, most))
 
 
 def load_target(target: str, folder: Path) -> Mesh:

@@ -52,6 +52,21 @@ class Observed:
     log_images: tuple[float, float]
 
 
+@dataclass(frozen=True)
+class WidthVolumes:
+    """Width of one layer at every pose, each (72, nd, nz).
+
+    Attributes:
+        off_m: Measured minus predicted width.
+        scale_m: Scale of its noise.
+        known: Probability that the model predicts it.
+    """
+
+    off_m: Floats
+    scale_m: Floats
+    known: Floats
+
+
 def width_kernel(z: Floats) -> Floats:
     """Return Student's t with three degrees of freedom, normalised to 1 at its peak."""
     return np.asarray((1 + z * z * np.float32(1 / 3)) ** -2)
@@ -59,9 +74,8 @@ def width_kernel(z: Floats) -> Floats:
 
 def width_ratios(
     model: TargetModel, seen: Sequence[Observed], turn_rad: float, grid: Grid, p: LikelihoodParams
-) -> tuple[Array32, Array32, list[tuple[Array32, Array32]]]:
-    """Return log ratios (nb, 72, nd, nz) summed over layers, those of a twin (1, 72, nd, nz), and residual and scale
-    (72, nd, nz) of each layer.
+) -> tuple[Array32, Array32, list[WidthVolumes]]:
+    """Return log ratios (nb, 72, nd, nz) summed over layers, those of a twin (1, 72, nd, nz), and each layer's volumes.
 
     The twin differs from the target at each closure independently with probability `twin_width`. A width that the model
     does not know is as that of any object (`Certainty`).
@@ -69,7 +83,7 @@ def width_ratios(
     shape = (len(model.phi_rad), len(grid.shift_m), len(grid.z0_m))
     total, twin = np.zeros((len(grid.bias_m), *shape), dtype=np.float32), np.zeros((1, *shape), dtype=np.float32)
     bias = grid.bias_m.astype(np.float32)[:, None, None, None]
-    offs: list[tuple[Array32, Array32]] = []
+    volumes: list[WidthVolumes] = []
     outlier = np.float32(p.width_outlier)
     far_sd: Floats = np.full((1, 1, 1, 1), p.twin_width_sd_m, dtype=np.float32)
     known: Floats = np.ones((1, 1, 1, 1), dtype=np.float32)
@@ -83,7 +97,7 @@ def width_ratios(
             unsure = nearest(model.certainty.width_sd_m, model, at, z_m, turn_rad)[None]
             sd, far_sd = np.hypot(sd, unsure), np.hypot(np.float32(p.twin_width_sd_m), unsure)
             known = nearest(model.certainty.width_known, model, at, z_m, turn_rad)[None]
-        offs.append((off[0], sd[0]))
+        volumes.append(WidthVolumes(off[0], sd[0], np.broadcast_to(known[0], shape)))
         scale = (1 - p.width_outlier) * math.exp(-o.log_width)
         if e.upper_only:  # contact of the other finger outside its gel: the width is an upper bound
             far_peak: Floats = np.full((1, 1, 1, 1), np.float32(scale / p.width_range_m))
@@ -99,7 +113,7 @@ def width_ratios(
         total += np.log(_or_none(known * width_kernel(biased / sd) * peak) + missed)
         near, far = width_kernel(off / sd) * peak, width_kernel(off / far_sd) * far_peak
         twin += np.log(_or_none(known * (near + np.float32(p.twin_width) * (far - near))) + missed)
-    return total, twin, offs
+    return total, twin, volumes
 
 
 def _or_none(density: Floats) -> Floats:
