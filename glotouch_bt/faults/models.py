@@ -7,6 +7,7 @@ from pathlib import Path
 from glotouch_bt.faults.effects import WrongScaleStlParams
 from glotouch_bt.faults.plan import FaultPlan
 from glotouch_bt.mission import Mission
+from glotouch_bt.perception import touched_name
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene import load_mesh, stl_files
 
@@ -29,6 +30,10 @@ def wrong_models(plan: FaultPlan, mission: Mission, folder: Path) -> dict[str, s
         if not mission.stl_parameters:
             raise BadInput(f"{spec.place}: {spec.name}: mission {mission.name!r} has no parameter of type stl")
         for name in mission.stl_parameters:
+            if touched_name(str(mission.parameters[name])):
+                raise BadInput(
+                    f"{spec.place}: {spec.name}: {mission.parameters[name]!r} has no STL; choose another fault"
+                )
             source = Path(given.get(name, str(mission.parameters[name])))
             if source.suffix.lower() != ".stl":
                 source = stl_files(mission.world.objects.folder)[str(source)]

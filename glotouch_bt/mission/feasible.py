@@ -9,7 +9,7 @@ from glotouch_bt.mission.load import Mission
 from glotouch_bt.mission.read import shipped_root
 from glotouch_bt.mission.spec import Finding, Findings, Place
 from glotouch_bt.motion import out_of_reach
-from glotouch_bt.perception import TooLow, model_for, too_wide
+from glotouch_bt.perception import TooLow, model_for, too_wide, touched_name
 from glotouch_bt.robot import BadInput, Gripper, ObjectSet, load_backend
 from glotouch_bt.robot.scene import Mesh, draw_layout, load_folder, load_mesh
 
@@ -46,7 +46,12 @@ def check_feasible(mission: Mission, backend: str, options: Mapping[str, object]
         findings.add(Place(str(objects.folder)), "no_layout", str(e))
     for name in mission.stl_parameters:
         target = str(mission.parameters.get(name, ""))
-        if target and gripper is not None and (fault := ungraspable(_loaded(target, objects), gripper)):
+        if (
+            target
+            and not touched_name(target)
+            and gripper is not None
+            and (fault := ungraspable(_loaded(target, objects), gripper))
+        ):
             findings.add(Place(f"--set {name}"), "target_out_of_reach", fault)
     return tuple(findings.sorted())
 

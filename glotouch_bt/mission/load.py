@@ -47,6 +47,7 @@ from glotouch_bt.mission.spec import (
     number_names,
     plain,
 )
+from glotouch_bt.perception import touched_name
 from glotouch_bt.robot import BadInput, ObjectSet, World
 from glotouch_bt.robot.scene import twins_of
 from glotouch_bt.skill import Context, Skill
@@ -232,7 +233,7 @@ def _check_twins(
 ) -> None:
     """Report the objects that cannot be told from a target."""
     for name, parameter in parameters.items():
-        if parameter.declared.type != "stl" or not parameter.value:
+        if parameter.declared.type != "stl" or not parameter.value or touched_name(str(parameter.value)):
             continue
         twins = twins_of(str(parameter.value), objects)
         if twins:

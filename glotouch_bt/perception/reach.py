@@ -13,6 +13,11 @@ class TooLow(BadInput):
     """An object is lower than the probe and the pads reach."""
 
 
+def pads_of(gripper: Gripper) -> PadSpec:
+    """Return the pads of a gripper."""
+    return PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
+
+
 def model_for(mesh: Mesh, gripper: Gripper, stance: str | None = None) -> TargetModel:
     """Return an object's model for the pads of a gripper; it is kept on disk.
 
@@ -25,7 +30,7 @@ def model_for(mesh: Mesh, gripper: Gripper, stance: str | None = None) -> Target
     Raises:
         TooLow: The object is lower than the probe and the pads reach.
     """
-    pads = PadSpec(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m)
+    pads = pads_of(gripper)
     try:
         return target_model(mesh, pads) if stance is None else model_with_sides(mesh, pads, stance)
     except ParamError as e:

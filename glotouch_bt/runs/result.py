@@ -16,7 +16,9 @@ from glotouch_bt.mission import Mission
 from glotouch_bt.mission.execution import Outcome
 from glotouch_bt.mission.read import conditions_name, shown
 from glotouch_bt.mission.record import to_json
+from glotouch_bt.perception import touched_name
 from glotouch_bt.robot import Conditions, Robot
+from glotouch_bt.robot.scene import stl_files
 from glotouch_bt.robot.simulation import Referee, TrueObject
 from glotouch_bt.runs.request import RunRequest
 from glotouch_bt.version import __version__
@@ -88,7 +90,7 @@ def score(
     if seen is not None:
         held = [o.name for o in seen.objects if o.in_gripper]
         retrieved = held[0] if held else None
-        correct = retrieved == target if target is not None else None
+        correct = _is(target, retrieved, mission)
         peak = seen.peak_force_N
     return {
         "mission": mission.name,
@@ -123,6 +125,16 @@ def score(
         "parameters": {k: _stem(str(v)) if k in mission.stl_parameters else v for k, v in mission.parameters.items()},
         "versions": installed_versions(),
     } | ({"go_on": GO_ON} if outcome.status == "aborted" else {})
+
+
+def _is(target: str | None, retrieved: str | None, mission: Mission) -> bool | None:
+    """Return True if the target was retrieved; None without one, or if no object of the world has its name."""
+    if target is None:
+        return None
+    name = touched_name(target)
+    if name and name not in stl_files(mission.world.objects.folder):
+        return None
+    return retrieved == (name or target)
 
 
 def _target(mission: Mission) -> str | None:

@@ -11,7 +11,7 @@ from glotouch_bt.perception.recognition import PARTS, ProbeOption, ProbeTouch, e
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import HOLD, Array
 from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.planning import TOO_LOW, load_target, load_target_model
+from glotouch_skills.common.planning import TOO_LOW, find_target
 
 PART_S = {"outline": 17.0, "top": 17.0}
 """Robot time of `refine_outline` and `touch_top` on one candidate. Source: measured, mean of 60 nominal missions."""
@@ -23,7 +23,8 @@ class NextProbeParams(SkillParams):
     """Parameters of `next_probe`."""
 
     target: str = param(
-        "The object wanted: an STL file, or the name of one in the world's object folder; empty: measure everything",
+        "The object wanted: an STL file, the name of one in the world's object folder, or touched:NAME; "
+        "empty: measure everything",
         default="",
         names="stl",
     )
@@ -76,9 +77,8 @@ class NextProbe(Skill):
         self.candidate = next(c for c in candidates if touch is None or c.index == touch.candidate)
 
     def _by_target(self, candidates: tuple[Candidate, ...], left: list[ProbeTouch]) -> ProbeTouch | None:
-        objects = self.context.world.objects
-        mesh = load_target(self.params.target, objects.folder)
-        model = load_target_model(mesh, self.context.arm.description.gripper, objects.stance)
+        gripper = self.context.arm.description.gripper
+        model = find_target(self.params.target, self.context.world.objects, gripper).model
         felt = {t.candidate.index: t.sequences for t in self.felt or ()}
         touchsets = tuple(TouchSet(c, felt.get(c.index, ())) for c in candidates)
         belief = recognition.infer_belief(model, touchsets)

@@ -10,10 +10,9 @@ from glotouch_bt import perception
 from glotouch_bt.perception import recognition
 from glotouch_bt.perception.recognition import Ranking
 from glotouch_bt.perception.touch import Candidate, TouchSet
-from glotouch_bt.robot import HOLD
-from glotouch_bt.robot.scene import standing, twins_of
+from glotouch_bt.robot import HOLD, BadInput
 from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.planning import TOO_LOW, GraspPlan, load_target, load_target_model, plan_grasp
+from glotouch_skills.common.planning import TOO_LOW, GraspPlan, SoughtObject, find_target, plan_grasp
 
 
 def in_words(ranking: Ranking) -> str:
@@ -26,7 +25,9 @@ def in_words(ranking: Ranking) -> str:
 class MatchParams(SkillParams):
     """Parameters of `match`."""
 
-    target: str = param("The object to find: an STL file, or the name of one in the world's object folder", names="stl")
+    target: str = param(
+        "The object to find: an STL file, the name of one in the world's object folder, or touched:NAME", names="stl"
+    )
     matcher: Literal["likelihood", "paper"] = param("Method of comparing candidates", default="likelihood")
 
 
@@ -76,12 +77,13 @@ class MatchTarget(Skill):
             )
         yield HOLD  # matching takes longer than a control period; on hardware the arm holds meanwhile
         gripper = self.context.arm.description.gripper
-        objects = self.context.world.objects
-        mesh = load_target(self.params.target, objects.folder)
-        model = load_target_model(mesh, gripper, objects.stance)
-        ranking = self._told_of_twins(recognition.MATCHERS[self.params.matcher](model, touchsets))
+        target = find_target(self.params.target, self.context.world.objects, gripper)
+        model = target.model
+        if model.certainty is not None and self.params.matcher == "paper":
+            raise BadInput("matcher paper: needs an STL; use the matcher likelihood for a target known by touch")
+        ranking = self._told_of_twins(recognition.MATCHERS[self.params.matcher](model, touchsets), target)
         self.ranking = ranking
-        self.event("ranking", target=mesh.name, ranking=ranking, gates=ranking.gates, matcher=self.params.matcher)
+        self.event("ranking", target=target.name, ranking=ranking, gates=ranking.gates, matcher=self.params.matcher)
         if not ranking.accepted:
             felt = {t.candidate.index for t in touchsets} | set(rejected)
             missed = [str(c.index) for c in self.known or () if c.index not in felt]
@@ -89,16 +91,16 @@ class MatchTarget(Skill):
             if fault := perception.too_wide(model, gripper):
                 raise self.TOO_WIDE(f"{fault} ({why})", narrowest_m=model.narrowest_m)
             raise self.NOT_RECOGNISED(
-                f"no candidate is surely {mesh.name}: {why}", advice=_advice(ranking), margin=ranking.margin
+                f"no candidate is surely {target.name}: {why}", advice=_advice(ranking), margin=ranking.margin
             )
         best = next(t for t in touchsets if t.candidate.index == ranking.best.index)
         quat = ranking.best.quat
-        self.plan = plan_grasp(best, ranking.best, standing(mesh, quat), model.standing(quat), gripper)
+        self.plan = plan_grasp(best, ranking.best, target.standing(quat), model.standing(quat), gripper)
         self.event("plan", plan=self.plan)
 
-    def _told_of_twins(self, ranking: Ranking) -> Ranking:
+    def _told_of_twins(self, ranking: Ranking, target: SoughtObject) -> Ranking:
         """Say which objects of the box have exactly the target's shape: nobody can tell them apart by touch."""
-        twins = twins_of(self.params.target, self.context.world.objects)
+        twins = target.twins
         if not twins:
             return ranking
         what = f"{', '.join(twins)} {'has' if len(twins) == 1 else 'have'} exactly the shape of the target"

@@ -10,30 +10,40 @@ from glotouch_bt.motion import Motion
 from glotouch_bt.perception.touch import Candidate, Layer, TouchSequence, TouchSet
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import Array, MotionRefused
-from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Out, Skill, SkillRun
+from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Out, Skill, SkillRun, param
 from glotouch_skills.common.hand import keeping_clear_of
 from glotouch_skills.common.planning import (
     MIN_GAP_M,
     ClosureParams,
     Squeezing,
     Stance,
+    all_sides,
     disturbance,
     layer_heights,
     plan_stances,
 )
 
 
+class SqueezeParams(ClosureParams):
+    """Parameters of `squeeze`."""
+
+    max_closures: int = param(
+        "Closures at most, spread over all sides and heights; 0: three sequences", default=0, ge=0, le=100
+    )
+
+
 class Squeeze(Skill):
     """Squeeze one candidate with limited force at several heights.
 
     A round candidate is squeezed at three yaws, 60 degrees apart; a box-like one on three parallel tracks across its
-    short side. Heights ascend: the first closure centres the object where it cannot topple.
+    short side. Heights ascend: the first closure centres the object where it cannot topple. With `max_closures`, the
+    sequences come from all sides instead: for an object to be remembered.
 
     SUCCESS: there is at least one stable layer; `touchset` has all layers.
     """
 
-    Params = ClosureParams
-    params: ClosureParams
+    Params = SqueezeParams
+    params: SqueezeParams
 
     PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers"}), "wrist": frozenset({"tared"})}
     POSTCONDITIONS: ClassVar = {"hand": "empty"}
@@ -67,12 +77,16 @@ class Squeeze(Skill):
         with keeping_clear_of(arm, others):
             heights = layer_heights(candidate, arm.description.gripper, self.params)
             container = self.context.world.container
-            stances, refusals = yield from plan_stances(
-                candidate, arm, container, float(heights[0]), (self.params.side_gap_m, 0.5 * self.params.side_gap_m)
-            )
+            gaps_m = (self.params.side_gap_m, 0.5 * self.params.side_gap_m)
+            most = self.params.max_closures
+            choices = [all_sides(candidate, arm.description.gripper, max(most // len(heights), 1))] if most else ()
+            stances, refusals = yield from plan_stances(candidate, arm, container, float(heights[0]), gaps_m, choices)
             for at in stances:
+                left = most - sum(len(s.layers) for s in sequences) if most else 2 * len(heights)
+                if left <= 0:
+                    break
                 try:
-                    sequences.append((yield from self._sequence(candidate, at, heights)))
+                    sequences.append((yield from self._sequence(candidate, at, heights, left)))
                 except MotionRefused as refusal:
                     refusals.append(str(refusal))
         touchset = TouchSet(candidate, tuple(sequences))
@@ -89,8 +103,8 @@ class Squeeze(Skill):
             )
         self.touchset = touchset
 
-    def _sequence(self, candidate: Candidate, at: Stance, heights: Array) -> Motion[TouchSequence]:
-        """Open over the candidate, close at each height from below, rise.
+    def _sequence(self, candidate: Candidate, at: Stance, heights: Array, most: int) -> Motion[TouchSequence]:
+        """Open over the candidate, close at each height from below at most `most` times, rise.
 
         Retry a height without a stable layer once, at a height nearby. If the hand cannot close there either, end the
         sequence: higher up the object slopes or stands free, too.
@@ -99,8 +113,10 @@ class Squeeze(Skill):
         layers: list[Layer] = []
         yield from hand.go_down(float(heights[0]))
         for height, elsewhere in zip(heights.tolist(), _elsewhere(heights), strict=True):
+            if len(layers) >= most:
+                break
             tried = [(yield from self._layer(hand, height))]
-            if tried[0] is None or not tried[0].stable:
+            if (tried[0] is None or not tried[0].stable) and len(layers) + len(tried) < most:
                 tried.append((yield from self._layer(hand, elsewhere)))
             layers += [layer for layer in tried if layer is not None]
             if tried[-1] is None:

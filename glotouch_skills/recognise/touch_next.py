@@ -23,8 +23,7 @@ from glotouch_skills.common.planning import (
     Standing,
     best_rates,
     disturbance,
-    load_target,
-    load_target_model,
+    find_target,
     options,
     pads_height_m,
 )
@@ -44,7 +43,9 @@ STILL_THERE_M = 0.003
 class TouchNextParams(ClosureParams):
     """Parameters of `touch_next`."""
 
-    target: str = param("The object to find: an STL file, or the name of one in the world's object folder", names="stl")
+    target: str = param(
+        "The object to find: an STL file, the name of one in the world's object folder, or touched:NAME", names="stl"
+    )
     confidence: float = param("Sufficient probability", default=0.9, gt=0.5, lt=1.0)
     unmeasured: bool = param("Touch candidates that the probe did not measure, too", default=False)
     min_gain_nats: float = param(
@@ -176,9 +177,8 @@ class TouchNext(Skill):
             SkillFailed: `too_low`.
         """
         if self._model is None:
-            objects = self.context.world.objects
-            mesh = load_target(self.params.target, objects.folder)
-            self._model = load_target_model(mesh, self.context.arm.description.gripper, objects.stance)
+            gripper = self.context.arm.description.gripper
+            self._model = find_target(self.params.target, self.context.world.objects, gripper).model
         return self._model
 
     def _choose(self, belief: Belief, down: Squeezing | None) -> Option | None:

@@ -9,7 +9,7 @@ import numpy as np
 from glotouch_bt.robot import HOLD, Array
 from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import GRAVITY_M_S2
-from glotouch_skills.common.planning import SHIFTS_M, TOO_LOW, GraspPlan, load_target, load_target_model
+from glotouch_skills.common.planning import SHIFTS_M, TOO_LOW, GraspPlan, find_target
 
 if TYPE_CHECKING:
     from glotouch_bt.perception.recognition import TargetModel
@@ -26,7 +26,9 @@ class ObjectCheckParams(SkillParams):
     wood to steel, so the weight only excludes the impossible.
     """
 
-    target: str = param("The object wanted: an STL file, or the name of one in the world's object folder", names="stl")
+    target: str = param(
+        "The object wanted: an STL file, the name of one in the world's object folder, or touched:NAME", names="stl"
+    )
     width_m: float = param("Largest deviation from that range", unit="m", default=0.0025, gt=0.0, le=0.02)
     lightest_kg_m3: float = param("Least density of the target", unit="kg/m3", default=100.0, gt=0.0)
     heaviest_kg_m3: float = param("Largest density of the target", unit="kg/m3", default=8000.0, gt=0.0)
@@ -70,16 +72,17 @@ class ObjectCheck(Skill):
         yield HOLD  # the model may have to be read from disk
         p, made = self.params, self.made
         gripper = self.context.arm.description.gripper
-        mesh = load_target(p.target, self.context.world.objects.folder)
-        volume = float(mesh.as_trimesh().volume)
-        light, heavy = (GRAVITY_M_S2 * density * volume for density in (p.lightest_kg_m3, p.heaviest_kg_m3))
+        target = find_target(p.target, self.context.world.objects, gripper)
+        name = target.name
+        low_m3, high_m3 = target.volume_m3
+        light, heavy = GRAVITY_M_S2 * p.lightest_kg_m3 * low_m3, GRAVITY_M_S2 * p.heaviest_kg_m3 * high_m3
         give = 2.0 * gripper.pad_depth_m
         off = misfit_m(np.array(made.aperture_m), self.grip_m, give).item()
         self.event("object_check", grip_m=self.grip_m, off_m=off, weight_N=self.weight_N, light_N=light, heavy_N=heavy)
         if not light <= self.weight_N <= heavy:
             self.impossible = True
             raise self.WRONG_OBJECT(
-                f"{mesh.name} weighs {light:.2f} to {heavy:.1f} N, of wood or steel; this weighs {self.weight_N:.2f} N",
+                f"{name} weighs {light:.2f} to {heavy:.1f} N, of wood or steel; this weighs {self.weight_N:.2f} N",
                 weight_N=self.weight_N,
                 light_N=light,
                 heavy_N=heavy,
@@ -87,19 +90,19 @@ class ObjectCheck(Skill):
         if off <= p.width_m:
             self.fits = True
             return
-        model = load_target_model(mesh, gripper, self.context.world.objects.stance)
-        widths = widths_m(model.standing(made.quat), float(made.position_K_m[2]))
-        least = float(misfit_m(widths, self.grip_m, give).min(initial=gripper.stroke_m))
+        widths, unsure = widths_m(target.model.standing(made.quat), float(made.position_K_m[2]))
+        misfits = np.maximum(misfit_m(widths, self.grip_m, give) - unsure, 0.0)
+        least = float(misfits.min(initial=gripper.stroke_m))
         if least <= p.width_m:
             raise self.NOT_AS_FELT(
                 f"the jaws stopped at {self.grip_m * 1e3:.1f} mm where {made.aperture_m * 1e3:.1f} mm were planned; "
-                f"{mesh.name} is that wide elsewhere",
+                f"{name} is that wide elsewhere",
                 off_m=off,
                 limit_m=p.width_m,
             )
         self.impossible = True
         raise self.WRONG_OBJECT(
-            f"the jaws stopped at {self.grip_m * 1e3:.1f} mm; wherever {mesh.name} is held at this height, they would "
+            f"the jaws stopped at {self.grip_m * 1e3:.1f} mm; wherever {name} is held at this height, they would "
             f"stop at least {least * 1e3:.1f} mm from there",
             off_m=off,
             min_m=least,
@@ -112,12 +115,16 @@ def misfit_m(width_m: Array, grip_m: float, give_m: float) -> Array:
     return np.asarray(np.maximum(np.maximum(grip_m - width_m, width_m - give_m - grip_m), 0.0))
 
 
-def widths_m(model: TargetModel, height_m: float) -> Array:
-    """Return the model's widths (n,) near a height, at any yaw.
+def widths_m(model: TargetModel, height_m: float) -> tuple[Array, Array]:
+    """Return the model's widths (n,) near a height, at any yaw, and by how much each may be wrong (0 of a mesh).
 
     Use only places where a grasp would be planned, since anything is narrow at the ends of the mesh.
     """
     level = np.abs(model.z_m - height_m) <= HEIGHT_SLACK_M
     inner = np.abs(model.l_m) <= SHIFTS_M
     widths = model.width_m[:, inner][:, :, level].astype(np.float64).ravel()
-    return np.asarray(widths[np.isfinite(widths)])
+    unsure = np.zeros_like(widths)
+    if model.certainty is not None:
+        unsure = 2.0 * model.certainty.width_sd_m[:, inner][:, :, level].astype(np.float64).ravel()
+    some = np.isfinite(widths)
+    return widths[some], unsure[some]

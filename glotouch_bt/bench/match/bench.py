@@ -8,15 +8,16 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from glotouch_bt.bench.match.acquire import acquire_layout
 from glotouch_bt.bench.match.closures import CLOSURE_COLUMNS, closures_to_confidence
 from glotouch_bt.bench.match.dataset import Layout, layout_files, read_layout, write_layout
-from glotouch_bt.bench.match.methods import DEFAULT
+from glotouch_bt.bench.match.methods import DEFAULT, TOUCHED
 from glotouch_bt.bench.match.plots import plot_all
 from glotouch_bt.bench.match.summary import summarise
-from glotouch_bt.bench.match.synthetic import sampled_layout
+from glotouch_bt.bench.match.synthetic import handled_objects, sampled_layout
 from glotouch_bt.bench.match.timing import time_matching
 from glotouch_bt.bench.match.trials import PAIR_COLUMNS, TRIAL_COLUMNS, decide, models_of
 from glotouch_bt.campaign import (
@@ -35,6 +36,8 @@ from glotouch_bt.campaign import (
 from glotouch_bt.escaped_text import finite
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read import conditions_name, load_conditions
+from glotouch_bt.perception.touch import TouchSet
+from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene import load_folder, stl_files, stream
 from glotouch_bt.runs import RunRequest
 
@@ -52,6 +55,8 @@ class MatchCampaign(Campaign):
         strangers: Folder of STL files that are never in the box, used as absent targets; or None.
         dataset: Folder of recorded TouchSets to use instead; it defines seeds (except their number) and conditions.
         sampled: Touch standing objects without a robot instead of running the mission.
+        touched: Compare the method `TOUCHED`, too, which knows each object by one handling only; needs `sampled`.
+        in_the_box: Objects in a layout. From a larger folder, each seed draws this many.
     """
 
     mission: str = "touch_all"
@@ -59,6 +64,8 @@ class MatchCampaign(Campaign):
     strangers: Path | None = None
     dataset: Path | None = None
     sampled: bool = False
+    touched: bool = False
+    in_the_box: int = IN_THE_BOX
 
     @property
     def folder(self) -> Path:
@@ -76,6 +83,10 @@ class MatchCampaign(Campaign):
             BadInput: A folder holds nothing usable.
         """
         load_folder(self.folder)
+        if self.touched and (not self.sampled or self.strangers is not None):
+            raise BadInput("--touched: needs --sampled, and cannot be combined with --strangers")
+        if self.in_the_box > IN_THE_BOX and not self.sampled:
+            raise BadInput(f"--in-box {self.in_the_box}: more than {IN_THE_BOX} objects need --sampled")
         if self.strangers is not None:
             load_folder(self.strangers)
         if self.dataset is not None:
@@ -83,7 +94,9 @@ class MatchCampaign(Campaign):
 
     def box(self, seed: int) -> Path | None:
         """Return the folder of a layout's objects, created if it is a drawn subset; None: the world's."""
-        return objects_of(self.folder, seed, self.out / "objects") if self.objects else None
+        if self.objects is None:
+            return None
+        return objects_of(self.folder, seed, self.out / "objects", self.in_the_box)
 
     def layout_trial(self, seed: int, file: Path | None = None) -> Trial:
         """Return the trial that acquires the layout of a seed, or reads it from a file."""
@@ -91,8 +104,9 @@ class MatchCampaign(Campaign):
         content = {"strangers": folder_digests(self.strangers), "file": file and digest(file.read_bytes())}
         run, failed = partial(layout_task, self, seed, file), partial(failed_task, self, seed)
         return self.trial(
-            f"layouts/{name}", run, failed, seed=seed, methods=self.methods, sampled=self.sampled, inputs=content
-        )
+            f"layouts/{name}", run, failed, seed=seed, methods=self.methods, sampled=self.sampled,
+            touched=self.touched, in_the_box=self.in_the_box, inputs=content
+        )  # fmt: skip
 
     def layout_request(self, seed: int) -> RunRequest:
         """Return the mission request for a layout."""
@@ -101,14 +115,14 @@ class MatchCampaign(Campaign):
         return self.request(seed, f"runs/s{seed:04d}", settings={"expected_objects": str(count)}, objects=box)
 
 
-def objects_of(folder: Path, seed: int, copies: Path) -> Path:
-    """Return the folder, or one below `copies` with `IN_THE_BOX` of its STLs drawn by the seed."""
+def objects_of(folder: Path, seed: int, copies: Path, count: int = IN_THE_BOX) -> Path:
+    """Return the folder, or one below `copies` with `count` of its STLs drawn by the seed."""
     files = list(stl_files(folder).values())
-    if len(files) <= IN_THE_BOX:
+    if len(files) <= count:
         return folder
     mine = copies / f"s{seed:04d}"
     mine.mkdir(parents=True, exist_ok=True)
-    for i in stream(seed, "which objects").permutation(len(files))[:IN_THE_BOX]:
+    for i in stream(seed, "which objects").permutation(len(files))[:count]:
         shutil.copyfile(files[i], mine / files[i].name)
     return mine
 
@@ -119,15 +133,19 @@ def layout_task(campaign: MatchCampaign, seed: int, file: Path | None) -> dict[s
     Raises:
         BadInput: The recording or an STL cannot be used.
     """
+    handled: dict[str, TouchSet] = {}
     if file is not None:
         layout = read_layout(file)
     elif campaign.sampled:
         world = load_mission(campaign.mission, {}, objects=campaign.box(seed)).world
-        layout = sampled_layout(campaign.backend, world, load_conditions(campaign.conditions), seed)
+        conditions = load_conditions(campaign.conditions)
+        layout = sampled_layout(campaign.backend, world, conditions, seed)
         write_layout(campaign.out / "touchsets", layout)
+        if campaign.touched:
+            handled = handled_objects(campaign.backend, world, conditions, seed)
     else:
         layout = acquire_layout(campaign.layout_request(seed), campaign.out / "touchsets")
-    return _decided(campaign, layout)
+    return _decided(campaign, layout, handled)
 
 
 def failed_task(campaign: MatchCampaign, seed: int, error: Exception) -> dict[str, Any]:
@@ -135,8 +153,11 @@ def failed_task(campaign: MatchCampaign, seed: int, error: Exception) -> dict[st
     return _decided(campaign, Layout(seed, conditions_name(campaign.conditions), (), (), crashed(error)["cause"]))
 
 
-def _decided(campaign: MatchCampaign, layout: Layout) -> dict[str, Any]:
-    decided = decide(layout, campaign.folder, campaign.strangers, campaign.methods)
+def _decided(
+    campaign: MatchCampaign, layout: Layout, handled: Mapping[str, TouchSet] = MappingProxyType({})
+) -> dict[str, Any]:
+    names = (*campaign.methods, TOUCHED) if handled else campaign.methods
+    decided = decide(layout, campaign.folder, campaign.strangers, names, handled)
     closures: list[dict[str, Any]] = []
     if DEFAULT in campaign.methods and layout.touched and not campaign.sampled:
         present = [n for n in layout.objects if layout.of(n)]
@@ -181,12 +202,13 @@ def run_campaign(campaign: MatchCampaign, executor: Executor, on_row: OnRow = si
         write=partial(_write, campaign.out),
     )
     rows, layouts = _tables(done)
+    compared = (*campaign.methods, TOUCHED) if campaign.touched else campaign.methods
     recorded = files or sorted((campaign.out / "touchsets").glob("s[0-9]*.json"))
     run = partial(timing_task, recorded[:3], campaign.folder, campaign.methods)
     timing = campaign.trial("timing", run, _untimed, methods=campaign.methods, files=recorded[:3])
     timed = run_trials(executor, [timing], campaign, whole=True, before=len(done))[0] if recorded else {}
     figures: dict[str, Any] = finite(
-        summarise(rows["trials"], rows["pairs"], rows["closures"], campaign.methods)
+        summarise(rows["trials"], rows["pairs"], rows["closures"], compared)
         | {
             "timing": timed,
             "conditions": ", ".join(sorted({x["conditions"] for x in layouts})),

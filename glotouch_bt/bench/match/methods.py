@@ -27,15 +27,19 @@ class Target:
     Attributes:
         mesh: Its mesh, in the frame of its file.
         model: Tables computed from it for the pads that touched.
+        touched: Tables that follow from one handling of the object; None if it was not handled.
     """
 
     mesh: Mesh
     model: TargetModel
+    touched: TargetModel | None = None
 
 
 Method = Callable[[Target, Sequence[TouchSet]], Ranking]
 
 DEFAULT = "likelihood"
+TOUCHED = "touched"
+"""The same matcher, with the target known by touch only instead of by its STL."""
 ACCEPTED = 0.9
 """Probability from which an outside matcher's best candidate counts as accepted. Source: the mission `retrieve`."""
 PAPER_TOP1: Mapping[str, float] = {"paper_width": 0.683, "paper_depth": 0.783, "paper_full": 0.900}
@@ -54,6 +58,17 @@ def methods() -> dict[str, Method]:
     made |= {name: matcher for name, matcher in MATCHERS.items() if name != "paper"}
     found: dict[str, Method] = {name: partial(judge, point) for name, point in plugins(OUTSIDE).items()}
     return {**found, **{name: partial(_by_model, matcher) for name, matcher in made.items()}}
+
+
+def by_touch(target: Target, touchsets: Sequence[TouchSet]) -> Ranking:
+    """Return the default matcher's ranking for the handled object.
+
+    Raises:
+        BadInput: It was not handled.
+    """
+    if target.touched is None:
+        raise BadInput(f"{target.mesh.name}: was not handled before; give --touched")
+    return MATCHERS[DEFAULT](target.touched, touchsets)
 
 
 def _by_model(matcher: Matcher, target: Target, touchsets: Sequence[TouchSet]) -> Ranking:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from glotouch_bt.perception.touch import (
     pad_noise_m,
 )
 from glotouch_bt.robot import Array, BadInput, Conditions, World, load_backend
-from glotouch_bt.robot.scene import stream
+from glotouch_bt.robot.scene import stl_files, stream
 from glotouch_bt.robot.simulation import Place, TouchSampler
 
 FORCE_N = 10.0
@@ -33,29 +34,77 @@ DRIFT_M, DRIFT_RAD = 1.5e-3, math.radians(3.0)
 """Motion of the object between two sequences. Source: ours."""
 
 
+BOX = 5
+"""Largest number of objects that a sampler places in one box."""
+HANDLED_SEED = 1_000_000
+"""Added to a layout's seed: an object is handled in another trial, with other errors, than it is recognised in."""
+MAX_CLOSURES = 20
+"""Largest number of closures of one handling. Source: `RememberParams`."""
+
+
 def sampled_layout(backend: str, world: World, conditions: Conditions, seed: int) -> Layout:
     """Touch every object of a trial as `sample_layout` does.
 
     Raises:
         BadInput: The backend has no `TouchSampler`, or the objects cannot be used.
     """
-    sampler = load_backend(backend).touch_sampler(world, conditions, seed)
-    if sampler is None:
-        raise BadInput(f"--backend {backend}: cannot touch objects without a robot")
-    return sample_layout(sampler, seed, conditions.name)
+    boxes = [
+        sample_layout(sampler, seed, conditions.name, k * BOX)
+        for k, sampler in enumerate(samplers(backend, world, conditions, seed))
+    ]
+    names = tuple(name for box in boxes for name in box.objects)
+    return Layout(seed, conditions.name, names, tuple(t for box in boxes for t in box.touched))
 
 
-def sample_layout(sampler: TouchSampler, seed: int, conditions: str) -> Layout:
-    """Touch every object once; equal seeds draw equal stances whatever the conditions."""
+def samplers(backend: str, world: World, conditions: Conditions, seed: int) -> list[TouchSampler]:
+    """Return samplers for all objects of a world, at most `BOX` objects each; all have the same sensors.
+
+    Objects that are touched without a robot are touched one by one, so they need not fit into one box.
+
+    Raises:
+        BadInput: See `sampled_layout`.
+    """
+    names = world.objects.names or tuple(stl_files(world.objects.folder))
+    out = []
+    for first in range(0, len(names), BOX):
+        some = replace(world, objects=replace(world.objects, names=names[first : first + BOX]))
+        sampler = load_backend(backend).touch_sampler(some, conditions, seed)
+        if sampler is None:
+            raise BadInput(f"--backend {backend}: cannot touch objects without a robot")
+        out.append(sampler)
+    return out
+
+
+def sample_layout(sampler: TouchSampler, seed: int, conditions: str, first: int = 0) -> Layout:
+    """Touch every object once; equal seeds draw equal stances whatever the conditions.
+
+    Candidates are numbered from `first`.
+    """
     touched = []
-    for index, name in enumerate(sampler.names):
+    for index, name in enumerate(sampler.names, first):
         rng = stream(seed, f"stances {name}")
         touchset, place = _touch(sampler, name, index, rng)
         touched.append(Touched(touchset, name, place, 0.0))
     return Layout(seed, conditions, sampler.names, tuple(touched))
 
 
-def _touch(sampler: TouchSampler, name: str, index: int, rng: np.random.Generator) -> tuple[TouchSet, Place]:
+def handled_objects(backend: str, world: World, conditions: Conditions, seed: int) -> dict[str, TouchSet]:
+    """Handle every object alone, as the mission `remember` does, in a trial of its own.
+
+    Raises:
+        BadInput: See `sampled_layout`.
+    """
+    seed += HANDLED_SEED
+    return {
+        name: _touch(sampler, name, 0, stream(seed, f"handling {name}"), True)[0]
+        for sampler in samplers(backend, world, conditions, seed)
+        for name in sampler.names
+    }
+
+
+def _touch(
+    sampler: TouchSampler, name: str, index: int, rng: np.random.Generator, alone: bool = False
+) -> tuple[TouchSet, Place]:
     solid = sampler.solid(name).as_trimesh()
     place: Place = (*rng.uniform(-0.05, 0.05, 2).tolist(), float(rng.uniform(-math.pi, math.pi)))
     top_m = float(np.asarray(solid.vertices)[:, 2].max()) + HEIGHT_SD_M * float(rng.standard_normal())
@@ -71,7 +120,8 @@ def _touch(sampler: TouchSampler, name: str, index: int, rng: np.random.Generato
     if heights[-1] - heights[0] < 0.003:
         heights = heights[:1]
     sequences = []
-    for stance in _stances(contour, rng):
+    stances = _handling(contour, rng, MAX_CLOSURES // len(heights)) if alone else _stances(contour, rng)
+    for stance in stances:
         drift = rng.standard_normal(3) * [DRIFT_M, DRIFT_M, DRIFT_RAD]
         place = (place[0] + drift[0], place[1] + drift[1], place[2] + drift[2])
         layers = []
@@ -93,6 +143,19 @@ def _stances(contour: Contour, rng: np.random.Generator) -> list[Place]:
         (x + k * contour.size_m[0] * along[0], y + k * contour.size_m[0] * along[1], contour.yaw_rad)
         for k in (-0.25, 0.0, 0.25)
     ]
+
+
+def _handling(contour: Contour, rng: np.random.Generator, count: int) -> list[Place]:
+    """Return the hand's places of `remember`, at most `count`.
+
+    A round object is squeezed from all sides, a box on its three tracks and then from other sides.
+    """
+    x, y = contour.centre_K_m.tolist()
+    tracks = [] if contour.kind == "round" else _stances(contour, rng)
+    first = float(rng.uniform(0.0, math.pi)) if contour.kind == "round" else contour.yaw_rad + 0.5 * math.pi
+    more = count - len(tracks)
+    turned = [(x, y, first + k * math.pi / (more + bool(tracks))) for k in range(more)]
+    return tracks + turned
 
 
 def _close(sampler: TouchSampler, name: str, place: Place, hand: Place, height_m: float) -> tuple[Layer, Place]:

@@ -8,15 +8,25 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
 
 from glotouch_bt.bench.match.dataset import Layout, Planar, Touched
-from glotouch_bt.bench.match.methods import Method, Target, methods
+from glotouch_bt.bench.match.methods import TOUCHED, Method, Target, by_touch, methods
 from glotouch_bt.bench.match.shapes import symmetries_rad, twins
 from glotouch_bt.perception import model_with_sides
-from glotouch_bt.perception.recognition import Match, PadSpec, Ranking, TargetModel
+from glotouch_bt.perception.recognition import (
+    Match,
+    PadSpec,
+    Ranking,
+    TargetModel,
+    TouchedObject,
+    encounter_of,
+    touched_model,
+)
+from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene import Mesh, load_folder
 
@@ -74,12 +84,18 @@ def pad_of(layout: Layout) -> PadSpec:
     return PadSpec()
 
 
-def decide(layout: Layout, objects: Path, strangers: Path | None, names: Sequence[str]) -> Decided:
+def decide(
+    layout: Layout,
+    objects: Path,
+    strangers: Path | None,
+    names: Sequence[str],
+    handled: Mapping[str, TouchSet] = MappingProxyType({}),
+) -> Decided:
     """Make every decision of a layout with every method.
 
     Present: a touched object's STL against all TouchSets. Absent: the same without its own TouchSets.
     Untouched: the STL of an object in the box that was never squeezed. Stranger: the STL of an object outside it.
-    A target with a twin in the box is marked.
+    A target with a twin in the box is marked. The method `TOUCHED` knows a target by its TouchSet in `handled` only.
 
     Raises:
         BadInput: An STL is missing or unusable.
@@ -87,13 +103,15 @@ def decide(layout: Layout, objects: Path, strangers: Path | None, names: Sequenc
     out = Decided([], [])
     if not layout.touched:
         return out
-    made = methods()
+    made = {**methods(), TOUCHED: by_touch}
     present = models_of(layout, objects)
     meshes = {n: meshes_of(objects)[n] for n in present}
     twin = {n: any(twins(m, other) for k, other in meshes.items() if k != n) for n, m in meshes.items()}
     known = {m.digest for m in meshes_of(objects).values()}
     strange = {} if strangers is None else {n: m for n, m in meshes_of(strangers).items() if m.digest not in known}
     foreign = {} if strangers is None or not strange else models_of(layout, strangers, tuple(strange))
+    pad = pad_of(layout)
+    felt = {n: touched_model(TouchedObject(n, (encounter_of(t, pad),)), pad) for n, t in handled.items()}
     for name in names:
         method = made[name]
         for target, model in present.items():
@@ -101,7 +119,7 @@ def decide(layout: Layout, objects: Path, strangers: Path | None, names: Sequenc
             others = [t for i, t in enumerate(layout.touched) if i not in mine]
             head = {"method": name, "seed": layout.seed, "target": target, "twin": twin[target]}
             mesh = meshes[target] if mine else None
-            shown = Target(meshes[target], model)
+            shown = Target(meshes[target], model, felt.get(target))
             row, ranking = _trial(method, shown, layout.touched, target, mesh)
             out.trials.append(head | {"kind": "present" if mine else "untouched"} | row)
             out.pairs.extend(_pairs(head | {"stranger": False}, layout, ranking))

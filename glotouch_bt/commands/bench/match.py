@@ -27,6 +27,13 @@ def match(
     sampled: Annotated[
         bool, typer.Option("--sampled", help="touch the objects without a robot, in about a second a layout")
     ] = False,
+    touched: Annotated[
+        bool,
+        typer.Option(
+            "--touched", help="with --sampled: compare targets known only by touch, each handled once with 20 closures"
+        ),
+    ] = False,
+    in_box: Annotated[int, typer.Option(min=1, help="objects drawn for a layout; above 5 only with --sampled")] = 5,
     method: Annotated[list[str] | None, typer.Option(help="only these matchers (default: all)")] = None,
     backend: shared.Backend = "mujoco",
     resume: shared.KeepTrials = False,
@@ -49,6 +56,8 @@ def match(
         strangers=strangers,
         dataset=dataset,
         sampled=sampled,
+        touched=touched,
+        in_the_box=in_box,
         methods=chosen(method or ()),
         backend=backend,
         out=shared.bench_folder(out, "match"),

@@ -30,6 +30,7 @@ from glotouch_bt.mission.spec import (
     units_for,
     walk,
 )
+from glotouch_bt.perception import read_touched, touched_name
 from glotouch_bt.robot import BadInput, ObjectSet
 from glotouch_bt.robot.scene import is_sound_stl, load_mesh, stl_files
 
@@ -254,7 +255,17 @@ def _valid(declared: Declaration) -> str:
 
 
 def stl_usable(name: str, objects: ObjectSet | None, place: Place, findings: Findings) -> bool:
-    """Check an object: the name of a file in the objects' folder, or a path; the file must be a valid solid."""
+    """Check an object: the name of a file in the objects' folder, or a path; the file must be a valid solid.
+
+    An object that is known only by touch must have been remembered.
+    """
+    if touched := touched_name(name):
+        try:
+            read_touched(touched)
+        except BadInput as e:
+            findings.add(place, "not_remembered", str(e))
+            return False
+        return True
     if objects is None:
         return True
     path, folder = Path(name), objects.folder

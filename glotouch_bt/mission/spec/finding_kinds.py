@@ -51,6 +51,12 @@ _KINDS = (
     _Error("unusable_world", "the world file cannot be read"),
     _Error("no_objects", "the folder of objects has no STL file", advice=_CONVERT),
     _Error("no_such_stl", "no object of this name exists"),
+    _Error(
+        "not_remembered",
+        "a target `touched:NAME` was never remembered, or its file is damaged",
+        "the mission would fail as soon as it needs the target",
+        "run the mission `remember` with the object alone in the box",
+    ),
     _Error("unusable_stl", "the STL file is not a solid of a plausible size", advice=_CONVERT),
     _Error(
         "no_layout",

@@ -19,7 +19,7 @@ from glotouch_skills.common.planning.grasp_holds import AREA_SCALE, LEVER_SCALE_
 from glotouch_skills.common.planning.squeeze_motion import lowest_pads_m
 
 if TYPE_CHECKING:
-    from glotouch_bt.perception.recognition import TargetModel
+    from glotouch_bt.perception.recognition import FeltClosure, TargetModel, TouchedObject
 
 STALENESS = 0.7
 """Factor on the worth of a closure for each later sequence: squeezing turns and shifts the object."""
@@ -66,7 +66,7 @@ class GraspPlan:
         aperture_m: Measured or expected aperture there; the jaws must stop near it.
         opening_m: Aperture during the descent.
         alternatives: Other grasps of the same object, best first.
-        source: `fitted` (from the mesh) or `felt` (from a closure).
+        source: `fitted` (from the mesh, or from a remembered closure) or `felt` (from a closure).
         quat: Rotation (w, x, y, z) of the mesh onto the side on which the object is taken to stand.
     """
 
@@ -91,23 +91,35 @@ class GraspPlan:
 
 
 def plan_grasp(
-    touchset: TouchSet, match: Match, mesh: Mesh, model: TargetModel, gripper: Gripper, side_gap_m: float = 0.010
+    touchset: TouchSet,
+    match: Match,
+    solid: Mesh | TouchedObject,
+    model: TargetModel,
+    gripper: Gripper,
+    side_gap_m: float = 0.010,
 ) -> GraspPlan:
     """Return the best grasp, with the next best as its alternatives.
 
     Args:
         touchset: Touches of the object.
         match: Its fit to the target.
-        mesh: The target, as it stands.
+        solid: The target, as it stands, or what was felt of it.
         model: Its tables.
         gripper: The robot's gripper.
         side_gap_m: Gap between open jaw and object on each side.
     """
-    com = np.asarray(mesh.as_trimesh().center_mass)
+    index = touchset.candidate.index
+    credible = match.fit is not None and misfit_m(touchset, match, model) <= MAX_MISFIT_M
     fitted: list[GraspPlan] = []
-    if match.fit is not None and misfit_m(touchset, match, model) <= MAX_MISFIT_M:
-        holds = holds_of(model, com, gripper, lowest_pads_m(model.height_m, gripper), FORCE_N)
-        fitted = _fitted(touchset.candidate.index, match, model, holds, side_gap_m)
+    if isinstance(solid, Mesh):
+        com = np.asarray(solid.as_trimesh().center_mass)
+        if credible:
+            holds = holds_of(model, com, gripper, lowest_pads_m(model.height_m, gripper), FORCE_N)
+            fitted = _fitted(index, match, model, holds, side_gap_m)
+    else:
+        com = np.array([*model.centre_m, 0.5 * model.height_m])
+        if credible:
+            fitted = _remembered(index, match, model, solid, gripper, side_gap_m)
     felt = _felt(touchset, _placed(com, match), side_gap_m)
     plans = [replace(plan, quat=match.quat) for plan in (*fitted, *felt)][: 1 + ALTERNATIVES]
     return replace(plans[0], alternatives=tuple(plans[1:]))
@@ -160,6 +172,40 @@ def _fitted(index: int, match: Match, model: TargetModel, holds: Holds, side_gap
                 yaw_rad=math.remainder(yaw, 2 * math.pi),
                 aperture_m=float(holds.width_m[i, j, k]),
                 opening_m=float(holds.opening_m[i, j, k]) + 2 * side_gap_m,
+                source="fitted",
+            )
+        )
+    return chosen
+
+
+def _remembered(
+    index: int, match: Match, model: TargetModel, felt: TouchedObject, gripper: Gripper, side_gap_m: float
+) -> list[GraspPlan]:
+    """Return the best remembered closures at the fitted pose that differ enough from each other."""
+    middle = _placed(np.array([*model.centre_m, 0.0]), match)
+
+    def worth(c: FeltClosure) -> float:
+        lever = math.hypot(c.along_m, 0.5 * (0.5 * model.height_m - c.height_m))
+        return math.prod(a / (a + AREA_SCALE) for a in c.areas) / (1.0 + (lever / LEVER_SCALE_M) ** 2)
+
+    chosen: list[GraspPlan] = []
+    for c in sorted((c for c in felt.closures if c.two_sided), key=worth, reverse=True):
+        i = round(c.phi_rad / (2 * math.pi) * len(model.phi_rad)) % len(model.phi_rad)
+        j, k = int(np.argmin(np.abs(model.l_m - c.along_m))), int(np.argmin(np.abs(model.z_m - c.height_m)))
+        opening = max(float(model.width_m[i, j, k:].max()), c.width_m) + 2 * side_gap_m
+        yaw, across = match.pose_K_O[2] + c.phi_rad, float(model.middle_m[i, j, k])
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        off = [cos * c.along_m + sin * across, sin * c.along_m - cos * across, c.height_m]
+        place = middle + np.array(off)
+        if len(chosen) == FITTED or any(_near(place, yaw, other) for other in chosen):
+            continue
+        chosen.append(
+            GraspPlan(
+                candidate=index,
+                position_K_m=place,
+                yaw_rad=math.remainder(yaw, 2 * math.pi),
+                aperture_m=c.aperture_m,
+                opening_m=min(opening, gripper.stroke_m),
                 source="fitted",
             )
         )

@@ -61,8 +61,12 @@ def stance(
     return Stance(position, yaw_K_rad, min(high - low + 2 * side_gap_m, stroke_m))
 
 
-def schemes(candidate: Candidate, gripper: Gripper) -> list[list[list[tuple[float, float]]]]:
-    """Return schemes of three sequences, preferred first; each sequence is a list of (along, yaw) alternatives.
+Scheme = list[list[tuple[float, float]]]
+"""Sequences, each a list of alternatives (along m, yaw rad), preferred first."""
+
+
+def schemes(candidate: Candidate, gripper: Gripper) -> list[Scheme]:
+    """Return schemes of three sequences, preferred first.
 
     For a free outline, the yaws start from its long side. One that is squeezed like a box may also be squeezed at three
     yaws, if some of its tracks would collide.
@@ -81,8 +85,24 @@ def schemes(candidate: Candidate, gripper: Gripper) -> list[list[list[tuple[floa
     return [tracks, *turned] if contour.family == "free" else [tracks]
 
 
+def all_sides(candidate: Candidate, gripper: Gripper, count: int) -> Scheme:
+    """Return a scheme of `count` sequences from all sides: first the tracks of a box, if there are that many."""
+    contour = candidate.contour
+    tracks = schemes(candidate, gripper)[0][:count] if contour.kind == "box" else []
+    turns = count - len(tracks)
+    step = np.pi / (turns + bool(tracks))
+    first = contour.yaw_rad + (0.5 * np.pi if len(tracks) else 0.0)
+    away = np.clip(ROUND_DEVIATIONS_RAD, -0.5 * step, 0.5 * step)
+    return tracks + [[(0.0, float(first + k * step + a)) for a in away] for k in range(turns)]
+
+
 def plan_stances(
-    candidate: Candidate, arm: Arm, container: Container, pads_height_m: float, side_gaps_m: Sequence[float]
+    candidate: Candidate,
+    arm: Arm,
+    container: Container,
+    pads_height_m: float,
+    side_gaps_m: Sequence[float],
+    choices: Sequence[Scheme] = (),
 ) -> Motion[tuple[list[Stance], list[str]]]:
     """Return the stances of the scheme with the most free sequences, and the refusals of the others.
 
@@ -94,11 +114,12 @@ def plan_stances(
         container: The registered container.
         pads_height_m: Lowest height of P above the floor.
         side_gaps_m: Gaps between open jaw and object to try, widest first.
+        choices: Schemes to try, preferred first (default: `schemes`).
     """
     gripper = arm.description.gripper
     best: list[Stance] = []
     refusals: list[str] = []
-    for scheme in schemes(candidate, gripper):
+    for scheme in choices or schemes(candidate, gripper):
         found: list[Stance] = []
         for alternatives in scheme:
             chosen = yield from _first_free(

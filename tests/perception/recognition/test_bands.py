@@ -9,11 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from glotouch_bt.perception.recognition.evidence import LayerEvidence
 from glotouch_bt.perception.recognition.likelihood.bands import MOVED_M, Residual, log_banded_twin, residual
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
+from glotouch_bt.perception.recognition.likelihood.volumes import Observed, WidthVolumes
 
 P = LikelihoodParams()
 NO_BIAS = np.zeros(1)
+SEEN = Observed(LayerEvidence(0, 0, 0.05, 1.0, False, 0.0, 0.0, 0.03, (None, None), (1e-4, 1e-4)), 0.0, (0.0, 0.0))
 
 
 def felt(offs_mm: list[float], height_m: float, scale_m: float = 3e-4) -> list[Residual]:
@@ -59,9 +62,10 @@ def test_a_closure_on_a_step_says_nothing() -> None:
     off = np.zeros((72, 7, 3), dtype=np.float32)
     off[:, :, 2] = 0.02
     scale = np.full_like(off, 3e-4)
-    assert residual(off, scale, 0.03, (0, 3, 1)) is None
-    inside = residual(off, scale, 0.03, (71, 3, 0))
+    volumes = WidthVolumes(off, scale, np.ones_like(off))
+    assert residual(volumes, SEEN, (0, 3, 1)) is None
+    inside = residual(volumes, SEEN, (71, 3, 0))
     assert inside is not None
     np.testing.assert_array_equal(inside.off_m, 0.0)
     off[5, 3, 0] = np.nan
-    assert residual(off, scale, 0.03, (5, 3, 0)) is None
+    assert residual(volumes, SEEN, (5, 3, 0)) is None

@@ -12,7 +12,8 @@ from py_trees.common import Status
 
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene.meshes import load_mesh
-from glotouch_skills.recognise.match import MatchTarget, load_target
+from glotouch_skills.common.planning.target import load_target
+from glotouch_skills.recognise.match import MatchTarget
 from tests.support.acquisition import IDEAL, acquire
 
 POSE = (0.03, -0.02, 0.4)

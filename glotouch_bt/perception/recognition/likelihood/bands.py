@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
-from glotouch_bt.perception.recognition.likelihood.volumes import T_PEAK, log_sum, width_kernel
-from glotouch_bt.perception.recognition.model import Array32
+from glotouch_bt.perception.recognition.likelihood.volumes import T_PEAK, Observed, WidthVolumes, log_sum, width_kernel
 from glotouch_bt.robot import Array
 
 BAND_M = 5e-3
@@ -33,15 +32,20 @@ class Residual:
             error of the pose is common to all closures.
         scale_m: Scale of its noise.
         height_m: Height of the pads.
+        known: Probability that the model predicts the width at all.
+        log_width: Log density of the width otherwise, of any object.
     """
 
     off_m: Array
     scale_m: float
     height_m: float
+    known: float = 1.0
+    log_width: float = 0.0
 
 
-def residual(off_m: Array32, scale_m: Array32, height_m: float, at: tuple[int, int, int]) -> Residual | None:
-    """Return the residual from volumes (72, nd, nz) at the best (yaw, shift, height offset); None if undefined."""
+def residual(volumes: WidthVolumes, seen: Observed, at: tuple[int, int, int]) -> Residual | None:
+    """Return the residual of a closure at the best (yaw, shift, height offset); None if undefined."""
+    off_m = volumes.off_m
     i, d, z = at
     middle = float(off_m[i, d, z])
     if not math.isfinite(middle):
@@ -51,7 +55,9 @@ def residual(off_m: Array32, scale_m: Array32, height_m: float, at: tuple[int, i
     half = 0.5 * (middle + np.where(np.isfinite(beside), beside, middle))
     if np.ptp(half) > STEP_M:
         return None
-    return Residual(half, float(scale_m[i, d, z]), height_m)
+    return Residual(
+        half, float(volumes.scale_m[i, d, z]), seen.layer.height_m, float(volumes.known[i, d, z]), seen.log_width
+    )
 
 
 def log_banded_twin(felt: list[Residual], bias_m: Array, log_bias: Array, p: LikelihoodParams) -> float:
@@ -78,6 +84,10 @@ def log_banded_twin(felt: list[Residual], bias_m: Array, log_bias: Array, p: Lik
     moved = np.append(MOVED_M, 0.0).astype(np.float32)
     peak = np.float32((1 - p.width_outlier) * T_PEAK) / scale
     density = peak * width_kernel((off - moved) / scale) + np.float32(p.width_outlier / p.width_range_m)
+    if any(r.known < 1.0 for r in order):
+        known = np.array([r.known for r in order], dtype=np.float32)[:, None, None]
+        other = np.exp([r.log_width for r in order], dtype=np.float32)[:, None, None]
+        density = known * density + (1 - known) * other
     by_band = np.add.reduceat(np.log(density), starts, axis=0)  # (bands, poses * biases, moves + unmoved)
     unmoved = by_band[..., -1]
     weight = width_kernel(MOVED_M / p.twin_width_sd_m)

@@ -115,42 +115,66 @@ def expected_gains(
         q = predictions[candidate]
         where = [i for i, c in enumerate(closures) if c.candidate == candidate]
         mine = [closures[i] for i in where]
-        width, sides, novelty = _at(q, mine)
+        width, sides, novelty, known = _at(q, mine)
         # Ratios for the target (one per pose), then for other objects (one per surface and quantile).
-        ratio = _width_ratios(width, np.array([_guess(q, c) for c in mine]), quantile, q.weight, p)
-        for side in sides:
-            ratio += _image_ratios(side, library, others, generic_other, q.weight, p)
+        ratio = _width_ratios(width, np.array([_guess(q, c) for c in mine]), quantile, q.weight, known, p)
+        for side, alike in zip(sides, known.images, strict=True):
+            ratio += _image_ratios(side, library, others, generic_other, q.weight, alike, p)
         ratio *= p.slope * novelty[:, None]
         s = width.shape[1]
         out[where] = entropy_decrease(ratio[:, :s], q.weight, ratio[:, s:], shares[candidate], entropy)
     return out
 
 
-def _width_ratios(width: Array, guess: Array, quantile: Array, weight: Array, p: LikelihoodParams) -> Array:
+@dataclass(frozen=True)
+class _Known:
+    """Certainty of the predictions, each (n, s): standard deviation of a width, shares known (see `Certainty`)."""
+
+    width_sd_m: Array
+    width: Array
+    images: tuple[Array, Array]
+
+
+def _width_ratios(
+    width: Array, guess: Array, quantile: Array, weight: Array, known: _Known, p: LikelihoodParams
+) -> Array:
     """Return tempered log ratios (n, s + o) of widths: of the target's poses, then of other objects."""
     middle, scale = guess[:, :1], guess[:, 1:]
     felt = np.isfinite(width)
     w = np.where(felt, width, 1.0)
     seen = np.concatenate([w, middle + scale * quantile], axis=1)
     generic = scale / math.pi / (scale**2 + (seen - middle) ** 2)
-    sd = math.hypot(p.width_sd_m, MEASURED_SD_M, p.width_rough * UNEVEN_M)
-    near = width_kernel((seen[:, :, None] - w[:, None, :]) / sd) * felt[:, None, :]
-    target = (near @ weight) * (T_PEAK / sd)
-    log_ratio = np.log((1 - p.width_outlier) * target / generic + p.width_outlier)
+    sd = np.hypot(math.hypot(p.width_sd_m, MEASURED_SD_M, p.width_rough * UNEVEN_M), known.width_sd_m)[:, None]
+    near = width_kernel((seen[:, :, None] - w[:, None, :]) / sd) * (felt * known.width)[:, None, :] / sd
+    target = (near @ weight) * T_PEAK
+    unknown = (1 - known.width @ weight)[:, None]
+    log_ratio = np.log((1 - p.width_outlier) * (target / generic + unknown) + p.width_outlier)
     return np.asarray(p.temper_width * log_ratio, dtype=np.float64)
 
 
 def _image_ratios(
-    side: Array32, library: Array32, others: Array32, generic_other: Array32, weight: Array, p: LikelihoodParams
+    side: Array32,
+    library: Array32,
+    others: Array32,
+    generic_other: Array32,
+    weight: Array,
+    known: Array,
+    p: LikelihoodParams,
 ) -> Array:
     """Return tempered log ratios (n, s + o) of one pad's images: of the target's poses, then of other objects."""
     n, s, size = side.shape
     flat = side.reshape(-1, size)
     norm = (side**2).sum(axis=2)
     inner = np.maximum(norm[:, :, None] + norm[:, None, :] - 2 * side @ side.transpose(0, 2, 1), 0) / np.float32(size)
-    own = image_kernel(inner, p) @ weight / image_kernel(mean_squared(flat, library), p).mean(axis=-1).reshape(n, s)
-    other = (image_kernel(mean_squared(others, flat), p).reshape(len(others), n, s) @ weight).T / generic_other
-    ratio = np.concatenate([own, other], axis=1)
+    shares = known * weight
+    unknown = (1 - shares.sum(axis=1))[:, None]
+    own = np.einsum("nij,nj->ni", image_kernel(inner, p), shares) / image_kernel(mean_squared(flat, library), p).mean(
+        axis=-1
+    ).reshape(n, s)
+    other = (image_kernel(mean_squared(others, flat), p).reshape(len(others), n, s) * shares).sum(
+        axis=2
+    ).T / generic_other
+    ratio = np.concatenate([own, other], axis=1) + unknown
     return np.asarray(p.temper_image * np.log((1 - p.image_outlier) * ratio + p.image_outlier), dtype=np.float64)
 
 
@@ -179,8 +203,9 @@ def entropy_decrease(there: Array, weight: Array, not_there: Array, share: float
     return np.asarray(np.maximum(entropy - mean, 0.0))
 
 
-def _at(q: Prediction, closures: Sequence[Closure]) -> tuple[Array, tuple[Array32, Array32], Array]:
-    """Return predicted widths (n, s), (left, right) features (n, s, 35), and novelty of each closure (n,), 0..1."""
+def _at(q: Prediction, closures: Sequence[Closure]) -> tuple[Array, tuple[Array32, Array32], Array, _Known]:
+    """Return predicted widths (n, s), (left, right) features (n, s, 35), novelty of each closure (n,), 0..1, and
+    certainty."""
     model, n = q.model, len(q.model.phi_rad)
     yaw = np.array([c.yaw_K_rad for c in closures])
     height = np.array([c.height_m for c in closures])
@@ -195,14 +220,20 @@ def _at(q: Prediction, closures: Sequence[Closure]) -> tuple[Array, tuple[Array3
     k = _nearest(model.z_m, height[:, None] + q.z0_m[None, :])
     table = model.images_by_height
     left = table[k, j, i]
-    right = table[k, _nearest(model.l_m, -along), (i + n // 2) % n]
+    j_right, i_right = _nearest(model.l_m, -along), (i + n // 2) % n
+    right = table[k, j_right, i_right]
     right = np.ascontiguousarray(right.reshape(*i.shape, *POOLED)[..., ::-1]).reshape(left.shape)
     novelty = np.ones(len(closures))
     if len(q.felt):
         d2 = ((q.felt[None, :, :2] - place[:, None]) ** 2).sum(axis=2) + (q.felt[None, :, 2] - height[:, None]) ** 2
         turned = (q.felt[None, :, 3] - yaw[:, None] + np.pi / 2) % np.pi - np.pi / 2
         novelty -= np.exp(-0.5 * d2 / NEAR_M**2 - 0.5 * (turned / NEAR_RAD) ** 2).max(axis=1)
-    return model.width_m[i, j, k].astype(np.float64), (left, right), novelty
+    sure = np.ones(i.shape)
+    known = _Known(np.zeros(i.shape), sure, (sure, sure))
+    if (c := model.certainty) is not None:
+        images = c.image_known[i, j, k], c.image_known[i_right, j_right, k]
+        known = _Known(c.width_sd_m[i, j, k], c.width_known[i, j, k], images)
+    return model.width_m[i, j, k].astype(np.float64), (left, right), novelty, known
 
 
 def _guess(q: Prediction, c: Closure) -> tuple[float, float]:

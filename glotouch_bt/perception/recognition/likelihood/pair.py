@@ -197,8 +197,8 @@ def _compare(
         shifts[seen[0].layer.sequence] = grid.shift_m[d]
         terms["width"] += float(widths[b, i, d, z])
         terms["image"] += float(images[i, d, z])
-        sharp = [(o, *at) for o, at in zip(seen, offs, strict=True) if not o.layer.upper_only]
-        felt += [r for o, off, sd in sharp if (r := residual(off, sd, o.layer.height_m, (i, d, z)))]
+        sharp = [(o, at) for o, at in zip(seen, offs, strict=True) if not o.layer.upper_only]
+        felt += [r for o, at in sharp if (r := residual(at, o, (i, d, z)))]
     by_bands = p.temper_width * log_banded_twin(felt, grid.bias_m, log_bias, p)
     log_twin = p.twin_slope * 0.5 * (by_places + by_bands)
     terms["pose"] = total - terms["width"] - terms["image"]

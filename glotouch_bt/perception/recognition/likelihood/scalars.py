@@ -53,8 +53,10 @@ def height_ratio(model: TargetModel, candidate: Candidate, p: LikelihoodParams) 
 def _height_density(off_m: Array, model: TargetModel, p: LikelihoodParams) -> Array:
     """Return the densities (n,), 1/m, of measured less true heights (n,); an object that leans is higher."""
     raised_m = math.hypot(p.height_sd_m, p.lean_sd_rad * 0.5 * model.outline.likely.size_m[0])
-    sd_m = np.where(off_m > 0, raised_m, p.height_sd_m)
-    return np.asarray(math.sqrt(2 / math.pi) * np.exp(-0.5 * (off_m / sd_m) ** 2) / (raised_m + p.height_sd_m))
+    unsure_m = model.certainty.height_sd_m if model.certainty is not None else 0.0
+    above_m, below_m = math.hypot(raised_m, unsure_m), math.hypot(p.height_sd_m, unsure_m)
+    sd_m = np.where(off_m > 0, above_m, below_m)
+    return np.asarray(math.sqrt(2 / math.pi) * np.exp(-0.5 * (off_m / sd_m) ** 2) / (above_m + below_m))
 
 
 def whole_share(model: TargetModel, candidate: Candidate, p: LikelihoodParams) -> float:

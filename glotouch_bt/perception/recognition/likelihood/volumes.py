@@ -52,6 +52,21 @@ class Observed:
     log_images: tuple[float, float]
 
 
+@dataclass(frozen=True)
+class WidthVolumes:
+    """Width of one layer at every pose, each (72, nd, nz).
+
+    Attributes:
+        off_m: Measured minus predicted width.
+        scale_m: Scale of its noise.
+        known: Probability that the model predicts it.
+    """
+
+    off_m: Floats
+    scale_m: Floats
+    known: Floats
+
+
 def width_kernel(z: Floats) -> Floats:
     """Return Student's t with three degrees of freedom, normalised to 1 at its peak."""
     return np.asarray((1 + z * z * np.float32(1 / 3)) ** -2)
@@ -59,39 +74,46 @@ def width_kernel(z: Floats) -> Floats:
 
 def width_ratios(
     model: TargetModel, seen: Sequence[Observed], turn_rad: float, grid: Grid, p: LikelihoodParams
-) -> tuple[Array32, Array32, list[tuple[Array32, Array32]]]:
-    """Return log ratios (nb, 72, nd, nz) summed over layers, those of a twin (1, 72, nd, nz), and residual and scale
-    (72, nd, nz) of each layer.
+) -> tuple[Array32, Array32, list[WidthVolumes]]:
+    """Return log ratios (nb, 72, nd, nz) summed over layers, those of a twin (1, 72, nd, nz), and each layer's volumes.
 
-    The twin differs from the target at each closure independently with probability `twin_width`.
+    The twin differs from the target at each closure independently with probability `twin_width`. A width that the model
+    does not know is as that of any object (`Certainty`).
     """
     shape = (len(model.phi_rad), len(grid.shift_m), len(grid.z0_m))
     total, twin = np.zeros((len(grid.bias_m), *shape), dtype=np.float32), np.zeros((1, *shape), dtype=np.float32)
     bias = grid.bias_m.astype(np.float32)[:, None, None, None]
-    offs: list[tuple[Array32, Array32]] = []
-    outlier, far_sd = np.float32(p.width_outlier), np.float32(p.twin_width_sd_m)
+    volumes: list[WidthVolumes] = []
+    outlier = np.float32(p.width_outlier)
+    far_sd: Floats = np.full((1, 1, 1, 1), p.twin_width_sd_m, dtype=np.float32)
+    known: Floats = np.ones((1, 1, 1, 1), dtype=np.float32)
     for o in seen:
         e = o.layer
         at, z_m = e.along_m + grid.shift_m, e.height_m + grid.z0_m
         off = np.float32(e.width_m) - interpolated_width(model, at, z_m, turn_rad)[None]
-        sd = np.float32(p.width_rough) * nearest_unevenness(model, at, z_m, turn_rad)[None]
+        sd = np.float32(p.width_rough) * nearest(model.unevenness_m, model, at, z_m, turn_rad)[None]
         sd = np.sqrt(sd * sd + np.float32(p.width_sd_m**2))
-        offs.append((off[0], sd[0]))
+        if model.certainty is not None:
+            unsure = nearest(model.certainty.width_sd_m, model, at, z_m, turn_rad)[None]
+            sd, far_sd = np.hypot(sd, unsure), np.hypot(np.float32(p.twin_width_sd_m), unsure)
+            known = nearest(model.certainty.width_known, model, at, z_m, turn_rad)[None]
+        volumes.append(WidthVolumes(off[0], sd[0], np.broadcast_to(known[0], shape)))
         scale = (1 - p.width_outlier) * math.exp(-o.log_width)
         if e.upper_only:  # contact of the other finger outside its gel: the width is an upper bound
-            far_peak = np.float32(scale / p.width_range_m)
-            peak = np.full((1, 1, 1, 1), far_peak)
+            far_peak: Floats = np.full((1, 1, 1, 1), np.float32(scale / p.width_range_m))
+            peak: Floats = far_peak
             biased = np.minimum(off - bias, np.float32(0))
             off = np.minimum(off, np.float32(0))
         else:
-            far_peak = np.float32(scale * T_PEAK / p.twin_width_sd_m)
+            far_peak = np.float32(scale * T_PEAK) / far_sd
             peak = np.float32(scale * T_PEAK) / sd
             biased = off - bias
         # An empty window (NaN) predicts no contact; only the outlier density remains.
-        total += np.log(_or_none(width_kernel(biased / sd) * peak) + outlier)
+        missed = outlier + (1 - known) * (1 - outlier)
+        total += np.log(_or_none(known * width_kernel(biased / sd) * peak) + missed)
         near, far = width_kernel(off / sd) * peak, width_kernel(off / far_sd) * far_peak
-        twin += np.log(_or_none(near + np.float32(p.twin_width) * (far - near)) + outlier)
-    return total, twin, offs
+        twin += np.log(_or_none(known * (near + np.float32(p.twin_width) * (far - near))) + missed)
+    return total, twin, volumes
 
 
 def _or_none(density: Floats) -> Floats:
@@ -119,8 +141,12 @@ def image_ratios(
                 at, roll = -at, turn + yaws // 2
             squared = _squared_distance(model, m, at, z_m)
             # (kernel / background) (1 - outlier) + outlier
-            good = np.float32((1 - p.image_outlier) * math.exp(-o.log_images[side]))
-            ratio = np.log(image_kernel(squared, p) * good + np.float32(p.image_outlier))
+            good: Floats = np.full((1, 1, 1), (1 - p.image_outlier) * math.exp(-o.log_images[side]), dtype=np.float32)
+            missed: Floats = np.full((1, 1, 1), p.image_outlier, dtype=np.float32)
+            if model.certainty is not None:
+                known = nearest(model.certainty.image_known, model, at, z_m, 0.0).transpose(2, 1, 0)
+                good, missed = good * known, missed + (1 - known) * (1 - missed)
+            ratio = np.log(image_kernel(squared, p) * good + missed)
             roll %= yaws
             total[:, :, : yaws - roll] += ratio[:, :, roll:]
             total[:, :, yaws - roll :] += ratio[:, :, :roll]
@@ -165,14 +191,14 @@ def interpolated_width(model: TargetModel, l_m: Array, z_m: Array, turn_rad: flo
     return np.asarray((1 - part) * first + part * np.concatenate([first[1:], first[:1]]), dtype=np.float32)
 
 
-def nearest_unevenness(model: TargetModel, l_m: Array, z_m: Array, turn_rad: float) -> Array32:
-    """Return the unevenness (72, nl, nz) of the nearest cells, at yaws phi + turn."""
+def nearest(table: Array32, model: TargetModel, l_m: Array, z_m: Array, turn_rad: float) -> Array32:
+    """Return the values (72, nl, nz) of the nearest cells of a table of a model, at yaws phi + turn."""
     i, j = (
         np.clip(np.rint((x - axis[0]) / (axis[1] - axis[0])), 0, len(axis) - 1).astype(np.int64)
         for axis, x in ((model.l_m, l_m), (model.z_m, z_m))
     )
     turn = round(turn_rad / (2 * np.pi) * len(model.phi_rad))
-    return np.roll(model.unevenness_m[:, i[:, None], j[None, :]], -turn, axis=0)
+    return np.roll(table[:, i[:, None], j[None, :]], -turn, axis=0)
 
 
 def _positions(axis: Array, x: Array) -> tuple[Index, Array32]:

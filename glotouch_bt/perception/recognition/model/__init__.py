@@ -3,8 +3,11 @@
 from glotouch_bt.perception.recognition.model.outline import (
     SENSING_M,
     TIP_RADIUS_M,
+    KindFit,
+    Outline,
     first_hit,
     minimum_rectangle,
+    outline_of,
     traced_tips,
 )
 from glotouch_bt.perception.recognition.model.pads import (
@@ -21,4 +24,11 @@ from glotouch_bt.perception.recognition.model.pads import (
 from glotouch_bt.perception.recognition.model.parts import VERSION, from_parts, to_parts
 from glotouch_bt.perception.recognition.model.raster import hand_axes, mirrored, span
 from glotouch_bt.perception.recognition.model.simulated_touches import touch_windows
-from glotouch_bt.perception.recognition.model.target import STRIDE, TargetHypothesis, TargetModel, table_axes
+from glotouch_bt.perception.recognition.model.target import (
+    STRIDE,
+    Certainty,
+    TargetHypothesis,
+    TargetModel,
+    axes_within,
+    table_axes,
+)

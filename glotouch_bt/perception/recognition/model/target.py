@@ -48,8 +48,25 @@ class TargetHypothesis:
 
 
 @dataclass(frozen=True, eq=False)
+class Certainty:
+    """How well the tables, each (72, nl, nz), and the height of an object known only by touch are known.
+
+    Attributes:
+        width_sd_m: Standard deviation of the width, besides that of a measurement.
+        width_known: Probability that the table predicts the width; otherwise it is as that of any object.
+        image_known: The same of the left pad's image.
+        height_sd_m: Standard deviation of the height.
+    """
+
+    width_sd_m: Array32
+    width_known: Array32
+    image_known: Array32
+    height_sd_m: float
+
+
+@dataclass(frozen=True, eq=False)
 class TargetModel:
-    """Tables of one mesh for one pad. Build with `from_mesh`.
+    """Tables of one target for one pad: of a mesh (`from_mesh`), or of what was felt (`touched.touched_model`).
 
     Attributes:
         name: Name of the mesh, for display.
@@ -71,6 +88,7 @@ class TargetModel:
         normal_dispersion: 1 - |mean normal| over touched patches, mean over touches (the paper's d_M).
         anisotropy: 1 - short / long of the footprint's minimum-area rectangle (the paper's a_M).
         sides: The sides on which the object may stand, each with a model of its own; empty if only as in its file.
+        certainty: How well the tables are known; None if they follow from a mesh. Without a mesh, `fine_m` is empty.
     """
 
     name: str
@@ -91,6 +109,7 @@ class TargetModel:
     anisotropy: float
     components: tuple[Outline, ...] = ()
     sides: tuple[TargetHypothesis, ...] = ()
+    certainty: Certainty | None = None
     _lazy: dict[str, Array32] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -228,21 +247,24 @@ def table_axes(mesh: Mesh, pad: PadSpec) -> TableAxes:
     """Return the axes of a mesh's tables (a millisecond)."""
     long, short, _, middle = minimum_rectangle(mesh.vertices_m[:, :2])
     footprint = mesh.vertices_m[:, :2] - middle
-    top = float(mesh.vertices_m[:, 2].max())
-    step_l, step_z = pad.window_m[0] / FINE[1], pad.window_m[1] / FINE[0]
     radius = float(np.hypot(*np.abs(footprint).max(axis=0)))
-    n = int(np.ceil((radius + 0.5 * pad.window_m[0]) / (STRIDE * step_l))) * STRIDE + FINE[1] // 2
+    axes = axes_within(radius, float(mesh.vertices_m[:, 2].max()), pad)
+    return replace(axes, centre_m=np.asarray(middle), anisotropy=1.0 - short / long)
+
+
+def axes_within(radius_m: float, top_m: float, pad: PadSpec) -> TableAxes:
+    """Return the axes of the tables of an object within a circle about the origin, up to its top."""
+    step_l, step_z = pad.window_m[0] / FINE[1], pad.window_m[1] / FINE[0]
+    n = int(np.ceil((radius_m + 0.5 * pad.window_m[0]) / (STRIDE * step_l))) * STRIDE + FINE[1] // 2
     fine_l = np.asarray(np.arange(-n, n + 1) * step_l, dtype=np.float64)
     # Heights: pad centres from 8 mm up to 8 mm above the top; the raster extends half a window on both sides.
-    centres = np.asarray(np.arange(0.008, top + 0.008, STRIDE * step_z), dtype=np.float64)
+    centres = np.asarray(np.arange(0.008, top_m + 0.008, STRIDE * step_z), dtype=np.float64)
     half = FINE[0] // 2
     rows = np.arange(STRIDE * (len(centres) - 1) + 1 + 2 * half) - half
     fine_z = np.asarray(centres[0] + rows * step_z, dtype=np.float64)
     phi = np.asarray(np.arange(YAWS) * (2 * np.pi / YAWS), dtype=np.float64)
     h = FINE[1] // 2
-    return TableAxes(
-        phi, fine_l[h:-h:STRIDE], centres, fine_l, fine_z, np.asarray(middle), top, radius, 1.0 - short / long
-    )
+    return TableAxes(phi, fine_l[h:-h:STRIDE], centres, fine_l, fine_z, np.zeros(2), top_m, radius_m, 0.0)
 
 
 def _build(mesh: Mesh, pad: PadSpec) -> TargetModel:

@@ -1,0 +1,119 @@
+"""Store what was felt of an object, so that it can be found again without a mesh."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+import numpy as np
+
+from glotouch_bt import perception
+from glotouch_bt.perception import recognition
+from glotouch_bt.perception.recognition import Match, PadSpec, TouchedObject, encounter_of
+from glotouch_bt.perception.touch import TouchSet, evidence_weight
+from glotouch_bt.robot import HOLD
+from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
+
+
+class RememberParams(SkillParams):
+    """Parameters of `remember`."""
+
+    object: str = param("Name of the object; it is retrieved as touched:NAME")
+    same: float = param(
+        "Least probability that the touches are of the object stored under this name", default=0.5, gt=0.0, lt=1.0
+    )
+    min_layers: int = param("Least number of closures that both pads felt", default=4, ge=1, le=100)
+
+
+class Remember(Skill):
+    """Store outline, height, widths and images of the object that was squeezed, in touched/NAME.json.
+
+    If something was stored under this name, the touches must be of the same object. They are turned and moved into its
+    frame and added, so that the object is known better after every encounter.
+
+    SUCCESS: `stored` is the file.
+    """
+
+    Params = RememberParams
+    params: RememberParams
+
+    USES: ClassVar = frozenset({"arm"})  # it holds the arm while it computes
+
+    TOO_LITTLE = Failure(
+        "too_little_felt",
+        "the top was not touched, or too few closures felt the object",
+        advice="squeeze it again; `squeeze` says why closures failed",
+    )
+    OTHER_OBJECT = Failure(
+        "other_object",
+        "another object is stored under this name",
+        advice="choose another name, or delete the file to forget the object",
+    )
+
+    touchset = In(TouchSet, "the touches of the object")
+    stored = Out(str, "the file", result=lambda path: f"remembered in {path}")
+    encounters = Out(int, "number of encounters that are remembered")
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        yield HOLD  # comparing with what is stored takes longer than a control period
+        touchset: TouchSet = self.touchset
+        layers = sum(evidence_weight(layer) >= 1.0 for layer in touchset.layers)
+        if not touchset.candidate.top_touched or layers < self.params.min_layers:
+            raise self.TOO_LITTLE(
+                f"both pads felt {layers} closures, and {self.params.min_layers} are needed; the top was "
+                + ("touched" if touchset.candidate.top_touched else "not touched"),
+                layers=layers,
+            )
+        path, pad = (
+            perception.touched_path(self.params.object),
+            perception.pads_of(self.context.arm.description.gripper),
+        )
+        if path.exists():
+            felt = self._grown(perception.read_touched(self.params.object), touchset, pad)
+        else:
+            felt = TouchedObject(self.params.object, (encounter_of(touchset, pad),))
+        self.stored, self.encounters = str(perception.write_touched(felt)), len(felt.encounters)
+        self.event("remembered", name=felt.name, file=self.stored, encounters=self.encounters, layers=layers)
+        self._tell(felt, pad)
+
+    def _grown(self, known: TouchedObject, touchset: TouchSet, pad: PadSpec) -> TouchedObject:
+        """Return the object with one more encounter, in its own frame.
+
+        Raises:
+            SkillFailed: `other_object`.
+        """
+        model = recognition.touched_model(known, pad)
+        ranking = recognition.MATCHERS["likelihood"](model, (touchset,))
+        best: Match = ranking.best
+        if best.probability < self.params.same:
+            raise self.OTHER_OBJECT(
+                f"the touches are of {known.name} with a probability of {best.probability:.2f} only",
+                probability=best.probability,
+                least=self.params.same,
+            )
+        # The closures moved the object. Before them, its traced centre was that of the outline.
+        theta = best.pose_K_O[2]
+        turn = np.array([[math.cos(theta), -math.sin(theta)], [math.sin(theta), math.cos(theta)]])
+        contour = touchset.candidate.contour
+        x, y = (np.asarray(contour.centre_K_m) - turn @ model.outline.of(contour.kind).centre_m).tolist()
+        return known.grown(encounter_of(touchset, pad, (x, y, theta)))
+
+    def _tell(self, felt: TouchedObject, pad: PadSpec) -> None:
+        """Add a section to the report."""
+        model = recognition.touched_model(felt, pad)
+        assert model.certainty is not None
+        inner = np.abs(model.l_m) <= 0.5 * pad.window_m[0]
+        known = model.certainty.width_known[:, inner]
+        rows = [
+            [str(i + 1), e.contour.family or "", f"{e.contour.size_m[0] * 1e3:.1f} x {e.contour.size_m[1] * 1e3:.1f}",
+             f"{e.height_m * 1e3:.1f}", str(len(e.closures)), str(sum(c.two_sided for c in e.closures))]
+            for i, e in enumerate(felt.encounters)
+        ]  # fmt: skip
+        self.report(
+            f"Remembered as {felt.name}",
+            f"{100 * float(known.mean()):.0f} % of the widths through its middle are known to about 2.5 mm or better. "
+            f"Retrieve it with --set target=touched:{felt.name}.",
+            ["encounter", "outline", "size, mm", "height, mm", "closures", "felt by both pads"],
+            rows,
+        )
