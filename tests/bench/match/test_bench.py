@@ -15,6 +15,7 @@ from glotouch_bt.bench.match import bench, closures, trials
 from glotouch_bt.bench.match.bench import MatchCampaign, objects_of, run_campaign
 from glotouch_bt.bench.match.dataset import write_layout
 from glotouch_bt.bench.match.methods import chosen
+from glotouch_bt.bench.match.trials import Decided
 from glotouch_bt.robot import BadInput
 from tests.bench.match.conftest import SIZES_M, a_layout, by_size
 
@@ -184,3 +185,25 @@ def test_the_command(as_json, command, quick, monkeypatch, tmp_path):
     else:
         for text in ("90.0", "100.0 [44, 100]", "(100, 100)", *SIZES_M, "in_turn", "7.2", "takes 0.50 s", "o/summary"):
             assert text in done.stdout.replace("\n", " "), text
+
+
+@pytest.mark.parametrize("changes", [{"touched": True}, {"in_the_box": 10}])
+def test_options_that_need_touches_without_a_robot(changes, tmp_path):
+    with pytest.raises(BadInput, match="--sampled"):
+        campaign(tmp_path, strangers=None, **changes).check()
+
+
+def test_a_handled_object_is_compared_with_its_stl(quick, monkeypatch, tmp_path):
+    monkeypatch.setattr(MatchCampaign, "check", lambda self: None)
+    monkeypatch.setattr(bench, "sampled_layout", lambda backend, world, conditions, seed: a_layout(seed))
+    handled = {t.name: t.touchset for t in a_layout(3).touched}
+    monkeypatch.setattr(bench, "handled_objects", lambda *_: handled)
+    seen = []
+
+    def decide(layout, folder, strangers, names, felt):
+        seen.append((names, felt))
+        return Decided([], [])
+
+    monkeypatch.setattr(bench, "decide", decide)
+    bench.layout_task(campaign(tmp_path, sampled=True, touched=True, methods=("likelihood",)), 3, None)
+    assert seen == [(("likelihood", "touched"), handled)]
