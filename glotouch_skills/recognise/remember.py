@@ -18,7 +18,10 @@ from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, pa
 class RememberParams(SkillParams):
     """Parameters of `remember`."""
 
-    object: str = param("Name of the object; it is retrieved as touched:NAME")
+    object: str = param(
+        "Name of the object, of letters, digits, _ and -; it is retrieved as touched:NAME",
+        pattern=r"^[A-Za-z0-9_-]{1,64}$",  # as `touched_path`; refused before the run, not at its end
+    )
     same: float = param(
         "Least probability that the touches are of the object stored under this name", default=0.5, gt=0.0, lt=1.0
     )

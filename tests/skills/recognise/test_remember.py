@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 import trimesh
 from py_trees.common import Status
+from pydantic import ValidationError
 
-from glotouch_bt.perception import read_touched
+from glotouch_bt.perception import read_touched, touched_path
+from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene.meshes import load_mesh
 from glotouch_skills.common.planning import find_target
 from glotouch_skills.recognise.match import MatchTarget
@@ -95,3 +97,11 @@ def test_the_report_says_what_is_known(run, solids) -> None:
     b, _ = run(touched(solids["block"], 1))
     sections = [fields for kind, fields in b.events if kind == "report"]
     assert any("touched:thing" in str(s) for s in sections), [k for k, _ in b.events]
+
+
+@pytest.mark.parametrize("name", ["", "a/b", "..", "thing 2", "x" * 65, "thing\n"])
+def test_a_name_that_no_file_can_have_is_refused_before_the_run(name: str) -> None:
+    with pytest.raises(BadInput):
+        touched_path(name)
+    with pytest.raises(ValidationError):
+        Remember.Params(object=name)
