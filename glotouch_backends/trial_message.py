@@ -45,7 +45,9 @@ class TrialData(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     stl: Annotated[dict[Stem, bytes], msgspec.Meta(max_length=MAX_OBJECTS)]
     min_gap_m: float
     min_wall_gap_m: float
+    touching_share: float
     stance: Literal["upright", "any"]
+    lying_share: float | None
     conditions: Conditions
     seed: Annotated[int, msgspec.Meta(ge=0)]
     options: WorldOptions
@@ -86,7 +88,9 @@ def trial_message(world: World, conditions: Conditions, seed: int, options: Worl
         stl=_stl_files(objects),
         min_gap_m=objects.min_gap_m,
         min_wall_gap_m=objects.min_wall_gap_m,
+        touching_share=objects.touching_share,
         stance=objects.stance,
+        lying_share=objects.lying_share,
         conditions=conditions,
         seed=seed,
         options=options,
@@ -144,7 +148,9 @@ def trial_of_message(message: bytes) -> Iterator[Trial]:
             names=tuple(data.stl),
             min_gap_m=data.min_gap_m,
             min_wall_gap_m=data.min_wall_gap_m,
+            touching_share=data.touching_share,
             stance=data.stance,
+            lying_share=data.lying_share,
         )
         for name, content in data.stl.items():
             (objects.folder / f"{name}.stl").write_bytes(content)

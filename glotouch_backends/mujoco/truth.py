@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from glotouch_backends.mujoco.axis_proof import AxisProof
 from glotouch_backends.mujoco.printed import printed_mesh
 from glotouch_bt.robot import Array, BadInput, Conditions, Pose, RobotDescription, World, rpy_to_matrix
-from glotouch_bt.robot.scene import Mesh, Placement, draw_layout, load_folder, stream
+from glotouch_bt.robot.scene import Mesh, Placement, draw_layout, load_folder, moved_apart, outline, stream
 
 
 @dataclass(frozen=True)
@@ -117,6 +117,13 @@ def _object(
     return ObjectTruth(mesh, place, mass_kg, friction, stl, scale, offset, com, float(lean), about)
 
 
+def _true_outline(truth: ObjectTruth) -> Array:
+    """Return the convex outline (n, 2) of an object from above as it stands, before its yaw, anticlockwise."""
+    axis = np.array([-np.sin(truth.lean_about_rad), np.cos(truth.lean_about_rad), 0.0])
+    stands = rotation_vector(truth.lean_rad * axis) @ Pose(np.zeros(3), np.array(truth.place.quat))
+    return outline(replace(truth.mesh, vertices_m=stands.apply(truth.mesh.vertices_m)))
+
+
 def _probe_stiffness(
     world: World, conditions: Conditions, rng: np.random.Generator, proof: AxisProof
 ) -> tuple[float, float]:
@@ -198,14 +205,18 @@ def draw_truth(
     rng = stream(seed, "objects")
     masses = rng.uniform(*conditions.object_mass_kg, len(meshes))
     frictions = rng.uniform(*conditions.object_friction, len(meshes))
+    objects = [
+        _object(m, p, float(mass), float(mu), conditions, stream(seed, f"object {m.name}"), proof)
+        for m, p, mass, mu in zip(meshes, places, masses, frictions, strict=True)
+    ]
+    if layout is None:
+        apart = moved_apart([_true_outline(o) for o in objects], places, world.container.interior_m[:2])
+        objects = [replace(o, place=p) for o, p in zip(objects, apart, strict=True)]
     return Truth(
         pose_B_K=_true_container(world, conditions, seed, proof),
         pose_handle_shaft=_true_shaft(world, conditions, stream(seed, "probe")),
         pad_friction=float(stream(seed, "pads").uniform(*conditions.pad_friction)),
-        objects=tuple(
-            _object(m, p, float(mass), float(mu), conditions, stream(seed, f"object {m.name}"), proof)
-            for m, p, mass, mu in zip(meshes, places, masses, frictions, strict=True)
-        ),
+        objects=tuple(objects),
         probe_stiffness_Nm_rad=_probe_stiffness(world, conditions, stream(seed, "probe compliance"), proof),
         joint_errors_rad=_joint_errors(description, world, conditions, stream(seed, "kinematics"), proof),
         contact_s=_softness("contact_softness_s", conditions, seed, proof),

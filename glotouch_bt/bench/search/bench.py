@@ -84,7 +84,7 @@ class SearchCampaign(Campaign):
     def planar_trial(self, policy: str, seed: int) -> Trial:
         """Return the trial of a policy in the planar simulator."""
         head = {"simulator": "planar", "policy": policy, "seed": seed}
-        run = partial(planar_trial, head, self.mission, self.objects, self.planar_budget_m)
+        run = partial(planar_trial, head, self.mission, self.objects, self.world, self.planar_budget_m)
         return self.trial(
             f"planar/{policy}-s{seed}", run, partial(failed_trial, head), **head, budget=self.planar_budget_m
         )
@@ -92,7 +92,7 @@ class SearchCampaign(Campaign):
     def recorded_trial(self, number: int, folder: Path) -> Trial:
         """Return the trial that scores a recorded run."""
         head = {"simulator": "recorded", "policy": self.policies[0], "seed": -1, "folder": str(folder)}
-        run = partial(recorded_trial, folder, self.mission, self.objects, self.policies[0])
+        run = partial(recorded_trial, folder, self.mission, self.objects, self.world, self.policies[0])
         content = {name: digest((folder / name).read_bytes()) for name in ("result.json", "truth.json")}
         return self.trial(f"recorded/{number}", run, partial(failed_trial, head), **head, content=content)
 
@@ -109,7 +109,7 @@ class SearchCampaign(Campaign):
     @property
     def object_count(self) -> int:
         """Return the number of objects in a layout."""
-        return len(scene(self.mission, self.objects)[1])
+        return len(scene(self.mission, self.objects, self.world)[1])
 
 
 def run_campaign(campaign: SearchCampaign, executor: Executor, on_row: OnRow = silent) -> dict[str, Any]:
@@ -142,7 +142,8 @@ def run_campaign(campaign: SearchCampaign, executor: Executor, on_row: OnRow = s
     if campaign.seeds:
         example = campaign.out / f"{campaign.policies[0]}-s{campaign.seeds[0]}"
         if (example / "run.mcap").is_file():
-            plot_layout(campaign.out / "layout.png", example, sections_of(campaign.mission, campaign.objects))
+            sections = sections_of(campaign.mission, campaign.objects, campaign.world)
+            plot_layout(campaign.out / "layout.png", example, sections)
     return summary
 
 

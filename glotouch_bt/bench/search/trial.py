@@ -43,7 +43,7 @@ def mission_trial(head: Row, request: RunRequest) -> Row:
         BadInput: The request itself is wrong.
     """
     done = launch_trial(request)
-    sections = sections_of(request.mission, request.objects)
+    sections = sections_of(request.mission, request.objects, request.world)
     return EMPTY_ROW | head | {"ended": _ended(done.result)} | score_run(read_run(done.folder), sections)
 
 
@@ -72,19 +72,19 @@ def recorded_folders(top: Path, conditions: str) -> list[Path]:
     return out
 
 
-def recorded_trial(folder: Path, mission: str, objects: Path | None, policy: str) -> Row:
+def recorded_trial(folder: Path, mission: str, objects: Path | None, world: str | None, policy: str) -> Row:
     """Return the row of a recorded run of any mission that explores.
 
     Args:
         folder: Folder of the run.
-        mission, objects: Source of the meshes.
+        mission, objects, world: Source of the meshes.
         policy: Name of the policy if the run does not record it.
     """
     record = read_run(folder)
     policy = str((record.run.get("parameters") or {}).get("policy", policy))
     row = EMPTY_ROW | {"simulator": record.run["backend"], "policy": policy, "seed": int(record.run["seed"])}
     row["folder"] = str(folder)
-    return row | {"ended": _ended(record.result)} | score_run(record, sections_of(mission, objects))
+    return row | {"ended": _ended(record.result)} | score_run(record, sections_of(mission, objects, world))
 
 
 def _ended(result: Any) -> str:
@@ -96,21 +96,27 @@ def _ended(result: Any) -> str:
 
 
 @lru_cache(maxsize=2)
-def sections_of(mission: str, objects: Path | None) -> dict[str, FeltSection]:
-    """Return the probe sections of a mission's objects, by name."""
-    world, meshes = scene(mission, objects)
-    return {m.name: felt_section(m, world.probe) for m in meshes}
+def sections_of(mission: str, objects: Path | None, world: str | None = None) -> dict[str, FeltSection]:
+    """Return the probe sections of a mission's objects, by name.
+
+    Raises:
+        BadInput: Objects of the world lie on other sides than upright.
+    """
+    there, meshes = scene(mission, objects, world)
+    if there.objects.stance != "upright":
+        raise BadInput(f"world {there.name!r}: missions with lying objects are not scored; use --trials 0 --planar N")
+    return {m.name: felt_section(m, there.probe) for m in meshes}
 
 
 @lru_cache(maxsize=2)
-def scene(mission: str, objects: Path | None) -> tuple[World, Sequence[Mesh]]:
-    """Return the mission's world and meshes.
+def scene(mission: str, objects: Path | None, world: str | None = None) -> tuple[World, Sequence[Mesh]]:
+    """Return the mission's world, or another one by name or path, and its meshes.
 
     Raises:
-        BadInput: There is no such mission, or a mesh is unusable.
+        BadInput: There is no such mission or world, or a mesh is unusable.
     """
-    world = load_mission(mission, {}, objects=objects).world
-    return world, load_folder(world.objects.folder, world.objects.names)
+    there = load_mission(mission, {}, objects=objects, world=world).world
+    return there, load_folder(there.objects.folder, there.objects.names)
 
 
 def score_run(record: RunRecord, sections: dict[str, FeltSection]) -> dict[str, Any]:
@@ -239,10 +245,10 @@ def _travelled(places: Array) -> Array:
     return out
 
 
-def planar_trial(head: Row, mission: str, objects: Path | None, budget_m: float) -> Row:
+def planar_trial(head: Row, mission: str, objects: Path | None, other_world: str | None, budget_m: float) -> Row:
     """Run an exploration in the planar simulator; `head` are the first columns of the row."""
     policy, seed = head["policy"], head["seed"]
-    world, meshes = scene(mission, objects)
+    world, meshes = scene(mission, objects, other_world)
     planar = planar_world(world, meshes, seed)
     explored = explore(planar, search_policy(policy, seed), len(meshes), budget_m=budget_m)
     layout = TrueLayout(planar.sections, planar.start_poses, planar.poses)

@@ -27,6 +27,7 @@ def search(
     seed: shared.FirstSeed = 0,
     conditions: shared.Conditions = "nominal",
     objects: shared.Objects = None,
+    world: shared.WorldName = None,
     backend: shared.Backend = "mujoco",
     workers: shared.Workers = 2,
     cluster: shared.Cluster = None,
@@ -52,8 +53,10 @@ def search(
     names = tuple(p.strip() for p in policies.split(",") if p.strip())
     executors = shared.Executors(workers, cluster, trial_limit)
     if count == "unknown":
-        if objects is not None or recorded or conditions != "nominal":
-            raise BadInput("--count unknown makes objects of its own: omit --objects, --recorded and --conditions")
+        if objects is not None or recorded or conditions != "nominal" or world is not None:
+            raise BadInput(
+                "--count unknown makes objects of its own: omit --objects, --world, --recorded and --conditions"
+            )
         counting = CountCampaign(
             policy=names[0] if names else "",
             seeds=tuple(range(seed, seed + planar)),
@@ -75,6 +78,7 @@ def search(
         planar_seeds=tuple(range(seed, seed + planar)),
         conditions=conditions,
         objects=objects,
+        world=world,
         backend=backend,
         out=shared.bench_folder(out, "search"),
         resume=resume,

@@ -84,9 +84,19 @@ class ObjectsSection(_Section):
     )
     min_gap_m: float = Field(default=ObjectSet.min_gap_m, ge=0, le=1.0)
     min_wall_gap_m: float = Field(default=ObjectSet.min_wall_gap_m, ge=0, le=1.0)
+    touching_share: float = Field(
+        default=ObjectSet.touching_share,
+        ge=0,
+        le=1,
+        description="share of the objects that touch another one or a wall",
+    )
     stance: Literal["upright", "any"] = Field(
         default=ObjectSet.stance, description="upright as in the file, or each object on any of its stable sides"
     )
+    lying_share: float | None = Field(
+        default=ObjectSet.lying_share, ge=0, le=1,
+        description="with stance any: share that lies on another side than upright; none: as each side is probable",
+    )  # fmt: skip
 
 
 class WorldFile(_Section):
@@ -161,7 +171,9 @@ def read_world(node: Node, file: Path, findings: Findings, objects: Path | None 
 def _objects(
     given: ObjectsSection, node: Map, file: Path, findings: Findings, override: Path | None
 ) -> ObjectSet | None:
-    placed: dict[str, Any] = given.model_dump(include={"min_gap_m", "min_wall_gap_m", "stance"})
+    placed: dict[str, Any] = given.model_dump(
+        include={"min_gap_m", "min_wall_gap_m", "touching_share", "stance", "lying_share"}
+    )
     if override is not None:
         given_at = Place(f"--objects {override}")
         files = _files(override, given_at, f"is not a folder with .stl files in it{_others(override)}", findings)

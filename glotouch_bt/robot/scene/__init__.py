@@ -13,7 +13,7 @@ from glotouch_bt.robot.scene.meshes import (
     solid_of,
 )
 from glotouch_bt.robot.scene.object_files import MESH_SUFFIXES, load_folder, stl_files, twins_of
-from glotouch_bt.robot.scene.placement import Placement, draw_layout, place_objects
+from glotouch_bt.robot.scene.placement import Placement, draw_layout, moved_apart, outline, place_objects
 from glotouch_bt.robot.scene.stances import UPRIGHT, ByDigest, Quat, stances, standing, turned
 from glotouch_bt.robot.scene.streams import stream
 from glotouch_bt.robot.scene.world import Container, Holder, ObjectSet, Probe, World

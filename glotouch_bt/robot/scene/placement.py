@@ -28,6 +28,12 @@ HOPELESS_SHARE = 0.75
 """See `HOPELESS_AFTER`."""
 ROUNDING_M = 1e-9
 """Bound of the rounding errors of a distance."""
+TOUCHING_M = 5e-5
+"""Gap between outlines that touch. It keeps the solids of a simulation from overlapping by rounding."""
+MAX_ADVANCES = 200
+"""Number of steps in which an object is moved until it touches something."""
+MAX_SEPARATIONS = 60
+"""Number of rounds in which overlapping outlines are moved apart."""
 
 
 @dataclass(frozen=True)
@@ -86,12 +92,18 @@ def gap(first: Array, second: Array) -> float:
 
 
 def _place_all(
-    outlines: Sequence[Array], half: Array, min_gap_m: float, min_wall_gap_m: float, rng: np.random.Generator
+    outlines: Sequence[Array],
+    half: Array,
+    min_gap_m: float,
+    min_wall_gap_m: float,
+    rng: np.random.Generator,
+    touching_share: float,
 ) -> list[Placement] | int:
     """Try to place all outlines in the given order; return the index that does not fit if it fails."""
     done: list[Placement] = []
     placed: list[tuple[Array, Placement, float]] = []
-    limit = half - min_wall_gap_m
+    limit = half - max(min_wall_gap_m, TOUCHING_M if touching_share else 0.0)
+    min_gap_m = max(min_gap_m, TOUCHING_M)  # a gap of 0 is also that of outlines that overlap
     for i, shape in enumerate(outlines):
         reach = float(np.linalg.norm(shape, axis=1).max())
         for _ in range(MAX_TRIES_PER_OBJECT):
@@ -106,6 +118,9 @@ def _place_all(
                 for other, there, far in placed
             )
             if all(clear):
+                if touching_share and rng.random() < touching_share:
+                    place = _moved_until_touching(shape, place, placed, half, rng)
+                    polygon = transformed(shape, place)
                 done.append(place)
                 placed.append((polygon, place, reach))
                 break
@@ -114,12 +129,92 @@ def _place_all(
     return done
 
 
+def _moved_until_touching(
+    shape: Array,
+    place: Placement,
+    placed: Sequence[tuple[Array, Placement, float]],
+    half: Array,
+    rng: np.random.Generator,
+) -> Placement:
+    """Return the place moved straight until the outline touches an outline or a wall.
+
+    The direction is towards one of the others, or any. Each step is as long as the nearest gap (conservative
+    advancement; Mirtich, 1996), so that nothing overlaps.
+    """  # fmt: skip
+    towards = int(rng.integers(len(placed) + 1))
+    angle = float(rng.uniform(-np.pi, np.pi))
+    way = np.array([np.cos(angle), np.sin(angle)])
+    if towards < len(placed):
+        there = placed[towards][1]
+        way = np.array([there.x_m - place.x_m, there.y_m - place.y_m])
+        way /= max(float(np.linalg.norm(way)), ROUNDING_M)
+    for _ in range(MAX_ADVANCES):
+        polygon = transformed(shape, place)
+        free = min([float((half - np.abs(polygon)).min()), *(gap(polygon, other) for other, _, _ in placed)])
+        if free <= 2.0 * TOUCHING_M:
+            break
+        step = (free - TOUCHING_M) * way
+        place = replace(place, x_m=float(place.x_m + step[0]), y_m=float(place.y_m + step[1]))
+    return place
+
+
+def moved_apart(
+    outlines: Sequence[Array], places: Sequence[Placement], interior_m: tuple[float, float]
+) -> list[Placement]:
+    """Return places at which no outlines (n, 2) overlap, each object moved by little.
+
+    True solids are a little larger than those of their files. Overlapping pairs share the shortest translation that
+    separates them; walls push back into the container.
+
+    Args:
+        outlines: Convex outlines in the mesh frames as they stand, anticlockwise.
+        places: Where they should be.
+        interior_m: Interior size along x_K and y_K.
+    """
+    at = np.array([(p.x_m, p.y_m) for p in places]).reshape(-1, 2)
+    turned_m = [transformed(o, replace(p, x_m=0.0, y_m=0.0)) for o, p in zip(outlines, places, strict=True)]
+    low = np.array([o.min(axis=0) for o in turned_m]).reshape(-1, 2)
+    high = np.array([o.max(axis=0) for o in turned_m]).reshape(-1, 2)
+    half = 0.5 * np.array(interior_m) - TOUCHING_M
+    for _ in range(MAX_SEPARATIONS):
+        before = at.copy()
+        at = np.clip(at, -half - low, half - high)
+        for i in range(len(at)):
+            for j in range(i):
+                push = _separation(turned_m[i] + at[i], turned_m[j] + at[j])
+                at[i] += 0.5 * push
+                at[j] -= 0.5 * push
+        if np.array_equal(before, at):
+            break
+    return [replace(p, x_m=float(x), y_m=float(y)) for p, (x, y) in zip(places, at, strict=True)]
+
+
+def _separation(first: Array, second: Array) -> Array:
+    """Return the shortest translation (2,) of the first of two convex polygons that leaves `TOUCHING_M` of gap.
+
+    Zero if they are farther apart (separating axis theorem).
+    """
+    best, push = np.inf, np.zeros(2)
+    for a, b, sign in ((first, second, -1.0), (second, first, 1.0)):
+        edge = np.roll(a, -1, axis=0) - a
+        edge = edge[np.linalg.norm(edge, axis=1) > ROUNDING_M]
+        normal = np.stack([edge[:, 1], -edge[:, 0]], axis=1) / np.linalg.norm(edge, axis=1, keepdims=True)
+        depth = (a @ normal.T).max(axis=0) - (b @ normal.T).min(axis=0) + 0.9 * TOUCHING_M
+        if depth.min() <= 0.0:
+            return np.zeros(2)
+        k = int(np.argmin(depth))
+        if depth[k] < best:
+            best, push = float(depth[k]), sign * (depth[k] + 0.1 * TOUCHING_M) * normal[k]
+    return push
+
+
 def place_objects(
     meshes: Sequence[Mesh],
     interior_m: tuple[float, float],
     min_gap_m: float,
     min_wall_gap_m: float,
     rng: np.random.Generator,
+    touching_share: float = 0.0,
 ) -> list[Placement]:
     """Return a random layout in K, in the order of `meshes`.
 
@@ -129,6 +224,7 @@ def place_objects(
         min_gap_m: Least distance between the convex outlines of two objects.
         min_wall_gap_m: Least distance between an outline and a wall.
         rng: Source of all draws.
+        touching_share: Share of the objects that are moved until they touch another one or a wall.
 
     Raises:
         BadInput: They do not fit. The message names the object and the available area.
@@ -148,7 +244,7 @@ def place_objects(
         for n in range(MAX_RESTARTS):
             if n >= HOPELESS_AFTER and failed <= HOPELESS_SHARE * len(meshes):
                 break
-            result = _place_all([outlines[i] for i in order], half, min_gap_m, min_wall_gap_m, rng)
+            result = _place_all([outlines[i] for i in order], half, min_gap_m, min_wall_gap_m, rng, touching_share)
             if isinstance(result, list):
                 places: list[Placement] = [result[0]] * len(meshes) if result else []
                 for i, place in zip(order, result, strict=True):
@@ -176,9 +272,14 @@ def draw_layout(meshes: Sequence[Mesh], world: World, seed: int) -> list[Placeme
     sides = [UPRIGHT] * len(meshes)
     if objects.stance == "any":
         rng = stream(seed, "stances")
-        sides = [draw_stance(m, rng) for m in meshes]
+        sides = [draw_stance(m, rng, objects.lying_share) for m in meshes]
         meshes = [turned(m, quat) for m, quat in zip(meshes, sides, strict=True)]
     places = place_objects(
-        meshes, (interior[0], interior[1]), objects.min_gap_m, objects.min_wall_gap_m, stream(seed, "layout")
+        meshes,
+        (interior[0], interior[1]),
+        objects.min_gap_m,
+        objects.min_wall_gap_m,
+        stream(seed, "layout"),
+        objects.touching_share,
     )
     return [replace(place, quat=quat) for place, quat in zip(places, sides, strict=True)]

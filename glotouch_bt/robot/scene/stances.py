@@ -49,9 +49,20 @@ def stances(mesh: Mesh) -> list[tuple[Quat, float]]:
     return list(zip(*_stances(ByDigest(mesh)), strict=True))
 
 
-def draw_stance(mesh: Mesh, rng: np.random.Generator) -> Quat:
-    """Return the rotation onto a stable side, drawn with its probability; upright if there is none."""
+def draw_stance(mesh: Mesh, rng: np.random.Generator, lying_share: float | None = None) -> Quat:
+    """Return the rotation onto a stable side, drawn with its probability; upright if there is none.
+
+    Args:
+        mesh: The object.
+        rng: Source of the draws.
+        lying_share: Probability of a side other than upright; None: that of the sides.
+    """
     sides, shares = _stances(ByDigest(mesh))
+    if lying_share is not None:
+        if rng.random() >= lying_share:
+            return UPRIGHT
+        lying = [i for i, side in enumerate(sides) if side != UPRIGHT]
+        sides, shares = tuple(sides[i] for i in lying), tuple(shares[i] for i in lying)
     number = rng.random()
     if not sides:
         return UPRIGHT

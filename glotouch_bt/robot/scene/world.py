@@ -100,14 +100,19 @@ class ObjectSet:
         names: File stems to use, in order; empty means every STL of the folder, sorted.
         min_gap_m: Least gap between two objects.
         min_wall_gap_m: Least gap between an object and a wall.
+        touching_share: Share of the objects that touch another object or a wall.
         stance: "upright" as in the file, or "any": each object on a random one of its stable sides.
+        lying_share: With stance "any", share of the objects that lie on a side other than upright; None: as the
+            probabilities of the sides give it.
     """
 
     folder: Path
     names: tuple[str, ...] = ()
     min_gap_m: float = 0.030
     min_wall_gap_m: float = 0.030
+    touching_share: float = 0.0
     stance: Literal["upright", "any"] = "upright"
+    lying_share: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,7 @@ import trimesh
 
 from glotouch_bt.robot import Array, BadInput
 from glotouch_bt.robot.scene.meshes import Mesh, load_mesh
-from glotouch_bt.robot.scene.placement import Placement, gap, outline, place_objects, transformed
+from glotouch_bt.robot.scene.placement import Placement, gap, moved_apart, outline, place_objects, transformed
 from glotouch_bt.robot.scene.streams import stream
 
 SIZES = {"bar": (0.09, 0.03, 0.04), "cube": (0.05, 0.05, 0.05), "plate": (0.07, 0.04, 0.02), "peg": (0.02, 0.02, 0.06)}
@@ -106,3 +106,32 @@ def test_an_object_far_from_its_files_origin_has_the_same_place(tmp_path: Path) 
         found.append(transformed(outline(mesh), place))
     order = [np.lexsort(f.round(4).T) for f in found]
     assert found[0][order[0]] == pytest.approx(found[1][order[1]], abs=2e-6)
+
+
+def test_objects_of_a_crowded_layout_touch_and_do_not_overlap(meshes: list[Mesh]) -> None:
+    touching, half = [], 0.5 * np.array(INTERIOR)
+    for seed in range(40):
+        places = place_objects(meshes, INTERIOR, 0.0, 0.0, stream(seed, "layout"), touching_share=0.5)
+        polygons = [transformed(outline(m), p) for m, p in zip(meshes, places, strict=True)]
+        assert all((np.abs(a) < half).all() for a in polygons)
+        gaps = [[sampled_gap(a, b) for b in polygons if b is not a] for a in polygons]
+        assert min(map(min, gaps)) > 0.0
+        walls = [float((half - np.abs(a)).min()) for a in polygons]
+        touching += [min(*g, wall) < STEP_M for g, wall in zip(gaps, walls, strict=True)]
+    assert 0.45 < np.mean(touching) < 0.75, "an object is also touched by another one that was moved to it"
+
+
+def test_overlapping_outlines_are_moved_apart_by_little(meshes: list[Mesh]) -> None:
+    for seed in range(20):
+        places = place_objects(meshes, INTERIOR, 0.0, 0.0, stream(seed, "layout"), touching_share=1.0)
+        grown = [1.02 * outline(m) for m in meshes]  # true solids are larger than their files
+        apart = moved_apart(grown, places, INTERIOR)
+        polygons = [transformed(o, p) for o, p in zip(grown, apart, strict=True)]
+        assert all((np.abs(a) <= 0.5 * np.array(INTERIOR)).all() for a in polygons)
+        assert min(sampled_gap(a, b) for i, a in enumerate(polygons) for b in polygons[:i]) > 0.0
+        assert max(np.hypot(a.x_m - p.x_m, a.y_m - p.y_m) for a, p in zip(apart, places, strict=True)) < 0.006
+
+
+def test_outlines_that_do_not_overlap_stay(meshes: list[Mesh]) -> None:
+    places = place_objects(meshes, INTERIOR, 0.001, 0.001, stream(1, "layout"))
+    assert moved_apart([outline(m) for m in meshes], places, INTERIOR) == places

@@ -56,3 +56,9 @@ def test_the_gaps_of_the_worlds(world: str, gap_m: float, wall_m: float) -> None
         nearest.append(min(gap(a, b) for a, b in combinations(shapes, 2)))
     assert gap_m - 1e-9 <= min(nearest) < 0.025
     assert sides == ({False} if world == "close_five" else {False, True})
+
+
+def test_the_share_of_lying_objects() -> None:
+    mesh, rng = solid(trimesh.creation.box((0.02, 0.04, 0.06))), np.random.default_rng(0)
+    lying = np.mean([draw_stance(mesh, rng, 0.3) != UPRIGHT for _ in range(1500)])
+    assert lying == pytest.approx(0.3, abs=0.04)
