@@ -40,6 +40,8 @@ EXAMPLES = {
     "unusable_world": "mission: m\nworld: broken.yaml\ntree: [bare_hand]\n",
     "no_objects": WORLD,
     "unusable_stl": HEAD + "parameters:\n  t: {type: stl, default: flat.stl}\ntree:\n  - match: {target: $t}\n",
+    "not_remembered": HEAD
+    + "parameters:\n  t: {type: stl, default: 'touched:nothing'}\ntree:\n  - match: {target: $t}\n",
     "too_large": HEAD + "tree: [" + "bare_hand, " * 3001 + "]\n",
     "subtree_outside": HEAD + "tree: {subtree: {file: /etc/shadow}}\n",
     "subtree_loop": HEAD + "tree: {subtree: {file: round}}\nsubtrees:\n  round: {tree: {subtree: {file: round}}}\n",
