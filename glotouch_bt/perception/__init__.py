@@ -8,12 +8,20 @@ if TYPE_CHECKING:
     from glotouch_bt.perception.model_cache import target_model
     from glotouch_bt.perception.reach import TooLow, model_for, pads_of, too_wide
     from glotouch_bt.perception.sides import model_with_sides
-    from glotouch_bt.perception.touched_files import read_touched, touched_name, touched_path, write_touched
+    from glotouch_bt.perception.touched_files import (
+        TOUCHED_NAME_PATTERN,
+        read_touched,
+        touched_name,
+        touched_path,
+        write_touched,
+    )
 
 __getattr__ = lazy_door(
     __name__,
     target_model="model_cache",
     model_with_sides="sides",
     **dict.fromkeys(("TooLow", "model_for", "pads_of", "too_wide"), "reach"),
-    **dict.fromkeys(("read_touched", "touched_name", "touched_path", "write_touched"), "touched_files"),
+    **dict.fromkeys(
+        ("TOUCHED_NAME_PATTERN", "read_touched", "touched_name", "touched_path", "write_touched"), "touched_files"
+    ),
 )

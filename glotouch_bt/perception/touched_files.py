@@ -26,8 +26,8 @@ MAX_FILE_BYTES = 4_000_000
 """Largest file that is read. Source: ours; an encounter of 20 closures takes 30 kB."""
 MAX_ENCOUNTERS = 10
 """Largest number of encounters; of more, the oldest are forgotten. Source: ours; 200 closures are fitted in 1 s."""
-NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
-"""Names of touched objects."""
+TOUCHED_NAME_PATTERN = r"^[A-Za-z0-9_-]{1,64}$"
+"""Names of touched objects, as a regular expression."""
 
 Length = Annotated[float, Field(ge=-0.5, le=0.5)]
 Size = Annotated[float, Field(gt=0.0, le=0.5)]
@@ -100,14 +100,18 @@ def touched_path(name: str) -> Path:
     Raises:
         BadInput: The name cannot be that of a file.
     """
-    if not NAME.fullmatch(name):
+    if not re.fullmatch(TOUCHED_NAME_PATTERN, name):
         raise BadInput(f"{name!r} cannot name a touched object: use 1 to 64 letters, digits, _ and -")
     return FOLDER / f"{name}.json"
 
 
 def touched_names() -> list[str]:
     """Return the names of the objects that were remembered."""
-    return sorted(p.stem for p in FOLDER.glob("*.json") if NAME.fullmatch(p.stem)) if FOLDER.is_dir() else []
+    return (
+        sorted(p.stem for p in FOLDER.glob("*.json") if re.fullmatch(TOUCHED_NAME_PATTERN, p.stem))
+        if FOLDER.is_dir()
+        else []
+    )
 
 
 def read_touched(name: str) -> TouchedObject:

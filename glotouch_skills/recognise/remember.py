@@ -1,4 +1,4 @@
-"""Store what was felt of an object, so that it can be found again without a mesh."""
+"""Store the touches of an object, so that it can be found again without a mesh."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class RememberParams(SkillParams):
 
     object: str = param(
         "Name of the object, of letters, digits, _ and -; it is retrieved as touched:NAME",
-        pattern=r"^[A-Za-z0-9_-]{1,64}$",  # as `touched_path`; refused before the run, not at its end
+        pattern=perception.TOUCHED_NAME_PATTERN,  # refused before the run, not at its end
     )
     same: float = param(
         "Least probability that the touches are of the object stored under this name", default=0.5, gt=0.0, lt=1.0

@@ -78,11 +78,12 @@ class Squeeze(Skill):
             heights = layer_heights(candidate, arm.description.gripper, self.params)
             container = self.context.world.container
             gaps_m = (self.params.side_gap_m, 0.5 * self.params.side_gap_m)
-            most = self.params.max_closures
-            choices = [all_sides(candidate, arm.description.gripper, max(most // len(heights), 1))] if most else ()
+            max_closures = self.params.max_closures
+            sides = max(max_closures // len(heights), 1)
+            choices = [all_sides(candidate, arm.description.gripper, sides)] if max_closures else ()
             stances, refusals = yield from plan_stances(candidate, arm, container, float(heights[0]), gaps_m, choices)
             for at in stances:
-                left = most - sum(len(s.layers) for s in sequences) if most else 2 * len(heights)
+                left = max_closures - sum(len(s.layers) for s in sequences) if max_closures else 2 * len(heights)
                 if left <= 0:
                     break
                 try:
@@ -103,8 +104,8 @@ class Squeeze(Skill):
             )
         self.touchset = touchset
 
-    def _sequence(self, candidate: Candidate, at: Stance, heights: Array, most: int) -> Motion[TouchSequence]:
-        """Open over the candidate, close at each height from below at most `most` times, rise.
+    def _sequence(self, candidate: Candidate, at: Stance, heights: Array, max_closures: int) -> Motion[TouchSequence]:
+        """Open over the candidate, close at each height from below at most `max_closures` times, rise.
 
         Retry a height without a stable layer once, at a height nearby. If the hand cannot close there either, end the
         sequence: higher up the object slopes or stands free, too.
@@ -113,10 +114,10 @@ class Squeeze(Skill):
         layers: list[Layer] = []
         yield from hand.go_down(float(heights[0]))
         for height, elsewhere in zip(heights.tolist(), _elsewhere(heights), strict=True):
-            if len(layers) >= most:
+            if len(layers) >= max_closures:
                 break
             tried = [(yield from self._layer(hand, height))]
-            if (tried[0] is None or not tried[0].stable) and len(layers) + len(tried) < most:
+            if (tried[0] is None or not tried[0].stable) and len(layers) + len(tried) < max_closures:
                 tried.append((yield from self._layer(hand, elsewhere)))
             layers += [layer for layer in tried if layer is not None]
             if tried[-1] is None:

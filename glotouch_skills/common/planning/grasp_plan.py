@@ -6,6 +6,7 @@ The widths measured by the closures decide whether that pose is credible. If not
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -109,17 +110,17 @@ def plan_grasp(
         side_gap_m: Gap between open jaw and object on each side.
     """
     index = touchset.candidate.index
-    credible = match.fit is not None and misfit_m(touchset, match, model) <= MAX_MISFIT_M
-    fitted: list[GraspPlan] = []
     if isinstance(solid, Mesh):
         com = np.asarray(solid.as_trimesh().center_mass)
-        if credible:
-            holds = holds_of(model, com, gripper, lowest_pads_m(model.height_m, gripper), FORCE_N)
-            fitted = _fitted(index, match, model, holds, side_gap_m)
     else:
         com = np.array([*model.centre_m, 0.5 * model.height_m])
-        if credible:
-            fitted = _remembered(index, match, model, solid, gripper, side_gap_m)
+    fitted: list[GraspPlan] = []
+    if match.fit is not None and misfit_m(touchset, match, model) <= MAX_MISFIT_M:
+        if isinstance(solid, Mesh):
+            holds = _mesh_holds(holds_of(model, com, gripper, lowest_pads_m(model.height_m, gripper), FORCE_N))
+        else:
+            holds = _remembered_holds(model, solid)
+        fitted = _fitted(index, match, model, holds, side_gap_m)
     felt = _felt(touchset, _placed(com, match), side_gap_m)
     plans = [replace(plan, quat=match.quat) for plan in (*fitted, *felt)][: 1 + ALTERNATIVES]
     return replace(plans[0], alternatives=tuple(plans[1:]))
@@ -151,18 +152,55 @@ def _placed(point_O_m: Array, match: Match) -> Array:
     return np.array([x + c * point_O_m[0] - s * point_O_m[1], y + s * point_O_m[0] + c * point_O_m[1], point_O_m[2]])
 
 
-def _fitted(index: int, match: Match, model: TargetModel, holds: Holds, side_gap_m: float) -> list[GraspPlan]:
-    """Return the best holds of the mesh that differ enough from each other."""
-    middle = _placed(np.array([*model.centre_m, 0.0]), match)
-    chosen: list[GraspPlan] = []
+@dataclass(frozen=True)
+class _Hold:
+    """Where the pads would hold the model, and how far they open: angles and lengths as in `TargetModel`."""
+
+    phi_rad: float
+    along_m: float
+    middle_m: float
+    height_m: float
+    aperture_m: float
+    opening_m: float
+
+
+def _mesh_holds(holds: Holds) -> Iterator[_Hold]:
+    """Yield the holds of a mesh that are worth it, best first."""
     for flat in np.argsort(-holds.worth, axis=None, kind="stable")[:2000].tolist():
         i, j, k = np.unravel_index(flat, holds.worth.shape)
-        if holds.worth[i, j, k] < MIN_WORTH or len(chosen) == FITTED:
+        if holds.worth[i, j, k] < MIN_WORTH:
+            return
+        yield _Hold(
+            float(holds.phi_rad[i]), float(holds.l_m[j]), float(holds.middle_m[i, j, k]), float(holds.z_m[k]),
+            float(holds.width_m[i, j, k]), float(holds.opening_m[i, j, k]),
+        )  # fmt: skip
+
+
+def _remembered_holds(model: TargetModel, felt: TouchedObject) -> Iterator[_Hold]:
+    """Yield the remembered closures of both pads, best first."""
+
+    def worth(c: FeltClosure) -> float:
+        lever = math.hypot(c.along_m, 0.5 * (0.5 * model.height_m - c.height_m))
+        return math.prod(a / (a + AREA_SCALE) for a in c.areas) / (1.0 + (lever / LEVER_SCALE_M) ** 2)
+
+    for c in sorted((c for c in felt.closures if c.two_sided), key=worth, reverse=True):
+        i = round(c.phi_rad / (2 * math.pi) * len(model.phi_rad)) % len(model.phi_rad)
+        j, k = int(np.argmin(np.abs(model.l_m - c.along_m))), int(np.argmin(np.abs(model.z_m - c.height_m)))
+        opening = max(float(model.width_m[i, j, k:].max()), c.width_m)
+        yield _Hold(c.phi_rad, c.along_m, float(model.middle_m[i, j, k]), c.height_m, c.aperture_m, opening)
+
+
+def _fitted(index: int, match: Match, model: TargetModel, holds: Iterable[_Hold], side_gap_m: float) -> list[GraspPlan]:
+    """Return the first holds, at the fitted pose, that differ enough from each other."""
+    middle = _placed(np.array([*model.centre_m, 0.0]), match)
+    chosen: list[GraspPlan] = []
+    for hold in holds:
+        if len(chosen) == FITTED:
             break
-        yaw = match.pose_K_O[2] + float(holds.phi_rad[i])
+        yaw = match.pose_K_O[2] + hold.phi_rad
         c, s = math.cos(yaw), math.sin(yaw)
-        across = float(holds.middle_m[i, j, k])
-        place = middle + np.array([c * holds.l_m[j] + s * across, s * holds.l_m[j] - c * across, float(holds.z_m[k])])
+        x, y = c * hold.along_m + s * hold.middle_m, s * hold.along_m - c * hold.middle_m
+        place = middle + np.array([x, y, hold.height_m])
         if any(_near(place, yaw, other) for other in chosen):
             continue
         chosen.append(
@@ -170,42 +208,8 @@ def _fitted(index: int, match: Match, model: TargetModel, holds: Holds, side_gap
                 candidate=index,
                 position_K_m=place,
                 yaw_rad=math.remainder(yaw, 2 * math.pi),
-                aperture_m=float(holds.width_m[i, j, k]),
-                opening_m=float(holds.opening_m[i, j, k]) + 2 * side_gap_m,
-                source="fitted",
-            )
-        )
-    return chosen
-
-
-def _remembered(
-    index: int, match: Match, model: TargetModel, felt: TouchedObject, gripper: Gripper, side_gap_m: float
-) -> list[GraspPlan]:
-    """Return the best remembered closures at the fitted pose that differ enough from each other."""
-    middle = _placed(np.array([*model.centre_m, 0.0]), match)
-
-    def worth(c: FeltClosure) -> float:
-        lever = math.hypot(c.along_m, 0.5 * (0.5 * model.height_m - c.height_m))
-        return math.prod(a / (a + AREA_SCALE) for a in c.areas) / (1.0 + (lever / LEVER_SCALE_M) ** 2)
-
-    chosen: list[GraspPlan] = []
-    for c in sorted((c for c in felt.closures if c.two_sided), key=worth, reverse=True):
-        i = round(c.phi_rad / (2 * math.pi) * len(model.phi_rad)) % len(model.phi_rad)
-        j, k = int(np.argmin(np.abs(model.l_m - c.along_m))), int(np.argmin(np.abs(model.z_m - c.height_m)))
-        opening = max(float(model.width_m[i, j, k:].max()), c.width_m) + 2 * side_gap_m
-        yaw, across = match.pose_K_O[2] + c.phi_rad, float(model.middle_m[i, j, k])
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        off = [cos * c.along_m + sin * across, sin * c.along_m - cos * across, c.height_m]
-        place = middle + np.array(off)
-        if len(chosen) == FITTED or any(_near(place, yaw, other) for other in chosen):
-            continue
-        chosen.append(
-            GraspPlan(
-                candidate=index,
-                position_K_m=place,
-                yaw_rad=math.remainder(yaw, 2 * math.pi),
-                aperture_m=c.aperture_m,
-                opening_m=min(opening, gripper.stroke_m),
+                aperture_m=hold.aperture_m,
+                opening_m=hold.opening_m + 2 * side_gap_m,
                 source="fitted",
             )
         )

@@ -67,8 +67,8 @@ def find_target(target: str, objects: ObjectSet, gripper: Gripper) -> SoughtObje
 def _touched(felt: TouchedObject, gripper: Gripper) -> SoughtObject:
     model = recognition.touched_model(felt, perception.pads_of(gripper))
     long, short = model.outline.likely.size_m
-    least, most = (share * long * short * felt.height_m for share in FILLED)
-    return SoughtObject(felt.name, model, felt, (least, most))
+    smallest_m3, largest_m3 = (share * long * short * felt.height_m for share in FILLED)
+    return SoughtObject(felt.name, model, felt, (smallest_m3, largest_m3))
 
 
 def load_target(target: str, folder: Path) -> Mesh:

@@ -12,7 +12,7 @@ from glotouch_bt.mission.read.worlds import load_conditions
 MAX_OVERLAP_M = 3e-4
 """Contacts of the solver are soft."""
 MAX_SETTLING_M = 0.010
-"""An object that leans on its uneven base comes to rest by a rocking of a few millimetres."""
+"""Of an upright object. A base that is not flat lets it lean: 0.1 rad at a height of 80 mm moves its top by 8 mm."""
 
 
 @pytest.mark.parametrize("name", ["touching_five", "clutter_ten"])

@@ -1,4 +1,4 @@
-"""What was felt of one object, in its own frame O: values without any mesh.
+"""Touch data of one object in its frame O, without any mesh.
 
 The first encounter defines O: its origin is the centre of the traced outline, its axes are those of K. Later encounters
 are turned and moved into O by the fitted pose. z is the height above the floor.
@@ -66,7 +66,7 @@ class Encounter:
 
 @dataclass(frozen=True, eq=False)
 class TouchedObject:
-    """Everything that was felt of one object.
+    """Touch data of all encounters with one object.
 
     Attributes:
         name: Its name.

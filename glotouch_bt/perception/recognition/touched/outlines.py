@@ -16,7 +16,7 @@ from glotouch_bt.robot import Array
 STEP_M = 0.5e-3
 """Distance of the places at which a simulated trace tests the ball for contact, and of points on an outline."""
 TRACE_SD_M = 1.5e-3
-"""Standard deviation of a traced side: the error of the encounter's own trace. Source: `LikelihoodParams`."""
+"""Standard deviation of a traced side: the error of one trace. Source: `LikelihoodParams`."""
 OTHER_KIND_SD_M = 3.0e-3
 """The same for a kind as which the object was never traced: its fit is simulated on the other. Source: ours."""
 
@@ -57,7 +57,7 @@ def middle_m(contour: Contour, phi_rad: float, along_m: float, half_m: float) ->
 
 
 def retraced(contours: Sequence[Contour]) -> Outline:
-    """Return the traces to expect in another encounter, with the error of the encounters' own traces.
+    """Return the traces to expect in another encounter, with the error of the traces of these encounters.
 
     Each outline is traced anew in simulation. The probability of a kind counts encounters only, by Laplace's rule.
     """
@@ -65,17 +65,17 @@ def retraced(contours: Sequence[Contour]) -> Outline:
     boxes = sum(c.kind == "box" for c in contours)
 
     def fit(kind: ContourKind) -> KindFit:
-        mine = [o.of(kind) for o, c in zip(simulated, contours, strict=True) if c.kind == kind]
-        own_sd = TRACE_SD_M / math.sqrt(len(mine)) if mine else OTHER_KIND_SD_M
-        fits = mine or [o.of(kind) for o in simulated]
+        same_kind = [o.of(kind) for o, c in zip(simulated, contours, strict=True) if c.kind == kind]
+        trace_sd = TRACE_SD_M / math.sqrt(len(same_kind)) if same_kind else OTHER_KIND_SD_M
+        fits = same_kind or [o.of(kind) for o in simulated]
         first = fits[0]
         size, spread = np.array([f.size_m for f in fits]), np.array([f.size_sd_m for f in fits])
-        sd = np.sqrt(size.var(axis=0) + np.square(spread).mean(axis=0) + own_sd**2)
+        sd = np.sqrt(size.var(axis=0) + np.square(spread).mean(axis=0) + trace_sd**2)
         mean = np.mean(np.exp(2j * np.array([f.yaw_rad for f in fits])))
         return replace(
             first,
             centre_m=np.mean([f.centre_m for f in fits], axis=0),
-            centre_sd_m=math.hypot(max(f.centre_sd_m for f in fits), own_sd),
+            centre_sd_m=math.hypot(max(f.centre_sd_m for f in fits), trace_sd),
             size_m=(float(size[:, 0].mean()), float(size[:, 1].mean())),
             size_sd_m=(float(sd[0]), float(sd[1])),
             yaw_rad=0.5 * float(np.angle(mean)) if kind == "box" else 0.0,

@@ -1,7 +1,7 @@
-"""Tables of a `TargetModel` from what was felt: the likelihood, the schedule and the grasp read them as an STL's.
+"""Tables of a `TargetModel` from touch data: the likelihood, the schedule and the grasp read them as an STL's.
 
-What was not felt is not certain. `Certainty` holds the standard deviation of each width, and the probability that width
-and image of a cell are predicted at all. Otherwise they are as those of any object.
+What was not touched is uncertain. `Certainty` holds the standard deviation of each width, and the probability that
+width and image of a cell are predicted at all. Otherwise they are as those of any object.
 """
 
 from __future__ import annotations
@@ -36,21 +36,23 @@ OVERHANG_M = 0.015
 TOP_SD_M, LEAN_RAD = 1.2e-3, 0.03
 """Standard deviations of a measured top, and of the lean of the object when it was measured. Source:
 `LikelihoodParams`."""
-KEPT = 16
-"""Number of models kept in memory. Source: ours; one takes 20 MB."""
-_latest: dict[tuple[str, str, PadSpec], TargetModel] = {}
+MAX_CACHED = 16
+"""Largest number of models in the cache. Source: ours; one takes 20 MB."""
 TOPS = 8
 """Number of tops of parts, all unknown: each is the whole object's. Source: `model.tops`."""
 
+_cache: dict[tuple[str, str, PadSpec], TargetModel] = {}
+"""Models by name, digest and pad, the oldest first."""
+
 
 def touched_model(felt: TouchedObject, pad: PadSpec) -> TargetModel:
-    """Return the model of an object that is known only by touch (below a second; the latest are kept in memory)."""
+    """Return the model of an object that is known only by touch (below a second; the latest are cached)."""
     key = (felt.name, digest_of(felt), pad)
-    if key not in _latest:
-        while len(_latest) >= KEPT:
-            del _latest[next(iter(_latest))]
-        _latest[key] = _build(felt, pad)
-    return _latest[key]
+    if key not in _cache:
+        while len(_cache) >= MAX_CACHED:
+            del _cache[next(iter(_cache))]
+        _cache[key] = _build(felt, pad)
+    return _cache[key]
 
 
 def _build(felt: TouchedObject, pad: PadSpec) -> TargetModel:
@@ -85,16 +87,28 @@ def _build(felt: TouchedObject, pad: PadSpec) -> TargetModel:
 
 
 def digest_of(felt: TouchedObject) -> str:
-    """Return a hash of everything that was felt."""
-    numbers = [
-        x
-        for e in felt.encounters
-        for x in (
-            e.height_m, *e.contour.size_m, *e.contour.centre_K_m, e.contour.yaw_rad,
-            *(v for c in e.closures for v in (c.phi_rad, c.along_m, c.height_m, c.width_m)),
-        )
-    ]  # fmt: skip
-    return hashlib.sha256(np.array(numbers, dtype="<f8").tobytes()).hexdigest()
+    """Return a hash of all values of all encounters."""
+    digest = hashlib.sha256()
+    for e in felt.encounters:
+        o = e.contour
+        outline = (o.size_m, o.centre_K_m, o.yaw_rad, o.rms_m, o.covariance, o.boundary_K_m)
+        closures = [
+            (
+                c.phi_rad,
+                c.along_m,
+                c.height_m,
+                c.aperture_m,
+                c.width_m,
+                c.areas,
+                *(i for i in c.images if i is not None),
+            )
+            for c in e.closures
+        ]
+        digest.update(f"{o.kind} {o.family} {[[i is None for i in c.images] for c in e.closures]}".encode())
+        for value in (e.height_m, *outline, *(v for closure in closures for v in closure)):
+            array = np.asarray(value, dtype="<f8")
+            digest.update(f"{array.shape}".encode() + array.tobytes())
+    return digest.hexdigest()
 
 
 def _filled(extent: Array) -> Array:

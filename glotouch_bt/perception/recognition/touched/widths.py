@@ -80,9 +80,9 @@ def interpolated(at: Array, residual_m: Array, wanted: Array, kernel: WidthKerne
         for a, p, f, w in zip(AMPLITUDES, share, factors, white, strict=True):
             if p > 1e-4:
                 half = scipy.linalg.solve_triangular(f, a * a * cross, lower=True)
-                own = half.T @ w
-                mean += p * own
-                square += p * (own**2 + np.maximum(a * a * prior - np.square(half).sum(axis=0), 0.0))
+                posterior = half.T @ w
+                mean += p * posterior
+                square += p * (posterior**2 + np.maximum(a * a * prior - np.square(half).sum(axis=0), 0.0))
         means.append(mean)
         sds.append(np.sqrt(np.maximum(square - mean**2, 0.0)))
     return np.concatenate(means), np.concatenate(sds)
