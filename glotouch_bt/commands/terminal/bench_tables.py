@@ -42,7 +42,7 @@ def print_growth(summary: dict[str, Any], folder: Path) -> None:
     """Print travel and planning of explorations by objects and area."""
     rows = [
         (
-            p["objects"],
+            str(p["objects"]),
             f"{p['area']:g}",
             f"{100 * p['complete']:.0f} %",
             f"{p['travel_m']['mean']:.2f} [{p['travel_m']['lo']:.2f}, {p['travel_m']['hi']:.2f}]",
