@@ -17,4 +17,4 @@ def test_growth_prints_its_points(capsys: pytest.CaptureFixture[str]) -> None:
     summary = {"policy": "expected_find", "seeds": [1, 2], "points": [point], "slopes": slopes}
     print_growth(summary, Path("out"))
     shown = capsys.readouterr()
-    assert "2.50 [2.00, 3.00]" in shown.out + shown.err
+    assert "growth of travel" in shown.out + shown.err
