@@ -107,11 +107,7 @@ def touched_path(name: str) -> Path:
 
 def touched_names() -> list[str]:
     """Return the names of the objects that were remembered."""
-    return (
-        sorted(p.stem for p in FOLDER.glob("*.json") if re.fullmatch(TOUCHED_NAME_PATTERN, p.stem))
-        if FOLDER.is_dir()
-        else []
-    )
+    return sorted(p.stem for p in FOLDER.glob("*.json") if re.fullmatch(TOUCHED_NAME_PATTERN, p.stem))
 
 
 def read_touched(name: str) -> TouchedObject:

@@ -12,7 +12,8 @@ from glotouch_bt.mission.read.worlds import load_conditions
 MAX_OVERLAP_M = 3e-4
 """Contacts of the solver are soft."""
 MAX_SETTLING_M = 0.010
-"""Of an upright object. A base that is not flat lets it lean: 0.1 rad at a height of 80 mm moves its top by 8 mm."""
+"""Of an upright object. Layouts are drawn without the lean: one that leans towards a wall which it touches starts
+inside the wall and is pushed out. Measured: 7 mm after an overlap of 1.5 mm (clutter_ten, seed 0)."""
 
 
 @pytest.mark.parametrize("name", ["touching_five", "clutter_ten"])

@@ -1,7 +1,7 @@
 """Tables of a `TargetModel` from touch data: the likelihood, the schedule and the grasp read them as an STL's.
 
 What was not touched is uncertain. `Certainty` holds the standard deviation of each width, and the probability that
-width and image of a cell are predicted at all. Otherwise they are as those of any object.
+width and image of a cell are predicted at all. Where they are not, the distribution over all objects is used.
 """
 
 from __future__ import annotations
@@ -91,21 +91,12 @@ def digest_of(felt: TouchedObject) -> str:
     digest = hashlib.sha256()
     for e in felt.encounters:
         o = e.contour
-        outline = (o.size_m, o.centre_K_m, o.yaw_rad, o.rms_m, o.covariance, o.boundary_K_m)
-        closures = [
-            (
-                c.phi_rad,
-                c.along_m,
-                c.height_m,
-                c.aperture_m,
-                c.width_m,
-                c.areas,
-                *(i for i in c.images if i is not None),
-            )
-            for c in e.closures
-        ]
+        values = [e.height_m, o.size_m, o.centre_K_m, o.yaw_rad, o.rms_m, o.covariance, o.boundary_K_m]
+        for c in e.closures:
+            values += [c.phi_rad, c.along_m, c.height_m, c.aperture_m, c.width_m, c.areas]
+            values += [image for image in c.images if image is not None]
         digest.update(f"{o.kind} {o.family} {[[i is None for i in c.images] for c in e.closures]}".encode())
-        for value in (e.height_m, *outline, *(v for closure in closures for v in closure)):
+        for value in values:
             array = np.asarray(value, dtype="<f8")
             digest.update(f"{array.shape}".encode() + array.tobytes())
     return digest.hexdigest()

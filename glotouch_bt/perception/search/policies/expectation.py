@@ -85,7 +85,12 @@ class _SearchLattice:
 
 
 def touched(centre: Array, reach: Array, a: Array, b: Array) -> Mask:
-    """Return True where a segment a-b comes within reach of a centre, all broadcast: (..., 2), but `reach` (...)."""
+    """Return True where a segment a-b comes within reach of a centre.
+
+    Args:
+        centre, a, b: Points (..., 2), broadcast against each other.
+        reach: Distances (...).
+    """
     along, from_a = b - a, centre - a
     t = (from_a * along).sum(axis=-1) / np.maximum((along * along).sum(axis=-1), 1e-12)
     away = from_a - np.clip(t, 0.0, 1.0)[..., None] * along

@@ -136,3 +136,21 @@ def test_an_object_whose_top_was_not_touched_is_refused(solids) -> None:
         encounter_of(unknown, PAD)
     with pytest.raises(ParamError, match="closure"):
         TouchedObject("thing", (encounter_of(replace(touchset, sequences=()), PAD),))
+
+
+@pytest.mark.parametrize("part", ["image", "area", "width", "size"])
+def test_objects_that_differ_in_one_value_have_models_of_their_own(solids, part: str) -> None:
+    felt = felt_once(solids.cylinder(0.025, 0.070))
+    encounter = felt.encounters[0]
+    first = next(c for c in encounter.closures if c.images[0] is not None)
+    changed = {
+        "image": replace(first, images=(first.images[0] + 0.01, first.images[1])),
+        "area": replace(first, areas=(first.areas[0] + 0.01, first.areas[1])),
+        "width": replace(first, width_m=first.width_m + 1e-4),
+    }.get(part, first)
+    other = replace(encounter, closures=tuple(changed if c is first else c for c in encounter.closures))
+    if part == "size":
+        contour = encounter.contour
+        other = replace(other, contour=replace(contour, size_m=tuple(s + 1e-4 for s in contour.size_m)))
+    assert touched_model(felt, PAD).digest != touched_model(TouchedObject("thing", (other,)), PAD).digest
+    assert touched_model(felt, PAD) is touched_model(TouchedObject("thing", (replace(encounter),)), PAD)
