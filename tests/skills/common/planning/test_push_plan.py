@@ -78,8 +78,6 @@ def test_distances_of_rectangles_and_circles(found) -> None:
     assert clearance_m(at, [other], HALF) == pytest.approx(0.04 - radius, abs=2e-4)
     at_wall = Rectangle(np.array([0.145, 0.0]), 0.0, np.array([0.01, 0.01]))
     assert clearance_m(at_wall, [], HALF) == pytest.approx(-0.005)
-        -0.005
-    )
     assert clearance_m(Rectangle(np.array([0.05, 0.0]), 0.0, np.array([0.002, 0.002])), [other], HALF) < 0.0
     assert gap_m(other, other.moved(np.array([0.0, 2 * radius + 0.01]))) == pytest.approx(0.01, abs=2e-4)
 
