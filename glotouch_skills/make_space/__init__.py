@@ -1,1 +1,1 @@
-"""Skills that make space for the fingers: push an object, or lift one out and set it down elsewhere."""
+"""Skills that make space for the fingers: push an object aside."""

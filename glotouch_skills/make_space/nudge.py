@@ -73,12 +73,12 @@ class Nudge(Skill):
     NO_PUSH = Failure(
         "no_push",
         "no push can be made, or none makes more space for the fingers; nothing was moved",
-        advice="lift a neighbour out instead, or push in another direction",
+        advice="push in another direction, or take a neighbour out by hand",
     )
     BLOCKED = Failure(
         "blocked",
         "the object stopped against something; `candidates` has its position there",
-        advice="push in another direction, or lift a neighbour out",
+        advice="push in another direction",
     )
     NOTHING_PUSHED = Failure(
         "nothing_pushed",
