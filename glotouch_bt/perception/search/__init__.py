@@ -1,6 +1,14 @@
 """Pure planners of tactile exploration: search for objects, outline tracing and height measurement."""
 
-from glotouch_bt.perception.search.candidates import admit, elsewhere_m, joins, of_another, part_of, refined
+from glotouch_bt.perception.search.candidates import (
+    HALF_QUALITY_SD_M,
+    admit,
+    elsewhere_m,
+    joins,
+    of_another,
+    part_of,
+    refined,
+)
 from glotouch_bt.perception.search.map import LEFT_BELOW, SearchMap
 from glotouch_bt.perception.search.moves import Move, MoveKind, MoveOutcome, SearchPlan, T
 from glotouch_bt.perception.search.policies import (

@@ -1,7 +1,16 @@
-"""Plans that several skills share: stances of the open hand, closures, grasps, and the target's model."""
+"""Plans that several skills share: stances of the open hand, closures, grasps, pushes, and the target's model."""
 
+from glotouch_skills.common.planning.finger_space import Neighbour, clearance_m, finger_clearance_m, finger_space_m
 from glotouch_skills.common.planning.grasp_holds import SHIFTS_M
 from glotouch_skills.common.planning.grasp_plan import GraspPlan, plan_grasp
+from glotouch_skills.common.planning.push_plan import (
+    NEEDED_M,
+    Push,
+    PushPlanner,
+    after_push,
+    displaced,
+    touched_edge_m,
+)
 from glotouch_skills.common.planning.squeeze_motion import (
     MIN_GAP_M,
     ClosureParams,

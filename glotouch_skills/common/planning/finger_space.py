@@ -1,0 +1,154 @@
+"""Space for the fingers: how far the open fingers beside an object stay from its neighbours and from the walls.
+
+Planar, in K. Neighbours count with their envelopes, as they do in the clearance scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from glotouch_bt.perception.touch import Candidate, Contour, signed_distance
+from glotouch_bt.perception.touch.outline import envelope
+from glotouch_bt.robot import Array, Gripper
+from glotouch_skills.common.planning.squeeze_plan import Stance
+from glotouch_skills.common.planning.touch_options import stances_over
+
+SAMPLE_M = 0.003
+"""Spacing of the points on an outline. The distance to its corners is exact, so the error is below 0.4 mm at a corner
+of a finger. Source: ours."""
+SIDE_GAP_M = 0.010
+"""Gap between open jaw and object on each side. Source: the default of `ClosureParams`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbour:
+    """The envelope of a candidate.
+
+    Attributes:
+        index: Index of the candidate.
+        contour: Its envelope: a circle or a rectangle.
+        points_K_m: (n, 2) points on it, at most `SAMPLE_M` apart.
+    """
+
+    index: int
+    contour: Contour
+    points_K_m: Array
+
+    @classmethod
+    def of(cls, candidate: Candidate) -> Neighbour:
+        """Return the envelope of a candidate, sampled."""
+        hull = envelope(candidate)
+        return cls(candidate.index, hull, sampled(hull.outline_K_m(90)))
+
+    def moved(self, shift_K_m: Array) -> Neighbour:
+        """Return the same, displaced by a vector (2,)."""
+        contour = replace(self.contour, centre_K_m=self.contour.centre_K_m + shift_K_m)
+        return Neighbour(self.index, contour, self.points_K_m + shift_K_m)
+
+
+@dataclass(frozen=True, eq=False)
+class Rectangle:
+    """A rectangle in K, the outline of fingers seen from above.
+
+    Attributes:
+        centre_K_m: (2,).
+        yaw_rad: Direction of its first side.
+        half_m: (2,) half sides.
+    """
+
+    centre_K_m: Array
+    yaw_rad: float
+    half_m: Array
+
+    @property
+    def axes(self) -> Array:
+        """(2, 2), one axis a row."""
+        c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
+        return np.array([[c, s], [-s, c]])
+
+    @property
+    def corners_K_m(self) -> Array:
+        """(4, 2)."""
+        signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
+        return np.asarray(self.centre_K_m + (signs * self.half_m) @ self.axes)
+
+    def distance_m(self, points_K_m: Array) -> Array:
+        """Return the signed distances (n,) of points (n, 2), negative inside."""
+        beyond = np.abs((points_K_m - self.centre_K_m) @ self.axes.T) - self.half_m
+        outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+        return np.asarray(outside + np.minimum(beyond.max(axis=1), 0.0))
+
+
+def sampled(outline_m: Array) -> Array:
+    """Return points (n, 2) on a closed polyline (m, 2), at most `SAMPLE_M` apart, with its corners."""
+    pieces = []
+    for a, b in pairwise(outline_m):
+        steps = max(int(np.ceil(np.linalg.norm(b - a) / SAMPLE_M)), 1)
+        pieces.append(a + np.arange(steps)[:, None] / steps * (b - a))
+    return np.concatenate(pieces)
+
+
+def clearance_m(rectangle: Rectangle, neighbours: Sequence[Neighbour], half_extent_m: Array) -> float:
+    """Return the distance of a rectangle from the nearest neighbour or wall, negative if they overlap.
+
+    Args:
+        rectangle: In K.
+        neighbours: What stands there.
+        half_extent_m: (2,) half of the container's interior.
+    """
+    least = float((half_extent_m - np.abs(rectangle.corners_K_m)).min())
+    for other in neighbours:
+        least = min(least, float(rectangle.distance_m(other.points_K_m).min()))
+        inside = signed_distance(other.contour, rectangle.centre_K_m[None])[0]
+        least = min(least, float(inside)) if inside < 0.0 else least  # the rectangle may be wholly inside
+    return least
+
+
+def gap_m(one: Neighbour, other: Neighbour) -> float:
+    """Return the distance of two envelopes, negative if one has points inside the other."""
+    return float(
+        min(
+            signed_distance(one.contour, other.points_K_m).min(),
+            signed_distance(other.contour, one.points_K_m).min(),
+        )
+    )
+
+
+def wall_gap_m(one: Neighbour, half_extent_m: Array) -> float:
+    """Return the distance of an envelope from the nearest wall."""
+    return float((half_extent_m - np.abs(one.points_K_m)).min())
+
+
+def fingers(at: Stance, gripper: Gripper) -> tuple[Rectangle, Rectangle]:
+    """Return the outlines of both open fingers at a stance."""
+    across = np.array([-np.sin(at.yaw_K_rad), np.cos(at.yaw_K_rad)])
+    along = np.array([across[1], -across[0]])
+    finger = gripper.finger
+    half = np.asarray(finger.half_m[:2])
+    middle = np.asarray(at.position_K_m) + finger.centre_m[0] * along
+    off = (0.5 * at.opening_m + finger.centre_m[1]) * across
+    return Rectangle(middle + off, at.yaw_K_rad, half), Rectangle(middle - off, at.yaw_K_rad, half)
+
+
+def finger_clearance_m(at: Stance, neighbours: Sequence[Neighbour], half_extent_m: Array, gripper: Gripper) -> float:
+    """Return the distance of the open fingers at a stance from the nearest neighbour or wall."""
+    return min(clearance_m(finger, neighbours, half_extent_m) for finger in fingers(at, gripper))
+
+
+def finger_space_m(target: Candidate, neighbours: Sequence[Neighbour], half_extent_m: Array, gripper: Gripper) -> float:
+    """Return the clearance of the open fingers over an object, at the stance where it is largest.
+
+    Minus infinity if the object does not fit between the jaws.
+
+    Args:
+        target: The object between the fingers.
+        neighbours: The other objects.
+        half_extent_m: (2,) half of the container's interior.
+        gripper: The robot's gripper.
+    """
+    stances = stances_over(target, gripper, SIDE_GAP_M)
+    return max((finger_clearance_m(at, neighbours, half_extent_m, gripper) for at in stances), default=-np.inf)

@@ -1,0 +1,1 @@
+"""Skills that make space for the fingers: push an object aside."""

@@ -1,0 +1,233 @@
+"""Push an object along the floor with the closed fingers, and know afterwards where it stands."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from glotouch_bt.motion import FREE_M_S, Motion, finger_outline_half_m, hand_pose_B
+from glotouch_bt.perception.touch import Candidate, TouchSet
+from glotouch_bt.robot import HOLD, MotionRefused, Pose
+from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Out, Skill, SkillParams, SkillRun, param
+from glotouch_skills.common.hand import ABOVE_RATIO, OVER_TOP_M, glide, keeping_clear_of, rise_clear
+from glotouch_skills.common.planning import Push, PushPlanner, after_push
+from glotouch_skills.make_space.push_guard import Felt, PushGuard, push_guard
+
+MIN_FELT_N = 0.08
+"""Least mean resistance of an object that slides with the fingers. The lightest of CONDITIONS (40 g, friction 0.45)
+resists with 0.18 N; the mean over half a second has 0.01 N of noise."""
+RETREAT_M = 0.006
+"""Way back from the object before the hand rises, so that the fingers do not rub along it. Source: ours."""
+HEAD = ("object", "direction, deg", "pushed, mm", "resistance, N", "peak, N", "end")
+"""Head of the table in the report."""
+
+
+class NudgeParams(SkillParams):
+    """Parameters of `nudge`.
+
+    The arm yields little: at 20 mm/s a blocked object raises the force by 1.2 N in a control period, so the hand
+    stops within a few newtons of `max_N`. The hard limit is 30 N.
+    """
+
+    distance_m: float = param(
+        "Distance to push; 0: as far as the fingers need, in a direction that makes space for them",
+        unit="m", default=0.0, ge=0.0, le=0.08,
+    )  # fmt: skip
+    direction_deg: float = param(
+        "Direction of the push in the container, from x, if a distance is given", unit="deg", default=0.0, ge=-360.0,
+        le=360.0,
+    )  # fmt: skip
+    speed_m_s: float = param("Speed of the push", unit="m/s", default=0.02, gt=0.0, le=0.03)
+    max_N: float = param("Resistance that ends the push", unit="N", default=6.0, gt=0.0, le=10.0)
+    height_m: float = param(
+        "Height of the fingertips above the floor: low, so that the object slides and does not topple",
+        unit="m", default=0.006, ge=0.003, le=0.02,
+    )  # fmt: skip
+    aperture_m: float = param("Opening of the jaws", unit="m", default=0.0, ge=0.0, le=0.01)
+    travel_speed_m_s: float = param("Speed above the objects", unit="m/s", default=0.25, gt=0.0, le=0.25)
+    descent_speed_m_s: float = param(
+        "Speed of the descent beside the object", unit="m/s", default=0.010, gt=0.0, le=0.04
+    )
+
+
+class Nudge(Skill):
+    """Push one object along the floor: a stated way, or the shortest way that makes space for the fingers.
+
+    The flat side of the closed fingers pushes through the object's centre, low and slowly. The object slides with them,
+    so its touched edge is where they stop. Its position across the push, and the positions of what it passed closely,
+    become less certain. The space is made for the first object of `cramped`; the pushed object may be a neighbour of
+    it. With a stated distance, that object itself is pushed.
+
+    SUCCESS: it was pushed all the way; `candidates` has its new position, and its touches are given up.
+    """
+
+    Params = NudgeParams
+    params: NudgeParams
+
+    PRECONDITIONS: ClassVar = {"hand": frozenset({"empty", "fingers"}), "wrist": frozenset({"tared"})}
+    POSTCONDITIONS: ClassVar = {"hand": "empty"}
+    FAILURE_STATES: ClassVar = {"hand": frozenset({UNCHANGED, "empty"})}
+    USES: ClassVar = frozenset({"arm"})
+
+    NO_PUSH = Failure(
+        "no_push",
+        "no push can be made, or none makes more space for the fingers; nothing was moved",
+        advice="push in another direction, or take a neighbour out by hand",
+    )
+    BLOCKED = Failure(
+        "blocked",
+        "the object stopped against something; `candidates` has its position there",
+        advice="push in another direction",
+    )
+    NOTHING_PUSHED = Failure(
+        "nothing_pushed",
+        "nothing resisted the fingers all the way: the object is not where it was traced",
+        advice="trace it again",
+    )
+    FAILURES: ClassVar = (MOTION_REFUSED.with_meaning("the hand cannot rise, or the fingers met something beside it"),)
+
+    known = In(tuple, "all candidates", key="candidates", element=Candidate)
+    cramped_before = In(tuple, "indices of candidates that lack space for the fingers", key="cramped", element=int)
+    felt_before = In(tuple, "touches so far", key="touchsets", element=TouchSet, required=False, expected=False)
+    refused_before = In(
+        tuple, "closures that could not be made", key="refused", element=tuple, required=False, expected=False
+    )
+    doubtful_before = In(
+        tuple, "indices of candidates that may have been moved", key="doubtful", element=int, required=False,
+        expected=False,
+    )  # fmt: skip
+    before = In(tuple, "pushes so far, as in the report", key="nudges", element=tuple, required=False, expected=False)
+    candidates = Out(tuple, "all candidates, the pushed one where it stands now", element=Candidate, always=True)
+    cramped = Out(tuple, "none: what lacks space now is not known yet", element=int)
+    touchsets = Out(tuple, "touches of objects that were not pushed", element=TouchSet, always=True)
+    refused = Out(tuple, "closures that could not be made, of the other objects", always=True)
+    doubtful = Out(tuple, "the same, with those that the object came close to", element=int, always=True)
+    nudges = Out(tuple, "pushes so far, with this one", element=tuple, always=True)
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        self.candidates, self.touchsets = self.known, self.felt_before or ()
+        self.refused, self.doubtful = self.refused_before or (), self.doubtful_before or ()
+        self.nudges = self.before or ()
+        target, push = yield from self._plan()
+        (moving,) = (c for c in self.known if c.index == push.candidate)
+        try:
+            felt = yield from self._push(moving, push)
+        except MotionRefused:
+            self._doubt(moving.index)
+            raise
+        self.touchsets = tuple(t for t in self.touchsets if t.candidate.index != moving.index)
+        self.refused = tuple(key for key in self.refused if key[0] not in (target.index, moving.index))
+        if felt.resistance_N < MIN_FELT_N:
+            self._doubt(moving.index)
+            self._tell(push, felt, "nothing resisted")
+            raise self.NOTHING_PUSHED(
+                f"candidate {moving.index} was not met: {felt.resistance_N:.2f} N along {felt.pushed_m * 1e3:.0f} mm",
+                resistance_N=felt.resistance_N,
+            )
+        moved = after_push(moving, push, felt.edge_m, self._half_m[1], felt.pushed_m)
+        shift_m = float((moved.contour.centre_K_m - moving.contour.centre_K_m) @ push.along_K)
+        self.candidates = tuple(moved if c.index == moved.index else c for c in self.known)
+        self._doubt(*push.near)
+        self.event("candidate", candidate=moved, moved_m=shift_m, ended="pushed")
+        self._tell(push, felt, "stopped" if felt.stopped else "pushed")
+        if felt.stopped:
+            raise self.BLOCKED(
+                f"candidate {moving.index} resisted with {felt.peak_N:.1f} N after {felt.pushed_m * 1e3:.0f} mm of "
+                f"{push.distance_m * 1e3:.0f}",
+                peak_N=felt.peak_N,
+                limit_N=self.params.max_N,
+            )
+        self.cramped = ()
+
+    @property
+    def _half_m(self) -> tuple[float, float]:
+        half = finger_outline_half_m(self.context.arm.description.gripper, self.params.aperture_m)
+        return float(half[0]), float(half[1])
+
+    def _plan(self) -> Motion[tuple[Candidate, Push]]:
+        """Return the object that needs space and the push.
+
+        Raises:
+            SkillFailed: `no_push`.
+        """
+        p = self.params
+        wanted = [c for index in self.cramped_before for c in self.known if c.index == index]
+        yield HOLD
+        if not wanted:
+            raise self.NO_PUSH("no candidate is said to lack space")
+        half_extent = 0.5 * np.array(self.context.world.container.interior_m[:2])
+        gripper = self.context.arm.description.gripper
+        planner = PushPlanner(self.known, half_extent, gripper, np.array(self._half_m))
+        target = wanted[0]
+        if p.distance_m > 0.0:
+            stated = planner.along(target, float(np.deg2rad(p.direction_deg)), p.distance_m)
+            if isinstance(stated, str):
+                raise self.NO_PUSH(f"candidate {target.index} cannot be pushed that way: {stated}")
+            return target, stated
+        best: Push | None = None
+        for found in planner.for_space(target):
+            best = found
+            yield HOLD  # the computation takes longer than a control period; on hardware the arm holds meanwhile
+        if best is None:
+            raise self.NO_PUSH(f"no push makes space for the fingers over candidate {target.index}")
+        return target, best
+
+    def _push(self, moving: Candidate, push: Push) -> Motion[Felt]:
+        """Go behind the object, push it, and rise.
+
+        Raises:
+            MotionRefused: There is no way, or the fingers met something on the way down; the hand is high.
+        """
+        arm, p, container = self.context.arm, self.params, self.context.world.container
+        tips = arm.description.gripper.fingertip_below_P_m
+        low = hand_pose_B(arm, container, np.array([*push.start_K_m, p.height_m + tips]), push.yaw_K_rad)
+        yield from rise_clear(arm)
+        yield from arm.jaws(p.aperture_m, speed_m_s=0.2)
+        high = Pose(np.array([*low.position_m[:2], float(arm.pose_B_P.position_m[2])]), low.quat)
+        others = [c for c in self.known if c.index != moving.index]
+        top_m = max(c.height_m for c in self.known)
+        with keeping_clear_of(arm, self.known):
+            yield from arm.transit(high, height_B_m=float(high.position_m[2]), speed_m_s=p.travel_speed_m_s)
+            height = float(container.pose_B_K.inverse().apply(high.position_m)[2]) - tips
+            beside = max(height - top_m - OVER_TOP_M, 0.0)
+            paces = ((0.0, ABOVE_RATIO * p.descent_speed_m_s), (beside, p.descent_speed_m_s))
+            reached = yield from glide(self.context, low, FREE_M_S, paces)
+        if not reached:
+            yield from rise_clear(arm)
+            raise MotionRefused("nudge", "the fingers met something on the way down")
+        along_B = container.pose_B_K.rotation @ np.array([*push.along_K, 0.0])
+        with keeping_clear_of(arm, others), arm.pause_signal.finishing():
+            guard: PushGuard = yield from push_guard(arm, along_B, p.max_N)
+            way = push.approach_m + push.distance_m
+            moved = yield from arm.shift(way * along_B, p.speed_m_s, guard=guard, what="push")
+            felt = yield from guard.at_rest(container, push, self._half_m[0], moved.stop is not None)
+            yield from arm.shift(-RETREAT_M * along_B, p.speed_m_s, check=False, what="retreat")
+        yield from rise_clear(arm)
+        return felt
+
+    def _doubt(self, *indices: int) -> None:
+        self.doubtful = tuple(sorted({*self.doubtful, *indices}))
+
+    def _tell(self, push: Push, felt: Felt, end: str) -> None:
+        """Record the push and add it to the report."""
+        direction_deg = float(np.rad2deg(push.yaw_K_rad))
+        self.event(
+            "nudge",
+            candidate=push.candidate,
+            direction_deg=direction_deg,
+            asked_m=push.distance_m,
+            pushed_m=felt.pushed_m,
+            resistance_N=felt.resistance_N,
+            peak_N=felt.peak_N,
+            stopped=felt.stopped,
+            space_m=push.space_m,
+            near=push.near,
+        )
+        row = (
+            f"{push.candidate}", f"{direction_deg:.0f}", f"{felt.pushed_m * 1e3:.0f}", f"{felt.resistance_N:.2f}",
+            f"{felt.peak_N:.1f}", end,
+        )  # fmt: skip
+        self.nudges = (*self.nudges, row)
+        self.report("Pushes", "Objects that were pushed to make space for the fingers.", HEAD, self.nudges)

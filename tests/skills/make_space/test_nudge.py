@@ -1,0 +1,75 @@
+"""nudge on the fake robot: it pushes, notices what blocks or is missing, and keeps the map."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from py_trees.common import Status
+
+from glotouch_skills.make_space.nudge import Nudge
+
+EDGE_X_M = -0.03
+
+
+def friction(force_N: float, blocked_from_m: float = np.inf):
+    """A box that resists with its friction from its rear edge on, and with a stiff spring where it is blocked."""
+
+    def force(ball, radius):
+        out = np.zeros_like(ball)
+        x = ball[:, 0] + 0.011  # the side of the closed fingers
+        low = ball[:, 2] < 0.05
+        out[low & (x > EDGE_X_M), 0] = -force_N
+        out[low & (x > blocked_from_m), 0] -= 3000.0 * (x - blocked_from_m)[low & (x > blocked_from_m)]
+        return out
+
+    return force
+
+
+@pytest.fixture
+def make(bench, found):
+    def make_one(force_N=0.7, blocked_from_m=np.inf, cramped=(0,), others=(), **params):
+        b = bench(tip_P_m=0.115, things=[friction(force_N, blocked_from_m)])
+        thing = found.box((0.0, 0.0), (0.06, 0.04), height_m=0.05)
+        given = {"known": (thing, *others), "cramped_before": cramped}
+        return b, b.make(Nudge, inputs=given, **{"distance_m": 0.03, "direction_deg": 0.0, **params})
+
+    return make_one
+
+
+def test_the_object_stands_where_the_fingers_stopped(make) -> None:
+    b, skill = make()
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    (moved,) = skill.candidates
+    np.testing.assert_allclose(moved.contour.centre_K_m, [0.03, 0.0], atol=1e-3)
+    assert skill.cramped == ()
+    assert b.of_kind("nudge")[0]["resistance_N"] == pytest.approx(0.7, abs=0.1)
+    assert b.of_kind("report")[0]["title"] == "Pushes"
+    assert float(b.arm.pose_B_P.position_m[2]) > -0.2 + 0.14
+
+
+def test_nudge__blocked__it_stops_softly_and_knows_where(make) -> None:
+    b, skill = make(blocked_from_m=EDGE_X_M + 0.010)
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "blocked")
+    assert skill.candidates[0].contour.centre_K_m[0] == pytest.approx(0.012, abs=0.003)
+    assert b.of_kind("nudge")[0]["peak_N"] < 20.0
+
+
+def test_nudge__nothing_pushed__what_is_not_there_is_doubted(make) -> None:
+    b, skill = make(force_N=0.0)
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "nothing_pushed")
+    assert skill.doubtful == (0,)
+    np.testing.assert_allclose(skill.candidates[0].contour.centre_K_m, [0.0, 0.0])
+
+
+def test_nudge__no_push__nothing_moves(make, found) -> None:
+    for given in ({"cramped": ()}, {"others": (found.box((0.07, 0.0), (0.06, 0.04), index=1),)}):
+        b, skill = make(**given)
+        b.run(skill)
+        assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_push")
+
+
+def test_broken_off_anywhere(make, preempt_all_along) -> None:
+    preempt_all_along(make, 4, finish=False)
