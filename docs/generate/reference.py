@@ -45,11 +45,11 @@ without its wall times.
 events.
 """
 TOPIC_NOTES = {
-    "/wrench": "50 Hz; newest sample, force in N and its magnitude, torque in Nm, in S",
-    "/pose": "50 Hz; P in B",
+    "/wrench": "25 Hz; newest sample, force in N and its magnitude, torque in Nm, in S",
+    "/pose": "25 Hz; P in B",
     "/tf": "25 Hz; every frame: P and K in B, the links, E, the fingers in P",
     "/joints": "25 Hz; rad and rad/s",
-    "/gripper": "50 Hz; as last reported",
+    "/gripper": "25 Hz; as last reported",
     "/tactile/left": "at most 10 Hz; depth map, 32FC1, metres, row 0 nearest the wrist",
     "/tactile/right": "as left",
     "/tree/ticks": "on change; `node` is the path in the tree",

@@ -17,7 +17,7 @@ from glotouch_backends.mujoco.control import (
 )
 from glotouch_backends.mujoco.model import STEP_S, STEPS, BuiltWorld
 from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, PoseReports, Tactile, WristSensor, up_in
-from glotouch_backends.mujoco.simulation import ControlTrace, RestingObjects, SnapshotStore
+from glotouch_backends.mujoco.simulation import CollisionFilter, ControlTrace, SnapshotStore
 from glotouch_bt.compiled import compiled
 from glotouch_bt.robot import (
     Array,
@@ -112,7 +112,7 @@ class MujocoRobot(Robot):
 
         self.trace = ControlTrace(model, data) if traced else None
         self._keeper = SnapshotStore(model, data)
-        self._resting = RestingObjects(model, data, handles)
+        self._filter = CollisionFilter(model, data, handles)
 
         self._samples[:] = data.sensordata
         self._wrist.fill(-self._samples[0, s.force.start : s.torque.stop])
@@ -149,7 +149,7 @@ class MujocoRobot(Robot):
         self._servo.plan(target, self._arm_ctrl)
         self._jaws.plan(self._aperture, self.period_s, self._jaw_ctrl)
         try:
-            with self._resting:
+            with self._filter:
                 self._advance()
             check_sane(self._warnings, self._samples, self.data.time)
         except mujoco.FatalError as e:

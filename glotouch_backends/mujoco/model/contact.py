@@ -38,8 +38,8 @@ PAD_HANDLE_FRICTION = (0.002, 1.0)  # pads on the probe's handle: stiffer, or th
 
 FRICTION_RATIO = 1e4
 """Stiffness of friction over that of the normal force (MuJoCo's impratio). Source: ours. The held probe with 2 N across
-its ball turns by less than 0.01 deg in a second. With 100 and three noslip iterations it turned by up to 0.15 deg, and a
-step took a quarter more time."""
+its ball turns by less than 0.01 deg in a second. With 100 and three noslip iterations it turned by up to 0.15 deg, and
+a step took a quarter more time."""
 GEL_TORSION_M = 0.005
 """Torsional friction of a gel pad, m: its contact patch is centimetres wide. Source: ours."""
 HARD_TORSION_M = 0.0002

@@ -1,7 +1,7 @@
 """Access to the simulated world besides the robot: ground truth, faults, snapshots and replay of the solver steps."""
 
+from glotouch_backends.mujoco.simulation.collision_filter import CollisionFilter
 from glotouch_backends.mujoco.simulation.control_trace import ControlTrace
 from glotouch_backends.mujoco.simulation.disturber import MujocoDisturber
 from glotouch_backends.mujoco.simulation.referee import MujocoReferee, Simulated
-from glotouch_backends.mujoco.simulation.resting import RestingObjects
 from glotouch_backends.mujoco.simulation.snapshot import SnapshotStore

@@ -46,7 +46,7 @@ FIXED: Mapping[str, frozenset[str]] = {
                 "_closed",
                 "_poses",
                 "_hand",
-                "_resting",
+                "_filter",
                 *PARTS,
             ),
             # views of the arrays that are kept

@@ -43,7 +43,8 @@ from glotouch_bt.version import __version__
 
 RUN_ATTACHMENT = "run.json"
 RESULT_ATTACHMENT = "result.json"
-PLOT_EVERY_CYCLES = 2
+PLOT_EVERY_CYCLES = 4
+"""Control cycles from one plotted sample to the next: 25 Hz. The packed channels hold every sample."""
 IMAGE_EVERY_S = 0.1
 LOG_LEVELS = {"": 2, "good": 2, "warn": 3, "bad": 4}
 """Levels of foxglove.Log: 2 info, 3 warning, 4 error."""
@@ -224,7 +225,7 @@ class Recorder:
         self._pending.extend(zip(log_ns, [channel] * len(messages), messages, strict=True))
 
     def _encode_samples(self, observations: list[Observation]) -> None:
-        """Write the full-rate samples, and the newest sample of every second cycle as plots."""
+        """Write the full-rate samples, and the newest sample of every fourth cycle as plots."""
         stamp_s = np.concatenate([o.stamp_s for o in observations])
         q = np.concatenate([o.q for o in observations])
         dq = np.concatenate([o.dq for o in observations])
@@ -252,11 +253,10 @@ class Recorder:
         ns = np.rint(stamp_s[pick] * 1e9).astype(np.int64)
         self._put_rows("/wrench", ns, plots.wrench(ns, wrench[pick]))
         self._put_rows("/pose", ns, plots.pose(ns, position[pick], quat[pick]))
-        few, jaws = pick[::2], np.array([o.gripper.aperture_m for o in observations])
-        jaws = jaws[(-self._cycles) % PLOT_EVERY_CYCLES :: PLOT_EVERY_CYCLES][::2]
-        frames = plots.transforms(ns[::2], self._frames, position[few], quat[few], q[few], jaws)
-        self._put_rows("/tf", ns[::2], frames)
-        self._put_rows("/joints", ns[::2], plots.joints(ns[::2], q[few], dq[few]))
+        jaws = np.array([o.gripper.aperture_m for o in observations])
+        jaws = jaws[(-self._cycles) % PLOT_EVERY_CYCLES :: PLOT_EVERY_CYCLES]
+        self._put_rows("/tf", ns, plots.transforms(ns, self._frames, position[pick], quat[pick], q[pick], jaws))
+        self._put_rows("/joints", ns, plots.joints(ns, q[pick], dq[pick]))
 
     def _encode_cycles(self, observations: list[Observation], commands: list[Command]) -> None:
         """Write the data of each cycle: the jaws and the command."""

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from glotouch_bt.compiled import compiled
 from glotouch_bt.perception.touch.detection.baseline import Baseline
 from glotouch_bt.perception.touch.detection.filtering import LowPass
 from glotouch_bt.perception.touch.detection.fusion import TipFusion
@@ -31,6 +32,9 @@ DRIFT_S = 2.0
 SUSTAINED_SIGMAS_RATIO = 1.5
 """Standard deviations of a force that lasts, over those of the fast rule: what lasts is not white noise. Source: ours;
 at 1, free motion in harsh conditions was not silent for five minutes (tests/bench/detection)."""
+
+ANY_DIRECTION = np.zeros(3)
+"""Stands for the direction of motion where none is required."""
 
 
 @dataclass(frozen=True)
@@ -158,49 +162,73 @@ class ContactGuard:
         )
 
 
+@compiled("f8[:, ::1]", "given f8[:, :]", "given f8[:, :]", "f8[::1]", "b1", "f8[::1]", "i8", "i8[::1]")
+def _tripped(
+    smooth: Array,
+    gain: Array,
+    covariance: Array,
+    approach: Array,
+    directed: bool,
+    limits: Array,
+    consecutive: int,
+    above: npt.NDArray[np.int64],
+) -> int:
+    """Return the sample at which the rule trips, or -1.
+
+    Args:
+        smooth: (n, 6) filtered residual wrench in S.
+        gain, covariance: (3, 6), (3, 3) of `TipFusion`.
+        approach: (3,) direction of motion in S; only used if `directed`.
+        directed: An opposing force is required.
+        limits: (4,) opposing force N, total force N, moment Nm, and standard deviations of the filtered force.
+        consecutive: Number of consecutive samples that trip the rule.
+        above: (1,) number of the newest samples in a row that satisfy it; updated.
+    """
+    directional, total, moment, sigmas = limits[0], limits[1], limits[2], limits[3]
+    sd = 0.0
+    for j in range(3):
+        for k in range(3):
+            sd += approach[j] * covariance[j, k] * approach[k]
+    min_against = max(directional, sigmas * np.sqrt(sd))
+    force = np.zeros(3)
+    for i in range(len(smooth)):
+        square = against = variance = torque = 0.0
+        for j in range(3):
+            f = 0.0
+            for k in range(6):
+                f += gain[j, k] * smooth[i, k]
+            force[j] = f
+            square += f * f
+            against -= f * approach[j]
+            torque += smooth[i, 3 + j] ** 2
+        for j in range(3):
+            for k in range(3):
+                variance += force[j] * covariance[j, k] * force[k]
+        # Multiplying both sides of the threshold by the norm avoids a division by a norm that may be zero.
+        met = square > total**2 and square * square > sigmas**2 * variance
+        if directed:
+            met = against > min_against and (met or torque > moment**2)
+        above[0] = above[0] + 1 if met else 0
+        if above[0] >= consecutive:
+            return i
+    return -1
+
+
 class _SoftRule:
     """The rule for one filter and its thresholds, over one move."""
 
     def __init__(self, params: GuardParams, baseline: Baseline, fusion: TipFusion) -> None:
-        self._params, self._fusion, self._gain = params, fusion, fusion.gain
+        self._fusion, self._consecutive = fusion, params.consecutive
         self._low_pass = LowPass(6, params.cutoff_Hz, params.rate_Hz)
-        self._sigmas = params.sigmas * math.sqrt(self._low_pass.noise_gain**2 + baseline.median_variance)
-        self._above = np.zeros(params.consecutive - 1, dtype=np.int64)
+        sigmas = params.sigmas * math.sqrt(self._low_pass.noise_gain**2 + baseline.median_variance)
+        self._limits = np.array([params.directional_N, params.total_N, params.moment_Nm, sigmas])
+        self._above = np.zeros(1, dtype=np.int64)
 
     def trip(self, residual_S: Array, approach_S: Array | None) -> tuple[int, Array] | None:
         """Return the sample of this block (n, 6) at which the rule trips and the filtered force (3,) there, or None."""
-        smooth = self._low_pass(residual_S)
-        force = smooth @ self._gain.T
-        above = self._evaluate(force, smooth[:, 3:], approach_S)
-        if above is None:
-            if not np.count_nonzero(self._above):
-                return None
-            above = np.zeros(len(force), dtype=np.int64)
-        carried = np.concatenate([self._above, above])
-        n = self._params.consecutive
-        self._above = carried[len(carried) - n + 1 :]
-        if not above.any():
-            return None
-        tripped = np.nonzero(np.convolve(carried, np.ones(n, np.int64), "valid") == n)[0]
-        return (int(tripped[0]), force[tripped[0]]) if len(tripped) else None
-
-    def _evaluate(self, force_S: Array, moment_S: Array, approach_S: Array | None) -> npt.NDArray[np.int64] | None:
-        """Return (n,) 1 where a sample satisfies the rule; None if no sample does (early exit)."""
-        p, opposing = self._params, None
-        if approach_S is not None:
-            against = force_S @ approach_S
-            if not np.count_nonzero(against < -p.directional_N):
-                return None
-            opposing = against < -max(p.directional_N, self._sigmas * self._fusion.sd_along(approach_S))
-            if not np.count_nonzero(opposing):
-                return None
-        square = (force_S * force_S).sum(axis=1)
-        if opposing is None and not np.count_nonzero(square > p.total_N**2):
-            return None
-        # Multiplying both sides of the threshold by the norm avoids a division by a norm that may be zero.
-        variance = ((force_S @ self._fusion.covariance) * force_S).sum(axis=1)
-        strong = (square > p.total_N**2) & (square * square > self._sigmas**2 * variance)
-        if opposing is None:
-            return np.asarray(strong, dtype=np.int64)
-        moment = (moment_S * moment_S).sum(axis=1) > p.moment_Nm**2
-        return np.asarray(opposing & (strong | moment), dtype=np.int64)
+        smooth, fusion = self._low_pass(residual_S), self._fusion
+        approach, directed = (ANY_DIRECTION, False) if approach_S is None else (approach_S, True)
+        i = _tripped(
+            smooth, fusion.gain, fusion.covariance, approach, directed, self._limits, self._consecutive, self._above
+        )
+        return None if i < 0 else (i, fusion.gain @ smooth[i])

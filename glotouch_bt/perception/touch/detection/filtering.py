@@ -12,10 +12,24 @@ from functools import lru_cache
 
 import numpy as np
 
+from glotouch_bt.compiled import compiled
 from glotouch_bt.robot import Array, ParamError
 
-MAX_OPERATOR_SAMPLES = 64
-"""Maximum block length, in samples, that is filtered by one matrix product."""
+
+@compiled("f8", "f8", "f8", "f8", "f8", "given f8[:, :]", "f8[:, ::1]")
+def _filtered(b0: float, b1: float, b2: float, a1: float, a2: float, samples: Array, state: Array) -> Array:
+    """Return the filtered samples (n, channels): transposed direct form II; `state` (2, channels) is updated."""
+    out = np.zeros(samples.shape)
+    for channel in range(samples.shape[1]):
+        first, second = state[0, channel], state[1, channel]
+        for i in range(len(samples)):
+            x = samples[i, channel]
+            y = b0 * x + first
+            first = b1 * x - a1 * y + second
+            second = b2 * x - a2 * y
+            out[i, channel] = y
+        state[0, channel], state[1, channel] = first, second
+    return out
 
 
 class LowPass:
@@ -34,17 +48,12 @@ class LowPass:
         if not 0 < cutoff_Hz < 0.5 * rate_Hz:
             raise ParamError("cutoff_Hz", cutoff_Hz, f"in (0, {0.5 * rate_Hz}), half the sampling rate")
         self.cutoff_Hz, self.rate_Hz = cutoff_Hz, rate_Hz
+        self._coefficients = butterworth(cutoff_Hz, rate_Hz)
         self._state: Array = np.zeros((2, channels))
 
     def __call__(self, block: Array) -> Array:
         """Filter the next block (n, channels); keep the state for the following call."""
-        n = len(block)
-        if n > MAX_OPERATOR_SAMPLES:
-            out, self._state = _filtered(butterworth(self.cutoff_Hz, self.rate_Hz), block, self._state)
-            return out
-        both = _operator(self.cutoff_Hz, self.rate_Hz, n) @ np.concatenate([self._state, block])
-        self._state = both[:2]
-        return np.asarray(both[2:])
+        return _filtered(*self._coefficients, block, self._state)
 
     @property
     def noise_gain(self) -> float:
@@ -52,6 +61,7 @@ class LowPass:
         return _noise_gain(self.cutoff_Hz, self.rate_Hz)
 
 
+@lru_cache(maxsize=64)
 def butterworth(cutoff_Hz: float, rate_Hz: float) -> tuple[float, float, float, float, float]:
     """Return (b0, b1, b2, a1, a2) of a second-order Butterworth low-pass, by the bilinear transform with prewarping.
 
@@ -64,33 +74,9 @@ def butterworth(cutoff_Hz: float, rate_Hz: float) -> tuple[float, float, float, 
     return gain, 2.0 * gain, gain, -2.0 * digital.real, (digital * digital.conjugate()).real
 
 
-def _filtered(coefficients: tuple[float, ...], samples: Array, state: Array) -> tuple[Array, Array]:
-    """Return the filtered samples (n, channels) and the next state (2, channels): transposed direct form II."""
-    b0, b1, b2, a1, a2 = coefficients
-    first, second = state
-    out = np.zeros_like(samples)
-    for i, x in enumerate(samples):
-        y = b0 * x + first
-        first = b1 * x - a1 * y + second
-        second = b2 * x - a2 * y
-        out[i] = y
-    return out, np.stack([first, second])
-
-
-@lru_cache(maxsize=64)
-def _operator(cutoff_Hz: float, rate_Hz: float, n: int) -> Array:
-    """Return the matrix (2 + n, 2 + n) from [state; n inputs] to [next state; n outputs].
-
-    Its columns are the responses to unit states and unit inputs. It is ten times faster than a loop over the samples.
-    """
-    columns = np.eye(2 + n)
-    out, state = _filtered(butterworth(cutoff_Hz, rate_Hz), columns[2:], columns[:2])
-    return np.concatenate([state, out])
-
-
 @lru_cache(maxsize=64)
 def _noise_gain(cutoff_Hz: float, rate_Hz: float) -> float:
     impulse = np.zeros((int(20 * rate_Hz / cutoff_Hz) + 1, 1))
     impulse[0] = 1.0
-    response, _ = _filtered(butterworth(cutoff_Hz, rate_Hz), impulse, np.zeros((2, 1)))
+    response = _filtered(*butterworth(cutoff_Hz, rate_Hz), impulse, np.zeros((2, 1)))
     return float(np.sqrt(np.sum(np.square(response))))

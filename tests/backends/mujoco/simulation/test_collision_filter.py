@@ -26,7 +26,7 @@ def open_with(world: World, layout: dict[str, tuple[float, float, float]]) -> Mu
 def left_out(robot: MujocoRobot) -> bool:
     """Return True if the next period leaves the object out."""
     body = robot.handles.object_bodies[0]
-    with robot._resting:
+    with robot._filter:
         return not robot.model.body_contype[body] and not robot.model.body_conaffinity[body]
 
 
