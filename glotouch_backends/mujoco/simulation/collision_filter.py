@@ -199,7 +199,8 @@ class CollisionFilter:
         last: Array = np.full((len(free), 7), np.nan)
         spans: Array = np.full((len(moving), 6), np.inf)  # at first everything is near
         now = data.xpos, data.xmat, last, spans, data.qpos, data.qvel, data.xfrc_applied
-        self._model, self._bodies, self._kinds = model, bodies, kinds
+        self._contype, self._conaffinity = model.body_contype, model.body_conaffinity
+        self._compiled = model.body_contype.copy(), model.body_conaffinity.copy()
         about = moving, bodies, collide, boxes, fixed, owners
         self._all = model.body_contype, model.body_conaffinity, kinds, data.body_awake, *about, *now, len(free)
 
@@ -209,4 +210,4 @@ class CollisionFilter:
 
     def __exit__(self, *_: object) -> None:
         """Take all bodies in again: between two periods the model is the compiled one."""
-        self._model.body_contype[self._bodies], self._model.body_conaffinity[self._bodies] = self._kinds.T
+        self._contype[:], self._conaffinity[:] = self._compiled
