@@ -16,21 +16,19 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 
+from glotouch_bt.compiled import compiled
 from glotouch_bt.perception.search.map import Exclusion, Mask, SearchMap
 from glotouch_bt.perception.search.policies.frontier import NearestFrontier
 from glotouch_bt.perception.search.policies.hidden import NearestHidden
 from glotouch_bt.perception.search.policies.policy import Stretch
-from glotouch_bt.perception.search.remaining import DiscPrior, Discs, discs
+from glotouch_bt.perception.search.remaining import Discs
 from glotouch_bt.perception.search.routes import Routes, segment_is_free
 from glotouch_bt.robot import Array
 
 Indices = npt.NDArray[np.int64]
 SAMPLE_M = 0.008
 """Spacing of the points at which legs are checked against envelopes."""
-LEGS_AT_ONCE = 2048
-"""Number of legs whose swaths are found at once, for memory."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,101 +53,119 @@ class ExpectationParams:
 
 @dataclass(frozen=True, eq=False)
 class _SearchLattice:
-    """Discs, nodes, legs and the swath of each leg.
+    """Nodes and the legs between them.
 
     Attributes:
-        discs: The h discs.
         nodes: (n, 2) positions, m.
-        ends: (l, 2) start and end node of every leg, in both directions.
+        ends: (l, 2) start and end node of every leg, in both directions, by start.
         length: (l,) lengths of the legs, m.
-        swath, begin: leg i touches the discs swath[begin[i]:begin[i + 1]].
         first: (n + 1,) legs of node i are first[i]..first[i + 1].
-        samples, owner: points along all legs (s, 2) and the leg of each (s,).
+        track: (l,) number of the track of each leg, the same in both directions.
+        samples, owner: points along all tracks (s, 2) and the track of each (s,).
     """
 
-    discs: Discs
     nodes: Array
     ends: Indices
     length: Array
-    swath: Indices
-    begin: Indices
     first: Indices
+    track: Indices
     samples: Array
     owner: Indices
 
-    def gains(self, node: int, left: Array) -> Array:
-        """Return the weight found on each leg of a node, of the weights (h,) that are left."""
-        begin = self.begin[self.first[node] : self.first[node + 1] + 1]
-        found = np.concatenate([[0.0], np.cumsum(left[self.swath[begin[0] : begin[-1]]])])
-        return np.asarray(np.diff(found[begin - begin[0]]))
+
+@dataclass(frozen=True)
+class _Hidden:
+    """Discs that may hide something, by their first coordinate.
+
+    Attributes:
+        centre, reach, weight: Of each disc (h, 2), (h,), (h,); see `Discs`.
+    """
+
+    centre: Array
+    reach: Array
+    weight: Array
+
+    @classmethod
+    def of(cls, every: Discs, weight: Array, low: Array, high: Array) -> _Hidden:
+        """Return the discs with a weight (h,) that a path between two corners (2,) of a region may touch."""
+        centre, reach = every.centre, every.reach[:, None]
+        chosen = np.flatnonzero((weight > 0.0) & ((centre > low - reach) & (centre < high + reach)).all(axis=1))
+        chosen = chosen[np.argsort(centre[chosen, 0], kind="stable")]
+        return cls(centre[chosen], every.reach[chosen], weight[chosen])
 
 
-def touched(centre: Array, reach: Array, a: Array, b: Array) -> Mask:
-    """Return True where a segment a-b comes within reach of a centre.
+@compiled("f8[:, ::1]", "f8[::1]", "f8[:, ::1]", "i8[::1]", "f8[:, ::1]", "f8[:, ::1]", "b1")
+def _find(centre: Array, reach: Array, left: Array, rows: Indices, start: Array, end: Array, take: bool) -> Array:
+    """Return the weight found on each leg (l,): that of the discs which the leg touches.
 
     Args:
-        centre, a, b: Points (..., 2), broadcast against each other.
-        reach: Distances (...).
+        centre, reach: (h, 2) and (h,) of the discs, by their first coordinate.
+        left: (r, h) weights that are left; with `take`, those found on a leg are set to zero.
+        rows: (l,) row of `left` for each leg.
+        start, end: (l, 2) ends of the legs, m.
+        take: See `left`.
     """
-    along, from_a = b - a, centre - a
-    t = (from_a * along).sum(axis=-1) / np.maximum((along * along).sum(axis=-1), 1e-12)
-    away = from_a - np.clip(t, 0.0, 1.0)[..., None] * along
-    return np.asarray((away * away).sum(axis=-1) < reach**2)
-
-
-def _swaths(every: Discs, start: Array, end: Array) -> tuple[Indices, Indices]:
-    """Return the discs that the segments start-end (l, 2) touch, one after another, and where each begins (l + 1,)."""
-    middle, half_m = 0.5 * (start + end), 0.5 * np.linalg.norm(end - start, axis=1)
-    tree, count, found = scipy.spatial.cKDTree(every.centre), np.zeros(len(start), dtype=np.int64), []
-    for i in range(0, len(start), LEGS_AT_ONCE):
-        part = slice(i, i + LEGS_AT_ONCE)
-        near = tree.query_ball_point(middle[part], half_m[part] + every.reach.max(), return_sorted=True)
-        disc = np.concatenate([np.asarray(n, dtype=np.int64) for n in near])
-        leg = i + np.repeat(np.arange(len(near)), [len(n) for n in near])
-        hit = touched(every.centre[disc], every.reach[disc], start[leg], end[leg])
-        found.append(disc[hit])
-        count += np.bincount(leg[hit], minlength=len(start))
-    return np.concatenate(found), np.concatenate([[0], np.cumsum(count)])
-
-
-def _repeated(values: Indices, begin: Indices, rows: Indices) -> tuple[Indices, Indices]:
-    """Return the chosen rows of a ragged table, one after another, and where each begins."""
-    lengths = np.diff(begin)[rows]
-    begins = np.concatenate([[0], np.cumsum(lengths)])
-    return values[np.arange(begins[-1]) + np.repeat(begin[rows] - begins[:-1], lengths)], begins
+    found = np.zeros(len(rows))
+    farthest = reach.max() if len(reach) else 0.0
+    for leg in range(len(rows)):
+        row, x, y = rows[leg], start[leg, 0], start[leg, 1]
+        along_x, along_y = end[leg, 0] - x, end[leg, 1] - y
+        length_2 = max(along_x * along_x + along_y * along_y, 1e-12)
+        low, high = min(x, end[leg, 0]) - farthest, max(x, end[leg, 0]) + farthest
+        i = np.searchsorted(centre[:, 0], low)
+        while i < len(centre) and centre[i, 0] <= high:
+            if left[row, i] > 0.0:
+                from_x, from_y = centre[i, 0] - x, centre[i, 1] - y
+                t = min(max((from_x * along_x + from_y * along_y) / length_2, 0.0), 1.0)
+                away_x, away_y = from_x - t * along_x, from_y - t * along_y
+                if away_x * away_x + away_y * away_y < reach[i] * reach[i]:
+                    found[leg] += left[row, i]
+                    if take:
+                        left[row, i] = 0.0
+            i += 1
+    return found
 
 
 @lru_cache(maxsize=4)
-def _lattice(half: tuple[float, float], prior: DiscPrior, p: ExpectationParams) -> _SearchLattice:
-    every = discs(half, prior)
+def _lattice(half: tuple[float, float], p: ExpectationParams) -> _SearchLattice:
     node_axes = [np.linspace(-h, h, max(round(2 * h / p.node_m) + 1, 2)) for h in half]
     nodes = np.stack(np.meshgrid(*node_axes, indexing="ij"), axis=-1).reshape(-1, 2)
     distance = np.linalg.norm(nodes[:, None] - nodes[None], axis=2)
     start, end = np.nonzero((distance > 0) & (distance <= p.leg_m))
-    one_way = start < end  # a leg and its reverse touch the same discs
-    swath, begin = _swaths(every, nodes[start[one_way]], nodes[end[one_way]])
     key = len(nodes) * np.minimum(start, end) + np.maximum(start, end)
-    swath, begin = _repeated(swath, begin, np.searchsorted(key[one_way], key))
-    first = np.searchsorted(start, np.arange(len(nodes) + 1))
+    _, once, track = np.unique(key, return_index=True, return_inverse=True)
     length = distance[start, end]
-    count = np.maximum(np.ceil(length / SAMPLE_M).astype(int) + 1, 2)
-    owner = np.repeat(np.arange(len(start)), count)
+    count = np.maximum(np.ceil(length[once] / SAMPLE_M).astype(int) + 1, 2)
+    owner = np.repeat(np.arange(len(once)), count)
     t = ((np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)) / (count - 1)[owner])[:, None]
-    samples = (1 - t) * nodes[start][owner] + t * nodes[end][owner]
-    ends = np.column_stack([start, end])
-    return _SearchLattice(every, nodes, ends, length, swath, begin, np.asarray(first), samples, owner)
+    samples = (1 - t) * nodes[start[once]][owner] + t * nodes[end[once]][owner]
+    first = np.searchsorted(start, np.arange(len(nodes) + 1))
+    return _SearchLattice(nodes, np.column_stack([start, end]), length, np.asarray(first), track, samples, owner)
 
 
-@lru_cache(maxsize=8)
 def _free_legs(lattice: _SearchLattice, exclusions: tuple[Exclusion, ...]) -> Mask:
+    """Return (l,) True for the legs that keep clear of all envelopes."""
     free = np.ones(len(lattice.ends), dtype=np.bool_)
     for e in exclusions:
-        free[lattice.owner[e.clearance(lattice.samples) < 0.0]] = False
+        free &= ~_blocked(lattice, e)[lattice.track]
     return free
 
 
+@lru_cache(maxsize=128)
+def _blocked(lattice: _SearchLattice, exclusion: Exclusion) -> Mask:
+    """Return True for the tracks that enter an envelope."""
+    blocked = np.zeros(int(lattice.owner[-1]) + 1, dtype=np.bool_)
+    contour = exclusion.contour
+    corners = contour.boundary_K_m if contour.family == "free" else contour.centre_K_m
+    reach = exclusion.margin_m + (0.0 if contour.family == "free" else 0.5 * float(np.linalg.norm(contour.size_m)))
+    low, high = np.min(np.atleast_2d(corners), axis=0) - reach, np.max(np.atleast_2d(corners), axis=0) + reach
+    near = np.flatnonzero(((lattice.samples > low) & (lattice.samples < high)).all(axis=1))
+    blocked[lattice.owner[near[exclusion.clearance(lattice.samples[near]) < 0.0]]] = True
+    return blocked
+
+
 class ExpectedFind:
-    """Policy of this module. Stateless; about 20 ms per call, 0.15 s for the first one.
+    """Policy of this module. Stateless.
 
     Args:
         params: See `ExpectationParams`.
@@ -179,7 +195,7 @@ class ExpectedFind:
     def _first_node(self, belief: SearchMap, tip: Array, weight: Array) -> Array | None:
         """Return the end of the best path's first leg, or None if no path finds anything."""
         p = self.params
-        lattice = _lattice(belief.half, belief.prior, p)
+        lattice = _lattice(belief.half, p)
         free = _free_legs(lattice, belief.exclusions)
         lengths = Routes(belief, tip).lengths(lattice.nodes)
         straight = np.linalg.norm(lattice.nodes - tip, axis=1)
@@ -190,10 +206,15 @@ class ExpectedFind:
         ]
         if len(near) == 0:
             return None
-        every = lattice.discs
-        swath = touched(every.centre[None], every.reach[None], tip, lattice.nodes[near][:, None])
-        left = weight[None] * ~swath
-        mass = weight.sum() - left.sum(axis=1)
+        goals, ahead_m = lattice.nodes[near], (p.depth - 1) * p.leg_m
+        corners = np.concatenate([tip[None], goals - ahead_m, goals + ahead_m])
+        discs = _Hidden.of(belief.hidden.discs, weight, corners.min(axis=0), corners.max(axis=0))
+        left = np.repeat(discs.weight[None], len(near), axis=0)
+
+        def find(rows: Indices, start: Array, end: Array, *, take: bool = False) -> Array:
+            return _find(discs.centre, discs.reach, left, rows, start, end, take)
+
+        mass = find(np.arange(len(near)), np.repeat(tip[None], len(near), axis=0), goals, take=True)
         length = lengths[near]
         score = mass * np.exp(-0.5 * length / p.discount_m)
         node, root = near.copy(), near.copy()
@@ -202,17 +223,16 @@ class ExpectedFind:
             kept = np.argsort(-score, kind="stable")[: p.width]
             leg = [np.arange(lattice.first[node[i]], lattice.first[node[i] + 1]) for i in kept]
             legs, parents = np.concatenate(leg), np.repeat(kept, [len(ls) for ls in leg])
-            gained = np.concatenate([lattice.gains(node[i], left[i]) for i in kept])[free[legs]]
             legs, parents = legs[free[legs]], parents[free[legs]]
             if len(legs) == 0:
                 break
+            start, end = (lattice.nodes[lattice.ends[legs, i]] for i in range(2))
             middle = length[parents] + 0.5 * lattice.length[legs]
-            score = score[parents] + gained * np.exp(-middle / p.discount_m)
+            score = score[parents] + find(parents, start, end) * np.exp(-middle / p.discount_m)
             top = np.argsort(-score, kind="stable")[: 3 * p.width]
             parents, legs, score = parents[top], legs[top], score[top]
             left = left[parents]
-            for weights, begin, end in zip(left, lattice.begin[legs], lattice.begin[legs + 1], strict=True):
-                weights[lattice.swath[begin:end]] = 0.0
+            find(np.arange(len(top)), start[top], end[top], take=True)
             length = length[parents] + lattice.length[legs]
             root, node = root[parents], lattice.ends[legs, 1]
             if float(score[0]) > best_score:

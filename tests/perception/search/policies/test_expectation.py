@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glotouch_bt.perception.search import ExpectationParams, ExpectedFind, SearchMap
-from glotouch_bt.perception.search.policies.expectation import _lattice, touched
+from glotouch_bt.perception.search.policies.expectation import _find, _Hidden, _lattice
 from glotouch_bt.perception.search.remaining import USUAL
 from glotouch_bt.perception.touch import Contour
 
@@ -47,26 +47,45 @@ def test_before_any_search_the_weights_are_a_distribution_over_discs_that_fit() 
 
 @settings(max_examples=30, deadline=None)
 @given(st.tuples(coordinate, coordinate), st.tuples(coordinate, coordinate), st.floats(0.005, 0.05))
-def test_touched_is_the_distance_of_a_point_from_a_segment(
-    a: tuple[float, float], b: tuple[float, float], reach: float
-) -> None:
+def test_a_leg_finds_the_discs_that_it_comes_near(a: tuple[float, float], b: tuple[float, float], reach: float) -> None:
+    """Against the distances from a finely sampled line."""
     start, end = np.array(a), np.array(b)
     line = start + np.linspace(0, 1, 2001)[:, None] * (end - start)
     centre = np.random.default_rng(0).uniform(-0.2, 0.2, (200, 2))
+    centre = centre[np.argsort(centre[:, 0])]
     distance = np.linalg.norm(centre[:, None] - line[None], axis=2).min(axis=1)
     clear = np.abs(distance - reach) > 2e-4  # of what is nearer the sampled line says nothing
-    got = touched(centre, np.full(200, reach), start, end)
-    np.testing.assert_array_equal(got[clear], (distance < reach)[clear])
+    left = np.ones((1, 200))
+    found = _find(centre, np.full(200, reach), left, np.zeros(1, dtype=np.int64), start[None], end[None], True)
+    np.testing.assert_array_equal(left[0, clear] == 0.0, (distance < reach)[clear])
+    assert found[0] == np.count_nonzero(left == 0.0)
 
 
-def test_the_legs_of_a_node_find_the_weight_that_they_touch() -> None:
-    """Against all discs compared with all legs."""
-    lattice = _lattice((0.05, 0.08), USUAL, PARAMS)
-    start, end = (lattice.nodes[lattice.ends[:, i]][:, None] for i in (0, 1))
-    every = touched(lattice.discs.centre[None], lattice.discs.reach[None], start, end)
-    weight = np.random.default_rng(1).uniform(size=every.shape[1])
-    found = [lattice.gains(node, weight) for node in range(len(lattice.nodes))]
-    np.testing.assert_allclose(np.concatenate(found), every @ weight, atol=1e-9)
+def test_weight_is_found_once_and_only_in_its_own_row() -> None:
+    centre, reach = np.array([[0.0, 0.0], [0.1, 0.0]]), np.array([0.02, 0.02])
+    left = np.array([[0.25, 0.5], [0.25, 0.5]])
+    start, end, row = np.array([[0.0, 0.0]]), np.array([[0.2, 0.0]]), np.zeros(1, dtype=np.int64)
+    assert _find(centre, reach, left, row, start, end, False)[0] == 0.75
+    assert _find(centre, reach, left, row, start, end, True)[0] == 0.75
+    assert _find(centre, reach, left, row, start, end, True)[0] == 0.0
+    np.testing.assert_array_equal(left, [[0.0, 0.0], [0.25, 0.5]])
+
+
+def test_discs_outside_the_region_of_the_paths_are_left_out_and_no_others() -> None:
+    every = blank().hidden
+    low, high = np.array([-0.05, -0.02]), np.array([0.01, 0.06])
+    some = _Hidden.of(every.discs, every.weight, low, high)
+    away = np.linalg.norm(np.maximum(np.maximum(low - every.discs.centre, every.discs.centre - high), 0.0), axis=1)
+    assert some.weight.sum() >= every.weight[away < every.discs.reach].sum()
+    assert len(some.weight) < np.count_nonzero(every.weight)
+    assert np.all(np.diff(some.centre[:, 0]) >= 0.0)
+
+
+def test_a_leg_and_its_reverse_have_one_track() -> None:
+    lattice = _lattice((0.05, 0.08), PARAMS)
+    ends = {tuple(e): track for e, track in zip(lattice.ends.tolist(), lattice.track.tolist(), strict=True)}
+    assert all(ends[b, a] == track for (a, b), track in ends.items())
+    assert len(set(ends.values())) == len(ends) // 2
 
 
 def test_a_disc_the_path_swept_over_is_ruled_out_and_no_other() -> None:
