@@ -62,6 +62,26 @@ def largest_force_2(external: Array, probe: Array, pads: Array, hand: int) -> fl
     return largest
 
 
+@compiled("f8[:, :]", "f8[:, :]", "f8[:]", "f8[:, :]", "given f8[:]", "f8")
+def carrying_torques(anchors: Array, axes: Array, origin: Array, rotation: Array, com: Array, weight_N: float) -> Array:
+    """Return the torques (dof,) Nm of hinges that carry a weight.
+
+    Args:
+        anchors, axes: (dof, 3) a point and the direction of each hinge in B, whose z axis points up.
+        origin, rotation: Pose of P in B.
+        com: (3,) centre of mass in P.
+        weight_N: Its weight.
+    """
+    x, y = origin[0], origin[1]
+    for k in range(3):
+        x += rotation[0, k] * com[k]
+        y += rotation[1, k] * com[k]
+    out = np.zeros(len(anchors))
+    for i in range(len(out)):  # the vertical speed of the weight for a unit speed of the hinge
+        out[i] = weight_N * (axes[i, 0] * (y - anchors[i, 1]) - axes[i, 1] * (x - anchors[i, 0]))
+    return out
+
+
 class MujocoRobot(Robot):
     """See `Robot`. Created by `MujocoBackend.open`; only the referee may read its truth."""
 
@@ -99,9 +119,10 @@ class MujocoRobot(Robot):
         self._hand = handles.hand_bodies.stop - handles.hand_bodies.start
         self._warnings, self._wrench_now = data.warning.number, data.sensordata[s.force.start : s.torque.stop]
         self._probe_now = data.xpos[handles.probe_body]
+        first, *_, last = model.dof_jntid[handles.arm_dof].tolist()
+        self._joints_now = data.xanchor[first : last + 1], data.xaxis[first : last + 1]
         self._pads_now = data.site_xpos[handles.pads_site], data.site_xmat[handles.pads_site].reshape(3, 3)
         self._ago_s = (np.arange(1, STEPS + 1, dtype=np.float64) - STEPS) * STEP_S
-        self._jacobian = np.zeros((3, model.nv))
         self._cycles = 0
         self._tare: PendingTare | None = None
         self._payload: PendingPayload | None = None
@@ -229,11 +250,9 @@ class MujocoRobot(Robot):
         return np.asarray((rates @ jacobian[:, h.arm_dof].T).reshape(2, 2, 3) @ rotation).reshape(2, 6)
 
     def _carry(self) -> Array:
-        """Return the joint torques (dof,) that carry the believed payload: J^T times its weight."""
+        """Return the joint torques (dof,) that carry the believed payload."""
         mass, com_P = self._payload_load or (0.0, np.zeros(3))
-        h, (origin, rotation) = self.handles, self._pads_now
-        mujoco.mj_jac(self.model, self.data, self._jacobian, None, origin + rotation @ com_P, h.hand_bodies.start)
-        return self._jacobian[2, h.arm_dof] * (mass * GRAVITY_M_S2)
+        return carrying_torques(*self._joints_now, *self._pads_now, com_P, mass * GRAVITY_M_S2)
 
     def _observe(self, command: Command) -> Observation:
         """Return the observation of the samples just taken."""

@@ -40,6 +40,7 @@ FIXED: Mapping[str, frozenset[str]] = {
                 "_warnings",
                 "_wrench_now",
                 "_probe_now",
+                "_joints_now",
                 "_pads_now",
                 "_keeper",
                 "_failed",

@@ -7,11 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 
 from glotouch_backends.mujoco import MujocoBackend
-from glotouch_backends.mujoco.robot import MujocoRobot
+from glotouch_backends.mujoco.robot import MujocoRobot, carrying_torques
 from glotouch_bt.robot import (
     HOLD,
     BackendError,
@@ -71,6 +72,18 @@ def run(robot: MujocoRobot, driver: Any) -> bytes:
     driver.cycle(Command(gripper=GripperTarget(0.0, 0.08, 10.0), tactile=True))
     driver.wait(0.6, Command(tactile=True))
     return b"".join(bytes_of(o) for o in driver.observations)
+
+
+def test_carrying_torques_are_those_of_mujocos_jacobian(open_robot: Open, drive: Drive) -> None:
+    robot = open_robot(NOISY, 3)
+    drive(robot).line((0.63, 0.08, -0.10), speed_m_s=0.2)
+    com, weight_N = np.array([0.01, -0.02, 0.05]), 3.0
+    origin, rotation = robot._pads_now
+    jacobian = np.zeros((3, robot.model.nv))
+    hand = robot.handles.hand_bodies.start
+    mujoco.mj_jac(robot.model, robot.data, jacobian, None, origin + rotation @ com, hand)
+    got = carrying_torques(*robot._joints_now, origin, rotation, com, weight_N)
+    np.testing.assert_allclose(got, weight_N * jacobian[2, robot.handles.arm_dof], atol=1e-12)
 
 
 def test_same_seed_same_bytes(open_robot: Open, drive: Drive) -> None:

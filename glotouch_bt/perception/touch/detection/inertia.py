@@ -136,4 +136,5 @@ class MeasuredInertia:
         last = _bends(stamps, places, self._lag_s, acceleration)
         kept = max(0, last - NEAREST)
         self._stamp_s, self._position_m = stamps[kept:], places[kept:]
-        return self._carried.wrench_S(acceleration @ (quat_to_matrix(o.quat_B_P[-1]) @ self._R_P_E))
+        acceleration_S = acceleration @ (quat_to_matrix(o.quat_B_P[-1]) @ self._R_P_E)
+        return _inertial(acceleration_S, self._carried.mass_kg, self._carried.com_S_m)
