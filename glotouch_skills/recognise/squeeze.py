@@ -21,6 +21,7 @@ from glotouch_skills.common.planning import (
     disturbance,
     layer_heights,
     plan_stances,
+    side_gaps_m,
 )
 
 
@@ -77,7 +78,7 @@ class Squeeze(Skill):
         with keeping_clear_of(arm, others):
             heights = layer_heights(candidate, arm.description.gripper, self.params)
             container = self.context.world.container
-            gaps_m = (self.params.side_gap_m, 0.5 * self.params.side_gap_m)
+            gaps_m = side_gaps_m(self.params.side_gap_m)
             max_closures = self.params.max_closures
             sides = max(max_closures // len(heights), 1)
             choices = [all_sides(candidate, arm.description.gripper, sides)] if max_closures else ()

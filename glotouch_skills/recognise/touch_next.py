@@ -20,12 +20,14 @@ from glotouch_skills.common.planning import (
     ClosureParams,
     Option,
     Squeezing,
+    Stance,
     Standing,
     best_rates,
     disturbance,
     find_target,
     options,
     pads_height_m,
+    side_gaps_m,
 )
 
 if TYPE_CHECKING:
@@ -231,8 +233,9 @@ class TouchNext(Skill):
             option: Option = found[i]
             if _key(option) in self.refused:
                 continue
-            if self._fits(belief, option, down):
-                return replace(option, closure=replace(option.closure, gain_nats=float(gains[i][0])))
+            at = self._fitting(belief, option, down)
+            if at is not None:
+                return replace(option, at=at, closure=replace(option.closure, gain_nats=float(gains[i][0])))
             self._refuse(option)
         return None
 
@@ -240,22 +243,23 @@ class TouchNext(Skill):
         """Record that a closure could not be made, for this skill and for later ones."""
         self.refused = (*self.refused, _key(option))
 
-    def _fits(self, belief: Belief, option: Option, down: Squeezing | None) -> bool:
-        """Return True if the open hand fits beside the neighbours, as it does where it already stands."""
+    def _fitting(self, belief: Belief, option: Option, down: Squeezing | None) -> Stance | None:
+        """Return the option's stance, opened as far as fits beside the neighbours; None if the hand does not fit."""
         if down is not None and option.at is down.at:
-            return True
+            return option.at
         arm = self.context.arm
-        z = option.closure.height_m
-        pose = hand_pose_B(
-            arm, self.context.world.container, np.array([*option.at.position_K_m, z]), option.at.yaw_K_rad
-        )
+        place = np.array([*option.at.position_K_m, option.closure.height_m])
+        pose = hand_pose_B(arm, self.context.world.container, place, option.at.yaw_K_rad)
         others = [t.candidate for t in belief.touchsets if t.candidate.index != option.closure.candidate]
         with keeping_clear_of(arm, others):
-            try:
-                require_clear(arm, pose, option.at.opening_m, CLEARANCE_M)
-            except MotionRefused:
-                return False
-        return True
+            for gap_m in side_gaps_m(self.params.side_gap_m):
+                at = option.at.opened(gap_m, arm.description.gripper)
+                try:
+                    require_clear(arm, pose, at.opening_m, CLEARANCE_M)
+                except MotionRefused:
+                    continue
+                return at
+        return None
 
     def _touch(
         self, candidates: tuple[Candidate, ...], chosen: Option, down: Squeezing | None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from glotouch_skills.common.hand import CLEARANCE_M, require_clear
 
 MIN_SIDE_GAP_M = 0.004
 """Least gap between open jaw and object on each side."""
+NARROW_RATIO = 0.5
+"""Smallest gap to try over the preferred one. Source: ours."""
 TURNS_RAD = np.deg2rad([0.0, 60.0, -60.0])
 """Yaws of the three sequences on a round candidate, relative to the base yaw."""
 BASES_RAD = np.deg2rad([0.0, 15.0, -15.0, 30.0])
@@ -32,11 +34,22 @@ class Stance:
         position_K_m: (2,) pads' mid-point.
         yaw_K_rad: Direction of x_P.
         opening_m: Aperture during the descent.
+        span_m: Extent of the candidate between the fingers.
     """
 
     position_K_m: Array
     yaw_K_rad: float
     opening_m: float
+    span_m: float
+
+    def opened(self, side_gap_m: float, gripper: Gripper) -> Stance:
+        """Return the stance with a gap between open jaw and candidate on each side, as far as the stroke allows."""
+        return replace(self, opening_m=min(self.span_m + 2 * side_gap_m, gripper.stroke_m))
+
+
+def side_gaps_m(side_gap_m: float) -> tuple[float, float]:
+    """Return the gaps between open jaw and candidate to try, widest first: neighbours may leave less space."""
+    return side_gap_m, max(NARROW_RATIO * side_gap_m, MIN_SIDE_GAP_M)
 
 
 def stance(
@@ -58,7 +71,7 @@ def stance(
     if high - low > widest_m:
         return None
     position = (contour.centre_K_m @ x + along_m) * x + 0.5 * (low + high) * y
-    return Stance(position, yaw_K_rad, min(high - low + 2 * side_gap_m, stroke_m))
+    return Stance(position, yaw_K_rad, stroke_m, float(high - low)).opened(side_gap_m, gripper)
 
 
 Scheme = list[list[tuple[float, float]]]
@@ -101,7 +114,7 @@ def plan_stances(
     arm: Arm,
     container: Container,
     pads_height_m: float,
-    side_gaps_m: Sequence[float],
+    gaps_m: Sequence[float],
     choices: Sequence[Scheme] = (),
 ) -> Motion[tuple[list[Stance], list[str]]]:
     """Return the stances of the scheme with the most free sequences, and the refusals of the others.
@@ -113,7 +126,7 @@ def plan_stances(
         arm: Arm whose scene has the other candidates as obstacles.
         container: The registered container.
         pads_height_m: Lowest height of P above the floor.
-        side_gaps_m: Gaps between open jaw and object to try, widest first.
+        gaps_m: Gaps between open jaw and object to try, widest first; see `side_gaps_m`.
         choices: Schemes to try, preferred first (default: `schemes`).
     """
     gripper = arm.description.gripper
@@ -122,9 +135,7 @@ def plan_stances(
     for scheme in choices or schemes(candidate, gripper):
         found: list[Stance] = []
         for alternatives in scheme:
-            chosen = yield from _first_free(
-                candidate, alternatives, arm, container, pads_height_m, side_gaps_m, refusals
-            )
+            chosen = yield from _first_free(candidate, alternatives, arm, container, pads_height_m, gaps_m, refusals)
             if chosen is not None:
                 found.append(chosen)
         if len(found) > len(best):
@@ -140,11 +151,11 @@ def _first_free(
     arm: Arm,
     container: Container,
     pads_height_m: float,
-    side_gaps_m: Sequence[float],
+    gaps_m: Sequence[float],
     refusals: list[str],
 ) -> Motion[Stance | None]:
     for along, yaw in alternatives:
-        for gap in side_gaps_m:
+        for gap in gaps_m:
             at = stance(candidate, along, yaw, gap, arm.description.gripper)
             if at is None:
                 refusals.append(f"wider than the jaws open at yaw {np.rad2deg(yaw):.0f} deg")

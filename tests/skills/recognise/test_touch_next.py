@@ -14,6 +14,7 @@ from py_trees.common import Status
 import glotouch_skills.recognise.touch_next as module
 from glotouch_bt.perception.recognition import PARTS, Closure, Match, ProbeTouch, Ranking
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
+from glotouch_bt.robot import MotionRefused
 from glotouch_skills.recognise.touch_next import TouchNext
 
 WIDTH = 0.05
@@ -99,6 +100,19 @@ def test_it_touches_where_it_tells_most_and_stops_when_it_knows(make) -> None:
     assert [e["touchset"].candidate.index for e in b.of_kind("touchset")] == [1]
     assert pads_height(b) > 0.13, "the hand is high again"
     assert not [o for o in b.arm.scene.obstacles if o.startswith("candidate")]
+
+
+def test_jaws_open_less_far_where_neighbours_leave_less_space(make, monkeypatch) -> None:
+    def require_clear(arm, pose, opening_m, margin_m=0.0) -> None:
+        if opening_m > WIDTH + 0.012:
+            raise MotionRefused("pose", "a neighbour is near")
+
+    monkeypatch.setattr(module, "require_clear", require_clear)
+    b, skill = make(Oracle(right=1, enough=3))
+    b.run(skill)
+    assert len(skill.touchsets[1].layers) == 1
+    assert skill._down.at.opening_m == pytest.approx(WIDTH + 0.010, abs=1e-6)
+    assert not skill.refused
 
 
 def test_none_of_them(make) -> None:
