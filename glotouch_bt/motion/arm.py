@@ -22,6 +22,7 @@ from glotouch_bt.motion.joints import plan_joints
 from glotouch_bt.motion.paths import Arc, Line, Path, Polyline
 from glotouch_bt.motion.plan import plan_piece
 from glotouch_bt.motion.timing import JointProfile, Paces, ProfileLimits
+from glotouch_bt.motion.tool_seat import ToolSeat
 from glotouch_bt.motion.travel import Guard, Motion, Mover, MoveResult
 from glotouch_bt.robot import (
     Array,
@@ -93,6 +94,7 @@ class Arm(Mover):
         kinematics: Forward and inverse kinematics.
         scene: Obstacles; skills add the objects they find.
         felt: Space that the held tool has felt to be free.
+        tool_seat: Displacement of the held tool since it was first measured.
         pause_signal: Pause state, written by the runner.
         not_run: Motions that were made and not run, each with its place in the code.
     """
@@ -102,12 +104,14 @@ class Arm(Mover):
         self.world = world
         self.scene = Scene(self.kinematics, world)
         self.felt = FeltSpace()
+        self.tool_seat = ToolSeat()
         self.not_run: list[str] = []
 
     def state(self) -> dict[str, Any]:
         """Return the state kept between two motions, including the scene, for `restore`."""
         remembered = {"q": self._q.copy(), "aperture_m": self._aperture_m}
-        return remembered | {"scene": self.scene.state(), "felt": self.felt.state()}
+        parts = {"scene": self.scene.state(), "felt": self.felt.state(), "tool_seat": self.tool_seat.state()}
+        return remembered | parts
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Restore a `state`; call `sync` afterwards if the arm has moved since.
@@ -121,6 +125,7 @@ class Arm(Mover):
         self._q, self._aperture_m, self._last_contact = q, aperture_m, None
         self.scene.restore(state["scene"])
         self.felt.restore(state["felt"])
+        self.tool_seat.restore(state["tool_seat"])
 
     # -- motions -----------------------------------------------------------------------------------------------------
 

@@ -18,7 +18,7 @@ from glotouch_bt.perception.touch.calibration import (
     solve_tip,
     wrench_delay,
 )
-from glotouch_bt.robot import Array, MotionRefused, Observation
+from glotouch_bt.robot import Array, MotionRefused, Observation, Pose
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool, Prober
 from glotouch_skills.common.hand import may_touch
@@ -254,6 +254,10 @@ class ToolCalibrate(Skill):
             corner_K_m=corner_of(self.context.world, tool) * found.walls_m,
             compliance_P_m_N=solve_compliance(presses) if presses else None,
         )
+        arm = self.context.arm
+        if arm.scene.holding_tool:
+            taken = Pose.pointing_down(np.zeros(3), tool.yaw_B_rad)
+            arm.tool_seat.measured(taken.apply(measured.tip_P_m)[:2])
         self.event(
             "calibration",
             tip_P_m=measured.tip_P_m,

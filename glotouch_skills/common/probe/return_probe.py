@@ -105,7 +105,8 @@ def return_probe(
         GuardTripped: The arm does not follow its setpoints; the probe is held.
     """
     arm, world = context.arm, context.world
-    grasp = Pose.pointing_down(world.holder.pose_B_grasp.position_m, yaw_B_rad)
+    seat = world.holder.pose_B_grasp.position_m - arm.tool_seat.displacement_B_m
+    grasp = Pose.pointing_down(seat, yaw_B_rad)
     above = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, world.probe.length_m + 0.06]))
     here = arm.pose_B_P.position_m
     if here[2] > above.position_m[2] or np.linalg.norm(here[:2] - above.position_m[:2]) > OVER_HOLDER_M:
@@ -128,6 +129,7 @@ def return_probe(
         raise MotionRefused("into the holder", str(why))
     yield from arm.jaws(min(aperture_m + 0.03, arm.description.gripper.stroke_m), speed_m_s=0.08)
     arm.scene.hold_tool(False)
+    arm.tool_seat.released()
     yield from arm.shift(np.array([0.0, 0.0, RISE_M]), 0.08, check=False)
     yield from set_payload_and_tare(context)
 
@@ -146,6 +148,7 @@ def _lower(context: Context, goal: Pose, paces: Paces, aperture_m: float, max_N:
     if not isinstance(moved.stop, Dropped):
         return moved
     arm.scene.hold_tool(False)
+    arm.tool_seat.released()
     arm.felt.forget()
     yield from _rise(context, paces[-1][1])
     raise TOOL_LOST(

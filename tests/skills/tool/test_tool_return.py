@@ -48,6 +48,17 @@ def test_the_probe_is_put_back(make) -> None:
     assert len(opened) == 1
 
 
+def test_a_tool_that_slid_in_the_jaws_is_put_where_it_stood(make) -> None:
+    b, skill = make()
+    slid_B_m = np.array([4e-4, -2e-4])
+    b.arm.tool_seat.measured(np.zeros(2))
+    b.arm.tool_seat.measured(slid_B_m)
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    np.testing.assert_allclose(b.arm.pose_B_P.position_m[:2], STOWED[:2] - slid_B_m, atol=1e-4)
+    np.testing.assert_array_equal(b.arm.tool_seat.displacement_B_m, np.zeros(3))
+
+
 def test_tool_return__motion_refused(make) -> None:
     b, skill = make()
     # A bar between the container and the holder, as high as the hand.
