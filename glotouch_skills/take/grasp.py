@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -88,7 +89,7 @@ class Grasp(Skill):
             for option in options:
                 try:
                     self.grip_m = yield from self._attempt(option)
-                    self.made, self.tried = option, (*made, option)
+                    self.made, self.tried = replace(option, closed_m=self.grip_m), (*made, option)
                     return
                 except MotionRefused as refusal:
                     tried.append(str(refusal))

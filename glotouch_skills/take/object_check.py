@@ -37,6 +37,8 @@ class ObjectCheckParams(SkillParams):
 class ObjectCheck(Skill):
     """Compare the aperture with the planned width, and the weight with the mesh's volume.
 
+    The aperture is that before the lift: an object may turn between the jaws while it is lifted.
+
     SUCCESS: the object can be the target; `fits` is true.
     """
 
@@ -61,7 +63,6 @@ class ObjectCheck(Skill):
     FAILURES: ClassVar = (TOO_LOW,)
 
     made = In(GraspPlan, "how it was taken")
-    grip_m = In(float, "aperture when the jaws had closed, m")
     weight_N = In(float, "weight in the hand, N", key="weight")
     fits = Out(bool, "it can be the target", always=True, on_success=True)
     impossible = Out(bool, "it cannot be the target, however it was taken", always=True)
@@ -77,8 +78,9 @@ class ObjectCheck(Skill):
         low_m3, high_m3 = target.volume_m3
         light, heavy = GRAVITY_M_S2 * p.lightest_kg_m3 * low_m3, GRAVITY_M_S2 * p.heaviest_kg_m3 * high_m3
         give = 2.0 * gripper.pad_depth_m
-        off = misfit_m(np.array(made.aperture_m), self.grip_m, give).item()
-        self.event("object_check", grip_m=self.grip_m, off_m=off, weight_N=self.weight_N, light_N=light, heavy_N=heavy)
+        grip_m = made.aperture_m if made.closed_m is None else made.closed_m
+        off = misfit_m(np.array(made.aperture_m), grip_m, give).item()
+        self.event("object_check", grip_m=grip_m, off_m=off, weight_N=self.weight_N, light_N=light, heavy_N=heavy)
         if not light <= self.weight_N <= heavy:
             self.impossible = True
             raise self.WRONG_OBJECT(
@@ -91,18 +93,18 @@ class ObjectCheck(Skill):
             self.fits = True
             return
         widths, unsure = widths_m(target.model.standing(made.quat), float(made.position_K_m[2]))
-        misfits = np.maximum(misfit_m(widths, self.grip_m, give) - unsure, 0.0)
+        misfits = np.maximum(misfit_m(widths, grip_m, give) - unsure, 0.0)
         least = float(misfits.min(initial=gripper.stroke_m))
         if least <= p.width_m:
             raise self.NOT_AS_FELT(
-                f"the jaws stopped at {self.grip_m * 1e3:.1f} mm where {made.aperture_m * 1e3:.1f} mm were planned; "
+                f"the jaws stopped at {grip_m * 1e3:.1f} mm where {made.aperture_m * 1e3:.1f} mm were planned; "
                 f"{name} is that wide elsewhere",
                 off_m=off,
                 limit_m=p.width_m,
             )
         self.impossible = True
         raise self.WRONG_OBJECT(
-            f"the jaws stopped at {self.grip_m * 1e3:.1f} mm; wherever {name} is held at this height, they would "
+            f"the jaws stopped at {grip_m * 1e3:.1f} mm; wherever {name} is held at this height, they would "
             f"stop at least {least * 1e3:.1f} mm from there",
             off_m=off,
             min_m=least,

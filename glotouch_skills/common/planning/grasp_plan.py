@@ -69,6 +69,7 @@ class GraspPlan:
         alternatives: Other grasps of the same object, best first.
         source: `fitted` (from the mesh, or from a remembered closure) or `felt` (from a closure).
         quat: Rotation (w, x, y, z) of the mesh onto the side on which the object is taken to stand.
+        closed_m: Aperture of the closed jaws before the lift, if the grasp was made.
     """
 
     candidate: int
@@ -79,6 +80,7 @@ class GraspPlan:
     alternatives: tuple[GraspPlan, ...] = ()
     source: str = "felt"
     quat: Quat = UPRIGHT
+    closed_m: float | None = None
 
     def __post_init__(self) -> None:
         position_K_m = np.asarray(self.position_K_m)

@@ -29,6 +29,7 @@ def test_the_jaws_close_at_the_place(make) -> None:
     b.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message
     assert skill.grip_m == pytest.approx(0.05, abs=1e-6)
+    assert skill.made.closed_m == skill.grip_m
     assert (skill.graspable, skill.doubtful) == (True, ())
     np.testing.assert_allclose(b.arm.pose_B_P.position_m, [0.61, 0.04, -0.17], atol=1e-5)
     assert abs(np.sin(b.arm.pose_B_P.yaw_rad - 0.3)) < 1e-6

@@ -29,7 +29,8 @@ def target(tmp_path_factory: pytest.TempPathFactory) -> str:
 def judged(bench, target):
     def judge(grip_m: float, weight_N: float = 2.0, plan: GraspPlan = PLAN):
         b = bench()
-        skill = b.make(ObjectCheck, inputs={"made": plan, "grip_m": grip_m, "weight_N": weight_N}, target=target)
+        made = dataclasses.replace(plan, closed_m=grip_m)
+        skill = b.make(ObjectCheck, inputs={"made": made, "weight_N": weight_N}, target=target)
         b.run(skill)
         return skill
 
