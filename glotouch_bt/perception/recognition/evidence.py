@@ -14,6 +14,9 @@ from glotouch_bt.robot import Array
 
 MIN_AREA_M2 = 6e-6
 """Minimum area of a connected contact patch."""
+EXTENT_RATIO = 0.5
+"""Depth over the threshold of contact down to which a patch extends (hysteresis threshold: J. Canny, 1986). Its peak
+exceeds the threshold. Source: ours."""
 ONE_SIDED = 0.35
 """Weight of a layer with one pad in contact, relative to 1 for both."""
 
@@ -106,7 +109,7 @@ def _usable(layer: Layer) -> bool:
 
 
 def contact_tops(maps_m: list[Array], noise_m: list[float], pad: PadSpec) -> list[float]:
-    """Return the maximum indentation in each map's largest patch, 0 without contact; map shapes may differ.
+    """Return the maximum indentation in each map's largest patch of contact, 0 without; map shapes may differ.
 
     A 3 x 3 median removes single outliers. A map with more than half of its taxels dead counts as no contact.
 
@@ -128,15 +131,15 @@ def contact_tops(maps_m: list[Array], noise_m: list[float], pad: PadSpec) -> lis
         smooth = scipy.ndimage.median_filter(filled, size=(1, 3, 3), mode="nearest")
         flat = np.zeros((3, 3, 3))
         flat[1] = [[0, 1, 0], [1, 1, 1], [0, 1, 0]]
-        labels, n = scipy.ndimage.label((smooth > threshold_m) & alive[:, None, None], structure=flat)
+        labels, n = scipy.ndimage.label((smooth > EXTENT_RATIO * threshold_m) & alive[:, None, None], structure=flat)
         if n == 0:
             continue
         count = np.bincount(labels.ravel(), minlength=n + 1)
+        peak = np.append(0.0, scipy.ndimage.maximum(smooth, labels, np.arange(1, n + 1)))
         least = MIN_AREA_M2 * shape[0] * shape[1] / (pad.window_m[0] * pad.window_m[1])
-        for i, label in zip(where, labels, strict=True):
+        for i, label, limit in zip(where, labels, threshold_m.ravel(), strict=True):
             own = np.unique(label)
-            own = own[(own > 0) & (count[own] >= least)]
+            own = own[(own > 0) & (count[own] >= least) & (peak[own] > limit)]
             if len(own):
-                best = own[np.argmax(count[own])]
-                out[i] = float(smooth[where.index(i)][label == best].max())
+                out[i] = float(peak[own[np.argmax(count[own])]])
     return out

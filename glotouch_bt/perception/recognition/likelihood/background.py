@@ -115,7 +115,10 @@ def mean_squared(a: Array32, b: Array32) -> Array32:
 
 
 def log_generic_widths(layers: tuple[LayerEvidence, ...], candidate: Candidate, p: LikelihoodParams) -> Array:
-    """Return the background log density (n,), per metre, of each width given earlier widths and the outline."""
+    """Return the background log density (n,), per metre, of each width given earlier widths and the outline.
+
+    A width that is only an upper bound is uniform above the object's own, as it is for the target.
+    """
     out = np.zeros(len(layers))
     known: dict[tuple[int, int], float] = {}
     for i, e in enumerate(layers):
@@ -125,8 +128,11 @@ def log_generic_widths(layers: tuple[LayerEvidence, ...], candidate: Candidate, 
             low, high = candidate.span_m(e.yaw_rad + 0.5 * math.pi)
             guesses = [(high - low, FIRST_SCALE_M)]
         # The Cauchy tails allow steps of the object.
-        density = np.mean([s / math.pi / (s**2 + (e.width_m - w) ** 2) for w, s in guesses])
-        out[i] = math.log((1 - p.width_outlier) * density + p.width_outlier / p.width_range_m)
-        if not e.upper_only:
+        if e.upper_only:
+            below = np.mean([0.5 + math.atan((e.width_m - w) / s) / math.pi for w, s in guesses])
+            density = below / p.width_range_m
+        else:
+            density = np.mean([s / math.pi / (s**2 + (e.width_m - w) ** 2) for w, s in guesses])
             known[(e.sequence, e.index)] = e.width_m
+        out[i] = math.log((1 - p.width_outlier) * density + p.width_outlier / p.width_range_m)
     return out

@@ -33,7 +33,8 @@ class LikelihoodParams:
         image_outlier: Probability of an outlier image.
         image_alike: Background probability that an image resembles a neighbouring one.
         height_sd_m: Standard deviation of the measured top.
-        lean_sd_rad: Standard deviation of the lean of an object that stands on an uneven base.
+        lean_rad: Mean lean of an object that stands on an uneven base, exponentially distributed. Source: REALISM, 0 to
+            3 deg, at most 8 deg.
         height_lower: Probability that a lower point of a wholly traced object was measured as its top. Source: ours; in
             recorded realistic missions nearly all low tops were those of partly traced objects.
         contour_sd_m: Standard deviation of a contour's side, besides that of the traces.
@@ -74,7 +75,7 @@ class LikelihoodParams:
     image_outlier: float = 0.05
     image_alike: float = 0.6
     height_sd_m: float = 1.2e-3
-    lean_sd_rad: float = 0.03
+    lean_rad: float = math.radians(3.0)
     height_lower: float = 0.03
     contour_sd_m: float = 1.5e-3
     contour_outlier: float = 0.1
@@ -98,7 +99,9 @@ class LikelihoodParams:
             v = getattr(self, f.name)
             if not math.isfinite(v) or (v < 0 and not f.name.endswith("offset")):
                 raise ParamError(f"likelihood.{f.name}", v, "finite and not negative")
-            if (f.name.endswith(("_sd_m", "_sd_rad", "_range_m")) or f.name.startswith("image_s")) and v == 0:
+            if (
+                f.name.endswith(("_sd_m", "_sd_rad", "_range_m", "lean_rad")) or f.name.startswith("image_s")
+            ) and v == 0:
                 raise ParamError(f"likelihood.{f.name}", v, "positive")
             if f.name.endswith("_steps") and v % 2 == 0:
                 raise ParamError(f"likelihood.{f.name}", v, "odd, so that the grid contains zero")

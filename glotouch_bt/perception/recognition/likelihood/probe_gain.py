@@ -22,10 +22,9 @@ from glotouch_bt.perception.recognition.likelihood.scalars import (
     contour_ratio,
     height_ratio,
     mode_ratio,
-    size_variance_m2,
     whole_share,
 )
-from glotouch_bt.perception.recognition.model import TargetModel
+from glotouch_bt.perception.recognition.model import TargetModel, size_variance_m2
 from glotouch_bt.perception.touch import Candidate, Contour
 from glotouch_bt.robot import Array
 

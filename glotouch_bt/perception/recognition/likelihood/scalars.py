@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
-from glotouch_bt.perception.recognition.model import SENSING_M, TargetModel, hand_axes
-from glotouch_bt.perception.touch import Candidate, Contour
+from glotouch_bt.perception.recognition.model import SENSING_M, TargetModel, hand_axes, size_variance_m2
+from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import Array
 
 SIZES_M = (0.020, 0.110)
@@ -19,6 +20,9 @@ FREE_KIND_WEIGHT = 0.4
 """Weight of the kind (round or box) of an irregular outline, 0..1. Source: 7 of 13 targets with irregular outlines had
 a negative term `mode` in `bench retrieve --objects DIR --trials 4 --per-seed 2 --seed 38000 --conditions realistic`
 (c4bb0c7; folders of `tests/support/any_shape.py`, seeds 8001-8003)."""
+RISE_SHARE = 0.75
+"""Distance of the measured top from the edge on which a leaning object stands, over its side. Source: half a side for a
+top in the middle, a whole side for the far edge of a flat top."""
 TAIL = 3.0
 """Degrees of freedom of the Student's t of a contour's side."""
 
@@ -51,12 +55,17 @@ def height_ratio(model: TargetModel, candidate: Candidate, p: LikelihoodParams) 
 
 
 def _height_density(off_m: Array, model: TargetModel, p: LikelihoodParams) -> Array:
-    """Return the densities (n,), 1/m, of measured less true heights (n,); an object that leans is higher."""
-    raised_m = math.hypot(p.height_sd_m, p.lean_sd_rad * 0.5 * model.outline.likely.size_m[0])
+    """Return the densities (n,), 1/m, of measured less nominal heights (n,).
+
+    The error is normal. An object that leans on an uneven base is higher: its top, up to a whole side away from the
+    edge on which it stands, rises by an exponentially distributed amount. Their sum is an exponentially modified
+    Gaussian (E. Grushka, 1972).
+    """
     unsure_m = model.certainty.height_sd_m if model.certainty is not None else 0.0
-    above_m, below_m = math.hypot(raised_m, unsure_m), math.hypot(p.height_sd_m, unsure_m)
-    sd_m = np.where(off_m > 0, above_m, below_m)
-    return np.asarray(math.sqrt(2 / math.pi) * np.exp(-0.5 * (off_m / sd_m) ** 2) / (above_m + below_m))
+    sd_m = math.hypot(p.height_sd_m, p.scale_sd * model.height_m, 2 * p.offset_sd_m, unsure_m)
+    rise_m = p.lean_rad * RISE_SHARE * float(np.mean(model.outline.likely.size_m))
+    log_density = 0.5 * (sd_m / rise_m) ** 2 - off_m / rise_m + log_ndtr(off_m / sd_m - sd_m / rise_m)
+    return np.asarray(np.exp(log_density) / rise_m)
 
 
 def whole_share(model: TargetModel, candidate: Candidate, p: LikelihoodParams) -> float:
@@ -72,7 +81,10 @@ def contour_ratio(model: TargetModel, candidate: Candidate, p: LikelihoodParams)
     low, high = SIZES_M
     good = other = 1.0
     for i in range(1 if one else 2):
-        sd = math.sqrt(p.contour_sd_m**2 + traced.size_sd_m[i] ** 2 + size_variance_m2(contour, i))
+        coarse = size_variance_m2(contour, i)
+        if len(contour.residuals_m) >= traced.contacts:  # the traces show how far a fit of so many contacts errs
+            coarse = max(coarse - traced.fit_sd_m[i] ** 2, 0.0)
+        sd = math.sqrt(p.contour_sd_m**2 + traced.size_sd_m[i] ** 2 + coarse)
         good *= _student((contour.size_m[i] - traced.size_m[i]) / sd) / sd
         other /= high - low
     return math.log((1 - p.contour_outlier) * good / other + p.contour_outlier)
@@ -108,16 +120,3 @@ def _student(z: float) -> float:
     """Return the density of Student's t with `TAIL` degrees of freedom."""
     c = math.gamma(0.5 * (TAIL + 1)) / (math.sqrt(TAIL * math.pi) * math.gamma(0.5 * TAIL))
     return float(c * (1 + z * z / TAIL) ** (-0.5 * (TAIL + 1)))
-
-
-def size_variance_m2(contour: Contour, side: int) -> float:
-    """Return the variance of a whole side from the fit's covariance of the half; 0 if unknown.
-
-    A free outline has a covariance of its centre only; half a side is at most as uncertain as that.
-    """
-    covariance = contour.covariance
-    if contour.family == "free" and covariance.shape == (2, 2) and np.isfinite(covariance).all():
-        return 4.0 * float(np.linalg.eigvalsh(covariance)[-1])
-    at = {"circle": 2, "rectangle": 3 + side}.get(contour.family or "", len(covariance))
-    variance = 4.0 * float(covariance[at, at]) if at < len(covariance) else 0.0
-    return variance if math.isfinite(variance) else 0.0

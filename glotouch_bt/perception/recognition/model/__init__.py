@@ -8,6 +8,7 @@ from glotouch_bt.perception.recognition.model.outline import (
     first_hit,
     minimum_rectangle,
     outline_of,
+    size_variance_m2,
     traced_tips,
 )
 from glotouch_bt.perception.recognition.model.pads import (

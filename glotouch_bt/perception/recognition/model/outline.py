@@ -46,6 +46,8 @@ class KindFit:
     Attributes:
         centre_m, centre_sd_m: (2,) centre in the frame of the solid; standard deviation per coordinate.
         size_m, size_sd_m: (long, short), and the standard deviation of each.
+        fit_sd_m: Largest standard deviation that a fit states for each size, knowing nothing of the solid.
+        contacts: Median number of contacts of a trace; approaches that miss the solid give none.
         yaw_rad, yaw_sd_rad: Direction of the long side (mod pi) and its standard deviation; 0 and pi for a circle.
     """
 
@@ -53,6 +55,8 @@ class KindFit:
     centre_sd_m: float
     size_m: tuple[float, float]
     size_sd_m: tuple[float, float]
+    fit_sd_m: tuple[float, float]
+    contacts: int
     yaw_rad: float
     yaw_sd_rad: float
 
@@ -131,8 +135,26 @@ def _summary(fits: list[Contour]) -> KindFit:
         yaw = 0.5 * float(np.angle(mean))
         yaw_sd = 0.5 * math.sqrt(-2 * math.log(min(max(float(abs(mean)), 1e-6), 1 - 1e-9)))
     (long, short), (long_sd, short_sd) = np.median(size, axis=0).tolist(), size.std(axis=0).tolist()
+    stated = [max(math.sqrt(size_variance_m2(f, side)) for f in fits) for side in (0, 1)]
+    contacts = int(np.median([len(f.residuals_m) for f in fits]))
     centre_sd = float(np.sqrt(centre.var(axis=0).mean()))
-    return KindFit(np.median(centre, axis=0), centre_sd, (long, short), (long_sd, short_sd), yaw, yaw_sd)
+    return KindFit(
+        np.median(centre, axis=0), centre_sd, (long, short), (long_sd, short_sd), (stated[0], stated[1]), contacts, yaw,
+        yaw_sd,
+    )  # fmt: skip
+
+
+def size_variance_m2(contour: Contour, side: int) -> float:
+    """Return the variance of a whole side from the fit's covariance of the half; 0 if unknown.
+
+    A free outline has a covariance of its centre only; half a side is at most as uncertain as that.
+    """
+    covariance = contour.covariance
+    if contour.family == "free" and covariance.shape == (2, 2) and np.isfinite(covariance).all():
+        return 4.0 * float(np.linalg.eigvalsh(covariance)[-1])
+    at = {"circle": 2, "rectangle": 3 + side}.get(contour.family or "", len(covariance))
+    variance = 4.0 * float(covariance[at, at]) if at < len(covariance) else 0.0
+    return variance if math.isfinite(variance) else 0.0
 
 
 def traced_tips(solid: trimesh.Trimesh, aim_m: Array, contacts: int, start_rad: float) -> Array:

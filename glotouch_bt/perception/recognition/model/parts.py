@@ -13,7 +13,7 @@ from glotouch_bt.perception.recognition.model.pads import Array32, PadSpec
 from glotouch_bt.perception.recognition.model.target import TargetModel
 from glotouch_bt.robot import ParamError
 
-VERSION = 3
+VERSION = 4
 """Version of the tables; increase it when a table's meaning or computation changes."""
 _NUMBERS = ("height_m", "rho", "rho_sd", "normal_dispersion", "anisotropy")
 
@@ -86,5 +86,6 @@ def _fit(facts: Mapping[str, Any]) -> KindFit:
         np.array(facts["centre_m"], dtype=np.float64), float(facts["centre_sd_m"]),
         (float(facts["size_m"][0]), float(facts["size_m"][1])),
         (float(facts["size_sd_m"][0]), float(facts["size_sd_m"][1])),
+        (float(facts["fit_sd_m"][0]), float(facts["fit_sd_m"][1])), int(facts["contacts"]),
         float(facts["yaw_rad"]), float(facts["yaw_sd_rad"]),
     )  # fmt: skip

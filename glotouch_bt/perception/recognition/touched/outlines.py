@@ -78,6 +78,7 @@ def retraced(contours: Sequence[Contour]) -> Outline:
             centre_sd_m=math.hypot(max(f.centre_sd_m for f in fits), trace_sd),
             size_m=(float(size[:, 0].mean()), float(size[:, 1].mean())),
             size_sd_m=(float(sd[0]), float(sd[1])),
+            fit_sd_m=(0.0, 0.0),  # the outline itself comes from a fit, so that another one errs as much as it states
             yaw_rad=0.5 * float(np.angle(mean)) if kind == "box" else 0.0,
         )
 
