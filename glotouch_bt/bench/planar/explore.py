@@ -107,7 +107,8 @@ def explore(
         left_below: With an unknown number, the chance that something is left below which it stops.
     """
     sweep, orbit = _defaults("guarded_sweep"), _defaults("orbit_probe")
-    belief = SearchMap.blank(world.half_m + world.tip_radius_m - sweep.wall_gap_m, expected, left_below)
+    half = world.half_m + world.tip_radius_m
+    belief = SearchMap.blank(half - sweep.wall_gap_m, expected, left_below, (2 * float(half[0]), 2 * float(half[1])))
     maps: list[SearchMap] = []
     found: dict[int, Traced] = {}
     candidates: tuple[Candidate, ...] = ()
@@ -123,7 +124,7 @@ def explore(
             first, radius = sought.contact, world.tip_radius_m
             old = part_of(candidates, first, radius)
             known = () if old is None else old.contacts
-            elsewhere = partial(of_another, candidates) if old is None else None
+            elsewhere = partial(of_another, belief, tuple(c for c in candidates if c is not old))
             joined = partial(joins, candidates, radius_m=radius) if old is None else None
             plan = trace(
                 first,
@@ -138,8 +139,8 @@ def explore(
             traced = drive(plan, execute)
             admitted = admit(belief, candidates, first, traced, orbit.height_m, orbit.exclusion_m, part_of=old)
             belief, candidates = admitted.belief, admitted.candidates
-            if admitted.index is not None:
-                found[admitted.index] = Traced(world.travel_m, candidates[admitted.index])
+            for index in admitted.changed:
+                found[index] = Traced(world.travel_m, candidates[index])
     except _OutOfBudget:
         ended = "budget"
     return Explored(tuple(found[i] for i in sorted(found)), world.travel_m, ended, belief, tuple(maps))

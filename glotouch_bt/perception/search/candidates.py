@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from glotouch_bt.perception.search.bodies import bodies, doubtful, outline_of
 from glotouch_bt.perception.search.map import FACING, SearchMap
 from glotouch_bt.perception.search.tracing import OutlineTrace, TraceParams
 from glotouch_bt.perception.touch import (
@@ -56,11 +57,13 @@ class Admitted:
         belief: The map.
         candidates: All candidates.
         index: Index of the new or updated candidate; None if the trace gave none.
+        changed: Indices of all new or updated candidates, `index` first: one contour may be several bodies.
     """
 
     belief: SearchMap
     candidates: tuple[Candidate, ...]
     index: int | None
+    changed: tuple[int, ...] = ()
 
 
 def admit(
@@ -87,21 +90,33 @@ def admit(
         exclusion_m: Margin around the object that the search avoids.
         part_of: Candidate whose contacts started the trace.
     """
-    belief = belief.with_path(traced.path_K_m).with_hints((*belief.hints, *traced.outliers))
+    outliers = tuple(c for c in traced.outliers if not belief.at_wall(c))
+    belief = belief.with_path(traced.path_K_m).with_hints((*belief.hints, *outliers))
     if traced.outline is None or len(traced.contacts) < MIN_CONTACTS:
         return Admitted(belief.with_dropped(first.point_K_m), known, None)
     radius = traced.outline.touches.radius_m
     if part_of is not None and traced.continued:
-        better = _with(part_of, traced.contacts, traced.outline)
-        belief = belief.with_exclusion(envelope(better), exclusion_m, new=False)
-        return Admitted(belief, tuple(better if c.index == better.index else c for c in known), better.index)
-    for old in known:
-        more = _merged(old, traced, radius, height_m)
-        if more is not None:
-            belief = belief.with_exclusion(envelope(more), exclusion_m, new=False)
-            return Admitted(belief, tuple(more if c.index == old.index else c for c in known), old.index)
-    candidate = Candidate(len(known), traced.outline.contour, height_m, quality(traced.outline), traced.contacts, False)
-    return Admitted(belief.with_exclusion(envelope(candidate), exclusion_m), (*known, candidate), candidate.index)
+        better: Candidate | None = _with(part_of, traced.contacts, traced.outline)
+    else:
+        better = next((m for m in (_merged(old, traced, radius, height_m) for old in known) if m is not None), None)
+    counted = better is not None
+    if better is None:
+        outline = traced.outline
+        better = Candidate(len(known), outline.contour, height_m, quality(outline), traced.contacts, False)
+    parts = bodies(better.contacts, radius, belief.path_K_m)
+    every = {c.index: c for c in known} | {better.index: better}
+    changed = []
+    for body in parts:
+        index = len(every) if changed else better.index
+        outline = outline_of(body, radius)
+        every[index] = replace(better, index=index)
+        if len(parts) > 1:
+            every[index] = _with(every[index], body, outline)
+        belief = belief.with_exclusion(envelope(every[index]), exclusion_m, new=bool(changed) or not counted)
+        changed.append(index)
+    candidates = tuple(every[i] for i in sorted(every))
+    belief = belief.with_doubtful(doubtful(candidates, radius, belief.path_K_m))
+    return Admitted(belief, candidates, better.index, tuple(changed))
 
 
 def refined(before: Candidate, traced: OutlineTrace) -> Candidate | None:
@@ -157,9 +172,9 @@ def joins(known: tuple[Candidate, ...], contacts: tuple[Contact, ...], radius_m:
     return any(max(_outline((*old.contacts, *contacts), radius_m).contour.size_m) <= MAX_LENGTH_M for old in near)
 
 
-def of_another(known: tuple[Candidate, ...], contact: Contact) -> bool:
-    """Return True if a contact made during a trace belongs to another, well-traced candidate."""
-    return any(
+def of_another(belief: SearchMap, known: tuple[Candidate, ...], contact: Contact) -> bool:
+    """Return True if a contact made during a trace belongs to a wall or to another, well-traced candidate."""
+    return belief.at_wall(contact) or any(
         float(signed_distance(envelope(c), contact.point_K_m[None])[0]) < ON_M and _is_well_traced(c) for c in known
     )
 
