@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from itertools import count
 from typing import Any
 
@@ -17,14 +17,10 @@ from glotouch_bt.perception.search import (
     MoveOutcome,
     SearchMap,
     SearchPolicy,
-    admit,
     elsewhere_m,
-    joins,
-    of_another,
-    part_of,
     refined,
     seek,
-    trace,
+    trace_bodies,
     trace_more,
 )
 from glotouch_bt.perception.touch import Candidate
@@ -122,25 +118,12 @@ def explore(
                 ended = "complete" if belief.complete else "exhausted"
                 break
             first, radius = sought.contact, world.tip_radius_m
-            old = part_of(candidates, first, radius)
-            known = () if old is None else old.contacts
-            elsewhere = partial(of_another, belief, tuple(c for c in candidates if c is not old))
-            joined = partial(joins, candidates, radius_m=radius) if old is None else None
-            plan = trace(
-                first,
-                world.tip_K_m,
-                radius,
-                orbit.rule(),
-                half_extent_m=belief.half_extent_m,
-                known=known,
-                elsewhere=elsewhere,
-                joined=joined,
+            plan = trace_bodies(
+                belief, candidates, first, world.tip_K_m, radius, orbit.rule(), orbit.height_m, orbit.exclusion_m
             )
-            traced = drive(plan, execute)
-            admitted = admit(belief, candidates, first, traced, orbit.height_m, orbit.exclusion_m, part_of=old)
+            admitted = drive(plan, execute)[0]
             belief, candidates = admitted.belief, admitted.candidates
-            for index in admitted.changed:
-                found[index] = Traced(world.travel_m, candidates[index])
+            found |= {i: Traced(world.travel_m, candidates[i]) for i in admitted.changed}
     except _OutOfBudget:
         ended = "budget"
     return Explored(tuple(found[i] for i in sorted(found)), world.travel_m, ended, belief, tuple(maps))

@@ -119,6 +119,38 @@ def admit(
     return Admitted(belief, candidates, better.index, tuple(changed))
 
 
+def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclusion_m: float) -> Admitted:
+    """Divide the contacts of two candidates anew after a further trace of the second one.
+
+    If one body explains all of them, the second candidate, which is the last one, is dropped.
+
+    Args:
+        admitted: Map and candidates.
+        whole, part: Indices of the two candidates.
+        more: The further trace.
+        exclusion_m: Margin around the objects that the search avoids.
+    """
+    outliers = tuple(c for c in more.outliers if not admitted.belief.at_wall(c))
+    belief = admitted.belief.with_path(more.path_K_m).with_hints((*admitted.belief.hints, *outliers))
+    if more.outline is None:
+        return replace(admitted, belief=belief)
+    one, other = admitted.candidates[whole], admitted.candidates[part]
+    radius = more.outline.touches.radius_m
+    parts = bodies((*one.contacts, *more.contacts), radius, belief.path_K_m)
+    every = {c.index: c for c in admitted.candidates}
+    changed = admitted.changed
+    if len(parts) == 1:
+        belief, changed = belief.with_one_less(), tuple(i for i in changed if i != part)
+        del every[part]
+        parts = (split_at_motion(parts[0], radius, likely=len(one.contacts))[1],)
+    for candidate, body in zip((one, other), parts, strict=False):
+        every[candidate.index] = _with(candidate, body, outline_of(body, radius))
+        belief = belief.with_exclusion(envelope(every[candidate.index]), exclusion_m, new=False)
+    candidates = tuple(every[i] for i in sorted(every))
+    belief = belief.with_doubtful(doubtful(candidates, radius, belief.path_K_m))
+    return Admitted(belief, candidates, admitted.index, changed)
+
+
 def refined(before: Candidate, traced: OutlineTrace) -> Candidate | None:
     """Return the candidate updated by a further trace; None if the trace added no contact."""
     if traced.outline is None or len(traced.contacts) == len(before.contacts):

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from glotouch_bt.perception.search.remaining import ANY, USUAL, DiscPrior, Remaining, chance_left, remaining
+from glotouch_bt.perception.search.remaining import ANY, CROWDED, USUAL, DiscPrior, Remaining, chance_left, remaining
 from glotouch_bt.perception.touch import Contact, Contour, signed_distance
 from glotouch_bt.robot import Array, ParamError, frozen_array
 
@@ -24,8 +24,8 @@ KNOWN_M = 0.005
 FACING = -0.4
 """Minimum cosine between the force on the ball and the direction from an object's centre to the contact for the contact
 to belong to the object."""
-DOUBT_LEFT = 0.10
-"""Remaining weight of places below which a search ends with doubtful objects counted."""
+DOUBT_LEFT = 0.05
+"""Probability that an object would have been missed below which a search ends with doubtful objects counted."""
 WALL_M = 0.003
 """Maximum distance from a wall of a contact with it. Source: ours; no object is as thin."""
 WALL_COSINE = 0.9
@@ -143,6 +143,10 @@ class SearchMap:
         disc = Contour("round", point, (2 * radius_m, 2 * radius_m), 0.0, 0.0, np.zeros(0))
         return replace(self, exclusions=(*self.exclusions, Exclusion(disc, 0.0, traced=False)))
 
+    def with_one_less(self) -> SearchMap:
+        """Count one traced object less: it is a part of another one."""
+        return replace(self, found=self.found - 1)
+
     def with_doubtful(self, doubtful: int) -> SearchMap:
         """Set the number of traced objects that may be parts of other ones."""
         return replace(self, doubtful=doubtful)
@@ -209,6 +213,12 @@ class SearchMap:
         return remaining(self.half, self.prior, traced, self.path_distance, self.dropped)
 
     @cached_property
+    def anywhere(self) -> Remaining:
+        """Where objects of the usual sizes may still be, without a gap to walls and traced objects."""
+        traced = [e.contour for e in self.exclusions]
+        return remaining(self.half, CROWDED, traced, self.path_distance, self.dropped)
+
+    @cached_property
     def chance_left(self) -> float:
         """Probability that at least one object of the prior is left; nan with a known number."""
         if self.expected is not None:
@@ -225,7 +235,7 @@ class SearchMap:
         if self.expected is not None:
             if self.found < self.expected:
                 return False
-            return self.found - self.doubtful >= self.expected or float(self.hidden.weight.sum()) < DOUBT_LEFT
+            return self.found - self.doubtful >= self.expected or self.anywhere.share < DOUBT_LEFT
         return not self.hints and self.chance_left < self.left_below
 
     @cached_property

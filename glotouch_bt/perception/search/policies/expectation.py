@@ -22,7 +22,7 @@ from glotouch_bt.perception.search.map import Exclusion, Mask, SearchMap
 from glotouch_bt.perception.search.policies.frontier import NearestFrontier
 from glotouch_bt.perception.search.policies.hidden import NearestHidden
 from glotouch_bt.perception.search.policies.policy import Stretch
-from glotouch_bt.perception.search.remaining import DiscPrior, Discs, discs
+from glotouch_bt.perception.search.remaining import CROWDED, DiscPrior, Discs, discs
 from glotouch_bt.perception.search.routes import Routes, segment_is_free
 from glotouch_bt.robot import Array
 
@@ -165,9 +165,10 @@ class ExpectedFind:
         tip = np.asarray(tip_K_m, dtype=np.float64)[:2]
         if belief.expected is None:
             return self._everywhere.next_stretch(belief, tip)
-        weight = belief.hidden.weight
-        if weight.sum() > self.params.left:
-            node = self._first_node(belief, tip, weight)
+        for left in (belief.hidden, belief.anywhere):
+            if left.weight.sum() <= self.params.left:
+                continue
+            node = self._first_node(belief, tip, left.weight, belief.prior if left is belief.hidden else CROWDED)
             if node is not None:
                 if segment_is_free(belief, tip, node):
                     return Stretch(node[None, :])
@@ -176,10 +177,10 @@ class ExpectedFind:
                     return Stretch(way)
         return self._rest.next_stretch(belief, tip)
 
-    def _first_node(self, belief: SearchMap, tip: Array, weight: Array) -> Array | None:
+    def _first_node(self, belief: SearchMap, tip: Array, weight: Array, prior: DiscPrior) -> Array | None:
         """Return the end of the best path's first leg, or None if no path finds anything."""
         p = self.params
-        lattice = _lattice(belief.half, belief.prior, p)
+        lattice = _lattice(belief.half, prior, p)
         free = _free_legs(lattice, belief.exclusions)
         lengths = Routes(belief, tip).lengths(lattice.nodes)
         straight = np.linalg.norm(lattice.nodes - tip, axis=1)
