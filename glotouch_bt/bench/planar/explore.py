@@ -123,7 +123,9 @@ def explore(
             )
             admitted = drive(plan, execute)[0]
             belief, candidates = admitted.belief, admitted.candidates
-            found |= {i: Traced(world.travel_m, candidates[i]) for i in admitted.changed}
+            for i in admitted.changed:
+                found[i] = Traced(world.travel_m, candidates[i])
+            found = {i: found[i] for i in range(len(candidates))}
     except _OutOfBudget:
         ended = "budget"
     return Explored(tuple(found[i] for i in sorted(found)), world.travel_m, ended, belief, tuple(maps))

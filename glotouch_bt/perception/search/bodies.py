@@ -16,6 +16,9 @@ from glotouch_bt.robot import Array
 SEPARATE_NATS = 12.0
 """Minimum gain of log evidence by which two bodies explain contacts better than one. Source: on 77 mixed and 408 pure
 contours of random layouts, 61 % and 6 % gain more."""
+WELL_NATS = 3.8
+"""Log evidence of a contact above which one outline explains the contacts well. Source: at most 3.5 on the 69 of these
+contours that two bodies explain better."""
 MIN_BODY_M = 0.015
 """Minimum width of a body. A narrower part is a limb. Source: objects are at least 15 mm wide."""
 MIN_PART = 2
@@ -23,6 +26,9 @@ MIN_PART = 2
 CERTAIN_NATS = 60.0
 """Minimum gain of log evidence above which two neighbouring candidates are two bodies beyond doubt. Source: the largest
 gain of a single body in 20 layouts was 65."""
+KNOWN_QUALITY = 0.3
+"""Minimum quality of a candidate beside another one that counts without doubt: the centre's standard deviation is below
+8 mm. Source: ours."""
 BESIDE_M = 0.020
 """Maximum distance between outlines that may be one body."""
 MAX_NATS = 7.0
@@ -72,24 +78,34 @@ def bodies(
     return tuple(sorted(parts, key=len, reverse=True))
 
 
-def doubtful(candidates: tuple[Candidate, ...], radius_m: float, path_K_m: Array) -> int:
-    """Return the number of candidates that may be a part of another one: candidates less certain bodies.
+def doubtful_pairs(
+    candidates: tuple[Candidate, ...], radius_m: float, path_K_m: Array
+) -> tuple[tuple[Candidate, Candidate], ...]:
+    """Return the pairs of neighbours that may be one body, or of which one is hardly known.
 
-    Two neighbours may be one body if one outline of a plausible size explains their contacts nearly as well as two.
+    Two neighbours may be one body if one outline of a plausible size explains their contacts nearly as well as two, or
+    if the centre of one lies inside the other.
     """
-    body = list(range(len(candidates)))
-    for i, a in enumerate(candidates):
-        for j, b in enumerate(candidates[:i]):
-            if body[i] != body[j] and _may_be_one(a, b, radius_m, path_K_m):
-                body = [body[j] if k == body[i] else k for k in body]
-    return len(body) - len(set(body))
+    pairs = ((a, b) for i, b in enumerate(candidates) for a in candidates[:i])
+    return tuple((a, b) for a, b in pairs if _may_be_one(a, b, radius_m, path_K_m))
+
+
+def count_doubtful(pairs: tuple[tuple[Candidate, Candidate], ...]) -> int:
+    """Return the number of candidates that may be a part of another one: candidates less certain bodies."""
+    body = {c.index: c.index for pair in pairs for c in pair}
+    for a, b in pairs:
+        old, new = body[b.index], body[a.index]
+        body = {k: new if v == old else v for k, v in body.items()}
+    return len(body) - len(set(body.values()))
 
 
 def _may_be_one(a: Candidate, b: Candidate, radius_m: float, path_K_m: Array) -> bool:
-    """Return True if two candidates may be one body."""
     if float(signed_distance(envelope(a), b.extent_K_m).min()) > BESIDE_M:
         return False
-    return gain_of_two(a, b, radius_m, path_K_m) < CERTAIN_NATS
+    if min(a.quality, b.quality) < KNOWN_QUALITY:
+        return True
+    over = (signed_distance(envelope(one), other.contour.centre_K_m[None])[0] for one, other in ((a, b), (b, a)))
+    return min(over) < 0.0 or gain_of_two(a, b, radius_m, path_K_m) < CERTAIN_NATS
 
 
 def gain_of_two(a: Candidate, b: Candidate, radius_m: float, path_K_m: Array) -> float:
@@ -111,6 +127,8 @@ def _near(path_K_m: Array, contacts: tuple[Contact, ...]) -> Array:
 def _divided(contacts: tuple[Contact, ...], radius_m: float, free: Array, gain: float) -> list[tuple[Contact, ...]]:
     """Divide contacts in two while that gains evidence."""
     limit = outline_of(contacts, radius_m, free).log_evidence + gain
+    if limit > WELL_NATS * len(contacts) + gain:
+        return [contacts]
     best: list[tuple[Contact, ...]] = []
     for part in _partitions(np.array([c.point_K_m for c in contacts])):
         sides = [tuple(c for c, mine in zip(contacts, part == side, strict=True) if mine) for side in (True, False)]

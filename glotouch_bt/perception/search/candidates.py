@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glotouch_bt.perception.search.bodies import bodies, doubtful, outline_of
+from glotouch_bt.perception.search.bodies import bodies, count_doubtful, doubtful_pairs, outline_of
 from glotouch_bt.perception.search.map import FACING, SearchMap
 from glotouch_bt.perception.search.tracing import OutlineTrace, TraceParams
 from glotouch_bt.perception.touch import (
@@ -58,12 +58,14 @@ class Admitted:
         candidates: All candidates.
         index: Index of the new or updated candidate; None if the trace gave none.
         changed: Indices of all new or updated candidates, `index` first: one contour may be several bodies.
+        doubtful: Pairs of neighbours that may be one body.
     """
 
     belief: SearchMap
     candidates: tuple[Candidate, ...]
     index: int | None
     changed: tuple[int, ...] = ()
+    doubtful: tuple[tuple[Candidate, Candidate], ...] = ()
 
 
 def admit(
@@ -114,15 +116,13 @@ def admit(
             every[index] = _with(every[index], body, outline)
         belief = belief.with_exclusion(envelope(every[index]), exclusion_m, new=bool(changed) or not counted)
         changed.append(index)
-    candidates = tuple(every[i] for i in sorted(every))
-    belief = belief.with_doubtful(doubtful(candidates, radius, belief.path_K_m))
-    return Admitted(belief, candidates, better.index, tuple(changed))
+    return _admitted(belief, every, radius, better.index, tuple(changed))
 
 
 def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclusion_m: float) -> Admitted:
     """Divide the contacts of two candidates anew after a further trace of the second one.
 
-    If one body explains all of them, the second candidate, which is the last one, is dropped.
+    If one body explains all of them, the second candidate is dropped, and the last one receives its index.
 
     Args:
         admitted: Map and candidates.
@@ -138,17 +138,30 @@ def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclu
     radius = more.outline.touches.radius_m
     parts = bodies((*one.contacts, *more.contacts), radius, belief.path_K_m)
     every = {c.index: c for c in admitted.candidates}
-    changed = admitted.changed
+    changed = tuple(dict.fromkeys((*admitted.changed, whole, part)))
     if len(parts) == 1:
         belief, changed = belief.with_one_less(), tuple(i for i in changed if i != part)
         del every[part]
         parts = (split_at_motion(parts[0], radius, likely=len(one.contacts))[1],)
-    for candidate, body in zip((one, other), parts, strict=False):
-        every[candidate.index] = _with(candidate, body, outline_of(body, radius))
-        belief = belief.with_exclusion(envelope(every[candidate.index]), exclusion_m, new=False)
+    mine = {id(c) for c in one.contacts}
+    parts = tuple(sorted(parts, key=lambda body: -sum(id(c) in mine for c in body)))
+    indices = (whole, part, *range(len(admitted.candidates), len(admitted.candidates) + len(parts)))
+    for index, body in zip(indices, parts, strict=False):
+        every[index] = _with(replace(every.get(index, other), index=index), body, outline_of(body, radius))
+        belief = belief.with_exclusion(envelope(every[index]), exclusion_m, new=index not in (whole, part))
+        changed = tuple(dict.fromkeys((*changed, index)))
+    if len(every) < len(admitted.candidates) and part != len(every):
+        every[part] = replace(every.pop(len(every)), index=part)
+        changed = (*(i for i in changed if i != len(every)), part)
+    return _admitted(belief, every, radius, whole, changed)
+
+
+def _admitted(
+    belief: SearchMap, every: dict[int, Candidate], radius_m: float, index: int, changed: tuple[int, ...]
+) -> Admitted:
     candidates = tuple(every[i] for i in sorted(every))
-    belief = belief.with_doubtful(doubtful(candidates, radius, belief.path_K_m))
-    return Admitted(belief, candidates, admitted.index, changed)
+    pairs = doubtful_pairs(candidates, radius_m, belief.path_K_m)
+    return Admitted(belief.with_doubtful(count_doubtful(pairs)), candidates, index, changed, pairs)
 
 
 def refined(before: Candidate, traced: OutlineTrace) -> Candidate | None:

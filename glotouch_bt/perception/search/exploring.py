@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 
-from glotouch_bt.perception.search.bodies import CERTAIN_NATS, gain_of_two
 from glotouch_bt.perception.search.candidates import Admitted, admit, joins, of_another, part_of, regroup
 from glotouch_bt.perception.search.map import SearchMap
 from glotouch_bt.perception.search.moves import SearchPlan
@@ -13,8 +11,8 @@ from glotouch_bt.perception.search.tracing import OutlineTrace, TraceParams, tra
 from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.robot import Array
 
-POOR_QUALITY = 0.5
-"""Quality below which a body that was separated from another one is traced further."""
+CHECKED_CONTACTS = 12
+"""Number of contacts from which on a doubtful candidate is not traced further. Source: ours."""
 
 
 def trace_bodies(
@@ -31,8 +29,8 @@ def trace_bodies(
 ) -> SearchPlan[tuple[Admitted, OutlineTrace]]:
     """Trace a touched object and add it to map and candidates.
 
-    A contour that two bodies explain better than one becomes two candidates. A body whose existence is in doubt, or
-    whose outline is poorly known, is traced further, and all contacts are divided anew.
+    A contour that two bodies explain better than one becomes two candidates. Doubtful candidates are traced further
+    before the search ends by count, and all their contacts are divided anew.
 
     Args:
         belief: Map before the trace.
@@ -55,21 +53,36 @@ def trace_bodies(
         joined=partial(joins, known, radius_m=radius) if old is None else None,
     )
     admitted = admit(belief, known, first, traced, height_m, exclusion_m, part_of=old)
-    for index in reversed(admitted.changed[1:]):
-        whole, part = (admitted.candidates[i] for i in (admitted.changed[0], index))
-        gain = gain_of_two(whole, part, radius, admitted.belief.path_K_m)
-        if gain > CERTAIN_NATS and part.quality > POOR_QUALITY:
-            continue
-        tip = traced.path_K_m[-1] if len(traced.path_K_m) else tip_K_m
+    checked: set[int] = set()
+    while (pair := _next_check(admitted, checked)) is not None:
+        whole, part = pair
+        checked |= {whole.index, part.index}
+        rest = tuple(c for c in admitted.candidates if c.index not in (whole.index, part.index))
         more = yield from trace_more(
             part.contacts,
-            tip,
+            tip_K_m,
             tip_radius_m,
             params,
             round_tip=round_tip,
             half_extent_m=belief.half_extent_m,
-            elsewhere=partial(of_another, belief, tuple(c for c in known if c.index != whole.index)),
+            elsewhere=partial(of_another, belief, rest),
         )
-        admitted = regroup(admitted, whole.index, index, more, exclusion_m)
-        traced = replace(traced, path_K_m=more.path_K_m if len(more.path_K_m) else traced.path_K_m)
+        admitted = regroup(admitted, whole.index, part.index, more, exclusion_m)
     return admitted, traced
+
+
+def _next_check(admitted: Admitted, checked: set[int]) -> tuple[Candidate, Candidate] | None:
+    """Return the next doubtful pair to check, the candidate to trace second; None: nothing needs a check now.
+
+    The parts of one contour are checked at once, all others before the search ends by count.
+    """
+    ends = admitted.belief.expected is not None and admitted.belief.found >= admitted.belief.expected
+    best: tuple[Candidate, Candidate] | None = None
+    for pair in admitted.doubtful:
+        indices = {c.index for c in pair}
+        if indices & checked or not (ends or indices <= set(admitted.changed)):
+            continue
+        whole, part = sorted(pair, key=lambda c: (-c.quality, c.index))
+        if len(part.contacts) < CHECKED_CONTACTS and (best is None or part.quality < best[1].quality):
+            best = whole, part
+    return best
